@@ -56,9 +56,7 @@ pub(super) fn face_page(
         if area >= 0.0 {
             continue;
         }
-        let [p, q, r] = triangle.uv.map(|uv| uv * size);
-        let texels = (q - p).perp_dot(r - p).abs();
-        texel_px = texel_px.max((area.abs() / texels).sqrt() / SAMPLES as f64);
+        texel_px = texel_px.max(triangle.texel_mm(size) * px_per_mm);
         let low = a.min(b).min(c).ceil().max(DVec2::ZERO);
         let high = a.max(b).max(c).floor() + 1.0;
         let end = |high: f64, size: usize| (high.max(0.0) as usize).min(size);
@@ -83,6 +81,6 @@ pub(super) fn face_page(
         let sum: u32 = rows.flat_map(|at| &shades[at..at + SAMPLES]).map(|&v| u32::from(v)).sum();
         (sum / (SAMPLES * SAMPLES) as u32) as u8
     });
-    let page = Page { width_mm, height_mm, px_per_mm, image, smear_px: 1.0 + texel_px };
+    let page = Page { width_mm, height_mm, px_per_mm, image, smear_px: 1.0 + texel_px, texel_px };
     (page, Placement { panel: panel.id, angle_rad: 0.0, origin_mm: DVec2::new(-left, -lower) })
 }

@@ -23,7 +23,7 @@ use deltille_core::lattice::Vertex;
 use deltille_core::raster::Gray;
 use deltille_core::targets::{Corner, Panel, TargetSpec};
 use deltille_core::words::counted;
-use deltille_files::export::mesh::{PLATE_TRIANGLES, UNTAGGED_CELLS};
+use deltille_files::export::mesh::{LEAST_TEXELS_PER_BIT, PLATE_TRIANGLES, UNTAGGED_CELLS};
 
 /// Largest deviation of a corner of a mesh, mm: a tenth of the error of a well glued panel.
 pub const MESH_TOLERANCE_MM: f64 = 0.05;
@@ -37,6 +37,9 @@ const LOCATED_PX: f64 = 0.04;
 
 /// And in pixels of the texture: between two of them it is interpolated, which moves edges along its rows or columns.
 const LOCATED_TEXELS: f64 = 0.15;
+
+/// Coarser textures than are made, of so many px of the picture, are allowed no more.
+const MOST_TEXEL_PX: f64 = CELL_PX / LEAST_TEXELS_PER_BIT;
 
 /// Edge of a tag's cell in the picture, px.
 const CELL_PX: f64 = 8.0;
@@ -309,7 +312,8 @@ fn check_print(
     let [a, b, c] = outline;
     let (low, high) = (a.min(b).min(c), a.max(b).max(c));
     let area_mm = [low.x, low.y, high.x, high.y];
-    let (page, placement) = face_page(model, panel, outline, area_mm, px_per_mm);
+    let (mut page, placement) = face_page(model, panel, outline, area_mm, px_per_mm);
+    page.texel_px = page.texel_px.min(MOST_TEXEL_PX);
     let found_from_stated = AffineMap::IDENTITY;
     let placed = PlacedPanel::new(&page, panel, &placement, found_from_stated);
     if let Some(finding) = wrong_tones(&placed) {
@@ -357,7 +361,8 @@ fn check_corners(
     verdict: &mut FaceVerdict,
 ) {
     let mut found = BTreeSet::new();
-    let located_mm = (LOCATED_PX / verdict.px_per_mm).max(LOCATED_TEXELS * texel_mm(model, panel));
+    let located_mm = LOCATED_PX.max(LOCATED_TEXELS * texel_px(model, panel, verdict.px_per_mm))
+        / verdict.px_per_mm;
     for grid in &detection.grids {
         let Some(seen) = verifier.target.panels.iter().find(|p| Some(p.id) == grid.panel) else {
             continue;
@@ -393,17 +398,14 @@ fn check_corners(
     verdict.findings.extend(missing.map(finding));
 }
 
-/// Side of the largest pixel of the texture on the front of a panel, mm.
-fn texel_mm(model: &Model, panel: &Panel) -> f64 {
+/// Side of the largest pixel of the texture on the front of a panel, px of a picture of it.
+fn texel_px(model: &Model, panel: &Panel, px_per_mm: f64) -> f64 {
     let size = DVec2::new(model.texture.width() as f64, model.texture.height() as f64);
     let sides = model.triangles.iter().filter_map(|triangle| {
         let is_front = |v: &DVec3| panel.pose.panel_from_target(*v).z.abs() <= MESH_TOLERANCE_MM;
-        let [a, b, c] = triangle.uv.map(|uv| uv * size);
-        let texels = (b - a).perp_dot(c - a).abs();
-        (triangle.vertices_mm.iter().all(is_front) && texels > 0.0)
-            .then(|| (triangle.winding().length() / texels).sqrt())
+        triangle.vertices_mm.iter().all(is_front).then(|| triangle.texel_mm(size))
     });
-    sides.fold(0.0, f64::max)
+    (sides.fold(0.0, f64::max) * px_per_mm).min(MOST_TEXEL_PX)
 }
 
 /// What is wrong with the surface where everything on it is right: its vertices, and that it is closed.

@@ -381,10 +381,8 @@ impl<'a> PlacedPanel<'a> {
         }
         if report.findings.is_empty() {
             let is_smeared = self.page.smear_px > 0.0;
-            let tolerance_px = match is_smeared {
-                true => SMEARED_MOVED_EDGE_PX.max(MOVED_EDGE_TEXELS * (self.page.smear_px - 1.0)),
-                false => MOVED_EDGE_PX,
-            };
+            let tolerance_px = if is_smeared { SMEARED_MOVED_EDGE_PX } else { MOVED_EDGE_PX };
+            let tolerance_px = tolerance_px.max(MOVED_EDGE_TEXELS * self.page.texel_px);
             let moved = self.moved_edges(&expected, tolerance_px);
             report.findings.extend(moved.into_iter().map(|moved| TileFinding::EdgeMoved {
                 row: moved.tile.anchor.row,

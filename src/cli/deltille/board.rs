@@ -7,7 +7,7 @@ use anyhow::{Context, bail};
 
 use super::delivery::Delivery;
 use super::files::{File, Formats, drawn, text_file};
-use super::meshes::{MESHES, Meshes, check_plate};
+use super::meshes::{MESHES, Meshes};
 use super::settings::{Plan, Settings};
 use crate::artwork;
 use crate::cli::output::{self, tell};
@@ -46,8 +46,7 @@ pub fn run(grid: GridKind, args: Args) -> anyhow::Result<ExitCode> {
     let mut plan = settings.plan(grid)?;
     // A mesh alone needs no paper.
     plan.pdf &= settings.prints() || !args.meshes.is_any();
-    args.meshes.check_use()?;
-    check_plate(args.plate, &args.meshes)?;
+    args.meshes.check_use(args.plate)?;
     let family = plan.spec.tags.as_ref().map(|tags| family::resolve(&tags.family)).transpose();
     let family = match (family, grid) {
         (Err(FamilyFileError::Name(FamilyError::Unknown { name })), GridKind::Checker) => bail!(
@@ -87,8 +86,7 @@ pub fn run(grid: GridKind, args: Args) -> anyhow::Result<ExitCode> {
     let mut files = files(&plan, &target, family.as_ref())?;
     let (meshes, texture) = args.meshes.files(&target, family.as_ref(), args.plate)?;
     files.extend(meshes);
-    let told = [Some(summary(&target)), texture].into_iter().flatten();
-    let told = told.collect::<Vec<_>>().join("\n");
+    let told = summary(&target) + &texture;
     let delivered = args.delivery.deliver(&target, family.as_ref(), &files, &told)?;
     if let Some((path, toml)) = template {
         output::write(path, toml.as_bytes(), overwrite).context("--save-template")?;

@@ -5,7 +5,7 @@
 use std::collections::BTreeMap;
 use std::ops::RangeInclusive;
 
-use anyhow::{anyhow, ensure};
+use anyhow::anyhow;
 
 use super::files::{File, bytes_file};
 use crate::cli::values::{number, whole};
@@ -69,25 +69,28 @@ impl Meshes {
         self.obj || self.sdf || self.urdf || self.mjcf
     }
 
-    /// Refuses options of a texture that is not made.
-    pub fn check_use(&self) -> anyhow::Result<()> {
-        let textures =
-            [("--texture", self.texture.is_some()), ("--texture-dpi", self.texture_dpi.is_some())];
-        let given = textures.into_iter().find(|(_, given)| *given && !self.is_any());
+    /// Refuses options of a mesh that is not made.
+    pub fn check_use(&self, plate_mm: Option<f64>) -> anyhow::Result<()> {
+        let options = [
+            ("--texture", self.texture.is_some()),
+            ("--texture-dpi", self.texture_dpi.is_some()),
+            ("--plate", plate_mm.is_some()),
+        ];
+        let given = options.into_iter().find(|(_, given)| *given && !self.is_any());
         given.map_or(Ok(()), |(option, _)| {
             Err(anyhow!("{option}: it says nothing without a mesh: add --gltf, or leave it out"))
         })
     }
 
-    /// The files that are asked for, and a line on their texture.
+    /// The files that are asked for, and a line on their texture to be told after others; empty where there is none.
     pub fn files(
         &self,
         target: &Target,
         family: Option<&Family>,
         plate_mm: Option<f64>,
-    ) -> anyhow::Result<(Vec<File>, Option<String>)> {
+    ) -> anyhow::Result<(Vec<File>, String)> {
         if !self.is_any() {
-            return Ok((Vec::new(), None));
+            return Ok((Vec::new(), String::new()));
         }
         let mut meshing = Meshing::default();
         meshing.plate_mm = plate_mm.unwrap_or(meshing.plate_mm);
@@ -126,15 +129,6 @@ impl Meshes {
         let [width, height] = mesh.texture_px;
         let texels = mesh.texels_per_bit;
         let texels = texels.map_or(String::new(), |px| format!(", {px:.1} px for a bit of a tag"));
-        Ok((files, Some(format!("texture: {width} × {height} px{texels}"))))
+        Ok((files, format!("\ntexture: {width} × {height} px{texels}")))
     }
-}
-
-/// Refuses a thickness of a plate that is not made.
-pub fn check_plate(plate_mm: Option<f64>, meshes: &Meshes) -> anyhow::Result<()> {
-    ensure!(
-        plate_mm.is_none() || meshes.is_any(),
-        "--plate: it says nothing without a mesh: add --gltf, or leave it out"
-    );
-    Ok(())
 }

@@ -118,14 +118,11 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
             family.name()
         );
     }
-    let tags = named.as_ref().map(|name| TagSpec {
-        family: name.clone(),
-        tags_in: TagsIn::Black,
-        ..match kind {
-            GridKind::Deltille => TagSpec::default(),
-            GridKind::Checker => TagSpec { spacing: 2, border_bits: 2.0, ..TagSpec::default() },
-        }
-    });
+    let usual = || match kind {
+        GridKind::Deltille => TagSpec::default(),
+        GridKind::Checker => TagSpec::for_squares(TagsIn::Black),
+    };
+    let tags = named.as_ref().map(|name| TagSpec { family: name.clone(), ..usual() });
     let paper = PaperSpec {
         size: args.paper.as_deref().map(str::parse).transpose().context("--paper")?,
         ..PaperSpec::default()

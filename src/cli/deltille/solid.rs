@@ -183,8 +183,7 @@ pub fn run(shape: SolidShape, args: Args) -> anyhow::Result<ExitCode> {
     let target = Target::build(&name, &solid, Some(&family), layout)?;
     args.delivery.check_beside(&target)?;
     let (files, texture) = args.files(&target, net, &spec, &family)?;
-    let told = [Some(summary(&target, &spec)?), texture].into_iter().flatten();
-    let told = told.collect::<Vec<_>>().join("\n");
+    let told = summary(&target, &spec)? + &texture;
     args.delivery.deliver(&target, Some(&family), &files, &told)
 }
 
@@ -205,7 +204,7 @@ impl Args {
         let unused = |option: &str, needed: &str| {
             Err(anyhow!("{option}: it says nothing without {needed}: add one, or leave it out"))
         };
-        self.meshes().check_use()?;
+        self.meshes().check_use(None)?;
         if self.dpi.is_some() && !self.png {
             return unused("--dpi", "--png");
         }
@@ -286,7 +285,7 @@ impl Args {
         net: bool,
         spec: &SolidSpec,
         family: &Family,
-    ) -> anyhow::Result<(Vec<File>, Option<String>)> {
+    ) -> anyhow::Result<(Vec<File>, String)> {
         let name = &target.name;
         let mut files = vec![text_file(format!("{name}.json"), target.to_json())];
         if self.dsc || self.dsc_dialect.is_some() {

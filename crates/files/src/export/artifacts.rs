@@ -186,10 +186,8 @@ pub fn make(
     })
 }
 
-/// The files of a mesh in one format: [`What::Gltf`], [`What::Obj`], or a scene.
-///
-/// # Panics
-/// For what is not made of a mesh.
+/// The files of a mesh in one format: [`What::Gltf`], [`What::Obj`], or a model for a simulator; none of what is not made of a
+/// mesh.
 pub fn of_mesh(mesh: &TexturedMesh, what: What) -> Files {
     let name = &mesh.name;
     let named = |end: &str, text: String| (format!("{name}{end}"), text.into_bytes());
@@ -201,7 +199,7 @@ pub fn of_mesh(mesh: &TexturedMesh, what: What) -> Files {
         What::Sdf => Some(named(".sdf", scene::sdf(name))),
         What::Urdf => Some(named(".urdf", scene::urdf(name))),
         What::Mjcf => Some(named(".xml", scene::mjcf(name))),
-        _ => panic!("{what:?} is not made of a mesh"),
+        _ => return Files::new(),
     };
     let parts = [named(".obj", obj::text(mesh)), named(".mtl", obj::material(mesh)), texture()];
     scene.into_iter().chain(parts).collect()

@@ -8,7 +8,7 @@ use super::{GENERATOR, png};
 use deltille_core::artwork::{ArtworkError, Atlas};
 use deltille_core::family::Family;
 use deltille_core::lattice::GridKind;
-use deltille_core::targets::{Panel, Target, TargetError, TargetSpec};
+use deltille_core::targets::{Panel, SolidSpec, Target, TargetError, TargetSpec};
 
 /// Texels along the edge of a cell of a tag, unless another resolution is asked for, so that a viewer sees it sharp at
 /// close range.
@@ -155,6 +155,14 @@ impl MeshFace {
     }
 }
 
+/// What has the shape of a mesh.
+#[derive(Clone, Copy)]
+enum Shape<'a> {
+    Solid(&'a SolidSpec),
+    /// A plate for a board.
+    Plate(&'a Panel),
+}
+
 impl TexturedMesh {
     /// Makes the mesh of a solid, or of a plate with a board, its quiet zone around it, whose front is the board's plane.
     ///
@@ -167,9 +175,9 @@ impl TexturedMesh {
         meshing: Meshing,
     ) -> Result<Self, MeshError> {
         let name = || target.name.to_string();
-        let plate = match (&target.spec, target.panels.as_slice()) {
-            (TargetSpec::Solid(_), _) => None,
-            (TargetSpec::Board(_), [panel]) => Some(panel),
+        let shape = match (&target.spec, target.panels.as_slice()) {
+            (TargetSpec::Solid(spec), _) => Shape::Solid(spec),
+            (TargetSpec::Board(_), [panel]) => Shape::Plate(panel),
             (TargetSpec::Board(_), panels) => {
                 return Err(MeshError::SeveralBoards(name(), panels.len()));
             }
@@ -178,12 +186,9 @@ impl TexturedMesh {
         if !(0.1..=1000.0).contains(&meshing.plate_mm) {
             return Err(MeshError::Thickness(meshing.plate_mm));
         }
-        let atlas = |px_per_m: u32| match (&target.spec, plate) {
-            (_, Some(panel)) => Ok(Atlas::of_plate(target, panel, family, px_per_m)?),
-            (TargetSpec::Solid(spec), None) => {
-                Ok(Atlas::new(target, &spec.faces()?, family, px_per_m)?)
-            }
-            _ => Err(MeshError::NoShape(name())),
+        let atlas = |px_per_m: u32| match shape {
+            Shape::Plate(panel) => Ok(Atlas::of_plate(target, panel, family, px_per_m)?),
+            Shape::Solid(spec) => Ok(Atlas::new(target, &spec.faces()?, family, px_per_m)?),
         };
         let cell_mm = smallest_cell_mm(target, family);
         let is_square = target.panels.iter().any(|panel| panel.kind == GridKind::Checker);
@@ -196,13 +201,12 @@ impl TexturedMesh {
                 DVec2::new(part.x, 1.0 - part.y)
             })
         });
-        let faces = match (&target.spec, plate) {
-            (TargetSpec::Solid(spec), _) => {
+        let faces = match shape {
+            Shape::Solid(spec) => {
                 let solid = spec.polyhedron();
                 front.enumerate().map(|(i, uv)| MeshFace::new(solid.triangle_mm(i), uv)).collect()
             }
-            (_, Some(panel)) => plate_faces(panel, meshing.plate_mm, front.collect(), &atlas),
-            _ => Vec::new(),
+            Shape::Plate(panel) => plate_faces(panel, meshing.plate_mm, front.collect(), &atlas),
         };
         let px_per_m = f64::from(atlas.px_per_m);
         Ok(Self {

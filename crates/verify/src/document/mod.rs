@@ -145,6 +145,8 @@ pub struct Page {
     /// Extra width of edges beyond the pixel that they cross, px, on a page that is resampled from
     /// others.
     pub smear_px: f64,
+    /// Side of a pixel of the texture that it shows, px; 0 where it shows none.
+    pub texel_px: f64,
 }
 
 impl Page {
@@ -253,7 +255,7 @@ impl Document {
                 })?
             }
         };
-        Ok(Page { width_mm, height_mm, px_per_mm, image, smear_px: 0.0 })
+        Ok(Page { width_mm, height_mm, px_per_mm, image, smear_px: 0.0, texel_px: 0.0 })
     }
 }
 

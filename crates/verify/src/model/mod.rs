@@ -38,4 +38,10 @@ impl Triangle {
         let [a, b, c] = self.vertices_mm;
         (b - a).cross(c - a)
     }
+
+    /// Side of a pixel of the texture of this size, px, on the triangle, mm.
+    pub fn texel_mm(&self, texture_px: DVec2) -> f64 {
+        let [a, b, c] = self.uv.map(|uv| uv * texture_px);
+        (self.winding().length() / (b - a).perp_dot(c - a).abs()).sqrt()
+    }
 }
