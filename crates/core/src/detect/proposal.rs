@@ -1,6 +1,6 @@
 //! Which board suits a camera, and the distances from which it is to be seen.
 
-use super::reach::{COMFORTABLE_BIT_PX, COMFORTABLE_EDGE_PX, Reach};
+use super::reach::{COMFORTABLE_BIT_PX, COMFORTABLE_EDGE_PX, Reach, shortening};
 use crate::family::Family;
 use crate::lattice::{GridKind, ROW_HEIGHT};
 use crate::targets::{
@@ -111,9 +111,7 @@ impl Situation {
         let unit = Target::build("plan", &TargetSpec::Board(spec.clone()), family, None)?;
         let unit = Reach::of(&unit, family);
         let comfortable = if family.is_some() { COMFORTABLE_BIT_PX } else { COMFORTABLE_EDGE_PX };
-        let shortened = self.tilt_rad.cos();
-        let shortened = if family.is_some() { shortened.sqrt() } else { shortened };
-        let px_at_far = self.focal_px / far_mm * shortened;
+        let px_at_far = self.focal_px / far_mm * shortening(family.is_some(), self.tilt_rad);
         spec.edge_mm = (comfortable / (unit.detail_mm * px_at_far)).ceil();
         let edge_mm = spec.edge_mm;
         let sides = |distance: f64| {

@@ -96,15 +96,18 @@ impl Reach {
     /// The distance up to which boards are labelled in sharp pictures of a camera of a focal length in px, tilted by an
     /// angle, mm. Tagged boards are hardly labelled a tenth farther away; those without tags often are.
     pub fn labelled_to_mm(&self, focal_px: f64, tilt_rad: f64) -> f64 {
-        let (needed_px, shortened) = match self.bits {
-            0 => (COMFORTABLE_EDGE_PX, tilt_rad.cos()),
+        let needed_px = match self.bits {
+            0 => COMFORTABLE_EDGE_PX,
             // Few bits must be the surer.
-            bits => {
-                (LEAST_BIT_PX * (1.0 + (FEW_BITS / f64::from(bits)).powi(3)), tilt_rad.cos().sqrt())
-            }
+            bits => LEAST_BIT_PX * (1.0 + (FEW_BITS / f64::from(bits)).powi(3)),
         };
-        focal_px * self.detail_mm * shortened / needed_px
+        focal_px * self.detail_mm * shortening(self.tags > 0, tilt_rad) / needed_px
     }
+}
+
+/// What is left, at a tilt, of how far a board is labelled: cells of tags must keep their area, tiles without their height.
+pub(super) fn shortening(has_tags: bool, tilt_rad: f64) -> f64 {
+    if has_tags { tilt_rad.cos().sqrt() } else { tilt_rad.cos() }
 }
 
 #[cfg(test)]

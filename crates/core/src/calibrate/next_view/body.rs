@@ -15,7 +15,10 @@ const SAMPLED: [usize; 2] = [40, 14];
 const UPWARDS: f64 = 0.4;
 
 /// Steps along a side of an outline, so that it bends with the lens.
-const STEPS: usize = 16;
+const STEPS: usize = 18;
+
+/// Of these, every so many are enough to tell how large it is.
+pub(super) const COARSE: usize = 3;
 
 /// What the detector needs of an edge in its most foreshortened direction, px: tags are read from 12 px on,
 /// untagged grids found from 7 px on (`docs/choosing.md`), and a hand is a quarter farther away than it should be.
@@ -109,11 +112,12 @@ impl Body {
         (!seen.is_empty()).then_some(seen)
     }
 
-    /// Outlines of the panels that are seen from the front, px, as far as the lens shows them.
-    pub(super) fn outlines(&self, camera: &Camera, pose: &Pose) -> Vec<Vec<DVec2>> {
+    /// Outlines of the panels that are seen from the front, by every so many of their points, px, as far as the lens shows
+    /// them.
+    pub(super) fn outlines(&self, camera: &Camera, pose: &Pose, every: usize) -> Vec<Vec<DVec2>> {
         let panels = self.panels.iter().filter(|panel| panel.is_towards(pose));
         let outlines = panels.map(|panel| {
-            let points = panel.outline.iter().map(|&point| pose.apply(point));
+            let points = panel.outline.iter().step_by(every).map(|&point| pose.apply(point));
             points.filter_map(|point| camera.project(point)).collect::<Vec<DVec2>>()
         });
         outlines.filter(|outline| outline.len() > 2).collect()

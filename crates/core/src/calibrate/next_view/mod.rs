@@ -381,7 +381,7 @@ impl Guide {
         let turned = |angle: f64| (angle + PI).rem_euclid(TAU) - PI;
         NextView {
             camera_from_target: pose,
-            outlines: self.body.outlines(camera, &pose),
+            outlines: self.body.outlines(camera, &pose, 1),
             upwards: self.body.upwards(camera, &pose),
             corners: corners.collect(),
             camera: camera.clone(),

@@ -4,7 +4,7 @@ use std::f64::consts::{PI, TAU};
 
 use glam::{DMat3, DQuat, DVec2};
 
-use super::body::Body;
+use super::body::{Body, COARSE};
 use crate::camera::{Camera, Pose};
 
 /// Poses are alike within this part of the image, so many rad (20°), and this part of the distance: twice of what a hand
@@ -70,7 +70,7 @@ impl Placing {
         // Seen in the middle of an image of a usual angle, then nearer or farther by how much it is off.
         let mut placing = Self { distance_mm: 2.0 * reach / part, ..self };
         for _ in 0..ROUNDS {
-            let outlines = body.outlines(camera, &placing.pose(camera, body)?);
+            let outlines = body.outlines(camera, &placing.pose(camera, body)?, COARSE);
             let points = || outlines.iter().flatten();
             let least = points().copied().reduce(DVec2::min)?;
             let most = points().copied().reduce(DVec2::max)?;

@@ -181,7 +181,7 @@ fn distances_are_kept() {
 fn it_ends_when_a_view_is_hardly_worth_the_trouble_or_what_was_asked_for_is_reached() {
     let (_, _, few) = guided(5, |guide| guide);
     assert!(!few.next.is_enough(None), "{:?}", few.next.gain());
-    let (_, _, many) = guided(25, |guide| guide);
+    let (_, _, many) = guided(22, |guide| guide);
     assert!(many.next.is_enough(None), "{:?}", many.next.gain());
     let now = many.next.now_px.unwrap();
     assert!(many.next.is_enough(Some(1.01 * now)) && !many.next.is_enough(Some(0.99 * now)));
