@@ -37,11 +37,11 @@ test("a webcam is watched, pictures are taken by themselves, and memory stays as
   const frames = async () => Number(await canvas.getAttribute("data-frames"));
   await expect.poll(frames, { timeout: 120_000 }).toBeGreaterThan(100);
   const [before, begin, first] = [await memory(page), Date.now(), await frames()];
-  await expect.poll(frames, { timeout: 120_000 }).toBeGreaterThan(first + 300);
+  await expect.poll(frames, { timeout: 120_000 }).toBeGreaterThan(first + 980);
   const [end, last, after] = [Date.now(), await frames(), await memory(page)];
   console.log(`webcam of 640 × 480: ${((1000 * (last - first)) / (end - begin)).toFixed(1)} frames a second; memory of the browser ${before.toFixed(0)} MB, ${last - first} frames later ${after.toFixed(0)} MB`);
   // A frame has 1.2 MB of pixels, and 0.03 MB of what is found.
-  expect(after - before).toBeLessThan(12);
+  expect(after - before).toBeLessThan(20);
   expect((1000 * (last - first)) / (end - begin)).toBeGreaterThan(10);
   await page.getByRole("button", { name: "Stop the webcam" }).click();
   // The photograph counts again where the webcam's pictures are forgotten.
