@@ -241,8 +241,8 @@ export function calibrate(): HTMLElement {
     if (stream) stop();
   }
 
-  /** The outline in which the board is to be held; it fills while the board is held there. */
-  function outline(context: CanvasRenderingContext2D, { outlines_px }: Next, held: Holding | null): void {
+  /** The outline in which the board is to be held, with an arrow to its upper side; it fills while the board is held there. */
+  function outline(context: CanvasRenderingContext2D, { outlines_px, upwards_px }: Next, held: Holding | null): void {
     const there = held?.held === "steady" || held?.held === "taken";
     context.save();
     context.strokeStyle = there ? "#30d158" : "#ff9600";
@@ -253,6 +253,19 @@ export function calibrate(): HTMLElement {
       for (const [x, y] of polygon) context.lineTo(x + 0.5, y + 0.5);
       context.closePath();
       context.fill();
+      context.stroke();
+    }
+    if (upwards_px) {
+      const [[x, y], [tipX, tipY]] = upwards_px;
+      const [backX, backY] = [(x - tipX) / 4, (y - tipY) / 4];
+      context.lineWidth *= 2;
+      context.beginPath();
+      context.moveTo(x + 0.5, y + 0.5);
+      context.lineTo(tipX + 0.5, tipY + 0.5);
+      for (const side of [0.6, -0.6]) {
+        context.moveTo(tipX + backX - side * backY + 0.5, tipY + backY + side * backX + 0.5);
+        context.lineTo(tipX + 0.5, tipY + 0.5);
+      }
       context.stroke();
     }
     context.restore();

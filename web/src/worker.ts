@@ -46,7 +46,7 @@ export type Shown = Seen & { width: number; height: number; grey: Uint8Array };
 /** How the board is held against what is proposed. */
 export type Holding = { held: "unseen" | "elsewhere" | "turned" | "moving" | "blurred" | "steady" | "taken"; part: number };
 /** The next picture, and how sure the camera is. */
-export type Next = { words: string; enough: boolean; uncertainty_px: number | null; expected_px: number | null; outlines_px: [number, number][][] };
+export type Next = { words: string; enough: boolean; uncertainty_px: number | null; expected_px: number | null; outlines_px: [number, number][][]; upwards_px: [[number, number], [number, number]] | null };
 /** What pictures show of the camera's: corners in cells of it, and of each the tilt of the board and where to, rad. */
 export type Survey = { size_px: [number, number]; cells: [number, number]; counts: number[]; covered: number; tilts: ([number, number] | null)[] };
 export type Watched = Seen & { keep: boolean; held: Holding | null; pixels: Uint8ClampedArray };
