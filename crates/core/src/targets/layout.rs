@@ -510,7 +510,7 @@ mod tests {
                 prop_assert!(bar.length_mm() % BAR_STEP_MM < 1e-9 || bar.length_mm() % BAR_STEP_MM > BAR_STEP_MM - 1e-9);
             }
             for text in &sheet.texts {
-                prop_assert!(text.at_mm.min_element() >= margin);
+                prop_assert!(text.at_mm.min_element() >= margin - slack, "{text:?} in a margin of {margin}");
             }
         }
     }
