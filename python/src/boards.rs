@@ -56,15 +56,17 @@ pub struct Tags {
 
 impl Tags {
     /// What a specification says, and the family.
-    pub fn spec(self, usual: TagSpec) -> PyResult<(TagSpec, Arc<family::Family>)> {
-        let usual_family = FamilyChoice::Name(PathBuf::from(&usual.family));
+    pub fn spec(self, grid: GridKind) -> PyResult<(TagSpec, Arc<family::Family>)> {
+        let default = TagSpec::usual(grid, None, self.tags_in);
+        let usual_family = FamilyChoice::Name(PathBuf::from(default.family));
         let (name, family) = self.family.unwrap_or(usual_family).resolve()?;
+        let usual = TagSpec::usual(grid, Some(&name), self.tags_in);
         let spec = TagSpec {
-            family: name,
             first_id: self.first_id,
             spacing: self.spacing.unwrap_or(usual.spacing),
             border_bits: self.border_bits.unwrap_or(usual.border_bits),
             tags_in: self.tags_in,
+            ..usual
         };
         Ok((spec, family))
     }
@@ -72,14 +74,7 @@ impl Tags {
 
 impl Wanted {
     fn make(self) -> PyResult<Target> {
-        let usual = |tags: &Tags| match self.grid {
-            GridKind::Deltille => TagSpec::default(),
-            GridKind::Checker => TagSpec::for_squares(tags.tags_in),
-        };
-        let tags = self.tags.map(|tags| {
-            let usual = usual(&tags);
-            tags.spec(usual)
-        });
+        let tags = self.tags.map(|tags| tags.spec(self.grid));
         let (tags, family) = tags.transpose()?.unzip();
         let [rows, cols] = self.size;
         let mut spec = BoardSpec {

@@ -33,7 +33,7 @@ struct Solids {
 impl Solids {
     fn make(self) -> PyResult<Target> {
         let usual = SolidSpec::new(self.shape.clone());
-        let (tags, family) = self.tags.spec(TagSpec::default())?;
+        let (tags, family) = self.tags.spec(GridKind::Deltille)?;
         let mut spec = SolidSpec {
             edge_mm: self.edge_mm.unwrap_or(usual.edge_mm),
             tiles: self.tiles.unwrap_or(usual.tiles),

@@ -1,7 +1,8 @@
 use std::process::ExitCode;
 
+use super::place_codes;
 use crate::cli::output::say;
-use crate::family::{Family, TagWords, bounds::bounds};
+use crate::family::{Family, TagWords, bounds::bounds, places};
 use crate::lattice::GridKind;
 use crate::targets::{BoardSpec, SolidShape, SolidSpec, TagSpec, Target, TargetSpec};
 use crate::words::counted;
@@ -23,6 +24,10 @@ fn tags_of(spec: &TargetSpec) -> anyhow::Result<usize> {
 }
 
 pub(super) fn run(args: Args) -> anyhow::Result<ExitCode> {
+    if args.family == places::NAME {
+        place_codes::about(&Family::shipped(places::NAME)?)?;
+        return Ok(ExitCode::SUCCESS);
+    }
     let family = super::resolve(&args.family)?;
     let (bits, rules) = (family.dimension().bits(), family.rules());
     let pairs = TagWords::new(family.dimension()).pairs();

@@ -1,7 +1,7 @@
 use std::process::ExitCode;
 
 use crate::cli::output::say;
-use crate::family::{self, shipped_names};
+use crate::family::{self, places, shipped_names};
 
 #[derive(clap::Args)]
 pub(super) struct Args {}
@@ -19,5 +19,11 @@ pub(super) fn run(_: Args) -> anyhow::Result<ExitCode> {
             family.fingerprint()
         );
     }
+    say!(
+        "{:<12} {:>4}   place codes of {} boards: `deltag info {0}`",
+        places::NAME,
+        9,
+        places::BOARDS
+    );
     Ok(ExitCode::SUCCESS)
 }

@@ -8,6 +8,7 @@ mod gen_family;
 mod info;
 mod list;
 mod parameters;
+mod place_codes;
 mod plan;
 mod rules;
 mod sheet;
@@ -89,6 +90,10 @@ fn deltags(family: Family) -> anyhow::Result<Family> {
             "{name}: its tags are square, deltag is about triangular ones; squares carry them: \
              `deltille checkerboard --tags {name}`"
         );
+    }
+    if family.is_of_places() {
+        let name = family.name();
+        bail!("{name}: its tags tell a place together only, on boards: `deltille board --dense`");
     }
     Ok(family)
 }

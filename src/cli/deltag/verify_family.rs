@@ -1,5 +1,6 @@
 use std::process::ExitCode;
 
+use super::place_codes;
 use crate::cli::output::say;
 use crate::cli::run::{BAD_INPUT, FAILED, report};
 use crate::family::{self, Certificate, FamilyFileError, certify};
@@ -35,6 +36,10 @@ pub(super) fn run(args: Args) -> anyhow::Result<ExitCode> {
                 continue;
             }
         };
+        if family.is_of_places() {
+            all_hold &= place_codes::verify(&family)?;
+            continue;
+        }
         let certificate = certify(&family);
         if certificate.holds() {
             let how = proof_of(&certificate, family.distance());

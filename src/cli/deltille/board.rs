@@ -15,7 +15,7 @@ use crate::export::dsc;
 use crate::export::kind::Kind;
 use crate::family::{self, Family, FamilyError, FamilyFileError, square_names};
 use crate::lattice::GridKind;
-use crate::targets::{Target, TargetSpec, id_range, parse_length_mm};
+use crate::targets::{Target, TargetSpec, parse_length_mm, tag_range};
 
 /// Arguments of both.
 #[derive(clap::Args)]
@@ -120,7 +120,7 @@ fn summary(target: &Target) -> String {
     let mut ids = panels.iter().flat_map(|panel| &panel.tags).map(|tag| tag.id);
     if let (Some(family), Some(first)) = (&target.family, ids.next()) {
         let last = ids.next_back().unwrap_or(first);
-        text += &format!(", {} {}", family.name, id_range(first, last));
+        text += &format!(", {}", tag_range(&family.name, first, last));
     }
     let Some(sheet) = target.sheets.first() else { return text };
     let page = sheet.pages.first().map_or(sheet, |page| &page.marks);

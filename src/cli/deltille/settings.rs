@@ -12,6 +12,7 @@ use serde::{Deserialize, Serialize};
 use crate::cli::values::{number, whole};
 use crate::export::GENERATOR;
 use crate::export::dsc::Dialect;
+use crate::family::places;
 use crate::lattice::GridKind;
 use crate::limits;
 use crate::reading::in_words;
@@ -61,6 +62,11 @@ pub struct Settings {
     /// [default: black]
     #[arg(long, help_heading = TAGS, value_name = "COLOUR", value_parser = colour)]
     tags_in: Option<TagsIn>,
+    /// A small place code in every upright tile: any few tiles beside each other tell where they are on a deltille board,
+    /// and on which of 255
+    #[arg(long, help_heading = TAGS, conflicts_with_all = ["family", "tag_spacing", "first_id", "untagged"])]
+    #[serde(skip_serializing_if = "is_false")]
+    dense: bool,
     /// No tags
     #[arg(long, help_heading = TAGS, conflicts_with_all = ["family", "tags_in", "tag_spacing", "tag_border", "first_id"])]
     #[serde(skip_serializing_if = "is_false")]
@@ -193,6 +199,7 @@ impl Settings {
     /// These settings, and those of a template where these say nothing.
     pub fn or(self, template: Self) -> Self {
         let tagged = self.family.is_some()
+            || self.dense
             || self.tags_in.is_some()
             || self.tag_spacing.is_some()
             || self.tag_border.is_some()
@@ -205,12 +212,14 @@ impl Settings {
             rows: self.rows.or(template.rows),
             cols: self.cols.or(template.cols),
             edge: self.edge.or(template.edge),
-            family: self.family.or(template.family),
+            // Which tags there are, is said as a whole.
+            dense: self.dense || (template.dense && self.family.is_none() && !self.untagged),
+            family: self.family.or(template.family.filter(|_| !self.dense)),
             tags_in: self.tags_in.or(template.tags_in),
             untagged: self.untagged || (template.untagged && !tagged),
-            tag_spacing: self.tag_spacing.or(template.tag_spacing),
+            tag_spacing: self.tag_spacing.or(template.tag_spacing.filter(|_| !self.dense)),
             tag_border: self.tag_border.or(template.tag_border),
-            first_id: self.first_id.or(template.first_id),
+            first_id: self.first_id.or(template.first_id.filter(|_| !self.dense)),
             board_id: self.board_id.or(template.board_id),
             boards: self.boards.or(template.boards),
             invert: self.invert || template.invert,
@@ -256,10 +265,11 @@ impl Settings {
         if grid == GridKind::Deltille && self.tags_in.is_some() {
             bail!("--tags-in: the tags of a deltille board are in its black tiles: leave it out");
         }
-        let default = match grid {
-            GridKind::Deltille => TagSpec::default(),
-            GridKind::Checker => TagSpec::for_squares(self.tags_in.unwrap_or_default()),
-        };
+        if grid == GridKind::Checker && self.dense {
+            bail!("--dense: place codes are for triangles: take `deltille board`");
+        }
+        let family = if self.dense { Some(places::NAME) } else { self.family.as_deref() };
+        let usual = TagSpec::usual(grid, family, self.tags_in.unwrap_or_default());
         let tagged = !self.untagged && (grid == GridKind::Deltille || self.family.is_some());
         let of_tags = [
             ("--tags-in", self.tags_in.is_some()),
@@ -274,11 +284,10 @@ impl Settings {
             bail!("{option}: there are no tags: name their family with --tags");
         }
         let tags = tagged.then(|| TagSpec {
-            family: self.family.clone().unwrap_or(default.family),
-            first_id: self.first_id.unwrap_or(default.first_id),
-            spacing: self.tag_spacing.unwrap_or(default.spacing),
-            border_bits: self.tag_border.unwrap_or(default.border_bits),
-            tags_in: self.tags_in.unwrap_or(default.tags_in),
+            first_id: self.first_id.unwrap_or(usual.first_id),
+            spacing: self.tag_spacing.unwrap_or(usual.spacing),
+            border_bits: self.tag_border.unwrap_or(usual.border_bits),
+            ..usual
         });
         let mut spec = BoardSpec {
             grid,

@@ -15,12 +15,13 @@ use crate::cli::values::{number, whole};
 use crate::export::artifacts::{self, Making, What};
 use crate::export::dsc::{self, Dialect};
 use crate::export::obj;
-use crate::family::{self, Family};
+use crate::family::{self, Family, places};
+use crate::lattice::GridKind;
 use crate::quantity::unit_mm;
 use crate::targets::{
     BORDER_BITS, ClosedMesh, DEFAULT_MARGIN_MM, FACE_TILES, MOST_ROWS, NEAR_EQUILATERAL, PaperSpec,
     Skeleton, SkeletonSpec, SolidShape, SolidSheets, SolidSpec, TagSpec, TagsIn, Target,
-    TargetSpec, parse_length_mm,
+    TargetSpec, parse_length_mm, tag_range,
 };
 
 /// Heading of the help.
@@ -43,6 +44,9 @@ pub struct Args {
     /// Tag family: a name from `deltag list`, or a family file [default: delTag25h7]
     #[arg(long, help_heading = TAGS)]
     family: Option<String>,
+    /// A small place code in every upright tile: any few tiles beside each other tell where they are
+    #[arg(long, help_heading = TAGS, conflicts_with_all = ["family", "tag_spacing", "first_id"])]
+    dense: bool,
     /// A tag in every n-th row and column of a face [default: 3]
     #[arg(long, help_heading = TAGS, value_name = "N", allow_negative_numbers = true, value_parser = whole(1..=MOST_ROWS))]
     tag_spacing: Option<u32>,
@@ -225,18 +229,18 @@ impl Args {
 
     fn spec(&self, shape: SolidShape) -> anyhow::Result<SolidSpec> {
         let default = SolidSpec::new(shape);
-        let tags = TagSpec::default();
+        let family = if self.dense { Some(places::NAME) } else { self.family.as_deref() };
+        let tags = TagSpec::usual(GridKind::Deltille, family, TagsIn::Black);
         let mut spec = SolidSpec {
             edge_mm: length("--edge", &self.edge)?.unwrap_or(default.edge_mm),
             tiles: self.tiles.unwrap_or(default.tiles),
             margin_mm: default.margin_mm,
             board_id: self.board_id.unwrap_or(default.board_id),
             tags: TagSpec {
-                tags_in: TagsIn::Black,
-                family: self.family.clone().unwrap_or(tags.family),
                 first_id: self.first_id.unwrap_or(tags.first_id),
                 spacing: self.tag_spacing.unwrap_or(tags.spacing),
                 border_bits: self.tag_border.unwrap_or(tags.border_bits),
+                ..tags
             },
             skeleton: self.skeleton()?,
             shape: default.shape,
@@ -326,16 +330,16 @@ fn length(option: &str, text: &Option<String>) -> anyhow::Result<Option<f64>> {
 fn summary(target: &Target, spec: &SolidSpec) -> anyhow::Result<String> {
     let corners: usize = target.panels.iter().map(|panel| panel.corners.len()).sum();
     let tags: usize = target.panels.iter().map(|panel| panel.tags.len()).sum();
-    let last = spec.tags.first_id as usize + tags - 1;
+    let family = target.family.as_ref().map_or("", |family| &family.name);
+    let last = spec.tags.first_id + tags as u32 - 1;
     let mut text = format!(
-        "{}: {} of {} mm edges, {} faces, {corners} corners, tiles of {} mm, {} ids {}–{last}",
+        "{}: {} of {} mm edges, {} faces, {corners} corners, tiles of {} mm, {}",
         target.name,
         spec.shape.name(),
         (spec.edge_mm * 1e3).round() / 1e3,
         target.panels.len(),
         range(target.panels.iter().map(|panel| panel.edge_mm), 3),
-        target.family.as_ref().map_or("", |family| &family.name),
-        spec.tags.first_id,
+        tag_range(family, spec.tags.first_id, last),
     );
     if let Some(skeleton) = &spec.skeleton {
         let solid = spec.polyhedron();

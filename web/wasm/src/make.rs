@@ -101,13 +101,14 @@ impl Wanted {
         })
     }
 
-    fn tags(&self, usual: TagSpec) -> TagSpec {
+    fn tags(&self, grid: GridKind) -> TagSpec {
+        let usual = TagSpec::usual(grid, self.family.as_deref(), self.tags_in);
         TagSpec {
-            family: self.family.clone().unwrap_or(usual.family),
             first_id: self.first_id,
             spacing: self.tag_spacing.unwrap_or(usual.spacing),
             border_bits: self.tag_border.unwrap_or(usual.border_bits),
             tags_in: self.tags_in,
+            ..usual
         }
     }
 
@@ -116,10 +117,7 @@ impl Wanted {
             (Some(family), _) => !family.is_empty(),
             (None, grid) => grid == GridKind::Deltille,
         };
-        let tags = has_tags.then(|| match grid {
-            GridKind::Deltille => self.tags(TagSpec::default()),
-            GridKind::Checker => self.tags(TagSpec::for_squares(self.tags_in)),
-        });
+        let tags = has_tags.then(|| self.tags(grid));
         let mut spec = BoardSpec {
             boards: self.boards,
             board_id: self.board_id,
@@ -149,7 +147,7 @@ impl Wanted {
             edge_mm: self.edge_mm.unwrap_or(usual.edge_mm),
             tiles: self.tiles.unwrap_or(usual.tiles),
             board_id: self.board_id,
-            tags: self.tags(TagSpec::default()),
+            tags: self.tags(GridKind::Deltille),
             skeleton: self.skeleton.then(SkeletonSpec::default),
             ..usual
         };

@@ -149,8 +149,8 @@ pub struct TagLabeller {
     readers: Vec<TagReader>,
     /// Name of the family.
     family: String,
-    /// Decoder of the whole family.
-    decoder: Decoder,
+    /// Decoder of the whole family; none of place codes, as each of their words is a code.
+    decoder: Option<Decoder>,
     /// Greatest number of misread cells at which a word certainly is a code of the family.
     sure_errors: u32,
     /// The number of words of the family.
@@ -165,6 +165,8 @@ pub struct TagLabeller {
     panels_abut: bool,
     /// Panels and tiles of each code of the target.
     places: Vec<Vec<(usize, Tile)>>,
+    /// In how many ways a tile may lie on the target.
+    ways: usize,
 }
 
 /// A panel of the target as labelling needs it, in its lattice coordinates.
@@ -176,10 +178,18 @@ struct LabelPanel {
     inverted: bool,
     /// Its corners.
     corners: BTreeSet<Vertex>,
-    /// Index of the target's code in each tile with a tag.
-    tags: BTreeMap<Tile, usize>,
+    /// The tag in each tile that has one.
+    tags: BTreeMap<Tile, LabelTag>,
     /// All tiles of the colour that tags are in, with a tag or without.
     tiles: BTreeSet<Tile>,
+}
+
+/// A tag of a panel.
+#[derive(Clone, Copy, Debug)]
+struct LabelTag {
+    id: u32,
+    /// Index of its code among those of the target.
+    code: usize,
 }
 
 /// The readings of the tiles of a grid by one reader, as the picture shows them or in its mirror image.
@@ -268,7 +278,14 @@ impl TagLabeller {
     ) -> Option<Self> {
         let ids: BTreeSet<u32> =
             target.panels.iter().flat_map(|panel| &panel.tags).map(|tag| tag.id).collect();
-        let ids: Vec<u32> = ids.into_iter().filter(|&id| family.code(id).is_some()).collect();
+        let coded: BTreeMap<u32, u64> =
+            ids.into_iter().filter_map(|id| Some((id, family.code(id)?))).collect();
+        // Many places of a board of place codes show the same.
+        let mut shown = BTreeSet::new();
+        let ids: Vec<u32> =
+            coded.iter().filter(|&(_, code)| shown.insert(code)).map(|(&id, _)| id).collect();
+        let of_code: HashMap<u64, usize> =
+            ids.iter().enumerate().map(|(index, id)| (coded[id], index)).collect();
         let mut tag_places: Vec<TagPlace> = Vec::new();
         let mut places = vec![Vec::new(); ids.len()];
         let mut panels = Vec::new();
@@ -278,14 +295,14 @@ impl TagLabeller {
                 tag_places.push(place);
                 tag_places.len() - 1
             });
-            let of_id = |id: u32| ids.binary_search(&id).ok();
-            let tags: BTreeMap<Tile, usize> = panel
+            let of_id = |id: u32| Some(LabelTag { id, code: of_code[coded.get(&id)?] });
+            let tags: BTreeMap<Tile, LabelTag> = panel
                 .tags
                 .iter()
                 .filter_map(|tag| Some((panel.tag_tile(tag), of_id(tag.id)?)))
                 .collect();
-            for (&tile, &code) in &tags {
-                places[code].push((index, tile));
+            for (&tile, tag) in &tags {
+                places[tag.code].push((index, tile));
             }
             let corners = panel_vertices(panel);
             let in_dark = panel.tags_in == TagsIn::Black;
@@ -297,13 +314,14 @@ impl TagLabeller {
         (!ids.is_empty()).then(|| Self {
             readers,
             family: family.name().to_owned(),
-            decoder: decoder(),
+            decoder: (!family.is_of_places()).then(decoder),
             sure_errors: family.correctable() / 2,
             family_words: family.len() * usize::from(family.kind().turns()),
             max_errors,
             words: TargetWords::new(family, ids),
             panels,
             panels_abut,
+            ways: usize::from(family.kind().turns()) * places.iter().map(Vec::len).sum::<usize>(),
             places,
         })
     }
@@ -430,10 +448,11 @@ impl TagLabeller {
         let of_target = |evidence: f32| f64::from(evidence) - among(of_words.len());
         let mut code = [most, second].map(|evidence| of_target(evidence).max(0.0));
         // A code of the family that the target does not have may fit better than all of these.
-        if let Some(decoded) = self.decoder.decode(reading.word(), self.sure_errors)
+        if let Some(decoder) = &self.decoder
+            && let Some(decoded) = decoder.decode(reading.word(), self.sure_errors)
             && self.words.code_of(decoded.id).is_none()
         {
-            let evidence = self.words.evidence_of(self.decoder.word(decoded), &reading.half_odds);
+            let evidence = self.words.evidence_of(decoder.word(decoded), &reading.half_odds);
             let clear = f64::from(evidence) - among(self.family_words);
             if evidence > most {
                 code = code.map(|code| code.max(clear));
@@ -458,9 +477,9 @@ impl TagLabeller {
     fn place(&self, sights: &[Sight], grid: &SaddleGrid) -> Placed {
         let proposals = self.proposals(sights);
         let tiles: usize = sights.iter().map(|sight| sight.readings.len()).sum();
-        // Bonferroni: about as many placements may be proposed as there are tiles times words, and by chance
+        // Bonferroni: about as many placements may be proposed as there are tiles times their places and turns, and by chance
         // the best of n exceeds E with a probability of up to n e^−E.
-        let ways = ((tiles * self.words.len()).max(1) as f64).ln();
+        let ways = ((tiles * self.ways).max(1) as f64).ln();
         let mut placed = Placed::default();
         let mut taken = BTreeSet::new();
         loop {
@@ -611,12 +630,14 @@ impl TagLabeller {
         let panel = &self.panels[placement.panel];
         let (tile, shown) = (sight.readings[index].tile, &sight.shown[index]);
         let on_panel = placement.map.apply_tile(tile);
-        if let Some(code) = panel.tags.get(&on_panel) {
-            let word = self.words.turns() * code + turns_of(placement.map, tile);
+        if let Some(tag) = panel.tags.get(&on_panel) {
+            let word = self.words.turns() * tag.code + turns_of(placement.map, tile);
             // The boards that it is compared with have the best code other than the predicted one.
             let but = usize::from(shown.word == word);
             let evidence = sight.evidence[index][word].into();
-            let predicted = [or_spoilt(evidence, SPOILT); DIRTY.len()];
+            // Where every tile has a tag, no plain ones tell how many are hidden.
+            let hidden = |chance| if self.decoder.is_none() { chance } else { SPOILT };
+            let predicted = DIRTY.map(|chance| or_spoilt(evidence, hidden(chance)));
             let other_code = [shown.code[but]; DIRTY.len()];
             let of_board = Some(shown.of_board[but]);
             Some(Judged { predicted, other_code, of_board })
@@ -632,15 +653,15 @@ impl TagLabeller {
         }
     }
 
-    /// The tags of the panel under a placement: tile of the grid (mirrored if its sight is), index of the
-    /// code, and the number of counter-clockwise turns of the tag in that tile.
-    fn expected(&self, placement: &Placement) -> impl Iterator<Item = (Tile, usize, usize)> {
+    /// The tags of the panel under a placement: tile of the grid (mirrored if its sight is), tag, and the number of
+    /// counter-clockwise turns of the tag in that tile.
+    fn expected(&self, placement: &Placement) -> impl Iterator<Item = (Tile, LabelTag, usize)> {
         let grid_from_panel = placement.map.inverse();
-        self.panels[placement.panel].tags.iter().map(move |(&tile, &code)| {
+        self.panels[placement.panel].tags.iter().map(move |(&tile, &tag)| {
             let on_grid = grid_from_panel.apply_tile(tile);
             let a = grid_from_panel.apply(tile.frame()[0]);
             let turns = on_grid.vertices().position(|v| v == a).unwrap_or(0);
-            (on_grid, code, turns)
+            (on_grid, tag, turns)
         })
     }
 
@@ -665,12 +686,12 @@ impl TagLabeller {
         let sight = &sights[placement.sight];
         let mut tags: Vec<DecodedTag> = self
             .expected(placement)
-            .filter_map(|(tile, code, turns)| {
+            .filter_map(|(tile, LabelTag { id, code }, turns)| {
                 let reading = *sight.index.get(&tile)?;
                 let word = self.words.turns() * code + turns;
                 let errors = (self.words.word(word) ^ sight.readings[reading].word()).count_ones();
                 let Vertex { row, col } = placement.map.apply_tile(tile).anchor;
-                let (id, family) = (self.words.id(code), self.family.clone());
+                let family = self.family.clone();
                 (sight.evidence[reading][word] > 0.0).then_some(DecodedTag {
                     id,
                     family,
@@ -961,6 +982,77 @@ mod tests {
                 assert_eq!(from, to, "{what}");
             }
         }
+    }
+
+    /// Patches of three by four tiles of a board of a thousand tiles, anywhere, turned and seen as in a mirror: one of twenty
+    /// cells is misread, and three of ten tiles are hidden by what has cells of its own.
+    #[test]
+    fn patches_of_dense_boards_tell_their_place() {
+        use rand::{Rng, SeedableRng};
+        use rand_distr::{Distribution, StandardNormal};
+        /// Noise of a cell by which one of twenty is taken for the other.
+        const NOISE: f64 = 0.608;
+        let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(5);
+        let spec = BoardSpec { tags: Some(TagSpec::dense()), ..BoardSpec::deltille(32, 33, 10.0) };
+        let target = Target::build(
+            "dense",
+            &TargetSpec::Board(spec),
+            Some(&Family::shipped("dense9").unwrap()),
+            None,
+        );
+        let (target, family) = (target.unwrap(), Family::shipped("dense9").unwrap());
+        let labeller = TagLabeller::new(&target, &family, None).unwrap();
+        let panel = &target.panels[0];
+        let codes: BTreeMap<Tile, u64> = panel
+            .tags
+            .iter()
+            .map(|tag| (panel.tag_tile(tag), family.code(tag.id).unwrap()))
+            .collect();
+        let cells = family.cells();
+        let (mut labelled, mut looked) = (0, 0);
+        for trial in 0..300 {
+            let anchor = panel.tags[rng.random_range(0..panel.tags.len())];
+            let anchor = Vertex::new(anchor.row, anchor.col);
+            let at = |row, col| Tile::upright(anchor + Vertex::new(row, col));
+            let patch = (0..3).flat_map(|row| (0..4).map(move |col| at(row, col)));
+            let map = panel_from_grid(Tile::upright(Vertex::new(0, 0)), at(0, 0), (trial % 3) as u8);
+            let flopped = trial % 2 == 1;
+            let shown: Vec<Tile> = patch.filter(|tile| codes.contains_key(tile)).collect();
+            if shown.len() < 12 {
+                continue;
+            }
+            looked += 1;
+            let readings: Vec<Reading> = shown
+                .iter()
+                .map(|tile| {
+                    let on_grid = map.inverse().apply_tile(*tile);
+                    let turned = (0..turns_of(map, on_grid)).fold(codes[tile], |w, _| cells.rotate(w));
+                    let word = if rng.random_bool(0.3) { rng.random() } else { turned };
+                    let odds = |bit: u32| {
+                        let cell = if word >> bit & 1 == 1 { 1.0 } else { -1.0 };
+                        let noise: f64 = StandardNormal.sample(&mut rng);
+                        let odds = (cell + NOISE * noise) / (NOISE * NOISE);
+                        odds.clamp(-2.6, 2.6) as f32
+                    };
+                    let reading = Reading { tile: on_grid, half_odds: (0..9).map(odds).collect() };
+                    if flopped { labeller.readers[0].mirrored(&reading) } else { reading }
+                })
+                .collect();
+            let placed = PlacedSaddle { position: DVec2::ZERO, amplitude: 1.0 };
+            let vertices = readings.iter().flat_map(|reading| reading.tile.vertices());
+            let grid: SaddleGrid = vertices.map(|v| (v, placed)).collect();
+            let mut evidence = TagEvidence::default();
+            let sight = labeller.sight((0, false, false), readings, &mut evidence);
+            let found = labeller.decide(vec![sight], &grid, evidence).found;
+            labelled += found.len();
+            for (from, to) in found.iter().flat_map(|found| &found.vertices) {
+                let seen = if flopped { mirrored(*from) } else { *from };
+                assert_eq!(*to, map.apply(seen), "trial {trial}");
+                assert_eq!(found[0].mirrored, flopped, "trial {trial}");
+            }
+        }
+        println!("{labelled} of {looked} patches are labelled");
+        assert!(labelled * 10 > looked * 9, "{labelled} of {looked}");
     }
 
     /// How single tags of d36h11, four pixels a bit, are read under noise.

@@ -46,7 +46,7 @@ impl TargetWords {
         let of_family = white(&mut family.codes().iter().copied());
         let of_target = white(&mut ids.iter().filter_map(|&id| family.code(id)));
         let frequency = |bit: usize| {
-            let in_family = of_family[bit] / family.len().max(1) as f64;
+            let in_family = of_family[bit] / family.codes().len().max(1) as f64;
             let frequency =
                 (of_target[bit] + FAMILY_WEIGHT * in_family) / (ids.len() as f64 + FAMILY_WEIGHT);
             frequency.clamp(LEAST_FREQUENCY, 1.0 - LEAST_FREQUENCY) as f32
@@ -68,11 +68,6 @@ impl TargetWords {
     /// How many turns each code has.
     pub fn turns(&self) -> usize {
         self.turns
-    }
-
-    /// The id of a code.
-    pub fn id(&self, code: usize) -> u32 {
-        self.ids[code]
     }
 
     /// The index of an id's code.

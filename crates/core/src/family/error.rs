@@ -7,7 +7,7 @@ pub enum FamilyError {
     /// No shipped family and no file of this name.
     #[error(
         "no family is called `{name}`: give one of {}, or the path of a .json family file",
-        [super::shipped_names(), super::square_names()].concat().join(", ")
+        [super::shipped_names(), super::square_names(), vec![super::places::NAME]].concat().join(", ")
     )]
     Unknown {
         /// The name asked for.

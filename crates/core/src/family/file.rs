@@ -41,6 +41,8 @@ pub enum Construction {
         /// Moves in each round.
         steps: u64,
     },
+    /// Places on boards ([`super::places`]).
+    Places,
     /// Codes taken over from elsewhere.
     Imported {
         /// Where they come from.
@@ -83,6 +85,15 @@ pub(super) fn from_json(json: &str) -> Result<Family, FamilyError> {
         return Err(FamilyError::Schema { found: schema });
     }
     let file: FamilyFile = serde_json::from_str(json)?;
+    if file.construction == Construction::Places {
+        // Its codes are computed and not listed.
+        let known = Family::places();
+        if (&file.name, &file.fingerprint) != (&known.name, &known.fingerprint) {
+            let problem = format!("place codes are those of {} alone", known.name);
+            return Err(FamilyError::field("construction", problem));
+        }
+        return Ok(known);
+    }
     let dimension =
         Dimension::from_bits(file.bits).map_err(|e| FamilyError::field("bits", e.to_string()))?;
     let codes = file
@@ -128,6 +139,7 @@ pub(super) fn from_json(json: &str) -> Result<Family, FamilyError> {
 
 pub(super) fn to_json(family: &Family) -> String {
     let words = TagWords::of(family.kind, family.dimension);
+    let listed = if family.is_of_places() { &[] } else { family.codes() };
     let file = FamilyFile {
         schema: SCHEMA.to_owned(),
         name: family.name.clone(),
@@ -139,7 +151,7 @@ pub(super) fn to_json(family: &Family) -> String {
         rules: family.rules.clone(),
         distance_histogram: family.histogram.clone(),
         false_positive_rate: family.false_positive_rates(),
-        codes: family.codes.iter().map(|&code| words.hex(code)).collect(),
+        codes: listed.iter().map(|&code| words.hex(code)).collect(),
     };
     let mut json = serde_json::to_string_pretty(&file).expect("plain data has a JSON form");
     json.push('\n');

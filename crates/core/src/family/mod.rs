@@ -15,6 +15,9 @@
 //! # Ok::<(), deltille_core::family::FamilyError>(())
 //! ```
 //!
+//! One family is of another kind, [`places`]: on its boards every tile has a tag of nine cells, which tell a place only
+//! together with those beside them.
+//!
 //! Families of square tags, the AprilTags of checkerboards, are read, decoded and drawn like the
 //! others, with their four turns by 90°; they are neither searched nor certified here.
 //!
@@ -34,6 +37,7 @@ mod file;
 mod independent;
 mod kernels;
 pub mod lexicode;
+pub mod places;
 mod polish;
 mod reading;
 mod rules;
@@ -125,6 +129,30 @@ impl Family {
         Self::from_json(shipped::json(name).ok_or_else(unknown)?)
     }
 
+    /// The family of place codes, see [`places`].
+    fn places() -> Self {
+        let cells = places::cells();
+        let dimension = cells.dimension();
+        let codes = places::first_board();
+        let fingerprint = file::fingerprint(cells.kind(), dimension, 1, &codes);
+        Self {
+            name: places::NAME.to_owned(),
+            kind: cells.kind(),
+            dimension,
+            distance: 1,
+            codes,
+            rules: Rules { min_complexity: 0.0, black_distance: 0, white_distance: 0 },
+            construction: Construction::Places,
+            histogram: BTreeMap::new(),
+            fingerprint,
+        }
+    }
+
+    /// Whether its tags tell a place only together with those beside them, and every tile has one.
+    pub fn is_of_places(&self) -> bool {
+        self.construction == Construction::Places
+    }
+
     /// Reads the text of a family file (`docs/formats.md`, “Family”, schema [`SCHEMA`]).
     ///
     /// # Errors
@@ -168,19 +196,23 @@ impl Family {
         (self.distance - 1) / 2
     }
 
-    /// The codes; an id is a position in this list.
+    /// The codes; an id is a position in this list. Of place codes these are those of the first board.
     pub fn codes(&self) -> &[u64] {
         &self.codes
     }
 
     /// The code of a tag.
     pub fn code(&self, id: u32) -> Option<u64> {
+        if self.is_of_places() && (id as usize) < self.len() {
+            return Some(places::word(id));
+        }
         self.codes.get(id as usize).copied()
     }
 
     /// Number of codes.
     pub fn len(&self) -> usize {
-        self.codes.len()
+        let boards = if self.is_of_places() { places::BOARDS as usize } else { 1 };
+        boards * self.codes.len()
     }
 
     /// Whether there is no code; never so for a family that was checked.
@@ -199,14 +231,17 @@ impl Family {
     }
 
     /// Number of unordered pairs, among the codes and their turns, at each distance; empty for
-    /// families of more than 100,000 codes.
+    /// families of more than 100,000 codes, and for place codes.
     pub fn histogram(&self) -> &BTreeMap<u32, u64> {
         &self.histogram
     }
 
     /// Probability that a word of fair coin tosses is taken for a tag, for 0, 1, …,
-    /// [`Self::correctable`] corrected bits.
+    /// [`Self::correctable`] corrected bits; of place codes every word is one of a place.
     pub fn false_positive_rates(&self) -> Vec<f64> {
+        if self.is_of_places() {
+            return vec![1.0];
+        }
         false_positive_rates(self.kind, self.dimension, self.distance, self.codes.len())
     }
 

@@ -105,6 +105,7 @@ pub(super) fn json(name: &str) -> Option<&'static str> {
         "delTag25h9" => include_str!("../../families/delTag25h9.json"),
         "delTag36h9" => include_str!("../../families/delTag36h9.json"),
         "delTag36h11" => include_str!("../../families/delTag36h11.json"),
+        super::places::NAME => include_str!("../../families/dense9.json"),
         "aprilTag16h5" => include_str!("../../families/aprilTag16h5.json"),
         "aprilTag25h9" => include_str!("../../families/aprilTag25h9.json"),
         "aprilTag36h11" => include_str!("../../families/aprilTag36h11.json"),

@@ -6,8 +6,7 @@ use glam::DVec2;
 
 use super::capacity::{check_family, wider_spacing};
 use super::{
-    BoardSpec, Corner, FamilyRef, GridKind, Outline, Panel, PanelPose, TagPlacement, TagSpec,
-    TagsIn, TargetError,
+    BoardSpec, Corner, FamilyRef, GridKind, Outline, Panel, PanelPose, TagSpec, TagsIn, TargetError,
 };
 use crate::family::Family;
 use crate::lattice::{ROW_HEIGHT, Vertex};
@@ -119,7 +118,6 @@ pub(super) fn panels(
 
 /// The panels of a checked spec, whether or not its family has so many tags.
 pub(super) fn untied_panels(spec: &BoardSpec) -> Vec<Panel> {
-    let first_tag = spec.tags.as_ref().map_or(0, |tags| tags.first_id);
     let vertices = board_vertices(spec.grid, spec.rows, spec.cols);
     let tagged = |tags: &TagSpec| tagged_tiles(spec.grid, &vertices, tags.spacing, tags.tags_in);
     let tiles = spec.tags.as_ref().map_or_else(Vec::new, tagged);
@@ -146,16 +144,10 @@ pub(super) fn untied_panels(spec: &BoardSpec) -> Vec<Panel> {
                 Corner { id, row: v.row, col: v.col, panel_mm, target_mm, measured: None }
             })
             .collect(),
-        tags: tiles
-            .iter()
-            .enumerate()
-            // No family has so many codes that ids overflow; a spec may ask for them.
-            .map(|(i, tile)| TagPlacement {
-                id: first_tag.saturating_add(board * tiles.len() as u32 + i as u32),
-                row: tile.row,
-                col: tile.col,
-            })
-            .collect(),
+        tags: spec
+            .tags
+            .as_ref()
+            .map_or_else(Vec::new, |tags| tags.placements(spec.board_id + board, board, &tiles)),
     };
     (0..spec.boards).map(panel).collect()
 }

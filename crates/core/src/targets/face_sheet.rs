@@ -19,7 +19,7 @@
 use glam::DVec2;
 
 use super::angles::turn_of;
-use super::layout::{ADVANCE_CAPS, Arrangement, Footprint, fit};
+use super::layout::{ADVANCE_CAPS, Arrangement, Footprint, fit, tag_range};
 use super::length::format_mm;
 use super::net::{Side, Sides};
 use super::paper::PaperSpec;
@@ -247,7 +247,7 @@ fn label(
         format!("{} tiles, margin {}", spec.tiles, format_mm(spec.margin_mm)),
     ];
     if let (Some(family), [first, .., last] | [first @ last]) = (family, panel.tags.as_slice()) {
-        parts.push(format!("{} ids {}–{}", family.name, first.id, last.id));
+        parts.push(tag_range(&family.name, first.id, last.id));
         parts.push(format!("fingerprint {}", family.fingerprint));
     }
     parts.push(format!("board {}", panel.id));

@@ -21,6 +21,7 @@ use super::{
     BoardSpec, CheckBar, FamilyRef, GridKind, Label, Panel, Placement, SheetLayout, SheetText,
     TagsIn, TargetError, board,
 };
+use crate::family::places;
 
 /// Capital height of the words on a check bar, mm: 7 pt, small print that is still easy to read.
 const BAR_CAP_MM: f64 = 1.8;
@@ -384,7 +385,7 @@ pub(super) fn label(
         format!("edge {}", format_mm(spec.edge_mm)),
     ];
     if let (Some(family), [first, .., last] | [first @ last]) = (family, panel.tags.as_slice()) {
-        parts.push(format!("{} {}", family.name, id_range(first.id, last.id)));
+        parts.push(tag_range(&family.name, first.id, last.id));
         parts.push(format!("fingerprint {}", family.fingerprint));
         if panel.tags_in == TagsIn::White {
             parts.push("tags in white squares".to_owned());
@@ -395,9 +396,13 @@ pub(super) fn label(
     parts.join(" · ")
 }
 
-/// Ids in words: `id 3`, `ids 3–7`.
-pub fn id_range(first: u32, last: u32) -> String {
-    if first == last { format!("id {first}") } else { format!("ids {first}–{last}") }
+/// Tags in words: `d25h7 id 3`, `d25h7 ids 3–7`; place codes, whose ids are those of places, by their family alone.
+pub fn tag_range(family: &str, first: u32, last: u32) -> String {
+    match (family, first == last) {
+        (places::NAME, _) => family.to_owned(),
+        (_, true) => format!("{family} id {first}"),
+        (_, false) => format!("{family} ids {first}–{last}"),
+    }
 }
 
 #[cfg(test)]

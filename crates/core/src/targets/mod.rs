@@ -45,7 +45,7 @@ pub use face_sheet::{edge_numbers, edge_text, upright_number};
 pub use json::{SCHEMA, TargetFileError};
 pub use label::Label;
 pub use layout::CHECK_BAR_STROKE_MM;
-pub use layout::id_range;
+pub use layout::tag_range;
 pub use length::{LengthError, parse_length_mm};
 pub use net::Hinge;
 pub use paper::{DEFAULT_MARGIN_MM, Orientation, PaperError, PaperSize, PaperSpec, SolidSheets};

@@ -7,8 +7,8 @@ use super::capacity::{check_family, wider_spacing};
 use super::length::format_mm;
 use super::polyhedron::{Face, Polyhedron};
 use super::{
-    Corner, FamilyRef, GridKind, Incircle, Outline, Panel, Skeleton, SolidShape, SolidSpec,
-    TagPlacement, TagsIn, TargetError,
+    Corner, FamilyRef, GridKind, Incircle, Outline, Panel, Skeleton, SolidShape, SolidSpec, TagsIn,
+    TargetError,
 };
 use crate::family::Family;
 use crate::lattice::Vertex;
@@ -188,16 +188,7 @@ pub(super) fn untied_panels(spec: &SolidSpec) -> Result<Vec<Panel>, TargetError>
                 Corner { id, row: v.row, col: v.col, panel_mm, target_mm, measured: None }
             })
             .collect(),
-        tags: tiles
-            .iter()
-            .zip(index * tiles.len() as u32..)
-            // No family has so many codes that ids overflow; a spec may ask for them.
-            .map(|(tile, id)| TagPlacement {
-                id: spec.tags.first_id.saturating_add(id),
-                row: tile.row,
-                col: tile.col,
-            })
-            .collect(),
+        tags: spec.tags.placements(spec.board_id + index, index, &tiles),
     };
     Ok((0..).zip(&faces).map(panel).collect())
 }

@@ -2,7 +2,9 @@ use glam::DVec3;
 use serde::{Deserialize, Serialize};
 
 use super::length::format_mm;
-use super::{ClosedMesh, GridKind, SkeletonSpec, TagsIn, TargetError};
+use super::{ClosedMesh, GridKind, SkeletonSpec, TagPlacement, TagsIn, TargetError};
+use crate::family::places;
+use crate::lattice::Vertex;
 
 /// Most rows or columns of a board: more than the largest paper holds at the finest edge that
 /// anybody prints, and few enough that no number overflows.
@@ -100,9 +102,10 @@ fn is_deltille(kind: &GridKind) -> bool {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct TagSpec {
-    /// Family name, or path of a family file.
+    /// Family name, or path of a family file. Of [`places`] every tile has a tag, whose id follows from the board's and
+    /// its place.
     pub family: String,
-    /// Id of the first tag; the others follow, by row, then column, board after board.
+    /// Id of the first tag; the others follow, by row, then column, board after board. 0 with place codes.
     pub first_id: u32,
     /// Every how many rows and columns there is a tag.
     pub spacing: u32,
@@ -192,6 +195,86 @@ impl Default for TagSpec {
 }
 
 impl TagSpec {
+    /// A place code in every tile of a deltille grid, with the usual border: corners are as precise as without codes from 2 px
+    /// a cell on.
+    pub fn dense() -> Self {
+        Self { family: places::NAME.to_owned(), spacing: 1, ..Self::default() }
+    }
+
+    /// The usual tags of a tiling: those above, or of the family that is asked for by its name.
+    pub fn usual(grid: GridKind, family: Option<&str>, tags_in: TagsIn) -> Self {
+        let usual = match grid {
+            GridKind::Checker => Self::for_squares(tags_in),
+            GridKind::Deltille if family == Some(places::NAME) => Self::dense(),
+            GridKind::Deltille => Self::default(),
+        };
+        let family = family.map_or(usual.family, str::to_owned);
+        Self { family, ..usual }
+    }
+
+    /// Whether every tile has a place code.
+    pub fn is_dense(&self) -> bool {
+        self.family == places::NAME
+    }
+
+    /// The tags in some tiles of the panel with an id, which is that of so many panels after the first.
+    pub(super) fn placements(&self, panel: u32, index: u32, tiles: &[Vertex]) -> Vec<TagPlacement> {
+        let first = self.first_id.saturating_add(index * tiles.len() as u32);
+        let tiles = tiles.iter().zip(0..);
+        let of_tile = |(tile, i): (&Vertex, u32)| TagPlacement {
+            id: match self.is_dense() {
+                true => places::id(panel, *tile),
+                // No family has so many codes that ids overflow; a spec may ask for them.
+                false => first.saturating_add(i),
+            },
+            row: tile.row,
+            col: tile.col,
+        };
+        tiles.map(of_tile).collect()
+    }
+
+    /// Checks that there are place codes for panels with these ids, whose tiles lie in so many rows and columns of the
+    /// lattice.
+    fn check_places(
+        &self,
+        (setting, panels): (&'static str, std::ops::Range<u32>),
+        (size, rows, cols): (&'static str, u32, u32),
+    ) -> Result<(), TargetError> {
+        let last = places::BOARDS - 1;
+        if panels.end > places::BOARDS {
+            let problem = format!(
+                "boards {} to {} are needed, {} tells {last} as the last: lower it, or make fewer",
+                panels.start,
+                panels.end - 1,
+                places::NAME
+            );
+            return Err(TargetError::invalid(setting, problem));
+        }
+        if !places::are_different(rows, cols) {
+            let problem = format!(
+                "places of {} come again after 256 edges, and some would be twice on it: make it smaller",
+                places::NAME
+            );
+            return Err(TargetError::invalid(size, problem));
+        }
+        let fixed = [
+            ("TagSpec::spacing", self.spacing, 1, "every tile has a place code"),
+            (
+                "TagSpec::first_id",
+                self.first_id,
+                0,
+                "the ids of place codes follow from the board's",
+            ),
+        ];
+        match fixed.into_iter().find(|(_, value, only, _)| value != only) {
+            Some((setting, value, only, why)) => {
+                let problem = format!("{value} is not {only}: {why}; leave it out");
+                Err(TargetError::invalid(setting, problem))
+            }
+            None => Ok(()),
+        }
+    }
+
     /// Tags for a checkerboard: aprilTag36h11 in every second row and column, so that each corner
     /// touches one tag at most.
     ///
@@ -246,6 +329,16 @@ impl SolidSpec {
         Self { shape, edge_mm, tiles: 10, margin_mm: 5.0, board_id: 0, tags, skeleton: None }
     }
 
+    /// How many faces it has.
+    fn face_count(&self) -> u32 {
+        match &self.shape {
+            SolidShape::Tetrahedron => 4,
+            SolidShape::Octahedron => 8,
+            SolidShape::Icosahedron => 20,
+            SolidShape::Mesh(mesh) => mesh.faces().len() as u32,
+        }
+    }
+
     /// Checks every number by itself.
     pub(super) fn check(&self) -> Result<(), TargetError> {
         if !SOLID_EDGE_MM.contains(&self.edge_mm) {
@@ -290,6 +383,13 @@ impl SolidSpec {
         if self.board_id.checked_add(MOST_FACES).is_none() {
             let problem = format!("{} leaves no ids for the faces after it", self.board_id);
             return Err(TargetError::invalid("SolidSpec::board_id", problem));
+        }
+        if self.tags.is_dense() {
+            let boards = self.board_id..self.board_id + self.face_count();
+            self.tags.check_places(
+                ("SolidSpec::board_id", boards),
+                ("SolidSpec::tiles", self.tiles, self.tiles),
+            )?;
         }
         self.tags.check()
     }
@@ -404,6 +504,14 @@ impl BoardSpec {
                 {
                     let problem = "the one square between 2 × 2 corners is black";
                     return Err(TargetError::invalid("TagSpec::tags_in", problem));
+                }
+                if tags.is_dense() {
+                    let boards = self.board_id..self.board_id + self.boards;
+                    let (rows, cols) = (self.rows, self.cols + self.rows / 2);
+                    tags.check_places(
+                        ("BoardSpec::board_id", boards),
+                        ("BoardSpec::rows", rows, cols),
+                    )?;
                 }
                 tags.check()
             }

@@ -12,7 +12,7 @@ use crate::lattice::Vertex;
 use crate::polygon;
 use crate::targets::angles::turn_of;
 use crate::targets::face_sheet::edge_numbers;
-use crate::targets::layout::{ADVANCE_CAPS, Arrangement, Footprint, fit_upright};
+use crate::targets::layout::{ADVANCE_CAPS, Arrangement, Footprint, fit_upright, tag_range};
 use crate::targets::length::format_mm;
 use crate::targets::paper::{PaperSpec, SolidSheets};
 use crate::targets::poster::{MOST_PAGES, Poster};
@@ -514,7 +514,7 @@ impl<'a> Drawing<'a> {
         let tags = || self.panels.iter().flat_map(|panel| &panel.tags);
         if let (Some(family), Some(first), Some(last)) = (self.family, tags().next(), tags().last())
         {
-            parts.push(format!("{} ids {}–{}", family.name, first.id, last.id));
+            parts.push(tag_range(&family.name, first.id, last.id));
             parts.push(format!("fingerprint {}", family.fingerprint));
         }
         let last = self.panels.last().map_or(0, |panel| panel.id);
