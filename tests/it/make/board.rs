@@ -74,6 +74,36 @@ fn a_saved_template_makes_the_same_board_and_options_win_over_it() {
 }
 
 #[test]
+fn dense_boards_have_a_place_code_in_every_tile_also_by_template_and_on_solids() {
+    let folder = tempfile::tempdir().unwrap();
+    let args =
+        "board --dense --rows 6 --cols 7 --board-id 254 --save-template t.toml --name d --png";
+    deltille(folder.path()).args(args.split(' ')).assert().success();
+    let first = read(&folder.path().join("d.json"));
+    assert_eq!(first.family.as_ref().unwrap().name, "dense9");
+    // Every upright tile between corners.
+    assert_eq!(first.panels[0].tags.len(), 5 * 6);
+    let again = "board --template t.toml -o again";
+    deltille(folder.path()).args(again.split(' ')).assert().success();
+    assert_eq!(first, read(&folder.path().join("again/d.json")));
+    let other = "board --template t.toml --family d25h7 -o other";
+    deltille(folder.path()).args(other.split(' ')).assert().success();
+    let TargetSpec::Board(spec) = read(&folder.path().join("other/d.json")).spec else {
+        panic!("a board")
+    };
+    assert_eq!(spec.tags.map(|tags| (tags.family, tags.spacing)), Some(("d25h7".to_owned(), 3)));
+    // Boards of other ids show other words.
+    let ids = |target: &Target| -> Vec<u32> {
+        target.panels.iter().flat_map(|panel| &panel.tags).map(|tag| tag.id).collect()
+    };
+    let solid = "octahedron --dense --tiles 6 --stl";
+    deltille(folder.path()).args(solid.split(' ')).assert().success();
+    let solid = read(&folder.path().join("octahedron.json"));
+    assert!(ids(&solid).iter().all(|id| !ids(&first).contains(id)));
+    deltille(folder.path()).args("verify d.json".split(' ')).assert().success();
+}
+
+#[test]
 fn every_sample_template_makes_a_board() {
     let templates = Path::new(env!("CARGO_MANIFEST_DIR")).join("templates");
     let folder = tempfile::tempdir().unwrap();
@@ -132,8 +162,14 @@ fn what_cannot_be_made_is_refused_with_the_option_to_change() {
         "--dsc --dsc-dialect original",
         "--dsc --dsc-dialect klingon",
         "--dsc-dialect fork",
+        "--dense --family d25h7",
+        "--dense --tag-spacing 2",
+        "--dense --board-id 255",
+        "--family dense9 --first-id 3",
+        "--dense --rows 300 --cols 300 --edge 2mm",
     ] {
-        page.refused(at, &format!("deltille board --rows 10 --cols 11 -o out {args}"));
+        let size = if args.contains("--rows") { "" } else { "--rows 10 --cols 11 " };
+        page.refused(at, &format!("deltille board {size}-o out {args}"));
     }
     for size in [
         "0 --cols 11",

@@ -1015,7 +1015,8 @@ mod tests {
             let anchor = Vertex::new(anchor.row, anchor.col);
             let at = |row, col| Tile::upright(anchor + Vertex::new(row, col));
             let patch = (0..3).flat_map(|row| (0..4).map(move |col| at(row, col)));
-            let map = panel_from_grid(Tile::upright(Vertex::new(0, 0)), at(0, 0), (trial % 3) as u8);
+            let map =
+                panel_from_grid(Tile::upright(Vertex::new(0, 0)), at(0, 0), (trial % 3) as u8);
             let flopped = trial % 2 == 1;
             let shown: Vec<Tile> = patch.filter(|tile| codes.contains_key(tile)).collect();
             if shown.len() < 12 {
@@ -1026,7 +1027,8 @@ mod tests {
                 .iter()
                 .map(|tile| {
                     let on_grid = map.inverse().apply_tile(*tile);
-                    let turned = (0..turns_of(map, on_grid)).fold(codes[tile], |w, _| cells.rotate(w));
+                    let turned =
+                        (0..turns_of(map, on_grid)).fold(codes[tile], |w, _| cells.rotate(w));
                     let word = if rng.random_bool(0.3) { rng.random() } else { turned };
                     let odds = |bit: u32| {
                         let cell = if word >> bit & 1 == 1 { 1.0 } else { -1.0 };
@@ -1205,26 +1207,30 @@ mod tests {
     fn boards_of_random_words_get_no_labels() {
         use rand::{Rng, SeedableRng};
         let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(1);
-        let family = Family::shipped("d16h5").unwrap();
-        let target = board(&family, 0).unwrap();
-        let labeller = TagLabeller::new(&target, &family, None).unwrap();
-        let panel = &target.panels[0];
         let placed = PlacedSaddle { position: DVec2::ZERO, amplitude: 1.0 };
-        let grid: SaddleGrid = panel_vertices(panel).into_iter().map(|v| (v, placed)).collect();
-        let wrong = (0..1000).filter(|trial| {
-            // From a single tile, the hardest to refuse, to many; cells sure, or hardly told.
-            let tiles = grid.keys().map(|&v| Tile::upright(v)).take(1 + trial % 40);
-            let strength = [2.6, 1.0, 0.3][trial % 3];
-            let readings = tiles
-                .map(|tile| {
-                    let odds = |_| if rng.random() { strength } else { -strength };
-                    Reading { tile, half_odds: (0..16).map(odds).collect() }
-                })
-                .collect();
-            let mut evidence = TagEvidence::default();
-            let sight = labeller.sight((0, false, false), readings, &mut evidence);
-            !labeller.decide(vec![sight], &grid, evidence).found.is_empty()
-        });
-        assert_eq!(wrong.count(), 0);
+        let tags = [TagSpec { family: "d16h5".to_owned(), ..TagSpec::default() }, TagSpec::dense()];
+        for tags in tags {
+            let family = Family::shipped(&tags.family).unwrap();
+            let bits = family.dimension().bits();
+            let target = board_of(&family, (8, 9), tags).unwrap();
+            let labeller = TagLabeller::new(&target, &family, None).unwrap();
+            let panel = &target.panels[0];
+            let grid: SaddleGrid = panel_vertices(panel).into_iter().map(|v| (v, placed)).collect();
+            let wrong = (0..1000).filter(|trial| {
+                // From a single tile, the hardest to refuse, to many; cells sure, or hardly told.
+                let tiles = grid.keys().map(|&v| Tile::upright(v)).take(1 + trial % 40);
+                let strength = [2.6, 1.0, 0.3][trial % 3];
+                let readings = tiles
+                    .map(|tile| {
+                        let odds = |_| if rng.random() { strength } else { -strength };
+                        Reading { tile, half_odds: (0..bits).map(odds).collect() }
+                    })
+                    .collect();
+                let mut evidence = TagEvidence::default();
+                let sight = labeller.sight((0, false, false), readings, &mut evidence);
+                !labeller.decide(vec![sight], &grid, evidence).found.is_empty()
+            });
+            assert_eq!(wrong.count(), 0, "{}", family.name());
+        }
     }
 }
