@@ -90,6 +90,26 @@ macro_rules! tell {
 }
 pub(crate) use tell;
 
+/// How a command tells its result.
+#[derive(clap::Args, Clone, Copy, Default)]
+pub struct Telling {
+    /// Print the result as JSON on standard output, and nothing else
+    #[arg(long)]
+    json: bool,
+}
+
+impl Telling {
+    /// Whether it is printed as JSON.
+    pub fn is_json(self) -> bool {
+        self.json
+    }
+}
+
+/// Prints a result as JSON.
+pub fn print_json(value: &impl serde::Serialize) -> anyhow::Result<()> {
+    print(&(serde_json::to_string_pretty(value)? + "\n"))
+}
+
 /// What becomes of files that are there already. One of the same kind is replaced.
 #[derive(clap::Args, Clone, Copy, Default)]
 pub struct Overwrite {

@@ -1,7 +1,7 @@
 // Make: settings, the sheet as it will be printed, files, and their proof.
 import { dropZone, el, field, latest, save, select, settled } from "./dom";
 import { LibraryError, drawing, folding, proving } from "./library";
-import { type Settings, asked, isKind, isSolid, nameOf, ofTemplate, query, read, settled as settingsOf, template, USUAL_FAMILY } from "./settings";
+import { type Settings, asked, isKind, isSolid, nameOf, ofTemplate, query, read, settled as settingsOf, template, PLACES, USUAL_FAMILY } from "./settings";
 import { made } from "./shared";
 import type { Folding } from "./solid";
 import { templates } from "./templates";
@@ -94,14 +94,16 @@ export function make(): HTMLElement {
     const ofSolid = isSolid(settings);
     const names = families.filter(({ kind }) => kind === (isSquare ? "checker" : "deltille")).map(({ name }) => name);
     const options: [string, string][] = names.map((name) => [name, name]);
+    if (!isSquare) options.push([PLACES, text.places]);
     if (!ofSolid) options.push(["", text.noTags]);
     const usualFamily = isSquare ? "" : USUAL_FAMILY;
     // What a link or a template gave stays to be seen.
-    if (settings.family && !names.includes(settings.family)) options.push([settings.family, settings.family]);
+    if (settings.family && !options.some(([name]) => name === settings.family)) options.push([settings.family, settings.family]);
     const sizes = settings.paper === null || papers.includes(settings.paper) ? papers : [...papers, settings.paper];
-    familyChoice = select(options, settings.family ?? usualFamily, (family) => changed({ family }, true));
+    familyChoice = select(options, settings.family ?? usualFamily, (family) => changed(family === PLACES ? { family, tag_spacing: null, first_id: 0 } : { family }, true));
     const name = el("input", { type: "text", value: settings.name, input: () => changed({ name: name.value }) });
     const isOpen = form.querySelector("details")?.open ?? false;
+    const isDense = settings.family === PLACES;
     const hasTags = ofSolid || (settings.family ?? usualFamily) !== "";
     const kinds = Object.entries(text.kinds).filter(([kind]) => kind !== "mesh" || settings.mesh !== null);
     const measures = ofSolid
@@ -123,9 +125,9 @@ export function make(): HTMLElement {
         ...(hasTags
           ? [
               ...(ofSolid || settings.kind === "deltille" ? [] : [field(text.tagsIn, select(Object.entries(text.tagsInColours), settings.tags_in, (tags_in) => changed({ tags_in })))]),
-              number(text.spacing, "tag_spacing", 1, 500, text.usual),
+              ...(isDense ? [] : [number(text.spacing, "tag_spacing", 1, 500, text.usual)]),
               number(text.border, "tag_border", 0.6, 10, text.usual),
-              number(text.firstId, "first_id", 0, MOST_IDS),
+              ...(isDense ? [] : [number(text.firstId, "first_id", 0, MOST_IDS)]),
             ]
           : []),
         number(text.boardId, "board_id", 0, MOST_IDS),
@@ -254,7 +256,7 @@ export function make(): HTMLElement {
 
   function tellFacts({ pages, reach, family }: Pages): void {
     facts.textContent = words.make.facts(reach.corners, reach.tags, pages.length);
-    if (reach.tags > 0) facts.textContent += ` ${words.make.idsLeft(reach.ids_left, family ?? "")}`;
+    if (reach.tags > 0 && family !== PLACES) facts.textContent += ` ${words.make.idsLeft(reach.ids_left, family ?? "")}`;
     void showRange();
   }
 

@@ -65,6 +65,9 @@ const NUMBERS = ["rows", "cols", "edge_mm", "tag_spacing", "tag_border", "first_
 /** The family of tags where none is given and there are tags. */
 export const USUAL_FAMILY = "delTag25h7";
 
+/** The family of place codes, of which every upright tile has one. */
+export const PLACES = "dense9";
+
 export const isSolid = (settings: Settings): boolean => settings.kind !== "deltille" && settings.kind !== "checker";
 
 /** What goes without saying of a kind of target. */
@@ -130,7 +133,7 @@ const KEYS: [string, keyof Settings][] = [
   ["orientation", "orientation"],
   ["margin", "margin_mm"],
 ];
-const OTHERS = ["command", "untagged", "pdf", "svg", "png", "dsc", "dsc-dialect", "dpi"];
+const OTHERS = ["command", "untagged", "dense", "pdf", "svg", "png", "dsc", "dsc-dialect", "dpi"];
 const UNITS: Record<string, number> = { "": 1, mm: 1, cm: 10, m: 1000, in: 25.4 };
 
 /** The settings of a template of `deltille board` or `deltille checkerboard`. */
@@ -145,6 +148,7 @@ export function ofTemplate(text: string): Settings {
     const value = string ?? plain ?? "";
     if (key === "command") values.set("kind", value === "checkerboard" ? "checker" : "deltille");
     else if (key === "untagged" && value === "true") values.set("family", "");
+    else if (key === "dense" && value === "true") values.set("family", PLACES);
     else if (known?.endsWith("_mm")) {
       const [, number, unit = ""] = /^([\d.]+)\s*(mm|cm|m|in)?$/.exec(value) ?? [];
       if (number === undefined) throw new Error(`${key}: ${value} is no length, such as 20mm`);

@@ -31,6 +31,7 @@ export const words = {
     usualEdge: "as the mesh is",
     tiles: "Tiles along a face",
     family: "Family of the tags",
+    places: "dense9: a place code in every tile",
     noTags: "no tags",
     tagsIn: "Squares with tags",
     tagsInColours: { black: "black", white: "white" } as Record<string, string>,

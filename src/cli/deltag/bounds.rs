@@ -1,7 +1,7 @@
 use std::process::ExitCode;
 
 use super::parameters::Parameters;
-use crate::cli::output::say;
+use crate::cli::output::{self, Telling, say};
 use crate::family::{self, Construction, bounds::bounds, shipped_names};
 use crate::lattice::GridKind;
 
@@ -9,28 +9,47 @@ use crate::lattice::GridKind;
 pub(super) struct Args {
     /// Bits and distance, such as d25h7
     family: Parameters,
+    #[command(flatten)]
+    telling: Telling,
 }
 
 pub(super) fn run(args: Args) -> anyhow::Result<ExitCode> {
     let Parameters { dimension, distance } = args.family;
     let bounds = bounds(GridKind::Deltille, dimension, distance);
+    let least = bounds.linear_programming.min(bounds.sphere_packing);
+    let mut shipped = Vec::new();
+    for name in shipped_names() {
+        let family = family::resolve(name)?;
+        if family.dimension() == dimension && family.distance() == distance {
+            // What its file does not list.
+            let by_rank = match family.construction() {
+                Construction::Algebraic(construction) => construction.by_rank(dimension, 0),
+                _ => None,
+            };
+            shipped.push((name, family.len(), by_rank.map(|(_, count)| count)));
+        }
+    }
+    if args.telling.is_json() {
+        let shipped = shipped.iter().map(|(name, codes, by_rank)| {
+            serde_json::json!({ "name": name, "codes": codes, "by_rank_before_rules": by_rank })
+        });
+        output::print_json(&serde_json::json!({
+            "bits": dimension.bits(), "distance": distance,
+            "linear_programming": bounds.linear_programming, "sphere_packing": bounds.sphere_packing,
+            "shipped": shipped.collect::<Vec<_>>(),
+        }))?;
+        return Ok(ExitCode::SUCCESS);
+    }
     // Better bounds may be known.
     say!("no family of {} bits and distance {distance} has more tags than", dimension.bits());
     say!("{:>12}  by linear programming (Delsarte)", bounds.linear_programming);
     say!("{:>12}  by sphere packing", bounds.sphere_packing);
-    let least = bounds.linear_programming.min(bounds.sphere_packing);
-    for name in shipped_names() {
-        let family = family::resolve(name)?;
-        if family.dimension() == dimension && family.distance() == distance {
-            let share = 100.0 * family.len() as f64 / least as f64;
-            say!("{:>12}  has {name}, {share:.1} % of the tighter bound", family.len());
-            // What its file does not list.
-            if let Construction::Algebraic(construction) = family.construction()
-                && let Some((_, count)) = construction.by_rank(dimension, 0)
-            {
-                let share = 100.0 * count as f64 / least as f64;
-                say!("{count:>12}  has {name} by rank, before the rules, {share:.1} %");
-            }
+    for (name, codes, by_rank) in shipped {
+        let share = |codes: f64| 100.0 * codes / least as f64;
+        say!("{codes:>12}  has {name}, {:.1} % of the tighter bound", share(codes as f64));
+        if let Some(count) = by_rank {
+            let share = share(count as f64);
+            say!("{count:>12}  has {name} by rank, before the rules, {share:.1} %");
         }
     }
     Ok(ExitCode::SUCCESS)

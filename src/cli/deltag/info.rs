@@ -1,7 +1,7 @@
 use std::process::ExitCode;
 
 use super::place_codes;
-use crate::cli::output::say;
+use crate::cli::output::{self, Telling, say};
 use crate::family::{Family, TagWords, bounds::bounds, places};
 use crate::lattice::GridKind;
 use crate::targets::{BoardSpec, SolidShape, SolidSpec, TagSpec, Target, TargetSpec};
@@ -11,6 +11,8 @@ use crate::words::counted;
 pub(super) struct Args {
     /// A shipped family, or a family file
     family: String,
+    #[command(flatten)]
+    telling: Telling,
 }
 
 /// Rows and columns of the board that coverage is told in, that of the paper.
@@ -25,10 +27,22 @@ fn tags_of(spec: &TargetSpec) -> anyhow::Result<usize> {
 
 pub(super) fn run(args: Args) -> anyhow::Result<ExitCode> {
     if args.family == places::NAME {
-        place_codes::about(&Family::shipped(places::NAME)?)?;
+        place_codes::about(&Family::shipped(places::NAME)?, args.telling)?;
         return Ok(ExitCode::SUCCESS);
     }
     let family = super::resolve(&args.family)?;
+    if args.telling.is_json() {
+        let bounds = bounds(family.kind(), family.dimension(), family.distance());
+        output::print_json(&serde_json::json!({
+            "name": family.name(), "fingerprint": family.fingerprint(), "codes": family.len(),
+            "bits": family.dimension().bits(), "distance": family.distance(),
+            "corrects": family.correctable(), "rules": family.rules(),
+            "construction": family.construction(), "upper_bound": bounds.linear_programming,
+            "false_positive_rate": family.false_positive_rates(),
+            "distance_histogram": family.histogram(),
+        }))?;
+        return Ok(ExitCode::SUCCESS);
+    }
     let (bits, rules) = (family.dimension().bits(), family.rules());
     let pairs = TagWords::new(family.dimension()).pairs();
     say!("{}, fingerprint {}", family.name(), family.fingerprint());

@@ -1,15 +1,31 @@
 use std::process::ExitCode;
 
-use crate::cli::output::say;
+use serde_json::json;
+
+use crate::cli::output::{self, Telling, say};
 use crate::family::{self, places, shipped_names};
 
 #[derive(clap::Args)]
-pub(super) struct Args {}
+pub(super) struct Args {
+    #[command(flatten)]
+    telling: Telling,
+}
 
-pub(super) fn run(_: Args) -> anyhow::Result<ExitCode> {
+pub(super) fn run(args: Args) -> anyhow::Result<ExitCode> {
+    let families = shipped_names().into_iter().map(family::resolve);
+    let families = families.collect::<Result<Vec<_>, _>>()?;
+    if args.telling.is_json() {
+        let listed = families.iter().map(|family| {
+            json!({
+                "name": family.name(), "bits": family.dimension().bits(), "distance": family.distance(),
+                "codes": family.len(), "fingerprint": family.fingerprint(),
+            })
+        });
+        output::print_json(&listed.collect::<Vec<_>>())?;
+        return Ok(ExitCode::SUCCESS);
+    }
     say!("{:<12} {:>4} {:>8} {:>8}  fingerprint", "family", "bits", "distance", "codes");
-    for name in shipped_names() {
-        let family = family::resolve(name)?;
+    for family in families {
         say!(
             "{:<12} {:>4} {:>8} {:>8}  {}",
             family.name(),

@@ -1,11 +1,26 @@
 //! What `deltag` tells of place codes, which are no family like others.
 
-use crate::cli::output::say;
+use serde_json::json;
+
+use crate::cli::output::{self, Telling, say};
 use crate::family::Family;
 use crate::family::places::{BOARDS, PLACES, PatchCertificate, certify_places};
 
 /// Tells all about them.
-pub(super) fn about(family: &Family) -> anyhow::Result<()> {
+pub(super) fn about(family: &Family, telling: Telling) -> anyhow::Result<()> {
+    if telling.is_json() {
+        let patches = certify_places().into_iter().map(|certificate| {
+            let PatchCertificate { tiles, forms, least, .. } = certificate;
+            json!({
+                "tiles": tiles, "forms": forms, "from_places": least.places,
+                "from_turned": least.turned, "from_mirrored": least.mirrored,
+            })
+        });
+        return output::print_json(&json!({
+            "name": family.name(), "fingerprint": family.fingerprint(), "bits": 9,
+            "boards": BOARDS, "places": PLACES, "patches": patches.collect::<Vec<_>>(),
+        }));
+    }
     say!("{}, fingerprint {}", family.name(), family.fingerprint());
     say!(
         "  of a kind of its own: every upright tile of a board tells, with some beside it, where it is"
@@ -33,30 +48,25 @@ fn line(certificate: &PatchCertificate) -> String {
     format!("    {tiles:>5}  {forms:>5}  {least:>5}  {corrected} corrected, {mirrored}")
 }
 
-/// Proves what is claimed of them, and tells it in a line; whether it holds.
-pub(super) fn verify(family: &Family) -> anyhow::Result<bool> {
-    let name = family.name();
+/// Whether what is claimed of them holds, and what was found.
+pub(super) fn verify(family: &Family) -> (bool, String) {
     let certificates = certify_places();
-    match certificates.iter().find(|certificate| !certificate.holds()) {
-        Some(PatchCertificate { tiles, least, claimed, .. }) => {
-            let found = least.places.min(least.turned);
-            say!(
-                "{name}: DOES NOT HOLD. Two patches of {tiles} tiles differ in {found} cells, not {claimed}"
-            );
-            Ok(false)
-        }
-        None => {
-            let distances = certificates.iter().map(|c| {
-                format!("{} tiles in {} cells", c.tiles, c.least.places.min(c.least.turned))
-            });
-            let distances = distances.collect::<Vec<_>>().join(", ");
-            let mirrored = certificates.last().map_or(0, |certificate| certificate.least.mirrored);
-            say!(
-                "{name}: holds. {PLACES} places on each of {BOARDS} boards; any two patches, turned or not, differ: \
-                 {distances} at least, the last from mirrored ones in {mirrored}; fingerprint {}",
-                family.fingerprint()
-            );
-            Ok(true)
-        }
+    let cells = |c: &PatchCertificate| c.least.places.min(c.least.turned);
+    if let Some(broken) = certificates.iter().find(|certificate| !certificate.holds()) {
+        let PatchCertificate { tiles, claimed, .. } = broken;
+        let found = cells(broken);
+        return (
+            false,
+            format!("two patches of {tiles} tiles differ in {found} cells, not {claimed}"),
+        );
     }
+    let distances = certificates.iter().map(|c| format!("{} tiles in {} cells", c.tiles, cells(c)));
+    let distances = distances.collect::<Vec<_>>().join(", ");
+    let mirrored = certificates.last().map_or(0, |certificate| certificate.least.mirrored);
+    let what = format!(
+        "{PLACES} places on each of {BOARDS} boards; any two patches, turned or not, differ: {distances} at least, \
+         the last from mirrored ones in {mirrored}; fingerprint {}",
+        family.fingerprint()
+    );
+    (true, what)
 }

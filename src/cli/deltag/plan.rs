@@ -3,9 +3,9 @@
 use std::process::ExitCode;
 
 use super::gen_family::{FILE_LIMIT, bytes_per_code};
-use crate::cli::output::say;
+use crate::cli::output::{self, Telling, say};
 use crate::cli::values::whole;
-use crate::family::{Family, shipped_names, smallest_shipped};
+use crate::family::{Family, ShippedFamily, shipped_names, smallest_shipped};
 use crate::lattice::GridKind;
 use crate::words::counted;
 
@@ -23,6 +23,8 @@ pub(super) struct Args {
     #[arg(long, value_name = "CELLS", default_value_t = 0, allow_negative_numbers = true,
           value_parser = whole(0..=24u32))]
     corrects: u32,
+    #[command(flatten)]
+    telling: Telling,
 }
 
 pub(super) fn run(args: Args) -> anyhow::Result<ExitCode> {
@@ -51,6 +53,19 @@ pub(super) fn run(args: Args) -> anyhow::Result<ExitCode> {
              --faces or --tags-per-face{corrects}"
         );
     };
+    let more = smallest_shipped(GridKind::Deltille, needed, best.correctable() + 1);
+    if args.telling.is_json() {
+        let of = |family: &ShippedFamily| {
+            serde_json::json!({
+                "name": family.name, "bits": family.bits, "distance": family.distance,
+                "codes": family.codes, "corrects": family.correctable(),
+            })
+        };
+        output::print_json(&serde_json::json!({
+            "tags": needed, "best": of(best), "corrects_more": more.map(of),
+        }))?;
+        return Ok(ExitCode::SUCCESS);
+    }
     let tags = counted(needed as usize, "tag");
     say!(
         "{} x {} = {tags}: {}",
@@ -59,7 +74,7 @@ pub(super) fn run(args: Args) -> anyhow::Result<ExitCode> {
         about(&Family::shipped(best.name)?)
     );
     // What more bits would buy.
-    if let Some(more) = smallest_shipped(GridKind::Deltille, needed, best.correctable() + 1) {
+    if let Some(more) = more {
         say!("to correct more, with smaller cells: {}", about(&Family::shipped(more.name)?));
     }
     Ok(ExitCode::SUCCESS)

@@ -1,9 +1,11 @@
 use std::process::ExitCode;
 
+use serde_json::json;
+
 use super::place_codes;
-use crate::cli::output::say;
+use crate::cli::output::{self, Telling, line, say};
 use crate::cli::run::{BAD_INPUT, FAILED, report};
-use crate::family::{self, Certificate, FamilyFileError, certify};
+use crate::family::{self, Certificate, Family, FamilyFileError, certify};
 use crate::words::counted;
 
 /// Told at the end of `--help`.
@@ -18,52 +20,60 @@ pub(super) struct Args {
     /// Family files, or names of shipped families
     #[arg(required = true)]
     families: Vec<String>,
+    #[command(flatten)]
+    telling: Telling,
 }
 
 pub(super) fn run(args: Args) -> anyhow::Result<ExitCode> {
     let (mut all_hold, mut all_read) = (true, true);
+    let mut told = Vec::new();
     for name in &args.families {
-        let family = match family::resolve(name) {
-            Ok(family) => family,
-            Err(error) if error.is_broken_claim() => {
-                say!("{name}: DOES NOT HOLD. {}", reason(&error));
-                all_hold = false;
-                continue;
-            }
+        let (holds, what) = match family::resolve(name) {
+            Ok(family) if family.is_of_places() => place_codes::verify(&family),
+            Ok(family) => verify(&family),
+            Err(error) if error.is_broken_claim() => (false, reason(&error).to_string()),
             Err(error) => {
                 report(&error.into());
                 all_read = false;
                 continue;
             }
         };
-        if family.is_of_places() {
-            all_hold &= place_codes::verify(&family)?;
-            continue;
-        }
-        let certificate = certify(&family);
-        if certificate.holds() {
-            let how = proof_of(&certificate, family.distance());
-            let unchecked = match certificate.unchecked.as_str() {
-                "" => String::new(),
-                what => format!("; not checked: {what}"),
-            };
-            say!(
-                "{name}: holds. {} codes of {} bits; {how}; every code satisfies the rules; \
-                 fingerprint {}{unchecked}",
-                family.len(),
-                family.dimension().bits(),
-                family.fingerprint()
-            );
+        all_hold &= holds;
+        if args.telling.is_json() {
+            told.push(json!({ "family": name, "holds": holds, "text": line(&what).trim_end() }));
+        } else if holds {
+            say!("{name}: holds. {what}");
         } else {
-            say!("{name}: DOES NOT HOLD. {}", certificate.failures.join("; "));
-            all_hold = false;
+            say!("{name}: DOES NOT HOLD. {what}");
         }
+    }
+    if args.telling.is_json() {
+        output::print_json(&told)?;
     }
     Ok(match (all_read, all_hold) {
         (false, _) => ExitCode::from(BAD_INPUT),
         (true, false) => ExitCode::from(FAILED),
         (true, true) => ExitCode::SUCCESS,
     })
+}
+
+/// Whether what a family claims holds, and what was found.
+fn verify(family: &Family) -> (bool, String) {
+    let certificate = certify(family);
+    if !certificate.holds() {
+        return (false, certificate.failures.join("; "));
+    }
+    let how = proof_of(&certificate, family.distance());
+    let unchecked = match certificate.unchecked.as_str() {
+        "" => String::new(),
+        what => format!("; not checked: {what}"),
+    };
+    let (bits, fingerprint) = (family.dimension().bits(), family.fingerprint());
+    let what = format!(
+        "{} codes of {bits} bits; {how}; every code satisfies the rules; fingerprint {fingerprint}{unchecked}",
+        family.len()
+    );
+    (true, what)
 }
 
 /// How far apart the codes of a family that claims a distance are, and how that is known.

@@ -4,16 +4,34 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use anyhow::Context;
+use serde::Serialize;
 
 use super::files::{File, same_file, write_all};
 use super::limits::FileLimits;
-use super::{target_file, verify};
-use crate::cli::output::{Overwrite, say};
+use super::target_file;
+use super::verify::{self, Proof};
+use crate::cli::output::{self, Overwrite, Telling, say};
 use crate::export::obj;
 use crate::family::Family;
 use crate::limits::Limits;
 use crate::targets::Target;
 use crate::verify::Format;
+
+/// Schema and version of what `--json` prints.
+const SCHEMA: &str = "deltille/delivery/1";
+
+/// What `--json` prints of a target that was made.
+#[derive(Serialize)]
+struct Delivered<'a> {
+    schema: &'static str,
+    target: &'a str,
+    /// In words.
+    summary: &'a str,
+    /// The files, in the order of writing.
+    written: Vec<PathBuf>,
+    /// What came of their proof; nothing where none was made.
+    proof: Option<Proof>,
+}
 
 /// Where the files of a target go, and what is checked before and after.
 #[derive(clap::Args)]
@@ -30,6 +48,8 @@ pub struct Delivery {
     /// Do not read the written files back to compare them with the description
     #[arg(long)]
     no_verify: bool,
+    #[command(flatten)]
+    telling: Telling,
     #[command(flatten)]
     limits: FileLimits,
 }
@@ -63,26 +83,41 @@ impl Delivery {
         summary: &str,
     ) -> anyhow::Result<ExitCode> {
         let written = write_all(&self.output, files, self.overwrite)?;
-        for line in summary.lines() {
-            say!("{line}");
-        }
-        for path in &written {
-            say!("wrote {}", path.display());
+        if !self.telling.is_json() {
+            for line in summary.lines() {
+                say!("{line}");
+            }
+            for path in &written {
+                say!("wrote {}", path.display());
+            }
         }
         let texture = obj::texture_name(&target.name);
         // A model for a simulator is proved together with the OBJ that it names.
         let models = [Format::Sdf, Format::Urdf, Format::Mjcf].map(Some);
         let is_in_model = written.iter().any(|path| models.contains(&Format::of(path)));
         let artifacts: Vec<PathBuf> = written
-            .into_iter()
+            .iter()
             .filter(|path| is_proved(path, &texture))
             .filter(|path| !(is_in_model && Format::of(path) == Some(Format::Obj)))
+            .cloned()
             .collect();
-        if self.no_verify || artifacts.is_empty() {
-            return Ok(ExitCode::SUCCESS);
-        }
         // They were just made, however large.
-        verify::verify(target, family, &artifacts, false, None, Limits::NONE)
+        let prove = || verify::prove(target, family, &artifacts, false, self.telling, Limits::NONE);
+        let proof = (!self.no_verify && !artifacts.is_empty()).then(prove).transpose()?;
+        let code = proof.as_ref().map_or(ExitCode::SUCCESS, Proof::code);
+        if self.telling.is_json() {
+            let name = &target.name;
+            output::print_json(&Delivered {
+                schema: SCHEMA,
+                target: name,
+                summary,
+                written,
+                proof,
+            })?;
+        } else if let Some(proof) = proof {
+            proof.tell()?;
+        }
+        Ok(code)
     }
 }
 

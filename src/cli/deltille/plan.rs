@@ -7,12 +7,12 @@ use anyhow::{Context, bail, ensure};
 
 use super::calibrating::distance;
 use super::camera_file;
-use crate::cli::output::say;
+use crate::cli::output::{self, Telling, say};
 use crate::cli::values::number;
 use crate::detect::{Proposal, Situation};
 use crate::family;
 use crate::lattice::GridKind;
-use crate::targets::{PaperSpec, TagSpec, TagsIn};
+use crate::targets::{BoardSpec, PaperSpec, TagSpec, TagsIn};
 use crate::words::counted;
 
 /// Tilts for which it is told how far a board is labelled, °.
@@ -48,6 +48,8 @@ pub struct Args {
     /// The paper that it must fit, such as A3 [default: up to A0]
     #[arg(long, value_name = "SIZE")]
     paper: Option<String>,
+    #[command(flatten)]
+    telling: Telling,
 }
 
 /// Width and height, px.
@@ -118,17 +120,36 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
             family.name()
         );
     }
-    let usual = || match kind {
-        GridKind::Deltille => TagSpec::default(),
-        GridKind::Checker => TagSpec::for_squares(TagsIn::Black),
-    };
-    let tags = named.as_ref().map(|name| TagSpec { family: name.clone(), ..usual() });
+    let tags = named.as_deref().map(|name| TagSpec::usual(kind, Some(name), TagsIn::Black));
     let paper = PaperSpec {
         size: args.paper.as_deref().map(str::parse).transpose().context("--paper")?,
         ..PaperSpec::default()
     };
     let proposal = situation.board(kind, tags.zip(family.as_ref()), &paper)?;
-    tell(&situation, &proposal, command, named.map(|name| format!(" {option} {name}")), &args)?;
+    let tags = match &named {
+        Some(name) => format!(" {option} {name}"),
+        None if args.checker => String::new(),
+        None => " --untagged".to_owned(),
+    };
+    let paper = args.paper.as_ref().map_or(String::new(), |paper| format!(" --paper {paper}"));
+    let BoardSpec { rows, cols, edge_mm, .. } = proposal.spec;
+    let command =
+        format!("deltille {command} --rows {rows} --cols {cols} --edge {edge_mm}mm{tags}{paper}");
+    let to_mm = |tilt: f64| proposal.reach.labelled_to_mm(focal_px, tilt.to_radians());
+    if args.telling.is_json() {
+        output::print_json(&serde_json::json!({
+            "schema": "deltille/plan/1",
+            "command": command,
+            "rows": rows, "cols": cols, "edge_mm": edge_mm, "family": named,
+            "corners": proposal.reach.corners, "tags": proposal.reach.tags,
+            "whole_from_mm": proposal.whole_from_mm,
+            "labelled_to_mm": TOLD_DEG.map(|tilt| {
+                serde_json::json!({ "tilt_deg": tilt, "distance_mm": to_mm(tilt) })
+            }),
+        }))?;
+        return Ok(ExitCode::SUCCESS);
+    }
+    tell(&situation, &proposal, &command, to_mm)?;
     Ok(ExitCode::SUCCESS)
 }
 
@@ -136,8 +157,7 @@ fn tell(
     situation: &Situation,
     proposal: &Proposal,
     command: &str,
-    tags: Option<String>,
-    args: &Args,
+    to_mm: impl Fn(f64) -> f64,
 ) -> anyhow::Result<()> {
     let Situation { focal_px, size_px: [width, height], distances_mm: [near, far], .. } =
         *situation;
@@ -150,16 +170,7 @@ fn tell(
         px_mm(far),
         shown(far)
     );
-    let spec = &proposal.spec;
-    let tags =
-        tags.unwrap_or_else(|| if args.checker { String::new() } else { " --untagged".to_owned() });
-    let paper = args.paper.as_ref().map_or(String::new(), |paper| format!(" --paper {paper}"));
-    say!(
-        "deltille {command} --rows {} --cols {} --edge {}mm{tags}{paper}",
-        spec.rows,
-        spec.cols,
-        spec.edge_mm
-    );
+    say!("{command}");
     let whole = match proposal.reach.tags {
         0 => "; nearer it is not labelled",
         _ => "; nearer, parts with a tag in them are labelled",
@@ -171,7 +182,7 @@ fn tell(
         shown(proposal.whole_from_mm)
     );
     let to = TOLD_DEG.map(|tilt| {
-        let far = proposal.reach.labelled_to_mm(focal_px, f64::to_radians(tilt));
+        let far = to_mm(tilt);
         match tilt {
             0.0 => format!("to {} facing the camera", shown(far)),
             _ => format!("to {} tilted by {tilt:.0}°", shown(far)),

@@ -12,7 +12,7 @@ use super::files::same_file;
 use super::limits::AllLimits;
 use super::target_file;
 use crate::cli::interrupt;
-use crate::cli::output::{self, Overwrite, say, tell};
+use crate::cli::output::{self, Overwrite, Telling, say, tell};
 use crate::cli::progress;
 use crate::cli::run::{self, FAILED};
 use crate::export::kind::Kind;
@@ -36,6 +36,8 @@ pub struct Args {
     /// Write all that was measured and found as JSON
     #[arg(long, value_name = "FILE")]
     report: Option<PathBuf>,
+    #[command(flatten)]
+    telling: Telling,
     #[command(flatten)]
     limits: AllLimits,
     #[command(flatten)]
@@ -70,23 +72,31 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         output::check_writable("--report", path)?;
     }
     interrupt::stands("not all was compared");
-    let report = args.report.as_deref().map(|path| (path, args.overwrite));
-    verify(&target, family.as_ref(), &artifacts, alone, report, limits)
+    let proof = prove(&target, family.as_ref(), &artifacts, alone, args.telling, limits)?;
+    if let Some(path) = &args.report {
+        let json = serde_json::to_string_pretty(&proof).context("--report")? + "\n";
+        output::write(path, json.as_bytes(), args.overwrite).context("--report")?;
+    }
+    match args.telling.is_json() {
+        true => output::print_json(&proof)?,
+        false => proof.tell()?,
+    }
+    Ok(proof.code())
 }
 
 /// How often the time that has passed is shown.
 const TICK: Duration = Duration::from_millis(200);
 
-/// Verifies files and prints a line on each, then the sum of it. All pages of a target are among them,
+/// Verifies files, and prints a line on each unless the whole is to be JSON. All pages of a target are among them,
 /// unless one is verified `alone`.
-pub fn verify(
+pub fn prove(
     target: &Target,
     family: Option<&Family>,
     artifacts: &[PathBuf],
     alone: bool,
-    report: Option<(&Path, Overwrite)>,
+    telling: Telling,
     limits: Limits,
-) -> anyhow::Result<ExitCode> {
+) -> anyhow::Result<Proof> {
     let bar = progress::bar(1, "");
     let show = |Progress { done, total }: Progress| {
         bar.set_length(total as u64);
@@ -94,9 +104,8 @@ pub fn verify(
     };
     let verifier = Verifier::new(target, family)?.within(limits).stopped_by(interrupt::flag());
     let verifier = verifier.telling(&show);
-    let mut verdicts = Vec::with_capacity(artifacts.len());
+    let mut proof = Proof::of(target);
     let mut done = BTreeSet::new();
-    let mut errors = Vec::new();
     for path in artifacts {
         // The pages of a net are verified together.
         if done.contains(path) {
@@ -110,41 +119,21 @@ pub fn verify(
         let verdict = verifier.verify_path(path);
         bar.finish_and_clear();
         match verdict {
-            Ok(verdict) => {
-                say!("{verdict}");
-                verdicts.push(verdict);
-            }
+            Ok(verdict) => proof.add(verdict, telling)?,
             Err(error) if interrupt::is_raised() => return Err(error.into()),
             // The others are verified all the same.
             Err(error) => {
                 let error = anyhow::Error::from(error);
                 run::report(&error);
-                errors.push(run::message(&error));
+                proof.errors.push(run::message(&error));
+                proof.passed = false;
             }
         }
     }
     for verdict in verifier.left_out(artifacts, alone) {
-        say!("{verdict}");
-        verdicts.push(verdict);
+        proof.add(verdict, telling)?;
     }
-    let failed = verdicts.iter().filter(|verdict| !verdict.passed).count();
-    if let Some((path, overwrite)) = report {
-        let report = Report::new(target, &verdicts, &errors);
-        let json = serde_json::to_string_pretty(&report).context("--report")? + "\n";
-        output::write(path, json.as_bytes(), overwrite).context("--report")?;
-    }
-    let count = verdicts.len();
-    if !errors.is_empty() {
-        return Ok(ExitCode::from(run::BAD_INPUT));
-    }
-    if failed > 0 {
-        let differ = if failed == 1 { "differs" } else { "differ" };
-        let files = counted(count, "file");
-        say!("FAILED: {failed} of {files} {differ} from target {}", target.name);
-        return Ok(ExitCode::from(FAILED));
-    }
-    say!("verified: {} of target {}", counted(count, "file"), target.name);
-    Ok(ExitCode::SUCCESS)
+    Ok(proof)
 }
 
 /// The artifacts of a target that are in a folder; those that cannot be its own are named.
@@ -215,20 +204,52 @@ fn pages_too_many(folder: &Path, target: &Target) -> Vec<PathBuf> {
 /// Schema and version of the file of `--report`.
 const SCHEMA: &str = "deltille/verdict/1";
 
+/// What came of the files of a target.
 #[derive(Serialize)]
-struct Report<'a> {
+pub struct Proof {
     schema: &'static str,
-    target: &'a str,
+    target: String,
     passed: bool,
-    artifacts: &'a [Verdict],
+    artifacts: Vec<Verdict>,
     /// Files that could not be compared.
     #[serde(skip_serializing_if = "<[_]>::is_empty")]
-    errors: &'a [String],
+    errors: Vec<String>,
 }
 
-impl<'a> Report<'a> {
-    fn new(target: &'a Target, artifacts: &'a [Verdict], errors: &'a [String]) -> Self {
-        let passed = errors.is_empty() && artifacts.iter().all(|verdict| verdict.passed);
-        Self { schema: SCHEMA, target: &target.name, passed, artifacts, errors }
+impl Proof {
+    fn of(target: &Target) -> Self {
+        let target = target.name.to_string();
+        Self { schema: SCHEMA, target, passed: true, artifacts: Vec::new(), errors: Vec::new() }
+    }
+
+    fn add(&mut self, verdict: Verdict, telling: Telling) -> anyhow::Result<()> {
+        if !telling.is_json() {
+            say!("{verdict}");
+        }
+        self.passed &= verdict.passed;
+        self.artifacts.push(verdict);
+        Ok(())
+    }
+
+    /// Prints the sum of it; what could not be compared was told.
+    pub fn tell(&self) -> anyhow::Result<()> {
+        let Self { target, artifacts, .. } = self;
+        let files = counted(artifacts.len(), "file");
+        match artifacts.iter().filter(|verdict| !verdict.passed).count() {
+            _ if !self.errors.is_empty() => {}
+            0 => say!("verified: {files} of target {target}"),
+            1 => say!("FAILED: 1 of {files} differs from target {target}"),
+            failed => say!("FAILED: {failed} of {files} differ from target {target}"),
+        }
+        Ok(())
+    }
+
+    /// The exit code that says so.
+    pub fn code(&self) -> ExitCode {
+        match (self.errors.is_empty(), self.passed) {
+            (false, _) => ExitCode::from(run::BAD_INPUT),
+            (true, false) => ExitCode::from(FAILED),
+            (true, true) => ExitCode::SUCCESS,
+        }
     }
 }
