@@ -5,6 +5,7 @@ mod board;
 mod calibrate;
 mod calibrating;
 mod camera_file;
+mod charuco;
 mod compare;
 mod delivery;
 mod detect;
@@ -20,6 +21,7 @@ mod meshes;
 mod page;
 mod plan;
 mod pose;
+mod printing;
 mod refine;
 mod render;
 mod rig;
@@ -59,6 +61,9 @@ enum Command {
     #[command(after_help = examples::CHECKERBOARD)]
     #[command(mut_arg("family", |arg| arg.long("tags").alias("family")))]
     Checkerboard(Box<board::Args>),
+    /// Make a ChArUco board, a checkerboard with markers, for OpenCV
+    #[command(after_help = examples::CHARUCO)]
+    Charuco(Box<charuco::Args>),
     /// Make a tetrahedron with tagged boards on its faces: a mesh, and what to print
     #[command(after_help = examples::SOLID)]
     Tetrahedron(Box<solid::Args>),
@@ -126,6 +131,7 @@ pub fn run(deltille: Deltille) -> anyhow::Result<ExitCode> {
         Command::Plan(args) => plan::run(args),
         Command::Board(args) => board::run(GridKind::Deltille, *args),
         Command::Checkerboard(args) => board::run(GridKind::Checker, *args),
+        Command::Charuco(args) => charuco::run(*args),
         Command::Tetrahedron(args) => solid::run(SolidShape::Tetrahedron, *args),
         Command::Octahedron(args) => solid::run(SolidShape::Octahedron, *args),
         Command::Icosahedron(args) => solid::run(SolidShape::Icosahedron, *args),

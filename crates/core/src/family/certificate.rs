@@ -136,7 +136,7 @@ pub fn certify_codes(family: &Family) -> Certificate {
         let step = codes.len().div_ceil(SAMPLE);
         codes.iter().copied().step_by(step).collect()
     };
-    let histogram = distance_histogram(family.dimension(), &compared);
+    let histogram = distance_histogram(family.kind(), family.dimension(), &compared);
     let min_distance = histogram.keys().next().copied().unwrap_or(family.dimension().bits());
     let mut closest = [0; 2];
     if min_distance < family.distance() {

@@ -23,6 +23,7 @@
 //! costs the square of their number.
 
 pub mod algebra;
+mod aruco;
 pub mod best;
 pub mod bounds;
 mod certificate;
@@ -44,6 +45,7 @@ mod tagwords;
 
 use std::collections::BTreeMap;
 
+pub use aruco::{dictionary, dictionary_names};
 pub use certificate::{Certificate, certify, certify_codes};
 pub use control::{Control, Progress};
 pub use decoder::{Decoded, Decoder};
@@ -94,10 +96,22 @@ impl Family {
         rules: Rules,
         construction: Construction,
     ) -> Result<Self, FamilyError> {
-        let kind = GridKind::Deltille;
+        Self::of(name, GridKind::Deltille, dimension, distance, codes, rules, construction)
+    }
+
+    /// The same of tags that fill a tile of `kind`.
+    fn of(
+        name: &str,
+        kind: GridKind,
+        dimension: Dimension,
+        distance: u32,
+        codes: Vec<u64>,
+        rules: Rules,
+        construction: Construction,
+    ) -> Result<Self, FamilyError> {
         file::check_form(name, kind, dimension, distance, &codes, &rules)?;
         let histogram = if codes.len() <= PAIRS_COUNTED {
-            distance_histogram(dimension, &codes)
+            distance_histogram(kind, dimension, &codes)
         } else {
             BTreeMap::new()
         };
@@ -116,13 +130,17 @@ impl Family {
         })
     }
 
-    /// A family that comes with the crate, by its name.
+    /// A family that comes with the crate, by its name: those of [`shipped_families`], and the dictionaries of
+    /// [`dictionary_names`].
     ///
     /// # Errors
     /// Where no family of that name is shipped; the message names those that are.
     pub fn shipped(name: &str) -> Result<Self, FamilyError> {
-        let unknown = || FamilyError::Unknown { name: name.to_owned() };
-        Self::from_json(shipped::json(name).ok_or_else(unknown)?)
+        match shipped::json(name) {
+            Some(json) => Self::from_json(json),
+            None => aruco::family(name)
+                .unwrap_or_else(|| Err(FamilyError::Unknown { name: name.to_owned() })),
+        }
     }
 
     /// Reads the text of a family file (`docs/formats.md`, “Family”, schema [`SCHEMA`]).

@@ -11,6 +11,7 @@ mod angles;
 mod board;
 mod build;
 mod capacity;
+mod charuco;
 mod closed_mesh;
 mod error;
 mod face_sheet;
@@ -24,6 +25,7 @@ mod paper;
 mod polyhedron;
 mod pose;
 mod poster;
+mod single_panel;
 mod skeleton;
 mod solid;
 mod spec;
@@ -38,6 +40,7 @@ use crate::quantity;
 pub(crate) use board::tagged_tiles;
 pub use board::{board_vertices, zigzag_vertices};
 pub use build::{largest_edge_mm, usual_edge_mm};
+pub use charuco::CharucoSpec;
 pub use closed_mesh::is_coordinate;
 pub use closed_mesh::{ClosedMesh, ClosedMeshError, NEAR_EQUILATERAL};
 pub use error::TargetError;
@@ -133,6 +136,13 @@ pub struct Panel {
     /// Which squares of a checkerboard carry its tags.
     #[serde(default, skip_serializing_if = "TagsIn::is_black")]
     pub tags_in: TagsIn,
+    /// Blank between a tile and the border of the tag in it, bit-widths, where it is not the usual one.
+    #[serde(
+        default,
+        skip_serializing_if = "Option::is_none",
+        deserialize_with = "quantity::border_bits::de"
+    )]
+    pub tag_margin_bits: Option<f64>,
     /// Whether the colours are exchanged: white upright tiles, or squares, on a black field.
     pub inverted: bool,
     /// Which tiles are drawn around the corners.

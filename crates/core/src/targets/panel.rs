@@ -71,7 +71,7 @@ impl Panel {
 
     /// Blank between the edges of a tile and the border of the tag in it, bit-widths.
     pub fn tag_margin_bits(&self) -> f64 {
-        self.tags_in.margin_bits()
+        self.tag_margin_bits.unwrap_or(self.tags_in.margin_bits())
     }
 
     /// Distance from the edges of a tile to the cells of the tag in it, bit-widths along the edge.

@@ -175,6 +175,7 @@ pub(super) fn untied_panels(spec: &SolidSpec) -> Result<Vec<Panel>, TargetError>
         edge_mm: face.tile_edge_mm,
         border_bits: Some(spec.tags.border_bits),
         tags_in: TagsIn::Black,
+        tag_margin_bits: None,
         inverted: false,
         outline: Outline::Triangle,
         matrix: [spec.tiles - 2; 2],

@@ -2,7 +2,7 @@ use glam::DVec3;
 use serde::{Deserialize, Serialize};
 
 use super::length::format_mm;
-use super::{ClosedMesh, GridKind, SkeletonSpec, TagsIn, TargetError};
+use super::{CharucoSpec, ClosedMesh, GridKind, SkeletonSpec, TagsIn, TargetError};
 
 /// Most rows or columns of a board: more than the largest paper holds at the finest edge that
 /// anybody prints, and few enough that no number overflows.
@@ -59,6 +59,8 @@ pub enum TargetSpec {
     Solid(SolidSpec),
     /// Single tags, in rows.
     Tags(TagSheetSpec),
+    /// A ChArUco board.
+    Charuco(CharucoSpec),
     /// Known only by its corners and tags, as another program listed them.
     Listed(ListedSpec),
 }
@@ -313,6 +315,12 @@ impl From<TagSheetSpec> for TargetSpec {
     }
 }
 
+impl From<CharucoSpec> for TargetSpec {
+    fn from(spec: CharucoSpec) -> Self {
+        Self::Charuco(spec)
+    }
+}
+
 impl TargetSpec {
     /// The family that its tags are of, by name or path; `None` for an untagged target, and for a listed
     /// one.
@@ -321,6 +329,7 @@ impl TargetSpec {
             Self::Board(board) => board.tags.as_ref().map(|tags| tags.family.as_str()),
             Self::Solid(solid) => Some(&solid.tags.family),
             Self::Tags(tags) => Some(&tags.family),
+            Self::Charuco(charuco) => Some(&charuco.dictionary),
             Self::Listed(_) => None,
         }
     }

@@ -128,6 +128,7 @@ fn panel(spec: &TagSheetSpec, id: u32) -> Panel {
         edge_mm: spec.edge_mm,
         border_bits: Some(spec.border_bits),
         tags_in: TagsIn::Black,
+        tag_margin_bits: None,
         inverted: false,
         outline: Outline::Touching,
         matrix: [0, 0],

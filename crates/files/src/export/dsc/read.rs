@@ -225,6 +225,7 @@ impl<'a> Block<'a> {
             edge_mm,
             border_bits: Some(self.border),
             tags_in: TagsIn::Black,
+            tag_margin_bits: None,
             inverted: false,
             outline: Outline::Touching,
             matrix: self.matrix,
