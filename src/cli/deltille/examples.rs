@@ -19,6 +19,14 @@ pub const CHARUCO: &str = "Examples:
   deltille charuco --squares 8x6 --edge 30mm --marker 22mm --dictionary 5x5_100
   deltille charuco --squares 11x8 --edge 20mm --dictionary apriltag_36h11 --svg --png -o board";
 
+pub const APRILGRID: &str = "Examples:
+  deltille aprilgrid --tags 6x6 --edge 25mm --gap 0.3
+  deltille aprilgrid --tags 6x6 --edge 88mm --paper A0 --name wall -o wall";
+
+pub const CIRCLES: &str = "Examples:
+  deltille circles --circles 9x7 --spacing 25mm
+  deltille circles --circles 4x11 --asymmetric --spacing 18mm --diameter 12mm";
+
 pub const SOLID: &str = "Examples:
   deltille icosahedron --edge 150mm --pdf --name ico -o ico
   deltille octahedron --paper A4 --pdf

@@ -15,8 +15,8 @@
 //! # Ok::<(), deltille_core::family::FamilyError>(())
 //! ```
 //!
-//! Families of square tags, the AprilTags of checkerboards, are read, decoded and drawn like the
-//! others, with their four turns by 90°; they are neither searched nor certified here.
+//! Families of square tags, the AprilTags of checkerboards, are read, decoded, drawn and certified like the
+//! others, with their four turns by 90°; they are not searched here.
 //!
 //! Limits: codes have 9, 16, 25, 36 or 49 bits ([`crate::lattice::Dimension`]). Loading a family
 //! checks its form and fingerprint; the distance between its codes is proved by [`certify`], which
@@ -32,6 +32,7 @@ mod decoder;
 mod error;
 mod export;
 mod file;
+mod import;
 mod independent;
 mod kernels;
 pub mod lexicode;
@@ -53,6 +54,7 @@ pub use error::FamilyError;
 pub use export::{ExportFormat, export};
 pub use file::check_name;
 pub use file::{Construction, SCHEMA};
+pub use import::{ImportError, ImportSpec, import};
 pub use reading::Reading;
 pub use rules::{Rules, Screen};
 pub use shipped::{ShippedFamily, shipped_families, shipped_names, smallest_shipped, square_names};

@@ -19,6 +19,8 @@ pub fn scene_of_target(target: &Target, family: Option<&Family>) -> Result<Scene
         TargetSpec::Board(_)
         | TargetSpec::Tags(_)
         | TargetSpec::Charuco(_)
+        | TargetSpec::AprilGrid(_)
+        | TargetSpec::Circles(_)
         | TargetSpec::Listed(_) => None,
     };
     let surface = |(index, panel): (usize, &Panel)| -> Result<Surface, ArtworkError> {

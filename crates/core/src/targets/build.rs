@@ -6,7 +6,7 @@ use super::paper::{PaperSpec, SolidSheets};
 use super::poster::Poster;
 use super::{
     BoardSpec, FamilyRef, LineKind, Name, Panel, Placement, SheetLayout, SheetLine, Target,
-    TargetError, TargetSpec, board, charuco, face_sheet, net, solid, tag_sheet,
+    TargetError, TargetSpec, aprilgrid, board, charuco, circles, face_sheet, net, solid, tag_sheet,
 };
 use crate::family::{Family, FamilyError};
 
@@ -77,6 +77,14 @@ impl Target {
             TargetSpec::Charuco(spec) => {
                 let (panels, family, sheets) = charuco::parts(&name, spec, family, layout)?;
                 (panels, Some(family), sheets)
+            }
+            TargetSpec::AprilGrid(spec) => {
+                let (panels, family, sheets) = aprilgrid::parts(&name, spec, family, layout)?;
+                (panels, Some(family), sheets)
+            }
+            TargetSpec::Circles(spec) => {
+                let (panels, sheets) = circles::parts(&name, spec, layout)?;
+                (panels, None, sheets)
             }
             TargetSpec::Listed(_) => {
                 return Err(TargetError::Listed);

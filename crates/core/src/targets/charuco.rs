@@ -155,6 +155,8 @@ impl CharucoSpec {
             border_bits: Some(BORDER_BITS),
             tags_in: TagsIn::White,
             tag_margin_bits: Some((edge_mm - self.marker_mm) / 2.0 / bit_mm),
+            gap_edges: None,
+            discs_mm: None,
             inverted: false,
             outline: Outline::Touching,
             matrix: [(columns - 1 + first) as u32, (rows - 1) as u32],

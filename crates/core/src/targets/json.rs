@@ -6,8 +6,8 @@ use glam::DVec2;
 use serde::{Deserialize, Serialize};
 
 use super::{
-    Corner, FamilyRef, GridKind, Name, Panel, SheetLayout, TagPlacement, Target, TargetSpec, board,
-    charuco, solid, tag_sheet,
+    Corner, FamilyRef, GridKind, Name, Panel, SheetLayout, TagPlacement, Target, TargetSpec,
+    aprilgrid, board, charuco, circles, solid, tag_sheet,
 };
 use crate::json::{self, ReadError};
 use crate::lattice::Vertex;
@@ -233,6 +233,8 @@ fn check_against_spec(target: &Target) -> Result<(), Problem> {
         TargetSpec::Solid(spec) => (solid::untied_panels(spec), true),
         TargetSpec::Tags(spec) => (Ok(tag_sheet::panels(spec)), true),
         TargetSpec::Charuco(spec) => (charuco::untied_panels(spec), true),
+        TargetSpec::AprilGrid(spec) => (aprilgrid::untied_panels(spec), true),
+        TargetSpec::Circles(spec) => (circles::untied_panels(spec), false),
         TargetSpec::Listed(_) => return Ok(()),
     };
     let made = made.or_else(|error| problem("spec", error.to_string()))?;
@@ -261,6 +263,8 @@ fn check_against_spec(target: &Target) -> Result<(), Problem> {
             ("kind", panel.kind == made.kind),
             ("border_bits", panel.border_bits == made.border_bits),
             ("tags_in", panel.tags_in == made.tags_in),
+            ("gap_edges", near(panel.gap_edges, made.gap_edges)),
+            ("discs_mm", near(panel.discs_mm, made.discs_mm)),
             ("tag_margin_bits", near(panel.tag_margin_bits, made.tag_margin_bits)),
             ("inverted", panel.inverted == made.inverted),
             ("outline", panel.outline == made.outline),

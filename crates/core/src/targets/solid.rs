@@ -176,6 +176,8 @@ pub(super) fn untied_panels(spec: &SolidSpec) -> Result<Vec<Panel>, TargetError>
         border_bits: Some(spec.tags.border_bits),
         tags_in: TagsIn::Black,
         tag_margin_bits: None,
+        gap_edges: None,
+        discs_mm: None,
         inverted: false,
         outline: Outline::Triangle,
         matrix: [spec.tiles - 2; 2],

@@ -2,7 +2,10 @@ use glam::DVec3;
 use serde::{Deserialize, Serialize};
 
 use super::length::format_mm;
-use super::{CharucoSpec, ClosedMesh, GridKind, SkeletonSpec, TagsIn, TargetError};
+use super::{
+    AprilGridSpec, CharucoSpec, CirclesSpec, ClosedMesh, GridKind, SkeletonSpec, TagsIn,
+    TargetError,
+};
 
 /// Most rows or columns of a board: more than the largest paper holds at the finest edge that
 /// anybody prints, and few enough that no number overflows.
@@ -61,6 +64,10 @@ pub enum TargetSpec {
     Tags(TagSheetSpec),
     /// A ChArUco board.
     Charuco(CharucoSpec),
+    /// An AprilGrid.
+    AprilGrid(AprilGridSpec),
+    /// A grid of circles.
+    Circles(CirclesSpec),
     /// Known only by its corners and tags, as another program listed them.
     Listed(ListedSpec),
 }
@@ -315,6 +322,18 @@ impl From<TagSheetSpec> for TargetSpec {
     }
 }
 
+impl From<AprilGridSpec> for TargetSpec {
+    fn from(spec: AprilGridSpec) -> Self {
+        Self::AprilGrid(spec)
+    }
+}
+
+impl From<CirclesSpec> for TargetSpec {
+    fn from(spec: CirclesSpec) -> Self {
+        Self::Circles(spec)
+    }
+}
+
 impl From<CharucoSpec> for TargetSpec {
     fn from(spec: CharucoSpec) -> Self {
         Self::Charuco(spec)
@@ -330,7 +349,8 @@ impl TargetSpec {
             Self::Solid(solid) => Some(&solid.tags.family),
             Self::Tags(tags) => Some(&tags.family),
             Self::Charuco(charuco) => Some(&charuco.dictionary),
-            Self::Listed(_) => None,
+            Self::AprilGrid(grid) => Some(&grid.family),
+            Self::Listed(_) | Self::Circles(_) => None,
         }
     }
 }

@@ -129,6 +129,8 @@ fn panel(spec: &TagSheetSpec, id: u32) -> Panel {
         border_bits: Some(spec.border_bits),
         tags_in: TagsIn::Black,
         tag_margin_bits: None,
+        gap_edges: None,
+        discs_mm: None,
         inverted: false,
         outline: Outline::Touching,
         matrix: [0, 0],

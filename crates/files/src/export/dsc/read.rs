@@ -226,6 +226,8 @@ impl<'a> Block<'a> {
             border_bits: Some(self.border),
             tags_in: TagsIn::Black,
             tag_margin_bits: None,
+            gap_edges: None,
+            discs_mm: None,
             inverted: false,
             outline: Outline::Touching,
             matrix: self.matrix,
