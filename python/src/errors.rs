@@ -28,6 +28,9 @@ pub mod raised {
 
 /// What messages of the library call a setting, and what it is called here.
 pub const KEYWORDS: &[(&str, &str)] = &[
+    ("AprilGridSpec::gap", "gap"),
+    ("AprilGridSpec::tag_mm", "tag_mm"),
+    ("AprilGridSpec::tags", "tags"),
     ("BoardSpec::board_id", "board_id"),
     ("BoardSpec::boards", "boards"),
     ("BoardSpec::cols", "cols"),
@@ -37,8 +40,18 @@ pub const KEYWORDS: &[(&str, &str)] = &[
     ("Calibration::board_shape", "board_shape"),
     ("Calibration::measure_target", "measure_target"),
     ("Calibration::refine_panels", "refine_target=True"),
+    ("CharucoSpec::dictionary", "dictionary"),
+    ("CharucoSpec::marker_mm", "marker_mm"),
+    ("CharucoSpec::square_mm", "square_mm"),
+    ("CharucoSpec::squares", "squares"),
+    ("CirclesSpec::circles", "circles"),
+    ("CirclesSpec::diameter_mm", "diameter_mm"),
+    ("CirclesSpec::spacing_mm", "spacing_mm"),
     ("Dialect::Fork", "dsc-fork"),
     ("Family::to_json", "Family.to_json"),
+    ("ImportSpec::bits", "bits"),
+    ("ImportSpec::distance", "distance"),
+    ("ImportSpec::kind", "kind"),
     ("Limits::max_bytes", "max_bytes"),
     ("Limits::max_depth", "max_depth"),
     ("Limits::max_nodes", "max_nodes"),

@@ -57,6 +57,21 @@ pub fn name(text: &str) -> Result<String, String> {
     Name::without_dots(text).map(Into::into)
 }
 
+/// Two whole numbers, such as 8x6.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Grid(pub [u32; 2]);
+
+impl FromStr for Grid {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let sides = text.split_once(['x', 'X', '×']);
+        let number = |side: &str| whole(0..=u32::MAX)(side.trim()).ok();
+        let sides = sides.and_then(|(a, b)| Some([number(a)?, number(b)?]));
+        sides.map(Self).ok_or_else(|| "write two whole numbers such as 8x6".to_owned())
+    }
+}
+
 /// Ids of tags, in the order given.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Ids(pub Vec<u32>);
@@ -115,6 +130,15 @@ mod tests {
         assert_eq!("3,7,20-22".parse::<Ids>().unwrap().0, [3, 7, 20, 21, 22]);
         for bad in ["", "-", "5-3", "a", "1-99999999", "0-9,,1", "0,0", "1-5,3"] {
             assert!(bad.parse::<Ids>().is_err(), "{bad}");
+        }
+    }
+
+    #[test]
+    fn grids_are_two_numbers() {
+        assert_eq!("8x6".parse(), Ok(Grid([8, 6])));
+        assert_eq!("11 × 8".parse(), Ok(Grid([11, 8])));
+        for bad in ["", "8", "x", "8x", "8x6x5", "-8x6", "8.5x6", "99999999999x2"] {
+            assert!(bad.parse::<Grid>().is_err(), "{bad}");
         }
     }
 

@@ -19,6 +19,9 @@ struct Named {
 
 /// Everything that messages of the library name.
 const NAMED: &[Named] = &[
+    named("AprilGridSpec::gap", "deltille aprilgrid", "--gap"),
+    named("AprilGridSpec::tag_mm", "deltille aprilgrid", "--edge"),
+    named("AprilGridSpec::tags", "deltille aprilgrid", "--tags"),
     named("BoardSpec::board_id", "deltille board", "--board-id"),
     named("BoardSpec::boards", "deltille board", "--boards"),
     named("BoardSpec::cols", "deltille board", "--cols"),
@@ -28,8 +31,18 @@ const NAMED: &[Named] = &[
     named("Calibration::board_shape", "deltille calibrate", "--board-shape"),
     named("Calibration::measure_target", "deltille calibrate", "--measure-target"),
     named("Calibration::refine_panels", "deltille rig", "--refine-target"),
+    named("CharucoSpec::dictionary", "deltille charuco", "--dictionary"),
+    named("CharucoSpec::marker_mm", "deltille charuco", "--marker"),
+    named("CharucoSpec::square_mm", "deltille charuco", "--edge"),
+    named("CharucoSpec::squares", "deltille charuco", "--squares"),
+    named("CirclesSpec::circles", "deltille circles", "--circles"),
+    named("CirclesSpec::diameter_mm", "deltille circles", "--diameter"),
+    named("CirclesSpec::spacing_mm", "deltille circles", "--spacing"),
     named("Dialect::Fork", "deltille board", "--dsc-dialect fork"),
     named("Family::to_json", "deltag gen-family", ""),
+    named("ImportSpec::bits", "deltag import", "--bits"),
+    named("ImportSpec::distance", "deltag import", "--distance"),
+    named("ImportSpec::kind", "deltag import", "--shape"),
     named("Limits::max_bytes", "deltille verify", "--max-bytes"),
     named("Limits::max_depth", "deltille verify", "--max-depth"),
     named("Limits::max_nodes", "deltille verify", "--max-nodes"),

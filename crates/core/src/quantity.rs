@@ -221,6 +221,8 @@ quantities! {
     side_of_matrix: 0.0 to 10_000.0 "";
     /// A border of a tag.
     border_bits: 0.0 to 100.0 "bit-widths";
+    /// The width of a gap between tags, in tags.
+    gap_edges: 0.01 to 1.0 "edges";
     /// A measured length over the stated one.
     print_scale: 0.5 to 2.0 "";
     /// A resolution.

@@ -127,7 +127,11 @@ fn is_solid(target: &Target) -> bool {
     match target.spec {
         TargetSpec::Solid(_) => true,
         TargetSpec::Listed(_) => target.panels.len() > 1,
-        TargetSpec::Board(_) | TargetSpec::Tags(_) => false,
+        TargetSpec::Board(_)
+        | TargetSpec::Tags(_)
+        | TargetSpec::Charuco(_)
+        | TargetSpec::AprilGrid(_)
+        | TargetSpec::Circles(_) => false,
     }
 }
 

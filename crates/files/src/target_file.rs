@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use deltille_core::family::Family;
+use deltille_core::family::{Family, PAIRS_COUNTED, certify_codes};
 use deltille_core::targets::{Target, TargetFileError};
 
 use crate::export::dsc::{self, DscError};
@@ -94,6 +94,14 @@ pub enum TargetFamilyError {
         /// Why.
         error: Box<FamilyFileError>,
     },
+    /// A family that is not what its file claims.
+    #[error("{name} is not what it claims: {failure}")]
+    Rejected {
+        /// The family's name.
+        name: String,
+        /// The first claim that does not hold.
+        failure: String,
+    },
     /// A family with other codes.
     #[error("{target} was made with fingerprint {wanted} of {name}, this one is {found}")]
     Other {
@@ -109,10 +117,11 @@ pub enum TargetFamilyError {
 }
 
 /// The family of a target: the one given, else by the name in the target, else by the path in its spec. Its codes must be
-/// those that the target was made with. `None` of a target without tags.
+/// those that the target was made with, and as far apart as the family claims: what is read by it is believed by
+/// that. `None` of a target without tags.
 ///
 /// # Errors
-/// Where it cannot be read, or has other codes.
+/// Where it cannot be read, has other codes, or some that are closer than it claims.
 pub fn family(target: &Target, given: Option<&str>) -> Result<Option<Family>, TargetFamilyError> {
     let Some(wanted) = &target.family else {
         return match given {
@@ -137,6 +146,14 @@ pub fn family(target: &Target, given: Option<&str>) -> Result<Option<Family>, Ta
             wanted: wanted.fingerprint.clone(),
             found: family.fingerprint().to_owned(),
         });
+    }
+    // Those that are shipped were compared when they were made.
+    let is_shipped = Family::shipped(family.name()).is_ok_and(|shipped| shipped == family);
+    if !is_shipped
+        && family.len() <= PAIRS_COUNTED
+        && let Some(failure) = certify_codes(&family).failures.into_iter().next()
+    {
+        return Err(TargetFamilyError::Rejected { name: family.name().to_owned(), failure });
     }
     Ok(Some(family))
 }

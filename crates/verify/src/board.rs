@@ -139,6 +139,22 @@ pub enum BoardFinding {
         /// Found minus stated position.
         by_mm: DVec2,
     },
+    /// A disc has another size.
+    #[error(
+        "circle {id} at row {row} col {col} has a diameter of {found_mm:.3} mm instead of {stated_mm:.3} mm"
+    )]
+    DiscDiameter {
+        /// Corner id.
+        id: u32,
+        /// Lattice row.
+        row: i32,
+        /// Lattice column.
+        col: i32,
+        /// That of a disc with as much ink.
+        found_mm: f64,
+        /// Stated.
+        stated_mm: f64,
+    },
     /// A corner was found where the target has none.
     #[error("a corner at ({:.2}, {:.2}) mm where none should be", at_mm.x, at_mm.y)]
     CornerExtra {
@@ -172,6 +188,7 @@ impl BoardFinding {
                 | Self::CornerMissing { .. }
                 | Self::CornerOff { .. }
                 | Self::CornerExtra { .. }
+                | Self::DiscDiameter { .. }
         )
     }
 }

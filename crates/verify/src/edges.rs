@@ -12,6 +12,7 @@ use rayon::prelude::*;
 
 use super::tiles::{Expected, PlacedPanel};
 use deltille_core::lattice::Tile;
+use deltille_core::targets::Panel;
 
 /// Side of the squares over which ink is added up, px: shorter than the side of a cell that is drawn for a check.
 const SQUARE: usize = 8;
@@ -30,7 +31,7 @@ pub(super) struct MovedEdge {
     pub by_mm: f64,
 }
 
-/// From pixels to positions in the lattice of the panel, in edges.
+/// From pixels to positions in the panel, in edges.
 struct LatticeFromPx {
     origin: DVec2,
     right: DVec2,
@@ -62,11 +63,12 @@ impl PlacedPanel<'_> {
         tolerance_px: f64,
     ) -> Vec<MovedEdge> {
         let Some(lattice_from_px) = LatticeFromPx::new(self) else { return Vec::new() };
-        let tile_at = |px| self.panel.kind.tile_at(lattice_from_px.apply(px));
+        let tile_at = |px| self.panel.tile_at(lattice_from_px.apply(px));
         let is_black = |px: DVec2| {
             let at = lattice_from_px.apply(px);
-            let tile = self.panel.kind.tile_at(at);
-            let here = expected.get(&tile).map(|expected| expected.is_black_at(uv(tile, at)));
+            let tile = self.panel.tile_at(at);
+            let uv = |tile| uv(self.panel, tile, at);
+            let here = expected.get(&tile).map(|expected| expected.is_black_at(uv(tile)));
             here.unwrap_or(self.panel.inverted)
         };
         let (width, height) = (self.page.image.width(), self.page.image.height());
@@ -159,9 +161,9 @@ fn covered([x, y]: [usize; 2], is_black: &impl Fn(DVec2) -> bool) -> f64 {
     black.count() as f64 / (SAMPLES * SAMPLES) as f64
 }
 
-/// Tile coordinates of a position in the lattice, in edges.
-fn uv(tile: Tile, at: DVec2) -> DVec2 {
-    let [a, b, c] = tile.frame().map(|v| tile.kind().position(v.row.into(), v.col.into()));
+/// Tile coordinates of a position in the panel, in edges.
+fn uv(panel: &Panel, tile: Tile, at: DVec2) -> DVec2 {
+    let [a, b, c] = tile.frame().map(|vertex| panel.position(vertex));
     let (ab, ac, p) = (b - a, c - a, at - a);
     DVec2::new(p.perp_dot(ac), ab.perp_dot(p)) / ab.perp_dot(ac)
 }

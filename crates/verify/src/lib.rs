@@ -65,7 +65,7 @@ mod on_disk;
 mod reader;
 mod scene;
 mod solid;
-mod tags;
+mod stated;
 mod tiles;
 mod verdict;
 
@@ -582,11 +582,9 @@ impl<'a> Verifier<'a> {
     /// Compares the panels and marks of a whole sheet.
     fn verify_sheet(&self, page: &Page, layout: &SheetLayout, verdict: &mut SheetVerdict) -> Seen {
         let placed = self.placed(page, layout);
-        let tags_alone = !placed.is_empty()
-            && placed.len() == layout.placements.len()
-            && placed.iter().all(|p| p.panel.is_tag_alone());
-        let (found_from_stated, seen) = if tags_alone {
-            tags::check(self, page, layout, verdict);
+        let all_stated = placed.len() == layout.placements.len() && stated::is_for(&placed);
+        let (found_from_stated, seen) = if all_stated {
+            stated::check(self, page, layout, verdict);
             (AffineMap::IDENTITY, Seen::new())
         } else {
             board::check(self, page, layout, verdict)

@@ -22,7 +22,7 @@ use deltille_core::artwork;
 use deltille_core::lattice::{Orientation, Tile};
 use deltille_core::polygon;
 use deltille_core::raster::{Coverage, Gray};
-use deltille_core::targets::{CHECK_BAR_STROKE_MM, Label, LineKind, SheetLayout};
+use deltille_core::targets::{CHECK_BAR_STROKE_MM, Corner, Label, LineKind, SheetLayout};
 
 /// Ink of a mark and of its outline, each the mean of 3 × 3 pixels, may differ by this. An edge
 /// that lies 0.02 mm off at 300 dpi changes a mean by 0.08, a missing stroke by more than 0.5.
@@ -43,6 +43,9 @@ const MOST_SPOTS: usize = 200;
 
 /// Greatest deviation of the line segments that replace curves, mm.
 const FLATNESS_MM: f64 = 0.002;
+
+/// Sides of the polygon that is compared with a disc: of a metre they are within 5 µm of a circle.
+const DISC_SIDES: u32 = 720;
 
 /// A deviation outside the tiles of a sheet. Lengths in mm in the page frame.
 #[derive(Clone, Debug, PartialEq, Serialize, thiserror::Error)]
@@ -80,6 +83,14 @@ pub enum MarkFinding {
         line: usize,
         /// Its purpose.
         purpose: LineKind,
+    },
+    /// A disc is not round, or not solid.
+    #[error("circle at row {row} col {col} differs from the description")]
+    DiscDiffers {
+        /// Lattice row.
+        row: i32,
+        /// Lattice column.
+        col: i32,
     },
     /// Ink, or on a black field a lack of it, outside the tiles, texts and check bars.
     #[error("spot of {area_mm2:.3} mm² at ({:.2}, {:.2}) mm", at_mm.x, at_mm.y)]
@@ -128,7 +139,8 @@ pub(super) fn check(
         let is_beside = |ground: &Ground| ground.expected(page, at, EDGE_PX).is_none();
         !window.is_some_and(in_window) && grounds.iter().all(is_beside)
     };
-    let (marks, mut findings) = marks(layout);
+    let (mut marks, mut findings) = marks(layout);
+    marks.extend(panels.iter().flat_map(discs));
     let drawn = Drawn::new(page, &marks);
     findings.par_extend(marks.par_iter().filter_map(|mark| {
         let is_right = mark.areas.iter().all(|area| drawn.is_in(area, is_own));
@@ -162,6 +174,8 @@ enum What {
     Text(usize),
     CheckBar(usize),
     Line(usize),
+    /// By row and column of its panel.
+    Disc(i32, i32),
 }
 
 impl What {
@@ -175,6 +189,7 @@ impl What {
             Self::Line(i) => {
                 MarkFinding::LineDiffers { line: i + 1, purpose: layout.lines[i].kind }
             }
+            Self::Disc(row, col) => MarkFinding::DiscDiffers { row, col },
         }
     }
 }
@@ -227,6 +242,24 @@ fn marks(layout: &SheetLayout) -> (Vec<Mark>, Vec<MarkFinding>) {
         marks.push(Mark { what: What::Line(index), outlines, areas });
     }
     (marks, findings)
+}
+
+/// The discs of a panel, each a polygon of so many sides that it is a circle.
+fn discs(placed: &PlacedPanel) -> Vec<Mark> {
+    let Some(diameter) = placed.panel.discs_mm else { return Vec::new() };
+    let radius = diameter / 2.0;
+    let disc = |corner: &Corner| {
+        let middle = placed.page_from_panel(corner.panel_mm);
+        let angles = (0..DISC_SIDES).map(|n| f64::from(n) * TAU / f64::from(DISC_SIDES));
+        let outline = angles.map(|angle| middle + radius * DVec2::from_angle(angle)).collect();
+        let bounds = Rect::from_center_size((middle.x, middle.y), (diameter, diameter));
+        Mark {
+            what: What::Disc(corner.row, corner.col),
+            outlines: vec![outline],
+            areas: vec![Area { along: Affine::IDENTITY, bounds }],
+        }
+    };
+    placed.panel.corners.iter().map(disc).collect()
 }
 
 /// A path as polygons.
@@ -499,9 +532,8 @@ impl<'a> Ground<'a> {
         }
         let edge_mm = self.placed.panel.edge_mm;
         let near = near_px / page.px_per_mm;
-        let reaches = |off: DVec2| {
-            self.tiles.contains(self.placed.panel.kind.tile_at((place + off) / edge_mm))
-        };
+        let reaches =
+            |off: DVec2| self.tiles.contains(self.placed.panel.tile_at((place + off) / edge_mm));
         let in_tile =
             reaches(DVec2::ZERO) || self.probes.iter().any(|&probe| reaches(near * probe));
         let undecided = in_tile || (self.inverted() && inside < near_px);

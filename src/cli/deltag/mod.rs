@@ -5,6 +5,7 @@ mod by_rank;
 mod checkpoint;
 mod export;
 mod gen_family;
+mod import;
 mod info;
 mod list;
 mod parameters;
@@ -52,6 +53,9 @@ enum Command {
     ByRank(by_rank::Args),
     /// Write a family for another program
     Export(export::Args),
+    /// Make a family file of a table of another program
+    #[command(after_help = import::HELP)]
+    Import(import::Args),
     /// Draw tags of a family on one picture, to look at
     Show(show::Args),
     /// Print tags of a family to true scale, on as many pages as they take
@@ -74,6 +78,7 @@ pub fn run(deltag: Deltag) -> anyhow::Result<ExitCode> {
         Command::Plan(args) => plan::run(args),
         Command::ByRank(args) => by_rank::run(args),
         Command::Export(args) => export::run(args),
+        Command::Import(args) => import::run(args),
         Command::Show(args) => show::run(args),
         Command::Sheet(args) => sheet::run(args),
         Command::List(args) => list::run(args),

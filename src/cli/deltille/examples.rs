@@ -15,6 +15,18 @@ pub const CHECKERBOARD: &str = "Examples:
   deltille checkerboard --rows 8 --cols 11 --edge 25mm
   deltille checkerboard --rows 8 --cols 11 --tags t36h11 --name tagged -o tagged";
 
+pub const CHARUCO: &str = "Examples:
+  deltille charuco --squares 8x6 --edge 30mm --marker 22mm --dictionary 5x5_100
+  deltille charuco --squares 11x8 --edge 20mm --dictionary apriltag_36h11 --svg --png -o board";
+
+pub const APRILGRID: &str = "Examples:
+  deltille aprilgrid --tags 6x6 --edge 25mm --gap 0.3
+  deltille aprilgrid --tags 6x6 --edge 88mm --paper A0 --name wall -o wall";
+
+pub const CIRCLES: &str = "Examples:
+  deltille circles --circles 9x7 --spacing 25mm
+  deltille circles --circles 4x11 --asymmetric --spacing 18mm --diameter 12mm";
+
 pub const SOLID: &str = "Examples:
   deltille icosahedron --edge 150mm --pdf --name ico -o ico
   deltille octahedron --paper A4 --pdf

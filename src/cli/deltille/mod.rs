@@ -1,10 +1,13 @@
 //! `deltille`: make, detect and verify deltille targets.
 
+mod aprilgrid;
 mod bench;
 mod board;
 mod calibrate;
 mod calibrating;
 mod camera_file;
+mod charuco;
+mod circles;
 mod compare;
 mod delivery;
 mod detect;
@@ -20,6 +23,7 @@ mod meshes;
 mod page;
 mod plan;
 mod pose;
+mod printing;
 mod refine;
 mod render;
 mod rig;
@@ -59,6 +63,15 @@ enum Command {
     #[command(after_help = examples::CHECKERBOARD)]
     #[command(mut_arg("family", |arg| arg.long("tags").alias("family")))]
     Checkerboard(Box<board::Args>),
+    /// Make a ChArUco board, a checkerboard with markers, for OpenCV
+    #[command(after_help = examples::CHARUCO)]
+    Charuco(Box<charuco::Args>),
+    /// Make an AprilGrid, tags in rows, for Kalibr
+    #[command(after_help = examples::APRILGRID)]
+    Aprilgrid(Box<aprilgrid::Args>),
+    /// Make a grid of circles, plain or asymmetric, for OpenCV
+    #[command(after_help = examples::CIRCLES)]
+    Circles(Box<circles::Args>),
     /// Make a tetrahedron with tagged boards on its faces: a mesh, and what to print
     #[command(after_help = examples::SOLID)]
     Tetrahedron(Box<solid::Args>),
@@ -126,6 +139,9 @@ pub fn run(deltille: Deltille) -> anyhow::Result<ExitCode> {
         Command::Plan(args) => plan::run(args),
         Command::Board(args) => board::run(GridKind::Deltille, *args),
         Command::Checkerboard(args) => board::run(GridKind::Checker, *args),
+        Command::Charuco(args) => charuco::run(*args),
+        Command::Aprilgrid(args) => aprilgrid::run(*args),
+        Command::Circles(args) => circles::run(*args),
         Command::Tetrahedron(args) => solid::run(SolidShape::Tetrahedron, *args),
         Command::Octahedron(args) => solid::run(SolidShape::Octahedron, *args),
         Command::Icosahedron(args) => solid::run(SolidShape::Icosahedron, *args),

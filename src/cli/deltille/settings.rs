@@ -25,7 +25,7 @@ use crate::targets::{
 pub const DEFAULT_DPI: u32 = 300;
 
 /// Range of the resolution: in a coarser picture a check bar cannot be measured to 0.02 mm.
-const DPI: RangeInclusive<u32> = 200..=2400;
+pub(super) const DPI: RangeInclusive<u32> = 200..=2400;
 
 /// Heading of the help of boards and solids: tags.
 pub const TAGS: &str = "Tags";

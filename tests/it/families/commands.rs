@@ -4,6 +4,7 @@ use std::path::Path;
 
 use crate::common::page::Page;
 use assert_cmd::Command;
+use deltille::family::{Construction, Family};
 
 fn deltag() -> Command {
     Command::cargo_bin("deltag").unwrap()
@@ -346,4 +347,68 @@ fn exports_are_read_by_opencv() {
                 list(tags.CODES)\n";
     let python = std::env::var_os("DELTILLE_PYTHON").expect("it was set when this was built");
     assert_runs(exports().path(), python, &["-c", text]);
+}
+
+#[test]
+fn tables_of_other_programs_become_families() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    let codes = Family::shipped("aprilTag16h5").unwrap();
+    let list = |suffix: &str| -> String {
+        codes.codes().iter().map(|code| format!("  0x{code:04x}{suffix},\n")).collect()
+    };
+    let c = format!("/* 16h5 */\nstatic const uint64_t t16h5[] = {{\n{}}};\n", list("ULL"));
+    std::fs::write(at.join("mine.h"), c).unwrap();
+    std::fs::write(at.join("mine.py"), format!("BITS = 16\ncodes = [\n{}]\n", list(""))).unwrap();
+    std::fs::write(at.join("words.txt"), "231b\n2ea5\n346a\n").unwrap();
+    std::fs::write(at.join("prose.txt"), "no table\n").unwrap();
+    let mut page = Page::default();
+    for args in [
+        "mine.h --shape square --bits 16 --name t16h5",
+        "mine.py --shape square",
+        "words.txt --shape triangle --bits 16 --distance 4",
+    ] {
+        assert!(page.run(at, &format!("deltag import {args}")).status.success(), "{args}");
+    }
+    let read = std::fs::read_to_string(at.join("t16h5.json")).unwrap();
+    assert_eq!(Family::from_json(&read).unwrap().fingerprint(), codes.fingerprint());
+    page.run(at, "deltag verify-family t16h5.json mine.json words.json aprilTag36h11");
+    let board = "deltille checkerboard --rows 4 --cols 5 --tags t16h5.json --png --name own";
+    assert!(page.run(at, board).status.success());
+    assert!(page.run(at, "deltille detect own.png --target own.json -o found").status.success());
+
+    page.title("What is no table");
+    for args in [
+        "prose.txt",
+        "mine.h --shape square",
+        "mine.h --bits 16",
+        "mine.h --shape square --bits 20",
+        "mine.h --shape square --bits 9",
+        "mine.h --shape square --bits 16 --distance 7",
+        "nowhere.h",
+    ] {
+        page.refused(at, &format!("deltag import {args}"));
+    }
+    page.is("deltag-import");
+}
+
+/// Whoever reads tags by a family believes in its distance.
+#[test]
+fn a_family_that_is_not_what_it_claims_is_not_detected_with() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    let known = Family::shipped("delTag16h5").unwrap();
+    let (dimension, rules) = (known.dimension(), known.rules().clone());
+    let source = Construction::Imported { source: "nowhere".to_owned() };
+    let codes = known.codes().to_vec();
+    let lies = Family::new("lies", dimension, 7, codes, rules, source).unwrap();
+    std::fs::write(at.join("lies.json"), lies.to_json()).unwrap();
+    let mut page = Page::default();
+    page.run(at, "deltag verify-family lies.json");
+    page.run(
+        at,
+        "deltille board --rows 5 --cols 6 --family lies.json --png --name own --no-verify",
+    );
+    page.refused(at, "deltille detect own.png --target own.json --family lies.json -o found");
+    page.is("family-rejected");
 }

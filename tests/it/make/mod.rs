@@ -4,6 +4,7 @@ mod dsc;
 mod export;
 mod meshes;
 mod net;
+mod other_detectors;
 mod plan;
 mod solid;
 mod tag_sheets;

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use glam::DVec2;
-use kurbo::{Affine, BezPath, Point, Rect};
+use kurbo::{Affine, BezPath, Circle, Point, Rect, Shape as _};
 
 use super::{ArtworkError, Paint, Part, Shape, Sheet, cells, check_bar, strokes_mm, text, window};
 use crate::family::Family;
@@ -11,6 +11,9 @@ use crate::lattice::{TagCells, Tile};
 use crate::targets::{
     Panel, Placement, SheetLayout, SheetLine, SheetPage, SheetText, TagPlacement, TagsIn, Target,
 };
+
+/// How far the curves of a disc may be from a circle, mm.
+const DISC_TOLERANCE_MM: f64 = 1e-4;
 
 /// Draws sheet `index` of a target, in the frame of the whole sheet, mm.
 pub(super) fn sheet(
@@ -103,6 +106,14 @@ pub(super) fn draw_panel(
 ) -> Result<Vec<Shape>, ArtworkError> {
     let page_from_panel = Affine::translate((placement.origin_mm.x, placement.origin_mm.y))
         * Affine::rotate(placement.angle_rad);
+    if let Some(diameter) = panel.discs_mm {
+        let discs = panel.corners.iter().map(|corner| {
+            let path = page_from_panel * disc(corner.panel_mm, diameter);
+            let part = Part::Tile { panel: panel.id, row: corner.row, col: corner.col };
+            Shape { part, paint: Paint::Fill, path }
+        });
+        return Ok(discs.collect());
+    }
     let mut drawn: BTreeMap<Tile, BezPath> =
         panel.dark_tiles().into_iter().map(|tile| (tile, tile_outline(panel, tile, 0.0))).collect();
     for tag in &panel.tags {
@@ -152,11 +163,15 @@ fn tag_word(
 
 /// A polygon in the frame of its panel, mm, from points in the coordinates of a tile.
 fn in_tile(panel: &Panel, tile: Tile, outline: impl IntoIterator<Item = DVec2>) -> BezPath {
-    let (row, col) = (f64::from(tile.anchor.row), f64::from(tile.anchor.col));
-    polygon(outline.into_iter().map(|DVec2 { x: u, y: v }| {
-        let place = panel.kind.position(row + v, col + u) * panel.edge_mm;
+    polygon(outline.into_iter().map(|at| {
+        let place = panel.place_in_tile(tile, at) * panel.edge_mm;
         Point::new(place.x, place.y)
     }))
+}
+
+/// The outline of a disc, mm.
+pub(super) fn disc(middle: DVec2, diameter: f64) -> BezPath {
+    Circle::new((middle.x, middle.y), diameter / 2.0).to_path(DISC_TOLERANCE_MM)
 }
 
 /// The outline of a tile in the frame of its panel, mm, moved inwards by the fraction `inside` of

@@ -225,6 +225,9 @@ pub fn subject(target: &Target) -> String {
     let tags: usize = target.panels.iter().map(|panel| panel.tags.len()).sum();
     let what = match corners {
         0 => "single DelTags".to_owned(),
+        _ if target.panels.iter().all(|panel| panel.discs_mm.is_some()) => {
+            format!("calibration target of {corners} circles")
+        }
         _ => {
             let kind = match target.panels.first().map(|panel| panel.kind) {
                 Some(GridKind::Checker) => "checkerboard",

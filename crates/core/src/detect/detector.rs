@@ -18,7 +18,7 @@ use super::reason::{Reason, ReasonKind};
 use super::refine::{Refinement, Refiner};
 use super::refine_grid::{is_sampled, sharp_level};
 use super::saddles::{SaddleFinder, too_many};
-use super::scene::{SceneError, check_distinct};
+use super::scene::{SceneError, check_detectable, check_distinct};
 use super::tile_shape::is_of_squares;
 use super::tiling::{CHECKER, DELTILLE, kind, step};
 use super::why;
@@ -256,7 +256,9 @@ impl Detector {
         targets: &[(&Target, Option<&Family>)],
         config: DetectorConfig,
     ) -> Result<Self, SceneError> {
-        check_distinct(&targets.iter().map(|(target, _)| *target).collect::<Vec<_>>())?;
+        let all: Vec<&Target> = targets.iter().map(|(target, _)| *target).collect();
+        check_distinct(&all)?;
+        check_detectable(&all)?;
         if let [(only, family)] = targets {
             return Ok(Self::for_target(only, *family, config));
         }

@@ -12,6 +12,14 @@ pub enum SceneError {
     /// No target.
     #[error("there is no target to look for")]
     Empty,
+    /// A target without corners of tiles.
+    #[error(
+        "{name} has circles, and detection finds corners of tiles: OpenCV's `findCirclesGrid` finds its circles"
+    )]
+    Circles {
+        /// The target.
+        name: String,
+    },
     /// Targets of one name, by which results tell them apart.
     #[error("two targets are named {name}: give each its own name")]
     SameName {
@@ -43,6 +51,18 @@ pub enum SceneError {
         /// Another one.
         second: String,
     },
+}
+
+/// Refuses targets that detection does not find.
+///
+/// # Errors
+/// Where one has circles instead of tiles.
+pub(super) fn check_detectable(targets: &[&Target]) -> Result<(), SceneError> {
+    let has_discs = |target: &&&Target| target.panels.iter().any(|panel| panel.discs_mm.is_some());
+    match targets.iter().find(has_discs) {
+        Some(target) => Err(SceneError::Circles { name: target.name.to_string() }),
+        None => Ok(()),
+    }
 }
 
 /// Refuses targets that cannot be told apart in a picture.

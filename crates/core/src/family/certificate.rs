@@ -117,9 +117,13 @@ const PREFIX: u64 = 1 << 22;
 /// distance is proved from the structure that the file records
 /// ([`super::algebra::AlgebraicConstruction::prove`]), and a sample of pairs is compared as well.
 pub fn certify_codes(family: &Family) -> Certificate {
-    let cells = TagCells::new(family.dimension());
+    let cells = family.cells();
     let codes = family.codes();
-    let screen = Screen::new(TagWords::new(family.dimension()), family.distance(), family.rules());
+    let screen = Screen::new(
+        TagWords::of(family.kind(), family.dimension()),
+        family.distance(),
+        family.rules(),
+    );
     let rule_breakers: Vec<u32> = (0..)
         .zip(codes)
         .filter(|&(_, &code)| !admits(&cells, &screen, family, code))
@@ -138,7 +142,7 @@ pub fn certify_codes(family: &Family) -> Certificate {
         let step = codes.len().div_ceil(SAMPLE);
         codes.iter().copied().step_by(step).collect()
     };
-    let histogram = distance_histogram(family.dimension(), &compared);
+    let histogram = distance_histogram(family.kind(), family.dimension(), &compared);
     let min_distance = histogram.keys().next().copied().unwrap_or(family.dimension().bits());
     let mut closest = [0; 2];
     if min_distance < family.distance() {
@@ -190,11 +194,11 @@ fn admits(cells: &TagCells, screen: &Screen, family: &Family, code: u64) -> bool
 
 fn closest_pair(cells: &TagCells, codes: &[u64], distance: u32) -> [u32; 2] {
     for (i, &code) in codes.iter().enumerate() {
-        let once = cells.rotate(code);
-        if (code ^ once).count_ones() == distance {
+        let turns = std::iter::successors(Some(code), |&word| Some(cells.rotate(word)));
+        let turns: Vec<u64> = turns.take(usize::from(cells.kind().turns())).collect();
+        if turns[1..].iter().any(|turn| (code ^ turn).count_ones() == distance) {
             return [i as u32; 2];
         }
-        let turns = [code, once, cells.rotate(once)];
         let near = |&other: &u64| turns.iter().any(|t| (t ^ other).count_ones() == distance);
         if let Some(j) = codes[..i].iter().position(near) {
             return [j as u32, i as u32];

@@ -18,14 +18,15 @@
 //! One family is of another kind, [`places`]: on its boards every tile has a tag of nine cells, which tell a place only
 //! together with those beside them.
 //!
-//! Families of square tags, the AprilTags of checkerboards, are read, decoded and drawn like the
-//! others, with their four turns by 90°; they are neither searched nor certified here.
+//! Families of square tags, the AprilTags of checkerboards, are read, decoded, drawn and certified like the
+//! others, with their four turns by 90°; they are not searched here.
 //!
 //! Limits: codes have 9, 16, 25, 36 or 49 bits ([`crate::lattice::Dimension`]). Loading a family
 //! checks its form and fingerprint; the distance between its codes is proved by [`certify`], which
 //! costs the square of their number.
 
 pub mod algebra;
+mod aruco;
 pub mod best;
 pub mod bounds;
 mod certificate;
@@ -34,6 +35,7 @@ mod decoder;
 mod error;
 mod export;
 mod file;
+mod import;
 mod independent;
 mod kernels;
 pub mod lexicode;
@@ -48,6 +50,7 @@ mod tagwords;
 
 use std::collections::BTreeMap;
 
+pub use aruco::{dictionary, dictionary_names};
 pub use certificate::{Certificate, certify, certify_codes};
 pub use control::{Control, Progress};
 pub use decoder::{Decoded, Decoder};
@@ -55,6 +58,7 @@ pub use error::FamilyError;
 pub use export::{ExportFormat, export};
 pub use file::check_name;
 pub use file::{Construction, SCHEMA};
+pub use import::{ImportError, ImportSpec, import};
 pub use reading::Reading;
 pub use rules::{Rules, Screen};
 pub use shipped::{ShippedFamily, shipped_families, shipped_names, smallest_shipped, square_names};
@@ -98,10 +102,22 @@ impl Family {
         rules: Rules,
         construction: Construction,
     ) -> Result<Self, FamilyError> {
-        let kind = GridKind::Deltille;
+        Self::of(name, GridKind::Deltille, dimension, distance, codes, rules, construction)
+    }
+
+    /// The same of tags that fill a tile of `kind`.
+    fn of(
+        name: &str,
+        kind: GridKind,
+        dimension: Dimension,
+        distance: u32,
+        codes: Vec<u64>,
+        rules: Rules,
+        construction: Construction,
+    ) -> Result<Self, FamilyError> {
         file::check_form(name, kind, dimension, distance, &codes, &rules)?;
         let histogram = if codes.len() <= PAIRS_COUNTED {
-            distance_histogram(dimension, &codes)
+            distance_histogram(kind, dimension, &codes)
         } else {
             BTreeMap::new()
         };
@@ -120,13 +136,17 @@ impl Family {
         })
     }
 
-    /// A family that comes with the crate, by its name.
+    /// A family that comes with the crate, by its name: those of [`shipped_families`], and the dictionaries of
+    /// [`dictionary_names`].
     ///
     /// # Errors
     /// Where no family of that name is shipped; the message names those that are.
     pub fn shipped(name: &str) -> Result<Self, FamilyError> {
-        let unknown = || FamilyError::Unknown { name: name.to_owned() };
-        Self::from_json(shipped::json(name).ok_or_else(unknown)?)
+        match shipped::json(name) {
+            Some(json) => Self::from_json(json),
+            None => aruco::family(name)
+                .unwrap_or_else(|| Err(FamilyError::Unknown { name: name.to_owned() })),
+        }
     }
 
     /// The family of place codes, see [`places`].

@@ -15,6 +15,9 @@ pub struct Rules {
 }
 
 impl Rules {
+    /// No rules: what is known of families from elsewhere.
+    pub const NONE: Self = Self { min_complexity: 0.0, black_distance: 0, white_distance: 0 };
+
     /// The rules of the published families: half of the pairs differ, and the untagged tile is as
     /// far as another code (`docs/families.md`, “What a family is”). The distance from a code to its
     /// own turns is always h.

@@ -8,18 +8,28 @@ use crate::lattice::{Dimension, GridKind};
 
 /// Number of unordered pairs of different words, among the codes and their turns, at each distance.
 ///
-/// Turning both words of a pair changes nothing, so pairs come in threes and the count is
-/// 3·(pairs of two codes in any turn) + 3·(a code and its own turn).
-pub fn distance_histogram(dimension: Dimension, codes: &[u64]) -> BTreeMap<u32, u64> {
-    let words = TagWords::new(dimension);
-    let turned: Vec<[u64; 3]> = codes.iter().map(|&code| words.turns(code)).collect();
-    let counts = turned
+/// Turning both words of a pair changes nothing, so with n turns pairs come in n, and the count is
+/// n·(pairs of two codes in any turn) + n·(a code and its own turn); but of half turns of a code there are n/2.
+pub fn distance_histogram(
+    kind: GridKind,
+    dimension: Dimension,
+    codes: &[u64],
+) -> BTreeMap<u32, u64> {
+    let words = TagWords::of(kind, dimension);
+    let n = usize::from(kind.turns());
+    let turns = |&code: &u64| std::iter::successors(Some(code), |&word| Some(words.turn(word)));
+    let turned: Vec<u64> = codes.iter().flat_map(|code| turns(code).take(n)).collect();
+    let counts = codes
         .par_iter()
         .enumerate()
-        .map(|(i, &[code, once, _])| {
+        .map(|(i, &code)| {
             let mut counts = [0u64; 65];
-            counts[(code ^ once).count_ones() as usize] += 1;
-            count_distances(code, turned[..i].as_flattened(), &mut counts);
+            count_distances(code, &turned[..n * i], &mut counts);
+            counts.iter_mut().for_each(|count| *count *= n as u64);
+            for turn in 1..=n / 2 {
+                let pairs = if 2 * turn == n { n / 2 } else { n };
+                counts[(code ^ turned[n * i + turn]).count_ones() as usize] += pairs as u64;
+            }
             counts
         })
         .reduce(
@@ -29,7 +39,7 @@ pub fn distance_histogram(dimension: Dimension, codes: &[u64]) -> BTreeMap<u32, 
                 sum
             },
         );
-    (0..).zip(counts).filter(|&(_, n)| n > 0).map(|(d, n)| (d, 3 * n)).collect()
+    (0..).zip(counts).filter(|&(_, n)| n > 0).collect()
 }
 
 /// Probability that a random word is within t cells of a code or one of its turns, for

@@ -16,7 +16,12 @@ use crate::targets::{Panel, Target, TargetSpec};
 pub fn scene_of_target(target: &Target, family: Option<&Family>) -> Result<Scene, ArtworkError> {
     let faces = match &target.spec {
         TargetSpec::Solid(spec) => spec.faces().ok(),
-        TargetSpec::Board(_) | TargetSpec::Tags(_) | TargetSpec::Listed(_) => None,
+        TargetSpec::Board(_)
+        | TargetSpec::Tags(_)
+        | TargetSpec::Charuco(_)
+        | TargetSpec::AprilGrid(_)
+        | TargetSpec::Circles(_)
+        | TargetSpec::Listed(_) => None,
     };
     let surface = |(index, panel): (usize, &Panel)| -> Result<Surface, ArtworkError> {
         let paper_mm = match faces.as_ref().and_then(|faces| faces.get(index)) {

@@ -128,6 +128,9 @@ pub(super) fn untied_panels(spec: &BoardSpec) -> Vec<Panel> {
         edge_mm: spec.edge_mm,
         border_bits: spec.tags.as_ref().map(|tags| tags.border_bits),
         tags_in: spec.tags.as_ref().map_or_else(TagsIn::default, |tags| tags.tags_in),
+        tag_margin_bits: None,
+        gap_edges: None,
+        discs_mm: None,
         inverted: spec.inverted,
         outline: match spec.grid {
             GridKind::Deltille => Outline::Zigzag,

@@ -6,7 +6,7 @@ use super::paper::{PaperSpec, SolidSheets};
 use super::poster::Poster;
 use super::{
     BoardSpec, FamilyRef, LineKind, Name, Panel, Placement, SheetLayout, SheetLine, Target,
-    TargetError, TargetSpec, board, face_sheet, net, solid, tag_sheet,
+    TargetError, TargetSpec, aprilgrid, board, charuco, circles, face_sheet, net, solid, tag_sheet,
 };
 use crate::family::{Family, FamilyError};
 
@@ -70,12 +70,21 @@ impl Target {
                 (panels, family, sheets.transpose()?.unwrap_or_default())
             }
             TargetSpec::Tags(spec) => {
-                let Some(family) = family else {
-                    let (wanted, given) = (spec.family.clone(), "none is given".to_owned());
-                    return Err(TargetError::Family { wanted, given });
-                };
+                let family = needed(family, &spec.family)?;
                 let (panels, family, sheets) = tag_sheet::parts(&name, spec, family, layout)?;
                 (panels, Some(family), sheets)
+            }
+            TargetSpec::Charuco(spec) => {
+                let (panels, family, sheets) = charuco::parts(&name, spec, family, layout)?;
+                (panels, Some(family), sheets)
+            }
+            TargetSpec::AprilGrid(spec) => {
+                let (panels, family, sheets) = aprilgrid::parts(&name, spec, family, layout)?;
+                (panels, Some(family), sheets)
+            }
+            TargetSpec::Circles(spec) => {
+                let (panels, sheets) = circles::parts(&name, spec, layout)?;
+                (panels, None, sheets)
             }
             TargetSpec::Listed(_) => {
                 return Err(TargetError::Listed);
@@ -113,6 +122,16 @@ impl Target {
         };
         overlap(board_id, "board ids", &boards(self), &boards(other))
     }
+}
+
+/// The family of tags that are asked for.
+pub(super) fn needed<'a>(
+    family: Option<&'a Family>,
+    wanted: &str,
+) -> Result<&'a Family, TargetError> {
+    let none =
+        || TargetError::Family { wanted: wanted.to_owned(), given: "none is given".to_owned() };
+    family.ok_or_else(none)
 }
 
 /// What a target consists of.

@@ -6,8 +6,8 @@ use glam::DVec2;
 use serde::{Deserialize, Serialize};
 
 use super::{
-    Corner, FamilyRef, GridKind, Name, Panel, SheetLayout, TagPlacement, Target, TargetSpec, board,
-    solid, tag_sheet,
+    Corner, FamilyRef, GridKind, Name, Panel, SheetLayout, TagPlacement, Target, TargetSpec,
+    aprilgrid, board, charuco, circles, solid, tag_sheet,
 };
 use crate::json::{self, ReadError};
 use crate::lattice::Vertex;
@@ -232,11 +232,18 @@ fn check_against_spec(target: &Target) -> Result<(), Problem> {
         }
         TargetSpec::Solid(spec) => (solid::untied_panels(spec), true),
         TargetSpec::Tags(spec) => (Ok(tag_sheet::panels(spec)), true),
+        TargetSpec::Charuco(spec) => (charuco::untied_panels(spec), true),
+        TargetSpec::AprilGrid(spec) => (aprilgrid::untied_panels(spec), true),
+        TargetSpec::Circles(spec) => (circles::untied_panels(spec), false),
         TargetSpec::Listed(_) => return Ok(()),
     };
     let made = made.or_else(|error| problem("spec", error.to_string()))?;
     let differs = |field: String, found: &dyn std::fmt::Display, made: &dyn std::fmt::Display| {
         problem(field, format!("it is {found}, but that of `spec` has {made}"))
+    };
+    let near = |a: Option<f64>, b: Option<f64>| match (a, b) {
+        (Some(a), Some(b)) => (a - b).abs() <= SPEC_SLACK_MM,
+        (a, b) => a == b,
     };
     if target.panels.len() != made.len() {
         return differs("panels.length".to_owned(), &target.panels.len(), &made.len());
@@ -256,6 +263,9 @@ fn check_against_spec(target: &Target) -> Result<(), Problem> {
             ("kind", panel.kind == made.kind),
             ("border_bits", panel.border_bits == made.border_bits),
             ("tags_in", panel.tags_in == made.tags_in),
+            ("gap_edges", near(panel.gap_edges, made.gap_edges)),
+            ("discs_mm", near(panel.discs_mm, made.discs_mm)),
+            ("tag_margin_bits", near(panel.tag_margin_bits, made.tag_margin_bits)),
             ("inverted", panel.inverted == made.inverted),
             ("outline", panel.outline == made.outline),
             ("matrix", panel.matrix == made.matrix),

@@ -8,9 +8,12 @@
 //! up on the print, z towards the viewer; `target = rotation · panel + translation`.
 
 mod angles;
+mod aprilgrid;
 mod board;
 mod build;
 mod capacity;
+mod charuco;
+mod circles;
 mod closed_mesh;
 mod error;
 mod face_sheet;
@@ -24,6 +27,7 @@ mod paper;
 mod polyhedron;
 mod pose;
 mod poster;
+mod single_panel;
 mod skeleton;
 mod solid;
 mod spec;
@@ -35,9 +39,12 @@ use serde::{Deserialize, Serialize};
 pub use crate::Name;
 use crate::lattice::GridKind;
 use crate::quantity;
+pub use aprilgrid::AprilGridSpec;
 pub(crate) use board::tagged_tiles;
 pub use board::{board_vertices, zigzag_vertices};
 pub use build::{largest_edge_mm, usual_edge_mm};
+pub use charuco::CharucoSpec;
+pub use circles::CirclesSpec;
 pub use closed_mesh::is_coordinate;
 pub use closed_mesh::{ClosedMesh, ClosedMeshError, NEAR_EQUILATERAL};
 pub use error::TargetError;
@@ -133,6 +140,28 @@ pub struct Panel {
     /// Which squares of a checkerboard carry its tags.
     #[serde(default, skip_serializing_if = "TagsIn::is_black")]
     pub tags_in: TagsIn,
+    /// Blank between a tile and the border of the tag in it, bit-widths, where it is not the usual one.
+    #[serde(
+        default,
+        skip_serializing_if = "Option::is_none",
+        deserialize_with = "quantity::border_bits::de"
+    )]
+    pub tag_margin_bits: Option<f64>,
+    /// Width of every second row and column of tiles of a checkerboard, in edges, where these are gaps between
+    /// tags: those of which the lower left vertex has an odd row, or an odd column.
+    #[serde(
+        default,
+        skip_serializing_if = "Option::is_none",
+        deserialize_with = "quantity::gap_edges::de"
+    )]
+    pub gap_edges: Option<f64>,
+    /// Diameter of the discs that are drawn about the corners instead of tiles, mm.
+    #[serde(
+        default,
+        skip_serializing_if = "Option::is_none",
+        deserialize_with = "quantity::edge_mm::de"
+    )]
+    pub discs_mm: Option<f64>,
     /// Whether the colours are exchanged: white upright tiles, or squares, on a black field.
     pub inverted: bool,
     /// Which tiles are drawn around the corners.

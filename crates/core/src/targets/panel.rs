@@ -48,7 +48,36 @@ impl Panel {
 
     /// Where a vertex of the panel's lattice lies in the panel frame, mm.
     pub fn lattice_mm(&self, vertex: Vertex) -> DVec2 {
-        self.kind.position(vertex.row.into(), vertex.col.into()) * self.edge_mm
+        self.position(vertex) * self.edge_mm
+    }
+
+    /// Where a vertex of the panel's lattice lies in the panel frame, in edges.
+    pub fn position(&self, Vertex { row, col }: Vertex) -> DVec2 {
+        let Some(gap) = self.gap_edges else { return self.kind.position(row.into(), col.into()) };
+        let along = |index: i32| {
+            f64::from(index.div_euclid(2)) * (1.0 + gap) + f64::from(index.rem_euclid(2))
+        };
+        DVec2::new(along(col), along(row))
+    }
+
+    /// A place in the panel frame, in edges, from coordinates of a tile: see [`Tile::frame`].
+    pub fn place_in_tile(&self, tile: Tile, DVec2 { x: u, y: v }: DVec2) -> DVec2 {
+        if self.gap_edges.is_none() {
+            let (row, col) = (f64::from(tile.anchor.row), f64::from(tile.anchor.col));
+            return self.kind.position(row + v, col + u);
+        }
+        let [a, b, c] = tile.frame().map(|vertex| self.position(vertex));
+        a + u * (b - a) + v * (c - a)
+    }
+
+    /// The tile at a place in the panel frame, in edges.
+    pub fn tile_at(&self, place: DVec2) -> Tile {
+        let Some(gap) = self.gap_edges else { return self.kind.tile_at(place) };
+        let index = |along: f64| {
+            let pair = (along / (1.0 + gap)).floor();
+            2 * pair as i32 + i32::from(along - pair * (1.0 + gap) >= 1.0)
+        };
+        self.kind.tag_tile(Vertex::new(index(place.y), index(place.x)))
     }
 
     /// Where a corner is in the target frame, mm: where it was measured, else as planned.
@@ -71,7 +100,7 @@ impl Panel {
 
     /// Blank between the edges of a tile and the border of the tag in it, bit-widths.
     pub fn tag_margin_bits(&self) -> f64 {
-        self.tags_in.margin_bits()
+        self.tag_margin_bits.unwrap_or(self.tags_in.margin_bits())
     }
 
     /// Distance from the edges of a tile to the cells of the tag in it, bit-widths along the edge.
@@ -87,12 +116,18 @@ impl Panel {
 
     /// The drawn tiles, and all tiles of the other colour that touch a corner.
     pub fn tiles(&self) -> BTreeSet<Tile> {
+        if self.discs_mm.is_some() {
+            return BTreeSet::new();
+        }
         self.dark_tiles().into_iter().chain(self.tiles_around_corners()).collect()
     }
 
     /// The dark tiles that are drawn, ordered by row, then column: black ones on white, or, on an
     /// inverted panel, white ones on black.
     pub fn dark_tiles(&self) -> Vec<Tile> {
+        if self.discs_mm.is_some() {
+            return Vec::new();
+        }
         let dark = self.tiles_around_corners().filter(|tile| tile.is_dark());
         let mut anchors: BTreeSet<Vertex> = dark.map(|tile| tile.anchor).collect();
         if self.outline == Outline::Zigzag
@@ -113,12 +148,18 @@ impl Panel {
         anchors.into_iter().map(|anchor| self.kind.tag_tile(anchor)).collect()
     }
 
-    /// Bounding box of the drawn tiles in the panel frame, mm: left, lower, right and upper end.
+    /// Bounding box of the drawn tiles, or discs, in the panel frame, mm: left, lower, right and upper end.
     pub fn bounds_mm(&self) -> [f64; 4] {
         let (mut least, mut most) = (DVec2::INFINITY, DVec2::NEG_INFINITY);
         for vertex in self.dark_tiles().iter().flat_map(|tile| tile.vertices()) {
             let place = self.lattice_mm(vertex);
             (least, most) = (least.min(place), most.max(place));
+        }
+        if let Some(diameter) = self.discs_mm {
+            for corner in &self.corners {
+                least = least.min(corner.panel_mm - diameter / 2.0);
+                most = most.max(corner.panel_mm + diameter / 2.0);
+            }
         }
         [least.x, least.y, most.x, most.y]
     }

@@ -2,7 +2,10 @@ use glam::DVec3;
 use serde::{Deserialize, Serialize};
 
 use super::length::format_mm;
-use super::{ClosedMesh, GridKind, SkeletonSpec, TagPlacement, TagsIn, TargetError};
+use super::{
+    AprilGridSpec, CharucoSpec, CirclesSpec, ClosedMesh, GridKind, SkeletonSpec, TagPlacement,
+    TagsIn, TargetError,
+};
 use crate::family::places;
 use crate::lattice::Vertex;
 
@@ -61,6 +64,12 @@ pub enum TargetSpec {
     Solid(SolidSpec),
     /// Single tags, in rows.
     Tags(TagSheetSpec),
+    /// A ChArUco board.
+    Charuco(CharucoSpec),
+    /// An AprilGrid.
+    AprilGrid(AprilGridSpec),
+    /// A grid of circles.
+    Circles(CirclesSpec),
     /// Known only by its corners and tags, as another program listed them.
     Listed(ListedSpec),
 }
@@ -413,6 +422,24 @@ impl From<TagSheetSpec> for TargetSpec {
     }
 }
 
+impl From<AprilGridSpec> for TargetSpec {
+    fn from(spec: AprilGridSpec) -> Self {
+        Self::AprilGrid(spec)
+    }
+}
+
+impl From<CirclesSpec> for TargetSpec {
+    fn from(spec: CirclesSpec) -> Self {
+        Self::Circles(spec)
+    }
+}
+
+impl From<CharucoSpec> for TargetSpec {
+    fn from(spec: CharucoSpec) -> Self {
+        Self::Charuco(spec)
+    }
+}
+
 impl TargetSpec {
     /// The family that its tags are of, by name or path; `None` for an untagged target, and for a listed
     /// one.
@@ -421,7 +448,9 @@ impl TargetSpec {
             Self::Board(board) => board.tags.as_ref().map(|tags| tags.family.as_str()),
             Self::Solid(solid) => Some(&solid.tags.family),
             Self::Tags(tags) => Some(&tags.family),
-            Self::Listed(_) => None,
+            Self::Charuco(charuco) => Some(&charuco.dictionary),
+            Self::AprilGrid(grid) => Some(&grid.family),
+            Self::Listed(_) | Self::Circles(_) => None,
         }
     }
 }

@@ -1,0 +1,306 @@
+//! ChArUco boards: checkerboards with a marker in every white square, as OpenCV defines and numbers them.
+//!
+//! ```text
+//!       x →
+//!     ┌──────────────►     The target frame is that of OpenCV's object points: its origin is the upper left
+//!   y │ ■ 0 ■ 1 ■          corner of the board, x runs right, y down, z into the board. Markers are numbered
+//!   ↓ │ 2 ■ 3 ■ 4          row by row from the upper left, and so are corners, those between four squares.
+//!     ▼ ■ 5 ■ 6 ■          The panel frame is that of every checkerboard: y up, z towards the viewer.
+//! ```
+//!
+//! Since OpenCV 4.6 the upper left square is black. Before, the lower left one was: with an even number of rows
+//! that is another pattern, OpenCV's `setLegacyPattern(true)`.
+
+use glam::{DMat3, DVec3};
+use serde::{Deserialize, Serialize};
+
+use super::build::needed;
+use super::length::format_mm;
+use super::single_panel::{SinglePanel, sheet};
+use super::{
+    Corner, FamilyRef, GridKind, Outline, Panel, PanelPose, PaperSpec, SheetLayout, TagPlacement,
+    TagsIn, TargetError, tag_range,
+};
+use crate::family::{Family, dictionary, dictionary_names};
+use crate::lattice::{Dimension, TagCells, Vertex};
+use crate::quantity;
+
+/// Range of squares along a side: with three there is a row of two corners.
+const SIDES: std::ops::RangeInclusive<u32> = 3..=200;
+
+/// Range of a square's edge, mm.
+const SQUARE_MM: std::ops::RangeInclusive<f64> = 1.0..=1000.0;
+
+/// Range of a marker's side, in squares: OpenCV finds markers that are as large as this without trouble, and finer
+/// ones waste the square.
+const MARKER_SQUARES: std::ops::RangeInclusive<f64> = 0.3..=0.9;
+
+/// The border of a marker, bit-widths: the default of OpenCV, and of everybody.
+const BORDER_BITS: f64 = 1.0;
+
+/// A ChArUco board.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct CharucoSpec {
+    /// Number of squares in each row, and of rows of squares, 3 to 200.
+    pub squares: [u32; 2],
+    /// Length of a square's edge, mm.
+    #[serde(deserialize_with = "quantity::length_mm::de")]
+    pub square_mm: f64,
+    /// Length of a marker's side with its black border, mm.
+    #[serde(deserialize_with = "quantity::length_mm::de")]
+    pub marker_mm: f64,
+    /// Name of the dictionary of OpenCV, such as `DICT_5X5_100`.
+    pub dictionary: String,
+    /// Id of the first marker; the others follow.
+    #[serde(default)]
+    pub first_id: u32,
+    /// Id of the board.
+    #[serde(default)]
+    pub board_id: u32,
+    /// Whether the pattern is that of OpenCV before 4.6.
+    #[serde(default)]
+    pub legacy: bool,
+}
+
+impl CharucoSpec {
+    /// A board of the present pattern, with markers of 0.75 squares.
+    pub fn new(squares: [u32; 2], square_mm: f64, dictionary: &str) -> Self {
+        let (marker_mm, dictionary) = (0.75 * square_mm, dictionary.to_owned());
+        Self { squares, square_mm, marker_mm, dictionary, first_id: 0, board_id: 0, legacy: false }
+    }
+
+    /// Number of its markers: there is one in every white square.
+    pub fn markers(&self) -> u32 {
+        let [columns, rows] = self.squares;
+        let all = columns * rows;
+        // Of an odd number of squares the corners are black, whichever pattern it is.
+        all / 2
+    }
+
+    /// Checks every number by itself; returns the dimension of the markers.
+    pub(super) fn check(&self) -> Result<Dimension, TargetError> {
+        if let Some(side) = self.squares.iter().find(|side| !SIDES.contains(side)) {
+            let problem = format!("{side} is not between {} and {}", SIDES.start(), SIDES.end());
+            return Err(TargetError::invalid("CharucoSpec::squares", problem));
+        }
+        if !SQUARE_MM.contains(&self.square_mm) {
+            let problem = format!("{} is not between 1 mm and 1000 mm", format_mm(self.square_mm));
+            return Err(TargetError::invalid("CharucoSpec::square_mm", problem));
+        }
+        if !MARKER_SQUARES.contains(&(self.marker_mm / self.square_mm)) {
+            let [least, most] = [MARKER_SQUARES.start(), MARKER_SQUARES.end()]
+                .map(|part| format_mm((part * self.square_mm * 1e3).round() / 1e3));
+            let marker = format_mm(self.marker_mm);
+            let problem = format!("{marker} is not between {least} and {most} in such a square");
+            return Err(TargetError::invalid("CharucoSpec::marker_mm", problem));
+        }
+        if self.board_id == u32::MAX {
+            let problem = format!("{} leaves no id for a board after it", self.board_id);
+            return Err(TargetError::invalid("BoardSpec::board_id", problem));
+        }
+        let Some((_, dimension)) = dictionary(&self.dictionary) else {
+            let names: Vec<&str> = dictionary_names().collect();
+            let problem = format!(
+                "OpenCV's `{}` is not known here: take one of {}",
+                self.dictionary,
+                names.join(", ")
+            );
+            return Err(TargetError::invalid("CharucoSpec::dictionary", problem));
+        };
+        Ok(dimension)
+    }
+
+    /// The first column of its corners in the lattice, in which squares whose lower left vertex has an even sum of
+    /// row and column are black.
+    fn first_col(&self) -> i32 {
+        let even_rows = self.squares[1].is_multiple_of(2);
+        i32::from(even_rows && !self.legacy)
+    }
+
+    /// The panel of a checked spec with markers of this dimension.
+    fn panel(&self, dimension: Dimension) -> Panel {
+        let [columns, rows] = self.squares.map(|side| side as i32);
+        let (first, kind, edge_mm) = (self.first_col(), GridKind::Checker, self.square_mm);
+        let bit_mm = self.marker_mm / TagCells::of(kind, dimension).width(BORDER_BITS);
+        // From the lower left corner in the panel to the upper left one of the board.
+        let translation =
+            DVec3::new(f64::from(1 - first) * edge_mm, f64::from(rows - 1) * edge_mm, 0.0);
+        let downwards = DMat3::from_diagonal(DVec3::new(1.0, -1.0, -1.0));
+        let pose = PanelPose::new(downwards, translation);
+        let corner = |row: i32, col: i32| {
+            let panel_mm = kind.position(row.into(), (first + col).into()) * edge_mm;
+            Corner {
+                id: ((rows - 2 - row) * (columns - 1) + col) as u32,
+                row,
+                col: first + col,
+                panel_mm,
+                target_mm: pose.target_from_panel(panel_mm),
+                measured: None,
+            }
+        };
+        let in_order = (-1..rows - 1)
+            .rev()
+            .flat_map(|row| (first - 1..first - 1 + columns).map(move |col| Vertex::new(row, col)));
+        let white = in_order.filter(|&v| !kind.tag_tile(v).is_dark());
+        let mut tags: Vec<TagPlacement> = white
+            .zip(self.first_id..)
+            .map(|(Vertex { row, col }, id)| TagPlacement { id, row, col })
+            .collect();
+        tags.sort_by_key(|tag| (tag.row, tag.col));
+        Panel {
+            id: self.board_id,
+            kind,
+            edge_mm,
+            border_bits: Some(BORDER_BITS),
+            tags_in: TagsIn::White,
+            tag_margin_bits: Some((edge_mm - self.marker_mm) / 2.0 / bit_mm),
+            gap_edges: None,
+            discs_mm: None,
+            inverted: false,
+            outline: Outline::Touching,
+            matrix: [(columns - 1 + first) as u32, (rows - 1) as u32],
+            pose,
+            corners: (0..rows - 1)
+                .flat_map(|row| (0..columns - 1).map(move |col| (row, col)))
+                .map(|(row, col)| corner(row, col))
+                .collect(),
+            tags,
+        }
+    }
+}
+
+/// The panels that a spec asks for, whether or not its dictionary has so many markers.
+pub(super) fn untied_panels(spec: &CharucoSpec) -> Result<Vec<Panel>, TargetError> {
+    Ok(vec![spec.panel(spec.check()?)])
+}
+
+/// The panel and the sheet of a board.
+pub(super) fn parts(
+    name: &str,
+    spec: &CharucoSpec,
+    family: Option<&Family>,
+    paper: Option<&PaperSpec>,
+) -> Result<(Vec<Panel>, FamilyRef, Vec<SheetLayout>), TargetError> {
+    let dimension = spec.check()?;
+    let family = needed(family, &spec.dictionary)?;
+    if dictionary(&spec.dictionary).is_none_or(|(name, _)| name != family.name()) {
+        let given = format!("{} is given", family.name());
+        return Err(TargetError::Family { wanted: spec.dictionary.clone(), given });
+    }
+    let needed = u64::from(spec.first_id) + u64::from(spec.markers());
+    if needed > family.len() as u64 {
+        return Err(TargetError::IdsRunOut {
+            first: spec.first_id,
+            last: needed - 1,
+            family: family.name().to_owned(),
+            end: family.len() as u64 - 1,
+            instead: "take a larger `CharucoSpec::dictionary`, or fewer `CharucoSpec::squares`"
+                .to_owned(),
+        });
+    }
+    let family =
+        FamilyRef { name: family.name().to_owned(), fingerprint: family.fingerprint().to_owned() };
+    let panel = spec.panel(dimension);
+    let label = label(name, spec, &family);
+    let single = SinglePanel {
+        of_size: &|square_mm| {
+            let marker_mm = spec.marker_mm * square_mm / spec.square_mm;
+            CharucoSpec { square_mm, marker_mm, ..spec.clone() }.panel(dimension)
+        },
+        size_mm: spec.square_mm,
+        setting: "CharucoSpec::square_mm",
+        fewer: "fewer `CharucoSpec::squares`",
+    };
+    let sheets = paper.map(|paper| sheet(&single, paper, label)).transpose()?;
+    Ok((vec![panel], family, sheets.into_iter().collect()))
+}
+
+/// All that is needed to make it again.
+fn label(name: &str, spec: &CharucoSpec, family: &FamilyRef) -> String {
+    let [columns, rows] = spec.squares;
+    let last = spec.first_id + spec.markers() - 1;
+    let mut parts = vec![
+        name.to_owned(),
+        format!("ChArUco {columns} × {rows} squares"),
+        format!("square {}", format_mm(spec.square_mm)),
+        format!("marker {}", format_mm(spec.marker_mm)),
+        tag_range(&family.name, spec.first_id, last),
+    ];
+    if spec.legacy {
+        parts.push("legacy pattern".to_owned());
+    }
+    parts.push(format!("board {}", spec.board_id));
+    parts.push(format!("deltille {}", env!("CARGO_PKG_VERSION")));
+    parts.join(" · ")
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+    use crate::targets::Target;
+
+    proptest! {
+        /// OpenCV: corner i is at ((i mod (w − 1) + 1) s, (i div (w − 1) + 1) s); the square in column x, row y has a marker
+        /// where x + y is odd, or, in the legacy pattern with an even number of rows, even.
+        #[test]
+        fn corners_and_markers_are_those_of_opencv(
+            w in 3u32..12, h in 3u32..12, square_mm in 10.0..50.0f64, legacy: bool,
+        ) {
+            let spec = CharucoSpec { legacy, ..CharucoSpec::new([w, h], square_mm, "DICT_5X5_100") };
+            let panel = spec.panel(spec.check().unwrap());
+            prop_assert_eq!(panel.corners.len() as u32, (w - 1) * (h - 1));
+            for corner in &panel.corners {
+                let (x, y) = (corner.id % (w - 1) + 1, corner.id / (w - 1) + 1);
+                let at = DVec3::new(x.into(), y.into(), 0.0) * square_mm;
+                prop_assert!(corner.target_mm.abs_diff_eq(at, 1e-9));
+            }
+            let odd = u32::from(!(legacy && h.is_multiple_of(2)));
+            let squares = (0..h).flat_map(|y| (0..w).map(move |x| (x, y)));
+            let marked: Vec<(u32, u32)> = squares.filter(|(x, y)| (x + y) % 2 == odd).collect();
+            let mut tags = panel.tags.clone();
+            tags.sort_by_key(|tag| tag.id);
+            prop_assert_eq!(tags.len(), marked.len());
+            prop_assert_eq!(tags.len() as u32, spec.markers());
+            for (tag, (x, y)) in tags.iter().zip(marked) {
+                let middle = DVec3::new(f64::from(x) + 0.5, f64::from(y) + 0.5, 0.0) * square_mm;
+                prop_assert!(panel.tag_centre_mm(tag).abs_diff_eq(middle, 1e-9));
+            }
+        }
+
+        #[test]
+        fn a_board_is_read_as_it_was_written(w in 3u32..12, h in 3u32..12, legacy: bool) {
+            let spec = CharucoSpec { legacy, ..CharucoSpec::new([w, h], 20.0, "4x4_1000") };
+            let target = Target::new("board", spec).unwrap();
+            prop_assert_eq!(Target::from_json(&target.to_json()).unwrap(), target);
+        }
+    }
+
+    #[test]
+    fn what_no_board_has_is_refused() {
+        let good = CharucoSpec::new([8, 6], 30.0, "5x5_100");
+        let family = Family::shipped("5x5_100").unwrap();
+        let said = |spec: CharucoSpec| {
+            let paper = PaperSpec::default();
+            let built = Target::build("board", &spec.into(), Some(&family), Some(&paper));
+            built.unwrap_err().to_string()
+        };
+        let cases = [
+            (CharucoSpec { squares: [2, 6], ..good.clone() }, "`CharucoSpec::squares`: 2 is not"),
+            (CharucoSpec { square_mm: f64::NAN, ..good.clone() }, "`CharucoSpec::square_mm`"),
+            (CharucoSpec { marker_mm: 29.0, ..good.clone() }, "`CharucoSpec::marker_mm`: 29 mm"),
+            (
+                CharucoSpec { dictionary: "7".to_owned(), ..good.clone() },
+                "`CharucoSpec::dictionary`",
+            ),
+            (CharucoSpec { first_id: 77, ..good.clone() }, "`TagSpec::first_id`: tags 77 to 100"),
+            (CharucoSpec { squares: [90, 90], ..good }, "`TagSpec::first_id`"),
+        ];
+        for (spec, start) in cases {
+            let said = said(spec);
+            assert!(said.starts_with(start), "{said}");
+        }
+    }
+}

@@ -1,0 +1,187 @@
+//! Grids of circles, plain and asymmetric, as OpenCV's `findCirclesGrid` defines and numbers them.
+//!
+//! ```text
+//!    x →            plain: circle j of row i is at (j, i)     asymmetric: at (2 j + i mod 2, i)
+//!  y  ●  ●  ●           spacings                              ●     ●     ●
+//!  ↓  ●  ●  ●                                                    ●     ●     ●
+//!     ●  ●  ●                                                 ●     ●     ●
+//! ```
+//!
+//! The target frame is that of OpenCV's object points: its origin is the first circle, at the upper left, x runs right,
+//! y down, z into the board.
+
+use glam::{DMat3, DVec3};
+use serde::{Deserialize, Serialize};
+
+use super::length::format_mm;
+use super::single_panel::{SinglePanel, sheet};
+use super::{
+    Corner, GridKind, Outline, Panel, PanelPose, PaperSpec, SheetLayout, TagsIn, TargetError,
+};
+use crate::quantity;
+
+/// Range of circles along a side.
+const SIDES: std::ops::RangeInclusive<u32> = 2..=200;
+
+/// Range of the spacing, mm.
+const SPACING_MM: std::ops::RangeInclusive<f64> = 1.0..=1000.0;
+
+/// Range of a circle's diameter, in spacings: OpenCV separates circles by the white between them.
+const DIAMETER: std::ops::RangeInclusive<f64> = 0.2..=0.8;
+
+/// A grid of circles.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct CirclesSpec {
+    /// Number of circles in each row, and of rows, 2 to 200: OpenCV's `patternSize`.
+    pub circles: [u32; 2],
+    /// Distance from row to row, mm; along a row too, in an asymmetric grid half of it.
+    #[serde(deserialize_with = "quantity::length_mm::de")]
+    pub spacing_mm: f64,
+    /// Diameter of the circles, mm.
+    #[serde(deserialize_with = "quantity::length_mm::de")]
+    pub diameter_mm: f64,
+    /// Whether every second row is shifted by half of the distance along a row.
+    #[serde(default)]
+    pub asymmetric: bool,
+    /// Id of the board.
+    #[serde(default)]
+    pub board_id: u32,
+}
+
+impl CirclesSpec {
+    /// A plain grid of circles of half a spacing.
+    pub fn new(circles: [u32; 2], spacing_mm: f64) -> Self {
+        let diameter_mm = 0.5 * spacing_mm;
+        Self { circles, spacing_mm, diameter_mm, asymmetric: false, board_id: 0 }
+    }
+
+    fn check(&self) -> Result<(), TargetError> {
+        if let Some(side) = self.circles.iter().find(|side| !SIDES.contains(side)) {
+            let problem = format!("{side} is not between {} and {}", SIDES.start(), SIDES.end());
+            return Err(TargetError::invalid("CirclesSpec::circles", problem));
+        }
+        if !SPACING_MM.contains(&self.spacing_mm) {
+            let spacing = format_mm(self.spacing_mm);
+            let problem = format!("{spacing} is not between 1 mm and 1000 mm");
+            return Err(TargetError::invalid("CirclesSpec::spacing_mm", problem));
+        }
+        if !DIAMETER.contains(&(self.diameter_mm / self.spacing_mm)) {
+            let [least, most] = [DIAMETER.start(), DIAMETER.end()]
+                .map(|part| format_mm((part * self.spacing_mm * 1e3).round() / 1e3));
+            let diameter = format_mm(self.diameter_mm);
+            let problem = format!("{diameter} is not between {least} and {most} at such a spacing");
+            return Err(TargetError::invalid("CirclesSpec::diameter_mm", problem));
+        }
+        if self.board_id == u32::MAX {
+            let problem = format!("{} leaves no id for a board after it", self.board_id);
+            return Err(TargetError::invalid("BoardSpec::board_id", problem));
+        }
+        Ok(())
+    }
+
+    /// The panel of a checked spec: its corners are the middles of the circles.
+    fn panel(&self) -> Panel {
+        let [columns, rows] = self.circles.map(|side| side as i32);
+        let (kind, edge_mm) = (GridKind::Checker, self.spacing_mm);
+        let downwards = DMat3::from_diagonal(DVec3::new(1.0, -1.0, -1.0));
+        let up = f64::from(rows - 1) * edge_mm;
+        let pose = PanelPose::new(downwards, DVec3::new(0.0, up, 0.0));
+        let col = |row: i32, j: i32| match self.asymmetric {
+            true => 2 * j + (rows - 1 - row) % 2,
+            false => j,
+        };
+        let corner = |row: i32, j: i32| {
+            let panel_mm = kind.position(row.into(), col(row, j).into()) * edge_mm;
+            let target_mm = pose.target_from_panel(panel_mm);
+            let id = ((rows - 1 - row) * columns + j) as u32;
+            Corner { id, row, col: col(row, j), panel_mm, target_mm, measured: None }
+        };
+        Panel {
+            id: self.board_id,
+            kind,
+            edge_mm,
+            border_bits: None,
+            tags_in: TagsIn::Black,
+            tag_margin_bits: None,
+            gap_edges: None,
+            discs_mm: Some(self.diameter_mm),
+            inverted: false,
+            outline: Outline::Touching,
+            matrix: [if self.asymmetric { 2 * columns } else { columns }, rows].map(|n| n as u32),
+            pose,
+            corners: (0..rows)
+                .flat_map(|row| (0..columns).map(move |j| (row, j)))
+                .map(|(row, j)| corner(row, j))
+                .collect(),
+            tags: Vec::new(),
+        }
+    }
+}
+
+/// The panels that a spec asks for.
+pub(super) fn untied_panels(spec: &CirclesSpec) -> Result<Vec<Panel>, TargetError> {
+    spec.check()?;
+    Ok(vec![spec.panel()])
+}
+
+/// The panel and the sheet of a grid.
+pub(super) fn parts(
+    name: &str,
+    spec: &CirclesSpec,
+    paper: Option<&PaperSpec>,
+) -> Result<(Vec<Panel>, Vec<SheetLayout>), TargetError> {
+    let panels = untied_panels(spec)?;
+    let single = SinglePanel {
+        of_size: &|spacing_mm| {
+            let diameter_mm = spec.diameter_mm * spacing_mm / spec.spacing_mm;
+            CirclesSpec { spacing_mm, diameter_mm, ..spec.clone() }.panel()
+        },
+        size_mm: spec.spacing_mm,
+        setting: "CirclesSpec::spacing_mm",
+        fewer: "fewer `CirclesSpec::circles`",
+    };
+    let sheets = paper.map(|paper| sheet(&single, paper, label(name, spec))).transpose()?;
+    Ok((panels, sheets.into_iter().collect()))
+}
+
+/// All that is needed to make it again.
+fn label(name: &str, spec: &CirclesSpec) -> String {
+    let [columns, rows] = spec.circles;
+    let kind = if spec.asymmetric { "asymmetric circles" } else { "circles" };
+    let parts = [
+        name.to_owned(),
+        format!("{columns} × {rows} {kind}"),
+        format!("spacing {}", format_mm(spec.spacing_mm)),
+        format!("diameter {}", format_mm(spec.diameter_mm)),
+        format!("board {}", spec.board_id),
+        format!("deltille {}", env!("CARGO_PKG_VERSION")),
+    ];
+    parts.join(" · ")
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+    use crate::targets::Target;
+
+    proptest! {
+        #[test]
+        fn circles_are_where_opencv_has_them(
+            columns in 2u32..9, rows in 2u32..12, asymmetric: bool, spacing_mm in 5.0..20.0f64,
+        ) {
+            let spec = CirclesSpec { asymmetric, ..CirclesSpec::new([columns, rows], spacing_mm) };
+            let target = Target::new("circles", spec).unwrap();
+            prop_assert_eq!(target.panels[0].corners.len() as u32, columns * rows);
+            for corner in &target.panels[0].corners {
+                let (i, j) = (corner.id / columns, corner.id % columns);
+                let x = if asymmetric { 2 * j + i % 2 } else { j };
+                let at = DVec3::new(x.into(), i.into(), 0.0) * spacing_mm;
+                prop_assert!(corner.target_mm.abs_diff_eq(at, 1e-9));
+            }
+            prop_assert_eq!(Target::from_json(&target.to_json()).unwrap(), target);
+        }
+    }
+}

@@ -1,0 +1,86 @@
+//! What every target of one panel is told about paper and files.
+
+use anyhow::{Context, bail};
+
+use super::delivery::Delivery;
+use super::files::{File, Formats, drawn, text_file};
+use super::settings::{DEFAULT_DPI, DPI, PAPER, PRINT};
+use crate::artwork;
+use crate::cli::values::{name, whole};
+use crate::family::Family;
+use crate::targets::{DEFAULT_MARGIN_MM, PaperSpec, Target, TargetSpec, parse_length_mm};
+
+/// Paper, and files to print.
+#[derive(clap::Args)]
+pub struct Printing {
+    /// A0 to A5, letter, legal, tabloid, or a size such as 297x420mm [default: the smallest of A4
+    /// to A0 that takes the target]
+    #[arg(long, help_heading = PAPER, value_name = "SIZE")]
+    paper: Option<String>,
+    /// auto, portrait or landscape
+    #[arg(long, help_heading = PAPER, default_value = "auto")]
+    orientation: String,
+    /// Blank along the edges of the paper; 0.5 mm are left in any case [default: 5mm]
+    #[arg(long, help_heading = PAPER, value_name = "LENGTH", value_parser = parse_length_mm)]
+    margin: Option<f64>,
+    /// Write <name>.pdf; so it is where no other of pdf, svg, png is asked for
+    #[arg(long, help_heading = PRINT)]
+    pdf: bool,
+    /// Write <name>.svg
+    #[arg(long, help_heading = PRINT)]
+    svg: bool,
+    /// Write <name>.png
+    #[arg(long, help_heading = PRINT)]
+    png: bool,
+    /// Resolution of the PNG, 200 to 2400 dots per inch [default: 300]
+    #[arg(long, help_heading = PRINT, allow_negative_numbers = true, value_parser = whole(DPI))]
+    dpi: Option<u32>,
+    /// Stem of the files' names, printed on the sheet [default: that of the command]
+    #[arg(long, value_parser = name)]
+    name: Option<String>,
+    #[command(flatten)]
+    pub delivery: Delivery,
+}
+
+impl Printing {
+    /// The target on its paper.
+    pub fn build(
+        &self,
+        command: &str,
+        spec: &TargetSpec,
+        family: Option<&Family>,
+    ) -> anyhow::Result<Target> {
+        if self.dpi.is_some() && !self.png {
+            bail!("--dpi: there is no PNG to write: add --png");
+        }
+        let paper = PaperSpec {
+            size: self.paper.as_deref().map(str::parse).transpose().context("--paper")?,
+            orientation: self.orientation.parse().context("--orientation")?,
+            margin_mm: self.margin.unwrap_or(DEFAULT_MARGIN_MM),
+            ..PaperSpec::default()
+        };
+        let name = self.name.as_deref().unwrap_or(command);
+        let target = Target::build(name, spec, family, Some(&paper))?;
+        self.delivery.check_beside(&target)?;
+        Ok(target)
+    }
+
+    /// The description of a target, and its pages.
+    pub fn files(&self, target: &Target, family: Option<&Family>) -> anyhow::Result<Vec<File>> {
+        let formats =
+            Formats { pdf: self.pdf || !(self.svg || self.png), svg: self.svg, png: self.png };
+        let dpi = self.dpi.unwrap_or(DEFAULT_DPI);
+        let mut files = vec![text_file(format!("{}.json", target.name), target.to_json())];
+        files.extend(drawn(&target.name, artwork::draw(target, family)?, formats, dpi));
+        Ok(files)
+    }
+}
+
+/// The paper of a target in words.
+pub fn page(target: &Target) -> String {
+    let sheet = target.sheets.first();
+    sheet.map_or_else(String::new, |sheet| {
+        let [width, height] = [sheet.width_mm, sheet.height_mm].map(|mm| (mm * 1e3).round() / 1e3);
+        format!(", page {width} × {height} mm")
+    })
+}
