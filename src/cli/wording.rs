@@ -46,6 +46,7 @@ const NAMED: &[Named] = &[
     named("SkeletonSpec::panel_thickness_mm", "deltille icosahedron", "--panel-thickness"),
     named("SkeletonSpec::rib_mm", "deltille icosahedron", "--rib"),
     named("SkeletonSpec::wall_mm", "deltille icosahedron", "--wall"),
+    named("SolidShape::Cuboid", "deltille cuboid", "--size"),
     named("SolidShape::Mesh", "deltille solid", "--mesh"),
     named("SolidSheets::PerFace", "deltille icosahedron", "--per-face"),
     named("SolidSheets::SeamedNet", "deltille icosahedron", "--allow-seams"),

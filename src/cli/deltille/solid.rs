@@ -1,9 +1,10 @@
-//! `deltille tetrahedron`, `octahedron`, `icosahedron`, `solid --mesh`.
+//! `deltille tetrahedron`, `octahedron`, `icosahedron`, `cube`, `cuboid`, `solid --mesh`.
 
 use std::path::PathBuf;
 use std::process::ExitCode;
 
 use anyhow::{Context, anyhow, bail};
+use glam::DVec3;
 
 use super::delivery::Delivery;
 use super::files::{self, File, bytes_file, text_file};
@@ -19,8 +20,8 @@ use crate::family::{self, Family};
 use crate::quantity::unit_mm;
 use crate::targets::{
     BORDER_BITS, ClosedMesh, DEFAULT_MARGIN_MM, FACE_TILES, MOST_ROWS, NEAR_EQUILATERAL, PaperSpec,
-    Skeleton, SkeletonSpec, SolidShape, SolidSheets, SolidSpec, TagSpec, TagsIn, Target,
-    TargetSpec, parse_length_mm,
+    Skeleton, SkeletonSpec, SolidShape, SolidSheets, SolidSpec, TagSpec, Target, TargetSpec,
+    parse_box_mm, parse_length_mm,
 };
 
 /// Heading of the help.
@@ -117,6 +118,34 @@ pub struct Args {
     delivery: Delivery,
     #[command(flatten)]
     meshes: Meshes,
+}
+
+/// Help of options that say something else of solids with square tags.
+pub mod squares {
+    pub const EDGE: &str = "Edge of the cube, such as 150mm, 15cm, 6in [default: 150mm]";
+    pub const MEAN: &str = "Mean of the three sides, to which the cuboid is scaled [default: as --size says]";
+    pub const TILES: &str = "Squares along each side of a face, on a cuboid along the shortest; \
+                             all faces have squares of the same size [default: 8]";
+    pub const FAMILY: &str = "Tag family: aprilTag36h11, aprilTag25h9 or aprilTag16h5, or a family file \
+                              [default: aprilTag36h11]";
+    pub const SPACING: &str = "A tag in every n-th row and column of a face, where the square is black, which with \
+                               an odd n every second is [default: 2]";
+    pub const BORDER: &str = "Black border of a tag, in widths of a bit, at least 1 [default: 2]";
+}
+
+/// Arguments of `deltille cuboid`.
+#[derive(clap::Args)]
+pub struct CuboidArgs {
+    /// Sides along x, y and z, such as 200x150x100mm or 8x6x4in
+    #[arg(long, value_name = "SIZE", value_parser = parse_box_mm)]
+    size: DVec3,
+    #[command(flatten)]
+    args: Args,
+}
+
+/// Makes a cuboid.
+pub fn run_cuboid(cuboid: CuboidArgs) -> anyhow::Result<ExitCode> {
+    run(SolidShape::Cuboid(cuboid.size), cuboid.args)
 }
 
 /// Arguments of `deltille solid`.
@@ -225,14 +254,14 @@ impl Args {
 
     fn spec(&self, shape: SolidShape) -> anyhow::Result<SolidSpec> {
         let default = SolidSpec::new(shape);
-        let tags = TagSpec::default();
+        let tags = default.tags;
         let mut spec = SolidSpec {
             edge_mm: length("--edge", &self.edge)?.unwrap_or(default.edge_mm),
             tiles: self.tiles.unwrap_or(default.tiles),
             margin_mm: default.margin_mm,
             board_id: self.board_id.unwrap_or(default.board_id),
             tags: TagSpec {
-                tags_in: TagsIn::Black,
+                tags_in: tags.tags_in,
                 family: self.family.clone().unwrap_or(tags.family),
                 first_id: self.first_id.unwrap_or(tags.first_id),
                 spacing: self.tag_spacing.unwrap_or(tags.spacing),
@@ -327,11 +356,15 @@ fn summary(target: &Target, spec: &SolidSpec) -> anyhow::Result<String> {
     let corners: usize = target.panels.iter().map(|panel| panel.corners.len()).sum();
     let tags: usize = target.panels.iter().map(|panel| panel.tags.len()).sum();
     let last = spec.tags.first_id as usize + tags - 1;
+    let size = match &spec.shape {
+        SolidShape::Cuboid(_) => spec.size(),
+        shape => {
+            format!("{} of {} mm edges", shape.name(), (spec.edge_mm * 1e3).round() / 1e3)
+        }
+    };
     let mut text = format!(
-        "{}: {} of {} mm edges, {} faces, {corners} corners, tiles of {} mm, {} ids {}–{last}",
+        "{}: {size}, {} faces, {corners} corners, tiles of {} mm, {} ids {}–{last}",
         target.name,
-        spec.shape.name(),
-        (spec.edge_mm * 1e3).round() / 1e3,
         target.panels.len(),
         range(target.panels.iter().map(|panel| panel.edge_mm), 3),
         target.family.as_ref().map_or("", |family| &family.name),

@@ -2,6 +2,7 @@ use glam::DVec3;
 use serde::{Deserialize, Serialize};
 
 use super::length::format_mm;
+use super::solid::mean_side;
 use super::{ClosedMesh, GridKind, SkeletonSpec, TagsIn, TargetError};
 
 /// Most rows or columns of a board: more than the largest paper holds at the finest edge that
@@ -40,6 +41,9 @@ pub const FACE_TILES: std::ops::RangeInclusive<u32> = 6..=200;
 /// Farthest a mesh may lie from its origin, mm: meshes and bodies are written in single precision,
 /// which at 100 m leaves 0.01 mm.
 const FARTHEST_MM: f64 = 1e5;
+
+/// Most triangles that the faces of a solid are divided into: meshes count their corners in 16 bits.
+const MOST_TRIANGLES: usize = 20_000;
 
 /// Most faces of a solid.
 const MOST_FACES: u32 = 10_000;
@@ -127,15 +131,17 @@ pub struct TagSheetSpec {
     pub border_bits: f64,
 }
 
-/// A solid whose faces carry triangular boards with tags.
+/// A solid whose faces carry boards with tags: triangles of deltille tiles on triangular faces, checkerboards
+/// on rectangular ones.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct SolidSpec {
     /// The shape of the solid.
     pub shape: SolidShape,
-    /// Length of the solid's edges, mm; on a mesh their mean, to which it is scaled.
+    /// Length of the solid's edges, mm; of a cuboid or mesh their mean, to which it is scaled.
     pub edge_mm: f64,
-    /// Number of black tiles along each side of a face, 6 to 200.
+    /// Number of black tiles along each side of a triangle, and of squares along the shortest side of all
+    /// rectangles, 6 to 200.
     pub tiles: u32,
     /// Blank between a face's edges and its tiles, mm.
     pub margin_mm: f64,
@@ -159,7 +165,11 @@ pub enum SolidShape {
     Octahedron,
     /// Twenty faces.
     Icosahedron,
-    /// Any other, by its triangles.
+    /// Six square faces.
+    Cube,
+    /// Six rectangular faces: the sides along x, y and z, to be scaled to the mean edge.
+    Cuboid(DVec3),
+    /// Any other, by its faces.
     Mesh(ClosedMesh),
 }
 
@@ -219,7 +229,34 @@ impl SolidShape {
             Self::Tetrahedron => "tetrahedron",
             Self::Octahedron => "octahedron",
             Self::Icosahedron => "icosahedron",
+            Self::Cube => "cube",
+            Self::Cuboid(_) => "cuboid",
             Self::Mesh(_) => "mesh",
+        }
+    }
+}
+
+impl SolidSpec {
+    /// Shape and size in words.
+    pub fn size(&self) -> String {
+        match &self.shape {
+            SolidShape::Cuboid(sides) => {
+                let sides = *sides * (self.edge_mm / mean_side(*sides));
+                let [x, y, z] = sides.to_array().map(format_mm);
+                let [x, y] = [&x, &y].map(|side| side.trim_end_matches(" mm"));
+                format!("cuboid {x} × {y} × {z}")
+            }
+            shape => format!("{} edge {}", shape.name(), format_mm(self.edge_mm)),
+        }
+    }
+}
+
+impl SolidShape {
+    /// The tiling of its faces.
+    fn tiling(&self) -> GridKind {
+        match self {
+            Self::Cube | Self::Cuboid(_) => GridKind::Checker,
+            _ => GridKind::Deltille,
         }
     }
 }
@@ -234,16 +271,22 @@ impl SolidSpec {
     /// Finest edge of a tile, mm: what [`BoardSpec`] allows.
     pub const FINEST_TILE_MM: f64 = *EDGE_MM.start();
 
-    /// A solid of 150 mm edges, or a mesh in its own size, with ten tiles a side (the tags of a
-    /// face then lie symmetrically) and 5 mm of blank along its edges, which leaves room to fold
+    /// A solid of 150 mm edges, or a cuboid or mesh in its own size, with ten tiles a side (the tags of a
+    /// triangle then lie symmetrically), or eight squares, and 5 mm of blank along its edges, which leaves room to fold
     /// and glue.
     pub fn new(shape: SolidShape) -> Self {
-        let tags = TagSpec::default();
+        let tags = match shape.tiling() {
+            GridKind::Checker => TagSpec::for_squares(TagsIn::Black),
+            GridKind::Deltille => TagSpec::default(),
+        };
         let edge_mm = match &shape {
             SolidShape::Mesh(mesh) => mesh.mean_edge(),
+            SolidShape::Cuboid(sides) => mean_side(*sides),
             _ => 150.0,
         };
-        Self { shape, edge_mm, tiles: 10, margin_mm: 5.0, board_id: 0, tags, skeleton: None }
+        // A square has room for more corners and tags than a triangle, so its tiles may be larger.
+        let tiles = if shape.tiling() == GridKind::Checker { 8 } else { 10 };
+        Self { shape, edge_mm, tiles, margin_mm: 5.0, board_id: 0, tags, skeleton: None }
     }
 
     /// Checks every number by itself.
@@ -260,11 +303,28 @@ impl SolidSpec {
             };
             return Err(TargetError::invalid("SolidSpec::edge_mm", problem));
         }
+        if let SolidShape::Cuboid(sides) = &self.shape {
+            let scale = self.edge_mm / mean_side(*sides);
+            let wrong = |side: &f64| !(*side > 0.0 && SOLID_EDGE_MM.contains(&(side * scale)));
+            if let Some(side) = sides.to_array().into_iter().find(wrong) {
+                let side = format_mm(side * scale);
+                let problem = format!("a side of {side} is not between 10 mm and 5000 mm");
+                return Err(TargetError::invalid("SolidShape::Cuboid", problem));
+            }
+        }
         if let SolidShape::Mesh(mesh) = &self.shape
             && mesh.faces().len() > MOST_FACES as usize
         {
             let problem = format!("{} faces are more than {MOST_FACES}", mesh.faces().len());
             return Err(TargetError::invalid("SolidShape::Mesh", problem));
+        }
+        if let SolidShape::Mesh(mesh) = &self.shape {
+            let triangles: usize = mesh.faces().iter().map(|face| face.len() - 2).sum();
+            if triangles > MOST_TRIANGLES {
+                let problem =
+                    format!("its faces are {triangles} triangles, more than {MOST_TRIANGLES}");
+                return Err(TargetError::invalid("SolidShape::Mesh", problem));
+            }
         }
         if let SolidShape::Mesh(mesh) = &self.shape {
             let scale = self.edge_mm / mesh.mean_edge();
@@ -291,7 +351,7 @@ impl SolidSpec {
             let problem = format!("{} leaves no ids for the faces after it", self.board_id);
             return Err(TargetError::invalid("SolidSpec::board_id", problem));
         }
-        self.tags.check()
+        self.tags.check(self.shape.tiling())
     }
 }
 
@@ -387,25 +447,14 @@ impl BoardSpec {
         }
         match &self.tags {
             Some(tags) => {
-                if self.grid == GridKind::Deltille && tags.tags_in == TagsIn::White {
-                    let problem = "the tags of a deltille board are in its black tiles";
-                    return Err(TargetError::invalid("TagSpec::tags_in", problem));
-                }
-                let least = LEAST_SQUARE_BORDER_BITS;
-                if self.grid == GridKind::Checker && tags.border_bits < least {
-                    let problem = format!(
-                        "{} is too narrow, a square tag has a border of at least {least} bit-width",
-                        tags.border_bits
-                    );
-                    return Err(TargetError::invalid("TagSpec::border_bits", problem));
-                }
+                tags.check(self.grid)?;
                 if (self.grid, self.rows, self.cols, tags.tags_in)
                     == (GridKind::Checker, 2, 2, TagsIn::White)
                 {
                     let problem = "the one square between 2 × 2 corners is black";
                     return Err(TargetError::invalid("TagSpec::tags_in", problem));
                 }
-                tags.check()
+                Ok(())
             }
             None if self.boards > 1 => {
                 let problem = "untagged boards cannot be told apart: give them tags, or make one";
@@ -417,7 +466,20 @@ impl BoardSpec {
 }
 
 impl TagSpec {
-    fn check(&self) -> Result<(), TargetError> {
+    /// Checks every number by itself, of tags in tiles of a kind.
+    fn check(&self, grid: GridKind) -> Result<(), TargetError> {
+        if grid == GridKind::Deltille && self.tags_in == TagsIn::White {
+            let problem = "the tags of a deltille board are in its black tiles";
+            return Err(TargetError::invalid("TagSpec::tags_in", problem));
+        }
+        let least = LEAST_SQUARE_BORDER_BITS;
+        if grid == GridKind::Checker && self.border_bits < least {
+            let problem = format!(
+                "{} is too narrow, a square tag has a border of at least {least} bit-width",
+                self.border_bits
+            );
+            return Err(TargetError::invalid("TagSpec::border_bits", problem));
+        }
         if !(1..=MOST_ROWS).contains(&self.spacing) {
             let problem = format!("{} is not between 1 and {MOST_ROWS}", self.spacing);
             return Err(TargetError::invalid("TagSpec::spacing", problem));
