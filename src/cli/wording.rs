@@ -54,6 +54,7 @@ const NAMED: &[Named] = &[
     named("SolidSpec::edge_mm", "deltille icosahedron", "--edge"),
     named("SolidSpec::margin_mm", "deltille icosahedron", "--face-margin"),
     named("SolidSpec::skeleton", "deltille icosahedron", "--skeleton"),
+    named("SolidSpec::square_tags", "deltille solid", "--square-family"),
     named("SolidSpec::tiles", "deltille icosahedron", "--tiles"),
     named("TagSheetSpec::border_bits", "deltag sheet", "--tag-border"),
     named("TagSheetSpec::edge_mm", "deltag sheet", "--edge"),

@@ -84,7 +84,7 @@ enum Command {
     #[command(mut_arg("tag_spacing", |arg| arg.help(solid::squares::SPACING)))]
     #[command(mut_arg("tag_border", |arg| arg.help(solid::squares::BORDER)))]
     Cuboid(Box<solid::CuboidArgs>),
-    /// Make a solid of any closed mesh of equilateral or nearly equilateral triangles
+    /// Make a solid of any closed mesh: of triangles, rectangles and other convex faces
     #[command(after_help = examples::MESH)]
     Solid(Box<solid::MeshArgs>),
     /// Compare the files of a target with its description

@@ -123,7 +123,8 @@ pub struct Args {
 /// Help of options that say something else of solids with square tags.
 pub mod squares {
     pub const EDGE: &str = "Edge of the cube, such as 150mm, 15cm, 6in [default: 150mm]";
-    pub const MEAN: &str = "Mean of the three sides, to which the cuboid is scaled [default: as --size says]";
+    pub const MEAN: &str =
+        "Mean of the three sides, to which the cuboid is scaled [default: as --size says]";
     pub const TILES: &str = "Squares along each side of a face, on a cuboid along the shortest; \
                              all faces have squares of the same size [default: 8]";
     pub const FAMILY: &str = "Tag family: aprilTag36h11, aprilTag25h9 or aprilTag16h5, or a family file \
@@ -151,9 +152,17 @@ pub fn run_cuboid(cuboid: CuboidArgs) -> anyhow::Result<ExitCode> {
 /// Arguments of `deltille solid`.
 #[derive(clap::Args)]
 pub struct MeshArgs {
-    /// A closed mesh of triangles as OBJ, in millimetres; a board is put on each
+    /// A closed mesh as OBJ, in millimetres, whose faces are flat and convex; a board is put on each: deltille
+    /// tiles on triangles, a checkerboard on rectangles, as many deltille tiles as find room on others
     #[arg(long, value_name = "FILE.obj")]
     mesh: PathBuf,
+    /// Family of the square tags, where the mesh has rectangular faces and others [default:
+    /// aprilTag36h11]
+    #[arg(long, help_heading = TAGS, value_name = "FAMILY")]
+    square_family: Option<String>,
+    /// Id of the first square tag there [default: 0]
+    #[arg(long, help_heading = TAGS, value_name = "ID", allow_negative_numbers = true, value_parser = whole(0..=u32::MAX))]
+    first_square_id: Option<u32>,
     /// Millimetres per unit of the mesh, such as 1000 for metres, 25.4 for inches [default: 1]
     #[arg(long, value_name = "FACTOR", allow_negative_numbers = true, conflicts_with = "edge",
           value_parser = number(unit_mm::RANGE.least..=unit_mm::RANGE.most))]
@@ -195,15 +204,49 @@ pub fn run_mesh(mut mesh: MeshArgs) -> anyhow::Result<ExitCode> {
     let vertices: Vec<_> = solid.vertices().iter().map(|&v| v * scale).collect();
     let (scaled, _) = ClosedMesh::new(&vertices, faces).with_context(show)?;
     mesh.args.name = Some(name);
-    run(SolidShape::Mesh(scaled), mesh.args)
+    let squares = Squares { family: mesh.square_family, first_id: mesh.first_square_id };
+    run_with(SolidShape::Mesh(scaled), mesh.args, squares)
+}
+
+/// What is asked of square tags beside triangular ones.
+#[derive(Default)]
+struct Squares {
+    family: Option<String>,
+    first_id: Option<u32>,
+}
+
+impl Squares {
+    /// The tags of rectangular faces, `usual` where there are such beside others.
+    fn tags(self, usual: Option<TagSpec>) -> anyhow::Result<Option<TagSpec>> {
+        let is_asked = self.family.is_some() || self.first_id.is_some();
+        match usual {
+            None if is_asked => bail!(
+                "--square-family, --first-square-id: the mesh has no rectangles beside other faces: give --family \
+                 or --first-id"
+            ),
+            None => Ok(None),
+            Some(usual) => Ok(Some(TagSpec {
+                family: self.family.unwrap_or(usual.family),
+                first_id: self.first_id.unwrap_or(usual.first_id),
+                ..usual
+            })),
+        }
+    }
 }
 
 /// Makes a solid, writes its files, and verifies what it wrote.
 pub fn run(shape: SolidShape, args: Args) -> anyhow::Result<ExitCode> {
+    run_with(shape, args, Squares::default())
+}
+
+fn run_with(shape: SolidShape, args: Args, squares: Squares) -> anyhow::Result<ExitCode> {
     args.check_use()?;
-    let spec = args.spec(shape)?;
+    let spec = args.spec(shape, squares)?;
     let paper = args.paper()?;
-    let family = family::resolve(&spec.tags.family).context("--family")?;
+    let mut family = family::resolve(&spec.tags.family).context("--family")?;
+    if let Some(tags) = &spec.square_tags {
+        family = family.with_squares(family::resolve(&tags.family).context("--square-family")?);
+    }
     let name = args.name.clone().unwrap_or_else(|| spec.shape.name().to_owned());
     // What is cut is the net that is printed, or would be: the description has it in either case.
     let net = args.dxf && !args.per_face;
@@ -252,7 +295,7 @@ impl Args {
         }
     }
 
-    fn spec(&self, shape: SolidShape) -> anyhow::Result<SolidSpec> {
+    fn spec(&self, shape: SolidShape, squares: Squares) -> anyhow::Result<SolidSpec> {
         let default = SolidSpec::new(shape);
         let tags = default.tags;
         let mut spec = SolidSpec {
@@ -267,6 +310,7 @@ impl Args {
                 spacing: self.tag_spacing.unwrap_or(tags.spacing),
                 border_bits: self.tag_border.unwrap_or(tags.border_bits),
             },
+            square_tags: squares.tags(default.square_tags)?,
             skeleton: self.skeleton()?,
             shape: default.shape,
         };
@@ -354,8 +398,6 @@ fn length(option: &str, text: &Option<String>) -> anyhow::Result<Option<f64>> {
 /// One line on what was made, and one on the panels of a skeleton.
 fn summary(target: &Target, spec: &SolidSpec) -> anyhow::Result<String> {
     let corners: usize = target.panels.iter().map(|panel| panel.corners.len()).sum();
-    let tags: usize = target.panels.iter().map(|panel| panel.tags.len()).sum();
-    let last = spec.tags.first_id as usize + tags - 1;
     let size = match &spec.shape {
         SolidShape::Cuboid(_) => spec.size(),
         shape => {
@@ -363,13 +405,19 @@ fn summary(target: &Target, spec: &SolidSpec) -> anyhow::Result<String> {
         }
     };
     let mut text = format!(
-        "{}: {size}, {} faces, {corners} corners, tiles of {} mm, {} ids {}–{last}",
+        "{}: {size}, {} faces, {corners} corners, tiles of {} mm",
         target.name,
         target.panels.len(),
         range(target.panels.iter().map(|panel| panel.edge_mm), 3),
-        target.family.as_ref().map_or("", |family| &family.name),
-        spec.tags.first_id,
     );
+    for kind in target.tilings() {
+        let tags = target.panels.iter().filter(|panel| panel.kind == kind).flat_map(|p| &p.tags);
+        let mut ids = tags.map(|tag| tag.id);
+        if let (Some(family), Some(first)) = (&target.family, ids.next()) {
+            let last = ids.last().unwrap_or(first);
+            text += &format!(", {} ids {first}–{last}", family.of_tiling(kind).name);
+        }
+    }
     if let Some(skeleton) = &spec.skeleton {
         let solid = spec.polyhedron();
         let made = Skeleton::new(&solid, skeleton)?;

@@ -230,8 +230,7 @@ fn a_turned_square_does_not_fold_into_the_cube() {
     let spec = SolidSpec { edge_mm: 70.0, ..SolidSpec::new(SolidShape::Cube) };
     let family = Family::shipped("aprilTag36h11").unwrap();
     let paper = PaperSpec::default();
-    let cube =
-        Target::build("t", &TargetSpec::Solid(spec), Some(&family), Some(&paper)).unwrap();
+    let cube = Target::build("t", &TargetSpec::Solid(spec), Some(&family), Some(&paper)).unwrap();
     let verdict = |target: &Target| {
         let artwork = artwork::draw(target, Some(&family)).unwrap();
         let folder = tempfile::tempdir().unwrap();

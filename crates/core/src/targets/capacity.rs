@@ -20,6 +20,7 @@ pub(super) fn check_family(
         let given = "and no family was given".to_owned();
         return Err(TargetError::Family { wanted: tags.family.clone(), given });
     };
+    let family = family.of_tiling(kind).unwrap_or(family);
     if family.kind() != kind {
         let problem = match kind {
             GridKind::Deltille => {
@@ -39,8 +40,7 @@ pub(super) fn check_family(
     let there = family.len() as u64;
     let first = u64::from(tags.first_id);
     if first + needed <= there {
-        let (name, fingerprint) = (family.name().to_owned(), family.fingerprint().to_owned());
-        return Ok(FamilyRef { name, fingerprint });
+        return Ok(FamilyRef::of(family));
     }
     let mut proposals = Vec::new();
     if let Some(highest) = there.checked_sub(needed) {

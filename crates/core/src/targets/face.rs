@@ -9,12 +9,17 @@
 //!      │   ▫ ▪ ▫ ▪ ▫ ▪    │    the board lies in the middle, its sides along those of the face
 //!      a──────────────────b
 //! ```
+//!
+//! Any other face is filled with deltille tiles, as many along its shortest side as a triangle has: all
+//! corners whose six tiles lie within its margin. A hexagon is filled by a hexagon of tiles, a rhomb of 60°
+//! by two triangles of them.
 
 use glam::{DMat3, DVec2, DVec3};
 
 use super::angles::direction;
 use super::board::board_vertices;
-use super::{Outline, PanelPose, Polyhedron};
+use super::spec::MOST_ROWS;
+use super::{Incircle, Outline, PanelPose, Polyhedron};
 use crate::lattice::{GridKind, ROW_HEIGHT, Vertex};
 
 /// Cosine of the least angle of a face that counts as rectangular: angles may be 1° off. Along a side of
@@ -39,7 +44,7 @@ pub struct Face {
 }
 
 /// The board of a face: which tiles it has.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum FaceBoard {
     /// A triangle of deltille tiles.
     Triangle {
@@ -51,13 +56,18 @@ pub enum FaceBoard {
         /// Squares along the lower side of the face, and upwards.
         across: [u32; 2],
     },
+    /// Deltille tiles that fill another shape.
+    Filled {
+        /// Its corners, by row, then column; the least of each is 0.
+        corners: Vec<Vertex>,
+    },
 }
 
 impl FaceBoard {
     /// The tiling.
-    pub fn kind(self) -> GridKind {
+    pub fn kind(&self) -> GridKind {
         match self {
-            Self::Triangle { .. } => GridKind::Deltille,
+            Self::Triangle { .. } | Self::Filled { .. } => GridKind::Deltille,
             Self::Squares { .. } => GridKind::Checker,
         }
     }
@@ -70,8 +80,8 @@ impl FaceBoard {
     ///          ▲ · ▲
     ///         ▲ · · ▲
     /// ```
-    pub fn corners(self) -> Vec<Vertex> {
-        match self {
+    pub fn corners(&self) -> Vec<Vertex> {
+        match *self {
             Self::Triangle { tiles } => {
                 let side = tiles as i32 - 2;
                 let row = |row: i32| (0..side - row).map(move |col| Vertex::new(row, col));
@@ -80,40 +90,44 @@ impl FaceBoard {
             Self::Squares { across: [cols, rows] } => {
                 board_vertices(GridKind::Checker, rows - 1, cols - 1)
             }
+            Self::Filled { ref corners } => corners.clone(),
         }
     }
 
     /// Which tiles are drawn around the corners.
-    pub fn outline(self) -> Outline {
+    pub fn outline(&self) -> Outline {
         match self {
             Self::Triangle { .. } => Outline::Triangle,
-            Self::Squares { .. } => Outline::Touching,
+            Self::Squares { .. } | Self::Filled { .. } => Outline::Touching,
         }
     }
 
     /// Columns and rows that hold every corner.
-    pub fn matrix(self) -> [u32; 2] {
+    pub fn matrix(&self) -> [u32; 2] {
         match self {
             Self::Triangle { tiles } => [tiles - 2; 2],
             Self::Squares { across } => across.map(|tiles| tiles - 1),
+            Self::Filled { corners } => {
+                let most = |of: fn(&Vertex) -> i32| corners.iter().map(of).max().unwrap_or(-1);
+                [most(|v| v.col), most(|v| v.row)].map(|most| (most + 1) as u32)
+            }
         }
     }
 }
 
 impl Polyhedron {
     /// A face with the largest board that leaves a margin: `tiles` tiles along each side of a triangle, and
-    /// along the shortest side of all rectangles; `None` where the margin takes all of it, or the face has
-    /// another shape.
+    /// along the shortest side of all rectangles and of every other face; `None` where the margin takes all of
+    /// it.
     pub fn face(&self, face: usize, tiles: u32, margin_mm: f64) -> Option<Face> {
         self.face_with_squares(face, tiles, margin_mm, self.square_edge_mm(tiles, margin_mm))
     }
 
-    /// The tiling that a face takes; `None` where it is neither a triangle nor a rectangle.
-    pub fn tiling(&self, face: usize) -> Option<GridKind> {
-        match self.faces[face].len() {
-            3 => Some(GridKind::Deltille),
-            4 if self.is_rectangle(face) => Some(GridKind::Checker),
-            _ => None,
+    /// The tiling that a face takes: squares where it is a rectangle.
+    pub fn tiling(&self, face: usize) -> GridKind {
+        match self.faces[face].len() == 4 && self.is_rectangle(face) {
+            true => GridKind::Checker,
+            false => GridKind::Deltille,
         }
     }
 
@@ -128,7 +142,7 @@ impl Polyhedron {
     /// The edge of the squares on all rectangular faces, mm: so many along the shortest side.
     pub(super) fn square_edge_mm(&self, tiles: u32, margin_mm: f64) -> f64 {
         let rectangles =
-            (0..self.faces.len()).filter(|&face| self.tiling(face) == Some(GridKind::Checker));
+            (0..self.faces.len()).filter(|&face| self.tiling(face) == GridKind::Checker);
         let sides = rectangles.map(|face| self.flat(face).room(margin_mm).1.min_element());
         sides.fold(f64::INFINITY, f64::min) / f64::from(tiles)
     }
@@ -141,8 +155,11 @@ impl Polyhedron {
         margin_mm: f64,
         square_edge_mm: f64,
     ) -> Option<Face> {
-        match self.tiling(face)? {
-            GridKind::Deltille => self.triangular_face(face, tiles, margin_mm),
+        match self.tiling(face) {
+            GridKind::Deltille if self.faces[face].len() == 3 => {
+                self.triangular_face(face, tiles, margin_mm)
+            }
+            GridKind::Deltille => self.flat(face).filled(tiles, margin_mm),
             GridKind::Checker => self.flat(face).with_squares(margin_mm, square_edge_mm),
         }
     }
@@ -235,4 +252,63 @@ impl Flat {
             board: FaceBoard::Squares { across: across.as_uvec2().to_array() },
         })
     }
+
+    /// The deltille lattice is laid so that most corners find room: from the lower left end of the margin, as
+    /// suits angles of 60° and 120°, or with a vertex, the middle of an edge or of a tile in the middle.
+    fn filled(self, tiles: u32, margin_mm: f64) -> Option<Face> {
+        let corners: Vec<DVec3> = self.outline.iter().map(|p| p.extend(0.0)).collect();
+        let circle = Incircle::of(&corners);
+        if circle.radius <= margin_mm {
+            return None;
+        }
+        let inner = circle.inset(&corners, margin_mm, 0.0);
+        let inner: Vec<DVec2> = inner.into_iter().map(DVec3::truncate).collect();
+        let lengths = inner.iter().zip(inner.iter().cycle().skip(1)).map(|(p, q)| p.distance(*q));
+        let edge_mm = lengths.fold(f64::INFINITY, f64::min) / f64::from(tiles);
+        let middle = circle.centre.truncate();
+        let in_tile = DVec2::new(0.5, ROW_HEIGHT / 3.0) * edge_mm;
+        let origins = [inner[0], middle, middle - DVec2::X * edge_mm / 2.0, middle - in_tile];
+        let boards = origins.map(|origin| (origin, corners_within(&inner, origin, edge_mm)));
+        let most = boards.iter().map(|(_, corners)| corners.len()).max()?;
+        let (origin, corners) = boards.into_iter().find(|(_, corners)| corners.len() == most)?;
+        let least =
+            Vertex::new(corners.iter().map(|v| v.row).min()?, corners.iter().map(|v| v.col).min()?);
+        let origin =
+            origin + GridKind::Deltille.position(least.row.into(), least.col.into()) * edge_mm;
+        let corners = corners.into_iter().map(|v| v - least).collect();
+        let translation = self.origin + self.rotation * origin.extend(0.0);
+        Some(Face {
+            outline_mm: self.outline.iter().map(|p| p - origin).collect(),
+            pose: PanelPose::new(self.rotation, translation),
+            tile_edge_mm: edge_mm,
+            board: FaceBoard::Filled { corners },
+        })
+    }
+}
+
+/// The vertices of a deltille lattice whose six tiles lie in a convex polygon, by row, then column.
+fn corners_within(polygon: &[DVec2], origin: DVec2, edge_mm: f64) -> Vec<Vertex> {
+    let place =
+        |v: Vertex| origin + GridKind::Deltille.position(v.row.into(), v.col.into()) * edge_mm;
+    let is_inside = |p: DVec2| {
+        let sides = polygon.iter().zip(polygon.iter().cycle().skip(1));
+        sides
+            .into_iter()
+            .all(|(a, b)| (b - a).normalize_or_zero().perp_dot(p - a) >= -ROUNDING * edge_mm)
+    };
+    let from_origin = || polygon.iter().map(|p| (p - origin) / edge_mm);
+    let span = |of: fn(DVec2) -> f64| {
+        let [least, most] = from_origin()
+            .map(of)
+            .fold([f64::INFINITY, f64::NEG_INFINITY], |[a, b], x| [a.min(x), b.max(x)]);
+        // A board may have no more; where more is asked for, all of it is too large.
+        let most = most.min(least + 2.0 * f64::from(MOST_ROWS));
+        least.floor() as i32..=most.ceil() as i32
+    };
+    let rows = span(|p| p.y / ROW_HEIGHT);
+    let cols = span(|p| p.x - p.y / ROW_HEIGHT / 2.0);
+    let vertices = rows.flat_map(|row| cols.clone().map(move |col| Vertex::new(row, col)));
+    let has_room =
+        |&vertex: &Vertex| GridKind::Deltille.neighbours(vertex).all(|next| is_inside(place(next)));
+    vertices.filter(has_room).collect()
 }

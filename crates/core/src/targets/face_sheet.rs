@@ -25,8 +25,8 @@ use super::net::Sides;
 use super::paper::PaperSpec;
 use super::polyhedron::sides;
 use super::{
-    Face, FamilyRef, Label, LineKind, Panel, Placement, Polyhedron, SheetLayout, SheetLine, SheetText,
-    SolidSpec, TargetError,
+    Face, FamilyRef, Label, LineKind, Panel, Placement, Polyhedron, SheetLayout, SheetLine,
+    SheetText, SolidSpec, TargetError,
 };
 
 /// White beyond the edges of a face, mm: what cutting and gluing by hand are off, and some more.
@@ -256,6 +256,7 @@ fn label(
         format!("{} tiles, margin {}", spec.tiles, format_mm(spec.margin_mm)),
     ];
     if let (Some(family), [first, .., last] | [first @ last]) = (family, panel.tags.as_slice()) {
+        let family = family.of_tiling(panel.kind);
         parts.push(format!("{} ids {}–{}", family.name, first.id, last.id));
         parts.push(format!("fingerprint {}", family.fingerprint));
     }

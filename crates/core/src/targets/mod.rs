@@ -34,6 +34,7 @@ use glam::{DVec2, DVec3};
 use serde::{Deserialize, Serialize};
 
 pub use crate::Name;
+use crate::family::Family;
 use crate::lattice::GridKind;
 use crate::quantity;
 pub(crate) use board::tagged_tiles;
@@ -83,6 +84,25 @@ pub struct FamilyRef {
     /// Its fingerprint, see [`crate::family::Family::fingerprint`]; empty where a file from
     /// elsewhere names a family whose codes this crate does not have.
     pub fingerprint: String,
+    /// The family of its squares, where a target has faces of both tilings.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub squares: Option<Box<FamilyRef>>,
+}
+
+impl FamilyRef {
+    /// The family of tags in tiles of a kind, of a target that has such.
+    pub fn of_tiling(&self, kind: GridKind) -> &Self {
+        match (kind, &self.squares) {
+            (GridKind::Checker, Some(squares)) => squares,
+            _ => self,
+        }
+    }
+
+    /// The name and fingerprint of a family.
+    pub fn of(family: &Family) -> Self {
+        let (name, fingerprint) = (family.name().to_owned(), family.fingerprint().to_owned());
+        Self { name, fingerprint, squares: None }
+    }
 }
 
 /// How far the tiles of a panel reach beyond its corners.
@@ -303,6 +323,25 @@ impl Target {
             }
         }
         target
+    }
+
+    /// The tilings of its panels.
+    pub fn tilings(&self) -> impl Iterator<Item = GridKind> {
+        let has = |kind: &GridKind| self.panels.iter().any(|panel| panel.kind == *kind);
+        [GridKind::Deltille, GridKind::Checker].into_iter().filter(has)
+    }
+
+    /// Its panels of a tiling alone.
+    pub(crate) fn of_tiling(&self, kind: GridKind) -> Self {
+        let panels = self.panels.iter().filter(|panel| panel.kind == kind).cloned().collect();
+        Self { panels, sheets: Vec::new(), ..self.clone() }
+    }
+
+    /// The ids of its tags in tiles of a kind, and their family.
+    pub(crate) fn tags_of_tiling(&self, kind: GridKind) -> Option<(&FamilyRef, Vec<u32>)> {
+        let own = self.panels.iter().filter(|panel| panel.kind == kind);
+        let ids = own.flat_map(|panel| &panel.tags).map(|tag| tag.id).collect();
+        Some((self.family.as_ref()?.of_tiling(kind), ids))
     }
 
     /// Whether places of its corners were measured.

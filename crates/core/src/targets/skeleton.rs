@@ -204,7 +204,8 @@ impl Incircle {
 /// It moves along d = (m + n) / (1 + m·n), as d·m = d·n = 1 with the inward normals m and n of its two sides.
 fn ways_inwards(corners: &[DVec3], normal: DVec3) -> Vec<DVec3> {
     let count = corners.len();
-    let inwards = |i: usize| normal.cross(corners[(i + 1) % count] - corners[i % count]).normalize_or_zero();
+    let inwards =
+        |i: usize| normal.cross(corners[(i + 1) % count] - corners[i % count]).normalize_or_zero();
     (0..count)
         .map(|i| {
             let (m, n) = (inwards(i + count - 1), inwards(i));

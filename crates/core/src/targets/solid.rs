@@ -9,8 +9,8 @@ use super::capacity::{check_family, wider_spacing};
 use super::length::format_mm;
 use super::spec::MOST_ROWS;
 use super::{
-    Corner, Face, FaceBoard, FamilyRef, GridKind, Incircle, Panel, Polyhedron, Skeleton, SolidShape,
-    SolidSpec, TagPlacement, TagSpec, TargetError,
+    Corner, Face, FaceBoard, FamilyRef, GridKind, Incircle, Panel, Polyhedron, Skeleton,
+    SolidShape, SolidSpec, TagPlacement, TagSpec, TargetError,
 };
 use crate::family::Family;
 use crate::lattice::Vertex;
@@ -58,6 +58,15 @@ impl SolidSpec {
                 if most > MOST_ROWS {
                     let problem = format!(
                         "face {index} would have {most} corners in a row, more than {MOST_ROWS}: take fewer"
+                    );
+                    return Err(TargetError::invalid("SolidSpec::tiles", problem));
+                }
+                let is_filled = matches!(face.board, FaceBoard::Filled { .. });
+                if is_filled && tagged(&face.board, &self.tags).is_empty() {
+                    let problem = format!(
+                        "{} leave face {index}, of {} sides, no room for a tag: take more",
+                        self.tiles,
+                        face.outline_mm.len()
                     );
                     return Err(TargetError::invalid("SolidSpec::tiles", problem));
                 }
@@ -148,15 +157,16 @@ pub(super) fn mean_side(sides: DVec3) -> f64 {
 }
 
 /// The tiles of a face that carry tags.
-fn tagged(board: FaceBoard, tags: &TagSpec) -> Vec<Vertex> {
+fn tagged(board: &FaceBoard, tags: &TagSpec) -> Vec<Vertex> {
     tagged_tiles(board.kind(), &board.corners(), tags.spacing, tags.tags_in)
 }
 
-/// How many tags a solid with these faces needs.
-fn tag_count(faces: &[Face], tags: &TagSpec) -> u64 {
+/// How many tags the faces of a tiling need.
+fn tag_count(faces: &[Face], kind: GridKind, tags: &TagSpec) -> u64 {
     let mut of_board = BTreeMap::new();
-    let counts = faces.iter().map(|face| {
-        *of_board.entry(face.board).or_insert_with(|| tagged(face.board, tags).len() as u64)
+    let counts = faces.iter().filter(|face| face.board.kind() == kind).map(|face| {
+        let count = || tagged(&face.board, tags).len() as u64;
+        *of_board.entry(&face.board).or_insert_with(count)
     });
     counts.sum()
 }
@@ -167,13 +177,34 @@ pub(super) fn panels(
     family: Option<&Family>,
 ) -> Result<(Vec<Panel>, Option<FamilyRef>), TargetError> {
     let faces = spec.faces()?;
+    let has = |kind: GridKind| faces.iter().any(|face| face.board.kind() == kind);
+    let of_kind = |kind: GridKind| family_of(spec, &faces, kind, family);
+    let family = match [GridKind::Deltille, GridKind::Checker].map(has) {
+        [true, true] => {
+            let squares = Some(Box::new(of_kind(GridKind::Checker)?));
+            FamilyRef { squares, ..of_kind(GridKind::Deltille)? }
+        }
+        [false, _] => of_kind(GridKind::Checker)?,
+        [true, false] => of_kind(GridKind::Deltille)?,
+    };
+    Ok((on_faces(spec, &faces), Some(family)))
+}
+
+/// The family of the tags on faces of a tiling.
+fn family_of(
+    spec: &SolidSpec,
+    faces: &[Face],
+    kind: GridKind,
+    family: Option<&Family>,
+) -> Result<FamilyRef, TargetError> {
+    let tags = spec.tags_of(kind);
     let instead = |available: u64| {
-        let wider = wider_spacing(&spec.tags, available, |spacing| {
-            tag_count(&faces, &TagSpec { spacing, ..spec.tags.clone() })
+        let wider = wider_spacing(tags, available, |spacing| {
+            tag_count(faces, kind, &TagSpec { spacing, ..tags.clone() })
         });
         let has_enough = |&tiles: &u32| {
             let faces = SolidSpec { tiles, ..spec.clone() }.faces();
-            faces.is_ok_and(|faces| tag_count(&faces, &spec.tags) <= available)
+            faces.is_ok_and(|faces| tag_count(&faces, kind, tags) <= available)
         };
         let fewer = (SolidSpec::FEWEST_TILES..spec.tiles)
             .rev()
@@ -181,10 +212,7 @@ pub(super) fn panels(
             .map(|tiles| format!("take at most {tiles} `SolidSpec::tiles`"));
         wider.into_iter().chain(fewer).collect()
     };
-    let kind = faces.first().map_or(GridKind::Deltille, |face| face.board.kind());
-    let needed = tag_count(&faces, &spec.tags);
-    let family = check_family(kind, &spec.tags, family, needed, instead)?;
-    Ok((on_faces(spec, &faces), Some(family)))
+    check_family(kind, tags, family, tag_count(faces, kind, tags), instead)
 }
 
 /// The panels of a checked spec, whether or not its family has so many tags.
@@ -195,22 +223,26 @@ pub(super) fn untied_panels(spec: &SolidSpec) -> Result<Vec<Panel>, TargetError>
 /// The panels of a solid's faces, with ids that follow from face to face.
 fn on_faces(spec: &SolidSpec, faces: &[Face]) -> Vec<Panel> {
     let mut of_board = BTreeMap::new();
-    let (mut next_corner, mut next_tag) = (0u32, spec.tags.first_id);
-    let panel = |(id, face): (u32, &Face)| {
-        let board = face.board;
-        let (vertices, tiles) = of_board
-            .entry(board)
-            .or_insert_with(|| (board.corners(), tagged(board, &spec.tags)));
-        let (first_corner, first_tag) = (next_corner, next_tag);
+    let mut next_corner = 0u32;
+    let mut next_tags =
+        [GridKind::Deltille, GridKind::Checker].map(|kind| spec.tags_of(kind).first_id);
+    let numbered = (spec.board_id..).zip(faces);
+    let panels = numbered.map(|(id, face)| {
+        let board = &face.board;
+        let tags = spec.tags_of(board.kind());
+        let (vertices, tiles) =
+            of_board.entry(board).or_insert_with(|| (board.corners(), tagged(board, tags)));
+        let next_tag = &mut next_tags[usize::from(board.kind() == GridKind::Checker)];
+        let (first_corner, first_tag) = (next_corner, *next_tag);
         next_corner += vertices.len() as u32;
         // No family has so many codes that ids overflow; a spec may ask for them.
-        next_tag = next_tag.saturating_add(tiles.len() as u32);
+        *next_tag = first_tag.saturating_add(tiles.len() as u32);
         Panel {
             id,
             kind: board.kind(),
             edge_mm: face.tile_edge_mm,
-            border_bits: Some(spec.tags.border_bits),
-            tags_in: spec.tags.tags_in,
+            border_bits: Some(tags.border_bits),
+            tags_in: tags.tags_in,
             inverted: false,
             outline: board.outline(),
             matrix: board.matrix(),
@@ -235,8 +267,8 @@ fn on_faces(spec: &SolidSpec, faces: &[Face]) -> Vec<Panel> {
                 })
                 .collect(),
         }
-    };
-    (spec.board_id..).zip(faces).map(panel).collect()
+    });
+    panels.collect()
 }
 
 #[cfg(test)]

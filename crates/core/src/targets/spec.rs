@@ -3,7 +3,7 @@ use serde::{Deserialize, Serialize};
 
 use super::length::format_mm;
 use super::solid::mean_side;
-use super::{ClosedMesh, GridKind, SkeletonSpec, TagsIn, TargetError};
+use super::{ClosedMesh, GridKind, Polyhedron, SkeletonSpec, TagsIn, TargetError};
 
 /// Most rows or columns of a board: more than the largest paper holds at the finest edge that
 /// anybody prints, and few enough that no number overflows.
@@ -149,6 +149,9 @@ pub struct SolidSpec {
     pub board_id: u32,
     /// The tags, without which faces could not be told apart.
     pub tags: TagSpec,
+    /// The tags of rectangular faces, where other faces have deltille tiles.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub square_tags: Option<TagSpec>,
     /// A frame that holds the faces as panels, if one is to be printed.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub skeleton: Option<SkeletonSpec>,
@@ -252,11 +255,17 @@ impl SolidSpec {
 }
 
 impl SolidShape {
-    /// The tiling of its faces.
-    fn tiling(&self) -> GridKind {
+    /// Whether faces have deltille tiles, and whether faces have squares.
+    fn tilings(&self) -> [bool; 2] {
         match self {
-            Self::Cube | Self::Cuboid(_) => GridKind::Checker,
-            _ => GridKind::Deltille,
+            Self::Cube | Self::Cuboid(_) => [false, true],
+            Self::Mesh(mesh) => {
+                let (vertices_mm, faces) = (mesh.vertices().to_vec(), mesh.faces().to_vec());
+                let solid = Polyhedron { vertices_mm, faces };
+                let has = |kind| (0..solid.faces.len()).any(|face| solid.tiling(face) == kind);
+                [GridKind::Deltille, GridKind::Checker].map(has)
+            }
+            _ => [true, false],
         }
     }
 }
@@ -275,9 +284,10 @@ impl SolidSpec {
     /// triangle then lie symmetrically), or eight squares, and 5 mm of blank along its edges, which leaves room to fold
     /// and glue.
     pub fn new(shape: SolidShape) -> Self {
-        let tags = match shape.tiling() {
-            GridKind::Checker => TagSpec::for_squares(TagsIn::Black),
-            GridKind::Deltille => TagSpec::default(),
+        let squares = || TagSpec::for_squares(TagsIn::Black);
+        let (tags, square_tags) = match shape.tilings() {
+            [false, _] => (squares(), None),
+            [true, has_squares] => (TagSpec::default(), has_squares.then(squares)),
         };
         let edge_mm = match &shape {
             SolidShape::Mesh(mesh) => mesh.mean_edge(),
@@ -285,8 +295,17 @@ impl SolidSpec {
             _ => 150.0,
         };
         // A square has room for more corners and tags than a triangle, so its tiles may be larger.
-        let tiles = if shape.tiling() == GridKind::Checker { 8 } else { 10 };
-        Self { shape, edge_mm, tiles, margin_mm: 5.0, board_id: 0, tags, skeleton: None }
+        let tiles = if shape.tilings()[0] { 10 } else { 8 };
+        let (margin_mm, board_id, skeleton) = (5.0, 0, None);
+        Self { shape, edge_mm, tiles, margin_mm, board_id, tags, square_tags, skeleton }
+    }
+
+    /// The tags of faces of a tiling.
+    pub(super) fn tags_of(&self, kind: GridKind) -> &TagSpec {
+        match (kind, &self.square_tags) {
+            (GridKind::Checker, Some(tags)) => tags,
+            _ => &self.tags,
+        }
     }
 
     /// Checks every number by itself.
@@ -351,7 +370,24 @@ impl SolidSpec {
             let problem = format!("{} leaves no ids for the faces after it", self.board_id);
             return Err(TargetError::invalid("SolidSpec::board_id", problem));
         }
-        self.tags.check(self.shape.tiling())
+        let kind = match (self.shape.tilings(), &self.square_tags) {
+            ([true, true], Some(tags)) => {
+                tags.check(GridKind::Checker)?;
+                GridKind::Deltille
+            }
+            ([true, false], None) => GridKind::Deltille,
+            ([false, _], None) => GridKind::Checker,
+            ([true, true], None) => {
+                let problem = "rectangular faces need square tags, the others have triangular ones";
+                return Err(TargetError::invalid("SolidSpec::square_tags", problem));
+            }
+            (_, Some(_)) => {
+                let problem =
+                    "all faces are of one kind, whose tags are those of `SolidSpec::tags`";
+                return Err(TargetError::invalid("SolidSpec::square_tags", problem));
+            }
+        };
+        self.tags.check(kind)
     }
 }
 
@@ -382,6 +418,14 @@ impl TargetSpec {
             Self::Solid(solid) => Some(&solid.tags.family),
             Self::Tags(tags) => Some(&tags.family),
             Self::Listed(_) => None,
+        }
+    }
+
+    /// The family of its square tags, where others are triangular: by name or path.
+    pub fn square_family(&self) -> Option<&str> {
+        match self {
+            Self::Solid(solid) => solid.square_tags.as_ref().map(|tags| tags.family.as_str()),
+            _ => None,
         }
     }
 }

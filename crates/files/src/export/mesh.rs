@@ -195,12 +195,13 @@ impl TexturedMesh {
         let needed = if is_square { LEAST_TEXELS_PER_SQUARE_BIT } else { LEAST_TEXELS_PER_BIT };
         let atlas = drawn(atlas, meshing.resolution, (cell_mm, needed))?;
         let size_mm = DVec2::new(atlas.sheet.width_mm, atlas.sheet.height_mm);
-        let front = atlas.outlines_mm.iter().flat_map(|outline| triangles(outline)).map(|triangle| {
-            triangle.map(|corner| {
-                let part = corner / size_mm;
-                DVec2::new(part.x, 1.0 - part.y)
-            })
-        });
+        let front =
+            atlas.outlines_mm.iter().flat_map(|outline| triangles(outline)).map(|triangle| {
+                triangle.map(|corner| {
+                    let part = corner / size_mm;
+                    DVec2::new(part.x, 1.0 - part.y)
+                })
+            });
         let faces = match shape {
             Shape::Solid(spec) => {
                 let surface = spec.polyhedron().triangles_mm();
@@ -222,7 +223,8 @@ impl TexturedMesh {
 
 /// Edge of the smallest cell of a tag, mm, or what would be one.
 fn smallest_cell_mm(target: &Target, family: Option<&Family>) -> f64 {
-    let cells = |panel: &Panel| match (family, panel.border_bits) {
+    let of_panel = |panel: &Panel| family.and_then(|family| family.of_tiling(panel.kind));
+    let cells = |panel: &Panel| match (of_panel(panel), panel.border_bits) {
         (Some(family), Some(_)) => family.cells().width(panel.tag_inset_bits()),
         _ => UNTAGGED_CELLS,
     };

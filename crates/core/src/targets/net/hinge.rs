@@ -57,7 +57,8 @@ fn of_sheets(target: &Target, spec: &SolidSpec) -> Option<Vec<Hinge>> {
         for placement in &sheet.placements {
             let face = target.panels.iter().position(|panel| panel.id == placement.panel)?;
             let outline = faces.get(face)?.outline_mm.iter();
-            let corners: Vec<_> = outline.map(|&corner| placement.page_from_panel(corner)).collect();
+            let corners: Vec<_> =
+                outline.map(|&corner| placement.page_from_panel(corner)).collect();
             on_sheet[face] = Some(corners);
         }
         let are_joined = |side: Side, other: Side| {
@@ -123,8 +124,13 @@ mod tests {
                     * DAffine3::from_translation(-from);
                 moved[hinge.face] = moved[on] * about;
             }
-            let in_space =
-                |face: usize| solid.corners_mm(face).into_iter().map(|v| moved[face].transform_point3(v)).collect::<Vec<_>>();
+            let in_space = |face: usize| {
+                solid
+                    .corners_mm(face)
+                    .into_iter()
+                    .map(|v| moved[face].transform_point3(v))
+                    .collect::<Vec<_>>()
+            };
             let sheet = &target.sheets[0];
             let on_paper: Vec<_> = (0..faces.len())
                 .flat_map(|face| {

@@ -8,7 +8,7 @@ use super::nest::{self, Outline, Place};
 use super::plane::{Motion, bounds};
 use super::tabs::{self, Tab};
 use super::unfold::{self, Piece, Side, Sides};
-use crate::lattice::Vertex;
+use crate::lattice::{GridKind, Vertex};
 use crate::polygon;
 use crate::targets::angles::turn_of;
 use crate::targets::face_sheet::edge_numbers;
@@ -300,12 +300,12 @@ fn with_tabs(pieces: Vec<Piece>, sides: &Sides) -> Option<Net> {
     Some(Net { pieces, tabs })
 }
 
-/// The triangle or rectangle that the tiles of a face fill, in the panel frame, mm.
+/// The convex shape that the tiles of a face fill, in the panel frame, mm.
 fn tiles_outline(panel: &Panel) -> Vec<DVec2> {
     if panel.outline != crate::targets::Outline::Triangle {
-        let [left, lower, right, upper] = panel.bounds_mm();
-        let ends = [(left, lower), (right, lower), (right, upper), (left, upper)];
-        return ends.map(DVec2::from).to_vec();
+        let tiles = panel.dark_tiles();
+        let vertices = tiles.iter().flat_map(|tile| tile.vertices());
+        return polygon::hull(vertices.map(|vertex| panel.lattice_mm(vertex)).collect());
     }
     let top = panel.corners.iter().map(|corner| corner.row).max().unwrap_or_default();
     let ends = [(-1, -1), (-1, top + 2), (top + 2, -1)];
@@ -517,17 +517,19 @@ impl<'a> Drawing<'a> {
     /// All that is needed to make the net again.
     fn label(&self, of: &str) -> String {
         let (spec, name) = (self.spec, self.name);
-        let mut parts = vec![
-            name.to_owned(),
-            spec.size(),
-        ];
+        let mut parts = vec![name.to_owned(), spec.size()];
         parts.push(of.to_owned());
         parts.push(format!("{} tiles, margin {}", spec.tiles, format_mm(spec.margin_mm)));
-        let tags = || self.panels.iter().flat_map(|panel| &panel.tags);
-        if let (Some(family), Some(first), Some(last)) = (self.family, tags().next(), tags().last())
-        {
-            parts.push(format!("{} ids {}–{}", family.name, first.id, last.id));
-            parts.push(format!("fingerprint {}", family.fingerprint));
+        for kind in [GridKind::Deltille, GridKind::Checker] {
+            let own = || self.panels.iter().filter(|panel| panel.kind == kind);
+            let tags = || own().flat_map(|panel| &panel.tags);
+            if let (Some(family), Some(first), Some(last)) =
+                (self.family, tags().next(), tags().last())
+            {
+                let family = family.of_tiling(kind);
+                parts.push(format!("{} ids {}–{}", family.name, first.id, last.id));
+                parts.push(format!("fingerprint {}", family.fingerprint));
+            }
         }
         let last = self.panels.last().map_or(0, |panel| panel.id);
         parts.push(format!("boards {}–{last}", spec.board_id));
@@ -635,6 +637,8 @@ mod tests {
             use SolidShape::{Cube, Cuboid, Icosahedron, Octahedron, Tetrahedron};
             let box_of = Cuboid(DVec3::new(2.0, 1.6, 1.2));
             let has_squares = shape > 2;
+            // The largest whose faces fit A4.
+            let edge_mm = if has_squares { 0.8 * edge_mm } else { edge_mm };
             let shape = [Tetrahedron, Octahedron, Icosahedron, Cube, box_of][shape].clone();
             let mut spec = SolidSpec { edge_mm, tiles, margin_mm, ..SolidSpec::new(shape) };
             spec.tags.family = if has_squares { "aprilTag36h11" } else { "delTag36h11" }.to_owned();
@@ -698,9 +702,7 @@ mod tests {
 
     /// Sheets of a target, and the part of their area that faces take.
     fn used(target: &Target) -> (usize, f64) {
-        let area = |placement: &Placement| {
-            polygon::area(&outline(target, placement))
-        };
+        let area = |placement: &Placement| polygon::area(&outline(target, placement));
         let faces: f64 = target.sheets.iter().flat_map(|s| &s.placements).map(area).sum();
         let paper: f64 = target.sheets.iter().map(|s| s.width_mm * s.height_mm).sum();
         (target.sheets.len(), faces / paper)
