@@ -55,6 +55,8 @@ const NAMED: &[Named] = &[
     named("SolidSpec::margin_mm", "deltille icosahedron", "--face-margin"),
     named("SolidSpec::skeleton", "deltille icosahedron", "--skeleton"),
     named("SolidSpec::square_tags", "deltille solid", "--square-family"),
+    named("SolidSpec::square_tags::family", "deltille solid", "--square-family"),
+    named("SolidSpec::square_tags::first_id", "deltille solid", "--first-square-id"),
     named("SolidSpec::tiles", "deltille icosahedron", "--tiles"),
     named("TagSheetSpec::border_bits", "deltag sheet", "--tag-border"),
     named("TagSheetSpec::edge_mm", "deltag sheet", "--edge"),

@@ -5,7 +5,9 @@ use std::path::Path;
 use crate::common::command::deltille;
 use crate::common::folder::names;
 use crate::common::page::Page;
+use crate::common::solids::{cuboctahedron, rhombic_dodecahedron, truncated_tetrahedron};
 use deltille::export::dsc;
+use deltille::lattice::GridKind;
 use deltille::targets::{LineKind, Target};
 use glam::DVec2;
 
@@ -197,7 +199,8 @@ fn meshes_that_are_no_solids_are_refused() {
     let good = bipyramid(120.0);
     let without_last = good.trim_end().rsplit_once('\n').unwrap().0.to_owned();
     let flattened = good.replace("f 1 2 9\n", "f 1 1 9\n");
-    let quad = good.replace("f 1 2 9\n", "f 1 2 3 9\n");
+    // A face of four corners that is bent along a diagonal.
+    let bent = good.replace("f 1 2 9\nf 2 1 5\n", "f 1 5 2 9\n");
     let wound = good.replace("f 1 2 9\n", "f 2 1 9\n");
     let twice = good.clone() + &good.replace("v 0 0 ", "v 999 0 ");
     let skewed: String = good
@@ -218,7 +221,7 @@ fn meshes_that_are_no_solids_are_refused() {
     for (name, text, options) in [
         ("open", without_last, ""),
         ("flat", flattened, ""),
-        ("quad", quad, ""),
+        ("bent", bent, ""),
         ("wound", wound, ""),
         ("crowd", twice, ""),
         ("nan", good.replacen("v ", "v nan ", 1), ""),
@@ -316,6 +319,53 @@ fn a_cube_is_made_photographed_and_found() {
     std::fs::write(path.join("camera.yaml"), CAMERA).unwrap();
     deltille(path, "render cube.json --camera camera.yaml --eye 210,-230,190").success();
     assert_eq!(corners_found(path, "cube"), 3 * 49);
+}
+
+/// Squares beside triangles, hexagons and rhombs, each with its board: from the mesh to the proof, and found in a
+/// photograph.
+#[test]
+fn meshes_of_other_faces_become_targets() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path();
+    std::fs::write(path.join("camera.yaml"), CAMERA).unwrap();
+    let mut page = Page::default();
+    let bodies = "--pdf --gltf --stl --skeleton --dxf --panel-thickness 1mm --wall 1.5mm";
+    // How many corners at least are found.
+    for (name, obj, options, least) in [
+        ("cubocta", cuboctahedron(70.0), "--tiles 6", 2 * 25 + 10),
+        ("truncated", truncated_tetrahedron(60.0), "--tiles 6 --first-id 7", 2 * 91),
+        ("rhombic", rhombic_dodecahedron(70.0), "--tiles 7", 3 * 20),
+    ] {
+        std::fs::write(path.join(format!("{name}-mesh.obj")), obj).unwrap();
+        let args = format!("solid --mesh {name}-mesh.obj {options} --name {name} {bodies}");
+        assert!(page.run(path, &format!("deltille {args}")).status.success());
+        deltille(path, &format!("render {name}.json --camera camera.yaml --eye 230,-260,200"))
+            .success();
+        let found = corners_found(path, name);
+        assert!(found >= least, "{name}: {found}");
+    }
+    // Of two families the tags of either kind have their own ids.
+    let target = std::fs::read_to_string(path.join("cubocta.json")).unwrap();
+    let target = Target::from_json(&target).unwrap();
+    let kinds = |kind| target.panels.iter().filter(move |panel| panel.kind == kind);
+    for (kind, faces) in [(GridKind::Deltille, 8), (GridKind::Checker, 6)] {
+        let ids: Vec<u32> = kinds(kind).flat_map(|panel| &panel.tags).map(|tag| tag.id).collect();
+        assert!(kinds(kind).count() == faces && ids == (0..ids.len() as u32).collect::<Vec<_>>());
+    }
+    let beside = "solid --mesh cubocta-mesh.obj --tiles 6 --name second --with cubocta.json -o out";
+    let own_ids = "--board-id 14 --first-id 8";
+    for refused in [
+        format!("{beside} {own_ids}"),
+        "solid --mesh cubocta-mesh.obj --dsc -o out".to_owned(),
+        "solid --mesh cubocta-mesh.obj --first-square-id 580 -o out".to_owned(),
+        "solid --mesh cubocta-mesh.obj --square-family delTag25h7 -o out".to_owned(),
+        "solid --mesh rhombic-mesh.obj --square-family aprilTag36h11 -o out".to_owned(),
+        "solid --mesh rhombic-mesh.obj --face-margin 30mm -o out".to_owned(),
+    ] {
+        page.refused(path, &format!("deltille {refused}"));
+    }
+    page.is("solids-of-other-faces");
+    deltille(path, &format!("{beside} {own_ids} --first-square-id 24")).success();
 }
 
 /// All faces of a cuboid have squares of one size, as many along its shortest side as are asked for.

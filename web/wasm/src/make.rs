@@ -149,7 +149,7 @@ impl Wanted {
             edge_mm: self.edge_mm.unwrap_or(usual.edge_mm),
             tiles: self.tiles.unwrap_or(usual.tiles),
             board_id: self.board_id,
-            tags: self.tags(TagSpec::default()),
+            tags: self.tags(usual.tags.clone()),
             skeleton: self.skeleton.then(SkeletonSpec::default),
             ..usual
         };

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use glam::DVec2;
 
-use super::capacity::{check_family, wider_spacing};
+use super::capacity::{Setting, check_family, wider_spacing};
 use super::{
     BoardSpec, Corner, FamilyRef, GridKind, Outline, Panel, PanelPose, TagPlacement, TagSpec,
     TagsIn, TargetError,
@@ -113,7 +113,7 @@ pub(super) fn panels(
         wider.into_iter().chain(fewer).collect()
     };
     let needed = boards * on_each(tags.spacing);
-    let family = check_family(spec.grid, tags, family, needed, instead)?;
+    let family = check_family(spec.grid, tags, family, needed, Setting::TAGS, instead)?;
     Ok((panels, Some(family)))
 }
 

@@ -1,6 +1,7 @@
 use glam::DVec2;
 
 use super::angles::turn_of;
+use super::capacity::Setting;
 use super::layout::{arrange, label};
 use super::paper::{PaperSpec, SolidSheets};
 use super::poster::Poster;
@@ -111,7 +112,8 @@ impl Target {
                 (self.tags_of_tiling(kind), other.tags_of_tiling(kind))
                 && family == same
             {
-                overlap("TagSpec::first_id", "tag ids", &ids, &others)?;
+                let setting = Setting::of(kind, self.tilings().count() > 1);
+                overlap(setting.first_id(), "tag ids", &ids, &others)?;
             }
         }
         let board_id = match self.spec {

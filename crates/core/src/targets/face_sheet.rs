@@ -52,7 +52,8 @@ const WORDS_HEIGHT_MM: f64 = FACE_CAP_MM + WORDS_MM[0] / 2.0 + WORDS.len() as f6
 const MARK_BLANK_MM: f64 = 1.5;
 /// Capital height of the number on a face, in widths of its margin, and the most of it, mm.
 const INNER_CAP: (f64, f64) = (0.35, 2.0);
-/// Place of the number on a face, along the bisector of its lower left end, in margins.
+/// Place of the number on a triangle, along the bisector of its lower left end, in margins; on other faces it is half
+/// as far as the end of the margin.
 const INNER_PLACE: f64 = 0.9;
 
 /// The sheets of a solid's faces, one each.
@@ -198,7 +199,13 @@ fn inner_number(
     let [a, b, .., c] = face.outline_mm[..] else { return None };
     let inwards = unit(b - a) + unit(c - a);
     let width = text.len() as f64 * ADVANCE_CAPS * cap;
-    let reach = INNER_PLACE * margin_mm / inwards.x.hypot(inwards.y);
+    // The length of the sum of two unit vectors that enclose α is 2 cos α/2.
+    let length = inwards.x.hypot(inwards.y);
+    let place = match face.outline_mm.len() {
+        3 => INNER_PLACE,
+        _ => 0.5 / (1.0 - length * length / 4.0).sqrt(),
+    };
+    let reach = place * margin_mm / length;
     let at = a + inwards * reach - DVec2::new(width, cap) / 2.0;
     Some(SheetText {
         text: Label::Words(text),

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use glam::DVec3;
 
 use super::board::tagged_tiles;
-use super::capacity::{check_family, wider_spacing};
+use super::capacity::{Setting, check_family, wider_spacing};
 use super::length::format_mm;
 use super::spec::MOST_ROWS;
 use super::{
@@ -198,10 +198,12 @@ fn family_of(
     family: Option<&Family>,
 ) -> Result<FamilyRef, TargetError> {
     let tags = spec.tags_of(kind);
+    let has_both = spec.square_tags.is_some();
     let instead = |available: u64| {
-        let wider = wider_spacing(tags, available, |spacing| {
-            tag_count(faces, kind, &TagSpec { spacing, ..tags.clone() })
-        });
+        let count = |spacing| tag_count(faces, kind, &TagSpec { spacing, ..tags.clone() });
+        // Square tags beside others have the usual spacing.
+        let is_free = !has_both || kind == GridKind::Deltille;
+        let wider = is_free.then(|| wider_spacing(tags, available, count)).flatten();
         let has_enough = |&tiles: &u32| {
             let faces = SolidSpec { tiles, ..spec.clone() }.faces();
             faces.is_ok_and(|faces| tag_count(&faces, kind, tags) <= available)
@@ -212,7 +214,8 @@ fn family_of(
             .map(|tiles| format!("take at most {tiles} `SolidSpec::tiles`"));
         wider.into_iter().chain(fewer).collect()
     };
-    check_family(kind, tags, family, tag_count(faces, kind, tags), instead)
+    let needed = tag_count(faces, kind, tags);
+    check_family(kind, tags, family, needed, Setting::of(kind, has_both), instead)
 }
 
 /// The panels of a checked spec, whether or not its family has so many tags.
