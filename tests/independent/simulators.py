@@ -109,7 +109,8 @@ def detected(program, folder, name, shown):
     off = np.array(off)
     print(f"{name}: MuJoCo: {found} of {wanted} corners seen within {SEEN_DEG:.0f}°, off by {np.median(off):.3f} px in the "
           f"median, {off.max():.3f} at most")
-    assert found >= SHARE * wanted and off.max() < 0.5
+    # MuJoCo does not smooth edges: along rows and columns of pixels they are off by up to half a pixel each.
+    assert found >= SHARE * wanted and off.max() < np.sqrt(0.5)
 
 
 def on_surface(name, what, vertices, faces, uv, texture, corners):
