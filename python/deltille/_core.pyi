@@ -31,6 +31,7 @@ __all__ = [
     "Camera",
     "Checkerboard",
     "Comparison",
+    "Cube",
     "DecodedTag",
     "Detection",
     "Detector",
@@ -257,6 +258,31 @@ class Icosahedron(Target):
         margin_mm: float | None = None,
         name: str | None = None,
     ) -> Icosahedron: ...
+
+@final
+class Cube(Target):
+    def __new__(
+        cls,
+        *,
+        edge_mm: float | None = None,
+        tiles: int | None = None,
+        face_margin_mm: float | None = None,
+        family: Family | AnyPath | None = None,
+        tag_spacing: int | None = None,
+        tag_border: float | None = None,
+        first_id: int = 0,
+        board_id: int = 0,
+        skeleton: bool = False,
+        panel_thickness_mm: float | None = None,
+        wall_mm: float | None = None,
+        rib_mm: float | None = None,
+        per_face: bool = False,
+        allow_seams: bool = False,
+        paper: str | None = None,
+        orientation: Orientation = "auto",
+        margin_mm: float | None = None,
+        name: str | None = None,
+    ) -> Cube: ...
 
 @final
 class Solid(Target):

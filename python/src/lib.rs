@@ -101,7 +101,7 @@ mod _core {
     #[pymodule_export]
     use super::rendering::{Truth, render};
     #[pymodule_export]
-    use super::solids::{Icosahedron, Octahedron, Solid, Tetrahedron};
+    use super::solids::{Cube, Icosahedron, Octahedron, Solid, Tetrahedron};
     #[pymodule_export]
     use super::targets::{_target, Tag, Target};
     #[pymodule_export]

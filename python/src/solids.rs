@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use deltille::export::obj;
+use deltille::family::Family;
 use deltille::limits::Limits;
 use deltille::targets::{
     self, ClosedMesh, NEAR_EQUILATERAL, PaperSpec, SkeletonSpec, SolidShape, SolidSheets,
@@ -33,7 +34,14 @@ struct Solids {
 impl Solids {
     fn make(self) -> PyResult<Target> {
         let usual = SolidSpec::new(self.shape.clone());
-        let (tags, family) = self.tags.spec(GridKind::Deltille)?;
+        let (tags, family) = self.tags.spec(usual.shape.tag_tiling())?;
+        let family = match &usual.square_tags {
+            Some(tags) => {
+                let squares = Family::shipped(&tags.family).raise(errors::family)?;
+                Arc::new(Family::clone(&family).with_squares(squares))
+            }
+            None => family,
+        };
         let mut spec = SolidSpec {
             edge_mm: self.edge_mm.unwrap_or(usual.edge_mm),
             tiles: self.tiles.unwrap_or(usual.tiles),
@@ -63,11 +71,11 @@ macro_rules! solid {
         /// edge_mm : float, optional
         ///     Edge of the solid, mm; 150 if left out.
         /// tiles : int, optional
-        ///     Black tiles along each side of a face; 10 if left out.
+        ///     Black tiles along each side of a face; 10 if left out, squares of a cube 8.
         /// face_margin_mm : float, optional
         ///     Blank between a face's edges and its tiles, mm.
         /// family : Family, str or path-like, optional
-        ///     Family of the tags; delTag25h7 if left out.
+        ///     Family of the tags; delTag25h7 if left out, of a cube aprilTag36h11.
         /// tag_spacing, tag_border, first_id, board_id
         ///     As of :class:`Board`.
         /// skeleton : bool, optional
@@ -178,7 +186,10 @@ solid!(
     "An icosahedron whose twenty faces carry tagged boards."
 );
 
-/// A solid of any closed mesh of equilateral or nearly equilateral triangles, with a board on each.
+solid!(Cube, SolidShape::Cube, "A cube whose six faces carry tagged checkerboards.");
+
+/// A solid of any closed mesh of flat, convex faces, with a board on each: deltille tiles on triangles, which must be
+/// nearly equilateral, and on most others, checkerboards on rectangles.
 ///
 /// Parameters
 /// ----------

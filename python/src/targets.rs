@@ -20,7 +20,7 @@ use crate::errors::{self, Raise, RaiseFile, raised, unlocked};
 use crate::families::{Family, FamilyChoice};
 use crate::interrupt::interruptible;
 use crate::pickles;
-use crate::solids::{Icosahedron, Octahedron, Solid, Tetrahedron};
+use crate::solids::{Cube, Icosahedron, Octahedron, Solid, Tetrahedron};
 use crate::verdict::{Proof, Verdict};
 
 /// What is printed, photographed and found: panels with corners and tags, in millimetres.
@@ -408,6 +408,10 @@ pub fn _target<'py>(
     let target = targets::Target::from_json(json).raise(errors::target)?;
     let family =
         family.map(deltille::family::Family::from_json).transpose().raise(errors::family)?;
+    let squares = target.family.as_ref().and_then(|family| family.squares.as_ref());
+    let squares = squares.map(|family| deltille::family::Family::shipped(&family.name));
+    let squares = squares.transpose().raise(errors::family)?;
+    let family = deltille::family::Family::paired(family, squares);
     let target = Target { target: Arc::new(target), family: family.map(Arc::new) };
     macro_rules! of_class {
         ($($class:ident),*) => {
@@ -420,7 +424,7 @@ pub fn _target<'py>(
             }
         };
     }
-    of_class!(Board, Checkerboard, Tetrahedron, Octahedron, Icosahedron, Solid)
+    of_class!(Board, Checkerboard, Tetrahedron, Octahedron, Icosahedron, Cube, Solid)
 }
 
 fn making(dpi: f64, texture_dpi: Option<f64>, texture_px: Option<i64>) -> PyResult<Making> {

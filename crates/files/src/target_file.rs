@@ -3,7 +3,8 @@
 use std::path::{Path, PathBuf};
 
 use deltille_core::family::{Family, PAIRS_COUNTED, certify_codes};
-use deltille_core::targets::{Target, TargetFileError};
+use deltille_core::lattice::GridKind;
+use deltille_core::targets::{FamilyRef, Target, TargetFileError};
 
 use crate::export::dsc::{self, DscError};
 use crate::export::staging;
@@ -129,10 +130,32 @@ pub fn family(target: &Target, given: Option<&str>) -> Result<Option<Family>, Ta
             None => Ok(None),
         };
     };
+    // A file that is given is that of the square tags, where it has such, and there are others.
+    let given = given.map(|given| family_file::resolve(given).map_err(TargetFamilyError::Given));
+    let given = given.transpose()?;
+    let Some(squares) = &wanted.squares else {
+        return Ok(Some(one_family(target, wanted, target.spec.family(), given)?));
+    };
+    let (of_squares, others): (Option<Family>, Option<Family>) = match given {
+        Some(given) if given.kind() == GridKind::Checker => (Some(given), None),
+        given => (None, given),
+    };
+    let family = one_family(target, wanted, target.spec.family(), others)?;
+    let squares = one_family(target, squares, target.spec.square_family(), of_squares)?;
+    Ok(Some(family.with_squares(squares)))
+}
+
+/// A family of a target: the one given, else by its name, else by its path in the spec.
+fn one_family(
+    target: &Target,
+    wanted: &FamilyRef,
+    path: Option<&str>,
+    given: Option<Family>,
+) -> Result<Family, TargetFamilyError> {
     let family = match given {
-        Some(given) => family_file::resolve(given).map_err(TargetFamilyError::Given)?,
+        Some(given) => given,
         None => family_file::resolve(&wanted.name)
-            .or_else(|error| target.spec.family().map_or(Err(error), family_file::resolve))
+            .or_else(|error| path.map_or(Err(error), family_file::resolve))
             .map_err(|error| TargetFamilyError::Named {
                 target: target.name.to_string(),
                 name: wanted.name.clone(),
@@ -155,5 +178,5 @@ pub fn family(target: &Target, given: Option<&str>) -> Result<Option<Family>, Ta
     {
         return Err(TargetFamilyError::Rejected { name: family.name().to_owned(), failure });
     }
-    Ok(Some(family))
+    Ok(family)
 }

@@ -196,13 +196,13 @@ fn check_seats(
     let faces: Vec<(usize, f64, Option<String>)> = (0..solid.faces.len())
         .into_par_iter()
         .map(|face| {
-            let corners = solid.triangle_mm(face);
-            let circle = Incircle::of(corners);
+            let corners = solid.corners_mm(face);
+            let circle = Incircle::of(&corners);
             let mut most = 0.0f64;
             for (inset, stated) in felt {
-                let [a, b, c] = circle.inset(corners, inset, -ABOVE_MM);
-                let places = [(a, b), (b, c), (c, a)].into_iter();
-                for at in places.flat_map(|(from, to)| PLACES.map(|part| from.lerp(to, part))) {
+                let outline = circle.inset(&corners, inset, -ABOVE_MM);
+                let sides = outline.iter().zip(outline.iter().cycle().skip(1));
+                for at in sides.flat_map(|(from, to)| PLACES.map(|part| from.lerp(*to, part))) {
                     let found = depth(facets, at, -circle.normal) - ABOVE_MM;
                     let off = match stated {
                         Some(stated) => (found - stated).abs(),

@@ -23,7 +23,7 @@ const SAMPLES: usize = 2;
 pub(super) fn face_page(
     model: &Model,
     panel: &Panel,
-    outline: [DVec2; 3],
+    outline: &[DVec2],
     area_mm: [f64; 4],
     px_per_mm: f64,
 ) -> (Page, Placement) {
@@ -41,10 +41,10 @@ pub(super) fn face_page(
         let flat = triangle.vertices_mm.map(|v| panel.pose.panel_from_target(v));
         let middle = flat.iter().sum::<DVec3>().truncate() / 3.0;
         let inside = |i: usize| {
-            let (from, to) = (outline[i], outline[(i + 1) % 3]);
+            let (from, to) = (outline[i], outline[(i + 1) % outline.len()]);
             (to - from).perp_dot(middle - from) > 0.0
         };
-        if flat.iter().any(|p| p.z.abs() > IN_PLANE_MM) || !(0..3).all(inside) {
+        if flat.iter().any(|p| p.z.abs() > IN_PLANE_MM) || !(0..outline.len()).all(inside) {
             continue;
         }
         // In samples of the page, whose centres are integers; y runs down there and up on the panel.

@@ -205,15 +205,15 @@ struct PrintedFace {
     /// Index of the sheet that it is on.
     sheet: usize,
     /// Its outline on the page, counter-clockwise, mm: the stated one at the detected pose.
-    outline_mm: [DVec2; 3],
+    outline_mm: Vec<DVec2>,
     /// Its pose on the page, fitted to the detected corners.
     page_from_panel: Rigid,
     /// Indices of the vertices of the solid at the corners of its outline.
-    vertices: [usize; 3],
+    vertices: Vec<usize>,
     /// The detected corners: the position on the page and the stated one in the target frame, mm.
     corners: Vec<(DVec2, DVec3)>,
     /// Edge numbers printed along each of its sides.
-    numbers: [Vec<usize>; 3],
+    numbers: Vec<Vec<usize>>,
     /// Tabs on its sides: the side, and the number of the face under which the tab says that it is
     /// to be glued.
     under: Vec<(usize, usize)>,
@@ -275,7 +275,7 @@ struct Place {
     /// Index of the face that belongs there.
     slot: usize,
     /// Vertices of the solid where the corners of the printed outline come to lie.
-    vertices: [usize; 3],
+    vertices: Vec<usize>,
     /// Pose of the part of the page with this face.
     space_from_page: SpaceFromPage,
 }
@@ -336,11 +336,12 @@ impl Net {
             let corners: Vec<_> = panel.corners.iter().filter_map(corner).collect();
             let pairs: Vec<_> = corners.iter().map(|&(flat, at, _)| (flat, at)).collect();
             let page_from_panel = Rigid::fit(&pairs)?;
-            let vertices = *solid.faces.get(index)?;
-            for side in 0..3 {
-                net.along.insert([vertices[side], vertices[(side + 1) % 3]], (index, side));
+            let vertices = solid.faces.get(index)?.clone();
+            for side in 0..vertices.len() {
+                let ends = [vertices[side], vertices[(side + 1) % vertices.len()]];
+                net.along.insert(ends, (index, side));
             }
-            for (vertex, corner) in vertices.into_iter().zip(face.outline_mm) {
+            for (&vertex, &corner) in vertices.iter().zip(&face.outline_mm) {
                 net.vertices_mm.insert(vertex, panel.pose.target_from_panel(corner));
             }
             net.poses.push(SpaceFromPage {
@@ -350,11 +351,11 @@ impl Net {
             net.faces.push(PrintedFace {
                 panel: panel.id,
                 sheet,
-                outline_mm: face.outline_mm.map(|p| page_from_panel.apply(p)),
+                outline_mm: face.outline_mm.iter().map(|&p| page_from_panel.apply(p)).collect(),
                 page_from_panel,
+                numbers: vec![Vec::new(); vertices.len()],
                 vertices,
                 corners: corners.into_iter().map(|(_, at, space)| (at, space)).collect(),
-                numbers: Default::default(),
                 under: Vec::new(),
                 names: Vec::new(),
             });
@@ -368,14 +369,19 @@ impl Net {
 
     /// Ends of a side on the page, mm.
     fn ends(&self, (face, side): (usize, usize)) -> [DVec2; 2] {
-        let outline = self.faces[face].outline_mm;
-        [outline[side], outline[(side + 1) % 3]]
+        let outline = &self.faces[face].outline_mm;
+        [outline[side], outline[(side + 1) % outline.len()]]
+    }
+
+    /// The sides of a face.
+    fn sides_of(&self, face: usize) -> impl Iterator<Item = (usize, usize)> + use<> {
+        (0..self.faces[face].vertices.len()).map(move |side| (face, side))
     }
 
     /// The sides of all faces on a sheet.
     fn sides_on(&self, sheet: usize) -> impl Iterator<Item = (usize, usize)> {
         let faces = (0..self.faces.len()).filter(move |&face| self.faces[face].sheet == sheet);
-        faces.flat_map(|face| (0..3).map(move |side| (face, side)))
+        faces.flat_map(|face| self.sides_of(face))
     }
 
     /// Notes which sides of two faces lie on one fold line of the layout, and which side of a single
@@ -410,8 +416,8 @@ impl Net {
             let centre = outline.bounding_box().center();
             let at = DVec2::new(centre.x, centre.y);
             let inside = |face: usize| {
-                (0..3).all(|side| {
-                    let [p, q] = self.ends((face, side));
+                self.sides_of(face).all(|side| {
+                    let [p, q] = self.ends(side);
                     (q - p).perp_dot(at - p) > 0.0
                 })
             };
@@ -447,7 +453,7 @@ impl Net {
             let mut piece = vec![first];
             let mut next = 0;
             while let Some(&face) = piece.get(next) {
-                let beside = (0..3).filter_map(|side| self.folds.get(&(face, side)));
+                let beside = self.sides_of(face).filter_map(|side| self.folds.get(&side));
                 piece.extend(beside.filter(|(face, _)| left.remove(face)).map(|(face, _)| *face));
                 next += 1;
             }
@@ -461,7 +467,7 @@ impl Net {
     /// Whether faces lack the fold by which they belong to another piece: whether a side of theirs is neither folded nor
     /// numbered.
     fn is_broken_off(&self, members: &[usize]) -> bool {
-        let mut sides = members.iter().flat_map(|&face| (0..3).map(move |side| (face, side)));
+        let mut sides = members.iter().flat_map(|&face| self.sides_of(face));
         sides.any(|(face, side)| {
             !self.folds.contains_key(&(face, side)) && self.faces[face].numbers[side].is_empty()
         })
@@ -501,13 +507,14 @@ impl Net {
         let origin = back.rotate(-face.page_from_panel.shift).extend(0.0);
         let space_from_page = SpaceFromPage { linear, shift: pose.linear * origin + pose.shift };
         let mut places: BTreeMap<usize, Place> = BTreeMap::new();
-        places.insert(root, Place { slot: root, vertices: face.vertices, space_from_page });
+        let vertices = face.vertices.clone();
+        places.insert(root, Place { slot: root, vertices, space_from_page });
         let mut queue = VecDeque::from([root]);
         while let Some(parent) = queue.pop_front() {
-            for side in 0..3 {
-                let Some(&(child, own)) = self.folds.get(&(parent, side)) else { continue };
+            for side in self.sides_of(parent) {
+                let Some(&(child, own)) = self.folds.get(&side) else { continue };
                 if !places.contains_key(&child)
-                    && let Some(place) = self.across(&places[&parent], (parent, side), (child, own))
+                    && let Some(place) = self.across(&places[&parent], side, (child, own))
                 {
                     places.insert(child, place);
                     queue.push_back(child);
@@ -526,14 +533,15 @@ impl Net {
         (face, side): (usize, usize),
         (child, own): (usize, usize),
     ) -> Option<Place> {
-        let [a, b] = [parent.vertices[side], parent.vertices[(side + 1) % 3]];
+        let [a, b] = [0, 1].map(|end| parent.vertices[(side + end) % parent.vertices.len()]);
         let &(slot, slot_side) = self.along.get(&[b, a])?;
-        let far = self.faces[slot].vertices[(slot_side + 2) % 3];
-        // The child's side runs from b to a.
-        let mut vertices = [0; 3];
-        vertices[own] = b;
-        vertices[(own + 1) % 3] = a;
-        vertices[(own + 2) % 3] = far;
+        // The child's side runs from b to a, as that of the slot does, if that has as many corners.
+        let (there, count) = (&self.faces[slot].vertices, self.faces[child].vertices.len());
+        if there.len() != count {
+            return None;
+        }
+        let at = |corner: usize| there[(slot_side + corner + count - own) % count];
+        let vertices = (0..count).map(at).collect();
         let axis = (self.vertices_mm[&b] - self.vertices_mm[&a]).normalize_or(DVec3::X);
         let [from, to] = [parent.slot, slot].map(|slot| self.poses[slot].linear.z_axis);
         let angle_rad = axis.dot(from.cross(to)).atan2(from.dot(to));
@@ -561,9 +569,12 @@ impl Net {
             }
             if place.vertices != face.vertices {
                 misplaced = true;
-                let turns = (0..3)
-                    .find(|&n| (0..3).all(|i| place.vertices[(i + 3 - n) % 3] == face.vertices[i]));
-                let angle_deg = 120.0 * turns.unwrap_or_default() as f64;
+                let count = face.vertices.len();
+                let is_turned_by = |n: &usize| {
+                    (0..count).all(|i| place.vertices[(i + count - n) % count] == face.vertices[i])
+                };
+                let turns = (0..count).find(is_turned_by).unwrap_or_default();
+                let angle_deg = 360.0 / count as f64 * turns as f64;
                 findings.push(FoldFinding::FaceTurned { panel, angle_deg });
                 continue;
             }
@@ -629,7 +640,7 @@ impl Net {
             findings.push(FoldFinding::FaceNumber { panel: face.panel, names, stated: index });
         }
         for &(side, named) in &face.under {
-            let [a, b] = [face.vertices[side], face.vertices[(side + 1) % 3]];
+            let [a, b] = [0, 1].map(|end| face.vertices[(side + end) % face.vertices.len()]);
             let beyond = self.along.get(&[b, a]).map(|&(other, _)| other);
             if let Some(stated) = beyond.filter(|&other| other != named) {
                 findings.push(FoldFinding::TabNames { panel: face.panel, named, stated });

@@ -258,7 +258,11 @@ impl<'a> Verifier<'a> {
     /// # Errors
     /// When the target needs another family.
     pub fn new(target: &'a Target, family: Option<&'a Family>) -> Result<Self, VerifyError> {
-        if let Some(needed) = &target.family {
+        for kind in target.tilings() {
+            let Some(needed) = target.family.as_ref().map(|family| family.of_tiling(kind)) else {
+                continue;
+            };
+            let family = family.map(|family| family.of_tiling(kind).unwrap_or(family));
             // A .dsc file names its family without a fingerprint.
             let same = |family: &Family| {
                 needed.fingerprint.is_empty() || family.fingerprint() == needed.fingerprint
@@ -525,7 +529,8 @@ impl<'a> Verifier<'a> {
         let here = panels.filter(|panel| layout.placements.iter().any(|p| p.panel == panel.id));
         let cells_mm = here.filter_map(|panel| {
             panel.border_bits?;
-            Some(panel.edge_mm / self.family?.cells().width(panel.tag_inset_bits()))
+            let family = self.family?.of_tiling(panel.kind)?;
+            Some(panel.edge_mm / family.cells().width(panel.tag_inset_bits()))
         });
         cells_mm.map(|cell_mm| CELL_PX / cell_mm).fold(PRINT_PX_PER_MM, f64::max)
     }

@@ -142,8 +142,8 @@ pub(super) fn verify(verifier: &Verifier, path: &Path, model: Model, format: For
         findings.push(BoardFinding::Scale { panel: verifier.target.panels[0].id, scale }.into());
     }
     let stated = match &verifier.target.spec {
-        // As many as there are faces, all of which are looked at: there is nothing else.
-        TargetSpec::Solid(spec) => Some(spec.polyhedron().faces.len()),
+        // As many as the faces have, all of which are looked at: there is nothing else.
+        TargetSpec::Solid(spec) => Some(spec.polyhedron().triangles_mm().len()),
         TargetSpec::Board(_) => {
             findings.extend(beside_front(&model, &verifier.target.panels));
             Some(PLATE_TRIANGLES)
@@ -221,7 +221,8 @@ fn view(verifier: &Verifier, model: &Model, panel: &Panel) -> (View, f64) {
     let centre = panel.middle_mm();
     let corners = || panel.corners.iter().map(|c| c.target_mm);
     let radius = corners().map(|c| c.distance(centre)).fold(0.0, f64::max) + 2.0 * panel.edge_mm;
-    let cells = verifier.family.map(|family| family.cells().width(panel.tag_inset_bits()));
+    let family = verifier.family.and_then(|family| family.of_tiling(panel.kind));
+    let cells = family.map(|family| family.cells().width(panel.tag_inset_bits()));
     let cell_mm = panel.edge_mm / cells.unwrap_or(UNTAGGED_CELLS);
     let px_per_mm = (CELL_PX / cell_mm).min(MAX_SIDE_PX / (2.0 * radius));
     let [x, y, z] = [0, 1, 2].map(|axis| panel.pose.matrix().col(axis));
@@ -310,10 +311,10 @@ fn check_print(
     verdict: &mut FaceVerdict,
 ) {
     let outline = verifier.face_outline_mm(panel);
-    let [a, b, c] = outline;
-    let (low, high) = (a.min(b).min(c), a.max(b).max(c));
+    let low = outline.iter().copied().reduce(DVec2::min).unwrap_or_default();
+    let high = outline.iter().copied().reduce(DVec2::max).unwrap_or_default();
     let area_mm = [low.x, low.y, high.x, high.y];
-    let (mut page, placement) = face_page(model, panel, outline, area_mm, px_per_mm);
+    let (mut page, placement) = face_page(model, panel, &outline, area_mm, px_per_mm);
     page.texel_px = page.texel_px.min(MOST_TEXEL_PX);
     let found_from_stated = AffineMap::IDENTITY;
     let placed = PlacedPanel::new(&page, panel, &placement, found_from_stated);
@@ -333,13 +334,14 @@ fn check_print(
 
 impl Verifier<'_> {
     /// The outline of a panel's face in the panel frame, mm.
-    fn face_outline_mm(&self, panel: &Panel) -> [DVec2; 3] {
+    fn face_outline_mm(&self, panel: &Panel) -> Vec<DVec2> {
         let of_panel = || {
             // Large enough for all that is printed.
             let [left, lower, right, upper] = panel.bounds_mm();
             let (width, height) = (right - left, upper - lower);
             let corner = DVec2::new(left, lower);
-            [corner, corner + DVec2::new(2.0 * width, 0.0), corner + DVec2::new(0.0, 2.0 * height)]
+            let beyond = [DVec2::new(2.0 * width, 0.0), DVec2::new(0.0, 2.0 * height)];
+            vec![corner, corner + beyond[0], corner + beyond[1]]
         };
         let TargetSpec::Solid(spec) = &self.target.spec else { return of_panel() };
         let solid = spec.polyhedron();
@@ -347,7 +349,8 @@ impl Verifier<'_> {
         let Some(index) = index.filter(|&index| index < solid.faces.len()) else {
             return of_panel();
         };
-        solid.triangle_mm(index).map(|v| panel.pose.panel_from_target(v).truncate())
+        let corners = solid.corners_mm(index).into_iter();
+        corners.map(|v| panel.pose.panel_from_target(v).truncate()).collect()
     }
 }
 

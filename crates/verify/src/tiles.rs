@@ -359,6 +359,7 @@ impl<'a> PlacedPanel<'a> {
 
     /// Compares all tiles of the panel.
     pub fn check_tiles(&self, family: Option<&Family>) -> TileReport {
+        let family = family.and_then(|family| family.of_tiling(self.panel.kind));
         let looks = family.map(|family| TagLooks::new(family, self.panel));
         let tags: BTreeMap<Tile, TagPlacement> =
             self.panel.tags.iter().map(|tag| (self.panel.tag_tile(tag), *tag)).collect();

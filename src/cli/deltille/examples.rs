@@ -33,6 +33,15 @@ pub const SOLID: &str = "Examples:
   deltille icosahedron --skeleton --per-face --pdf --dxf --name rigid -o rigid
   deltille tetrahedron --usd --texture 4096";
 
+pub const CUBE: &str = "Examples:
+  deltille cube --edge 150mm --pdf --name die -o die
+  deltille cube --tiles 10 --skeleton --per-face --pdf --dxf
+  deltille cube --usd --mjcf --texture 4096";
+
+pub const CUBOID: &str = "Examples:
+  deltille cuboid --size 200x150x100mm --pdf --gltf --name box -o box
+  deltille cuboid --size 8x6x4in --paper tabloid --pdf";
+
 pub const MESH: &str = "Examples:
   deltille solid --mesh part.obj --pdf
   deltille solid --mesh ball.obj --scale 1000 --name ball --gltf --pdf -o ball";

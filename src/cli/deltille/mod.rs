@@ -81,7 +81,23 @@ enum Command {
     /// Make an icosahedron
     #[command(after_help = examples::SOLID)]
     Icosahedron(Box<solid::Args>),
-    /// Make a solid of any closed mesh of equilateral or nearly equilateral triangles
+    /// Make a cube with tagged checkerboards on its faces
+    #[command(after_help = examples::CUBE)]
+    #[command(mut_arg("edge", |arg| arg.help(solid::squares::EDGE)))]
+    #[command(mut_arg("tiles", |arg| arg.help(solid::squares::TILES)))]
+    #[command(mut_arg("family", |arg| arg.help(solid::squares::FAMILY)))]
+    #[command(mut_arg("tag_spacing", |arg| arg.help(solid::squares::SPACING)))]
+    #[command(mut_arg("tag_border", |arg| arg.help(solid::squares::BORDER)))]
+    Cube(Box<solid::Args>),
+    /// Make a cuboid: a box whose sides differ
+    #[command(after_help = examples::CUBOID)]
+    #[command(mut_arg("edge", |arg| arg.help(solid::squares::MEAN)))]
+    #[command(mut_arg("tiles", |arg| arg.help(solid::squares::TILES)))]
+    #[command(mut_arg("family", |arg| arg.help(solid::squares::FAMILY)))]
+    #[command(mut_arg("tag_spacing", |arg| arg.help(solid::squares::SPACING)))]
+    #[command(mut_arg("tag_border", |arg| arg.help(solid::squares::BORDER)))]
+    Cuboid(Box<solid::CuboidArgs>),
+    /// Make a solid of any closed mesh: of triangles, rectangles and other convex faces
     #[command(after_help = examples::MESH)]
     Solid(Box<solid::MeshArgs>),
     /// Compare the files of a target with its description
@@ -145,6 +161,8 @@ pub fn run(deltille: Deltille) -> anyhow::Result<ExitCode> {
         Command::Tetrahedron(args) => solid::run(SolidShape::Tetrahedron, *args),
         Command::Octahedron(args) => solid::run(SolidShape::Octahedron, *args),
         Command::Icosahedron(args) => solid::run(SolidShape::Icosahedron, *args),
+        Command::Cube(args) => solid::run(SolidShape::Cube, *args),
+        Command::Cuboid(args) => solid::run_cuboid(*args),
         Command::Solid(args) => solid::run_mesh(*args),
         Command::Detect(args) => detect::run(args),
         Command::Experiment(args) => experiment::run(args),

@@ -1,9 +1,10 @@
-//! `deltille tetrahedron`, `octahedron`, `icosahedron`, `solid --mesh`.
+//! `deltille tetrahedron`, `octahedron`, `icosahedron`, `cube`, `cuboid`, `solid --mesh`.
 
 use std::path::PathBuf;
 use std::process::ExitCode;
 
 use anyhow::{Context, anyhow, bail};
+use glam::DVec3;
 
 use super::delivery::Delivery;
 use super::files::{self, File, bytes_file, text_file};
@@ -16,12 +17,11 @@ use crate::export::artifacts::{self, Making, What};
 use crate::export::dsc::{self, Dialect};
 use crate::export::obj;
 use crate::family::{self, Family, places};
-use crate::lattice::GridKind;
 use crate::quantity::unit_mm;
 use crate::targets::{
     BORDER_BITS, ClosedMesh, DEFAULT_MARGIN_MM, FACE_TILES, MOST_ROWS, NEAR_EQUILATERAL, PaperSpec,
     Skeleton, SkeletonSpec, SolidShape, SolidSheets, SolidSpec, TagSpec, TagsIn, Target,
-    TargetSpec, parse_length_mm, tag_range,
+    TargetSpec, parse_box_mm, parse_length_mm, tag_range,
 };
 
 /// Heading of the help.
@@ -123,12 +123,49 @@ pub struct Args {
     meshes: Meshes,
 }
 
+/// Help of options that say something else of solids with square tags.
+pub mod squares {
+    pub const EDGE: &str = "Edge of the cube, such as 150mm, 15cm, 6in [default: 150mm]";
+    pub const MEAN: &str =
+        "Mean of the three sides, to which the cuboid is scaled [default: as --size says]";
+    pub const TILES: &str = "Squares along each side of a face, on a cuboid along the shortest; \
+                             all faces have squares of the same size [default: 8]";
+    pub const FAMILY: &str = "Tag family: aprilTag36h11, aprilTag25h9 or aprilTag16h5, or a family file \
+                              [default: aprilTag36h11]";
+    pub const SPACING: &str = "A tag in every n-th row and column of a face, where the square is black, which with \
+                               an odd n every second is [default: 2]";
+    pub const BORDER: &str = "Black border of a tag, in widths of a bit, at least 1 [default: 2]";
+}
+
+/// Arguments of `deltille cuboid`.
+#[derive(clap::Args)]
+pub struct CuboidArgs {
+    /// Sides along x, y and z, such as 200x150x100mm or 8x6x4in
+    #[arg(long, value_name = "SIZE", value_parser = parse_box_mm)]
+    size: DVec3,
+    #[command(flatten)]
+    args: Args,
+}
+
+/// Makes a cuboid.
+pub fn run_cuboid(cuboid: CuboidArgs) -> anyhow::Result<ExitCode> {
+    run(SolidShape::Cuboid(cuboid.size), cuboid.args)
+}
+
 /// Arguments of `deltille solid`.
 #[derive(clap::Args)]
 pub struct MeshArgs {
-    /// A closed mesh of triangles as OBJ, in millimetres; a board is put on each
+    /// A closed mesh as OBJ, in millimetres, whose faces are flat and convex; a board is put on each: deltille
+    /// tiles on triangles, a checkerboard on rectangles, as many deltille tiles as find room on others
     #[arg(long, value_name = "FILE.obj")]
     mesh: PathBuf,
+    /// Family of the square tags, where the mesh has rectangular faces and others [default:
+    /// aprilTag36h11]
+    #[arg(long, help_heading = TAGS, value_name = "FAMILY")]
+    square_family: Option<String>,
+    /// Id of the first square tag there [default: 0]
+    #[arg(long, help_heading = TAGS, value_name = "ID", allow_negative_numbers = true, value_parser = whole(0..=u32::MAX))]
+    first_square_id: Option<u32>,
     /// Millimetres per unit of the mesh, such as 1000 for metres, 25.4 for inches [default: 1]
     #[arg(long, value_name = "FACTOR", allow_negative_numbers = true, conflicts_with = "edge",
           value_parser = number(unit_mm::RANGE.least..=unit_mm::RANGE.most))]
@@ -170,15 +207,49 @@ pub fn run_mesh(mut mesh: MeshArgs) -> anyhow::Result<ExitCode> {
     let vertices: Vec<_> = solid.vertices().iter().map(|&v| v * scale).collect();
     let (scaled, _) = ClosedMesh::new(&vertices, faces).with_context(show)?;
     mesh.args.name = Some(name);
-    run(SolidShape::Mesh(scaled), mesh.args)
+    let squares = Squares { family: mesh.square_family, first_id: mesh.first_square_id };
+    run_with(SolidShape::Mesh(scaled), mesh.args, squares)
+}
+
+/// What is asked of square tags beside triangular ones.
+#[derive(Default)]
+struct Squares {
+    family: Option<String>,
+    first_id: Option<u32>,
+}
+
+impl Squares {
+    /// The tags of rectangular faces, `usual` where there are such beside others.
+    fn tags(self, usual: Option<TagSpec>) -> anyhow::Result<Option<TagSpec>> {
+        let is_asked = self.family.is_some() || self.first_id.is_some();
+        match usual {
+            None if is_asked => bail!(
+                "--square-family, --first-square-id: the mesh has no rectangles beside other faces: give --family \
+                 or --first-id"
+            ),
+            None => Ok(None),
+            Some(usual) => Ok(Some(TagSpec {
+                family: self.family.unwrap_or(usual.family),
+                first_id: self.first_id.unwrap_or(usual.first_id),
+                ..usual
+            })),
+        }
+    }
 }
 
 /// Makes a solid, writes its files, and verifies what it wrote.
 pub fn run(shape: SolidShape, args: Args) -> anyhow::Result<ExitCode> {
+    run_with(shape, args, Squares::default())
+}
+
+fn run_with(shape: SolidShape, args: Args, squares: Squares) -> anyhow::Result<ExitCode> {
     args.check_use()?;
-    let spec = args.spec(shape)?;
+    let spec = args.spec(shape, squares)?;
     let paper = args.paper()?;
-    let family = family::resolve(&spec.tags.family).context("--family")?;
+    let mut family = family::resolve(&spec.tags.family).context("--family")?;
+    if let Some(tags) = &spec.square_tags {
+        family = family.with_squares(family::resolve(&tags.family).context("--square-family")?);
+    }
     let name = args.name.clone().unwrap_or_else(|| spec.shape.name().to_owned());
     // What is cut is the net that is printed, or would be: the description has it in either case.
     let net = args.dxf && !args.per_face;
@@ -227,10 +298,10 @@ impl Args {
         }
     }
 
-    fn spec(&self, shape: SolidShape) -> anyhow::Result<SolidSpec> {
+    fn spec(&self, shape: SolidShape, squares: Squares) -> anyhow::Result<SolidSpec> {
         let default = SolidSpec::new(shape);
         let family = if self.dense { Some(places::NAME) } else { self.family.as_deref() };
-        let tags = TagSpec::usual(GridKind::Deltille, family, TagsIn::Black);
+        let tags = TagSpec::usual(default.shape.tag_tiling(), family, TagsIn::Black);
         let mut spec = SolidSpec {
             edge_mm: length("--edge", &self.edge)?.unwrap_or(default.edge_mm),
             tiles: self.tiles.unwrap_or(default.tiles),
@@ -242,6 +313,7 @@ impl Args {
                 border_bits: self.tag_border.unwrap_or(tags.border_bits),
                 ..tags
             },
+            square_tags: squares.tags(default.square_tags)?,
             skeleton: self.skeleton()?,
             shape: default.shape,
         };
@@ -329,18 +401,26 @@ fn length(option: &str, text: &Option<String>) -> anyhow::Result<Option<f64>> {
 /// One line on what was made, and one on the panels of a skeleton.
 fn summary(target: &Target, spec: &SolidSpec) -> anyhow::Result<String> {
     let corners: usize = target.panels.iter().map(|panel| panel.corners.len()).sum();
-    let tags: usize = target.panels.iter().map(|panel| panel.tags.len()).sum();
-    let family = target.family.as_ref().map_or("", |family| &family.name);
-    let last = spec.tags.first_id + tags as u32 - 1;
+    let size = match &spec.shape {
+        SolidShape::Cuboid(_) => spec.size(),
+        shape => {
+            format!("{} of {} mm edges", shape.name(), (spec.edge_mm * 1e3).round() / 1e3)
+        }
+    };
     let mut text = format!(
-        "{}: {} of {} mm edges, {} faces, {corners} corners, tiles of {} mm, {}",
+        "{}: {size}, {} faces, {corners} corners, tiles of {} mm",
         target.name,
-        spec.shape.name(),
-        (spec.edge_mm * 1e3).round() / 1e3,
         target.panels.len(),
         range(target.panels.iter().map(|panel| panel.edge_mm), 3),
-        tag_range(family, spec.tags.first_id, last),
     );
+    for kind in target.tilings() {
+        let tags = target.panels.iter().filter(|panel| panel.kind == kind).flat_map(|p| &p.tags);
+        let mut ids = tags.map(|tag| tag.id);
+        if let (Some(family), Some(first)) = (&target.family, ids.next()) {
+            let last = ids.last().unwrap_or(first);
+            text += &format!(", {}", tag_range(&family.of_tiling(kind).name, first, last));
+        }
+    }
     if let Some(skeleton) = &spec.skeleton {
         let solid = spec.polyhedron();
         let made = Skeleton::new(&solid, skeleton)?;

@@ -5,6 +5,7 @@ use std::process::Output;
 
 use crate::common::command::deltille;
 use crate::common::page::Page;
+use crate::common::solids::cuboctahedron;
 use deltille::camera::{BrownConrady, Camera, Lens, Pose};
 use deltille::detect::{Detection, Grid, GridCorner};
 use deltille::export::detection;
@@ -399,26 +400,7 @@ fn a_rig_is_calibrated_from_pictures() {
     std::fs::write(at.join("ico.json"), target.to_json()).unwrap();
     let camera = Camera::centred(1200, 900, 1700.0, camera().lens);
     std::fs::write(at.join("true.yaml"), camera.to_yaml()).unwrap();
-    let eye = DVec3::new(200.0, 20.0, 0.0);
-    let right = Pose::looking_at(eye, DVec3::new(0.0, 0.0, 650.0), DVec3::NEG_Y);
-    let places = [("left", Pose::IDENTITY), ("right", right)];
-    for (name, place) in &places {
-        for frame in 0..5 {
-            let i = f64::from(frame);
-            let turn = DVec3::new(0.9 - 0.5 * i, 1.1 * i - 2.0, 0.4 * i);
-            let translation = DVec3::new(20.0 * i - 40.0, 30.0 - 15.0 * i, 600.0 + 25.0 * i);
-            let rotation = DQuat::from_scaled_axis(turn);
-            let pose = place.after(&Pose { rotation, translation });
-            let (turn, at_mm) = (pose.rotation.to_scaled_axis(), pose.translation);
-            let pose = turn.to_array().into_iter().chain(at_mm.to_array());
-            let pose: Vec<String> = pose.map(|v| v.to_string()).collect();
-            let file = format!("{name}/{frame}.png");
-            let args = format!("render ico.json --camera true.yaml -o {file} --seed {frame}");
-            std::fs::create_dir_all(at.join(name)).unwrap();
-            done(at, &format!("{args} --pose {}", pose.join(",")));
-        }
-        done(at, &format!("detect {name} --target ico.json -o corners/{name}"));
-    }
+    let right = photographed(at, "ico", 5);
     let cameras = "--camera left=corners/left --camera right=corners/right";
     done(at, &format!("rig {cameras} --target ico.json -o rig --format kalibr,colmap"));
     let rig = json(&at.join("rig/rig.json"));
@@ -514,6 +496,75 @@ fn a_rig_is_calibrated_from_pictures() {
     let excluded = &rig["excluded"][0];
     assert_eq!([&excluded["camera"], &excluded["view"]], ["left", "3"], "{excluded}");
     assert_eq!(excluded["panel"], 99);
+}
+
+/// Photographs of a target in several poses by two cameras, and what is found in them; where the right camera is.
+fn photographed(at: &Path, target: &str, frames: u32) -> Pose {
+    let eye = DVec3::new(200.0, 20.0, 0.0);
+    let right = Pose::looking_at(eye, DVec3::new(0.0, 0.0, 650.0), DVec3::NEG_Y);
+    let places = [("left", Pose::IDENTITY), ("right", right)];
+    for (name, place) in &places {
+        for frame in 0..frames {
+            let i = f64::from(frame);
+            let turn = DVec3::new(0.9 - 0.5 * i, 1.1 * i - 2.0, 0.4 * i);
+            let translation = DVec3::new(20.0 * i - 40.0, 30.0 - 15.0 * i, 600.0 + 25.0 * i);
+            let rotation = DQuat::from_scaled_axis(turn);
+            let pose = place.after(&Pose { rotation, translation });
+            let (turn, at_mm) = (pose.rotation.to_scaled_axis(), pose.translation);
+            let pose = turn.to_array().into_iter().chain(at_mm.to_array());
+            let pose: Vec<String> = pose.map(|v| v.to_string()).collect();
+            let file = format!("{name}/{frame}.png");
+            let args = format!("render {target}.json --camera true.yaml -o {file} --seed {frame}");
+            std::fs::create_dir_all(at.join(name)).unwrap();
+            done(at, &format!("{args} --pose {}", pose.join(",")));
+        }
+        done(at, &format!("detect {name} --target {target}.json -o corners/{name}"));
+    }
+    right
+}
+
+/// A cube, and a solid of triangles and squares: the rig and the poses of the target are where they were, within four of
+/// the deviations that are stated.
+#[test]
+fn rigs_are_calibrated_from_pictures_of_squares() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    let camera = Camera::centred(1200, 900, 1700.0, camera().lens);
+    std::fs::write(at.join("true.yaml"), camera.to_yaml()).unwrap();
+    std::fs::write(at.join("mesh.obj"), cuboctahedron(90.0)).unwrap();
+    done(at, "cube --edge 120mm --name cube");
+    done(at, "solid --mesh mesh.obj --tiles 6 --name cubocta");
+    for target in ["cube", "cubocta"] {
+        let right = photographed(at, target, 6);
+        let cameras = "--camera left=corners/left --camera right=corners/right";
+        done(at, &format!("rig {cameras} --target {target}.json -o rig-{target}"));
+        let rig = json(&at.join(format!("rig-{target}/rig.json")));
+        is_within_four_deviations(&rig["cameras"][1]["camera_from_rig"], &right);
+        for line in
+            done(at, &format!("pose left --target {target}.json --camera true.yaml")).lines()
+        {
+            let found: Value = serde_json::from_str(line).unwrap();
+            let picture = Path::new(found["image"].as_str().unwrap()).with_extension("json");
+            let truth = &json(&at.join("left").join(picture))["camera_from_target"];
+            is_within_four_deviations(&found["camera_from_target"], &motion(truth));
+        }
+        for folder in ["left", "right", "corners"] {
+            std::fs::remove_dir_all(at.join(folder)).unwrap();
+        }
+    }
+}
+
+#[track_caller]
+fn is_within_four_deviations(found: &Value, truth: &Pose) {
+    let deviations = |key: &str| {
+        let numbers = found[key].as_array().unwrap().iter().map(|v| v.as_f64().unwrap());
+        DVec3::from_slice(&numbers.collect::<Vec<f64>>())
+    };
+    let [turn, step] = motion(found).off(truth);
+    for (off, sd) in [(turn, "rotation_sd_rad"), (step, "translation_sd_mm")] {
+        let parts = off / deviations(sd);
+        assert!(parts.abs().max_element() < 4.0, "{sd}: {parts}");
+    }
 }
 
 fn motion(value: &Value) -> Pose {

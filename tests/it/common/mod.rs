@@ -5,6 +5,7 @@ pub mod folder;
 pub mod glb;
 pub mod page;
 pub mod png;
+pub mod solids;
 pub mod verdict;
 pub mod view;
 

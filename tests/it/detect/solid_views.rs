@@ -128,7 +128,7 @@ fn spikes() -> ClosedMesh {
     let mut vertices = inner.vertices_mm.clone();
     let mut faces = Vec::new();
     for (index, face) in inner.faces.iter().enumerate() {
-        let [a, b, c] = inner.triangle_mm(index);
+        let [a, b, c] = inner.corners_mm(index)[..] else { panic!("a triangle") };
         let middle = (a + b + c) / 3.0;
         let apex = middle + middle.normalize() * 100.0 * (2f64 / 3.0).sqrt();
         faces.extend((0..3).map(|i| [face[i], face[(i + 1) % 3], vertices.len()]));

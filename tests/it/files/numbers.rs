@@ -12,6 +12,7 @@ use deltille::lattice::GridKind;
 use deltille::targets::{
     BoardSpec, ClosedMesh, PaperSpec, Polyhedron, SolidShape, SolidSpec, Target, TargetSpec,
 };
+use glam::DVec3;
 use rand::SeedableRng;
 use serde_json::Value;
 
@@ -133,6 +134,14 @@ fn mesh() -> Target {
     Target::build("mesh", &TargetSpec::Solid(spec), Some(&family), None).unwrap()
 }
 
+/// A solid whose sides are numbers.
+fn cuboid() -> Target {
+    let shape = SolidShape::Cuboid(DVec3::new(90.0, 70.0, 60.0));
+    let spec = SolidSpec { tiles: 6, ..SolidSpec::new(shape) };
+    let family = Family::shipped("aprilTag36h11").unwrap();
+    Target::build("cuboid", &TargetSpec::Solid(spec), Some(&family), None).unwrap()
+}
+
 /// The solid as it is measured: poses with their covariances.
 fn measured() -> Target {
     let mut target = solid();
@@ -176,7 +185,7 @@ const CAMERA: &str = "width: 1280\nheight: 960\nfocal_px: [1100.5, 1100]\ncentre
 
 #[test]
 fn targets() {
-    for target in [board(), solid(), mesh(), measured()] {
+    for target in [board(), solid(), mesh(), cuboid(), measured()] {
         for (text, what) in changed(&target.to_json(), 150) {
             match Target::from_json(&text) {
                 Err(error) => is_told(&error.to_string(), &what),

@@ -148,10 +148,11 @@ fn turn(target: &mut Target, at: usize) {
     let TargetSpec::Solid(spec) = &target.spec else { panic!("a solid") };
     let placement = &mut target.sheets[0].placements[at];
     let panel = target.panels.iter().position(|panel| panel.id == placement.panel).unwrap();
-    let outline = spec.faces().unwrap()[panel].outline_mm;
-    let middle = outline.iter().sum::<DVec2>() / 3.0;
+    let outline = spec.faces().unwrap().swap_remove(panel).outline_mm;
+    let sides = outline.len() as f64;
+    let middle = outline.iter().sum::<DVec2>() / sides;
     let kept = placement.page_from_panel(middle);
-    placement.angle_rad += TAU / 3.0;
+    placement.angle_rad += TAU / sides;
     let moved = placement.page_from_panel(middle);
     placement.origin_mm += kept - moved;
 }
@@ -221,6 +222,33 @@ fn a_wrong_layout_does_not_fold_into_the_solid() {
         };
         assert!(!verdict.passed && findings(&verdict).any(is_it), "{verdict}");
     }
+}
+
+/// The same of a cube: a face turned by a right angle has its sides where they were.
+#[test]
+fn a_turned_square_does_not_fold_into_the_cube() {
+    let spec = SolidSpec { edge_mm: 70.0, ..SolidSpec::new(SolidShape::Cube) };
+    let family = Family::shipped("aprilTag36h11").unwrap();
+    let paper = PaperSpec::default();
+    let cube = Target::build("t", &TargetSpec::Solid(spec), Some(&family), Some(&paper)).unwrap();
+    let verdict = |target: &Target| {
+        let artwork = artwork::draw(target, Some(&family)).unwrap();
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("t.svg");
+        svg::write(&artwork, 0, &path).unwrap();
+        Verifier::new(target, Some(&family)).unwrap().verify_path(&path).unwrap()
+    };
+    let whole = verdict(&cube);
+    assert!(whole.passed && whole.sheets[0].fold.unwrap().edges == 12, "{whole}");
+    let mut turned = cube.clone();
+    turn(&mut turned, 2);
+    let board = turned.sheets[0].placements[2].panel;
+    let quarter = json!({ "kind": "face_turned", "panel": board, "angle_deg": 90.0 });
+    assert_found(&verdict(&turned), [quarter]);
+    let mut swapped = cube.clone();
+    swap(&mut swapped, 0, 4);
+    let elsewhere = json!({ "kind": "face_elsewhere" });
+    assert_found(&verdict(&swapped), [elsewhere]);
 }
 
 /// The print differs from a right description.

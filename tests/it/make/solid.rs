@@ -1,9 +1,13 @@
 //! `deltille icosahedron` and its sisters: what they write, and what proves it.
 
+use std::path::Path;
+
 use crate::common::command::deltille;
 use crate::common::folder::names;
 use crate::common::page::Page;
+use crate::common::solids::{cuboctahedron, rhombic_dodecahedron, truncated_tetrahedron};
 use deltille::export::dsc;
+use deltille::lattice::GridKind;
 use deltille::targets::{LineKind, Target};
 use glam::DVec2;
 
@@ -195,7 +199,8 @@ fn meshes_that_are_no_solids_are_refused() {
     let good = bipyramid(120.0);
     let without_last = good.trim_end().rsplit_once('\n').unwrap().0.to_owned();
     let flattened = good.replace("f 1 2 9\n", "f 1 1 9\n");
-    let quad = good.replace("f 1 2 9\n", "f 1 2 3 9\n");
+    // A face of four corners that is bent along a diagonal.
+    let bent = good.replace("f 1 2 9\nf 2 1 5\n", "f 1 5 2 9\n");
     let wound = good.replace("f 1 2 9\n", "f 2 1 9\n");
     let twice = good.clone() + &good.replace("v 0 0 ", "v 999 0 ");
     let skewed: String = good
@@ -216,7 +221,7 @@ fn meshes_that_are_no_solids_are_refused() {
     for (name, text, options) in [
         ("open", without_last, ""),
         ("flat", flattened, ""),
-        ("quad", quad, ""),
+        ("bent", bent, ""),
         ("wound", wound, ""),
         ("crowd", twice, ""),
         ("nan", good.replacen("v ", "v nan ", 1), ""),
@@ -256,11 +261,19 @@ fn an_octahedron_is_made_photographed_and_found() {
     let args = "render octahedron.json --camera camera.yaml --eye 250,180,220 --bits 16 --seed 3";
     assert!(page.run(path, &format!("deltille {args}")).status.success());
     page.is("octahedron");
-    deltille(path, "detect --target octahedron.json octahedron-view.png -o found").success();
-    let read = |name: &str| -> serde_json::Value {
-        serde_json::from_str(&std::fs::read_to_string(path.join(name)).unwrap()).unwrap()
+    assert!(corners_found(path, "octahedron") >= 36);
+    let picture = image::ImageReader::open(path.join("octahedron-view.png")).unwrap();
+    assert_eq!(picture.decode().unwrap().color(), image::ColorType::L16);
+}
+
+/// How many corners of a target are found in its rendered view, each within 0.2 px of its true place.
+fn corners_found(path: &Path, name: &str) -> usize {
+    deltille(path, &format!("detect --target {name}.json {name}-view.png -o found")).success();
+    let read = |file: String| -> serde_json::Value {
+        serde_json::from_str(&std::fs::read_to_string(path.join(file)).unwrap()).unwrap()
     };
-    let (truth, found) = (read("octahedron-view.json"), read("found/octahedron-view.json"));
+    let (truth, found) =
+        (read(format!("{name}-view.json")), read(format!("found/{name}-view.json")));
     let truth: std::collections::BTreeMap<u64, [f64; 2]> = truth["corners"]
         .as_array()
         .unwrap()
@@ -276,9 +289,113 @@ fn an_octahedron_is_made_photographed_and_found() {
         assert!((at[0] - x).hypot(at[1] - y) < 0.2, "{corner}");
         near += 1;
     }
-    assert!(near >= 36, "{near}");
-    let picture = image::ImageReader::open(path.join("octahedron-view.png")).unwrap();
-    assert_eq!(picture.decode().unwrap().color(), image::ColorType::L16);
+    near
+}
+
+const CAMERA: &str = "width: 1600\nheight: 1200\nmodel: pinhole\nfocal_px: [1800, 1800]\n\
+                      centre_px: [799.5, 599.5]\n";
+
+/// A cube from the command to its proof in every format, and to a photograph in which three faces are found.
+#[test]
+fn a_cube_is_made_photographed_and_found() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path();
+    let mut page = Page::default();
+    let args = "cube --edge 80mm --pdf --svg --png --gltf --obj --usd --mjcf --stl --dxf --skeleton --texture 4096";
+    assert!(page.run(path, &format!("deltille {args}")).status.success());
+    let per_face = "cube --edge 80mm --per-face --pdf --dxf --name faces";
+    assert!(page.run(path, &format!("deltille {per_face}")).status.success());
+    for refused in [
+        "cube --family delTag25h7",
+        "cube --tag-border 0.8",
+        "cube --tiles 5",
+        "cube --first-id 560",
+        "cube --edge 12mm",
+        "cube --pdf --face-margin 1mm",
+    ] {
+        page.refused(path, &format!("deltille {refused} -o out"));
+    }
+    page.is("cube");
+    std::fs::write(path.join("camera.yaml"), CAMERA).unwrap();
+    deltille(path, "render cube.json --camera camera.yaml --eye 210,-230,190").success();
+    assert_eq!(corners_found(path, "cube"), 3 * 49);
+}
+
+/// Squares beside triangles, hexagons and rhombs, each with its board: from the mesh to the proof, and found in a
+/// photograph.
+#[test]
+fn meshes_of_other_faces_become_targets() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path();
+    std::fs::write(path.join("camera.yaml"), CAMERA).unwrap();
+    let mut page = Page::default();
+    let bodies = "--pdf --gltf --stl --skeleton --dxf --panel-thickness 1mm --wall 1.5mm";
+    // How many corners at least are found.
+    for (name, obj, options, least) in [
+        ("cubocta", cuboctahedron(70.0), "--tiles 6", 2 * 25 + 10),
+        ("truncated", truncated_tetrahedron(60.0), "--tiles 6 --first-id 7", 2 * 91),
+        ("rhombic", rhombic_dodecahedron(70.0), "--tiles 7", 3 * 20),
+    ] {
+        std::fs::write(path.join(format!("{name}-mesh.obj")), obj).unwrap();
+        let args = format!("solid --mesh {name}-mesh.obj {options} --name {name} {bodies}");
+        assert!(page.run(path, &format!("deltille {args}")).status.success());
+        deltille(path, &format!("render {name}.json --camera camera.yaml --eye 230,-260,200"))
+            .success();
+        let found = corners_found(path, name);
+        assert!(found >= least, "{name}: {found}");
+    }
+    // Of two families the tags of either kind have their own ids.
+    let target = std::fs::read_to_string(path.join("cubocta.json")).unwrap();
+    let target = Target::from_json(&target).unwrap();
+    let kinds = |kind| target.panels.iter().filter(move |panel| panel.kind == kind);
+    for (kind, faces) in [(GridKind::Deltille, 8), (GridKind::Checker, 6)] {
+        let ids: Vec<u32> = kinds(kind).flat_map(|panel| &panel.tags).map(|tag| tag.id).collect();
+        assert!(kinds(kind).count() == faces && ids == (0..ids.len() as u32).collect::<Vec<_>>());
+    }
+    let beside = "solid --mesh cubocta-mesh.obj --tiles 6 --name second --with cubocta.json -o out";
+    let own_ids = "--board-id 14 --first-id 8";
+    for refused in [
+        format!("{beside} {own_ids}"),
+        "solid --mesh cubocta-mesh.obj --dsc -o out".to_owned(),
+        "solid --mesh cubocta-mesh.obj --first-square-id 580 -o out".to_owned(),
+        "solid --mesh cubocta-mesh.obj --square-family delTag25h7 -o out".to_owned(),
+        "solid --mesh rhombic-mesh.obj --square-family aprilTag36h11 -o out".to_owned(),
+        "solid --mesh rhombic-mesh.obj --face-margin 30mm -o out".to_owned(),
+    ] {
+        page.refused(path, &format!("deltille {refused}"));
+    }
+    page.is("solids-of-other-faces");
+    deltille(path, &format!("{beside} {own_ids} --first-square-id 24")).success();
+}
+
+/// All faces of a cuboid have squares of one size, as many along its shortest side as are asked for.
+#[test]
+fn a_cuboid_is_made_photographed_and_found() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path();
+    let mut page = Page::default();
+    let args = "cuboid --size 160x120x80mm --pdf --gltf --stl --skeleton --dxf --name box";
+    assert!(page.run(path, &format!("deltille {args}")).status.success());
+    let pieces = "cuboid --size 160x120x80mm --paper A4 --pdf --name pieces";
+    assert!(page.run(path, &format!("deltille {pieces}")).status.success());
+    for refused in [
+        "--size 160x120mm",
+        "--size 160x120x8mm",
+        "--size 4000x30x30mm --edge 1m --tiles 6 --tag-spacing 60",
+        "--size 160x-120x80mm",
+    ] {
+        page.refused(path, &format!("deltille cuboid {refused} -o out"));
+    }
+    page.is("cuboid");
+    let target = std::fs::read_to_string(path.join("box.json")).unwrap();
+    let target = Target::from_json(&target).unwrap();
+    assert!(target.panels.iter().all(|panel| panel.edge_mm == target.panels[0].edge_mm));
+    // Squares of 8.25 mm within margins of 7 mm: 17 along 146 mm, 12 along 106 mm, 8 along 66 mm.
+    let boards: Vec<_> = target.panels.iter().map(|panel| panel.matrix).collect();
+    assert_eq!(boards, [[16, 7], [11, 7], [16, 7], [11, 7], [11, 16], [16, 11]]);
+    std::fs::write(path.join("camera.yaml"), CAMERA).unwrap();
+    deltille(path, "render box.json --camera camera.yaml --eye 260,-260,240").success();
+    assert_eq!(corners_found(path, "box"), 7 * 16 + 7 * 11 + 11 * 16);
 }
 
 /// What is printed wrong on a mesh is named, also where the detector would not mind.

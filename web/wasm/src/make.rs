@@ -147,7 +147,7 @@ impl Wanted {
             edge_mm: self.edge_mm.unwrap_or(usual.edge_mm),
             tiles: self.tiles.unwrap_or(usual.tiles),
             board_id: self.board_id,
-            tags: self.tags(GridKind::Deltille),
+            tags: self.tags(usual.shape.tag_tiling()),
             skeleton: self.skeleton.then(SkeletonSpec::default),
             ..usual
         };

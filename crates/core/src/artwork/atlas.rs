@@ -26,8 +26,8 @@ pub struct Atlas {
     pub px_per_m: u32,
     /// Width and height of the texture, px.
     pub size_px: [u32; 2],
-    /// Vertices of each face on the sheet, mm, in the order of the faces; of a plate two triangles.
-    pub outlines_mm: Vec<[DVec2; 3]>,
+    /// Vertices of each face on the sheet, mm, in the order of the faces; of a plate those of its front.
+    pub outlines_mm: Vec<Vec<DVec2>>,
 }
 
 impl Atlas {
@@ -55,7 +55,8 @@ impl Atlas {
         for ((face, panel), placement) in faces.iter().zip(&target.panels).zip(packing.placements())
         {
             shapes.extend(draw_panel(target, panel, &placement, family)?);
-            outlines_mm.push(face.outline_mm.map(|p| placement.page_from_panel(p)));
+            let outline = face.outline_mm.iter();
+            outlines_mm.push(outline.map(|&p| placement.page_from_panel(p)).collect());
         }
         let sheet = Sheet { width_mm, height_mm, shapes };
         Ok(Atlas { sheet, px_per_m, size_px: size_px.as_uvec2().to_array(), outlines_mm })
@@ -84,11 +85,12 @@ impl Atlas {
         let [b, d] = [DVec2::new(c.x, a.y), DVec2::new(a.x, c.y)];
         let sheet = Sheet { width_mm, height_mm, shapes };
         let size_px = size_px.as_uvec2().to_array();
-        Ok(Atlas { sheet, px_per_m, size_px, outlines_mm: vec![[a, b, c], [a, c, d]] })
+        Ok(Atlas { sheet, px_per_m, size_px, outlines_mm: vec![vec![a, b, c, d]] })
     }
 }
 
-/// Faces packed in rows of equal number, alternately upright and upside down.
+/// Faces packed in rows of equal number, alternately upright and upside down; those of four and more corners as the
+/// rectangles around them.
 pub(super) struct Packing {
     pub size_mm: DVec2,
     /// Rotation of each panel, rad, and position of its origin, mm.
@@ -114,18 +116,20 @@ impl Packing {
     fn new(faces: &[Face], columns: usize, padding: f64) -> Self {
         // Slanted edges keep the padding, measured across them, along a row; so does the flattest
         // one.
-        let slants = faces.iter().flat_map(|Face { outline_mm: [a, b, c], .. }| {
-            [a, b].map(|end| {
-                let slant = c - end;
+        let shapes: Vec<Vec<DVec2>> = faces.iter().map(packed_shape).collect();
+        let triangles = shapes.iter().filter(|shape| shape.len() == 3);
+        let slants = triangles.flat_map(|shape| {
+            [shape[0], shape[1]].map(|end| {
+                let slant = shape[2] - end;
                 slant.y / slant.x.hypot(slant.y)
             })
         });
         let gap = padding / slants.fold(1.0, f64::min);
-        let height = |face: &Face| face.outline_mm[2].y - face.outline_mm[0].y;
-        let row_height = faces.iter().map(height).fold(0.0, f64::max);
+        let height = |shape: &Vec<DVec2>| shape[2].y - shape[0].y;
+        let row_height = shapes.iter().map(height).fold(0.0, f64::max);
         let mut packing = Self { size_mm: DVec2::ZERO, places: Vec::with_capacity(faces.len()) };
-        let mut last = None;
-        for (index, face) in faces.iter().enumerate() {
+        let mut last: Option<Vec<DVec2>> = None;
+        for (index, shape) in shapes.iter().enumerate() {
             if index.is_multiple_of(columns) {
                 packing.size_mm.y += if index == 0 { padding } else { row_height + padding };
                 last = None;
@@ -134,15 +138,15 @@ impl Packing {
             let turn = if upright { 1.0 } else { -1.0 };
             // The lower edge of an upright face, or the apex of an inverted one, lies at the bottom
             // of the row.
-            let lowest = if upright { face.outline_mm[0].y } else { -face.outline_mm[2].y };
+            let lowest = if upright { shape[0].y } else { -shape[2].y };
             let y = packing.size_mm.y - lowest;
-            let shape = face.outline_mm.map(|p| turn * p + DVec2::Y * y);
+            let shape: Vec<DVec2> = shape.iter().map(|&p| turn * p + DVec2::Y * y).collect();
             let left = shape.iter().map(|p| p.x).fold(f64::INFINITY, f64::min);
             let x = match &last {
                 None => padding - left,
                 Some(before) => shift_beside(before, &shape) + gap,
             };
-            let shape = shape.map(|p| p + DVec2::X * x);
+            let shape: Vec<DVec2> = shape.into_iter().map(|p| p + DVec2::X * x).collect();
             let right = shape.iter().map(|p| p.x).fold(0.0, f64::max);
             packing.size_mm.x = packing.size_mm.x.max(right + padding);
             packing.places.push((if upright { 0.0 } else { PI }, DVec2::new(x, y)));
@@ -153,11 +157,22 @@ impl Packing {
     }
 }
 
+/// The outline of a triangle, or the rectangle around another face, from its lower left end: mm in the panel frame.
+fn packed_shape(face: &Face) -> Vec<DVec2> {
+    let outline = &face.outline_mm;
+    if outline.len() == 3 {
+        return outline.clone();
+    }
+    let low = outline.iter().copied().reduce(DVec2::min).unwrap_or_default();
+    let high = outline.iter().copied().reduce(DVec2::max).unwrap_or_default();
+    vec![low, DVec2::new(high.x, low.y), high, DVec2::new(low.x, high.y)]
+}
+
 /// The shift along x, mm, with which `shape` touches `before` from the right.
 ///
-/// The right outline of one triangle and the left outline of the other are straight between the
+/// The right outline of one shape and the left outline of the other are straight between the
 /// vertices of both, so that they touch at the height of a vertex.
-fn shift_beside(before: &[DVec2; 3], shape: &[DVec2; 3]) -> f64 {
+fn shift_beside(before: &[DVec2], shape: &[DVec2]) -> f64 {
     let heights = before.iter().chain(shape).map(|p| p.y);
     let needed = heights.filter_map(|y| {
         let [_, right] = extent_at(before, y)?;
@@ -167,11 +182,11 @@ fn shift_beside(before: &[DVec2; 3], shape: &[DVec2; 3]) -> f64 {
     needed.fold(f64::NEG_INFINITY, f64::max)
 }
 
-/// Left and right end of a triangle at height y; `None` where it does not reach that height.
-fn extent_at(triangle: &[DVec2; 3], y: f64) -> Option<[f64; 2]> {
+/// Left and right end of a convex shape at height y; `None` where it does not reach that height.
+fn extent_at(shape: &[DVec2], y: f64) -> Option<[f64; 2]> {
     let mut extent: Option<[f64; 2]> = None;
-    for i in 0..3 {
-        let (a, b) = (triangle[i], triangle[(i + 1) % 3]);
+    for i in 0..shape.len() {
+        let (a, b) = (shape[i], shape[(i + 1) % shape.len()]);
         if y < a.y.min(b.y) || y > a.y.max(b.y) {
             continue;
         }

@@ -117,7 +117,7 @@ pub(super) fn draw_panel(
     let mut drawn: BTreeMap<Tile, BezPath> =
         panel.dark_tiles().into_iter().map(|tile| (tile, tile_outline(panel, tile, 0.0))).collect();
     for tag in &panel.tags {
-        let (cells, word) = tag_word(target, tag, family)?;
+        let (cells, word) = tag_word(target, panel, tag, family)?;
         let tile = panel.tag_tile(tag);
         if panel.tags_in == TagsIn::White {
             let margin = panel.tag_margin_bits() / cells.width(panel.tag_inset_bits());
@@ -144,11 +144,13 @@ pub(super) fn draw_panel(
 /// The cells and the code word of a tag.
 fn tag_word(
     target: &Target,
+    panel: &Panel,
     tag: &TagPlacement,
     family: Option<&Family>,
 ) -> Result<(TagCells, u64), ArtworkError> {
-    let Some(family) = family else {
-        let name = target.family.as_ref().map_or_else(String::new, |f| f.name.clone());
+    let Some(family) = family.and_then(|family| family.of_tiling(panel.kind)) else {
+        let named = target.family.as_ref().map(|family| family.of_tiling(panel.kind));
+        let name = named.map_or_else(String::new, |f| f.name.clone());
         return Err(ArtworkError::FamilyMissing(name));
     };
     let word = family.code(tag.id).ok_or_else(|| ArtworkError::NoSuchTag {

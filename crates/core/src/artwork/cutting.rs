@@ -97,13 +97,13 @@ pub fn panels_to_cut(target: &Target) -> Result<CutDrawing, CuttingError> {
     let mut drawing = CutDrawing::default();
     let packing = Packing::tightest(&panels, GAP_MM);
     for (index, (panel, placement)) in panels.iter().zip(packing.placements()).enumerate() {
-        let outline = panel.outline_mm;
-        let points_mm = outline.map(|p| placement.page_from_panel(p)).to_vec();
+        let outline = &panel.outline_mm;
+        let points_mm = outline.iter().map(|&p| placement.page_from_panel(p)).collect();
         drawing.paths.push(CutPath { layer: CutLayer::Cut, closed: true, points_mm });
         let numbers = edge_numbers(&solid, &edges, index);
         let mut texts = vec![face_number(&placement, outline, index)];
         for (i, number) in numbers.into_iter().enumerate() {
-            let ends = [outline[i], outline[(i + 1) % 3]];
+            let ends = [outline[i], outline[(i + 1) % outline.len()]];
             texts.push(edge_text(
                 &placement,
                 ends,
@@ -199,10 +199,11 @@ fn outlines(sheet: &SheetLayout) -> Option<Vec<Vec<DVec2>>> {
 /// The number of a face, centred on its incircle.
 fn face_number(
     placement: &Placement,
-    outline: [DVec2; 3],
+    outline: &[DVec2],
     index: usize,
 ) -> crate::targets::SheetText {
-    let circle = crate::targets::Incircle::of(outline.map(|corner| corner.extend(0.0)));
+    let corners: Vec<_> = outline.iter().map(|corner| corner.extend(0.0)).collect();
+    let circle = crate::targets::Incircle::of(&corners);
     let text = upright_number(index);
     let cap = (FACE_CAP.0 * circle.radius).min(FACE_CAP.1);
     let width = text.len() as f64 * ADVANCE_CAPS * cap;

@@ -239,6 +239,10 @@ pub fn subject(target: &Target) -> String {
     let mut subject = format!("{what}, {}", counted(tags, "tag"));
     if let Some(family) = &target.family {
         subject += &format!(", family {}, fingerprint {}", family.name, family.fingerprint);
+        if let Some(squares) = &family.squares {
+            let (name, fingerprint) = (&squares.name, &squares.fingerprint);
+            subject += &format!(", of squares {name}, fingerprint {fingerprint}");
+        }
     }
     subject
 }

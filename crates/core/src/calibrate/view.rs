@@ -475,7 +475,7 @@ fn check_panel(target: &Target, panel: &Panel, grid: &Grid) -> Result<(), String
     }
     for tag in &grid.tags {
         let same = panel.tags.iter().any(|t| (t.id, t.row, t.col) == (tag.id, tag.row, tag.col));
-        let family = target.family.as_ref().map(|family| family.name.as_str());
+        let family = target.family.as_ref().map(|family| &*family.of_tiling(panel.kind).name);
         if !same || family != Some(tag.family.as_str()) {
             return Err(format!(
                 "tag {} of {} in row {}, column {} is not on {}",

@@ -221,12 +221,25 @@ impl Detector {
         Self { finder, refiner, tag_areas, labels, edge_mm, ink, clock, other }
     }
 
-    /// A detector of a target, whose panels are of one kind; `family` is the family that the target
-    /// names.
+    /// A detector of a target; `family` is the family that the target names.
     ///
     /// An untagged panel is labelled where it is seen whole and nothing else of the target looks so;
     /// see [`Self::for_grid`] for which corner of a checkerboard is the first then.
     pub fn for_target(target: &Target, family: Option<&Family>, config: DetectorConfig) -> Self {
+        let mut of_tilings = target.tilings().map(|kind| {
+            let family = family.and_then(|family| family.of_tiling(kind));
+            match target.tilings().count() {
+                1 => Self::of_one_tiling(target, family, config.clone()),
+                _ => Self::of_one_tiling(&target.of_tiling(kind), family, config.clone()),
+            }
+        });
+        let first = of_tilings.next();
+        let other = of_tilings.next().map(Box::new);
+        let first = first.unwrap_or_else(|| Self::of_one_tiling(target, family, config));
+        Self { other, ..first }
+    }
+
+    fn of_one_tiling(target: &Target, family: Option<&Family>, config: DetectorConfig) -> Self {
         let labels = Labels::of_target(target, family, &config);
         let tag_areas = family.map(|family| TagAreas::of(target, family)).unwrap_or_default();
         Self::with(kind_of(target), labels, tag_areas, edge_of(&[target]), config)
@@ -263,17 +276,28 @@ impl Detector {
             return Ok(Self::for_target(only, *family, config));
         }
         let of_kind = |kind: GridKind| {
-            let own = || targets.iter().filter(move |(target, _)| kind_of(target) == kind);
-            let labels = own().map(|(target, family)| {
+            // What of each target has this tiling, with the family of its tags.
+            let has_it = |(target, _): &&(&Target, Option<&Family>)| {
+                kind_of(target) == kind || target.tilings().any(|own| own == kind)
+            };
+            let own: Vec<(Target, Option<&Family>)> = targets
+                .iter()
+                .filter(has_it)
+                .map(|(target, family)| {
+                    let family = family.and_then(|family| family.of_tiling(kind));
+                    (target.of_tiling(kind), family)
+                })
+                .collect();
+            let labels = own.iter().map(|(target, family)| {
                 (target.name.to_string(), Labels::of_target(target, *family, &config))
             });
-            let tag_areas = own().filter_map(|(target, family)| {
+            let tag_areas = own.iter().filter_map(|(target, family)| {
                 Some((target.name.to_string(), TagAreas::of(target, (*family)?)))
             });
-            let edge_mm = edge_of(&own().map(|(target, _)| *target).collect::<Vec<_>>());
+            let edge_mm = edge_of(&own.iter().map(|(target, _)| target).collect::<Vec<_>>());
             let (labels, tag_areas) =
                 (Labels::of_scene(labels.collect()), TagAreas::of_scene(tag_areas));
-            own().next().map(|_| Self::with(kind, labels, tag_areas, edge_mm, config.clone()))
+            (!own.is_empty()).then(|| Self::with(kind, labels, tag_areas, edge_mm, config.clone()))
         };
         let mut of_kinds = [GridKind::Deltille, GridKind::Checker].into_iter().filter_map(of_kind);
         let first = of_kinds.next().ok_or(SceneError::Empty)?;

@@ -54,12 +54,22 @@ impl Reach {
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
     pub fn of(target: &Target, family: Option<&Family>) -> Self {
-        let tags = target.panels.iter().flat_map(|panel| &panel.tags);
-        let after = tags.clone().map(|tag| tag.id as usize + 1).max().unwrap_or(0);
-        let cells =
-            target.panels.iter().filter(|panel| !panel.tags.is_empty()).filter_map(|panel| {
-                Some(panel.edge_mm / family?.cells().width(panel.tag_inset_bits()))
-            });
+        let family_of = |kind| family.and_then(|family| family.of_tiling(kind));
+        let tagged = || target.panels.iter().filter(|panel| !panel.tags.is_empty());
+        let cells = tagged().filter_map(|panel| {
+            let family = family_of(panel.kind)?;
+            Some(panel.edge_mm / family.cells().width(panel.tag_inset_bits()))
+        });
+        let bits = tagged().map(|panel| {
+            let bits = family_of(panel.kind).map_or(0, |family| family.dimension().bits());
+            bits * panel.tags.len() as u32
+        });
+        // Of two families the one that has fewer left.
+        let left = target.tilings().filter_map(|kind| {
+            let (_, ids) = target.tags_of_tiling(kind)?;
+            let after = ids.into_iter().max().map_or(0, |id| id as usize + 1);
+            Some(family_of(kind)?.len().saturating_sub(after))
+        });
         let cell_mm = cells.reduce(f64::min);
         let edge_mm = target.panels.iter().map(|panel| panel.edge_mm).fold(f64::INFINITY, f64::min);
         let places = target.panels.iter().flat_map(|panel| &panel.corners).map(|c| c.target_mm);
@@ -75,10 +85,9 @@ impl Reach {
         };
         Self {
             corners: target.panels.iter().map(|panel| panel.corners.len()).sum(),
-            bits: family
-                .map_or(0, |family| family.dimension().bits() * tags.clone().count() as u32),
-            tags: tags.count(),
-            ids_left: family.map_or(0, |family| family.len().saturating_sub(after)),
+            bits: bits.sum(),
+            tags: tagged().map(|panel| panel.tags.len()).sum(),
+            ids_left: left.min().unwrap_or(0),
             detail_mm: cell_mm.unwrap_or(edge_mm),
             needed_px: if cell_mm.is_some() { COMFORTABLE_BIT_PX } else { MIN_UNTAGGED_EDGE_PX },
             size_mm,

@@ -86,12 +86,15 @@ fn check_pair(one: &Target, other: &Target) -> Result<(), SceneError> {
     if one.name == other.name {
         return Err(SceneError::SameName { name: one.name.to_string() });
     }
-    if let (Some(family), Some(same)) = (&one.family, &other.family)
-        && family.name == same.name
-        && let Some(&id) = ids(one).intersection(&ids(other)).next()
-    {
-        let (first, second) = names();
-        return Err(SceneError::SameTag { first, second, id, family: family.name.clone() });
+    for kind in one.tilings() {
+        if let (Some((family, own)), Some((same, others))) =
+            (one.tags_of_tiling(kind), other.tags_of_tiling(kind))
+            && family.name == same.name
+            && let Some(&id) = own.iter().filter(|id| others.contains(id)).min()
+        {
+            let (first, second) = names();
+            return Err(SceneError::SameTag { first, second, id, family: family.name.clone() });
+        }
     }
     if let Some((first, second)) =
         outlines(one).intersection(&outlines(other)).next().map(|_| names())
@@ -99,10 +102,6 @@ fn check_pair(one: &Target, other: &Target) -> Result<(), SceneError> {
         return Err(SceneError::SameOutline { first, second });
     }
     Ok(())
-}
-
-fn ids(target: &Target) -> BTreeSet<u32> {
-    target.panels.iter().flat_map(|panel| &panel.tags).map(|tag| tag.id).collect()
 }
 
 /// Tiling, rows and columns of the panels without tags.

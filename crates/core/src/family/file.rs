@@ -134,6 +134,7 @@ pub(super) fn from_json(json: &str) -> Result<Family, FamilyError> {
         construction: file.construction,
         histogram: file.distance_histogram,
         fingerprint,
+        squares: None,
     })
 }
 

@@ -82,6 +82,8 @@ pub struct Family {
     construction: Construction,
     histogram: BTreeMap<u32, u64>,
     fingerprint: String,
+    /// See [`Family::with_squares`].
+    squares: Option<Box<Family>>,
 }
 
 impl Family {
@@ -133,7 +135,27 @@ impl Family {
             construction,
             histogram,
             fingerprint,
+            squares: None,
         })
+    }
+
+    /// The same family with that of the squares of a target whose faces are of both tilings. Files of families have one
+    /// of them.
+    pub fn with_squares(self, squares: Family) -> Self {
+        Self { squares: Some(Box::new(squares)), ..self }
+    }
+
+    /// A family with that of the squares, where there are both.
+    pub fn paired(family: Option<Self>, squares: Option<Self>) -> Option<Self> {
+        match (family, squares) {
+            (Some(family), Some(squares)) => Some(family.with_squares(squares)),
+            (family, _) => family,
+        }
+    }
+
+    /// The family of tags in tiles of a kind: this one, or that of its squares.
+    pub fn of_tiling(&self, kind: GridKind) -> Option<&Self> {
+        if self.kind == kind { Some(self) } else { self.squares.as_deref() }
     }
 
     /// A family that comes with the crate, by its name: those of [`shipped_families`], and the dictionaries of
@@ -165,6 +187,7 @@ impl Family {
             construction: Construction::Places,
             histogram: BTreeMap::new(),
             fingerprint,
+            squares: None,
         }
     }
 

@@ -25,7 +25,7 @@ pub fn scene_of_target(target: &Target, family: Option<&Family>) -> Result<Scene
     };
     let surface = |(index, panel): (usize, &Panel)| -> Result<Surface, ArtworkError> {
         let paper_mm = match faces.as_ref().and_then(|faces| faces.get(index)) {
-            Some(face) => face.outline_mm.to_vec(),
+            Some(face) => face.outline_mm.clone(),
             None => {
                 let [x0, y0, x1, y1] = panel.field_mm();
                 [(x0, y0), (x1, y0), (x1, y1), (x0, y1)].map(DVec2::from).to_vec()

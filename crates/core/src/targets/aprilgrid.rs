@@ -166,6 +166,7 @@ pub(super) fn parts(
     let needed = u64::from(spec.first_id) + u64::from(spec.count());
     if needed > family.len() as u64 {
         return Err(TargetError::IdsRunOut {
+            setting: "TagSpec::first_id",
             first: spec.first_id,
             last: needed - 1,
             family: family.name().to_owned(),
@@ -173,8 +174,7 @@ pub(super) fn parts(
             instead: "make fewer `AprilGridSpec::tags`".to_owned(),
         });
     }
-    let family =
-        FamilyRef { name: family.name().to_owned(), fingerprint: family.fingerprint().to_owned() };
+    let family = FamilyRef::of(family);
     let label = label(name, spec, &family);
     let single = SinglePanel {
         of_size: &|tag_mm| AprilGridSpec { tag_mm, ..spec.clone() }.panel(),

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use glam::DVec2;
 
-use super::capacity::{check_family, wider_spacing};
+use super::capacity::{Setting, check_family, wider_spacing};
 use super::{
     BoardSpec, Corner, FamilyRef, GridKind, Outline, Panel, PanelPose, TagSpec, TagsIn, TargetError,
 };
@@ -112,7 +112,7 @@ pub(super) fn panels(
         wider.into_iter().chain(fewer).collect()
     };
     let needed = boards * on_each(tags.spacing);
-    let family = check_family(spec.grid, tags, family, needed, instead)?;
+    let family = check_family(spec.grid, tags, family, needed, Setting::TAGS, instead)?;
     Ok((panels, Some(family)))
 }
 
@@ -147,10 +147,10 @@ pub(super) fn untied_panels(spec: &BoardSpec) -> Vec<Panel> {
                 Corner { id, row: v.row, col: v.col, panel_mm, target_mm, measured: None }
             })
             .collect(),
-        tags: spec
-            .tags
-            .as_ref()
-            .map_or_else(Vec::new, |tags| tags.placements(spec.board_id + board, board, &tiles)),
+        tags: spec.tags.as_ref().map_or_else(Vec::new, |tags| {
+            let first = tags.first_id.saturating_add(board * tiles.len() as u32);
+            tags.placements(spec.board_id + board, first, &tiles)
+        }),
     };
     (0..spec.boards).map(panel).collect()
 }

@@ -1,6 +1,7 @@
 use glam::DVec2;
 
 use super::angles::turn_of;
+use super::capacity::Setting;
 use super::layout::{arrange, label};
 use super::paper::{PaperSpec, SolidSheets};
 use super::poster::Poster;
@@ -27,7 +28,9 @@ impl Target {
     /// ```
     pub fn new(name: &str, spec: impl Into<TargetSpec>) -> Result<Target, TargetError> {
         let spec = spec.into();
-        let family = spec.family().map(Family::shipped).transpose();
+        let shipped = |name: Option<&str>| name.map(Family::shipped).transpose();
+        let family = shipped(spec.family())
+            .and_then(|family| Ok(Family::paired(family, shipped(spec.square_family())?)));
         let family = family.map_err(|error| TargetError::UnknownFamily(error.to_string()))?;
         Self::build(name, &spec, family.as_ref(), Some(&PaperSpec::default()))
     }
@@ -37,7 +40,10 @@ impl Target {
     /// # Errors
     /// Where that is not a family that is shipped.
     pub fn family(&self) -> Result<Option<Family>, FamilyError> {
-        self.family.as_ref().map(|family| Family::shipped(&family.name)).transpose()
+        let shipped = |family: &FamilyRef| Family::shipped(&family.name);
+        let Some(family) = &self.family else { return Ok(None) };
+        let squares = family.squares.as_deref().map(shipped).transpose()?;
+        Ok(Family::paired(Some(shipped(family)?), squares))
     }
 
     /// Makes what `spec` asks for, laid out on `layout`; without a layout there are no sheets.
@@ -109,12 +115,15 @@ impl Target {
             let (other, free) = (other.name.to_string(), u64::from(high) + 1);
             Err(TargetError::Overlap { setting, what, first, last, other, free })
         };
-        let tags = |target: &Target| -> Vec<u32> {
-            target.panels.iter().flat_map(|panel| &panel.tags).map(|tag| tag.id).collect()
-        };
         let boards = |target: &Target| target.panels.iter().map(|p| p.id).collect::<Vec<_>>();
-        if self.family.is_some() && self.family == other.family {
-            overlap("TagSpec::first_id", "tag ids", &tags(self), &tags(other))?;
+        for kind in self.tilings() {
+            if let (Some((family, ids)), Some((same, others))) =
+                (self.tags_of_tiling(kind), other.tags_of_tiling(kind))
+                && family == same
+            {
+                let setting = Setting::of(kind, self.tilings().count() > 1);
+                overlap(setting.first_id(), "tag ids", &ids, &others)?;
+            }
         }
         let board_id = match self.spec {
             TargetSpec::Solid(_) => "SolidSpec::board_id",

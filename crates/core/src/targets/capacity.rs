@@ -6,6 +6,34 @@ use crate::family::{Family, smallest_shipped};
 /// Spacings beyond this are not proposed: a tag in twenty tiles is easily hidden.
 const SPARSEST: u32 = 20;
 
+/// What sets the family and the ids of tags.
+#[derive(Clone, Copy)]
+pub(super) struct Setting {
+    family: &'static str,
+    first_id: &'static str,
+}
+
+impl Setting {
+    /// Of all tags of a target.
+    pub const TAGS: Self = Self { family: "TagSpec::family", first_id: "TagSpec::first_id" };
+
+    /// Of square tags beside others.
+    pub const SQUARE_TAGS: Self = Self {
+        family: "SolidSpec::square_tags::family",
+        first_id: "SolidSpec::square_tags::first_id",
+    };
+
+    /// Of the tags in tiles of a kind on a target of one or two tilings.
+    pub fn of(kind: GridKind, has_both: bool) -> Self {
+        if has_both && kind == GridKind::Checker { Self::SQUARE_TAGS } else { Self::TAGS }
+    }
+
+    /// The name of the first id.
+    pub fn first_id(self) -> &'static str {
+        self.first_id
+    }
+}
+
 /// Checks that the family is there, for tiles of this kind, and has `needed` codes from the first
 /// id on; `instead` lists
 /// what other than ids and family to change, given how many codes there are from the first id on.
@@ -14,12 +42,14 @@ pub(super) fn check_family(
     tags: &TagSpec,
     family: Option<&Family>,
     needed: u64,
+    setting: Setting,
     instead: impl FnOnce(u64) -> Vec<String>,
 ) -> Result<FamilyRef, TargetError> {
     let Some(family) = family else {
         let given = "and no family was given".to_owned();
         return Err(TargetError::Family { wanted: tags.family.clone(), given });
     };
+    let family = family.of_tiling(kind).unwrap_or(family);
     if family.kind() != kind {
         let problem = match kind {
             GridKind::Deltille => {
@@ -31,16 +61,12 @@ pub(super) fn check_family(
                                   aprilTag25h9, aprilTag16h5"
             }
         };
-        return Err(TargetError::invalid(
-            "TagSpec::family",
-            format!("{} {problem}", family.name()),
-        ));
+        return Err(TargetError::invalid(setting.family, format!("{} {problem}", family.name())));
     }
     let there = family.len() as u64;
     let first = u64::from(tags.first_id);
     if first + needed <= there {
-        let (name, fingerprint) = (family.name().to_owned(), family.fingerprint().to_owned());
-        return Ok(FamilyRef { name, fingerprint });
+        return Ok(FamilyRef::of(family));
     }
     let mut proposals = Vec::new();
     if let Some(highest) = there.checked_sub(needed) {
@@ -49,13 +75,14 @@ pub(super) fn check_family(
     proposals.extend(instead(there.saturating_sub(first)));
     if let Some(larger) = smallest_shipped(kind, first + needed, 0) {
         let (name, codes) = (larger.name, larger.codes);
-        proposals.push(format!("take `TagSpec::family` {name} with its {codes} codes"));
+        proposals.push(format!("take `{}` {name} with its {codes} codes", setting.family));
     }
     if proposals.is_empty() {
         proposals
             .push("make a smaller target, or a larger family by `deltag gen-family`".to_owned());
     }
     Err(TargetError::IdsRunOut {
+        setting: setting.first_id,
         first: tags.first_id,
         last: first + needed - 1,
         family: family.name().to_owned(),

@@ -191,6 +191,7 @@ pub(super) fn parts(
     let needed = u64::from(spec.first_id) + u64::from(spec.markers());
     if needed > family.len() as u64 {
         return Err(TargetError::IdsRunOut {
+            setting: "TagSpec::first_id",
             first: spec.first_id,
             last: needed - 1,
             family: family.name().to_owned(),
@@ -199,8 +200,7 @@ pub(super) fn parts(
                 .to_owned(),
         });
     }
-    let family =
-        FamilyRef { name: family.name().to_owned(), fingerprint: family.fingerprint().to_owned() };
+    let family = FamilyRef::of(family);
     let panel = spec.panel(dimension);
     let label = label(name, spec, &family);
     let single = SinglePanel {

@@ -1,9 +1,14 @@
-//! Solids given as lists of triangles: what makes them solids, and how far they are from regular.
+//! Solids given as lists of faces: what makes them solids, and how far their triangles are from regular.
 
 use std::collections::BTreeMap;
+use std::f64::consts::TAU;
+use std::fmt;
 
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
+
+use super::angles::angle;
+use super::polyhedron::{normal, sides, triangles};
 
 /// Largest deviation of an edge from the mean of its face for a face that counts as
 /// near-equilateral. The faces of geodesic spheres, made of equal triangles as nearly as a sphere
@@ -19,6 +24,13 @@ const LEAST_HEIGHT: f64 = 1e-4;
 /// A mesh that encloses less than this part of the cube of its extent is flat.
 const LEAST_VOLUME: f64 = 1e-6;
 
+/// A vertex may be so far beside the plane of its face, in parts of the mesh's extent: 0.05 mm on a solid of half a
+/// metre, which is what a made one is allowed.
+const FLAT: f64 = 1e-4;
+
+/// Sine of the least turn at a corner of a face of four and more, 0.6°: with less, its sides are one line.
+const LEAST_TURN: f64 = 0.01;
+
 /// Largest coordinate, in the unit of the list.
 const FARTHEST: f64 = 1e9;
 
@@ -27,7 +39,25 @@ pub fn is_coordinate(value: f64) -> bool {
     value.abs() <= FARTHEST
 }
 
-/// Why a list of triangles is not a closed solid. Triangles and vertices are counted from 1.
+/// What faces are called.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum FaceNoun {
+    /// Where all of them are triangles.
+    Triangle,
+    /// Where not all of them are.
+    Face,
+}
+
+impl fmt::Display for FaceNoun {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        f.write_str(match self {
+            Self::Triangle => "triangle",
+            Self::Face => "face",
+        })
+    }
+}
+
+/// Why a list of faces is not a closed solid. Faces and vertices are counted from 1.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum ClosedMeshError {
@@ -38,20 +68,26 @@ pub enum ClosedMeshError {
     #[error("vertex {0}: its coordinates must be finite numbers of at most {FARTHEST:e}")]
     NotFinite(usize),
     /// An index beyond the vertices.
-    #[error("triangle {0} names a vertex that is not there")]
-    NoSuchVertex(usize),
-    /// A triangle without area.
-    #[error("triangle {0} has no area")]
-    NoArea(usize),
+    #[error("{0} {1} names a vertex that is not there")]
+    NoSuchVertex(FaceNoun, usize),
+    /// A face without area.
+    #[error("{0} {1} has no area")]
+    NoArea(FaceNoun, usize),
+    /// Vertices of a face are not in one plane.
+    #[error("face {0} is not flat: divide it into triangles")]
+    NotFlat(usize),
+    /// A face with a corner that is straight, or turned inwards.
+    #[error("face {0} is not convex, or has a corner between two sides in one line: divide it")]
+    NotConvex(usize),
     /// An edge with a face on one side only.
-    #[error("it is open: triangle {0} has no neighbour along an edge")]
-    Open(usize),
+    #[error("it is open: {0} {1} has no neighbour along an edge")]
+    Open(FaceNoun, usize),
     /// More than two faces at an edge.
-    #[error("it is not manifold: an edge of triangle {0} belongs to {1} triangles")]
-    CrowdedEdge(usize, usize),
+    #[error("it is not manifold: an edge of {0} {1} belongs to {2} {0}s")]
+    CrowdedEdge(FaceNoun, usize, usize),
     /// Two neighbours that turn different sides outwards.
-    #[error("triangles {0} and {1} are neighbours but wound against each other")]
-    Winding(usize, usize),
+    #[error("{0}s {1} and {2} are neighbours but wound against each other")]
+    Winding(FaceNoun, usize, usize),
     /// Solids that touch in a vertex, at these coordinates.
     #[error("it is not manifold: parts of it touch only in the vertex at {0}")]
     Pinched(DVec3),
@@ -65,11 +101,11 @@ pub enum ClosedMeshError {
     #[error("it encloses no volume")]
     Flat,
     /// Faces that go through each other.
-    #[error("triangles {0} and {1} cut through each other")]
-    CutsItself(usize, usize),
+    #[error("{0}s {1} and {2} cut through each other")]
+    CutsItself(FaceNoun, usize, usize),
 }
 
-/// A closed solid of triangles in one piece, its faces counter-clockwise as seen from outside.
+/// A closed solid of flat, convex faces in one piece, these counter-clockwise as seen from outside.
 ///
 /// It may be concave, but does not cut through itself. The order of faces, and which vertex of a
 /// face comes first, are those of the list that it was made from.
@@ -77,7 +113,7 @@ pub enum ClosedMeshError {
 #[serde(try_from = "Lists", into = "Lists")]
 pub struct ClosedMesh {
     vertices: Vec<DVec3>,
-    faces: Vec<[usize; 3]>,
+    faces: Vec<Vec<usize>>,
 }
 
 /// A closed mesh as it is written.
@@ -85,7 +121,7 @@ pub struct ClosedMesh {
 #[serde(deny_unknown_fields)]
 struct Lists {
     vertices: Vec<DVec3>,
-    faces: Vec<[usize; 3]>,
+    faces: Vec<Vec<usize>>,
 }
 
 impl TryFrom<Lists> for ClosedMesh {
@@ -103,12 +139,16 @@ impl From<ClosedMesh> for Lists {
 }
 
 impl ClosedMesh {
-    /// Checks a list of triangles. Vertices in the same place become one, those that no triangle
+    /// Checks a list of faces. Vertices in the same place become one, those that no face
     /// names are left out; a mesh that is wound inside out is turned, and the second value says so.
     ///
     /// # Errors
-    /// Where the triangles are not one closed surface, or a coordinate is no number.
-    pub fn new(vertices: &[DVec3], faces: &[[usize; 3]]) -> Result<(Self, bool), ClosedMeshError> {
+    /// Where the faces are not one closed surface, one of them is not flat and convex, or a coordinate is no
+    /// number.
+    pub fn new<F: AsRef<[usize]>>(
+        vertices: &[DVec3],
+        faces: &[F],
+    ) -> Result<(Self, bool), ClosedMeshError> {
         use ClosedMeshError::*;
         if faces.is_empty() {
             return Err(Empty);
@@ -118,12 +158,21 @@ impl ClosedMesh {
         {
             return Err(NotFinite(bad + 1));
         }
-        if let Some(bad) = faces.iter().position(|f| f.iter().any(|&v| v >= vertices.len())) {
-            return Err(NoSuchVertex(bad + 1));
+        if let Some(bad) =
+            faces.iter().position(|f| f.as_ref().iter().any(|&v| v >= vertices.len()))
+        {
+            return Err(NoSuchVertex(noun(faces), bad + 1));
         }
         let mut mesh = welded(vertices, faces);
         if let Some(bad) = (0..mesh.faces.len()).find(|&face| !mesh.has_area(face)) {
-            return Err(NoArea(bad + 1));
+            return Err(NoArea(mesh.noun(), bad + 1));
+        }
+        let flat_within = FLAT * mesh.extent();
+        if let Some(bad) = (0..mesh.faces.len()).find(|&face| !mesh.is_flat(face, flat_within)) {
+            return Err(NotFlat(bad + 1));
+        }
+        if let Some(bad) = (0..mesh.faces.len()).find(|&face| !mesh.is_convex(face)) {
+            return Err(NotConvex(bad + 1));
         }
         mesh.check_edges()?;
         mesh.check_vertices()?;
@@ -132,7 +181,7 @@ impl ClosedMesh {
             return Err(Flat);
         }
         if volume < 0.0 {
-            mesh.faces.iter_mut().for_each(|[_, b, c]| std::mem::swap(b, c));
+            mesh.faces.iter_mut().for_each(|face| face[1..].reverse());
         }
         mesh.check_self()?;
         Ok((mesh, volume < 0.0))
@@ -144,7 +193,7 @@ impl ClosedMesh {
     }
 
     /// Indices of the vertices of each face.
-    pub fn faces(&self) -> &[[usize; 3]] {
+    pub fn faces(&self) -> &[Vec<usize>] {
         &self.faces
     }
 
@@ -152,10 +201,10 @@ impl ClosedMesh {
     pub fn mean_edge(&self) -> f64 {
         // Every edge belongs to two faces.
         let lengths = (0..self.faces.len()).flat_map(|face| self.lengths(face));
-        lengths.sum::<f64>() / (3 * self.faces.len()) as f64
+        lengths.sum::<f64>() / self.faces.iter().map(Vec::len).sum::<usize>() as f64
     }
 
-    /// The face that is farthest from equilateral, and by how much its edges deviate from their
+    /// The triangle that is farthest from equilateral, and by how much its edges deviate from their
     /// mean at most, relative.
     pub fn most_skewed(&self) -> (usize, f64) {
         let deviation = |face: usize| {
@@ -163,17 +212,19 @@ impl ClosedMesh {
             let mean = lengths.iter().sum::<f64>() / 3.0;
             lengths.iter().map(|length| (length / mean - 1.0).abs()).fold(0.0, f64::max)
         };
-        let faces = (0..self.faces.len()).map(|face| (face, deviation(face)));
+        let triangles = (0..self.faces.len()).filter(|&face| self.faces[face].len() == 3);
+        let faces = triangles.map(|face| (face, deviation(face)));
         faces.max_by(|a, b| a.1.total_cmp(&b.1)).unwrap_or_default()
     }
 
-    fn corners(&self, face: usize) -> [DVec3; 3] {
-        self.faces[face].map(|vertex| self.vertices[vertex])
+    fn corners(&self, face: usize) -> Vec<DVec3> {
+        self.faces[face].iter().map(|&vertex| self.vertices[vertex]).collect()
     }
 
-    fn lengths(&self, face: usize) -> [f64; 3] {
-        let [a, b, c] = self.corners(face);
-        [a.distance(b), b.distance(c), c.distance(a)]
+    fn lengths(&self, face: usize) -> Vec<f64> {
+        sides(&self.faces[face])
+            .map(|(from, to)| self.vertices[from].distance(self.vertices[to]))
+            .collect()
     }
 
     fn extent(&self) -> f64 {
@@ -181,19 +232,39 @@ impl ClosedMesh {
     }
 
     fn has_area(&self, face: usize) -> bool {
-        let [a, b, c] = self.corners(face);
-        let longest = self.lengths(face).into_iter().fold(0.0, f64::max);
-        (b - a).cross(c - a).length() > LEAST_HEIGHT * longest * longest
+        let lengths = self.lengths(face);
+        let longest = lengths.iter().copied().fold(0.0, f64::max);
+        let area = normal(&self.corners(face)).length();
+        area > LEAST_HEIGHT * longest * longest && lengths.iter().all(|&length| length > 0.0)
+    }
+
+    fn is_flat(&self, face: usize, within: f64) -> bool {
+        let corners = self.corners(face);
+        let normal = normal(&corners).normalize_or_zero();
+        corners.iter().all(|v| normal.dot(v - corners[0]).abs() <= within)
+    }
+
+    /// Whether every corner of a face of more than three turns the same way, once around.
+    fn is_convex(&self, face: usize) -> bool {
+        let corners = self.corners(face);
+        let count = corners.len();
+        let outwards = normal(&corners).normalize_or_zero();
+        let side = |i: usize| (corners[(i + 1) % count] - corners[i % count]).normalize_or_zero();
+        let turns = (0..count).map(|i| {
+            let (before, behind) = (side(i), side(i + 1));
+            let sine = before.cross(behind).dot(outwards);
+            (sine, angle(sine, before.dot(behind)))
+        });
+        let turns: Vec<(f64, f64)> = turns.collect();
+        let around: f64 = turns.iter().map(|(_, turn)| turn).sum();
+        count == 3 || turns.iter().all(|(sine, _)| *sine > LEAST_TURN) && around < 1.5 * TAU
     }
 
     /// Sum of the signed volumes of the tetrahedra over a vertex.
     fn volume(&self) -> f64 {
         let o = self.vertices[0];
-        let signed = |face: usize| {
-            let [a, b, c] = self.corners(face).map(|v| v - o);
-            a.dot(b.cross(c)) / 6.0
-        };
-        (0..self.faces.len()).map(signed).sum()
+        let surface = (0..self.faces.len()).flat_map(|face| triangles(&self.corners(face)));
+        surface.map(|[a, b, c]| (a - o).dot((b - o).cross(c - o)) / 6.0).sum()
     }
 
     /// The faces at each edge, each with whether it runs along the edge from the lower vertex to
@@ -201,8 +272,7 @@ impl ClosedMesh {
     fn faces_at_edges(&self) -> BTreeMap<[usize; 2], Vec<(usize, bool)>> {
         let mut edges = BTreeMap::<_, Vec<_>>::new();
         for (face, vertices) in self.faces.iter().enumerate() {
-            for i in 0..3 {
-                let (from, to) = (vertices[i], vertices[(i + 1) % 3]);
+            for (from, to) in sides(vertices) {
                 let edge = [from.min(to), from.max(to)];
                 edges.entry(edge).or_default().push((face, from < to));
             }
@@ -210,15 +280,22 @@ impl ClosedMesh {
         edges
     }
 
+    fn noun(&self) -> FaceNoun {
+        noun(&self.faces)
+    }
+
     fn check_edges(&self) -> Result<(), ClosedMeshError> {
+        let noun = self.noun();
         for faces in self.faces_at_edges().values() {
             match faces.as_slice() {
                 [(a, along), (b, other)] if along == other => {
-                    return Err(ClosedMeshError::Winding(a + 1, b + 1));
+                    return Err(ClosedMeshError::Winding(noun, a + 1, b + 1));
                 }
                 [_, _] => {}
-                [(face, _)] => return Err(ClosedMeshError::Open(face + 1)),
-                many => return Err(ClosedMeshError::CrowdedEdge(many[0].0 + 1, many.len())),
+                [(face, _)] => return Err(ClosedMeshError::Open(noun, face + 1)),
+                many => {
+                    return Err(ClosedMeshError::CrowdedEdge(noun, many[0].0 + 1, many.len()));
+                }
             }
         }
         Ok(())
@@ -227,10 +304,12 @@ impl ClosedMesh {
     /// The faces around a vertex form one ring, and all faces hang together.
     fn check_vertices(&self) -> Result<(), ClosedMeshError> {
         let mut next = vec![BTreeMap::new(); self.vertices.len()];
-        for &[a, b, c] in &self.faces {
-            next[a].insert(b, c);
-            next[b].insert(c, a);
-            next[c].insert(a, b);
+        // Around a vertex each face leads from the vertex after it to the one before.
+        for face in &self.faces {
+            let count = face.len();
+            for i in 0..count {
+                next[face[i]].insert(face[(i + 1) % count], face[(i + count - 1) % count]);
+            }
         }
         for (vertex, ring) in next.iter().enumerate() {
             let Some((&first, _)) = ring.first_key_value() else { continue };
@@ -260,8 +339,10 @@ impl ClosedMesh {
     fn check_self(&self) -> Result<(), ClosedMeshError> {
         let boxes: Vec<[DVec3; 2]> = (0..self.faces.len())
             .map(|face| {
-                let [a, b, c] = self.corners(face);
-                [a.min(b).min(c), a.max(b).max(c)]
+                let corners = self.corners(face);
+                let least = corners.iter().copied().reduce(DVec3::min).unwrap_or_default();
+                let most = corners.iter().copied().reduce(DVec3::max).unwrap_or_default();
+                [least, most]
             })
             .collect();
         for (&[from, to], faces) in &self.faces_at_edges() {
@@ -270,12 +351,24 @@ impl ClosedMesh {
             for (other, [least, most]) in boxes.iter().enumerate() {
                 let apart = low.cmpgt(*most).any() || high.cmplt(*least).any();
                 let touching = self.faces[other].iter().any(|&v| v == from || v == to);
-                if !apart && !touching && pierces([p, q], self.corners(other)) {
-                    return Err(ClosedMeshError::CutsItself(faces[0].0 + 1, other + 1));
+                let is_pierced = || {
+                    let triangles = triangles(&self.corners(other));
+                    triangles.into_iter().any(|triangle| pierces([p, q], triangle))
+                };
+                if !apart && !touching && is_pierced() {
+                    let [one, other] = [faces[0].0 + 1, other + 1];
+                    return Err(ClosedMeshError::CutsItself(self.noun(), one, other));
                 }
             }
         }
         Ok(())
+    }
+}
+
+fn noun<F: AsRef<[usize]>>(faces: &[F]) -> FaceNoun {
+    match faces.iter().all(|face| face.as_ref().len() == 3) {
+        true => FaceNoun::Triangle,
+        false => FaceNoun::Face,
     }
 }
 
@@ -297,8 +390,8 @@ fn extent(vertices: &[DVec3]) -> f64 {
 }
 
 /// The mesh with one vertex for all in the same place, in the order in which the faces name them.
-fn welded(vertices: &[DVec3], faces: &[[usize; 3]]) -> ClosedMesh {
-    let used: Vec<DVec3> = faces.iter().flatten().map(|&v| vertices[v]).collect();
+fn welded<F: AsRef<[usize]>>(vertices: &[DVec3], faces: &[F]) -> ClosedMesh {
+    let used: Vec<DVec3> = faces.iter().flat_map(F::as_ref).map(|&v| vertices[v]).collect();
     let near = WELD * extent(&used);
     let mut by_x: Vec<usize> = (0..vertices.len()).collect();
     by_x.sort_by(|&a, &b| vertices[a].x.total_cmp(&vertices[b].x));
@@ -314,13 +407,14 @@ fn welded(vertices: &[DVec3], faces: &[[usize; 3]]) -> ClosedMesh {
     let mut mesh = ClosedMesh { vertices: Vec::new(), faces: Vec::with_capacity(faces.len()) };
     let mut index = BTreeMap::new();
     for face in faces {
-        mesh.faces.push(face.map(|vertex| {
+        let named = face.as_ref().iter().map(|&vertex| {
             let first = stands_for[vertex];
             *index.entry(first).or_insert_with(|| {
                 mesh.vertices.push(vertices[first]);
                 mesh.vertices.len() - 1
             })
-        }));
+        });
+        mesh.faces.push(named.collect());
     }
     mesh
 }
@@ -328,15 +422,16 @@ fn welded(vertices: &[DVec3], faces: &[[usize; 3]]) -> ClosedMesh {
 #[cfg(test)]
 mod tests {
     use super::ClosedMeshError::*;
+    use super::FaceNoun::Triangle;
     use super::*;
     use crate::targets::Polyhedron;
 
-    fn octahedron() -> (Vec<DVec3>, Vec<[usize; 3]>) {
+    fn octahedron() -> (Vec<DVec3>, Vec<Vec<usize>>) {
         let solid = Polyhedron::octahedron(100.0);
         (solid.vertices_mm, solid.faces)
     }
 
-    fn refused(vertices: &[DVec3], faces: &[[usize; 3]]) -> ClosedMeshError {
+    fn refused<F: AsRef<[usize]>>(vertices: &[DVec3], faces: &[F]) -> ClosedMeshError {
         ClosedMesh::new(vertices, faces).unwrap_err()
     }
 
@@ -344,7 +439,7 @@ mod tests {
     fn triangles_of_their_own_vertices_are_welded_and_inner_sides_turned() {
         let solid = Polyhedron::icosahedron(100.0);
         let vertices: Vec<DVec3> =
-            (0..20).flat_map(|face| solid.triangle_mm(face)).map(|v| v + 1e-5).collect();
+            (0..20).flat_map(|face| solid.corners_mm(face)).map(|v| v + 1e-5).collect();
         let faces: Vec<[usize; 3]> = (0..20).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect();
         let (mesh, turned) = ClosedMesh::new(&vertices, &faces).unwrap();
         assert!(mesh.vertices().len() == 12 && !turned);
@@ -360,23 +455,27 @@ mod tests {
     #[test]
     fn what_is_no_closed_solid_is_refused() {
         let (vertices, faces) = octahedron();
-        assert_eq!(refused(&vertices, &[]), Empty);
-        assert_eq!(refused(&vertices, &faces[1..]), Open(1));
-        assert_eq!(refused(&vertices, &[&faces[..], &[[0, 1, 9]]].concat()), NoSuchVertex(9));
+        assert_eq!(refused::<[usize; 3]>(&vertices, &[]), Empty);
+        assert_eq!(refused(&vertices, &faces[1..]), Open(Triangle, 1));
+        assert_eq!(
+            refused(&vertices, &[&faces[..], &[vec![0, 1, 9]]].concat()),
+            NoSuchVertex(Triangle, 9)
+        );
         let mut bad = vertices.clone();
         bad[2].y = f64::NAN;
         assert_eq!(refused(&bad, &faces), NotFinite(3));
         bad[2] = bad[1];
-        assert_eq!(refused(&bad, &faces), NoArea(2));
+        assert_eq!(refused(&bad, &faces), NoArea(Triangle, 2));
         let mut wound = faces.clone();
         wound[3].swap(0, 1);
-        assert!(matches!(refused(&vertices, &wound), Winding(_, _)));
+        assert!(matches!(refused(&vertices, &wound), Winding(Triangle, _, _)));
         let twice = [&faces[..], &faces[..]].concat();
-        assert!(matches!(refused(&vertices, &twice), CrowdedEdge(1, 4)));
+        assert!(matches!(refused(&vertices, &twice), CrowdedEdge(Triangle, 1, 4)));
         // A second solid: apart, in a vertex of the first, and through it.
         let beside = |by: DVec3| {
             let more: Vec<DVec3> = vertices.iter().map(|v| v + by).collect();
-            let indices: Vec<[usize; 3]> = faces.iter().map(|f| f.map(|v| v + 6)).collect();
+            let indices: Vec<Vec<usize>> =
+                faces.iter().map(|f| f.iter().map(|v| v + 6).collect()).collect();
             refused(&[&vertices[..], &more[..]].concat(), &[&faces[..], &indices[..]].concat())
         };
         assert_eq!(beside(DVec3::X * 500.0), Pieces(2));
@@ -385,12 +484,28 @@ mod tests {
         assert_eq!(refused(&vertices, &flat), Flat);
     }
 
+    #[test]
+    fn faces_of_four_are_flat_and_convex() {
+        let cube = Polyhedron::cuboid(DVec3::splat(100.0));
+        let (mesh, turned) = ClosedMesh::new(&cube.vertices_mm, &cube.faces).unwrap();
+        assert!(!turned && mesh.faces().len() == 6 && mesh.most_skewed().1 == 0.0);
+        assert!((mesh.volume() - 1e6).abs() < 1e-6 && (mesh.mean_edge() - 100.0).abs() < 1e-9);
+        let mut bent = cube.vertices_mm.clone();
+        bent[6] += DVec3::new(0.0, 0.0, 0.2);
+        assert_eq!(refused(&bent, &cube.faces), NotFlat(5));
+        // A vertex of the upper and of two other faces moved far inwards, in the plane of the upper one.
+        let mut dented = Polyhedron::cuboid(DVec3::splat(100.0));
+        let deep = |z: f64| DVec3::new(-20.0, -20.0, z);
+        (dented.vertices_mm[6], dented.vertices_mm[2]) = (deep(50.0), deep(-50.0));
+        assert_eq!(refused(&dented.vertices_mm, &dented.faces), NotConvex(5));
+    }
+
     /// A vertex pushed through a face on the other side.
     #[test]
     fn a_solid_that_cuts_itself_is_refused() {
         let (mut vertices, faces) = octahedron();
         vertices[4] = DVec3::new(40.0, 30.0, -40.0);
         let result = ClosedMesh::new(&vertices, &faces);
-        assert!(matches!(result, Err(CutsItself(_, _))), "{result:?}");
+        assert!(matches!(result, Err(CutsItself(Triangle, _, _))), "{result:?}");
     }
 }

@@ -26,9 +26,11 @@ pub enum TargetError {
     },
     /// More tags than codes.
     #[error(
-        "`TagSpec::first_id`: tags {first} to {last} are needed, but family {family} ends at {end}: {instead}"
+        "`{setting}`: tags {first} to {last} are needed, but family {family} ends at {end}: {instead}"
     )]
     IdsRunOut {
+        /// The field to change, such as `TagSpec::first_id`.
+        setting: &'static str,
         /// First id needed.
         first: u32,
         /// Last id needed.

@@ -21,12 +21,12 @@ use glam::DVec2;
 use super::angles::turn_of;
 use super::layout::{ADVANCE_CAPS, Arrangement, Footprint, fit, tag_range};
 use super::length::format_mm;
-use super::net::{Side, Sides};
+use super::net::Sides;
 use super::paper::PaperSpec;
-use super::polyhedron::Face;
+use super::polyhedron::sides;
 use super::{
-    FamilyRef, Label, LineKind, Panel, Placement, Polyhedron, SheetLayout, SheetLine, SheetText,
-    SolidSpec, TargetError,
+    Face, FamilyRef, Label, LineKind, Panel, Placement, Polyhedron, SheetLayout, SheetLine,
+    SheetText, SolidSpec, TargetError,
 };
 
 /// White beyond the edges of a face, mm: what cutting and gluing by hand are off, and some more.
@@ -46,11 +46,14 @@ const EDGE_CAP_MM: f64 = 2.2;
 const WORDS_MM: [f64; 2] = [2.0, 3.4];
 /// How to use a sheet, below the number of its face.
 const WORDS: [&str; 3] = ["Cut from mark to mark.", "Edges of the same", "number meet."];
+/// Height of the number of a face and the instructions below it, mm.
+const WORDS_HEIGHT_MM: f64 = FACE_CAP_MM + WORDS_MM[0] / 2.0 + WORDS.len() as f64 * WORDS_MM[1];
 /// Blank between what a face prints and the marks along the margins of the page, mm.
 const MARK_BLANK_MM: f64 = 1.5;
 /// Capital height of the number on a face, in widths of its margin, and the most of it, mm.
 const INNER_CAP: (f64, f64) = (0.35, 2.0);
-/// Place of the number on a face, along the bisector of its lower left end, in margins.
+/// Place of the number on a triangle, along the bisector of its lower left end, in margins; on other faces it is half
+/// as far as the end of the margin.
 const INNER_PLACE: f64 = 0.9;
 
 /// The sheets of a solid's faces, one each.
@@ -72,9 +75,8 @@ pub(super) fn sheets(
             let words = label(name, spec, index, panel, family);
             let mut sheet = arrangement.sheet(panel.id, ink, words);
             let numbers = edge_numbers(&solid, &edges, index);
-            let edge_words = [0, 1, 2].map(|side| {
-                let beyond = sides.partner(Side { face: index, side }).map(|other| other.face);
-                let edge = numbers[side];
+            let edge_words = sides.of(index).zip(numbers).map(|(side, edge)| {
+                let beyond = sides.partner(side).map(|other| other.face);
                 beyond.map_or(Label::Edge(edge), |face| Label::Beyond { edge, face })
             });
             mark(&mut sheet, spec, &face, index, edge_words);
@@ -85,20 +87,21 @@ pub(super) fn sheets(
 }
 
 /// Numbers of the edges of a face, in the order of its outline.
-pub fn edge_numbers(solid: &Polyhedron, edges: &[[usize; 2]], face: usize) -> [usize; 3] {
-    let vertices = solid.faces[face];
-    [0, 1, 2].map(|i| {
-        let (from, to) = (vertices[i], vertices[(i + 1) % 3]);
+pub fn edge_numbers(solid: &Polyhedron, edges: &[[usize; 2]], face: usize) -> Vec<usize> {
+    let number = |(from, to): (usize, usize)| {
         edges.iter().position(|&edge| edge == [from.min(to), from.max(to)]).unwrap_or_default()
-    })
+    };
+    sides(&solid.faces[face]).map(number).collect()
 }
 
 /// Bounding box of what is printed of a face, with its marks, in the panel frame, mm.
 fn bounds(face: &Face) -> [f64; 4] {
-    let [a, b, c] = face.outline_mm;
     let reach = CROSS_MM[0] + CROSS_MM[1];
-    let (least, most) = (a.min(b).min(c) - reach, a.max(b).max(c) + reach);
-    [least.x, least.y, most.x, most.y]
+    let least = face.outline_mm.iter().copied().reduce(DVec2::min).unwrap_or_default() - reach;
+    let most = face.outline_mm.iter().copied().reduce(DVec2::max).unwrap_or_default() + reach;
+    // Beside the apex of a triangle there is room for words.
+    let words = if face.outline_mm.len() > 3 { WORDS_HEIGHT_MM } else { 0.0 };
+    [least.x, least.y, most.x, most.y + words]
 }
 
 fn arrange(
@@ -136,10 +139,17 @@ fn arrange(
 }
 
 /// Adds cutting marks, numbers and instructions.
-fn mark(sheet: &mut SheetLayout, spec: &SolidSpec, face: &Face, index: usize, edges: [Label; 3]) {
+fn mark(
+    sheet: &mut SheetLayout,
+    spec: &SolidSpec,
+    face: &Face,
+    index: usize,
+    edges: impl Iterator<Item = Label>,
+) {
     let placement = sheet.placements[0];
-    for (i, text) in edges.into_iter().enumerate() {
-        let (a, b) = (face.outline_mm[i], face.outline_mm[(i + 1) % 3]);
+    let count = face.outline_mm.len();
+    for (i, text) in edges.enumerate() {
+        let (a, b) = (face.outline_mm[i], face.outline_mm[(i + 1) % count]);
         for (end, outwards) in [(a, -1.0), (b, 1.0)] {
             let [from_mm, to_mm] =
                 MARK_MM.map(|mm| placement.page_from_panel(end + unit(b - a) * (outwards * mm)));
@@ -148,8 +158,8 @@ fn mark(sheet: &mut SheetLayout, spec: &SolidSpec, face: &Face, index: usize, ed
         }
         sheet.texts.push(edge_text(&placement, [a, b], text, -(BLEED_MM + EDGE_CAP_MM)));
     }
-    for vertex in 0..3 {
-        let [a, b, c] = [0, 1, 2].map(|i| face.outline_mm[(vertex + i) % 3]);
+    for vertex in 0..count {
+        let [a, b, c] = [0, 1, count - 1].map(|i| face.outline_mm[(vertex + i) % count]);
         let middle = a - CROSS_MM[0] * unit(unit(b - a) + unit(c - a));
         for arm in [DVec2::X, DVec2::Y].map(|axis| CROSS_MM[1] * axis) {
             let ends = [middle - arm, middle + arm];
@@ -186,10 +196,16 @@ fn inner_number(
         return None;
     }
     let text = upright_number(index);
-    let [a, b, c] = face.outline_mm;
+    let [a, b, .., c] = face.outline_mm[..] else { return None };
     let inwards = unit(b - a) + unit(c - a);
     let width = text.len() as f64 * ADVANCE_CAPS * cap;
-    let reach = INNER_PLACE * margin_mm / inwards.x.hypot(inwards.y);
+    // The length of the sum of two unit vectors that enclose α is 2 cos α/2.
+    let length = inwards.x.hypot(inwards.y);
+    let place = match face.outline_mm.len() {
+        3 => INNER_PLACE,
+        _ => 0.5 / (1.0 - length * length / 4.0).sqrt(),
+    };
+    let reach = place * margin_mm / length;
     let at = a + inwards * reach - DVec2::new(width, cap) / 2.0;
     Some(SheetText {
         text: Label::Words(text),
@@ -242,11 +258,12 @@ fn label(
 ) -> String {
     let mut parts = vec![
         name.to_owned(),
-        format!("{} edge {}", spec.shape.name(), format_mm(spec.edge_mm)),
+        spec.size(),
         format!("face {index}"),
         format!("{} tiles, margin {}", spec.tiles, format_mm(spec.margin_mm)),
     ];
     if let (Some(family), [first, .., last] | [first @ last]) = (family, panel.tags.as_slice()) {
+        let family = family.of_tiling(panel.kind);
         parts.push(tag_range(&family.name, first.id, last.id));
         parts.push(format!("fingerprint {}", family.fingerprint));
     }

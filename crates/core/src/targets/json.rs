@@ -150,8 +150,19 @@ pub fn check(target: &Target) -> Result<(), Problem> {
         return problem("panels", "there is none");
     }
     // A family is looked for by its name, which must not lead to a file.
-    let family = target.family.as_ref().map_or(Ok(()), |f| Name::new(&f.name).map(|_| ()));
-    family.or_else(|wrong| problem("family.name", wrong))?;
+    let named = |family: &FamilyRef| Name::new(&family.name).map(|_| ());
+    let family = target.family.as_ref();
+    family.map_or(Ok(()), named).or_else(|wrong| problem("family.name", wrong))?;
+    let squares = family.and_then(|family| family.squares.as_deref());
+    squares.map_or(Ok(()), named).or_else(|wrong| problem("family.squares.name", wrong))?;
+    if squares.is_some_and(|family| family.squares.is_some()) {
+        return problem("family.squares.squares", "a family of squares has none");
+    }
+    if squares.is_some() != target.spec.square_family().is_some() {
+        let what = "it must be there if, and only if, `spec.square_tags` is";
+        return problem("family.squares", what);
+    }
+    let may_differ = squares.is_some();
     let (mut panels, mut corners, mut tags) = (BTreeSet::new(), BTreeSet::new(), BTreeSet::new());
     for (p, panel) in target.panels.iter().enumerate() {
         let field = format!("panels[{p}]");
@@ -159,7 +170,7 @@ pub fn check(target: &Target) -> Result<(), Problem> {
             return problem(format!("{field}.id"), "ids must ascend from panel to panel");
         }
         panels.insert(panel.id);
-        if panel.kind != target.panels[0].kind {
+        if panel.kind != target.panels[0].kind && !may_differ {
             return problem(format!("{field}.kind"), "all panels must be of one kind");
         }
         check_panel(panel, &field)?;
@@ -170,7 +181,7 @@ pub fn check(target: &Target) -> Result<(), Problem> {
             }
         }
         for (i, tag) in panel.tags.iter().enumerate() {
-            if !tags.insert(tag.id) {
+            if !tags.insert((panel.kind == GridKind::Checker, tag.id)) {
                 let what = format!("{} is the id of another tag too", tag.id);
                 return problem(format!("{field}.tags[{i}].id"), what);
             }

@@ -1,3 +1,5 @@
+use glam::DVec3;
+
 /// Units and their millimetres; longer names first, so that `m` does not take the end of `mm`.
 const UNITS: [(&str, f64); 5] =
     [("mm", 1.0), ("cm", 10.0), ("in", 25.4), ("pt", 25.4 / 72.0), ("m", 1000.0)];
@@ -29,6 +31,36 @@ pub fn parse_length_mm(text: &str) -> Result<f64, LengthError> {
     }
 }
 
+/// Reads the three sides of a box, such as `200x150x100mm`, `20 × 15 × 10 cm` or `200mm x 15cm x 0.1m`: a
+/// side without a unit has that of the last.
+///
+/// ```
+/// let sides = deltille_core::targets::parse_box_mm("20x15x10 cm");
+/// assert_eq!(sides, Ok(glam::DVec3::new(200.0, 150.0, 100.0)));
+/// ```
+///
+/// # Errors
+/// Where it is not three lengths.
+pub fn parse_box_mm(text: &str) -> Result<DVec3, BoxError> {
+    let unknown = || BoxError(text.to_owned());
+    let sides: Vec<&str> = text.split(['x', 'X', '×']).map(str::trim).collect();
+    let [first, second, last] = sides[..] else { return Err(unknown()) };
+    let unit = last.trim_start_matches(|c: char| !c.is_alphabetic());
+    let side = |text: &str| match text.ends_with(char::is_alphabetic) {
+        true => parse_length_mm(text),
+        false => parse_length_mm(&format!("{text}{unit}")),
+    };
+    match [side(first), side(second), side(last)] {
+        [Ok(x), Ok(y), Ok(z)] if x.min(y).min(z) > 0.0 => Ok(DVec3::new(x, y, z)),
+        _ => Err(unknown()),
+    }
+}
+
+/// A text that is not three sides.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("`{0}` is not three sides such as 200x150x100mm")]
+pub struct BoxError(pub String);
+
 /// The shortest way to write a length in millimetres, with its unit: `20 mm`, `12.5 mm`.
 pub(super) fn format_mm(mm: f64) -> String {
     if mm.abs() > 1e9 {
@@ -55,6 +87,16 @@ mod tests {
     fn what_is_no_finite_number_is_refused() {
         for text in ["", "mm", "NaN", "nanmm", "inf", "1e999mm", "20 km", "2,5cm", "20mm mm"] {
             assert_eq!(parse_length_mm(text), Err(LengthError(text.to_owned())));
+        }
+    }
+
+    #[test]
+    fn sides_of_a_box_have_the_unit_of_the_last() {
+        for text in ["200x150x100mm", "20 × 15 X 10 cm", "0.2mx15cmx100", " 200 x 150 x 100 "] {
+            assert_eq!(parse_box_mm(text), Ok(DVec3::new(200.0, 150.0, 100.0)), "{text}");
+        }
+        for text in ["", "200", "200x150mm", "1x2x3x4", "axbxc", "1x-2x3", "1x2xmm", "1x2x3km"] {
+            assert_eq!(parse_box_mm(text), Err(BoxError(text.to_owned())));
         }
     }
 

@@ -16,6 +16,7 @@ mod charuco;
 mod circles;
 mod closed_mesh;
 mod error;
+mod face;
 mod face_sheet;
 pub mod json;
 mod label;
@@ -37,6 +38,7 @@ use glam::{DVec2, DVec3};
 use serde::{Deserialize, Serialize};
 
 pub use crate::Name;
+use crate::family::Family;
 use crate::lattice::GridKind;
 use crate::quantity;
 pub use aprilgrid::AprilGridSpec;
@@ -46,17 +48,18 @@ pub use build::{largest_edge_mm, usual_edge_mm};
 pub use charuco::CharucoSpec;
 pub use circles::CirclesSpec;
 pub use closed_mesh::is_coordinate;
-pub use closed_mesh::{ClosedMesh, ClosedMeshError, NEAR_EQUILATERAL};
+pub use closed_mesh::{ClosedMesh, ClosedMeshError, FaceNoun, NEAR_EQUILATERAL};
 pub use error::TargetError;
+pub use face::{Face, FaceBoard};
 pub use face_sheet::{edge_numbers, edge_text, upright_number};
 pub use json::{SCHEMA, TargetFileError};
 pub use label::Label;
 pub use layout::CHECK_BAR_STROKE_MM;
 pub use layout::tag_range;
-pub use length::{LengthError, parse_length_mm};
+pub use length::{BoxError, LengthError, parse_box_mm, parse_length_mm};
 pub use net::Hinge;
 pub use paper::{DEFAULT_MARGIN_MM, Orientation, PaperError, PaperSize, PaperSpec, SolidSheets};
-pub use polyhedron::{Face, Polyhedron};
+pub use polyhedron::{Polyhedron, triangles};
 pub use skeleton::Incircle;
 pub use skeleton::{Skeleton, SkeletonSpec};
 pub use spec::{BORDER_BITS, FACE_TILES, MOST_ROWS, SIDES, least_untagged_corners};
@@ -88,6 +91,25 @@ pub struct FamilyRef {
     /// Its fingerprint, see [`crate::family::Family::fingerprint`]; empty where a file from
     /// elsewhere names a family whose codes this crate does not have.
     pub fingerprint: String,
+    /// The family of its squares, where a target has faces of both tilings.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub squares: Option<Box<FamilyRef>>,
+}
+
+impl FamilyRef {
+    /// The family of tags in tiles of a kind, of a target that has such.
+    pub fn of_tiling(&self, kind: GridKind) -> &Self {
+        match (kind, &self.squares) {
+            (GridKind::Checker, Some(squares)) => squares,
+            _ => self,
+        }
+    }
+
+    /// The name and fingerprint of a family.
+    pub fn of(family: &Family) -> Self {
+        let (name, fingerprint) = (family.name().to_owned(), family.fingerprint().to_owned());
+        Self { name, fingerprint, squares: None }
+    }
 }
 
 /// How far the tiles of a panel reach beyond its corners.
@@ -330,6 +352,25 @@ impl Target {
             }
         }
         target
+    }
+
+    /// The tilings of its panels.
+    pub fn tilings(&self) -> impl Iterator<Item = GridKind> {
+        let has = |kind: &GridKind| self.panels.iter().any(|panel| panel.kind == *kind);
+        [GridKind::Deltille, GridKind::Checker].into_iter().filter(has)
+    }
+
+    /// Its panels of a tiling alone.
+    pub(crate) fn of_tiling(&self, kind: GridKind) -> Self {
+        let panels = self.panels.iter().filter(|panel| panel.kind == kind).cloned().collect();
+        Self { panels, sheets: Vec::new(), ..self.clone() }
+    }
+
+    /// The ids of its tags in tiles of a kind, and their family.
+    pub(crate) fn tags_of_tiling(&self, kind: GridKind) -> Option<(&FamilyRef, Vec<u32>)> {
+        let own = self.panels.iter().filter(|panel| panel.kind == kind);
+        let ids = own.flat_map(|panel| &panel.tags).map(|tag| tag.id).collect();
+        Some((self.family.as_ref()?.of_tiling(kind), ids))
     }
 
     /// Whether places of its corners were measured.

@@ -1,19 +1,18 @@
-//! Solids of triangles: vertices, faces, and where the frame of each face lies.
+//! Solids: vertices and faces.
 
-use glam::{DMat3, DVec2, DVec3};
+use glam::DVec3;
 
-use super::PanelPose;
 use super::angles::direction;
-use crate::lattice::ROW_HEIGHT;
 
-/// A closed solid of triangles, mm; right-handed. Regular solids have their centre in the origin,
-/// meshes keep the origin of their file.
+/// A closed solid of flat, convex faces, mm; right-handed. Named solids have their centre in the
+/// origin, meshes keep the origin of their file.
 ///
 /// A face lists its vertices counter-clockwise as seen from outside. The first two are the ends of
-/// its lower edge, the third is its apex: printed on the face, x runs along the lower edge, y
-/// towards the apex, z outwards.
+/// its lower edge, of a triangle the third is its apex: printed on the face, x runs along the lower
+/// edge, y upwards, to the apex, z outwards.
 ///
-/// The regular solids stand on the z axis, `n` is their upper vertex, `s` the lower one:
+/// Solids of triangles stand on the z axis, `n` is their upper vertex, `s` the lower one; the faces
+/// of a cuboid are perpendicular to the axes:
 ///
 /// ```text
 ///   icosahedron, unfolded (the vertices u lie above, l below the middle, u0 in the plane y = 0)
@@ -28,24 +27,23 @@ use crate::lattice::ROW_HEIGHT;
 ///
 ///   octahedron:  faces 0–3  e_k  e_k+1  n;  faces 4–7  e_k+1  e_k  s
 ///   tetrahedron: faces 0–2  b_k  b_k+1  n;  face 3     b_1    b_0  b_2
+///
+///   cuboid, unfolded (l0 is the vertex with the least x, y and z; u_k lies above l_k)
+///
+///            u0──u3
+///            │ 4 │                  faces 0–3  l_k  l_k+1  u_k+1  u_k    around the z axis
+///       u0──u1──u2──u3──u0          face  4    u1   u2     u3     u0     towards z
+///       │ 0 │ 1 │ 2 │ 3 │           face  5    l0   l3     l2     l1     away from it
+///       l0──l1──l2──l3──l0
+///            │ 5 │
+///            l0──l3
 /// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct Polyhedron {
     /// Vertices, mm.
     pub vertices_mm: Vec<DVec3>,
     /// Indices of the vertices of each face.
-    pub faces: Vec<[usize; 3]>,
-}
-
-/// A face with the largest board of tiles that it takes.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Face {
-    /// Outline in the panel frame, mm, counter-clockwise from the left end of the lower edge.
-    pub outline_mm: [DVec2; 3],
-    /// Pose of the panel frame in the target frame.
-    pub pose: PanelPose,
-    /// Edge of a tile, mm.
-    pub tile_edge_mm: f64,
+    pub faces: Vec<Vec<usize>>,
 }
 
 impl Polyhedron {
@@ -54,9 +52,8 @@ impl Polyhedron {
         // A base of radius a/√3 lies √6/12 a below the centre, the apex √6/4 a above.
         let mut vertices_mm = ring(3, edge_mm / 3f64.sqrt(), -edge_mm * 6f64.sqrt() / 12.0, 0.0);
         vertices_mm.push(DVec3::Z * edge_mm * 6f64.sqrt() / 4.0);
-        let mut faces: Vec<[usize; 3]> = (0..3).map(|k| [k, (k + 1) % 3, 3]).collect();
-        faces.push([1, 0, 2]);
-        Self { vertices_mm, faces }
+        let sides = (0..3).map(|k| [k, (k + 1) % 3, 3]);
+        Self { vertices_mm, faces: sides.chain([[1, 0, 2]]).map(Vec::from).collect() }
     }
 
     /// Eight faces; the vertices lie on the axes.
@@ -66,7 +63,7 @@ impl Polyhedron {
         vertices_mm.extend([DVec3::Z * radius, DVec3::NEG_Z * radius]);
         let upper = (0..4).map(|k| [k, (k + 1) % 4, 4]);
         let lower = (0..4).map(|k| [(k + 1) % 4, k, 5]);
-        Self { vertices_mm, faces: upper.chain(lower).collect() }
+        Self { vertices_mm, faces: upper.chain(lower).map(Vec::from).collect() }
     }
 
     /// Twenty faces: five around each pole, ten in between.
@@ -84,68 +81,40 @@ impl Polyhedron {
             .chain((0..5).map(|k| [u(k + 1), u(k), l(k)]))
             .chain((0..5).map(|k| [l(k), l(k + 1), u(k + 1)]))
             .chain((0..5).map(|k| [l(k + 1), l(k), s]));
-        Self { vertices_mm, faces: faces.collect() }
+        Self { vertices_mm, faces: faces.map(Vec::from).collect() }
+    }
+
+    /// Six faces, perpendicular to the axes; `size_mm` along these.
+    pub fn cuboid(size_mm: DVec3) -> Self {
+        let around = [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)];
+        let ring = |z: f64| around.map(|(x, y)| DVec3::new(x, y, z) * size_mm / 2.0);
+        let vertices_mm = [ring(-1.0), ring(1.0)].concat();
+        let (l, u) = (|k: usize| k % 4, |k: usize| 4 + k % 4);
+        let sides = (0..4).map(|k| [l(k), l(k + 1), u(k + 1), u(k)]);
+        let ends = [[u(1), u(2), u(3), u(0)], [l(0), l(3), l(2), l(1)]];
+        Self { vertices_mm, faces: sides.chain(ends).map(Vec::from).collect() }
     }
 
     /// The vertices of a face, mm.
-    pub fn triangle_mm(&self, face: usize) -> [DVec3; 3] {
-        self.faces[face].map(|vertex| self.vertices_mm[vertex])
+    pub fn corners_mm(&self, face: usize) -> Vec<DVec3> {
+        self.faces[face].iter().map(|&vertex| self.vertices_mm[vertex]).collect()
     }
 
-    /// All faces, mm, counter-clockwise from outside.
+    /// The unit normal of a face, outwards.
+    pub fn normal(&self, face: usize) -> DVec3 {
+        normal(&self.corners_mm(face)).normalize_or_zero()
+    }
+
+    /// The surface in triangles, mm, counter-clockwise from outside: each face from its first vertex.
     pub fn triangles_mm(&self) -> Vec<[DVec3; 3]> {
-        (0..self.faces.len()).map(|face| self.triangle_mm(face)).collect()
-    }
-
-    /// A face with the largest board of `tiles` tiles a side that leaves a margin; `None` where
-    /// the margin takes all of it.
-    ///
-    /// The board is equilateral whatever the face is, and its lower side is parallel to that of
-    /// the face. With its centre on the incentre of the face (inradius r), a vertex of the board
-    /// of side S lies S/√3 away in direction d, and keeps the margin m from the edge with inward
-    /// normal n when r + S/√3 d·n ≥ m.
-    pub fn face(&self, face: usize, tiles: u32, margin_mm: f64) -> Option<Face> {
-        let corners = self.triangle_mm(face);
-        let [a, b, c] = corners;
-        let lengths = [(c - b).length(), (a - c).length(), (b - a).length()];
-        let around: f64 = lengths.iter().sum();
-        let centre = (a * lengths[0] + b * lengths[1] + c * lengths[2]) / around;
-        let normal = (b - a).cross(c - a);
-        let inradius = normal.length() / around;
-        let x = (b - a).normalize_or_zero();
-        let z = normal.normalize_or_zero();
-        let rotation = DMat3::from_cols(x, z.cross(x), z);
-        let flat = |p: DVec3| (rotation.transpose() * (p - centre)).truncate();
-        let outline = corners.map(flat);
-
-        let normals =
-            [0, 1, 2].map(|i| (outline[(i + 1) % 3] - outline[i]).perp().normalize_or_zero());
-        let towards = [-150f64, -30.0, 90.0].map(|degrees| direction(degrees.to_radians()));
-        let steepest = normals
-            .iter()
-            .flat_map(|n| towards.iter().map(move |d| -d.dot(*n)))
-            .fold(0.0, f64::max);
-        let side = 3f64.sqrt() * (inradius - margin_mm) / steepest;
-        if !(side > 0.0 && side.is_finite()) {
-            return None;
-        }
-        // The board's lower left end is lattice vertex (−1,−1); the panel's origin is (0,0).
-        let tile_edge_mm = side / f64::from(tiles);
-        let origin = towards[0] * side / 3f64.sqrt() + DVec2::new(1.5, ROW_HEIGHT) * tile_edge_mm;
-        let translation = centre + rotation * origin.extend(0.0);
-        Some(Face {
-            outline_mm: outline.map(|p| p - origin),
-            pose: PanelPose::new(rotation, translation),
-            tile_edge_mm,
-        })
+        (0..self.faces.len()).flat_map(|face| triangles(&self.corners_mm(face))).collect()
     }
 
     /// Edges as pairs of vertices, lower index first, in the order in which the faces name them.
     pub fn edges(&self) -> Vec<[usize; 2]> {
         let mut edges = Vec::new();
         for face in &self.faces {
-            for i in 0..3 {
-                let (from, to) = (face[i], face[(i + 1) % 3]);
+            for (from, to) in sides(face) {
                 let edge = [from.min(to), from.max(to)];
                 if !edges.contains(&edge) {
                     edges.push(edge);
@@ -154,6 +123,22 @@ impl Polyhedron {
         }
         edges
     }
+}
+
+/// The sides of a face: pairs of vertices.
+pub(super) fn sides(face: &[usize]) -> impl Iterator<Item = (usize, usize)> {
+    face.iter().copied().zip(face.iter().copied().cycle().skip(1))
+}
+
+/// A flat, convex polygon in triangles that have its first corner in common.
+pub fn triangles<T: Copy>(corners: &[T]) -> Vec<[T; 3]> {
+    corners.windows(2).skip(1).map(|ends| [corners[0], ends[0], ends[1]]).collect()
+}
+
+/// A normal of a flat polygon whose length is twice its area.
+pub(super) fn normal(corners: &[DVec3]) -> DVec3 {
+    let normals = triangles(corners).into_iter().map(|[a, b, c]| (b - a).cross(c - a));
+    normals.reduce(|sum, normal| sum + normal).unwrap_or_default()
 }
 
 /// `n` vertices around the z axis; the first lies `turn` steps from the plane y = 0.
@@ -166,11 +151,12 @@ fn ring(n: usize, radius: f64, z: f64, turn: f64) -> Vec<DVec3> {
 mod tests {
     use super::*;
 
-    fn solids() -> [Polyhedron; 3] {
+    fn solids() -> [Polyhedron; 4] {
         [
             Polyhedron::tetrahedron(150.0),
             Polyhedron::octahedron(150.0),
             Polyhedron::icosahedron(150.0),
+            Polyhedron::cuboid(DVec3::splat(150.0)),
         ]
     }
 
@@ -182,10 +168,9 @@ mod tests {
             assert!(mean.length() < 1e-9);
             let mut directed = std::collections::BTreeSet::new();
             for (index, face) in solid.faces.iter().enumerate() {
-                let [a, b, c] = solid.triangle_mm(index);
-                assert!((b - a).cross(c - a).dot(a + b + c) > 0.0, "face {index}");
-                for i in 0..3 {
-                    let (from, to) = (face[i], face[(i + 1) % 3]);
+                let corners = solid.corners_mm(index);
+                assert!(normal(&corners).dot(corners.iter().sum()) > 0.0, "face {index}");
+                for (from, to) in sides(face) {
                     let length = solid.vertices_mm[from].distance(solid.vertices_mm[to]);
                     assert!((length - 150.0).abs() < 1e-9);
                     assert!(directed.insert((from, to)), "two faces run along {from}–{to}");
@@ -202,9 +187,10 @@ mod tests {
         for solid in solids() {
             for index in 0..solid.faces.len() {
                 let face = solid.face(index, 10, 5.0).unwrap();
-                let expected = (150.0 - 2.0 * 3f64.sqrt() * 5.0) / 10.0;
+                let blank = if face.outline_mm.len() == 3 { 3f64.sqrt() } else { 1.0 } * 5.0;
+                let expected = (150.0 - 2.0 * blank) / 10.0;
                 assert!((face.tile_edge_mm - expected).abs() < 1e-9);
-                for (flat, vertex) in face.outline_mm.iter().zip(solid.triangle_mm(index)) {
+                for (flat, vertex) in face.outline_mm.iter().zip(solid.corners_mm(index)) {
                     let back = face.pose.target_from_panel(*flat);
                     assert!((back - vertex).length() < 1e-9);
                 }
@@ -213,7 +199,7 @@ mod tests {
                 let outwards = face.pose.matrix().z_axis;
                 assert!(outwards.dot(face.pose.translation_mm) > 0.0);
             }
-            assert_eq!(solid.face(0, 10, 50.0), None);
+            assert_eq!(solid.face(0, 10, 75.0), None);
         }
     }
 }

@@ -8,7 +8,7 @@
 //!   and wall below that   ╰───────╯         ╰───────╯    edges of the solid.
 //! ```
 //!
-//! Every boundary on a face is its triangle moved inwards in its own plane, so that a seat is exact
+//! Every boundary on a face is its outline moved inwards in its own plane, so that a seat is exact
 //! whatever the angles between faces are. Panels are cut straight: nothing is mitred.
 
 use std::f64::consts::PI;
@@ -19,6 +19,7 @@ use serde::{Deserialize, Serialize};
 
 use super::angles::{angle, tangent};
 use super::length::format_mm;
+use super::polyhedron::normal;
 use super::{ClosedMesh, Polyhedron, TargetError};
 
 /// Material left at the foot of a rib on either side of the edge, mm: two lines of a 0.4 mm nozzle.
@@ -101,8 +102,9 @@ impl Skeleton {
             return Err(TargetError::invalid("SkeletonSpec::rib_mm", problem));
         }
         let window = (rib + wall).max(inside(thickness + wall) + wall);
-        let faces = || (0..solid.faces.len()).map(|face| solid.triangle_mm(face));
-        let inradius = faces().map(|corners| Incircle::of(corners).radius).fold(f64::MAX, f64::min);
+        let faces = || (0..solid.faces.len()).map(|face| solid.corners_mm(face));
+        let inradius =
+            faces().map(|corners| Incircle::of(&corners).radius).fold(f64::MAX, f64::min);
         if window + LEAST_WINDOW_MM > inradius {
             let problem = format!(
                 "seats and ledges take {:.1} mm from the edges, but the smallest face has its \
@@ -115,18 +117,19 @@ impl Skeleton {
         let inner = inner_vertices(solid, thickness + wall);
         let mut triangles_mm = Vec::new();
         for (face, corners) in faces().enumerate() {
-            let circle = Incircle::of(corners);
-            let at = |inset, below| circle.inset(corners, inset, below);
+            let circle = Incircle::of(&corners);
+            let at = |inset, below| circle.inset(&corners, inset, below);
             let loops = [
-                corners,
+                corners.clone(),
                 at(rib, 0.0),
                 at(rib, thickness),
                 at(window, thickness),
                 at(window, thickness + wall),
-                solid.faces[face].map(|vertex| inner[vertex]),
+                solid.faces[face].iter().map(|&vertex| inner[vertex]).collect(),
             ];
             for (outer, next) in loops.iter().zip(&loops[1..]) {
-                for (i, j) in [(0, 1), (1, 2), (2, 0)] {
+                for i in 0..outer.len() {
+                    let j = (i + 1) % outer.len();
                     triangles_mm.push([outer[i], outer[j], next[j]]);
                     triangles_mm.push([outer[i], next[j], next[i]]);
                 }
@@ -147,31 +150,68 @@ impl Skeleton {
     }
 }
 
-/// The circle that touches the sides of a triangle in space.
+/// How far the sides of a convex polygon in space can be moved inwards: of a triangle the circle that
+/// touches them.
 pub struct Incircle {
-    /// Centre of the circle.
+    /// Centre of the circle, or of another polygon the mean of its corners.
     pub centre: DVec3,
-    /// Radius of the circle, in the unit of the corners.
+    /// Radius of the circle, in the unit of the corners; of another polygon how far its sides can be moved
+    /// until one vanishes.
     pub radius: f64,
-    /// Unit normal of the triangle.
+    /// Unit normal of the polygon.
     pub normal: DVec3,
 }
 
 impl Incircle {
-    /// The circle in the triangle of these corners.
-    pub fn of([a, b, c]: [DVec3; 3]) -> Self {
-        let lengths = [b.distance(c), c.distance(a), a.distance(b)];
-        let around: f64 = lengths.iter().sum();
-        let centre = (a * lengths[0] + b * lengths[1] + c * lengths[2]) / around;
-        let normal = (b - a).cross(c - a);
-        Self { centre, radius: normal.length() / around, normal: normal.normalize_or_zero() }
+    /// The circle in the polygon of these corners.
+    pub fn of(corners: &[DVec3]) -> Self {
+        let normal = normal(corners);
+        if let [a, b, c] = *corners {
+            let lengths = [b.distance(c), c.distance(a), a.distance(b)];
+            let around: f64 = lengths.iter().sum();
+            let centre = (a * lengths[0] + b * lengths[1] + c * lengths[2]) / around;
+            let radius = normal.length() / around;
+            return Self { centre, radius, normal: normal.normalize_or_zero() };
+        }
+        let normal = normal.normalize_or_zero();
+        let centre = corners.iter().sum::<DVec3>() / corners.len() as f64;
+        let ways = ways_inwards(corners, normal);
+        // A side is shorter by what its ends come nearer along it.
+        let side = |i: usize| {
+            let j = (i + 1) % corners.len();
+            let along = corners[j] - corners[i];
+            along.length_squared() / (ways[i] - ways[j]).dot(along)
+        };
+        let radius = (0..corners.len()).map(side).filter(|h| *h > 0.0).fold(f64::MAX, f64::min);
+        Self { centre, radius, normal }
     }
 
-    /// The triangle with its sides moved inwards, and below its plane.
-    pub fn inset(&self, corners: [DVec3; 3], inset: f64, below: f64) -> [DVec3; 3] {
-        let scale = (self.radius - inset) / self.radius;
-        corners.map(|v| self.centre + (v - self.centre) * scale - self.normal * below)
+    /// The polygon with its sides moved inwards, and below its plane.
+    pub fn inset(&self, corners: &[DVec3], inset: f64, below: f64) -> Vec<DVec3> {
+        let down = self.normal * below;
+        if corners.len() == 3 {
+            let scale = (self.radius - inset) / self.radius;
+            let moved = |v: &DVec3| self.centre + (v - self.centre) * scale - down;
+            return corners.iter().map(moved).collect();
+        }
+        let ways = ways_inwards(corners, self.normal);
+        corners.iter().zip(ways).map(|(v, way)| v + way * inset - down).collect()
     }
+}
+
+/// Where each corner of a convex polygon goes when its sides are moved inwards by one unit.
+///
+/// It moves along d = (m + n) / (1 + m·n), as d·m = d·n = 1 with the inward normals m and n of its two sides.
+fn ways_inwards(corners: &[DVec3], normal: DVec3) -> Vec<DVec3> {
+    let count = corners.len();
+    let inwards =
+        |i: usize| normal.cross(corners[(i + 1) % count] - corners[i % count]).normalize_or_zero();
+    (0..count)
+        .map(|i| {
+            let (m, n) = (inwards(i + count - 1), inwards(i));
+            (m + n) / (1.0 + m.dot(n))
+        })
+        .collect()
 }
 
 /// The vertices of the inner side: `below` the planes of all faces around a vertex, exactly where
@@ -179,7 +219,7 @@ impl Incircle {
 fn inner_vertices(solid: &Polyhedron, below: f64) -> Vec<DVec3> {
     let mut normals = vec![Vec::new(); solid.vertices_mm.len()];
     for (index, face) in solid.faces.iter().enumerate() {
-        let normal = Incircle::of(solid.triangle_mm(index)).normal;
+        let normal = solid.normal(index);
         face.iter().for_each(|&vertex| normals[vertex].push(normal));
     }
     let moved = |(vertex, normals): (&DVec3, &Vec<DVec3>)| {
@@ -199,10 +239,9 @@ impl Polyhedron {
     pub fn dihedral_angles_rad(&self) -> Vec<f64> {
         let mut sides = std::collections::BTreeMap::<[usize; 2], Vec<(usize, DVec3)>>::new();
         for (index, face) in self.faces.iter().enumerate() {
-            let normal = Incircle::of(self.triangle_mm(index)).normal;
-            for i in 0..3 {
-                let (from, to) = (face[i], face[(i + 1) % 3]);
-                let apex = face[(i + 2) % 3];
+            let normal = self.normal(index);
+            for i in 0..face.len() {
+                let [from, to, apex] = [0, 1, 2].map(|step| face[(i + step) % face.len()]);
                 sides.entry([from.min(to), from.max(to)]).or_default().push((apex, normal));
             }
         }
@@ -234,6 +273,7 @@ mod tests {
             (Polyhedron::tetrahedron(50.0), 1.0 / 3.0),
             (Polyhedron::octahedron(50.0), -1.0 / 3.0),
             (Polyhedron::icosahedron(50.0), -(5f64.sqrt()) / 3.0),
+            (Polyhedron::cuboid(DVec3::new(50.0, 40.0, 30.0)), 0.0),
         ] {
             for angle in solid.dihedral_angles_rad() {
                 assert!((angle.cos() - cosine).abs() < 1e-12);
@@ -247,9 +287,8 @@ mod tests {
         for solid in [Polyhedron::icosahedron(150.0), Polyhedron::octahedron(150.0)] {
             let spec = SkeletonSpec::default();
             let frame = Skeleton::new(&solid, &spec).unwrap();
-            let outer = (0..solid.faces.len()).map(|face| solid.triangle_mm(face));
-            let whole = volume(&outer.clone().collect::<Vec<_>>());
-            let circle = Incircle::of(solid.triangle_mm(0));
+            let whole = volume(&solid.triangles_mm());
+            let circle = Incircle::of(&solid.corners_mm(0));
             let depth = circle.centre.dot(circle.normal);
             let hollow = (1.0 - 7.0 / depth).powi(3) * whole;
             let area = |inset: f64| 3.0 * 3f64.sqrt() * (circle.radius - inset).powi(2);
@@ -258,6 +297,23 @@ mod tests {
             let found = volume(&frame.triangles_mm);
             assert!((found / expected - 1.0).abs() < 1e-9, "{found} {expected}");
         }
+    }
+
+    /// The same of a box whose sides differ.
+    #[test]
+    fn the_frame_of_a_cuboid_is_that_of_its_parts() {
+        let size = DVec3::new(200.0, 150.0, 100.0);
+        let solid = Polyhedron::cuboid(size);
+        let frame = Skeleton::new(&solid, &SkeletonSpec::default()).unwrap();
+        let shrunk = |by: f64| size - 2.0 * by;
+        let area = |inset: f64| {
+            let DVec3 { x, y, z } = shrunk(inset);
+            2.0 * (x * y + y * z + z * x)
+        };
+        let cut = area(frame.rib_mm) * 3.0 + area(frame.window_mm) * 4.0;
+        let expected = size.element_product() - shrunk(7.0).element_product() - cut;
+        let found = volume(&frame.triangles_mm);
+        assert!((found / expected - 1.0).abs() < 1e-9, "{found} {expected}");
     }
 
     #[test]

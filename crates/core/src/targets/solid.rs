@@ -1,14 +1,16 @@
 //! Solids with a board of tiles on each face.
 
+use std::collections::BTreeMap;
+
 use glam::DVec3;
 
 use super::board::tagged_tiles;
-use super::capacity::{check_family, wider_spacing};
+use super::capacity::{Setting, check_family, wider_spacing};
 use super::length::format_mm;
-use super::polyhedron::{Face, Polyhedron};
+use super::spec::MOST_ROWS;
 use super::{
-    Corner, FamilyRef, GridKind, Incircle, Outline, Panel, Skeleton, SolidShape, SolidSpec, TagsIn,
-    TargetError,
+    Corner, Face, FaceBoard, FamilyRef, GridKind, Incircle, Panel, Polyhedron, Skeleton,
+    SolidShape, SolidSpec, TagSpec, TargetError,
 };
 use crate::family::Family;
 use crate::lattice::Vertex;
@@ -24,6 +26,10 @@ impl SolidSpec {
             SolidShape::Tetrahedron => Polyhedron::tetrahedron(self.edge_mm),
             SolidShape::Octahedron => Polyhedron::octahedron(self.edge_mm),
             SolidShape::Icosahedron => Polyhedron::icosahedron(self.edge_mm),
+            SolidShape::Cube => Polyhedron::cuboid(DVec3::splat(self.edge_mm)),
+            SolidShape::Cuboid(sides) => {
+                Polyhedron::cuboid(*sides * (self.edge_mm / mean_side(*sides)))
+            }
             SolidShape::Mesh(mesh) => {
                 let scale = self.edge_mm / mesh.mean_edge();
                 let vertices_mm = mesh.vertices().iter().map(|&v| v * scale).collect();
@@ -40,12 +46,31 @@ impl SolidSpec {
     pub fn faces(&self) -> Result<Vec<Face>, TargetError> {
         self.check()?;
         let solid = self.polyhedron();
+        let square_edge_mm = solid.square_edge_mm(self.tiles, self.margin_mm);
         (0..solid.faces.len())
             .map(|index| {
-                solid
-                    .face(index, self.tiles, self.margin_mm)
+                let face =
+                    solid.face_with_squares(index, self.tiles, self.margin_mm, square_edge_mm);
+                let face = face
                     .filter(|face| face.tile_edge_mm >= Self::FINEST_TILE_MM)
-                    .ok_or_else(|| self.too_fine(&solid))
+                    .ok_or_else(|| self.too_fine(&solid))?;
+                let most = face.board.matrix().into_iter().max().unwrap_or_default();
+                if most > MOST_ROWS {
+                    let problem = format!(
+                        "face {index} would have {most} corners in a row, more than {MOST_ROWS}: take fewer"
+                    );
+                    return Err(TargetError::invalid("SolidSpec::tiles", problem));
+                }
+                let is_filled = matches!(face.board, FaceBoard::Filled { .. });
+                if is_filled && tagged(&face.board, &self.tags).is_empty() {
+                    let problem = format!(
+                        "{} leave face {index}, of {} sides, no room for a tag: take more",
+                        self.tiles,
+                        face.outline_mm.len()
+                    );
+                    return Err(TargetError::invalid("SolidSpec::tiles", problem));
+                }
+                Ok(face)
             })
             .collect()
     }
@@ -57,9 +82,9 @@ impl SolidSpec {
     pub fn panel_faces(&self) -> Result<Vec<Face>, TargetError> {
         let (mut faces, inset_mm) = (self.faces()?, self.panel_inset_mm()?);
         for face in &mut faces {
-            let corners = face.outline_mm.map(|corner| corner.extend(0.0));
-            let inner = Incircle::of(corners).inset(corners, inset_mm, 0.0);
-            face.outline_mm = inner.map(DVec3::truncate);
+            let corners: Vec<DVec3> = face.outline_mm.iter().map(|v| v.extend(0.0)).collect();
+            let inner = Incircle::of(&corners).inset(&corners, inset_mm, 0.0);
+            face.outline_mm = inner.into_iter().map(DVec3::truncate).collect();
         }
         Ok(faces)
     }
@@ -126,18 +151,24 @@ impl SolidSpec {
     }
 }
 
-/// The corners of a face: a triangle of vertices, two fewer a side than there are tiles, so that
-/// all of them have six tiles around.
-///
-/// ```text
-///            ▲               tiles = 4: the vertices of the outline are no corners,
-///           ▲ ▲              two remain in the lowest row, one above
-///          ▲ · ▲
-///         ▲ · · ▲
-/// ```
-pub(super) fn triangle_vertices(tiles: u32) -> Vec<Vertex> {
-    let side = tiles as i32 - 2;
-    (0..side).flat_map(|row| (0..side - row).map(move |col| Vertex::new(row, col))).collect()
+/// The mean side of a cuboid.
+pub(super) fn mean_side(sides: DVec3) -> f64 {
+    sides.element_sum() / 3.0
+}
+
+/// The tiles of a face that carry tags.
+fn tagged(board: &FaceBoard, tags: &TagSpec) -> Vec<Vertex> {
+    tagged_tiles(board.kind(), &board.corners(), tags.spacing, tags.tags_in)
+}
+
+/// How many tags the faces of a tiling need.
+fn tag_count(faces: &[Face], kind: GridKind, tags: &TagSpec) -> u64 {
+    let mut of_board = BTreeMap::new();
+    let counts = faces.iter().filter(|face| face.board.kind() == kind).map(|face| {
+        let count = || tagged(&face.board, tags).len() as u64;
+        *of_board.entry(&face.board).or_insert_with(count)
+    });
+    counts.sum()
 }
 
 /// The panels of a checked spec, a face each, and the family of their tags.
@@ -145,55 +176,96 @@ pub(super) fn panels(
     spec: &SolidSpec,
     family: Option<&Family>,
 ) -> Result<(Vec<Panel>, Option<FamilyRef>), TargetError> {
-    let panels = untied_panels(spec)?;
-    let faces = panels.len() as u64;
-    let needed = |tiles, spacing| {
-        let vertices = triangle_vertices(tiles);
-        faces * tagged_tiles(GridKind::Deltille, &vertices, spacing, TagsIn::Black).len() as u64
+    let faces = spec.faces()?;
+    let has = |kind: GridKind| faces.iter().any(|face| face.board.kind() == kind);
+    let of_kind = |kind: GridKind| family_of(spec, &faces, kind, family);
+    let family = match [GridKind::Deltille, GridKind::Checker].map(has) {
+        [true, true] => {
+            let squares = Some(Box::new(of_kind(GridKind::Checker)?));
+            FamilyRef { squares, ..of_kind(GridKind::Deltille)? }
+        }
+        [false, _] => of_kind(GridKind::Checker)?,
+        [true, false] => of_kind(GridKind::Deltille)?,
     };
+    Ok((on_faces(spec, &faces), Some(family)))
+}
+
+/// The family of the tags on faces of a tiling.
+fn family_of(
+    spec: &SolidSpec,
+    faces: &[Face],
+    kind: GridKind,
+    family: Option<&Family>,
+) -> Result<FamilyRef, TargetError> {
+    let tags = spec.tags_of(kind);
+    let has_both = spec.square_tags.is_some();
     let instead = |available: u64| {
-        let wider = wider_spacing(&spec.tags, available, |spacing| needed(spec.tiles, spacing));
+        let count = |spacing| tag_count(faces, kind, &TagSpec { spacing, ..tags.clone() });
+        // Square tags beside others have the usual spacing.
+        let is_free = !has_both || kind == GridKind::Deltille;
+        let wider = is_free.then(|| wider_spacing(tags, available, count)).flatten();
+        let has_enough = |&tiles: &u32| {
+            let faces = SolidSpec { tiles, ..spec.clone() }.faces();
+            faces.is_ok_and(|faces| tag_count(&faces, kind, tags) <= available)
+        };
         let fewer = (SolidSpec::FEWEST_TILES..spec.tiles)
             .rev()
-            .find(|&tiles| needed(tiles, spec.tags.spacing) <= available)
+            .find(has_enough)
             .map(|tiles| format!("take at most {tiles} `SolidSpec::tiles`"));
         wider.into_iter().chain(fewer).collect()
     };
-    let tags = needed(spec.tiles, spec.tags.spacing);
-    let family = check_family(GridKind::Deltille, &spec.tags, family, tags, instead)?;
-    Ok((panels, Some(family)))
+    let needed = tag_count(faces, kind, tags);
+    check_family(kind, tags, family, needed, Setting::of(kind, has_both), instead)
 }
 
 /// The panels of a checked spec, whether or not its family has so many tags.
 pub(super) fn untied_panels(spec: &SolidSpec) -> Result<Vec<Panel>, TargetError> {
-    let faces = spec.faces()?;
-    let vertices = triangle_vertices(spec.tiles);
-    let tiles = tagged_tiles(GridKind::Deltille, &vertices, spec.tags.spacing, TagsIn::Black);
-    let panel = |(index, face): (u32, &Face)| Panel {
-        id: spec.board_id + index,
-        kind: GridKind::Deltille,
-        edge_mm: face.tile_edge_mm,
-        border_bits: Some(spec.tags.border_bits),
-        tags_in: TagsIn::Black,
-        tag_margin_bits: None,
-        gap_edges: None,
-        discs_mm: None,
-        inverted: false,
-        outline: Outline::Triangle,
-        matrix: [spec.tiles - 2; 2],
-        pose: face.pose,
-        corners: vertices
-            .iter()
-            .zip(index * vertices.len() as u32..)
-            .map(|(v, id)| {
-                let panel_mm = v.position() * face.tile_edge_mm;
-                let target_mm = face.pose.target_from_panel(panel_mm);
-                Corner { id, row: v.row, col: v.col, panel_mm, target_mm, measured: None }
-            })
-            .collect(),
-        tags: spec.tags.placements(spec.board_id + index, index, &tiles),
-    };
-    Ok((0..).zip(&faces).map(panel).collect())
+    Ok(on_faces(spec, &spec.faces()?))
+}
+
+/// The panels of a solid's faces, with ids that follow from face to face.
+fn on_faces(spec: &SolidSpec, faces: &[Face]) -> Vec<Panel> {
+    let mut of_board = BTreeMap::new();
+    let mut next_corner = 0u32;
+    let mut next_tags =
+        [GridKind::Deltille, GridKind::Checker].map(|kind| spec.tags_of(kind).first_id);
+    let numbered = (spec.board_id..).zip(faces);
+    let panels = numbered.map(|(id, face)| {
+        let board = &face.board;
+        let tags = spec.tags_of(board.kind());
+        let (vertices, tiles) =
+            of_board.entry(board).or_insert_with(|| (board.corners(), tagged(board, tags)));
+        let next_tag = &mut next_tags[usize::from(board.kind() == GridKind::Checker)];
+        let (first_corner, first_tag) = (next_corner, *next_tag);
+        next_corner += vertices.len() as u32;
+        *next_tag = first_tag.saturating_add(tiles.len() as u32);
+        Panel {
+            id,
+            kind: board.kind(),
+            edge_mm: face.tile_edge_mm,
+            border_bits: Some(tags.border_bits),
+            tags_in: tags.tags_in,
+            tag_margin_bits: None,
+            gap_edges: None,
+            discs_mm: None,
+            inverted: false,
+            outline: board.outline(),
+            matrix: board.matrix(),
+            pose: face.pose,
+            corners: vertices
+                .iter()
+                .zip(first_corner..)
+                .map(|(v, id)| {
+                    let panel_mm =
+                        board.kind().position(v.row.into(), v.col.into()) * face.tile_edge_mm;
+                    let target_mm = face.pose.target_from_panel(panel_mm);
+                    Corner { id, row: v.row, col: v.col, panel_mm, target_mm, measured: None }
+                })
+                .collect(),
+            tags: tags.placements(id, first_tag, tiles),
+        }
+    });
+    panels.collect()
 }
 
 #[cfg(test)]
@@ -205,8 +277,13 @@ mod tests {
     use super::*;
     use crate::targets::{Target, TargetSpec};
 
-    const SHAPES: [SolidShape; 3] =
-        [SolidShape::Tetrahedron, SolidShape::Octahedron, SolidShape::Icosahedron];
+    const SHAPES: [SolidShape; 5] = [
+        SolidShape::Tetrahedron,
+        SolidShape::Octahedron,
+        SolidShape::Icosahedron,
+        SolidShape::Cube,
+        SolidShape::Cuboid(DVec3::new(2.0, 1.5, 1.0)),
+    ];
 
     fn build(spec: &SolidSpec) -> Result<Target, TargetError> {
         let family = Family::shipped(&spec.tags.family).unwrap();
@@ -253,11 +330,13 @@ mod tests {
         /// the file says the same.
         #[test]
         fn every_solid_is_consistent(
-            shape in 0usize..3, tiles in 6u32..16, edge_mm in 100.0f64..400.0, spacing in 3u32..5,
+            shape in 0usize..5, tiles in 6u32..16, edge_mm in 100.0f64..400.0, spacing in 3u32..5,
         ) {
             let mut spec = SolidSpec { tiles, edge_mm, ..SolidSpec::new(SHAPES[shape].clone()) };
             spec.tags.spacing = spacing;
-            spec.tags.family = "delTag36h11".to_owned();
+            if shape < 3 {
+                spec.tags.family = "delTag36h11".to_owned();
+            }
             let target = build(&spec).unwrap();
             let ids: BTreeSet<u32> =
                 target.panels.iter().flat_map(|p| &p.tags).map(|tag| tag.id).collect();

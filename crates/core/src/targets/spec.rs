@@ -2,9 +2,10 @@ use glam::DVec3;
 use serde::{Deserialize, Serialize};
 
 use super::length::format_mm;
+use super::solid::mean_side;
 use super::{
-    AprilGridSpec, CharucoSpec, CirclesSpec, ClosedMesh, GridKind, SkeletonSpec, TagPlacement,
-    TagsIn, TargetError,
+    AprilGridSpec, CharucoSpec, CirclesSpec, ClosedMesh, GridKind, Polyhedron, SkeletonSpec,
+    TagPlacement, TagsIn, TargetError,
 };
 use crate::family::places;
 use crate::lattice::Vertex;
@@ -45,6 +46,9 @@ pub const FACE_TILES: std::ops::RangeInclusive<u32> = 6..=200;
 /// Farthest a mesh may lie from its origin, mm: meshes and bodies are written in single precision,
 /// which at 100 m leaves 0.01 mm.
 const FARTHEST_MM: f64 = 1e5;
+
+/// Most triangles that the faces of a solid are divided into: meshes count their corners in 16 bits.
+const MOST_TRIANGLES: usize = 20_000;
 
 /// Most faces of a solid.
 const MOST_FACES: u32 = 10_000;
@@ -139,15 +143,17 @@ pub struct TagSheetSpec {
     pub border_bits: f64,
 }
 
-/// A solid whose faces carry triangular boards with tags.
+/// A solid whose faces carry boards with tags: triangles of deltille tiles on triangular faces, checkerboards
+/// on rectangular ones.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct SolidSpec {
     /// The shape of the solid.
     pub shape: SolidShape,
-    /// Length of the solid's edges, mm; on a mesh their mean, to which it is scaled.
+    /// Length of the solid's edges, mm; of a cuboid or mesh their mean, to which it is scaled.
     pub edge_mm: f64,
-    /// Number of black tiles along each side of a face, 6 to 200.
+    /// Number of black tiles along each side of a triangle, and of squares along the shortest side of all
+    /// rectangles, 6 to 200.
     pub tiles: u32,
     /// Blank between a face's edges and its tiles, mm.
     pub margin_mm: f64,
@@ -155,6 +161,9 @@ pub struct SolidSpec {
     pub board_id: u32,
     /// The tags, without which faces could not be told apart.
     pub tags: TagSpec,
+    /// The tags of rectangular faces, where other faces have deltille tiles.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub square_tags: Option<TagSpec>,
     /// A frame that holds the faces as panels, if one is to be printed.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub skeleton: Option<SkeletonSpec>,
@@ -171,7 +180,11 @@ pub enum SolidShape {
     Octahedron,
     /// Twenty faces.
     Icosahedron,
-    /// Any other, by its triangles.
+    /// Six square faces.
+    Cube,
+    /// Six rectangular faces: the sides along x, y and z, to be scaled to the mean edge.
+    Cuboid(DVec3),
+    /// Any other, by its faces.
     Mesh(ClosedMesh),
 }
 
@@ -226,9 +239,8 @@ impl TagSpec {
         self.family == places::NAME
     }
 
-    /// The tags in some tiles of the panel with an id, which is that of so many panels after the first.
-    pub(super) fn placements(&self, panel: u32, index: u32, tiles: &[Vertex]) -> Vec<TagPlacement> {
-        let first = self.first_id.saturating_add(index * tiles.len() as u32);
+    /// The tags in some tiles of the panel with an id, where those of a family begin with `first`.
+    pub(super) fn placements(&self, panel: u32, first: u32, tiles: &[Vertex]) -> Vec<TagPlacement> {
         let tiles = tiles.iter().zip(0..);
         let of_tile = |(tile, i): (&Vertex, u32)| TagPlacement {
             id: match self.is_dense() {
@@ -311,7 +323,45 @@ impl SolidShape {
             Self::Tetrahedron => "tetrahedron",
             Self::Octahedron => "octahedron",
             Self::Icosahedron => "icosahedron",
+            Self::Cube => "cube",
+            Self::Cuboid(_) => "cuboid",
             Self::Mesh(_) => "mesh",
+        }
+    }
+}
+
+impl SolidSpec {
+    /// Shape and size in words.
+    pub fn size(&self) -> String {
+        match &self.shape {
+            SolidShape::Cuboid(sides) => {
+                let sides = *sides * (self.edge_mm / mean_side(*sides));
+                let [x, y, z] = sides.to_array().map(format_mm);
+                let [x, y] = [&x, &y].map(|side| side.trim_end_matches(" mm"));
+                format!("cuboid {x} × {y} × {z}")
+            }
+            shape => format!("{} edge {}", shape.name(), format_mm(self.edge_mm)),
+        }
+    }
+}
+
+impl SolidShape {
+    /// The tiling whose tags [`SolidSpec::tags`] are: squares where all faces are rectangles.
+    pub fn tag_tiling(&self) -> GridKind {
+        if self.tilings()[0] { GridKind::Deltille } else { GridKind::Checker }
+    }
+
+    /// Whether faces have deltille tiles, and whether faces have squares.
+    fn tilings(&self) -> [bool; 2] {
+        match self {
+            Self::Cube | Self::Cuboid(_) => [false, true],
+            Self::Mesh(mesh) => {
+                let (vertices_mm, faces) = (mesh.vertices().to_vec(), mesh.faces().to_vec());
+                let solid = Polyhedron { vertices_mm, faces };
+                let has = |kind| (0..solid.faces.len()).any(|face| solid.tiling(face) == kind);
+                [GridKind::Deltille, GridKind::Checker].map(has)
+            }
+            _ => [true, false],
         }
     }
 }
@@ -326,16 +376,32 @@ impl SolidSpec {
     /// Finest edge of a tile, mm: what [`BoardSpec`] allows.
     pub const FINEST_TILE_MM: f64 = *EDGE_MM.start();
 
-    /// A solid of 150 mm edges, or a mesh in its own size, with ten tiles a side (the tags of a
-    /// face then lie symmetrically) and 5 mm of blank along its edges, which leaves room to fold
+    /// A solid of 150 mm edges, or a cuboid or mesh in its own size, with ten tiles a side (the tags of a
+    /// triangle then lie symmetrically), or eight squares, and 5 mm of blank along its edges, which leaves room to fold
     /// and glue.
     pub fn new(shape: SolidShape) -> Self {
-        let tags = TagSpec::default();
+        let squares = || TagSpec::for_squares(TagsIn::Black);
+        let (tags, square_tags) = match shape.tilings() {
+            [false, _] => (squares(), None),
+            [true, has_squares] => (TagSpec::default(), has_squares.then(squares)),
+        };
         let edge_mm = match &shape {
             SolidShape::Mesh(mesh) => mesh.mean_edge(),
+            SolidShape::Cuboid(sides) => mean_side(*sides),
             _ => 150.0,
         };
-        Self { shape, edge_mm, tiles: 10, margin_mm: 5.0, board_id: 0, tags, skeleton: None }
+        // A square has room for more corners and tags than a triangle, so its tiles may be larger.
+        let tiles = if shape.tilings()[0] { 10 } else { 8 };
+        let (margin_mm, board_id, skeleton) = (5.0, 0, None);
+        Self { shape, edge_mm, tiles, margin_mm, board_id, tags, square_tags, skeleton }
+    }
+
+    /// The tags of faces of a tiling.
+    pub(super) fn tags_of(&self, kind: GridKind) -> &TagSpec {
+        match (kind, &self.square_tags) {
+            (GridKind::Checker, Some(tags)) => tags,
+            _ => &self.tags,
+        }
     }
 
     /// How many faces it has.
@@ -344,6 +410,7 @@ impl SolidSpec {
             SolidShape::Tetrahedron => 4,
             SolidShape::Octahedron => 8,
             SolidShape::Icosahedron => 20,
+            SolidShape::Cube | SolidShape::Cuboid(_) => 6,
             SolidShape::Mesh(mesh) => mesh.faces().len() as u32,
         }
     }
@@ -362,11 +429,28 @@ impl SolidSpec {
             };
             return Err(TargetError::invalid("SolidSpec::edge_mm", problem));
         }
+        if let SolidShape::Cuboid(sides) = &self.shape {
+            let scale = self.edge_mm / mean_side(*sides);
+            let wrong = |side: &f64| !(*side > 0.0 && SOLID_EDGE_MM.contains(&(side * scale)));
+            if let Some(side) = sides.to_array().into_iter().find(wrong) {
+                let side = format_mm(side * scale);
+                let problem = format!("a side of {side} is not between 10 mm and 5000 mm");
+                return Err(TargetError::invalid("SolidShape::Cuboid", problem));
+            }
+        }
         if let SolidShape::Mesh(mesh) = &self.shape
             && mesh.faces().len() > MOST_FACES as usize
         {
             let problem = format!("{} faces are more than {MOST_FACES}", mesh.faces().len());
             return Err(TargetError::invalid("SolidShape::Mesh", problem));
+        }
+        if let SolidShape::Mesh(mesh) = &self.shape {
+            let triangles: usize = mesh.faces().iter().map(|face| face.len() - 2).sum();
+            if triangles > MOST_TRIANGLES {
+                let problem =
+                    format!("its faces are {triangles} triangles, more than {MOST_TRIANGLES}");
+                return Err(TargetError::invalid("SolidShape::Mesh", problem));
+            }
         }
         if let SolidShape::Mesh(mesh) = &self.shape {
             let scale = self.edge_mm / mesh.mean_edge();
@@ -395,12 +479,29 @@ impl SolidSpec {
         }
         if self.tags.is_dense() {
             let boards = self.board_id..self.board_id + self.face_count();
-            self.tags.check_places(
-                ("SolidSpec::board_id", boards),
-                ("SolidSpec::tiles", self.tiles, self.tiles),
-            )?;
+            // Faces of other shapes than triangles have up to twice as many rows.
+            let rows = if matches!(self.shape, SolidShape::Mesh(_)) { 2 } else { 1 } * self.tiles;
+            let size = ("SolidSpec::tiles", rows, rows);
+            self.tags.check_places(("SolidSpec::board_id", boards), size)?;
         }
-        self.tags.check()
+        let kind = match (self.shape.tilings(), &self.square_tags) {
+            ([true, true], Some(tags)) => {
+                tags.check(GridKind::Checker)?;
+                GridKind::Deltille
+            }
+            ([true, false], None) => GridKind::Deltille,
+            ([false, _], None) => GridKind::Checker,
+            ([true, true], None) => {
+                let problem = "rectangular faces need square tags, the others have triangular ones";
+                return Err(TargetError::invalid("SolidSpec::square_tags", problem));
+            }
+            (_, Some(_)) => {
+                let problem =
+                    "all faces are of one kind, whose tags are those of `SolidSpec::tags`";
+                return Err(TargetError::invalid("SolidSpec::square_tags", problem));
+            }
+        };
+        self.tags.check(kind)
     }
 }
 
@@ -451,6 +552,14 @@ impl TargetSpec {
             Self::Charuco(charuco) => Some(&charuco.dictionary),
             Self::AprilGrid(grid) => Some(&grid.family),
             Self::Listed(_) | Self::Circles(_) => None,
+        }
+    }
+
+    /// The family of its square tags, where others are triangular: by name or path.
+    pub fn square_family(&self) -> Option<&str> {
+        match self {
+            Self::Solid(solid) => solid.square_tags.as_ref().map(|tags| tags.family.as_str()),
+            _ => None,
         }
     }
 }
@@ -516,18 +625,7 @@ impl BoardSpec {
         }
         match &self.tags {
             Some(tags) => {
-                if self.grid == GridKind::Deltille && tags.tags_in == TagsIn::White {
-                    let problem = "the tags of a deltille board are in its black tiles";
-                    return Err(TargetError::invalid("TagSpec::tags_in", problem));
-                }
-                let least = LEAST_SQUARE_BORDER_BITS;
-                if self.grid == GridKind::Checker && tags.border_bits < least {
-                    let problem = format!(
-                        "{} is too narrow, a square tag has a border of at least {least} bit-width",
-                        tags.border_bits
-                    );
-                    return Err(TargetError::invalid("TagSpec::border_bits", problem));
-                }
+                tags.check(self.grid)?;
                 if (self.grid, self.rows, self.cols, tags.tags_in)
                     == (GridKind::Checker, 2, 2, TagsIn::White)
                 {
@@ -542,7 +640,7 @@ impl BoardSpec {
                         ("BoardSpec::rows", rows, cols),
                     )?;
                 }
-                tags.check()
+                Ok(())
             }
             None if self.boards > 1 => {
                 let problem = "untagged boards cannot be told apart: give them tags, or make one";
@@ -554,7 +652,20 @@ impl BoardSpec {
 }
 
 impl TagSpec {
-    fn check(&self) -> Result<(), TargetError> {
+    /// Checks every number by itself, of tags in tiles of a kind.
+    fn check(&self, grid: GridKind) -> Result<(), TargetError> {
+        if grid == GridKind::Deltille && self.tags_in == TagsIn::White {
+            let problem = "the tags of a deltille board are in its black tiles";
+            return Err(TargetError::invalid("TagSpec::tags_in", problem));
+        }
+        let least = LEAST_SQUARE_BORDER_BITS;
+        if grid == GridKind::Checker && self.border_bits < least {
+            let problem = format!(
+                "{} is too narrow, a square tag has a border of at least {least} bit-width",
+                self.border_bits
+            );
+            return Err(TargetError::invalid("TagSpec::border_bits", problem));
+        }
         if !(1..=MOST_ROWS).contains(&self.spacing) {
             let problem = format!("{} is not between 1 and {MOST_ROWS}", self.spacing);
             return Err(TargetError::invalid("TagSpec::spacing", problem));

@@ -73,8 +73,7 @@ pub(super) fn parts(
     paper: Option<&PaperSpec>,
 ) -> Result<(Vec<Panel>, FamilyRef, Vec<SheetLayout>), TargetError> {
     check(spec, family)?;
-    let family_ref =
-        FamilyRef { name: family.name().to_owned(), fingerprint: family.fingerprint().to_owned() };
+    let family_ref = FamilyRef::of(family);
     let panels = panels(spec);
     let Some(paper) = paper else { return Ok((panels, family_ref, Vec::new())) };
 

@@ -37,7 +37,7 @@ pub fn write(mesh: &TexturedMesh, path: &Path) -> Result<(), atomic::WriteError>
 }
 
 /// The bytes of the mesh as a `.glb` file. Faces do not share vertices, so that normals are exact.
-/// Indices have 16 bits, which suffice for the 10 000 faces that a solid may have.
+/// Indices have 16 bits, which suffice for the 20 000 triangles that a solid may have.
 pub fn to_bytes(mesh: &TexturedMesh) -> Vec<u8> {
     let corners = || mesh.faces.iter().flat_map(|face| (0..3).map(move |i| (face, i)));
     let positions: Vec<[f32; 3]> =

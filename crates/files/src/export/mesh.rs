@@ -8,7 +8,7 @@ use super::{GENERATOR, png};
 use deltille_core::artwork::{ArtworkError, Atlas};
 use deltille_core::family::Family;
 use deltille_core::lattice::GridKind;
-use deltille_core::targets::{Panel, SolidSpec, Target, TargetError, TargetSpec};
+use deltille_core::targets::{Panel, SolidSpec, Target, TargetError, TargetSpec, triangles};
 
 /// Texels along the edge of a cell of a tag, unless another resolution is asked for, so that a viewer sees it sharp at
 /// close range.
@@ -124,7 +124,7 @@ pub fn extras(target: &Target) -> serde_json::Value {
 pub struct TexturedMesh {
     /// Name of the target.
     pub name: String,
-    /// The triangles: the faces of a solid in the order of its panels, or those of a plate, the front first.
+    /// The triangles: those of the faces of a solid in the order of its panels, or those of a plate, the front first.
     pub faces: Vec<MeshFace>,
     /// The texture as a grey 8-bit PNG file.
     pub texture_png: Vec<u8>,
@@ -195,16 +195,17 @@ impl TexturedMesh {
         let needed = if is_square { LEAST_TEXELS_PER_SQUARE_BIT } else { LEAST_TEXELS_PER_BIT };
         let atlas = drawn(atlas, meshing.resolution, (cell_mm, needed))?;
         let size_mm = DVec2::new(atlas.sheet.width_mm, atlas.sheet.height_mm);
-        let front = atlas.outlines_mm.iter().map(|outline| {
-            outline.map(|corner| {
-                let part = corner / size_mm;
-                DVec2::new(part.x, 1.0 - part.y)
-            })
-        });
+        let front =
+            atlas.outlines_mm.iter().flat_map(|outline| triangles(outline)).map(|triangle| {
+                triangle.map(|corner| {
+                    let part = corner / size_mm;
+                    DVec2::new(part.x, 1.0 - part.y)
+                })
+            });
         let faces = match shape {
             Shape::Solid(spec) => {
-                let solid = spec.polyhedron();
-                front.enumerate().map(|(i, uv)| MeshFace::new(solid.triangle_mm(i), uv)).collect()
+                let surface = spec.polyhedron().triangles_mm();
+                surface.into_iter().zip(front).map(|(mm, uv)| MeshFace::new(mm, uv)).collect()
             }
             Shape::Plate(panel) => plate_faces(panel, meshing.plate_mm, front.collect(), &atlas),
         };
@@ -222,7 +223,8 @@ impl TexturedMesh {
 
 /// Edge of the smallest cell of a tag, mm, or what would be one.
 fn smallest_cell_mm(target: &Target, family: Option<&Family>) -> f64 {
-    let cells = |panel: &Panel| match (family, panel.border_bits) {
+    let of_panel = |panel: &Panel| family.and_then(|family| family.of_tiling(panel.kind));
+    let cells = |panel: &Panel| match (of_panel(panel), panel.border_bits) {
         (Some(family), Some(_)) => family.cells().width(panel.tag_inset_bits()),
         _ => UNTAGGED_CELLS,
     };

@@ -20,26 +20,17 @@ pub enum ObjError {
     /// The reader panicked.
     #[error(transparent)]
     Broken(#[from] limits::Broken),
-    /// A face is not a triangle.
-    #[error("face {face} has {corners} corners: triangles are needed")]
-    NotTriangle {
-        /// The face, counted from 1.
-        face: usize,
-        /// Number of its corners.
-        corners: u32,
-    },
-    /// The triangles are not one closed surface.
+    /// The faces are not one closed surface.
     #[error(transparent)]
     Mesh(#[from] ClosedMeshError),
 }
 
-/// Reads the triangles of all objects and groups of an OBJ as one solid, in the unit of the file;
+/// Reads the faces of all objects and groups of an OBJ as one solid, in the unit of the file;
 /// lines, points, materials and texture coordinates are ignored. The second value tells whether the
 /// surface was inside out.
 ///
 /// # Errors
-/// When the file is not a valid OBJ, has a face that is not a triangle, or its triangles are not
-/// one closed surface.
+/// When the file is not a valid OBJ, or its faces are not one closed surface of flat, convex faces.
 pub fn read(text: &[u8]) -> Result<(ClosedMesh, bool), ObjError> {
     let options =
         tobj::LoadOptions { ignore_lines: true, ignore_points: true, ..Default::default() };
@@ -48,15 +39,13 @@ pub fn read(text: &[u8]) -> Result<(ClosedMesh, bool), ObjError> {
     let (models, _) = limits::caught(load)??;
     let (mut vertices, mut faces) = (Vec::new(), Vec::new());
     for mesh in models.iter().map(|model| &model.mesh) {
-        let corners = mesh.face_arities.iter().position(|&n| n != 3);
-        if let Some(face) = corners {
-            let (corners, face) = (mesh.face_arities[face], faces.len() + face + 1);
-            return Err(ObjError::NotTriangle { face, corners });
-        }
         let first = vertices.len();
         vertices.extend(mesh.positions.as_chunks::<3>().0.iter().copied().map(DVec3::from));
-        let indices = mesh.indices.as_chunks::<3>().0;
-        faces.extend(indices.iter().map(|face| face.map(|index| first + index as usize)));
+        // Without the numbers of their corners, all faces are triangles.
+        let triangles = vec![3; mesh.indices.len() / 3];
+        let counts = if mesh.face_arities.is_empty() { &triangles } else { &mesh.face_arities };
+        let mut indices = mesh.indices.iter().map(|&index| first + index as usize);
+        faces.extend(counts.iter().map(|&n| indices.by_ref().take(n as usize).collect::<Vec<_>>()));
     }
     ClosedMesh::new(&vertices, &faces).map_err(|error| match error {
         // The reader numbers vertices as faces name them, the user as the file lists them.

@@ -5,7 +5,7 @@ use serde::Serialize;
 
 use super::unfold::{Side, Sides};
 use crate::targets::angles::angle;
-use crate::targets::{Incircle, SolidSpec, Target, TargetSpec};
+use crate::targets::{SolidSpec, Target, TargetSpec};
 
 /// Sides that lie on each other on a sheet differ by less, mm.
 const TOUCHING_MM: f64 = 0.01;
@@ -50,22 +50,25 @@ impl Target {
 fn of_sheets(target: &Target, spec: &SolidSpec) -> Option<Vec<Hinge>> {
     let (solid, faces) = (spec.polyhedron(), spec.faces().ok()?);
     let sides = Sides::new(&solid);
-    let normal = |face: usize| Incircle::of(solid.triangle_mm(face)).normal;
     let mut hinges = Vec::with_capacity(faces.len());
     for sheet in &target.sheets {
         // Of each face the ends of its sides on the sheet.
         let mut on_sheet = vec![None; faces.len()];
         for placement in &sheet.placements {
             let face = target.panels.iter().position(|panel| panel.id == placement.panel)?;
-            let outline = faces.get(face)?.outline_mm;
-            on_sheet[face] = Some(outline.map(|corner| placement.page_from_panel(corner)));
+            let outline = faces.get(face)?.outline_mm.iter();
+            let corners: Vec<_> =
+                outline.map(|&corner| placement.page_from_panel(corner)).collect();
+            on_sheet[face] = Some(corners);
         }
         let are_joined = |side: Side, other: Side| {
-            let (Some(one), Some(two)) = (on_sheet[side.face], on_sheet[other.face]) else {
+            let ends = |side: Side| {
+                let corners = on_sheet[side.face].as_ref()?;
+                Some([corners[side.side], corners[(side.side + 1) % corners.len()]])
+            };
+            let (Some([from, to]), Some([first, second])) = (ends(side), ends(other)) else {
                 return false;
             };
-            let (from, to) = (one[side.side], one[(side.side + 1) % 3]);
-            let (first, second) = (two[other.side], two[(other.side + 1) % 3]);
             from.distance(second).max(to.distance(first)) < TOUCHING_MM
         };
         let first = (0..faces.len()).find(|&face| on_sheet[face].is_some())?;
@@ -76,16 +79,16 @@ fn of_sheets(target: &Target, spec: &SolidSpec) -> Option<Vec<Hinge>> {
         let mut next = begin;
         while let Some(&Hinge { face: on, .. }) = hinges.get(next) {
             next += 1;
-            for side in (0..3).map(|side| Side { face: on, side }) {
+            for side in sides.of(on) {
                 let Some(own) = sides.partner(side) else { continue };
                 if is_hung[own.face] || !are_joined(side, own) {
                     continue;
                 }
                 is_hung[own.face] = true;
-                let corners = solid.triangle_mm(on);
-                let ends_mm = [corners[side.side], corners[(side.side + 1) % 3]];
+                let corners = solid.corners_mm(on);
+                let ends_mm = [corners[side.side], corners[(side.side + 1) % corners.len()]];
                 let axis = (ends_mm[1] - ends_mm[0]).normalize_or_zero();
-                let (from, to) = (normal(own.face), normal(on));
+                let (from, to) = (solid.normal(own.face), solid.normal(on));
                 let angle_rad = angle(axis.dot(from.cross(to)), from.dot(to));
                 hinges.push(Hinge { face: own.face, on: Some(on), ends_mm, angle_rad });
             }
@@ -104,7 +107,8 @@ mod tests {
     /// Turned about their hinges, all faces lie in one plane, as they do on the sheet.
     #[test]
     fn unfolded_faces_lie_as_on_the_sheet() {
-        for shape in [SolidShape::Tetrahedron, SolidShape::Octahedron, SolidShape::Icosahedron] {
+        use SolidShape::{Cube, Icosahedron, Octahedron, Tetrahedron};
+        for shape in [Tetrahedron, Octahedron, Icosahedron, Cube] {
             let spec = SolidSpec::new(shape);
             let target = Target::new("solid", spec.clone()).unwrap();
             let (solid, faces) = (spec.polyhedron(), spec.faces().unwrap());
@@ -120,14 +124,20 @@ mod tests {
                     * DAffine3::from_translation(-from);
                 moved[hinge.face] = moved[on] * about;
             }
-            let in_space =
-                |face: usize| solid.triangle_mm(face).map(|v| moved[face].transform_point3(v));
+            let in_space = |face: usize| {
+                solid
+                    .corners_mm(face)
+                    .into_iter()
+                    .map(|v| moved[face].transform_point3(v))
+                    .collect::<Vec<_>>()
+            };
             let sheet = &target.sheets[0];
             let on_paper: Vec<_> = (0..faces.len())
                 .flat_map(|face| {
                     let id = target.panels[face].id;
                     let placement = sheet.placements.iter().find(|p| p.panel == id).unwrap();
-                    faces[face].outline_mm.map(|corner| placement.page_from_panel(corner))
+                    let outline = faces[face].outline_mm.iter();
+                    outline.map(|&corner| placement.page_from_panel(corner)).collect::<Vec<_>>()
                 })
                 .collect();
             let flat: Vec<_> = (0..faces.len()).flat_map(in_space).collect();

@@ -27,4 +27,4 @@ mod unfold;
 
 pub use hinge::Hinge;
 pub(super) use sheet::sheets;
-pub(super) use unfold::{Side, Sides};
+pub(super) use unfold::Sides;

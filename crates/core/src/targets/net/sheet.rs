@@ -8,7 +8,7 @@ use super::nest::{self, Outline, Place};
 use super::plane::{Motion, bounds};
 use super::tabs::{self, Tab};
 use super::unfold::{self, Piece, Side, Sides};
-use crate::lattice::Vertex;
+use crate::lattice::{GridKind, Vertex};
 use crate::polygon;
 use crate::targets::angles::turn_of;
 use crate::targets::face_sheet::edge_numbers;
@@ -158,7 +158,7 @@ fn seamed(
             };
             let tiles = sheet.placements.iter().filter_map(|placement| {
                 let panel = drawing.panels.iter().find(|panel| panel.id == placement.panel)?;
-                Some(tiles_outline(panel).map(|p| placement.page_from_panel(p)).to_vec())
+                Some(on_page(placement, &tiles_outline(panel)))
             });
             let (tiles, lines) = (tiles.collect(), sheet.lines.clone());
             let words = |at: DVec2, room: f64| instructions(&lines, at, room).to_vec();
@@ -243,7 +243,7 @@ fn nested(
 }
 
 /// The net whose pieces take the fewest pages with a room of this size, then that with the fewest pieces.
-fn nest_on(flat: &[[DVec2; 3]], sides: &Sides, room: DVec2) -> Option<Nested> {
+fn nest_on(flat: &[Vec<DVec2>], sides: &Sides, room: DVec2) -> Option<Nested> {
     let mut best: Option<Nested> = None;
     for part in PARTS_OF_ROOM {
         let mut fewest = usize::MAX;
@@ -254,7 +254,7 @@ fn nest_on(flat: &[[DVec2; 3]], sides: &Sides, room: DVec2) -> Option<Nested> {
             fewest = fewest.min(pieces.len());
             let Some(net) = with_tabs(pieces, sides) else { continue };
             let outline = |(piece, tabs): (&Piece, &Vec<Tab>)| -> Outline {
-                let faces = piece.iter().map(|face| face.corners.to_vec());
+                let faces = piece.iter().map(|face| face.corners.clone());
                 faces.chain(tabs.iter().map(|tab| tab.corners.to_vec())).collect()
             };
             let outlines: Vec<Outline> = net.pieces.iter().zip(&net.tabs).map(outline).collect();
@@ -291,8 +291,8 @@ fn nets(solid: &Polyhedron, spec: &SolidSpec, faces: &[Face], sides: &Sides) -> 
     fewest.next().into_iter().collect()
 }
 
-fn outlines(faces: &[Face]) -> Vec<[DVec2; 3]> {
-    faces.iter().map(|face| face.outline_mm).collect()
+fn outlines(faces: &[Face]) -> Vec<Vec<DVec2>> {
+    faces.iter().map(|face| face.outline_mm.clone()).collect()
 }
 
 fn with_tabs(pieces: Vec<Piece>, sides: &Sides) -> Option<Net> {
@@ -300,16 +300,26 @@ fn with_tabs(pieces: Vec<Piece>, sides: &Sides) -> Option<Net> {
     Some(Net { pieces, tabs })
 }
 
-/// The triangle that the tiles of a face fill, in the panel frame, mm.
-fn tiles_outline(panel: &Panel) -> [DVec2; 3] {
+/// The convex shape that the tiles of a face fill, in the panel frame, mm.
+fn tiles_outline(panel: &Panel) -> Vec<DVec2> {
+    if panel.outline != crate::targets::Outline::Triangle {
+        let tiles = panel.dark_tiles();
+        let vertices = tiles.iter().flat_map(|tile| tile.vertices());
+        return polygon::hull(vertices.map(|vertex| panel.lattice_mm(vertex)).collect());
+    }
     let top = panel.corners.iter().map(|corner| corner.row).max().unwrap_or_default();
     let ends = [(-1, -1), (-1, top + 2), (top + 2, -1)];
-    ends.map(|(row, col)| panel.lattice_mm(Vertex::new(row, col)))
+    ends.map(|(row, col)| panel.lattice_mm(Vertex::new(row, col))).to_vec()
+}
+
+/// Points of a panel on a page, mm.
+fn on_page(placement: &Placement, points: &[DVec2]) -> Vec<DVec2> {
+    points.iter().map(|&p| placement.page_from_panel(p)).collect()
 }
 
 /// All corners of a piece and its tabs.
 fn points(piece: &Piece, tabs: &[Tab]) -> Vec<DVec2> {
-    let faces = piece.iter().flat_map(|face| face.corners);
+    let faces = piece.iter().flat_map(|face| face.corners.iter().copied());
     faces.chain(tabs.iter().flat_map(|tab| tab.corners)).collect()
 }
 
@@ -360,9 +370,9 @@ struct Drawing<'a> {
     family: Option<&'a FamilyRef>,
     sides: &'a Sides,
     /// Numbers of the edges of each face.
-    numbers: Vec<[usize; 3]>,
+    numbers: Vec<Vec<usize>>,
     /// Which way each side of each face is folded.
-    folds: Vec<[LineKind; 3]>,
+    folds: Vec<Vec<LineKind>>,
 }
 
 impl<'a> Drawing<'a> {
@@ -376,7 +386,7 @@ impl<'a> Drawing<'a> {
         sides: &'a Sides,
     ) -> Self {
         let edges = solid.edges();
-        let numbers: Vec<[usize; 3]> =
+        let numbers: Vec<Vec<usize>> =
             (0..faces.len()).map(|face| edge_numbers(solid, &edges, face)).collect();
         let angles_rad = solid.dihedral_angles_rad();
         let fold = |edge: usize| match angles_rad[edge] - PI {
@@ -385,7 +395,8 @@ impl<'a> Drawing<'a> {
             angle if angle > 0.0 => LineKind::Valley,
             _ => LineKind::Fold,
         };
-        let folds = numbers.iter().map(|edges| edges.map(fold)).collect();
+        let folds =
+            numbers.iter().map(|edges| edges.iter().map(|&edge| fold(edge)).collect()).collect();
         Self { name, spec, faces, panels, family, sides, numbers, folds }
     }
 
@@ -423,9 +434,10 @@ impl<'a> Drawing<'a> {
         let hinges: Vec<(Side, Side)> = piece.iter().filter_map(|face| face.hinge).collect();
         for flat in piece {
             let (face, index) = (&self.faces[flat.face], flat.face);
-            let corners = flat.corners.map(|corner| sheet_from_net.apply(corner));
-            let [a, b, _] = face.outline_mm;
-            let motion = Motion::carrying([a, b], [corners[0], corners[1]]);
+            let corners: Vec<DVec2> =
+                flat.corners.iter().map(|&corner| sheet_from_net.apply(corner)).collect();
+            let lower = [face.outline_mm[0], face.outline_mm[1]];
+            let motion = Motion::carrying(lower, [corners[0], corners[1]]);
             let placement = Placement {
                 panel: self.panels[index].id,
                 angle_rad: turn_of(motion.turn),
@@ -433,9 +445,9 @@ impl<'a> Drawing<'a> {
             };
             sheet.placements.push(placement);
             let mut named = false;
-            for side in 0..3 {
-                let ends = [corners[side], corners[(side + 1) % 3]];
-                let at = Side { face: index, side };
+            for at in self.sides.of(index) {
+                let side = at.side;
+                let ends = [corners[side], corners[(side + 1) % corners.len()]];
                 let hinge = hinges.iter().find(|(on, own)| *on == at || *own == at);
                 let tab = tabs.iter().find(|tab| tab.side == at);
                 let number = self.numbers[index][side];
@@ -505,17 +517,19 @@ impl<'a> Drawing<'a> {
     /// All that is needed to make the net again.
     fn label(&self, of: &str) -> String {
         let (spec, name) = (self.spec, self.name);
-        let mut parts = vec![
-            name.to_owned(),
-            format!("{} edge {}", spec.shape.name(), format_mm(spec.edge_mm)),
-        ];
+        let mut parts = vec![name.to_owned(), spec.size()];
         parts.push(of.to_owned());
         parts.push(format!("{} tiles, margin {}", spec.tiles, format_mm(spec.margin_mm)));
-        let tags = || self.panels.iter().flat_map(|panel| &panel.tags);
-        if let (Some(family), Some(first), Some(last)) = (self.family, tags().next(), tags().last())
-        {
-            parts.push(tag_range(&family.name, first.id, last.id));
-            parts.push(format!("fingerprint {}", family.fingerprint));
+        for kind in [GridKind::Deltille, GridKind::Checker] {
+            let own = || self.panels.iter().filter(|panel| panel.kind == kind);
+            let tags = || own().flat_map(|panel| &panel.tags);
+            if let (Some(family), Some(first), Some(last)) =
+                (self.family, tags().next(), tags().last())
+            {
+                let family = family.of_tiling(kind);
+                parts.push(tag_range(&family.name, first.id, last.id));
+                parts.push(format!("fingerprint {}", family.fingerprint));
+            }
         }
         let last = self.panels.last().map_or(0, |panel| panel.id);
         parts.push(format!("boards {}–{last}", spec.board_id));
@@ -586,6 +600,7 @@ fn words(
 
 #[cfg(test)]
 mod tests {
+    use glam::DVec3;
     use proptest::prelude::*;
 
     use super::super::plane::gap_mm;
@@ -603,11 +618,10 @@ mod tests {
     }
 
     /// Page positions of a placed panel's outline.
-    fn triangle(target: &Target, placement: &Placement) -> [DVec2; 3] {
+    fn outline(target: &Target, placement: &Placement) -> Vec<DVec2> {
         let TargetSpec::Solid(spec) = &target.spec else { panic!("a solid") };
         let index = target.panels.iter().position(|panel| panel.id == placement.panel).unwrap();
-        let outline = spec.faces().unwrap()[index].outline_mm;
-        outline.map(|p| placement.page_from_panel(p))
+        on_page(placement, &spec.faces().unwrap()[index].outline_mm)
     }
 
     proptest! {
@@ -617,14 +631,18 @@ mod tests {
         /// on several pages of one sheet every line is shown, and every cross on two.
         #[test]
         fn nothing_on_a_net_meets_anything_else(
-            shape in 0usize..3, edge_mm in 60.0f64..200.0, tiles in 6u32..12, margin_mm in 2.5f64..7.0,
+            shape in 0usize..5, edge_mm in 60.0f64..200.0, tiles in 6u32..12, margin_mm in 2.5f64..7.0,
             paper in 0usize..3, seams in any::<bool>(),
         ) {
-            use SolidShape::{Icosahedron, Octahedron, Tetrahedron};
-            let shape = [Tetrahedron, Octahedron, Icosahedron][shape].clone();
+            use SolidShape::{Cube, Cuboid, Icosahedron, Octahedron, Tetrahedron};
+            let box_of = Cuboid(DVec3::new(2.0, 1.6, 1.2));
+            let has_squares = shape > 2;
+            // The largest whose faces fit A4.
+            let edge_mm = if has_squares { 0.8 * edge_mm } else { edge_mm };
+            let shape = [Tetrahedron, Octahedron, Icosahedron, Cube, box_of][shape].clone();
             let mut spec = SolidSpec { edge_mm, tiles, margin_mm, ..SolidSpec::new(shape) };
-            spec.tags.family = "delTag36h11".to_owned();
-            let family = Family::shipped("delTag36h11").unwrap();
+            spec.tags.family = if has_squares { "aprilTag36h11" } else { "delTag36h11" }.to_owned();
+            let family = Family::shipped(&spec.tags.family).unwrap();
             let size = [None, Some("A4".parse().unwrap()), Some("A2".parse().unwrap())];
             let solids = if seams { SolidSheets::SeamedNet } else { SolidSheets::Net };
             let paper = PaperSpec { size: size[paper].clone(), solids, ..PaperSpec::default() };
@@ -643,15 +661,15 @@ mod tests {
     }
 
     fn check_sheet(target: &Target, sheet: &SheetLayout) -> Result<(), TestCaseError> {
-        let triangles: Vec<_> = sheet.placements.iter().map(|p| triangle(target, p)).collect();
-        for (n, a) in triangles.iter().enumerate() {
+        let outlines: Vec<_> = sheet.placements.iter().map(|p| outline(target, p)).collect();
+        for (n, a) in outlines.iter().enumerate() {
             prop_assert!(a.iter().all(|p| p.x > 0.0 && p.y > 0.0));
             prop_assert!(a.iter().all(|p| p.x < sheet.width_mm && p.y < sheet.height_mm));
-            prop_assert!(triangles[n + 1..].iter().all(|b| gap_mm(a, b) > -1e-6));
+            prop_assert!(outlines[n + 1..].iter().all(|b| gap_mm(a, b) > -1e-6));
         }
         let tiles = sheet.placements.iter().map(|placement| {
             let panel = target.panels.iter().find(|p| p.id == placement.panel).unwrap();
-            tiles_outline(panel).map(|p| placement.page_from_panel(p)).to_vec()
+            on_page(placement, &tiles_outline(panel))
         });
         let lines = sheet.lines.iter().map(|l| vec![l.from_mm, l.to_mm]);
         let marks: Vec<Vec<DVec2>> = tiles.chain(lines).collect();
@@ -684,10 +702,7 @@ mod tests {
 
     /// Sheets of a target, and the part of their area that faces take.
     fn used(target: &Target) -> (usize, f64) {
-        let area = |placement: &Placement| {
-            let [a, b, c] = triangle(target, placement);
-            polygon::area(&[a, b, c])
-        };
+        let area = |placement: &Placement| polygon::area(&outline(target, placement));
         let faces: f64 = target.sheets.iter().flat_map(|s| &s.placements).map(area).sum();
         let paper: f64 = target.sheets.iter().map(|s| s.width_mm * s.height_mm).sum();
         (target.sheets.len(), faces / paper)
@@ -720,9 +735,10 @@ mod tests {
             };
             faces = faces
                 .iter()
-                .flat_map(|&[a, b, c]| {
+                .flat_map(|face| {
+                    let [a, b, c] = face[..] else { panic!("a triangle") };
                     let [ab, bc, ca] = [middle(a, b), middle(b, c), middle(c, a)];
-                    [[a, ab, ca], [ab, b, bc], [ca, bc, c], [ab, bc, ca]]
+                    [[a, ab, ca], [ab, b, bc], [ca, bc, c], [ab, bc, ca]].map(Vec::from)
                 })
                 .collect();
         }

@@ -82,7 +82,7 @@ pub fn cut_edges(pieces: &[Piece], sides: &Sides) -> Vec<(Side, Side)> {
     let faces = || pieces.iter().flatten();
     let folded: Vec<(Side, Side)> = faces().filter_map(|face| face.hinge).collect();
     let mut all: Vec<(Side, Side)> = faces()
-        .flat_map(|face| (0..3).map(|side| Side { face: face.face, side }))
+        .flat_map(|face| sides.of(face.face))
         .filter_map(|side| Some((side, sides.partner(side)?)))
         .filter(|(own, partner)| own < partner)
         .filter(|&(a, b)| !folded.contains(&(a, b)) && !folded.contains(&(b, a)))

@@ -8,6 +8,7 @@ use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
 use super::plane::{Motion, TOUCHING_MM, bounds, gap_mm};
+use crate::targets::polyhedron::sides;
 use crate::targets::{Polyhedron, SolidShape};
 
 /// Seed of the search for nets of meshes: any will do, a fixed one makes results repeatable.
@@ -36,12 +37,12 @@ pub struct Side {
 }
 
 /// A face laid into the plane.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct FlatFace {
     /// Index of the face.
     pub face: usize,
     /// Its vertices, counter-clockwise, mm.
-    pub corners: [DVec2; 3],
+    pub corners: Vec<DVec2>,
     /// The side of an earlier face that it hangs on, and its own there; `None` for the first.
     pub hinge: Option<(Side, Side)>,
 }
@@ -49,7 +50,7 @@ pub struct FlatFace {
 impl FlatFace {
     /// Ends of a side, mm.
     pub fn ends(&self, side: usize) -> [DVec2; 2] {
-        [self.corners[side], self.corners[(side + 1) % 3]]
+        [self.corners[side], self.corners[(side + 1) % self.corners.len()]]
     }
 }
 
@@ -59,7 +60,7 @@ pub type Piece = Vec<FlatFace>;
 
 /// The sides of a solid's faces, matched.
 pub struct Sides {
-    partner: Vec<[Option<Side>; 3]>,
+    partner: Vec<Vec<Option<Side>>>,
 }
 
 impl Sides {
@@ -67,14 +68,19 @@ impl Sides {
     pub fn new(solid: &Polyhedron) -> Self {
         let mut along = BTreeMap::new();
         for (face, vertices) in solid.faces.iter().enumerate() {
-            for side in 0..3 {
-                along.insert((vertices[side], vertices[(side + 1) % 3]), Side { face, side });
+            for (side, ends) in sides(vertices).enumerate() {
+                along.insert(ends, Side { face, side });
             }
         }
-        let partner = solid.faces.iter().map(|vertices| {
-            [0, 1, 2].map(|side| along.get(&(vertices[(side + 1) % 3], vertices[side])).copied())
-        });
-        Self { partner: partner.collect() }
+        let partners = |vertices: &Vec<usize>| {
+            sides(vertices).map(|(from, to)| along.get(&(to, from)).copied()).collect()
+        };
+        Self { partner: solid.faces.iter().map(partners).collect() }
+    }
+
+    /// The sides of a face.
+    pub fn of(&self, face: usize) -> impl Iterator<Item = Side> + use<> {
+        (0..self.partner[face].len()).map(move |side| Side { face, side })
     }
 
     /// The other side of the same edge; `None` on the rim of an open mesh.
@@ -87,13 +93,13 @@ impl Sides {
 /// once. `flat` holds the outlines of the faces, each in a frame of its own, mm.
 ///
 /// A named solid has its usual nets, any other solid those that are [`grown`].
-pub fn unfoldings(solid: &Polyhedron, shape: &SolidShape, flat: &[[DVec2; 3]]) -> Vec<Vec<Piece>> {
+pub fn unfoldings(solid: &Polyhedron, shape: &SolidShape, flat: &[Vec<DVec2>]) -> Vec<Vec<Piece>> {
     let usual = usual(solid, shape, flat);
     if usual.is_empty() { grown(solid, flat) } else { usual }
 }
 
 /// The usual nets of a named solid.
-fn usual(solid: &Polyhedron, shape: &SolidShape, flat: &[[DVec2; 3]]) -> Vec<Vec<Piece>> {
+fn usual(solid: &Polyhedron, shape: &SolidShape, flat: &[Vec<DVec2>]) -> Vec<Vec<Piece>> {
     let sides = Sides::new(solid);
     let nets = usual_hinges(shape).into_iter().filter_map(|(root, hinges)| {
         let piece = hang(flat, &sides, root, &hinges)?;
@@ -105,7 +111,7 @@ fn usual(solid: &Polyhedron, shape: &SolidShape, flat: &[[DVec2; 3]]) -> Vec<Vec
 /// Nets grown from many beginnings in many orders: a face is laid on the first free side where it
 /// overlaps nothing, and what finds no place begins another piece, so that every result is a valid
 /// one. Fewer pieces are better, then a smaller bounding box.
-fn grown(solid: &Polyhedron, flat: &[[DVec2; 3]]) -> Vec<Vec<Piece>> {
+fn grown(solid: &Polyhedron, flat: &[Vec<DVec2>]) -> Vec<Vec<Piece>> {
     let sides = Sides::new(solid);
     let mut grown: Vec<Vec<Piece>> =
         (0..tries(flat.len())).map(|n| grow_all(flat, &sides, n, |_, _| true)).collect();
@@ -117,7 +123,7 @@ fn grown(solid: &Polyhedron, flat: &[[DVec2; 3]]) -> Vec<Vec<Piece>> {
 /// A last resort: nets of pieces of at most `most` faces.
 pub fn in_small_pieces(
     solid: &Polyhedron,
-    flat: &[[DVec2; 3]],
+    flat: &[Vec<DVec2>],
     most: usize,
 ) -> impl Iterator<Item = Vec<Piece>> {
     let sides = Sides::new(solid);
@@ -127,14 +133,14 @@ pub fn in_small_pieces(
 
 /// Nets of pieces whose corners `fit`, with room for a tab along every side that is cut.
 pub fn in_pieces_that_fit(
-    flat: &[[DVec2; 3]],
+    flat: &[Vec<DVec2>],
     sides: &Sides,
     seed: u64,
     fit: impl Fn(&[DVec2]) -> bool,
 ) -> Vec<Piece> {
     grow_all(flat, sides, seed, |piece, face| {
-        let corners = || piece.iter().chain([face]).flat_map(|face| face.corners);
-        leaves_gaps(piece, face) && fit(&corners().collect::<Vec<_>>())
+        let corners = piece.iter().chain([face]).flat_map(|face| face.corners.iter().copied());
+        leaves_gaps(piece, face) && fit(&corners.collect::<Vec<_>>())
     })
 }
 
@@ -142,18 +148,19 @@ pub fn in_pieces_that_fit(
 /// a vertex.
 fn leaves_gaps(piece: &[FlatFace], face: &FlatFace) -> bool {
     // Directions at a corner: to the next corner, and to the one before; the face lies to the left of the first.
-    let sector = |corners: &[DVec2; 3], n: usize| {
-        [1, 2].map(|way| (corners[(n + way) % 3] - corners[n]).to_angle())
+    let sector = |corners: &[DVec2], n: usize| {
+        let count = corners.len();
+        [1, count - 1].map(|way| (corners[(n + way) % count] - corners[n]).to_angle())
     };
     let own_side = face.hinge.map(|(_, own)| own.side);
-    (0..3).all(|n| {
+    let count = face.corners.len();
+    (0..count).all(|n| {
         let [first, last] = sector(&face.corners, n);
         // The sides that lie along these directions.
-        let [on_first, on_last] = [n, (n + 2) % 3].map(|side| own_side == Some(side));
+        let [on_first, on_last] = [n, (n + count - 1) % count].map(|side| own_side == Some(side));
         piece.iter().all(|other| {
-            let Some(at) =
-                (0..3).find(|&m| other.corners[m].distance(face.corners[n]) < TOUCHING_MM)
-            else {
+            let meets = |corner: &DVec2| corner.distance(face.corners[n]) < TOUCHING_MM;
+            let Some(at) = other.corners.iter().position(meets) else {
                 return true;
             };
             let [from, to] = sector(&other.corners, at);
@@ -195,18 +202,22 @@ fn usual_hinges(shape: &SolidShape) -> Vec<(usize, Vec<(usize, usize)>)> {
             let teeth = (0..5).flat_map(|k| [(5 + k, k), (10 + k, 15 + k)]);
             vec![(10, belt.chain(teeth).collect())]
         }
+        // A cross: a belt of four, and the ends above and below the second of it.
+        SolidShape::Cube | SolidShape::Cuboid(_) => {
+            vec![(1, vec![(1, 0), (1, 2), (2, 3), (1, 4), (1, 5)])]
+        }
         SolidShape::Mesh(_) => Vec::new(),
     }
 }
 
 /// Lays the faces out as the pairs of parent and child say; `None` where two overlap.
 fn hang(
-    flat: &[[DVec2; 3]],
+    flat: &[Vec<DVec2>],
     sides: &Sides,
     root: usize,
     hinges: &[(usize, usize)],
 ) -> Option<Piece> {
-    let mut piece = vec![FlatFace { face: root, corners: flat[root], hinge: None }];
+    let mut piece = vec![FlatFace { face: root, corners: flat[root].clone(), hinge: None }];
     let mut left = hinges.to_vec();
     while !left.is_empty() {
         let before = left.len();
@@ -215,11 +226,9 @@ fn hang(
                 left.push((parent, child));
                 continue;
             };
-            let joins = |side: &usize| {
-                let side = Side { face: parent, side: *side };
-                sides.partner(side).is_some_and(|partner| partner.face == child)
-            };
-            let side = Side { face: parent, side: (0..3).find(joins)? };
+            let joins =
+                |side: &Side| sides.partner(*side).is_some_and(|partner| partner.face == child);
+            let side = sides.of(parent).find(joins)?;
             let face = beside(flat, on, side, sides.partner(side)?);
             if !is_free(&piece, &face.corners) {
                 return None;
@@ -234,19 +243,20 @@ fn hang(
 }
 
 /// A face laid beside another, across a side of it.
-fn beside(flat: &[[DVec2; 3]], on: &FlatFace, side: Side, own: Side) -> FlatFace {
-    let outline = flat[own.face];
+fn beside(flat: &[Vec<DVec2>], on: &FlatFace, side: Side, own: Side) -> FlatFace {
+    let outline = &flat[own.face];
+    let next = (own.side + 1) % outline.len();
     let [p, q] = on.ends(side.side);
-    let motion = Motion::carrying([outline[own.side], outline[(own.side + 1) % 3]], [q, p]);
-    let mut corners = outline.map(|corner| motion.apply(corner));
+    let motion = Motion::carrying([outline[own.side], outline[next]], [q, p]);
+    let mut corners: Vec<DVec2> = outline.iter().map(|&corner| motion.apply(corner)).collect();
     // The shared ends are the same numbers, not only the same to rounding.
     corners[own.side] = q;
-    corners[(own.side + 1) % 3] = p;
+    corners[next] = p;
     FlatFace { face: own.face, corners, hinge: Some((side, own)) }
 }
 
-/// Whether a triangle overlaps none of a piece.
-fn is_free(piece: &[FlatFace], corners: &[DVec2; 3]) -> bool {
+/// Whether a face overlaps none of a piece.
+fn is_free(piece: &[FlatFace], corners: &[DVec2]) -> bool {
     let [x0, y0, x1, y1] = bounds(corners);
     piece.iter().all(|face| {
         let [left, lower, right, upper] = bounds(&face.corners);
@@ -260,7 +270,7 @@ fn is_free(piece: &[FlatFace], corners: &[DVec2; 3]) -> bool {
 
 /// Grows pieces until every face is in one; a piece takes a face that it `may`.
 fn grow_all(
-    flat: &[[DVec2; 3]],
+    flat: &[Vec<DVec2>],
     sides: &Sides,
     seed: u64,
     may: impl Fn(&[FlatFace], &FlatFace) -> bool,
@@ -280,17 +290,17 @@ fn grow_all(
 
 /// Grows one piece; `placed` tells the faces that are taken.
 fn grow(
-    flat: &[[DVec2; 3]],
+    flat: &[Vec<DVec2>],
     sides: &Sides,
     (root, round): (usize, bool),
     may: &impl Fn(&[FlatFace], &FlatFace) -> bool,
     placed: &mut [bool],
     random: &mut ChaCha8Rng,
 ) -> Piece {
-    let centre = flat[root].iter().sum::<DVec2>() / 3.0;
+    let centre = flat[root].iter().sum::<DVec2>() / flat[root].len() as f64;
     placed[root] = true;
-    let mut piece = vec![FlatFace { face: root, corners: flat[root], hinge: None }];
-    let mut open: Vec<(usize, usize)> = (0..3).map(|side| (0, side)).collect();
+    let mut piece = vec![FlatFace { face: root, corners: flat[root].clone(), hinge: None }];
+    let mut open: Vec<(usize, usize)> = (0..flat[root].len()).map(|side| (0, side)).collect();
     while !open.is_empty() {
         let distance = |&(at, side): &(usize, usize)| {
             let [p, q] = piece[at].ends(side);
@@ -309,7 +319,8 @@ fn grow(
         let face = beside(flat, &piece[at], side, own);
         if may(&piece, &face) && is_free(&piece, &face.corners) {
             placed[own.face] = true;
-            open.extend((0..3).filter(|&s| s != own.side).map(|s| (piece.len(), s)));
+            let others = (0..face.corners.len()).filter(|&s| s != own.side);
+            open.extend(others.map(|s| (piece.len(), s)));
             piece.push(face);
         }
     }
@@ -329,6 +340,8 @@ mod tests {
         let mut solid = match shape {
             SolidShape::Tetrahedron => Polyhedron::tetrahedron(100.0),
             SolidShape::Octahedron => Polyhedron::octahedron(100.0),
+            SolidShape::Cube => Polyhedron::cuboid(DVec3::splat(100.0)),
+            SolidShape::Cuboid(sides) => Polyhedron::cuboid(*sides * 60.0),
             _ => Polyhedron::icosahedron(100.0),
         };
         for (vertex, by) in solid.vertices_mm.iter_mut().zip(moves) {
@@ -337,7 +350,7 @@ mod tests {
         solid
     }
 
-    fn outlines(solid: &Polyhedron) -> Vec<[DVec2; 3]> {
+    fn outlines(solid: &Polyhedron) -> Vec<Vec<DVec2>> {
         let outline = |face| solid.face(face, 6, 1.0).unwrap().outline_mm;
         (0..solid.faces.len()).map(outline).collect()
     }
@@ -355,14 +368,13 @@ mod tests {
         for (piece, tabs) in pieces.iter().zip(&tabs) {
             prop_assert_eq!(piece.iter().filter(|face| face.hinge.is_none()).count(), 1);
             for face in piece {
-                let space = solid.triangle_mm(face.face);
-                for side in 0..3 {
+                let space = solid.corners_mm(face.face);
+                for side in 0..space.len() {
                     let [p, q] = face.ends(side);
-                    let length = space[side].distance(space[(side + 1) % 3]);
+                    let length = space[side].distance(space[(side + 1) % space.len()]);
                     prop_assert!((p.distance(q) - length).abs() < 1e-9);
                 }
-                let [a, b, c] = face.corners;
-                prop_assert!((b - a).perp_dot(c - a) > 0.0);
+                prop_assert!(crate::polygon::area(&face.corners) > 0.0);
                 if let Some((on, own)) = face.hinge {
                     let on_face = piece.iter().find(|other| other.face == on.face).unwrap();
                     let [p, q] = on_face.ends(on.side);
@@ -419,9 +431,10 @@ mod tests {
             let edge = [a.min(b), a.max(b)];
             core.vertices_mm.len() + edges.iter().position(|e| *e == edge).unwrap()
         };
-        let faces = core.faces.iter().flat_map(|&[a, b, c]| {
+        let faces = core.faces.iter().flat_map(|face| {
+            let [a, b, c] = face[..] else { panic!("a triangle") };
             let (ab, bc, ca) = (middle(a, b), middle(b, c), middle(c, a));
-            [[a, ab, ca], [ab, b, bc], [ca, bc, c], [ab, bc, ca]]
+            [[a, ab, ca], [ab, b, bc], [ca, bc, c], [ab, bc, ca]].map(Vec::from)
         });
         Polyhedron { vertices_mm, faces: faces.collect() }
     }
@@ -437,7 +450,9 @@ mod tests {
 
     #[test]
     fn regular_solids_have_their_usual_nets_in_one_piece() {
-        for shape in [SolidShape::Tetrahedron, SolidShape::Octahedron, SolidShape::Icosahedron] {
+        use SolidShape::{Cube, Cuboid, Icosahedron, Octahedron, Tetrahedron};
+        let box_of = Cuboid(DVec3::new(2.0, 1.6, 1.2));
+        for shape in [Tetrahedron, Octahedron, Icosahedron, Cube, box_of] {
             let solid = dented(&shape, &[]);
             let flat = outlines(&solid);
             for net in usual(&solid, &shape, &flat).iter().chain(&grown(&solid, &flat)) {

@@ -95,7 +95,7 @@ fn read_in(text: &str, name: &str, units: &[Units]) -> Result<Target, DscError> 
 /// The family by its name in this crate, with its fingerprint where the crate has its codes.
 fn family_ref(name: &str, blocks: &[Block]) -> Result<FamilyRef, DscError> {
     let Ok(family) = Family::shipped(name) else {
-        return Ok(FamilyRef { name: name.to_owned(), fingerprint: String::new() });
+        return Ok(FamilyRef { name: name.to_owned(), fingerprint: String::new(), squares: None });
     };
     for block in blocks {
         for corner in &block.corners {
@@ -105,7 +105,7 @@ fn family_ref(name: &str, blocks: &[Block]) -> Result<FamilyRef, DscError> {
             }
         }
     }
-    Ok(FamilyRef { name: name.to_owned(), fingerprint: family.fingerprint().to_owned() })
+    Ok(FamilyRef { name: name.to_owned(), ..FamilyRef::of(&family) })
 }
 
 /// A line of the file.

@@ -18,6 +18,9 @@ pub fn write(target: &Target, dialect: Dialect) -> Result<String, DscError> {
         name: target.name.to_string(),
         reason: reason.to_owned(),
     };
+    if target.tilings().count() > 1 {
+        return Err(refused("its tags are of two families, and the format has one"));
+    }
     let name = target.family.as_ref().map(|family| family.name.as_str());
     let name = name.ok_or_else(|| refused("the format needs tags, and the board has none"))?;
     let known = FAMILIES.iter().find(|&known| {
