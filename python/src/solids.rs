@@ -3,11 +3,11 @@
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use deltille::export::obj;
+use deltille::export::solid_mesh;
 use deltille::family::Family;
 use deltille::limits::Limits;
 use deltille::targets::{
-    self, ClosedMesh, NEAR_EQUILATERAL, PaperSpec, SkeletonSpec, SolidShape, SolidSheets,
+    self, ClosedMesh, NEAR_EQUILATERAL, Name, PaperSpec, SkeletonSpec, SolidShape, SolidSheets,
     SolidSpec, TagSpec, TagsIn, TargetSpec,
 };
 use pyo3::prelude::*;
@@ -238,7 +238,7 @@ impl Solid {
         margin_mm: Option<f64>,
         name: Option<String>,
     ) -> PyResult<PyClassInitializer<Self>> {
-        let stem = mesh.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+        let stem = Name::like(&mesh.file_stem().unwrap_or_default().to_string_lossy()).to_string();
         let sizes = [panel_thickness_mm, wall_mm, rib_mm];
         let solids = Solids {
             shape: SolidShape::Mesh(read_mesh(&mesh, scale, allow_skew)?),
@@ -258,7 +258,7 @@ impl Solid {
 fn read_mesh(path: &Path, scale: f64, allow_skew: bool) -> PyResult<ClosedMesh> {
     let text = Limits::default().read(path).raise_of_file(path, errors::file)?;
     let wrong = |what: String| raised::TargetError::new_err(format!("{}: {what}", path.display()));
-    let (mesh, _) = obj::read(&text).map_err(|error| wrong(errors::told(&error)))?;
+    let (mesh, _) = solid_mesh::read(&text).map_err(|error| wrong(errors::told(&error)))?;
     let (face, deviation) = mesh.most_skewed();
     if deviation > NEAR_EQUILATERAL && !allow_skew {
         return Err(wrong(format!(

@@ -15,12 +15,12 @@ use crate::cli::output::say;
 use crate::cli::values::{number, whole};
 use crate::export::artifacts::{self, Making, What};
 use crate::export::dsc::{self, Dialect};
-use crate::export::obj;
+use crate::export::solid_mesh;
 use crate::family::{self, Family, places};
 use crate::quantity::unit_mm;
 use crate::targets::{
-    BORDER_BITS, ClosedMesh, DEFAULT_MARGIN_MM, FACE_TILES, MOST_ROWS, NEAR_EQUILATERAL, PaperSpec,
-    Skeleton, SkeletonSpec, SolidShape, SolidSheets, SolidSpec, TagSpec, TagsIn, Target,
+    BORDER_BITS, ClosedMesh, DEFAULT_MARGIN_MM, FACE_TILES, MOST_ROWS, NEAR_EQUILATERAL, Name,
+    PaperSpec, Skeleton, SkeletonSpec, SolidShape, SolidSheets, SolidSpec, TagSpec, TagsIn, Target,
     TargetSpec, parse_box_mm, parse_length_mm, tag_range,
 };
 
@@ -155,9 +155,9 @@ pub fn run_cuboid(cuboid: CuboidArgs) -> anyhow::Result<ExitCode> {
 /// Arguments of `deltille solid`.
 #[derive(clap::Args)]
 pub struct MeshArgs {
-    /// A closed mesh as OBJ, in millimetres, whose faces are flat and convex; a board is put on each: deltille
+    /// A closed mesh as OBJ, STL or PLY, in millimetres, whose faces are flat and convex; a board is put on each: deltille
     /// tiles on triangles, a checkerboard on rectangles, as many deltille tiles as find room on others
-    #[arg(long, value_name = "FILE.obj")]
+    #[arg(long, value_name = "FILE")]
     mesh: PathBuf,
     /// Family of the square tags, where the mesh has rectangular faces and others [default:
     /// aprilTag36h11]
@@ -182,7 +182,7 @@ pub fn run_mesh(mut mesh: MeshArgs) -> anyhow::Result<ExitCode> {
     let (path, scale) = (&mesh.mesh, mesh.scale.unwrap_or(1.0));
     let show = || format!("--mesh: {}", path.display());
     let text = mesh.args.delivery.limits().read(path).context("--mesh")?;
-    let (solid, inside_out) = obj::read(&text).with_context(show)?;
+    let (solid, inside_out) = solid_mesh::read(&text).with_context(show)?;
     let (face, deviation) = solid.most_skewed();
     if deviation > NEAR_EQUILATERAL && !mesh.allow_skew {
         bail!(
@@ -197,8 +197,8 @@ pub fn run_mesh(mut mesh: MeshArgs) -> anyhow::Result<ExitCode> {
     if inside_out {
         say!("{}: its faces look inwards; they were turned", path.display());
     }
-    let stem = || path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
-    let name = mesh.args.name.clone().unwrap_or_else(stem);
+    let stem = path.file_stem().unwrap_or_default().to_string_lossy();
+    let name = mesh.args.name.clone().unwrap_or_else(|| Name::like(&stem).to_string());
     if mesh.args.meshes.has_obj() && mesh.args.delivery.would_replace(&format!("{name}.obj"), path)
     {
         bail!("--name: {name}.obj would be written over the mesh: give another name or folder");

@@ -1,6 +1,6 @@
 //! Solids given as lists of faces: what makes them solids, and how far their triangles are from regular.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::f64::consts::TAU;
 use std::fmt;
 
@@ -185,6 +185,70 @@ impl ClosedMesh {
         }
         mesh.check_self()?;
         Ok((mesh, volume < 0.0))
+    }
+
+    /// The same with neighbouring faces that lie in one plane as one, where that is convex: files of triangles have squares
+    /// in two halves. Vertices within straight edges are left out.
+    ///
+    /// # Errors
+    /// Where the larger faces are not one closed surface.
+    pub fn with_whole_faces(&self) -> Result<Self, ClosedMeshError> {
+        let mut group: Vec<usize> = (0..self.faces.len()).collect();
+        let normals: Vec<DVec3> =
+            (0..group.len()).map(|face| normal(&self.corners(face)).normalize_or_zero()).collect();
+        for faces in self.faces_at_edges().values() {
+            let [(a, _), (b, _)] = faces[..] else { continue };
+            if normals[a].cross(normals[b]).length() < LEAST_TURN
+                && normals[a].dot(normals[b]) > 0.0
+                && group[a] != group[b]
+            {
+                let (kept, taken) = (group[a], group[b]);
+                group.iter_mut().filter(|of| **of == taken).for_each(|of| *of = kept);
+            }
+        }
+        let mut members = BTreeMap::<usize, Vec<usize>>::new();
+        group.iter().enumerate().for_each(|(face, &of)| members.entry(of).or_default().push(face));
+        let outlines = members.values().flat_map(|members| match self.outline_of(members) {
+            Some(outline) => vec![outline],
+            None => members.iter().map(|&face| self.faces[face].clone()).collect(),
+        });
+        let outlines: Vec<Vec<usize>> = outlines.collect();
+        // A vertex goes only where no face has a corner there.
+        let is_straight = |face: &[usize], i: usize| {
+            let at = |i: usize| self.vertices[face[i % face.len()]];
+            let before = (at(i) - at(i + face.len() - 1)).normalize_or_zero();
+            before.cross((at(i + 1) - at(i)).normalize_or_zero()).length() < LEAST_TURN
+        };
+        let mut is_corner = vec![false; self.vertices.len()];
+        for face in &outlines {
+            (0..face.len())
+                .filter(|&i| !is_straight(face, i))
+                .for_each(|i| is_corner[face[i]] = true);
+        }
+        let corners = |face: &Vec<usize>| face.iter().copied().filter(|&v| is_corner[v]).collect();
+        let faces: Vec<Vec<usize>> = outlines.iter().map(corners).collect();
+        Self::new(&self.vertices, &faces).map(|(mesh, _)| mesh)
+    }
+
+    /// The outline of faces in one plane that hang together, if it is one and convex.
+    fn outline_of(&self, faces: &[usize]) -> Option<Vec<usize>> {
+        let edges: BTreeSet<(usize, usize)> =
+            faces.iter().flat_map(|&face| sides(&self.faces[face])).collect();
+        let rim = edges.iter().filter(|&&(from, to)| !edges.contains(&(to, from)));
+        let next: BTreeMap<usize, usize> = rim.clone().copied().collect();
+        let (&first, _) = next.first_key_value()?;
+        let outline: Vec<usize> = std::iter::successors(Some(first), |at| {
+            next.get(at).copied().filter(|&to| to != first)
+        })
+        .take(next.len() + 1)
+        .collect();
+        let whole = outline.len() == next.len() && next.len() == rim.count();
+        let turns = |i: usize| {
+            let at = |i: usize| self.vertices[outline[i % outline.len()]];
+            let side = |i: usize| (at(i + 1) - at(i)).normalize_or_zero();
+            side(i).cross(side(i + 1)).dot(normal(&self.corners(faces[0])).normalize_or_zero())
+        };
+        (whole && (0..outline.len()).all(|i| turns(i) > -LEAST_TURN)).then_some(outline)
     }
 
     /// The vertices, in the unit of the list.

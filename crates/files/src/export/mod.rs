@@ -39,6 +39,8 @@ pub mod rig;
 pub mod saved;
 #[cfg(feature = "meshes")]
 pub mod scene;
+#[cfg(feature = "meshes")]
+pub mod solid_mesh;
 pub mod staging;
 pub mod stl;
 #[cfg(feature = "print")]
