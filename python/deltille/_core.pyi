@@ -158,6 +158,7 @@ class Board(Target):
         orientation: Orientation = "auto",
         margin_mm: float | None = None,
         poster: bool = False,
+        packed: bool = False,
         name: str = "board",
     ) -> Board: ...
 
@@ -181,6 +182,7 @@ class Checkerboard(Target):
         orientation: Orientation = "auto",
         margin_mm: float | None = None,
         poster: bool = False,
+        packed: bool = False,
         name: str = "checkerboard",
     ) -> Checkerboard: ...
 

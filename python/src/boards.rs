@@ -134,6 +134,8 @@ pub fn spacing_of(tag_spacing: Option<i64>) -> PyResult<Option<u32>> {
 ///     Blank along the edges of the paper, mm.
 /// poster : bool, optional
 ///     Whether a board that is larger than the paper is printed over several pages, to be joined.
+/// packed : bool, optional
+///     Whether as many boards as fit are printed on each sheet, to be cut apart.
 /// name : str, optional
 ///     Stem of the names of its files, printed on the sheet.
 ///
@@ -156,7 +158,7 @@ impl Board {
     #[new]
     #[pyo3(signature = (rows, cols, *, edge_mm = None, family = None, tags = true, tag_spacing = None,
         tag_border = None, first_id = 0, boards = 1, board_id = 0, inverted = false, paper = None,
-        orientation = "auto", margin_mm = None, poster = false, name = "board"))]
+        orientation = "auto", margin_mm = None, poster = false, packed = false, name = "board"))]
     #[expect(clippy::too_many_arguments, reason = "keywords")]
     fn new(
         rows: i64,
@@ -174,10 +176,11 @@ impl Board {
         orientation: &str,
         margin_mm: Option<f64>,
         poster: bool,
+        packed: bool,
         name: &str,
     ) -> PyResult<PyClassInitializer<Self>> {
         let paper = self::paper(paper, orientation, margin_mm, SolidSheets::default())?;
-        let paper = PaperSpec { poster, ..paper };
+        let paper = PaperSpec { poster, packed, ..paper };
         let spacing = spacing_of(tag_spacing)?;
         let first_id = whole("first_id", first_id, errors::target)?;
         let of_tags =
@@ -209,7 +212,7 @@ impl Board {
 ///     ``"aprilTag36h11"``, ``"aprilTag25h9"`` or ``"aprilTag16h5"``; no tags if left out.
 /// tags_in : str, optional
 ///     Squares that carry the tags, ``"black"`` or ``"white"``.
-/// tag_spacing, tag_border, first_id, boards, board_id, inverted, paper, orientation, margin_mm, poster, name
+/// tag_spacing, tag_border, first_id, boards, board_id, inverted, paper, orientation, margin_mm, poster, packed, name
 ///     As of :class:`Board`.
 #[pyclass(frozen, extends = Target, module = "deltille")]
 pub struct Checkerboard;
@@ -219,7 +222,7 @@ impl Checkerboard {
     #[new]
     #[pyo3(signature = (rows, cols, *, edge_mm = None, family = None, tags_in = "black", tag_spacing = None,
         tag_border = None, first_id = 0, boards = 1, board_id = 0, inverted = false, paper = None,
-        orientation = "auto", margin_mm = None, poster = false, name = "checkerboard"))]
+        orientation = "auto", margin_mm = None, poster = false, packed = false, name = "checkerboard"))]
     #[expect(clippy::too_many_arguments, reason = "keywords")]
     fn new(
         rows: i64,
@@ -237,6 +240,7 @@ impl Checkerboard {
         orientation: &str,
         margin_mm: Option<f64>,
         poster: bool,
+        packed: bool,
         name: &str,
     ) -> PyResult<PyClassInitializer<Self>> {
         let tags_in = match tags_in {
@@ -264,6 +268,7 @@ impl Checkerboard {
             name: name.to_owned(),
             paper: PaperSpec {
                 poster,
+                packed,
                 ..self::paper(paper, orientation, margin_mm, SolidSheets::default())?
             },
         };

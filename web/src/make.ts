@@ -133,7 +133,7 @@ export function make(): HTMLElement {
         number(text.boardId, "board_id", 0, MOST_IDS),
         ...(ofSolid
           ? [number(text.faceMargin, "face_margin_mm", 0, 1000, text.usual), box(text.skeleton, "skeleton"), box(text.perFace, "per_face"), box(text.allowSeams, "allow_seams")]
-          : [number(text.boards, "boards", 1, 500), box(text.inverted, "inverted"), box(text.poster, "poster")]),
+          : [number(text.boards, "boards", 1, 500), box(text.inverted, "inverted"), box(text.poster, "poster"), box(text.packed, "packed")]),
       ),
     );
     downloads.replaceChildren(

@@ -18,6 +18,7 @@ export type Settings = {
   per_face: boolean;
   allow_seams: boolean;
   poster: boolean;
+  packed: boolean;
   paper: string | null;
   orientation: string;
   margin_mm: number | null;
@@ -45,6 +46,7 @@ export const usual: Settings = {
   per_face: false,
   allow_seams: false,
   poster: false,
+  packed: false,
   paper: null,
   orientation: "auto",
   margin_mm: null,
@@ -52,7 +54,7 @@ export const usual: Settings = {
   mesh: null,
 };
 
-const OF_BOARDS = ["rows", "cols", "tags_in", "boards", "inverted", "poster"] as const;
+const OF_BOARDS = ["rows", "cols", "tags_in", "boards", "inverted", "poster", "packed"] as const;
 const OF_SOLIDS = ["tiles", "face_margin_mm", "skeleton", "per_face", "allow_seams"] as const;
 /** What some settings can be. */
 const CHOICES: Record<string, string[]> = {
@@ -129,6 +131,7 @@ const KEYS: [string, keyof Settings][] = [
   ["boards", "boards"],
   ["invert", "inverted"],
   ["poster", "poster"],
+  ["pack", "packed"],
   ["paper", "paper"],
   ["orientation", "orientation"],
   ["margin", "margin_mm"],

@@ -51,6 +51,7 @@ export const words = {
     perFace: "A sheet for each face",
     allowSeams: "A net larger than the paper in one piece, over pages to be joined",
     poster: "Over several pages where it is larger than the paper",
+    packed: "Several boards on a sheet, to be cut apart",
     name: "Name",
     more: "More settings",
     preview: "The sheet, in true proportions",

@@ -85,7 +85,7 @@ pub struct Settings {
     /// Id of the first board [default: 0]
     #[arg(long, value_name = "ID", allow_negative_numbers = true, value_parser = whole(0..=u32::MAX))]
     board_id: Option<u32>,
-    /// Number of boards, alike but for their ids, each on its own sheet [default: 1]
+    /// Number of boards, alike but for their ids, each on its own sheet, or with --pack several on one [default: 1]
     #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = whole(1..=MOST_ROWS))]
     boards: Option<u32>,
     /// White tiles on black: black and white exchanged
@@ -100,6 +100,10 @@ pub struct Settings {
     #[arg(long, help_heading = PAPER)]
     #[serde(skip_serializing_if = "is_false")]
     poster: bool,
+    /// As many boards on each sheet as fit, to be cut apart, each with a label of its own
+    #[arg(long, help_heading = PAPER, conflicts_with = "poster")]
+    #[serde(skip_serializing_if = "is_false")]
+    pack: bool,
     /// auto, portrait or landscape [default: auto]
     #[arg(long, help_heading = PAPER)]
     orientation: Option<String>,
@@ -224,7 +228,8 @@ impl Settings {
             boards: self.boards.or(template.boards),
             invert: self.invert || template.invert,
             paper: self.paper.or(template.paper),
-            poster: self.poster || template.poster,
+            poster: self.poster || (template.poster && !self.pack),
+            pack: self.pack || (template.pack && !self.poster),
             orientation: self.orientation.or(template.orientation),
             margin: self.margin.or(template.margin),
             pdf: self.pdf || (template.pdf && !formats),
@@ -260,6 +265,7 @@ impl Settings {
             },
             margin_mm: length("margin", &self.margin)?.unwrap_or(DEFAULT_MARGIN_MM),
             poster: self.poster,
+            packed: self.pack,
             ..PaperSpec::default()
         };
         if grid == GridKind::Deltille && self.tags_in.is_some() {

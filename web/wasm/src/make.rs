@@ -39,6 +39,7 @@ struct Wanted {
     per_face: bool,
     allow_seams: bool,
     poster: bool,
+    packed: bool,
     /// The text of an OBJ file.
     mesh: Option<String>,
     paper: Option<String>,
@@ -68,6 +69,7 @@ impl Default for Wanted {
             per_face: false,
             allow_seams: false,
             poster: false,
+            packed: false,
             mesh: None,
             paper: None,
             orientation: "auto".to_owned(),
@@ -98,6 +100,7 @@ impl Wanted {
                 (false, false) => SolidSheets::Net,
             },
             poster: self.poster,
+            packed: self.packed,
         })
     }
 

@@ -7,7 +7,8 @@ use super::paper::{PaperSpec, SolidSheets};
 use super::poster::Poster;
 use super::{
     BoardSpec, FamilyRef, LineKind, Name, Panel, Placement, SheetLayout, SheetLine, Target,
-    TargetError, TargetSpec, aprilgrid, board, charuco, circles, face_sheet, net, solid, tag_sheet,
+    TargetError, TargetSpec, aprilgrid, board, charuco, circles, face_sheet, net, packed, solid,
+    tag_sheet,
 };
 use crate::family::{Family, FamilyError};
 
@@ -153,8 +154,14 @@ fn board_parts(
     layout: Option<&PaperSpec>,
 ) -> Result<Parts, TargetError> {
     board.check()?;
-    let arrangement = layout.map(|paper| (arrange(board, paper), paper));
+    let packed = layout.filter(|paper| paper.packed);
+    let arrangement =
+        layout.filter(|_| packed.is_none()).map(|paper| (arrange(board, paper), paper));
     let (panels, family) = board::panels(board, family)?;
+    if let Some(paper) = packed {
+        let sheets = packed::sheets(name, board, &panels, family.as_ref(), paper)?;
+        return Ok((panels, family, sheets));
+    }
     let words = |panel: &Panel| label(name, board, panel, family.as_ref());
     let sheets = match arrangement {
         None => Vec::new(),

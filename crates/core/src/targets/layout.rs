@@ -64,7 +64,7 @@ pub(super) struct Footprint {
 }
 
 impl Footprint {
-    fn new(spec: &BoardSpec, margin_mm: f64) -> Self {
+    pub fn new(spec: &BoardSpec, margin_mm: f64) -> Self {
         let DVec2 { x: width, y: height } = board::size_mm(spec);
         let quiet = Panel::quiet_zone_at_mm(spec.edge_mm);
         if spec.inverted {
@@ -120,7 +120,17 @@ impl Marks {
 /// orientation of the board's longer side, the board not turned, the label below.
 pub(super) fn arrange(spec: &BoardSpec, paper: &PaperSpec) -> Result<Arrangement, TargetError> {
     let fitting = |spec: &BoardSpec| fit(&Footprint::new(spec, paper.margin_mm), paper);
-    fitting(spec)?.ok_or_else(|| TargetError::DoesNotFit {
+    let fits = |smaller: &BoardSpec| fitting(smaller).is_ok_and(|found| found.is_some());
+    fitting(spec)?.ok_or_else(|| does_not_fit(spec, paper, fits))
+}
+
+/// What is said of a board that finds no room on paper, with the largest edge that `fits`.
+pub(super) fn does_not_fit(
+    spec: &BoardSpec,
+    paper: &PaperSpec,
+    fits: impl Fn(&BoardSpec) -> bool,
+) -> TargetError {
+    TargetError::DoesNotFit {
         rows: spec.rows,
         cols: spec.cols,
         edge: format_mm(spec.edge_mm),
@@ -130,11 +140,10 @@ pub(super) fn arrange(spec: &BoardSpec, paper: &PaperSpec) -> Result<Arrangement
             (Some(size), Orientation::Portrait) => format!("{size} portrait"),
             (Some(size), Orientation::Landscape) => format!("{size} landscape"),
         },
-        fitting_edge_mm: (LEAST_PROPOSED_MM..=spec.edge_mm.ceil() as u32).rev().find(|&mm| {
-            let smaller = BoardSpec { edge_mm: f64::from(mm), ..spec.clone() };
-            fitting(&smaller).is_ok_and(|found| found.is_some())
-        }),
-    })
+        fitting_edge_mm: (LEAST_PROPOSED_MM..=spec.edge_mm.ceil() as u32)
+            .rev()
+            .find(|&mm| fits(&BoardSpec { edge_mm: f64::from(mm), ..spec.clone() })),
+    }
 }
 
 /// Fits a footprint on paper; `None` where it does not fit.
@@ -375,15 +384,7 @@ pub(super) fn label(
     panel: &Panel,
     family: Option<&FamilyRef>,
 ) -> String {
-    let corners = format!("{} × {} corners", spec.rows, spec.cols);
-    let mut parts = vec![
-        name.to_owned(),
-        match spec.grid {
-            GridKind::Deltille => corners,
-            GridKind::Checker => format!("checkerboard {corners}"),
-        },
-        format!("edge {}", format_mm(spec.edge_mm)),
-    ];
+    let mut parts = size_in_words(name, spec);
     if let (Some(family), [first, .., last] | [first @ last]) = (family, panel.tags.as_slice()) {
         parts.push(tag_range(&family.name, first.id, last.id));
         parts.push(format!("fingerprint {}", family.fingerprint));
@@ -394,6 +395,28 @@ pub(super) fn label(
     parts.push(format!("board {}", panel.id));
     parts.push(format!("deltille {}", env!("CARGO_PKG_VERSION")));
     parts.join(" · ")
+}
+
+/// The label of a board among others on a sheet: what tells it from them.
+pub(super) fn label_of_one(spec: &BoardSpec, panel: &Panel, family: Option<&FamilyRef>) -> String {
+    let mut parts = size_in_words(&format!("board {}", panel.id), spec);
+    if let (Some(family), [first, .., last] | [first @ last]) = (family, panel.tags.as_slice()) {
+        parts.push(tag_range(&family.name, first.id, last.id));
+    }
+    parts.join(" · ")
+}
+
+/// What is called so, its corners and its edge.
+fn size_in_words(name: &str, spec: &BoardSpec) -> Vec<String> {
+    let corners = format!("{} × {} corners", spec.rows, spec.cols);
+    vec![
+        name.to_owned(),
+        match spec.grid {
+            GridKind::Deltille => corners,
+            GridKind::Checker => format!("checkerboard {corners}"),
+        },
+        format!("edge {}", format_mm(spec.edge_mm)),
+    ]
 }
 
 /// Tags in words: `d25h7 id 3`, `d25h7 ids 3–7`; place codes, whose ids are those of places, by their family alone.

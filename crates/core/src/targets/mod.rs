@@ -23,6 +23,7 @@ mod label;
 mod layout;
 mod length;
 mod net;
+mod packed;
 mod panel;
 mod paper;
 mod polyhedron;

@@ -40,6 +40,8 @@ pub struct PaperSpec {
     pub solids: SolidSheets,
     /// Whether a board that is larger than the paper is printed over several pages.
     pub poster: bool,
+    /// Whether as many boards as fit are printed on a sheet, to be cut apart, instead of one on each.
+    pub packed: bool,
 }
 
 /// How the faces of a solid are printed.
@@ -74,6 +76,7 @@ impl Default for PaperSpec {
             margin_mm: DEFAULT_MARGIN_MM,
             solids: SolidSheets::default(),
             poster: false,
+            packed: false,
         }
     }
 }

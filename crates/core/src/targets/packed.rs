@@ -1,0 +1,159 @@
+//! Several boards on one sheet, to be cut apart.
+//!
+//! ```text
+//!   ┌──────────────┬──────────────┐   in rows from the upper left, as many as fit; around each its quiet zone, below it
+//!   │ ▲▲▲▲▲▲▲▲▲▲▲  │ ▲▲▲▲▲▲▲▲▲▲▲  │   a label of its own, which stays with it; along the lower and the right margin
+//!   │ ▲▲▲▲▲▲▲▲▲▲▲  │ ▲▲▲▲▲▲▲▲▲▲▲  │   of the sheet the check bars and the label of all
+//!   │ board 0 · …  │ board 1 · …  │
+//!   └──────────────┴──────────────┘
+//! ```
+
+use glam::DVec2;
+
+use super::layout::{Arrangement, Footprint, check_margin, label, label_of_one, on_page};
+use super::paper::{Orientation, PaperSpec};
+use super::{
+    BoardSpec, FamilyRef, Label, LineKind, Panel, Placement, SheetLayout, SheetLine, SheetText,
+    TargetError, layout,
+};
+
+/// Capital height of a board's label, mm.
+const LABEL_CAP_MM: f64 = 2.0;
+/// Blank around that label, mm.
+const LABEL_GAP_MM: f64 = 1.5;
+/// Blank between a quiet zone and the line to cut along, mm.
+const CUT_GAP_MM: f64 = 0.5;
+/// Width of these lines, mm.
+const LINE_MM: f64 = 0.15;
+
+/// Where a board lies in its part of a sheet.
+struct Cell {
+    /// Lower left and upper right end of its ink, in the frame of its panel, mm.
+    ink: [DVec2; 2],
+    /// Blank around that, mm.
+    blank: f64,
+}
+
+impl Cell {
+    fn new(spec: &BoardSpec, panel: &Panel, margin_mm: f64) -> Self {
+        let [left, lower, right, upper] =
+            if panel.inverted { panel.field_mm() } else { panel.bounds_mm() };
+        let ink = [DVec2::new(left, lower), DVec2::new(right, upper)];
+        Self { ink, blank: Footprint::new(spec, margin_mm).mark_blank + CUT_GAP_MM }
+    }
+
+    /// Blank below the board, with its label.
+    fn below(&self) -> f64 {
+        self.blank + LABEL_CAP_MM + 2.0 * LABEL_GAP_MM
+    }
+
+    fn size(&self) -> DVec2 {
+        let [from, to] = self.ink;
+        to - from + DVec2::new(2.0 * self.blank, self.blank + self.below())
+    }
+}
+
+/// Sheets with as many boards on each as fit.
+pub(super) fn sheets(
+    name: &str,
+    spec: &BoardSpec,
+    panels: &[Panel],
+    family: Option<&FamilyRef>,
+    paper: &PaperSpec,
+) -> Result<Vec<SheetLayout>, TargetError> {
+    let Some(first) = panels.first() else { return Ok(Vec::new()) };
+    let cell = Cell::new(spec, first, paper.margin_mm);
+    let (grid @ [columns, rows], arrangement) = arrange(&cell, panels.len(), paper)?
+        .ok_or_else(|| layout::does_not_fit(spec, paper, |spec| fits(spec, paper)))?;
+    let pages: Vec<&[Panel]> = panels.chunks(columns * rows).collect();
+    let count = pages.len();
+    let sheets = pages.into_iter().enumerate().map(|(index, panels)| {
+        let mut words = label(name, spec, &panels[0], family);
+        if let ([first, .., last], true) = (panels, panels.len() > 1) {
+            let one = format!("board {}", first.id);
+            words = words.replace(&one, &format!("boards {}–{}", first.id, last.id));
+        }
+        if count > 1 {
+            words += &format!(" · page {} of {count}", index + 1);
+        }
+        sheet(&cell, grid, &arrangement, (panels, spec, family), words)
+    });
+    Ok(sheets.collect())
+}
+
+/// Whether a board of this kind finds room.
+fn fits(spec: &BoardSpec, paper: &PaperSpec) -> bool {
+    let panels = super::board::untied_panels(&BoardSpec { boards: 1, ..spec.clone() });
+    let cell = panels.first().map(|panel| Cell::new(spec, panel, paper.margin_mm));
+    cell.is_some_and(|cell| arrange(&cell, 1, paper).is_ok_and(|found| found.is_some()))
+}
+
+/// The columns and rows that a page takes, at most as many as there are boards, and where they lie: on the smallest
+/// paper that takes one, the way that takes most.
+fn arrange(
+    cell: &Cell,
+    boards: usize,
+    paper: &PaperSpec,
+) -> Result<Option<([usize; 2], Arrangement)>, TargetError> {
+    let margin = check_margin(paper)?;
+    let on_sheet = |page: DVec2| {
+        let size = cell.size();
+        let most = (page / size).floor();
+        let [columns, rows] = [most.x as usize, most.y as usize];
+        let grids = (1..=columns.min(boards))
+            .flat_map(|c| (1..=rows.min(boards.div_ceil(c))).map(move |r| [c, r]));
+        let fitting = grids.filter_map(|grid @ [c, r]| {
+            let footprint = Footprint {
+                width: size.x * c as f64,
+                height: size.y * r as f64,
+                edge_blank: margin,
+                mark_blank: LABEL_GAP_MM,
+            };
+            Some((grid, on_page(&footprint, page, margin, false)?))
+        });
+        fitting.max_by_key(|([c, r], _)| (c * r, *c))
+    };
+    let on_size = |size: &super::PaperSize| {
+        let pages = match paper.orientation {
+            Orientation::Portrait => vec![size.portrait_mm()],
+            Orientation::Landscape => vec![size.landscape_mm()],
+            Orientation::Auto => vec![size.portrait_mm(), size.landscape_mm()],
+        };
+        let found = pages.into_iter().filter_map(on_sheet);
+        found.max_by_key(|([c, r], _)| c * r)
+    };
+    Ok(paper.sizes().iter().find_map(on_size))
+}
+
+/// One sheet: boards from the upper left, row by row, and the lines between them.
+fn sheet(
+    cell: &Cell,
+    [columns, rows]: [usize; 2],
+    arrangement: &Arrangement,
+    (panels, spec, family): (&[Panel], &BoardSpec, Option<&FamilyRef>),
+    words: String,
+) -> SheetLayout {
+    let size = cell.size();
+    let whole = size * DVec2::new(columns as f64, rows as f64);
+    let mut sheet = arrangement.sheet(0, [0.0, 0.0, whole.x, whole.y], words);
+    let lower_left = sheet.placements[0].origin_mm;
+    let at = |column: usize, row: usize| lower_left + size * DVec2::new(column as f64, row as f64);
+    let line =
+        |from_mm, to_mm| SheetLine { kind: LineKind::Cut, from_mm, to_mm, width_mm: LINE_MM };
+    sheet.lines.extend((0..=columns).map(|column| line(at(column, 0), at(column, rows))));
+    sheet.lines.extend((0..=rows).map(|row| line(at(0, row), at(columns, row))));
+    sheet.placements.clear();
+    for (index, panel) in panels.iter().enumerate() {
+        let corner = at(index % columns, rows - 1 - index / columns);
+        let origin_mm = corner + DVec2::new(cell.blank, cell.below()) - cell.ink[0];
+        sheet.placements.push(Placement { panel: panel.id, angle_rad: 0.0, origin_mm });
+        sheet.texts.push(SheetText {
+            text: Label::Words(label_of_one(spec, panel, family)),
+            at_mm: corner + DVec2::new(cell.blank, LABEL_GAP_MM + LABEL_CAP_MM / 3.0),
+            angle_rad: 0.0,
+            cap_height_mm: LABEL_CAP_MM,
+            max_width_mm: size.x - 2.0 * cell.blank,
+        });
+    }
+    sheet
+}
