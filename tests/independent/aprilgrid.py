@@ -91,7 +91,8 @@ def check(deltille, folder, name, options, dictionary):
     in_tag = (u > spacing) & (v > spacing)
     white = ~in_small & ~in_tag
     at = px(place).astype(np.float32)
-    seen = cv2.remap(image, at[:, 0].reshape(-1, 1), at[:, 1].reshape(-1, 1), cv2.INTER_LINEAR).ravel()
+    at = at.reshape(len(y), len(x), 2)
+    seen = cv2.remap(image, at[..., 0], at[..., 1], cv2.INTER_LINEAR).ravel()
     # Clear of edges.
     clear = np.ones(len(place), bool)
     for part in (u, v):

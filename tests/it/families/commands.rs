@@ -405,7 +405,10 @@ fn a_family_that_is_not_what_it_claims_is_not_detected_with() {
     std::fs::write(at.join("lies.json"), lies.to_json()).unwrap();
     let mut page = Page::default();
     page.run(at, "deltag verify-family lies.json");
-    page.run(at, "deltille board --rows 5 --cols 6 --family lies.json --png --name own --no-verify");
+    page.run(
+        at,
+        "deltille board --rows 5 --cols 6 --family lies.json --png --name own --no-verify",
+    );
     page.refused(at, "deltille detect own.png --target own.json --family lies.json -o found");
     page.is("family-rejected");
 }

@@ -106,7 +106,8 @@ fn circles_are_written_and_verified() {
     assert_eq!(page.run(at, "deltille verify larger.json plain.svg").status.code(), Some(1));
 
     page.title("What cannot be made or found");
-    for args in ["--circles 1x5", "--circles 7x5 --diameter 19mm", "--circles 7x5 --spacing 0.5mm"] {
+    for args in ["--circles 1x5", "--circles 7x5 --diameter 19mm", "--circles 7x5 --spacing 0.5mm"]
+    {
         page.refused(at, &format!("deltille circles -o out {args}"));
     }
     page.refused(at, "deltille detect --target plain.json plain.png -o out");
