@@ -144,7 +144,9 @@ def photographs(deltille, folder, name, target, grid, dictionary):
         for who, found in (("deltille", ours), ("OpenCV", by_opencv(image, grid, panel, dictionary))):
             errors[who] += [np.hypot(*(place - truth[keys[index]])) for index, place in found.items()]
     rms = {who: np.sqrt(np.mean(np.square(found)) / 2) for who, found in errors.items()}
-    words = ", ".join(f"{who} {len(found)} of {due}, rms {rms[who]:.4f} px" for who, found in errors.items())
+    words = ", ".join(
+        f"{who} {len(found)} of {due}, rms {rms[who]:.4f}, median {np.median(found):.4f} px" for who, found in errors.items()
+    )
     assert max(errors["deltille"]) < WRONG_PX and len(errors["deltille"]) >= 0.95 * due, words
     assert rms["deltille"] <= rms["OpenCV"], words
     print(f"{name}: in photographs: {words}", flush=True)
