@@ -91,7 +91,8 @@ def check(deltille, folder, name, options, dictionary):
     in_tag = (u > spacing) & (v > spacing)
     white = ~in_small & ~in_tag
     at = px(place).astype(np.float32)
-    seen = cv2.remap(image, at[:, 0].reshape(-1, 1), at[:, 1].reshape(-1, 1), cv2.INTER_LINEAR).ravel()
+    at = at.reshape(len(y), len(x), 2)
+    seen = cv2.remap(image, at[..., 0], at[..., 1], cv2.INTER_LINEAR).ravel()
     # Clear of edges.
     clear = np.ones(len(place), bool)
     for part in (u, v):
@@ -143,7 +144,9 @@ def photographs(deltille, folder, name, target, grid, dictionary):
         for who, found in (("deltille", ours), ("OpenCV", by_opencv(image, grid, panel, dictionary))):
             errors[who] += [np.hypot(*(place - truth[keys[index]])) for index, place in found.items()]
     rms = {who: np.sqrt(np.mean(np.square(found)) / 2) for who, found in errors.items()}
-    words = ", ".join(f"{who} {len(found)} of {due}, rms {rms[who]:.4f} px" for who, found in errors.items())
+    words = ", ".join(
+        f"{who} {len(found)} of {due}, rms {rms[who]:.4f}, median {np.median(found):.4f} px" for who, found in errors.items()
+    )
     assert max(errors["deltille"]) < WRONG_PX and len(errors["deltille"]) >= 0.95 * due, words
     assert rms["deltille"] <= rms["OpenCV"], words
     print(f"{name}: in photographs: {words}", flush=True)

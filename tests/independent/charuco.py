@@ -141,7 +141,8 @@ def photographs(deltille, folder, name, target, board):
     for who, found in errors.items():
         found = np.array(found)
         rms[who] = np.sqrt(np.mean(found**2) / 2) if len(found) else np.inf
-        words.append(f"{who} {len(found)} of {due}, rms {rms[who]:.4f} px")
+        median = np.median(found) if len(found) else np.inf
+        words.append(f"{who} {len(found)} of {due}, rms {rms[who]:.4f}, median {median:.4f} px")
         if who == "deltille":
             assert (found < WRONG_PX).all(), f"{name}: wrong labels, {found.max()} px"
             assert len(found) >= LEAST_FOUND * due, f"{name}: {words}"

@@ -658,6 +658,7 @@ impl SheetVerdict {
     fn new(index: usize, page: &Page, findings: Vec<Finding>) -> Self {
         Self {
             sheet: index + 1,
+            has_discs: false,
             px_per_mm: page.px_per_mm,
             size_mm: DVec2::new(page.width_mm, page.height_mm),
             check_bars_mm: Vec::new(),

@@ -33,6 +33,7 @@ pub(super) fn check(
         verdict.tags += panel.tags.len();
         verdict.corners += panel.corners.len();
         if let Some(diameter_mm) = panel.discs_mm {
+            verdict.has_discs = true;
             check_discs(&placed, diameter_mm, verdict);
             continue;
         }

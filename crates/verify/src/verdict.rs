@@ -107,6 +107,9 @@ pub struct FaceVerdict {
 #[derive(Clone, Debug, PartialEq, Serialize)]
 #[non_exhaustive]
 pub struct SheetVerdict {
+    /// Whether its corners are the middles of circles.
+    #[serde(skip)]
+    pub has_discs: bool,
     /// Sheet of the target, counted from 1.
     pub sheet: usize,
     /// Resolution at which it was looked at, px/mm.
@@ -229,7 +232,9 @@ impl fmt::Display for Verdict {
             let corners = sum(|s| s.corners_found);
             // A sheet of single tags has none.
             if corners > 0 {
-                write!(f, "{} within {deviation:.4} mm, ", counted(corners, "corner"))?;
+                let what =
+                    if self.sheets.iter().all(|s| s.has_discs) { "circle" } else { "corner" };
+                write!(f, "{} within {deviation:.4} mm, ", counted(corners, what))?;
             }
             let folds: Vec<&FoldVerdict> =
                 self.sheets.iter().filter_map(|s| s.fold.as_ref()).collect();

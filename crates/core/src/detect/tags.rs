@@ -65,18 +65,21 @@ pub struct TagPlace {
     /// Blank between the edges of the tile and the border.
     margin_bits: f64,
     tags_in: TagsIn,
+    /// Width of every second row and column of tiles, in edges, where these are gaps between tags.
+    gap_edges: Option<f64>,
 }
 
 impl TagPlace {
     /// That of tags with a border of so many bits.
     pub fn with(border_bits: f64, tags_in: TagsIn) -> Self {
-        Self { border_bits, margin_bits: tags_in.margin_bits(), tags_in }
+        Self { border_bits, margin_bits: tags_in.margin_bits(), tags_in, gap_edges: None }
     }
 
     /// That of the tags of `panel`.
     pub fn of(panel: &Panel) -> Self {
         let border_bits = panel.border_bits.unwrap_or(1.0);
-        Self { border_bits, margin_bits: panel.tag_margin_bits(), tags_in: panel.tags_in }
+        let (margin_bits, tags_in) = (panel.tag_margin_bits(), panel.tags_in);
+        Self { border_bits, margin_bits, tags_in, gap_edges: panel.gap_edges }
     }
 }
 
@@ -88,6 +91,7 @@ type EdgeLevels = BTreeMap<(Vertex, usize), Option<[f64; 2]>>;
 pub struct TagReader {
     kind: GridKind,
     tags_in: TagsIn,
+    gap_edges: Option<f64>,
     model: CellModel,
     clear: ClearDepth,
     /// For each bit the one whose cell takes its place in a mirror.
@@ -108,7 +112,7 @@ pub struct Read {
 impl TagReader {
     /// A reader for tags that lie so in their tiles.
     pub fn new(family: &Family, place: TagPlace) -> Self {
-        let TagPlace { border_bits, margin_bits, tags_in } = place;
+        let TagPlace { border_bits, margin_bits, tags_in, gap_edges } = place;
         let cells = family.cells();
         let inset_bits = margin_bits + border_bits;
         let width = cells.width(inset_bits);
@@ -118,7 +122,7 @@ impl TagReader {
             TagsIn::White => ClearDepth { dark: PLAIN_DEPTH, bright: depth(margin_bits) },
         };
         let model = CellModel::new(&cells, inset_bits, margin_bits);
-        Self { kind: family.kind(), tags_in, model, clear, mirror: mirror(&cells) }
+        Self { kind: family.kind(), tags_in, gap_edges, model, clear, mirror: mirror(&cells) }
     }
 
     /// Reads tiles of a grid whose corners are known: those that may carry a tag of a board that is not
@@ -177,7 +181,7 @@ impl TagReader {
         light: &GridLight,
         (mixings, edges): (&mut Mixings, &mut EdgeLevels),
     ) -> Option<(Reading, f64)> {
-        let map = TileMap::new(grid, tile)?;
+        let map = TileMap::new(grid, tile, self.gap_edges)?;
         let levels = light.levels(image, grid, tile, edges)?;
         let middle = self.kind.middle();
         let [_, contrast] = levels.at(middle);

@@ -147,20 +147,21 @@ fn tokens(text: &str) -> Vec<&str> {
     tokens
 }
 
-/// The codes of a table.
+/// The codes of a table; what is wider than any code is the widest.
 fn codes(text: &str, tokens: &[&str]) -> Vec<u64> {
     let is_hex = |c: char| c.is_ascii_hexdigit();
+    let number = |digits: &str| u64::from_str_radix(digits, 16).unwrap_or(u64::MAX);
     let word = |token: &&str| {
         let digits = token.strip_prefix("0x").or_else(|| token.strip_prefix("0X"))?;
         let end = digits.find(|c| !is_hex(c)).unwrap_or(digits.len());
-        u64::from_str_radix(&digits[..end], 16).ok()
+        (end > 0).then(|| number(&digits[..end]))
     };
     let words: Vec<u64> = tokens.iter().filter_map(word).collect();
     if !words.is_empty() {
         return words;
     }
-    let lines = text.lines().map(str::trim).filter(|line| line.chars().all(is_hex));
-    lines.filter_map(|line| u64::from_str_radix(line, 16).ok()).collect()
+    let lines = text.lines().map(str::trim).filter(|line| !line.is_empty());
+    lines.filter(|line| line.chars().all(is_hex)).map(number).collect()
 }
 
 /// The number of cells that a table states, such as `nbits = 36`, `BITS: u32 = 36`.
@@ -281,6 +282,8 @@ mod tests {
         assert!(said("0x231b", spec(None, Some(16))).contains("`ImportSpec::kind`"));
         assert!(said("0x231b", spec(squares, Some(17))).contains("17"));
         assert!(said("0x1231b", spec(squares, Some(16))).contains("more than 16 bits"));
+        let wide = format!("0x{}", "f".repeat(17));
+        assert!(said(&wide, spec(squares, Some(16))).contains("more than 16 bits"));
         assert!(said("0x231b 0x231b", spec(squares, Some(16))).contains("again"));
         let claims = ImportSpec { distance: Some(9), ..spec(squares, Some(16)) };
         assert!(said("0x231b 0x2ea5", claims).contains("`ImportSpec::distance`"));
