@@ -8,7 +8,7 @@ use deltille::family::Family;
 use deltille::limits::Limits;
 use deltille::targets::{
     self, ClosedMesh, NEAR_EQUILATERAL, Name, PaperSpec, SkeletonSpec, SolidShape, SolidSheets,
-    SolidSpec, TagSpec, TagsIn, TargetSpec,
+    SolidSpec, TagsIn, TargetSpec,
 };
 use pyo3::prelude::*;
 

@@ -76,6 +76,8 @@ def test_solids_are_meshes_too(tmp_path, root):
     (tmp_path / "part.obj").write_bytes(deltille.Tetrahedron().files("obj")["tetrahedron.obj"])
     part = deltille.Solid(tmp_path / "part.obj", name="part")
     assert len(part.panels) == 4
+    cube = deltille.Cube(edge_mm=80)
+    assert len(cube.panels) == 6 and cube.family.name == "aprilTag36h11" and cube.verify()
     assert deltille.Octahedron(skeleton=True).files("skeleton")
     with pytest.raises(deltille.TargetError, match="without skeleton=True"):
         deltille.Octahedron(wall_mm=3)

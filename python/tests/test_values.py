@@ -59,7 +59,7 @@ def test_a_rig_is_made_of_any_mapping(rig, detections, board):
 
 
 def test_targets_keep_their_class(board):
-    for target in [board, deltille.Checkerboard(4, 5), deltille.Icosahedron(), deltille.Target.from_json(board.to_json())]:
+    for target in [board, deltille.Checkerboard(4, 5), deltille.Icosahedron(), deltille.Cube(), deltille.Target.from_json(board.to_json())]:
         assert again(target) == target
     assert again(board.tags[0]) == board.tags[0]
 

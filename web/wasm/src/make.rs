@@ -146,6 +146,11 @@ impl Wanted {
             other => return Err(JsError::new(&format!("{other} is no kind of target"))),
         };
         let usual = SolidSpec::new(shape);
+        if usual.square_tags.is_some() {
+            let what = "the mesh has rectangles and other faces, whose tags are of two families: make it with \
+                        `deltille solid --mesh`";
+            return Err(JsError::new(what));
+        }
         let mut spec = SolidSpec {
             edge_mm: self.edge_mm.unwrap_or(usual.edge_mm),
             tiles: self.tiles.unwrap_or(usual.tiles),

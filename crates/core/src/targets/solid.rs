@@ -57,7 +57,7 @@ impl SolidSpec {
                 let most = face.board.matrix().into_iter().max().unwrap_or_default();
                 if most > MOST_ROWS {
                     let problem = format!(
-                        "face {index} would have {most} corners in a row, more than {MOST_ROWS}: take fewer"
+                        "face {index} would have {most} corners in a row, more than {MOST_ROWS}: take fewer, or sides that differ less"
                     );
                     return Err(TargetError::invalid("SolidSpec::tiles", problem));
                 }
