@@ -162,7 +162,7 @@ fn board_parts(
         let sheets = packed::sheets(name, board, &panels, family.as_ref(), paper)?;
         return Ok((panels, family, sheets));
     }
-    let words = |panel: &Panel| label(name, board, panel, family.as_ref());
+    let words = |panel: &Panel| label(name, board, std::slice::from_ref(panel), family.as_ref());
     let sheets = match arrangement {
         None => Vec::new(),
         Some((Ok(arrangement), _)) => {

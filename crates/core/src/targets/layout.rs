@@ -377,22 +377,28 @@ fn bar_words(length_mm: f64) -> String {
     fitting.unwrap_or_else(|| format!("{length_mm} mm"))
 }
 
-/// The label of one board: all that is needed to make it again.
+/// The label of a sheet of boards: all that is needed to make them again.
 pub(super) fn label(
     name: &str,
     spec: &BoardSpec,
-    panel: &Panel,
+    panels: &[Panel],
     family: Option<&FamilyRef>,
 ) -> String {
     let mut parts = size_in_words(name, spec);
-    if let (Some(family), [first, .., last] | [first @ last]) = (family, panel.tags.as_slice()) {
+    let mut tags = panels.iter().flat_map(|panel| &panel.tags);
+    if let (Some(family), Some(first)) = (family, tags.next()) {
+        let last = tags.next_back().unwrap_or(first);
         parts.push(tag_range(&family.name, first.id, last.id));
         parts.push(format!("fingerprint {}", family.fingerprint));
-        if panel.tags_in == TagsIn::White {
+        if panels[0].tags_in == TagsIn::White {
             parts.push("tags in white squares".to_owned());
         }
     }
-    parts.push(format!("board {}", panel.id));
+    parts.extend(match panels {
+        [] => None,
+        [only] => Some(format!("board {}", only.id)),
+        [first, .., last] => Some(format!("boards {}–{}", first.id, last.id)),
+    });
     parts.push(format!("deltille {}", env!("CARGO_PKG_VERSION")));
     parts.join(" · ")
 }

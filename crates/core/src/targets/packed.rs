@@ -8,6 +8,8 @@
 //!   └──────────────┴──────────────┘
 //! ```
 
+use std::cmp::Reverse;
+
 use glam::DVec2;
 
 use super::layout::{Arrangement, Footprint, check_margin, label, label_of_one, on_page};
@@ -68,11 +70,7 @@ pub(super) fn sheets(
     let pages: Vec<&[Panel]> = panels.chunks(columns * rows).collect();
     let count = pages.len();
     let sheets = pages.into_iter().enumerate().map(|(index, panels)| {
-        let mut words = label(name, spec, &panels[0], family);
-        if let ([first, .., last], true) = (panels, panels.len() > 1) {
-            let one = format!("board {}", first.id);
-            words = words.replace(&one, &format!("boards {}–{}", first.id, last.id));
-        }
+        let mut words = label(name, spec, panels, family);
         if count > 1 {
             words += &format!(" · page {} of {count}", index + 1);
         }
@@ -96,6 +94,8 @@ fn arrange(
     paper: &PaperSpec,
 ) -> Result<Option<([usize; 2], Arrangement)>, TargetError> {
     let margin = check_margin(paper)?;
+    // The most boards, in no more room than they need.
+    let worth = |[c, r]: [usize; 2]| ((c * r).min(boards), Reverse(c * r), c);
     let on_sheet = |page: DVec2| {
         let size = cell.size();
         let most = (page / size).floor();
@@ -111,7 +111,7 @@ fn arrange(
             };
             Some((grid, on_page(&footprint, page, margin, false)?))
         });
-        fitting.max_by_key(|([c, r], _)| (c * r, *c))
+        fitting.max_by_key(|(grid, _)| worth(*grid))
     };
     let on_size = |size: &super::PaperSize| {
         let pages = match paper.orientation {
@@ -120,7 +120,7 @@ fn arrange(
             Orientation::Auto => vec![size.portrait_mm(), size.landscape_mm()],
         };
         let found = pages.into_iter().filter_map(on_sheet);
-        found.max_by_key(|([c, r], _)| c * r)
+        found.max_by_key(|(grid, _)| worth(*grid))
     };
     Ok(paper.sizes().iter().find_map(on_size))
 }
