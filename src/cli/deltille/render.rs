@@ -115,9 +115,13 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     write_all(output::folder_of(&path), &files, args.overwrite)?;
     say!("{}: {} corners in view", path.display(), seen.len());
     if seen.is_empty() {
+        // In the frames of OpenCV's boards z points into the board.
+        let first = target.panels.first();
+        let is_away = first.is_some_and(|panel| panel.pose.matrix().z_axis.z < 0.0);
+        let side = if is_away { "z < 0" } else { "z > 0" };
         tell!(
             "warning: the camera looks past the target, or at its back: with --eye it looks at the \
-             middle of the target, whose front is on the side of z > 0 where it is a board"
+             middle of the target, whose front is on the side of {side} where it is a board"
         );
     }
     Ok(ExitCode::SUCCESS)
