@@ -417,7 +417,7 @@ fn summary(target: &Target, spec: &SolidSpec) -> anyhow::Result<String> {
         let tags = target.panels.iter().filter(|panel| panel.kind == kind).flat_map(|p| &p.tags);
         let mut ids = tags.map(|tag| tag.id);
         if let (Some(family), Some(first)) = (&target.family, ids.next()) {
-            let last = ids.last().unwrap_or(first);
+            let last = ids.next_back().unwrap_or(first);
             text += &format!(", {}", tag_range(&family.of_tiling(kind).name, first, last));
         }
     }

@@ -10,7 +10,7 @@ use super::{
     TargetError, TargetSpec, aprilgrid, board, charuco, circles, face_sheet, net, packed, solid,
     tag_sheet,
 };
-use crate::family::{Family, FamilyError};
+use crate::family::{Family, FamilyError, places};
 
 impl Target {
     /// Makes what `spec` asks for with a family that is shipped, laid out on the smallest paper that takes it.
@@ -121,6 +121,8 @@ impl Target {
             if let (Some((family, ids)), Some((same, others))) =
                 (self.tags_of_tiling(kind), other.tags_of_tiling(kind))
                 && family == same
+                // Place codes follow from the ids of boards.
+                && family.name != places::NAME
             {
                 let setting = Setting::of(kind, self.tilings().count() > 1);
                 overlap(setting.first_id(), "tag ids", &ids, &others)?;
