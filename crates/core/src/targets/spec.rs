@@ -496,8 +496,7 @@ impl SolidSpec {
                 return Err(TargetError::invalid("SolidSpec::square_tags", problem));
             }
             (_, Some(_)) => {
-                let problem =
-                    "all faces are of one kind, whose tags are those of `SolidSpec::tags`";
+                let problem = "all faces are of one kind and have one kind of tags: leave it out";
                 return Err(TargetError::invalid("SolidSpec::square_tags", problem));
             }
         };
