@@ -15,10 +15,11 @@ use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
 use super::dsc::{self, Dialect, DscError};
+use super::inlay::InlaidBodies;
 use super::kind::Kind;
 use super::mesh::{MeshError, Meshing, TexturedMesh};
 use super::staging::Staging;
-use super::{atomic, dxf, gltf, obj, pdf, png, scene, sheet_file_name, stl, svg};
+use super::{atomic, dxf, gltf, obj, pdf, png, scene, sheet_file_name, stl, svg, threemf};
 use crate::limits::{Limits, ReadError};
 use deltille_core::artwork::{self, ArtworkError, CuttingError};
 use deltille_core::family::Family;
@@ -53,6 +54,8 @@ pub enum What {
     Mjcf,
     /// `<name>.usda`, with its texture.
     Usd,
+    /// `<name>.3mf`, two bodies, black inlaid into white, of a solid, or of a plate with a board.
+    ThreeMf,
     /// `<name>.stl`, the bare solid.
     Stl,
     /// `<name>-skeleton.stl` of a solid that has one.
@@ -66,8 +69,8 @@ pub enum What {
 /// A text that is nothing that can be made.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error(
-    "`{0}` is no format: json, pdf, svg, png, dsc, dsc-original, gltf, obj, sdf, urdf, mjcf, usd, stl, skeleton, panels \
-     or net"
+    "`{0}` is no format: json, pdf, svg, png, dsc, dsc-original, gltf, obj, sdf, urdf, mjcf, usd, 3mf, stl, skeleton, \
+     panels or net"
 )]
 pub struct WhatError(String);
 
@@ -88,6 +91,7 @@ impl FromStr for What {
             "urdf" => Self::Urdf,
             "mjcf" => Self::Mjcf,
             "usd" | "usda" => Self::Usd,
+            "3mf" => Self::ThreeMf,
             "stl" => Self::Stl,
             "skeleton" => Self::Skeleton,
             "panels" => Self::Panels,
@@ -167,6 +171,9 @@ pub fn make(
         What::Dsc(dialect) => named(".dsc", dsc::write(target, dialect)?.into_bytes()),
         What::Gltf | What::Obj | What::Sdf | What::Urdf | What::Mjcf | What::Usd => {
             of_mesh(&TexturedMesh::new(target, family, making.mesh)?, what)
+        }
+        What::ThreeMf => {
+            named(".3mf", threemf::to_bytes(&InlaidBodies::new(target, family, making.mesh)?))
         }
         What::Stl => {
             named(".stl", stl::to_bytes(name, &solid(target)?.polyhedron().triangles_mm()))
