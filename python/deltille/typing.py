@@ -37,6 +37,7 @@ TargetFormat: TypeAlias = Literal[
     "mjcf",
     "usd",
     "usda",
+    "3mf",
     "stl",
     "skeleton",
     "panels",
