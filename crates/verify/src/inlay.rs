@@ -30,6 +30,9 @@ const RELATIVE_SLACK: f64 = 1e-6;
 /// White around a face in its picture, mm.
 const AROUND_MM: f64 = 5.0;
 
+/// Part of a pixel that both bodies or neither may cover: a thousandth of a millimetre along its side.
+const MOST_BESIDE: f32 = 0.01;
+
 type Triangle = [DVec3; 3];
 
 /// A face with a board.
@@ -86,8 +89,9 @@ pub(super) fn verify(
     let done = AtomicUsize::new(0);
     let sheets: Vec<SheetVerdict> = (faces.par_iter().zip(&fronts).enumerate())
         .map(|(index, (face, fronts))| {
-            let (page, layout) = surface(verifier, face, fronts);
-            let mut sheet = SheetVerdict::new(index, &page, Vec::new());
+            let (page, layout, problem) = surface(verifier, face, fronts);
+            let problem = problem.map(|problem| MeshFinding::Body { problem }.into());
+            let mut sheet = SheetVerdict::new(index, &page, problem.into_iter().collect());
             verifier.verify_sheet(&page, &layout, &mut sheet);
             verifier.tell(done.fetch_add(1, Ordering::Relaxed) + 1, faces.len());
             sheet
@@ -226,12 +230,12 @@ fn area(triangles: &[[DVec2; 3]]) -> f64 {
     triangles.iter().map(|corners| polygon::area(corners)).sum()
 }
 
-/// A face as a page, grey where neither or both bodies are, and what it should show.
+/// A face as a page, what it should show, and where both bodies or neither of them are.
 fn surface(
     verifier: &Verifier,
     face: &Face,
     [white, black]: &[Vec<[DVec2; 3]>; 2],
-) -> (Page, SheetLayout) {
+) -> (Page, SheetLayout, Option<String>) {
     let least = face.outline.iter().copied().reduce(DVec2::min).unwrap_or_default();
     let most = face.outline.iter().copied().reduce(DVec2::max).unwrap_or_default();
     let low = least - AROUND_MM;
@@ -257,16 +261,27 @@ fn surface(
         smear_px: 0.0,
         texel_px: 0.0,
     };
-    let mut ink = Coverage::new(width, height);
-    // Clockwise on the screen is positive.
-    let mut add = |corners: &[DVec2], value: f64| {
-        let pixels = corners.iter().rev().map(|&corner| page.px_from_page(corner - low));
-        ink.add(&pixels.collect::<Vec<DVec2>>(), value);
+    let covered = |parts: Vec<(&[DVec2], f64)>| {
+        let mut cover = Coverage::new(width, height);
+        for (corners, value) in parts {
+            // Clockwise on the screen is positive.
+            let pixels = corners.iter().rev().map(|&corner| page.px_from_page(corner - low));
+            cover.add(&pixels.collect::<Vec<DVec2>>(), value);
+        }
+        cover.finish()
     };
-    add(&face.outline, 0.5);
-    white.iter().for_each(|corners| add(corners, -0.5));
-    black.iter().for_each(|corners| add(corners, 0.5));
+    let dark = || black.iter().map(|corners| (corners.as_slice(), 1.0));
+    let both = white.iter().map(|corners| (corners.as_slice(), 1.0)).chain(dark());
+    let beside = covered(both.chain([(face.outline.as_slice(), -1.0)]).collect());
+    let worst = beside.pixels().iter().position(|part| part.abs() > MOST_BESIDE);
+    let problem = worst.map(|index| {
+        let pixel = DVec2::new((index % width) as f64, (index / width) as f64);
+        let place = page.page_from_px(pixel) + low;
+        let [x, y] = place.to_array();
+        let id = face.panel.id;
+        format!("the bodies overlap, or leave a gap, around ({x:.2}, {y:.2}) mm on board {id}")
+    });
     let light = |ink: f32| (255.0 * (1.0 - ink)).round().clamp(0.0, 255.0) as u8;
-    page.image = ink.finish().map(light);
-    (page, layout)
+    page.image = covered(dark().collect()).map(light);
+    (page, layout, problem)
 }
