@@ -40,6 +40,7 @@ TargetFormat: TypeAlias = Literal[
     "3mf",
     "stl",
     "skeleton",
+    "skeleton-3mf",
     "panels",
     "net",
 ]

@@ -3,7 +3,7 @@
 lib3mf, the reader of the 3MF consortium, takes each file in its strict mode without a warning and finds both bodies
 manifold and oriented, with their names and colours. trimesh finds them closed; the black one has the volume of what the SVG
 of the same target shows (its loops, combined by shapely) times the depth, both together that of the plate or solid, and
-every corner of the description is a vertex of the black body. The file is the same when it is made again.
+every corner of the description is a vertex of the black body; a skeleton is one closed body. The file is the same when it is made again.
 
 Needs lib3mf, trimesh, lxml, networkx and shapely.
 """
@@ -105,12 +105,24 @@ def check(program, folder, name, command, whole_mm3):
     )
 
 
+def check_skeleton(program, folder):
+    """The frame as 3MF is closed, and is that of the STL."""
+    command = [program, "octahedron", "--edge", "100mm", "--name", "frame", "--skeleton", "--3mf", "-o", folder]
+    subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
+    body = trimesh.load(folder / "frame-skeleton.3mf", process=False).geometry["skeleton"]
+    same = trimesh.load(folder / "frame-skeleton.stl")
+    assert body.is_watertight and body.is_winding_consistent
+    assert abs(body.volume / same.volume - 1) < 1e-4, (body.volume, same.volume)
+    print(f"skeleton: {len(body.faces)} triangles, closed; {body.volume / 1e3:.3f} cm3")
+
+
 def main():
     program, folder = sys.argv[1], pathlib.Path(sys.argv[2])
     for name, command in BOARDS.items():
         check(program, folder, name, command, None)
     for name, factor in SOLIDS.items():
         check(program, folder, name, f"{name} --edge {EDGE_MM}mm", factor * EDGE_MM**3)
+    check_skeleton(program, folder)
 
 
 main()

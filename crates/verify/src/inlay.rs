@@ -1,5 +1,5 @@
 //! Verification of two bodies to print, as 3MF: both closed, the black one inlaid into the white one, and the surface that
-//! they have in common compared like a printed page, face by face.
+//! they have in common compared like a printed page, face by face; a skeleton is one body, see [`super::body`].
 //!
 //! Vertices lie on a face, below it on the floor of the inlay, or on the back of a plate; triangles are level or upright.
 //! So the outline that is seen on the surface is that of the bodies all the way down, and volumes follow from areas.
@@ -12,14 +12,18 @@ use glam::{DVec2, DVec3};
 use rayon::prelude::*;
 
 use super::document::MAX_PIXELS;
+use super::model::Facet;
+use super::reader::Reader;
 use super::solid::MeshFinding;
 use super::{
     DocumentError, Finding, Format, InlayVerdict, Page, SheetVerdict, Verdict, Verifier, body,
+    construct,
 };
 use deltille_core::polygon;
 use deltille_core::raster::{Coverage, Gray};
 use deltille_core::targets::{Panel, Placement, SheetLayout, TargetSpec};
 use deltille_files::export::inlay::Body;
+use deltille_files::export::threemf;
 
 /// Tolerance of coordinates, mm: they are written as decimals, with nine digits after the point.
 const SLACK_MM: f64 = 1e-5;
@@ -42,19 +46,44 @@ struct Face<'a> {
     outline: Vec<DVec2>,
 }
 
-/// Compares a white and a black body with the board or the solid of a target.
+/// Reads the 3MF of a board, a solid or a skeleton, as it is named, and compares it with the target.
+///
+/// # Errors
+///
+/// The file cannot be read, or the target has no such bodies. Deviations are findings of the verdict.
 pub(super) fn verify(
     verifier: &Verifier,
+    reader: &Reader,
     path: &Path,
-    bodies: &[Body; 2],
 ) -> Result<Verdict, DocumentError> {
+    let is_skeleton = super::file_name(path).ends_with(&threemf::skeleton_name(""));
+    let names = if is_skeleton { threemf::SKELETON } else { threemf::INLAY };
+    let (refused, bodies) = construct::bodies(reader, path, names, verifier.target)?;
+    match <[Body; 2]>::try_from(bodies) {
+        _ if !refused.is_empty() => Ok(Verdict::new(path, Format::ThreeMf, refused)),
+        Ok(bodies) => inlaid(verifier, path, &bodies),
+        Err(bodies) => skeleton(verifier, path, &bodies),
+    }
+}
+
+/// Compares the body of a skeleton.
+fn skeleton(verifier: &Verifier, path: &Path, bodies: &[Body]) -> Result<Verdict, DocumentError> {
+    if let Some(problem) = bodies.iter().find_map(not_closed) {
+        return Ok(Verdict::new(path, Format::ThreeMf, vec![MeshFinding::Body { problem }.into()]));
+    }
+    let facets = bodies.iter().flat_map(triangles_of).map(|vertices_mm| {
+        let [a, b, c] = vertices_mm;
+        Facet { normal: (b - a).cross(c - a).normalize_or_zero(), vertices_mm }
+    });
+    body::verify(verifier, path, &facets.collect::<Vec<_>>(), Format::ThreeMf)
+}
+
+/// Compares a white and a black body with the board or the solid of a target.
+fn inlaid(verifier: &Verifier, path: &Path, bodies: &[Body; 2]) -> Result<Verdict, DocumentError> {
     let faces = faces(verifier).ok_or_else(|| {
         DocumentError::unreadable(path, "the target is neither a board nor a solid")
     })?;
-    let triangles = bodies.each_ref().map(|body| {
-        let places = |triangle: &[usize; 3]| triangle.map(|vertex| body.vertices_mm[vertex]);
-        body.triangles.iter().map(places).collect::<Vec<Triangle>>()
-    });
+    let triangles = bodies.each_ref().map(triangles_of);
     let [white_mm3, black_mm3] =
         triangles.each_ref().map(|triangles| body::volume(triangles.iter().copied()));
     let fronts: Vec<[Vec<[DVec2; 3]>; 2]> = (faces.par_iter())
@@ -100,6 +129,11 @@ pub(super) fn verify(
     let mut verdict = Verdict::new(path, Format::ThreeMf, Vec::<Finding>::new());
     verdict.passed = sheets.iter().all(|sheet| sheet.findings.is_empty());
     Ok(Verdict { sheets, inlay: Some(inlay), ..verdict })
+}
+
+fn triangles_of(body: &Body) -> Vec<Triangle> {
+    let places = |triangle: &[usize; 3]| triangle.map(|vertex| body.vertices_mm[vertex]);
+    body.triangles.iter().map(places).collect()
 }
 
 /// The faces of a target that is one board or a solid.

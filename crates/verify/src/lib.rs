@@ -390,13 +390,7 @@ impl<'a> Verifier<'a> {
             Format::Sdf | Format::Urdf | Format::Mjcf => {
                 return scene::verify(self, reader, path, format);
             }
-            Format::ThreeMf => {
-                let (refused, bodies) = construct::bodies(reader, path, self.target)?;
-                return match refused.is_empty() {
-                    true => Ok(inlay::verify(self, path, &bodies)?),
-                    false => Ok(Verdict::new(path, format, refused)),
-                };
-            }
+            Format::ThreeMf => return Ok(inlay::verify(self, reader, path)?),
             Format::Glb | Format::Obj | Format::Usda | Format::Stl => {}
         }
         let (refused, parts) = construct::check(reader, path, format, self.target)?;
@@ -404,7 +398,7 @@ impl<'a> Verifier<'a> {
             return Ok(Verdict::new(path, format, refused));
         }
         let mut verdict = match format {
-            Format::Stl => body::verify(self, reader, path)?,
+            Format::Stl => body::verify(self, path, &model::load_stl(reader, path)?, format)?,
             _ => solid::verify(self, path, model::load(reader, path, parts)?, format),
         };
         verdict.passed &= refused.is_empty();

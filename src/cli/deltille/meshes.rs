@@ -5,16 +5,16 @@
 use std::collections::BTreeMap;
 use std::ops::RangeInclusive;
 
-use anyhow::anyhow;
+use anyhow::{Context, anyhow};
 
 use super::files::{File, bytes_file};
 use crate::cli::values::{number, whole};
-use crate::export::artifacts::{What, of_mesh};
+use crate::export::artifacts::{Making, What, make, of_mesh};
 use crate::export::inlay::InlaidBodies;
 use crate::export::mesh::{MAX_TEXTURE_PX, MeshError, Meshing, Resolution, TexturedMesh};
 use crate::export::threemf;
 use crate::family::Family;
-use crate::targets::{Target, parse_length_mm};
+use crate::targets::{Target, TargetSpec, parse_length_mm};
 
 /// Heading of these options.
 pub const MESHES: &str = "Meshes and models for simulators";
@@ -46,7 +46,7 @@ pub struct Meshes {
     #[arg(long)]
     usd: bool,
     /// Write <name>.3mf to print in two colours: two bodies, what is black inlaid into the white
-    /// plate or solid (millimetres)
+    /// plate or solid (millimetres); with --skeleton also <name>-skeleton.3mf
     #[arg(long = "3mf")]
     threemf: bool,
     /// Depth of what is black in a 3MF, less than the plate is thick, or than where faces meet [default: 0.4mm]
@@ -116,6 +116,11 @@ impl Meshes {
             let bodies = InlaidBodies::new(target, family, meshing);
             let bodies = bodies.map_err(|error| refusal(&error, Some("--3mf")))?;
             files.push(bytes_file(format!("{}.3mf", target.name), threemf::to_bytes(&bodies)));
+            if matches!(&target.spec, TargetSpec::Solid(spec) if spec.skeleton.is_some()) {
+                let skeleton = make(target, family, What::Skeleton3mf, Making::default());
+                let skeleton = skeleton.context("--3mf")?.into_iter();
+                files.extend(skeleton.map(|(name, bytes)| bytes_file(name, bytes)));
+            }
         }
         Ok((files, told))
     }

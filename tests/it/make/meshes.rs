@@ -43,7 +43,7 @@ fn boards_and_solids_are_two_bodies_to_print() {
         "board --rows 5 --cols 6 --edge 20mm --name black --invert --plate 5mm --inlay 0.6mm",
         "board --rows 7 --cols 8 --edge 20mm --name patches --dense",
         "checkerboard --rows 4 --cols 5 --edge 30mm --name squares --tags t25h9",
-        "octahedron --edge 100mm --tiles 6 --name eight",
+        "octahedron --edge 100mm --tiles 6 --name eight --skeleton",
     ] {
         page.run(at, &format!("deltille {arguments} --3mf"));
     }

@@ -60,6 +60,8 @@ pub enum What {
     Stl,
     /// `<name>-skeleton.stl` of a solid that has one.
     Skeleton,
+    /// `<name>-skeleton.3mf` likewise.
+    Skeleton3mf,
     /// `<name>-panels.dxf`, outlines of a solid's panels to cut.
     Panels,
     /// `<name>-net.dxf`, the net of a solid to cut and fold.
@@ -70,7 +72,7 @@ pub enum What {
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error(
     "`{0}` is no format: json, pdf, svg, png, dsc, dsc-original, gltf, obj, sdf, urdf, mjcf, usd, 3mf, stl, skeleton, \
-     panels or net"
+     skeleton-3mf, panels or net"
 )]
 pub struct WhatError(String);
 
@@ -94,6 +96,7 @@ impl FromStr for What {
             "3mf" => Self::ThreeMf,
             "stl" => Self::Stl,
             "skeleton" => Self::Skeleton,
+            "skeleton-3mf" => Self::Skeleton3mf,
             "panels" => Self::Panels,
             "net" => Self::Net,
             _ => return Err(WhatError(text.to_owned())),
@@ -179,12 +182,11 @@ pub fn make(
             named(".stl", stl::to_bytes(name, &solid(target)?.polyhedron().triangles_mm()))
         }
         What::Skeleton => {
-            let spec = solid(target)?;
-            let skeleton = spec.skeleton.as_ref();
-            let skeleton = skeleton.ok_or_else(|| MakeError::NoSkeleton(name.to_string()))?;
-            let skeleton = Skeleton::new(&spec.polyhedron(), skeleton)?;
-            spec.panel_inset_mm()?;
-            vec![(stl::skeleton_name(name), stl::to_bytes(name, &skeleton.triangles_mm))]
+            vec![(stl::skeleton_name(name), stl::to_bytes(name, &skeleton(target)?.triangles_mm))]
+        }
+        What::Skeleton3mf => {
+            let bytes = threemf::skeleton(target, &skeleton(target)?.triangles_mm);
+            vec![(threemf::skeleton_name(name), bytes.map_err(MeshError::from)?)]
         }
         What::Panels => {
             named("-panels.dxf", dxf::text(&artwork::panels_to_cut(target)?).into_bytes())
@@ -217,6 +219,16 @@ fn solid(target: &Target) -> Result<&SolidSpec, MakeError> {
         TargetSpec::Solid(spec) => Ok(spec),
         _ => Err(MakeError::NotSolid(target.name.to_string())),
     }
+}
+
+/// The skeleton of a solid whose panels fit into it.
+fn skeleton(target: &Target) -> Result<Skeleton, MakeError> {
+    let spec = solid(target)?;
+    let skeleton = spec.skeleton.as_ref();
+    let skeleton = skeleton.ok_or_else(|| MakeError::NoSkeleton(target.name.to_string()))?;
+    let skeleton = Skeleton::new(&spec.polyhedron(), skeleton)?;
+    spec.panel_inset_mm()?;
+    Ok(skeleton)
 }
 
 /// The pages of a target.

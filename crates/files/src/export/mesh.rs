@@ -9,7 +9,7 @@ use super::{GENERATOR, png};
 use deltille_core::artwork::{ArtworkError, Atlas};
 use deltille_core::family::Family;
 use deltille_core::lattice::GridKind;
-use deltille_core::targets::{Panel, SolidSpec, Target, TargetError, TargetSpec};
+use deltille_core::targets::{ClosedMeshError, Panel, SolidSpec, Target, TargetError, TargetSpec};
 
 /// Texels along the edge of a cell of a tag, unless another resolution is asked for, so that a viewer sees it sharp at
 /// close range.
@@ -87,6 +87,9 @@ pub enum MeshError {
     /// Shapes of the drawing cross each other.
     #[error("what is drawn on it crosses itself: it cannot be made as two bodies")]
     Crossing,
+    /// A skeleton is no closed body.
+    #[error("the skeleton cannot be made as one body: {0}")]
+    Skeleton(#[from] ClosedMeshError),
     /// The faces cannot be made.
     #[error(transparent)]
     Target(#[from] TargetError),

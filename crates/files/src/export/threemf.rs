@@ -1,6 +1,7 @@
-//! 3MF of two bodies, white and black: the core specification only, with a base material each, in millimetres.
+//! 3MF of two bodies, white and black, or of a skeleton: the core specification only, with a base material for each body,
+//! in millimetres.
 //!
-//! The two are components of one object, which slicers that know of parts take for its parts; others take them for two
+//! Two bodies are components of one object, which slicers that know of parts take for its parts; others take them for two
 //! objects in their places.
 
 use std::fmt::Write as _;
@@ -12,6 +13,8 @@ use glam::DVec3;
 
 use super::GENERATOR;
 use super::inlay::{Body, InlaidBodies};
+use deltille_core::artwork::subject;
+use deltille_core::targets::{ClosedMesh, ClosedMeshError, Target};
 
 /// The part of the file that holds the bodies.
 pub const MODEL: &str = "3D/3dmodel.model";
@@ -35,10 +38,38 @@ pub fn fixed_parts() -> [(&'static str, String); 2] {
     [("[Content_Types].xml", types), ("_rels/.rels", relations)]
 }
 
+/// The names of the bodies of an inlay.
+pub const INLAY: &[&str] = &["white", "black"];
+
+/// The name of the one body of a skeleton.
+pub const SKELETON: &[&str] = &["skeleton"];
+
+/// The file name of the skeleton of a target of this name.
+pub fn skeleton_name(name: &str) -> String {
+    format!("{name}-skeleton.3mf")
+}
+
 /// The content of `<name>.3mf`, the same in every run.
 pub fn to_bytes(bodies: &InlaidBodies) -> Vec<u8> {
+    let head = frame(&bodies.name, &bodies.subject, INLAY);
+    packed(&model(&head, &[&bodies.white, &bodies.black]))
+}
+
+/// The content of `<name>-skeleton.3mf`, from the triangles of a skeleton, mm.
+///
+/// # Errors
+/// When these are not one closed surface.
+pub fn skeleton(target: &Target, triangles_mm: &[[DVec3; 3]]) -> Result<Vec<u8>, ClosedMeshError> {
+    let corners: Vec<usize> = (0..3 * triangles_mm.len()).collect();
+    let (mesh, _) = ClosedMesh::new(triangles_mm.as_flattened(), corners.as_chunks().0)?;
+    let body = Body { vertices_mm: mesh.vertices().to_vec(), triangles: mesh.faces().to_vec() };
+    let head = frame(&target.name, &subject(target), SKELETON);
+    Ok(packed(&model(&head, &[&body])))
+}
+
+/// The file of a model.
+fn packed(model: &str) -> Vec<u8> {
     let [types, relations] = fixed_parts();
-    let model = model(bodies);
     zip(&[
         (types.0, types.1.as_bytes(), false),
         (relations.0, relations.1.as_bytes(), false),
@@ -46,18 +77,18 @@ pub fn to_bytes(bodies: &InlaidBodies) -> Vec<u8> {
     ])
 }
 
-/// The text of [`MODEL`].
-fn model(bodies: &InlaidBodies) -> String {
-    let vertices = || bodies.white.vertices_mm.iter().chain(&bodies.black.vertices_mm);
+/// The text of [`MODEL`], from its [`frame`].
+fn model(head: &str, bodies: &[&Body]) -> String {
+    let vertices = bodies.iter().flat_map(|body| &body.vertices_mm);
     // The target frame, moved to where all coordinates are positive, as printers have it.
-    let least = vertices().copied().reduce(DVec3::min).unwrap_or_default();
+    let least = vertices.copied().reduce(DVec3::min).unwrap_or_default();
     let [x, y, z] = least.to_array().map(|mm| decimal(-mm));
-    let item = format!("{ITEM}{x} {y} {z}\"/>");
-    let mut next = [&bodies.white, &bodies.black].into_iter();
+    let place = format!("{TURN}{x} {y} {z}\"/>");
+    let mut next = bodies.iter();
     let mut body = None;
     let mut text = String::new();
-    for line in frame(&bodies.name, &bodies.subject).lines() {
-        text += if line == format!("{ITEM}\"/>") { &item } else { line };
+    for line in head.lines() {
+        text += &line.replace(&format!("{TURN}\"/>"), &place);
         text.push('\n');
         match line.trim_start() {
             "<vertices>" => {
@@ -71,19 +102,36 @@ fn model(bodies: &InlaidBodies) -> String {
     text
 }
 
-/// The line that puts the object onto the printer, before the numbers of its place.
-pub const ITEM: &str = "    <item objectid=\"4\" transform=\"1 0 0 0 1 0 0 0 1 ";
+/// Before the three numbers that tell where on the printer the object is put: it is not turned.
+pub const TURN: &str = "transform=\"1 0 0 0 1 0 0 0 1 ";
 
-/// The text of [`MODEL`] without the vertices and triangles of the bodies, and without the place on the printer.
-pub fn frame(name: &str, subject: &str) -> String {
+/// The text of [`MODEL`] with bodies of these names, without their vertices and triangles, and without the place on the
+/// printer.
+pub fn frame(name: &str, subject: &str, bodies: &[&str]) -> String {
     let escaped = |text: &str| text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;");
     let (name, subject) = (escaped(name), escaped(subject));
-    let body = |id: u32, colour: &str, index: u32| {
-        format!(
-            "    <object id=\"{id}\" type=\"model\" name=\"{colour}\" pid=\"1\" pindex=\"{index}\">\n      <mesh>\n        \
-             <vertices>\n        </vertices>\n        <triangles>\n        </triangles>\n      </mesh>\n    </object>\n"
-        )
-    };
+    let colours: String = bodies
+        .iter()
+        .map(|body| {
+            let colour = if *body == "black" { "#000000" } else { "#FFFFFF" };
+            format!("      <base name=\"{body}\" displaycolor=\"{colour}\"/>\n")
+        })
+        .collect();
+    let objects: String = bodies
+        .iter()
+        .enumerate()
+        .map(|(index, body)| {
+            format!(
+                "    <object id=\"{}\" type=\"model\" name=\"{body}\" pid=\"1\" pindex=\"{index}\">\n      <mesh>\n        \
+                 <vertices>\n        </vertices>\n        <triangles>\n        </triangles>\n      </mesh>\n    </object>\n",
+                FIRST_ID + index
+            )
+        })
+        .collect();
+    let components: String = (FIRST_ID..FIRST_ID + bodies.len())
+        .map(|id| format!("        <component objectid=\"{id}\"/>\n"))
+        .collect();
+    let whole = FIRST_ID + bodies.len();
     format!(
         "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n\
          <model unit=\"millimeter\" xml:lang=\"en-US\" \
@@ -91,16 +139,15 @@ pub fn frame(name: &str, subject: &str) -> String {
          <metadata name=\"Title\">{name}</metadata>\n  \
          <metadata name=\"Description\">{subject}</metadata>\n  \
          <metadata name=\"Application\">{GENERATOR}</metadata>\n  \
-         <resources>\n    <basematerials id=\"1\">\n      \
-         <base name=\"white\" displaycolor=\"#FFFFFF\"/>\n      \
-         <base name=\"black\" displaycolor=\"#000000\"/>\n    </basematerials>\n\
-         {}{}    <object id=\"4\" type=\"model\" name=\"{name}\">\n      <components>\n        \
-         <component objectid=\"2\"/>\n        <component objectid=\"3\"/>\n      </components>\n    </object>\n  \
-         </resources>\n  <build>\n{ITEM}\"/>\n  </build>\n</model>\n",
-        body(2, "white", 0),
-        body(3, "black", 1),
+         <resources>\n    <basematerials id=\"1\">\n{colours}    </basematerials>\n\
+         {objects}    <object id=\"{whole}\" type=\"model\" name=\"{name}\">\n      \
+         <components>\n{components}      </components>\n    </object>\n  \
+         </resources>\n  <build>\n    <item objectid=\"{whole}\" {TURN}\"/>\n  </build>\n</model>\n"
     )
 }
+
+/// The id of the first body; the materials are before it.
+const FIRST_ID: usize = 2;
 
 fn vertices_of(body: &Body, text: &mut String) {
     for v in &body.vertices_mm {

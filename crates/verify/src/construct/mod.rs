@@ -203,7 +203,7 @@ pub(super) fn check(
     Ok((found.0, Vec::new()))
 }
 
-/// Inspects a 3MF, and returns the findings and its bodies, the white one first.
+/// Inspects a 3MF that should have bodies of these names, and returns the findings, and the bodies unless there are any.
 ///
 /// # Errors
 ///
@@ -211,10 +211,12 @@ pub(super) fn check(
 pub(super) fn bodies(
     reader: &Reader,
     path: &Path,
+    names: &'static [&str],
     target: &Target,
-) -> Result<(Vec<Finding>, [Body; 2]), DocumentError> {
+) -> Result<(Vec<Finding>, Vec<Body>), DocumentError> {
     let (bytes, words, limits) = (reader.read(path)?, Words::of(target), reader.limits);
-    let (found, bodies) = reader.run(path, move || threemf::check(&bytes, &words, &limits))?;
+    let check = move || threemf::check(&bytes, names, &words, &limits);
+    let (found, bodies) = reader.run(path, check)?;
     Ok((found.0, bodies))
 }
 

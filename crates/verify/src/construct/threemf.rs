@@ -1,4 +1,4 @@
-//! The parts and lines of a 3MF that this program writes: two bodies, their vertices and triangles.
+//! The parts and lines of a 3MF that this program writes: bodies, their vertices and triangles.
 
 use flate2::{Crc, Decompress};
 use glam::DVec3;
@@ -6,7 +6,7 @@ use glam::DVec3;
 use super::usda::same_lines;
 use super::{Findings, Words, decimal, text, unpack_by};
 use deltille_files::export::inlay::Body;
-use deltille_files::export::threemf::{ITEM, MODEL, fixed_parts, frame};
+use deltille_files::export::threemf::{MODEL, TURN, fixed_parts, frame};
 use deltille_files::limits::{Kind, Limits};
 
 /// Bytes of the record that ends a ZIP, and of the headers of a part in its directory and before its content, without
@@ -15,18 +15,19 @@ const END: usize = 22;
 const LISTED: usize = 46;
 const HEADER: usize = 30;
 
-/// Inspects a 3MF; returns the findings, and its white and its black body.
+/// Inspects a 3MF that should have bodies of these names; returns the findings, and the bodies unless anything was found.
 ///
 /// # Errors
 ///
 /// It is no ZIP, is damaged, names vertices that are not there, or exceeds the limits.
 pub(super) fn check(
     file: &[u8],
+    names: &[&str],
     words: &Words,
     limits: &Limits,
-) -> Result<(Findings, [Body; 2]), String> {
+) -> Result<(Findings, Vec<Body>), String> {
     let mut found = Findings::default();
-    let mut bodies = [Body::default(), Body::default()];
+    let mut bodies = Vec::new();
     let mut fixed = fixed_parts().into_iter();
     let mut has_model = false;
     for (name, content) in parts(file, limits, &mut found)? {
@@ -36,7 +37,8 @@ pub(super) fn check(
             }
             None if name == MODEL && !has_model => {
                 has_model = true;
-                bodies = model(text(&content)?, words, limits, &mut found)?;
+                let stated = frame(&words.title, &words.subject, names);
+                bodies = model(text(&content)?, &stated, limits, &mut found)?;
             }
             _ => found.add(format!("part {name}"), "a part, or its place in the file"),
         }
@@ -150,10 +152,10 @@ fn number(bytes: &[u8], at: usize, length: usize) -> Option<usize> {
 /// The bodies of a model; everything else must be as it is written.
 fn model(
     text: &str,
-    words: &Words,
+    stated: &str,
     limits: &Limits,
     found: &mut Findings,
-) -> Result<[Body; 2], String> {
+) -> Result<Vec<Body>, String> {
     let mut bodies: Vec<Body> = Vec::new();
     let mut rest = String::new();
     let mut section = "";
@@ -176,18 +178,17 @@ fn model(
                 if section == "<vertices>" {
                     bodies.push(Body::default());
                 }
-                rest += placed(line);
+                rest += &placed(line);
                 rest.push('\n');
             }
         }
     }
-    same_lines(&rest, &frame(&words.title, &words.subject), str::to_owned, found);
+    same_lines(&rest, stated, str::to_owned, found);
     if found.refuse() {
-        return Ok([Body::default(), Body::default()]);
+        return Ok(Vec::new());
     }
     let is_known =
         |body: &Body| body.triangles.iter().flatten().all(|&v| v < body.vertices_mm.len());
-    let bodies: [Body; 2] = bodies.try_into().map_err(|_| "not two bodies".to_owned())?;
     match bodies.iter().all(is_known) {
         true => Ok(bodies),
         false => Err("a triangle names a vertex that is not there".to_owned()),
@@ -195,20 +196,15 @@ fn model(
 }
 
 /// A line, without its numbers if it is the one that puts the object onto the printer.
-fn placed(line: &str) -> &str {
-    let numbers = line.strip_prefix(ITEM).and_then(|rest| rest.strip_suffix("\"/>"));
-    let is_place = |numbers: &str| {
-        let numbers: Vec<_> = numbers.split(' ').map(decimal).collect();
-        numbers.len() == 3 && numbers.iter().all(Option::is_some)
-    };
-    match numbers.is_some_and(is_place) {
-        true => PLACED,
-        false => line,
+fn placed(line: &str) -> String {
+    let Some((before, rest)) = line.split_once(TURN) else { return line.to_owned() };
+    let numbers = rest.trim_end_matches("\"/>").split(' ').map(decimal);
+    let are_numbers = numbers.filter(Option::is_some).count() == 3 && rest.split(' ').count() == 3;
+    match are_numbers && rest.ends_with("\"/>") {
+        true => format!("{before}{TURN}\"/>"),
+        false => line.to_owned(),
     }
 }
-
-/// [`ITEM`] with its end.
-const PLACED: &str = "    <item objectid=\"4\" transform=\"1 0 0 0 1 0 0 0 1 \"/>";
 
 fn vertex(line: &str) -> Option<DVec3> {
     let [x, y, z] = values(line, ["<vertex x=\"", "\" y=\"", "\" z=\""])?.map(decimal);
