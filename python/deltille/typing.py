@@ -37,8 +37,10 @@ TargetFormat: TypeAlias = Literal[
     "mjcf",
     "usd",
     "usda",
+    "3mf",
     "stl",
     "skeleton",
+    "skeleton-3mf",
     "panels",
     "net",
 ]

@@ -220,7 +220,7 @@ impl Target {
     /// ----------
     /// format : str
     ///     ``"json"``, ``"pdf"``, ``"svg"``, ``"png"``, ``"dsc"``, ``"dsc-original"``; as meshes ``"gltf"``,
-    ///     ``"obj"``, ``"sdf"``, ``"urdf"``, ``"mjcf"``, ``"usd"``; of a solid also ``"stl"``, ``"skeleton"``, ``"panels"`` (DXF)
+    ///     ``"obj"``, ``"sdf"``, ``"urdf"``, ``"mjcf"``, ``"usd"``, and to print in two colours ``"3mf"``; of a solid also ``"stl"``, ``"skeleton"``, ``"skeleton-3mf"``, ``"panels"`` (DXF)
     ///     and ``"net"`` (DXF).
     /// dpi : float, optional
     ///     Resolution of PNG pages, dots per inch.

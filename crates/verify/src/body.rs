@@ -1,4 +1,4 @@
-//! Verification of bodies to print, as STL: a closed surface with its normals outwards and of the
+//! Verification of bodies to print, as STL, and of skeletons as 3MF: a closed surface with its normals outwards and of the
 //! stated shape.
 //!
 //! A skeleton, which holds a panel on each face, is probed from outside with rays: on the ribs they
@@ -21,14 +21,13 @@ use rayon::prelude::*;
 use rstar::RTree;
 use rstar::primitives::GeomWithData;
 
-use super::model::{Facet, load_stl};
-use super::reader::Reader;
+use super::model::Facet;
 use super::solid::{MeshFinding, is_other_mesh, other_count};
 use super::{BodyVerdict, DocumentError, Finding, Format, MESH_TOLERANCE_MM, Verdict, Verifier};
 use deltille_core::targets::{
     ClosedMesh, Incircle, Polyhedron, Skeleton, SkeletonSpec, TargetSpec,
 };
-use deltille_files::export::stl::skeleton_name;
+use deltille_files::export::{stl, threemf};
 
 /// Tolerance of the distance of a stated unit normal from that of its triangle: vertices are in
 /// single precision, and some triangles are small.
@@ -48,16 +47,16 @@ const SAME_MIDDLE: usize = 4;
 /// Positions along a side of a face, as fractions of its length, at which rays are sent.
 const PLACES: [f64; 3] = [0.15, 0.5, 0.85];
 
-/// Reads the STL of a solid or of its skeleton and compares it with the target.
+/// Compares the triangles of a solid or of its skeleton, as the file is named, with the target.
 ///
 /// # Errors
 ///
-/// The file cannot be read as a binary STL, the target is no solid, or the file is named as a
-/// skeleton and the target has none. Deviations are findings of the verdict.
+/// The target is no solid, or the file is named as a skeleton and the target has none. Deviations are findings of the verdict.
 pub(super) fn verify(
     verifier: &Verifier,
-    reader: &Reader,
     path: &Path,
+    facets: &[Facet],
+    format: Format,
 ) -> Result<Verdict, DocumentError> {
     let unreadable = |problem: &str| DocumentError::unreadable(path, problem);
     let target = verifier.target;
@@ -65,7 +64,6 @@ pub(super) fn verify(
         return Err(unreadable("the target is no solid"));
     };
     let artifact = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
-    let facets = load_stl(reader, path)?;
     let solid = spec.polyhedron();
     let mut body = BodyVerdict {
         triangles: facets.len(),
@@ -73,7 +71,9 @@ pub(super) fn verify(
         seats: 0,
         max_deviation_mm: 0.0,
     };
-    let is_skeleton = artifact.ends_with(&skeleton_name(""));
+    let is_skeleton = [stl::skeleton_name(""), threemf::skeleton_name("")]
+        .iter()
+        .any(|end| artifact.ends_with(end));
     let skeleton = match spec.skeleton.as_ref().filter(|_| is_skeleton) {
         Some(skeleton) => Some((
             Skeleton::new(&solid, skeleton).map_err(|error| unreadable(&error.to_string()))?,
@@ -90,17 +90,17 @@ pub(super) fn verify(
     if is_other_mesh(facets.len(), stated.len()) {
         findings.extend(other_count(facets.len(), stated.len()));
     } else {
-        findings = check_surface(&facets);
+        findings = check_surface(facets);
         let wrong_seats = skeleton.map_or_else(Vec::new, |(skeleton, spec)| {
-            check_seats(&facets, &solid, (&skeleton, spec), &mut body)
+            check_seats(facets, &solid, (&skeleton, spec), &mut body)
         });
         // Where a seat is wrong, its triangles would only repeat that.
         if wrong_seats.is_empty() {
-            check_triangles(&facets, &stated, &mut body, &mut findings);
+            check_triangles(facets, &stated, &mut body, &mut findings);
         }
         findings.extend(wrong_seats);
     }
-    Ok(Verdict { body: Some(body), ..Verdict::new(path, Format::Stl, findings) })
+    Ok(Verdict { body: Some(body), ..Verdict::new(path, format, findings) })
 }
 
 /// Findings unless the surface is closed, in one piece and oriented outwards, and the stated normals

@@ -32,6 +32,8 @@
 //! within [`MESH_TOLERANCE_MM`] of its stated position in space. The texture on each face is then
 //! laid out flat and compared like a sheet: every tile, every cell of every tag, and no other mark.
 //! Models for simulators (`.sdf`, `.urdf`, `.xml` of MuJoCo) must put that mesh in its place; a `.usda` holds it.
+//! Of two bodies to print in two colours (`.3mf`), each must be closed, the black one fill what the white one leaves of the
+//! plate, and the surface of both is compared like a printed page.
 //! A body to print (`.stl`) must be a closed surface with its normals outwards and of the stated
 //! shape.
 //!
@@ -58,6 +60,7 @@ mod face_page;
 mod finding;
 mod fit;
 mod fold;
+mod inlay;
 mod listing;
 mod marks;
 mod model;
@@ -94,7 +97,8 @@ pub use fold::FOLD_TOLERANCE_MM;
 pub use reader::Artifact;
 pub use solid::MESH_TOLERANCE_MM;
 pub use verdict::{
-    BodyVerdict, CutVerdict, FaceVerdict, FoldVerdict, ListVerdict, SheetVerdict, Verdict,
+    BodyVerdict, CutVerdict, FaceVerdict, FoldVerdict, InlayVerdict, ListVerdict, SheetVerdict,
+    Verdict,
 };
 
 /// Largest deviation of a position or a length on paper, mm: a fifth of the error of a good
@@ -131,7 +135,7 @@ pub enum VerifyError {
     },
     /// The file name has no extension of a known [`Format`].
     #[error(
-        "{}: only .pdf, .svg, .png, .glb, .obj, .sdf, .urdf, .xml (MuJoCo), .usda, .stl, .dsc and .dxf files are \
+        "{}: only .pdf, .svg, .png, .glb, .obj, .sdf, .urdf, .xml (MuJoCo), .usda, .3mf, .stl, .dsc and .dxf files are \
          compared with their target",
         path.display()
     )]
@@ -390,6 +394,7 @@ impl<'a> Verifier<'a> {
             Format::Sdf | Format::Urdf | Format::Mjcf => {
                 return scene::verify(self, reader, path, format);
             }
+            Format::ThreeMf => return Ok(inlay::verify(self, reader, path)?),
             Format::Glb | Format::Obj | Format::Usda | Format::Stl => {}
         }
         let (refused, parts) = construct::check(reader, path, format, self.target)?;
@@ -397,7 +402,7 @@ impl<'a> Verifier<'a> {
             return Ok(Verdict::new(path, format, refused));
         }
         let mut verdict = match format {
-            Format::Stl => body::verify(self, reader, path)?,
+            Format::Stl => body::verify(self, path, &model::load_stl(reader, path)?, format)?,
             _ => solid::verify(self, path, model::load(reader, path, parts)?, format),
         };
         verdict.passed &= refused.is_empty();

@@ -31,6 +31,9 @@ pub struct Verdict {
     /// Result for a body to print; `None` for other files.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub body: Option<BodyVerdict>,
+    /// Result for two bodies to print; `None` for other files.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub inlay: Option<InlayVerdict>,
     /// Result for a list for other detectors; `None` for other files.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub list: Option<ListVerdict>,
@@ -79,6 +82,23 @@ pub struct BodyVerdict {
     pub seats: usize,
     /// Largest distance of a vertex, or of the floor of a seat, from its stated position, mm.
     pub max_deviation_mm: f64,
+}
+
+/// The result for a black body that is inlaid into a white one.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+#[non_exhaustive]
+pub struct InlayVerdict {
+    /// Triangles of both.
+    pub triangles: usize,
+    /// Depth of the black body, mm.
+    pub inlay_mm: f64,
+    /// Thickness of the plate of a board, mm.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub plate_mm: Option<f64>,
+    /// Volume of the white body, mm³.
+    pub white_mm3: f64,
+    /// Volume of the black body, mm³.
+    pub black_mm3: f64,
 }
 
 /// The result for one face of a mesh.
@@ -162,6 +182,7 @@ impl Verdict {
             sheets: Vec::new(),
             faces: Vec::new(),
             body: None,
+            inlay: None,
             list: None,
             cut: None,
         }
@@ -186,6 +207,16 @@ impl fmt::Display for CutVerdict {
     }
 }
 
+impl fmt::Display for InlayVerdict {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { triangles, inlay_mm, plate_mm, white_mm3, black_mm3 } = self;
+        let [white, black] = [white_mm3, black_mm3].map(|mm3| mm3 / 1e3);
+        write!(f, "verified, two closed bodies of {}, ", counted(*triangles, "triangle"))?;
+        write!(f, "{black:.2} cm³ black {inlay_mm:.2} mm deep in {white:.2} cm³ white")?;
+        plate_mm.map_or(Ok(()), |mm| write!(f, ", {mm:.2} mm thick"))
+    }
+}
+
 impl fmt::Display for Verdict {
     /// One line: what was proved, or what is wrong.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
@@ -203,6 +234,18 @@ impl fmt::Display for Verdict {
             return match seats {
                 0 => write!(f, "vertices within {max_deviation_mm:.4} mm"),
                 _ => write!(f, "{} within {max_deviation_mm:.4} mm", counted(*seats, "seat")),
+            };
+        }
+        if let Some(inlay) = self.inlay.as_ref().filter(|_| self.passed) {
+            write!(f, "{inlay}")?;
+            let sum =
+                |count: fn(&SheetVerdict) -> usize| self.sheets.iter().map(count).sum::<usize>();
+            let deviation = self.sheets.iter().map(|s| s.max_deviation_mm).fold(0.0, f64::max);
+            let corners = counted(sum(|s| s.corners_found), "corner");
+            write!(f, ", {corners} within {deviation:.4} mm")?;
+            return match sum(|s| s.tags_exact) {
+                0 => Ok(()),
+                tags => write!(f, ", {} exact", counted(tags, "tag")),
             };
         }
         if self.passed && !self.faces.is_empty() {

@@ -6,9 +6,10 @@ use std::sync::LazyLock;
 use deltille::artwork;
 use deltille::detect::{Detector, DetectorConfig};
 use deltille::export::dsc::{self, Dialect};
+use deltille::export::inlay::InlaidBodies;
 use deltille::export::mesh::{Meshing, TexturedMesh};
 use deltille::export::{detection, dxf, gltf, obj as obj_writer, pdf as pdf_writer};
-use deltille::export::{png, stl as stl_writer, svg as svg_writer};
+use deltille::export::{png, stl as stl_writer, svg as svg_writer, threemf};
 use deltille::family::Family;
 use deltille::lattice::GridKind;
 use deltille::photograph;
@@ -119,6 +120,10 @@ pub fn glb() -> Vec<u8> {
 pub fn stl() -> Vec<u8> {
     let TargetSpec::Solid(spec) = &SOLID.spec else { unreachable!("it was built as one") };
     stl_writer::to_bytes("t", &spec.polyhedron().triangles_mm())
+}
+
+pub fn threemf() -> Vec<u8> {
+    threemf::to_bytes(&InlaidBodies::new(&BOARD, Some(&FAMILY), Meshing::default()).unwrap())
 }
 
 pub fn dxf() -> Vec<u8> {

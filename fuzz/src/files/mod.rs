@@ -53,6 +53,7 @@ pub const READERS: &[Reader] = &[
     of("verify_glb", Form::Glb, "glb", good::glb, read::solid),
     of("verify_obj", Form::Text, "obj", good::obj, read::solid),
     of("verify_stl", Form::Bytes, "stl", good::stl, read::solid),
+    of("verify_3mf", Form::Bytes, "3mf", good::threemf, read::page),
     of("verify_dxf", Form::Text, "dxf", good::dxf, read::solid),
 ];
 

@@ -189,7 +189,9 @@ fn is_of_target(name: &str, stem: &str) -> bool {
         None => part.is_empty(),
         Some(part) => is_page(part) || ["texture", "skeleton", "panels", "net"].contains(&part),
     };
-    is_part && ["pdf", "svg", "png", "dsc", "glb", "obj", "mtl", "stl", "dxf"].contains(&extension)
+    is_part
+        && ["pdf", "svg", "png", "dsc", "glb", "obj", "mtl", "stl", "dxf", "3mf"]
+            .contains(&extension)
 }
 
 #[cfg(test)]

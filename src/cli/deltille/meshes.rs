@@ -5,14 +5,16 @@
 use std::collections::BTreeMap;
 use std::ops::RangeInclusive;
 
-use anyhow::anyhow;
+use anyhow::{Context, anyhow};
 
 use super::files::{File, bytes_file};
 use crate::cli::values::{number, whole};
-use crate::export::artifacts::{What, of_mesh};
+use crate::export::artifacts::{Making, What, make, of_mesh};
+use crate::export::inlay::InlaidBodies;
 use crate::export::mesh::{MAX_TEXTURE_PX, MeshError, Meshing, Resolution, TexturedMesh};
+use crate::export::threemf;
 use crate::family::Family;
-use crate::targets::Target;
+use crate::targets::{Target, TargetSpec, parse_length_mm};
 
 /// Heading of these options.
 pub const MESHES: &str = "Meshes and models for simulators";
@@ -43,6 +45,13 @@ pub struct Meshes {
     /// Write <name>.usda, for Isaac Sim, Omniverse or Blender, with its texture (metres)
     #[arg(long)]
     usd: bool,
+    /// Write <name>.3mf to print in two colours: two bodies, what is black inlaid into the white
+    /// plate or solid (millimetres); with --skeleton also <name>-skeleton.3mf
+    #[arg(long = "3mf")]
+    threemf: bool,
+    /// Depth of what is black in a 3MF, less than the plate is thick, or than where faces meet [default: 0.4mm]
+    #[arg(long, value_name = "LENGTH", value_parser = parse_length_mm)]
+    inlay: Option<f64>,
     /// Longest side of the texture, px; at least 4 px are needed for a bit of a tag, of a
     /// checkerboard 12 [default: 20 px for a bit, or as many as 16384 px take]
     #[arg(long, value_name = "PX", allow_negative_numbers = true, value_parser = whole(SIDE_PX))]
@@ -56,6 +65,11 @@ pub struct Meshes {
 impl Meshes {
     /// Whether any is asked for.
     pub fn is_any(&self) -> bool {
+        self.is_textured() || self.threemf
+    }
+
+    /// Whether any with a texture is asked for.
+    fn is_textured(&self) -> bool {
         self.gltf || self.obj || self.sdf || self.urdf || self.mjcf || self.usd
     }
 
@@ -71,14 +85,16 @@ impl Meshes {
 
     /// Refuses options of a mesh that is not made.
     pub fn check_use(&self, plate_mm: Option<f64>) -> anyhow::Result<()> {
+        let (textured, any) = (self.is_textured(), self.is_any());
         let options = [
-            ("--texture", self.texture.is_some()),
-            ("--texture-dpi", self.texture_dpi.is_some()),
-            ("--plate", plate_mm.is_some()),
+            ("--texture", self.texture.is_some(), textured, "a mesh: add --gltf"),
+            ("--texture-dpi", self.texture_dpi.is_some(), textured, "a mesh: add --gltf"),
+            ("--plate", plate_mm.is_some(), any, "a mesh: add --gltf"),
+            ("--inlay", self.inlay.is_some(), self.threemf, "two bodies: add --3mf"),
         ];
-        let given = options.into_iter().find(|(_, given)| *given && !self.is_any());
-        given.map_or(Ok(()), |(option, _)| {
-            Err(anyhow!("{option}: it says nothing without a mesh: add --gltf, or leave it out"))
+        let idle = options.into_iter().find(|(_, is_given, is_used, _)| *is_given && !is_used);
+        idle.map_or(Ok(()), |(option, .., without)| {
+            Err(anyhow!("{option}: it says nothing without {without}, or leave it out"))
         })
     }
 
@@ -89,11 +105,33 @@ impl Meshes {
         family: Option<&Family>,
         plate_mm: Option<f64>,
     ) -> anyhow::Result<(Vec<File>, String)> {
-        if !self.is_any() {
-            return Ok((Vec::new(), String::new()));
-        }
         let mut meshing = Meshing::default();
         meshing.plate_mm = plate_mm.unwrap_or(meshing.plate_mm);
+        meshing.inlay_mm = self.inlay.unwrap_or(meshing.inlay_mm);
+        let (mut files, told) = match self.is_textured() {
+            true => self.textured(target, family, meshing)?,
+            false => (Vec::new(), String::new()),
+        };
+        if self.threemf {
+            let bodies = InlaidBodies::new(target, family, meshing);
+            let bodies = bodies.map_err(|error| refusal(&error, Some("--3mf")))?;
+            files.push(bytes_file(format!("{}.3mf", target.name), threemf::to_bytes(&bodies)));
+            if matches!(&target.spec, TargetSpec::Solid(spec) if spec.skeleton.is_some()) {
+                let skeleton = make(target, family, What::Skeleton3mf, Making::default());
+                let skeleton = skeleton.context("--3mf")?.into_iter();
+                files.extend(skeleton.map(|(name, bytes)| bytes_file(name, bytes)));
+            }
+        }
+        Ok((files, told))
+    }
+
+    /// The files with a texture that are asked for, and a line on it.
+    fn textured(
+        &self,
+        target: &Target,
+        family: Option<&Family>,
+        mut meshing: Meshing,
+    ) -> anyhow::Result<(Vec<File>, String)> {
         let option = match (self.texture, self.texture_dpi) {
             (Some(side), _) => {
                 meshing.resolution = Resolution::Side(side);
@@ -105,14 +143,8 @@ impl Meshes {
             }
             (None, None) => None,
         };
-        let mesh = TexturedMesh::new(target, family, meshing).map_err(|error| {
-            let option = match &error {
-                MeshError::Thickness(_) => Some("--plate"),
-                MeshError::SeveralBoards(..) => Some("--boards"),
-                _ => option,
-            };
-            option.map_or_else(|| anyhow!("{error}"), |option| anyhow!("{option}: {error}"))
-        })?;
+        let mesh = TexturedMesh::new(target, family, meshing);
+        let mesh = mesh.map_err(|error| refusal(&error, option))?;
         let asked = [
             (self.gltf, What::Gltf),
             (self.obj, What::Obj),
@@ -131,4 +163,15 @@ impl Meshes {
         let texels = texels.map_or(String::new(), |px| format!(", {px:.1} px for a bit of a tag"));
         Ok((files, format!("\ntexture: {width} × {height} px{texels}")))
     }
+}
+
+/// Why there is no mesh, with the option that is at fault; where no other is, that is `option`.
+fn refusal(error: &MeshError, option: Option<&str>) -> anyhow::Error {
+    let option = match error {
+        MeshError::Thickness(_) => Some("--plate"),
+        MeshError::ThinInlay(_) | MeshError::DeepInlay { .. } => Some("--inlay"),
+        MeshError::SeveralBoards(..) => Some("--boards"),
+        _ => option,
+    };
+    option.map_or_else(|| anyhow!("{error}"), |option| anyhow!("{option}: {error}"))
 }

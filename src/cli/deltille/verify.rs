@@ -16,7 +16,7 @@ use crate::cli::output::{self, Overwrite, Telling, say, tell};
 use crate::cli::progress;
 use crate::cli::run::{self, FAILED};
 use crate::export::kind::Kind;
-use crate::export::{sheet_file_name, stl};
+use crate::export::{sheet_file_name, stl, threemf};
 use crate::family::Family;
 use crate::limits::Limits;
 use crate::targets::Target;
@@ -63,7 +63,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     if artifacts.is_empty() {
         let name = &target.name;
         bail!(
-            "no {name}.pdf, .svg, .png, .glb, .obj, .sdf, .urdf, .xml, .usda, .stl, .dsc or .dxf beside {}: name the files",
+            "no {name}.pdf, .svg, .png, .glb, .obj, .sdf, .urdf, .xml, .usda, .3mf, .stl, .dsc or .dxf beside {}: name the files",
             args.target.display()
         );
     }
@@ -148,10 +148,11 @@ fn artifacts_beside(folder: &Path, target: &Target) -> Vec<PathBuf> {
     });
     let printed = [format!("{name}.pdf")].into_iter().chain(drawn).filter_map(present);
     let printed: Vec<PathBuf> = printed.collect();
-    let meshes = ["glb", "obj", "sdf", "urdf", "xml", "usda", "stl", "dsc"];
+    let meshes = ["glb", "obj", "sdf", "urdf", "xml", "usda", "3mf", "stl", "dsc"];
     let meshes = meshes.map(|extension| format!("{name}.{extension}"));
-    let more = [stl::skeleton_name(name), format!("{name}-panels.dxf"), format!("{name}-net.dxf")];
-    let meshes = meshes.into_iter().chain(more).filter_map(present);
+    let skeletons = [stl::skeleton_name(name), threemf::skeleton_name(name)];
+    let more = [format!("{name}-panels.dxf"), format!("{name}-net.dxf")];
+    let meshes = meshes.into_iter().chain(skeletons).chain(more).filter_map(present);
     if target.sheets.is_empty() {
         for path in printed {
             tell!(

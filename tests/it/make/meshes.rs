@@ -3,6 +3,11 @@
 
 use crate::common::command::deltille;
 use crate::common::page::Page;
+use deltille::export::inlay::{Body, InlaidBodies};
+use deltille::export::mesh::Meshing;
+use deltille::export::threemf;
+use deltille::targets::{BoardSpec, Target};
+use deltille::verify::{Artifact, verify};
 use glam::DVec3;
 
 /// What a target is in all formats of meshes.
@@ -26,6 +31,86 @@ fn boards_and_solids_are_models_for_simulators() {
     page.run(at, "deltille board --rows 5 --cols 6 --edge 400mm --name wall --gltf --texture 900");
     page.run(at, "deltille verify desk.json desk.xml desk.urdf");
     page.is("meshes");
+}
+
+#[test]
+fn boards_and_solids_are_two_bodies_to_print() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    let mut page = Page::default();
+    for arguments in [
+        "board --rows 5 --cols 6 --edge 30mm --name desk",
+        "board --rows 5 --cols 6 --edge 20mm --name black --invert --plate 5mm --inlay 0.6mm",
+        "board --rows 7 --cols 8 --edge 20mm --name patches --dense",
+        "checkerboard --rows 4 --cols 5 --edge 30mm --name squares --tags t25h9",
+        "octahedron --edge 100mm --tiles 6 --name eight --skeleton",
+    ] {
+        page.run(at, &format!("deltille {arguments} --3mf"));
+    }
+    page.run(at, "deltille verify desk.json squares.3mf");
+    page.is("inlays");
+}
+
+/// What is wrong with the bodies of a board, after they were changed.
+fn verdict_on(change: impl FnOnce(&mut InlaidBodies)) -> String {
+    let board = Target::new("desk", BoardSpec::deltille(3, 4, 20.0)).unwrap();
+    let family = board.family().unwrap();
+    let mut bodies = InlaidBodies::new(&board, family.as_ref(), Meshing::default()).unwrap();
+    change(&mut bodies);
+    let file = [Artifact::new("desk.3mf", threemf::to_bytes(&bodies))];
+    verify(&board, family.as_ref(), "desk.3mf", &file).unwrap().to_string()
+}
+
+#[test]
+fn bodies_that_were_changed_are_refused() {
+    assert!(verdict_on(|_| {}).contains("verified, two closed bodies"));
+    let moved = |body: &mut Body, by: DVec3| body.vertices_mm.iter_mut().for_each(|v| *v += by);
+    for (verdict, expected) in [
+        (
+            verdict_on(|bodies| {
+                bodies.black.triangles.pop();
+            }),
+            "black body: the surface is open",
+        ),
+        (verdict_on(|bodies| bodies.white.triangles.push([0, 1, 2])), "white body: triangles that"),
+        (verdict_on(|bodies| moved(&mut bodies.black, 0.03 * DVec3::X)), "overlap, or leave"),
+        (verdict_on(|bodies| bodies.black.vertices_mm[0].x += 0.1), "neither on a face nor a wall"),
+        (verdict_on(|bodies| std::mem::swap(&mut bodies.white, &mut bodies.black)), "FAILED"),
+        (
+            verdict_on(|bodies| {
+                bodies.subject = bodies.subject.replace("corners", "knots");
+            }),
+            "Description",
+        ),
+        (
+            verdict_on(|bodies| {
+                for body in [&mut bodies.white, &mut bodies.black] {
+                    body.vertices_mm.iter_mut().for_each(|v| *v *= 1.001);
+                }
+            }),
+            "neither on a face",
+        ),
+    ] {
+        assert!(verdict.contains("FAILED") && verdict.contains(expected), "{expected}: {verdict}");
+    }
+}
+
+#[test]
+fn a_small_file_that_unpacks_to_a_large_one_is_not_unpacked() {
+    let board = Target::new("desk", BoardSpec::deltille(3, 4, 20.0)).unwrap();
+    let family = board.family().unwrap();
+    let bodies = InlaidBodies::new(&board, family.as_ref(), Meshing::default()).unwrap();
+    let mut file = threemf::to_bytes(&bodies);
+    // The length of the model, in its entry of the directory and before it.
+    let name = b"3D/3dmodel.model";
+    let names: Vec<usize> =
+        (0..file.len() - name.len()).filter(|&at| file[at..].starts_with(name)).collect();
+    for (at, before) in [(names[names.len() - 2], 8), (names[names.len() - 1], 22)] {
+        file[at - before..at - before + 4].copy_from_slice(&900_000_000u32.to_le_bytes());
+    }
+    let verdict = verify(&board, family.as_ref(), "desk.3mf", &[Artifact::new("desk.3mf", file)]);
+    let error = verdict.unwrap_err().to_string();
+    assert!(error.contains("max_bytes"), "{error}");
 }
 
 #[test]
@@ -78,6 +163,12 @@ fn meshes_that_cannot_be_made_are_refused_in_a_line() {
         "board --rows 5 --cols 6 --pdf --texture 1000",
         "board --rows 400 --cols 400 --edge 20mm --gltf",
         "icosahedron --stl --texture 1000",
+        "board --rows 5 --cols 6 --3mf --boards 2",
+        "board --rows 5 --cols 6 --3mf --inlay 3mm",
+        "board --rows 5 --cols 6 --3mf --inlay 0.01mm",
+        "board --rows 5 --cols 6 --gltf --inlay 0.4mm",
+        "board --rows 5 --cols 6 --3mf --texture 1000",
+        "icosahedron --3mf --inlay 20mm",
     ] {
         page.refused(at, &format!("deltille {arguments}"));
     }

@@ -15,10 +15,11 @@ use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
 use super::dsc::{self, Dialect, DscError};
+use super::inlay::InlaidBodies;
 use super::kind::Kind;
 use super::mesh::{MeshError, Meshing, TexturedMesh};
 use super::staging::Staging;
-use super::{atomic, dxf, gltf, obj, pdf, png, scene, sheet_file_name, stl, svg};
+use super::{atomic, dxf, gltf, obj, pdf, png, scene, sheet_file_name, stl, svg, threemf};
 use crate::limits::{Limits, ReadError};
 use deltille_core::artwork::{self, ArtworkError, CuttingError};
 use deltille_core::family::Family;
@@ -53,10 +54,14 @@ pub enum What {
     Mjcf,
     /// `<name>.usda`, with its texture.
     Usd,
+    /// `<name>.3mf`, two bodies, black inlaid into white, of a solid, or of a plate with a board.
+    ThreeMf,
     /// `<name>.stl`, the bare solid.
     Stl,
     /// `<name>-skeleton.stl` of a solid that has one.
     Skeleton,
+    /// `<name>-skeleton.3mf` likewise.
+    Skeleton3mf,
     /// `<name>-panels.dxf`, outlines of a solid's panels to cut.
     Panels,
     /// `<name>-net.dxf`, the net of a solid to cut and fold.
@@ -66,8 +71,8 @@ pub enum What {
 /// A text that is nothing that can be made.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error(
-    "`{0}` is no format: json, pdf, svg, png, dsc, dsc-original, gltf, obj, sdf, urdf, mjcf, usd, stl, skeleton, panels \
-     or net"
+    "`{0}` is no format: json, pdf, svg, png, dsc, dsc-original, gltf, obj, sdf, urdf, mjcf, usd, 3mf, stl, skeleton, \
+     skeleton-3mf, panels or net"
 )]
 pub struct WhatError(String);
 
@@ -88,8 +93,10 @@ impl FromStr for What {
             "urdf" => Self::Urdf,
             "mjcf" => Self::Mjcf,
             "usd" | "usda" => Self::Usd,
+            "3mf" => Self::ThreeMf,
             "stl" => Self::Stl,
             "skeleton" => Self::Skeleton,
+            "skeleton-3mf" => Self::Skeleton3mf,
             "panels" => Self::Panels,
             "net" => Self::Net,
             _ => return Err(WhatError(text.to_owned())),
@@ -168,16 +175,18 @@ pub fn make(
         What::Gltf | What::Obj | What::Sdf | What::Urdf | What::Mjcf | What::Usd => {
             of_mesh(&TexturedMesh::new(target, family, making.mesh)?, what)
         }
+        What::ThreeMf => {
+            named(".3mf", threemf::to_bytes(&InlaidBodies::new(target, family, making.mesh)?))
+        }
         What::Stl => {
             named(".stl", stl::to_bytes(name, &solid(target)?.polyhedron().triangles_mm()))
         }
         What::Skeleton => {
-            let spec = solid(target)?;
-            let skeleton = spec.skeleton.as_ref();
-            let skeleton = skeleton.ok_or_else(|| MakeError::NoSkeleton(name.to_string()))?;
-            let skeleton = Skeleton::new(&spec.polyhedron(), skeleton)?;
-            spec.panel_inset_mm()?;
-            vec![(stl::skeleton_name(name), stl::to_bytes(name, &skeleton.triangles_mm))]
+            vec![(stl::skeleton_name(name), stl::to_bytes(name, &skeleton(target)?.triangles_mm))]
+        }
+        What::Skeleton3mf => {
+            let bytes = threemf::skeleton(target, &skeleton(target)?.triangles_mm);
+            vec![(threemf::skeleton_name(name), bytes.map_err(MeshError::from)?)]
         }
         What::Panels => {
             named("-panels.dxf", dxf::text(&artwork::panels_to_cut(target)?).into_bytes())
@@ -210,6 +219,16 @@ fn solid(target: &Target) -> Result<&SolidSpec, MakeError> {
         TargetSpec::Solid(spec) => Ok(spec),
         _ => Err(MakeError::NotSolid(target.name.to_string())),
     }
+}
+
+/// The skeleton of a solid whose panels fit into it.
+fn skeleton(target: &Target) -> Result<Skeleton, MakeError> {
+    let spec = solid(target)?;
+    let skeleton = spec.skeleton.as_ref();
+    let skeleton = skeleton.ok_or_else(|| MakeError::NoSkeleton(target.name.to_string()))?;
+    let skeleton = Skeleton::new(&spec.polyhedron(), skeleton)?;
+    spec.panel_inset_mm()?;
+    Ok(skeleton)
 }
 
 /// The pages of a target.

@@ -2,7 +2,7 @@
 //! another writer.
 //!
 //! Formats with a place for it name their writer: the schema of a JSON, the creator of a PDF, the
-//! software of a PNG, the generator of a glTF, the header of an STL, and a comment in the first
+//! software of a PNG, the generator of a glTF, the first part of a 3MF, the header of an STL, and a comment in the first
 //! lines of a text. Other files are recognised by what they begin with, such as the header of a
 //! CSV, or by the keys of a JSON.
 
@@ -80,6 +80,13 @@ impl Kind {
             signed("Parquet", contains(end, b"deltille "))
         } else if content.starts_with(b"glTF") {
             signed("glTF", contains(glb_json(content), b"\"generator\":\"deltille "))
+        } else if content.starts_with(b"PK\x03\x04") {
+            // The first part of a 3MF of this program is not compressed.
+            let head = &content[..content.len().min(HEAD)];
+            match contains(head, b"3dmanufacturing") || contains(content, b"3D/3dmodel.model") {
+                true => signed("3MF", contains(head, b"<!-- deltille ")),
+                false => Self::words("a ZIP"),
+            }
         } else if content.starts_with(b"deltille ") && content.get(80..84).is_some() {
             signed("STL", true)
         } else {

@@ -4,11 +4,14 @@ use std::io;
 
 use glam::{DVec2, DVec3};
 
+use super::inlay::{INLAY_MM, LEAST_INLAY_MM};
 use super::{GENERATOR, png};
 use deltille_core::artwork::{ArtworkError, Atlas};
 use deltille_core::family::Family;
 use deltille_core::lattice::GridKind;
-use deltille_core::targets::{Panel, SolidSpec, Target, TargetError, TargetSpec, triangles};
+use deltille_core::targets::{
+    ClosedMeshError, Panel, SolidSpec, Target, TargetError, TargetSpec, triangles,
+};
 
 /// Texels along the edge of a cell of a tag, unless another resolution is asked for, so that a viewer sees it sharp at
 /// close range.
@@ -69,6 +72,26 @@ pub enum MeshError {
     /// A thickness that no plate has.
     #[error("a plate cannot be {0} mm thick: give 0.1 to 1000 mm")]
     Thickness(f64),
+    /// An inlay that is thinner than any layer.
+    #[error("an inlay cannot be {0} mm deep: give {LEAST_INLAY_MM} mm or more")]
+    ThinInlay(f64),
+    /// An inlay that is as deep as the plate, or that meets that of another face.
+    #[error("an inlay cannot be {inlay_mm} mm deep there: give less than {most_mm:.2} mm")]
+    DeepInlay {
+        /// Depth of the inlay, mm.
+        inlay_mm: f64,
+        /// Depth at which it reaches through the plate, or meets another, mm.
+        most_mm: f64,
+    },
+    /// A solid that is not convex.
+    #[error("{0} has faces that lean towards each other: it is not made as two bodies")]
+    Dented(String),
+    /// Shapes of the drawing cross each other.
+    #[error("what is drawn on it crosses itself: it cannot be made as two bodies")]
+    Crossing,
+    /// A skeleton is no closed body.
+    #[error("the skeleton cannot be made as one body: {0}")]
+    Skeleton(#[from] ClosedMeshError),
     /// The faces cannot be made.
     #[error(transparent)]
     Target(#[from] TargetError),
@@ -100,11 +123,13 @@ pub struct Meshing {
     pub resolution: Resolution,
     /// Thickness of the plate of a board, mm.
     pub plate_mm: f64,
+    /// Depth of what is dark, mm, where it is a body of its own.
+    pub inlay_mm: f64,
 }
 
 impl Default for Meshing {
     fn default() -> Self {
-        Self { resolution: Resolution::Usual, plate_mm: PLATE_MM }
+        Self { resolution: Resolution::Usual, plate_mm: PLATE_MM, inlay_mm: INLAY_MM }
     }
 }
 

@@ -19,6 +19,8 @@ mod estimate;
 mod finding;
 #[cfg(feature = "meshes")]
 pub mod gltf;
+#[cfg(feature = "meshes")]
+pub mod inlay;
 pub mod kind;
 #[cfg(feature = "meshes")]
 pub mod mesh;
@@ -49,6 +51,8 @@ mod supersample;
 pub mod svg;
 #[cfg(feature = "parquet")]
 pub mod tables;
+#[cfg(feature = "meshes")]
+pub mod threemf;
 pub mod truth;
 pub mod undistortion;
 

@@ -15,6 +15,7 @@ mod pdf_content;
 mod png;
 mod stl;
 mod svg;
+mod threemf;
 pub(crate) mod usda;
 
 use std::path::Path;
@@ -27,6 +28,7 @@ use super::reader::Reader;
 use super::{Artifact, DocumentError, Finding, Format, PageFinding};
 use deltille_core::artwork::subject;
 use deltille_core::targets::Target;
+use deltille_files::export::inlay::Body;
 use deltille_files::export::mesh::extras;
 use deltille_files::export::scene;
 
@@ -194,9 +196,28 @@ pub(super) fn check(
         Format::Urdf => model(&bytes, &scene::urdf(&words.title)),
         Format::Mjcf => model(&bytes, &scene::mjcf(&words.title)),
         // Their readers know nothing but what is written.
-        Format::Obj | Format::Usda | Format::Dsc | Format::Dxf => Ok(Findings::default()),
+        Format::Obj | Format::Usda | Format::ThreeMf | Format::Dsc | Format::Dxf => {
+            Ok(Findings::default())
+        }
     })?;
     Ok((found.0, Vec::new()))
+}
+
+/// Inspects a 3MF that should have bodies of these names, and returns the findings, and the bodies unless there are any.
+///
+/// # Errors
+///
+/// The file cannot be read at all, or exceeds the limits.
+pub(super) fn bodies(
+    reader: &Reader,
+    path: &Path,
+    names: &'static [&str],
+    target: &Target,
+) -> Result<(Vec<Finding>, Vec<Body>), DocumentError> {
+    let (bytes, words, limits) = (reader.read(path)?, Words::of(target), reader.limits);
+    let check = move || threemf::check(&bytes, names, &words, &limits);
+    let (found, bodies) = reader.run(path, check)?;
+    Ok((found.0, bodies))
 }
 
 /// Inspects a model that puts the mesh of an OBJ in its place and does nothing else.
@@ -228,8 +249,17 @@ fn decimal(word: &str) -> Option<f64> {
 
 /// Decompresses zlib data block by block and returns its length: `None` unless the stream ends with
 /// the last byte, its checksum is right, and it is no longer than `most`.
-fn unpack(packed: &[u8], most: u64, mut each: impl FnMut(&[u8])) -> Option<u64> {
-    let mut stream = Decompress::new(true);
+fn unpack(packed: &[u8], most: u64, each: impl FnMut(&[u8])) -> Option<u64> {
+    unpack_by(Decompress::new(true), packed, most, each)
+}
+
+/// Likewise by a stream that expects a head and a checksum, or none.
+fn unpack_by(
+    mut stream: Decompress,
+    packed: &[u8],
+    most: u64,
+    mut each: impl FnMut(&[u8]),
+) -> Option<u64> {
     let mut block = vec![0; 1 << 16];
     loop {
         let (read, before) = (stream.total_in(), stream.total_out());

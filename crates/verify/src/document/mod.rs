@@ -54,11 +54,14 @@ pub enum Format {
     Mjcf,
     /// Universal Scene Description, as text.
     Usda,
+    /// Two bodies to print in two colours.
+    #[serde(rename = "3mf")]
+    ThreeMf,
 }
 
 impl Format {
     /// All formats with the extensions of their files.
-    pub const ALL: [(Self, &str); 12] = [
+    pub const ALL: [(Self, &str); 13] = [
         (Self::Pdf, "pdf"),
         (Self::Svg, "svg"),
         (Self::Png, "png"),
@@ -71,6 +74,7 @@ impl Format {
         (Self::Urdf, "urdf"),
         (Self::Mjcf, "xml"),
         (Self::Usda, "usda"),
+        (Self::ThreeMf, "3mf"),
     ];
 
     /// The format by the extension of a file name; `None` for other extensions.
