@@ -5,6 +5,7 @@ use serde_json::json;
 use crate::cli::output::{self, Telling, say};
 use crate::family::Family;
 use crate::family::places::{BOARDS, PLACES, PatchCertificate, certify_places};
+use crate::words::counted;
 
 /// Tells all about them.
 pub(super) fn about(family: &Family, telling: Telling) -> anyhow::Result<()> {
@@ -60,7 +61,9 @@ pub(super) fn verify(family: &Family) -> (bool, String) {
             format!("two patches of {tiles} tiles differ in {found} cells, not {claimed}"),
         );
     }
-    let distances = certificates.iter().map(|c| format!("{} tiles in {} cells", c.tiles, cells(c)));
+    let distances = certificates
+        .iter()
+        .map(|c| format!("{} tiles in {}", c.tiles, counted(cells(c) as usize, "cell")));
     let distances = distances.collect::<Vec<_>>().join(", ");
     let mirrored = certificates.last().map_or(0, |certificate| certificate.least.mirrored);
     let what = format!(

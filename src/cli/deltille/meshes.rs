@@ -46,7 +46,7 @@ pub struct Meshes {
     #[arg(long)]
     usd: bool,
     /// Write <name>.3mf to print in two colours: two bodies, what is black inlaid into the white
-    /// plate or solid (millimetres); with --skeleton also <name>-skeleton.3mf
+    /// plate or solid (millimetres); of a solid with --skeleton that frame, too
     #[arg(long = "3mf")]
     threemf: bool,
     /// Depth of what is black in a 3MF, less than the plate is thick, or than where faces meet [default: 0.4mm]
