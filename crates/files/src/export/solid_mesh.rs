@@ -40,13 +40,16 @@ const STL_TRIANGLE: usize = 50;
 /// Vertices, and the faces between them by their indices.
 type Faces = (Vec<DVec3>, Vec<Vec<usize>>);
 
+/// Reads them from a file, or says what is wrong with it.
+type Read = fn(&[u8]) -> Result<Faces, String>;
+
 /// Reads a file as one solid, in the unit of the file. Triangles of an STL or a PLY that lie in one plane are one face. The second
 /// value tells whether the surface was inside out.
 ///
 /// # Errors
 /// When the file is not a valid OBJ, STL or PLY, or its faces are not one closed surface of flat, convex faces.
 pub fn read(bytes: &[u8]) -> Result<(ClosedMesh, bool), MeshFileError> {
-    let (format, read): (_, fn(&[u8]) -> Result<Faces, String>) = if bytes.starts_with(b"ply") {
+    let (format, read): (_, Read) = if bytes.starts_with(b"ply") {
         ("PLY", ply)
     } else if is_binary_stl(bytes) || bytes.trim_ascii_start().starts_with(b"solid") {
         ("STL", stl)
