@@ -21,7 +21,8 @@ pub(super) fn run(args: Args) -> anyhow::Result<ExitCode> {
                 "codes": family.len(), "fingerprint": family.fingerprint(),
             })
         });
-        output::print_json(&listed.collect::<Vec<_>>())?;
+        let of_places = json!({ "name": places::NAME, "bits": 9, "boards": places::BOARDS, "places": places::PLACES });
+        output::print_json(&listed.chain([of_places]).collect::<Vec<_>>())?;
         return Ok(ExitCode::SUCCESS);
     }
     say!("{:<12} {:>4} {:>8} {:>8}  fingerprint", "family", "bits", "distance", "codes");

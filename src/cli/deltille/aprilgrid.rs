@@ -7,6 +7,7 @@ use anyhow::Context;
 use super::files::text_file;
 use super::printing::{Printing, page};
 use super::settings::TAGS;
+use crate::cli::output::tell;
 use crate::cli::values::{Grid, number, whole};
 use crate::family;
 use crate::targets::{AprilGridSpec, TargetSpec, parse_length_mm, tag_range};
@@ -56,7 +57,13 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let family = family.as_ref();
     let target = args.printing.build("aprilgrid", &TargetSpec::AprilGrid(spec.clone()), family)?;
     let mut files = args.printing.files(&target, family)?;
-    files.push(text_file(format!("{}.yaml", target.name), spec.to_kalibr_yaml()));
+    match spec.to_kalibr_yaml() {
+        Some(yaml) => files.push(text_file(format!("{}.yaml", target.name), yaml)),
+        None => tell!(
+            "no {}.yaml is written: Kalibr reads tags of aprilTag36h11 with a border of 2 bits only",
+            target.name
+        ),
+    }
     let [columns, rows] = spec.tags;
     let last = spec.first_id + spec.count() - 1;
     let summary = format!(

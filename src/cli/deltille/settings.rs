@@ -274,6 +274,11 @@ impl Settings {
         if grid == GridKind::Checker && self.dense {
             bail!("--dense: place codes are for triangles: take `deltille board`");
         }
+        if self.dense && (self.family.is_some() || self.untagged) {
+            bail!(
+                "--dense: a board of place codes has no other tags: leave --family and --untagged out"
+            );
+        }
         let family = if self.dense { Some(places::NAME) } else { self.family.as_deref() };
         let usual = TagSpec::usual(grid, family, self.tags_in.unwrap_or_default());
         let tagged = !self.untagged && (grid == GridKind::Deltille || self.family.is_some());

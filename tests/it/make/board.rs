@@ -103,6 +103,26 @@ fn dense_boards_have_a_place_code_in_every_tile_also_by_template_and_on_solids()
     deltille(folder.path()).args("verify d.json".split(' ')).assert().success();
 }
 
+/// Boards beside each other are not taken for one.
+#[test]
+fn boards_that_are_packed_on_a_sheet_are_proved_each() {
+    let folder = tempfile::tempdir().unwrap();
+    for (args, boards, sheets) in [
+        ("board --rows 3 --cols 4 --boards 4", 4, 1),
+        // Without an edge, the largest that fits: one board fills the paper.
+        ("board --rows 4 --cols 5 --boards 2 --paper A4", 2, 2),
+        ("board --dense --rows 5 --cols 6 --edge 8mm --boards 9 --paper A4 --invert", 9, 1),
+        ("checkerboard --rows 4 --cols 5 --edge 15mm --tags t36h11 --boards 7 --paper A4", 7, 2),
+    ] {
+        let args = format!("{args} --pack --json --name packed --force");
+        let made = deltille(folder.path()).args(args.split(' ')).assert().success();
+        let told: serde_json::Value = serde_json::from_slice(&made.get_output().stdout).unwrap();
+        assert_eq!(told["proof"]["passed"], true, "{args}");
+        let target = read(&folder.path().join("packed.json"));
+        assert_eq!((target.panels.len(), target.sheets.len()), (boards, sheets), "{args}");
+    }
+}
+
 #[test]
 fn every_sample_template_makes_a_board() {
     let templates = Path::new(env!("CARGO_MANIFEST_DIR")).join("templates");
@@ -167,6 +187,9 @@ fn what_cannot_be_made_is_refused_with_the_option_to_change() {
         "--dense --board-id 255",
         "--family dense9 --first-id 3",
         "--dense --rows 300 --cols 300 --edge 2mm",
+        "--dense --rows 4 --cols 4",
+        "--pack --poster",
+        "--pack --rows 4 --cols 5 --edge 60mm --paper A4",
     ] {
         let size = if args.contains("--rows") { "" } else { "--rows 10 --cols 11 " };
         page.refused(at, &format!("deltille board {size}-o out {args}"));

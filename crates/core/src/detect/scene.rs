@@ -2,6 +2,7 @@
 
 use std::collections::BTreeSet;
 
+use crate::family::places;
 use crate::lattice::GridKind;
 use crate::targets::Target;
 
@@ -28,8 +29,8 @@ pub enum SceneError {
     },
     /// Targets that show the same tags.
     #[error(
-        "{first} and {second} both show tag {id} of {family}: make one of them with other ids, by \
-         `TagSpec::first_id`"
+        "{first} and {second} both show tag {id} of {family}: make one of them with other ids, by {}",
+        if family == places::NAME { "`BoardSpec::board_id`" } else { "`TagSpec::first_id`" }
     )]
     SameTag {
         /// A target.

@@ -68,10 +68,14 @@ impl AprilGridSpec {
         self.tags[0] * self.tags[1]
     }
 
-    /// The target file of Kalibr. It has no place for the family and the border, which must be those of
-    /// [`Self::new`].
-    pub fn to_kalibr_yaml(&self) -> String {
+    /// The target file of Kalibr, if that reads the grid: it has no place for the family and the border, which must be those
+    /// of [`Self::new`].
+    pub fn to_kalibr_yaml(&self) -> Option<String> {
         let Self { tags: [columns, rows], tag_mm, gap, first_id, .. } = self;
+        let known = Self::new(self.tags, self.tag_mm);
+        if (&self.family, self.border_bits) != (&known.family, known.border_bits) {
+            return None;
+        }
         let lines = [
             "target_type: 'aprilgrid'".to_owned(),
             format!("tagCols: {columns}"),
@@ -80,7 +84,7 @@ impl AprilGridSpec {
             format!("tagSpacing: {gap:?}  # width of the gaps, in tags"),
             format!("codeOffset: {first_id}"),
         ];
-        lines.map(|line| line + "\n").concat()
+        Some(lines.map(|line| line + "\n").concat())
     }
 
     fn check(&self) -> Result<(), TargetError> {
@@ -244,7 +248,7 @@ mod tests {
 
     #[test]
     fn kalibr_reads_what_is_written() {
-        let yaml = AprilGridSpec::new([6, 5], 88.0).to_kalibr_yaml();
+        let yaml = AprilGridSpec::new([6, 5], 88.0).to_kalibr_yaml().unwrap();
         let lines: Vec<&str> = yaml.lines().collect();
         assert_eq!(lines[..3], ["target_type: 'aprilgrid'", "tagCols: 6", "tagRows: 5"]);
         assert!(

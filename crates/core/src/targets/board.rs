@@ -194,6 +194,24 @@ mod tests {
         assert!(tiles.len() >= 10, "{}", tiles.len());
     }
 
+    /// And smaller ones.
+    #[test]
+    fn places_of_boards_of_256_rows_and_columns_are_different() {
+        use crate::family::places::{are_different, id};
+        for (rows, cols) in
+            [(256, 256), (256, 30), (30, 257), (257, 257), (300, 40), (20, 258), (500, 500)]
+        {
+            let ids: std::collections::BTreeSet<u32> =
+                zigzag_vertices(rows, cols).map(|tile| id(0, tile)).collect();
+            assert!(
+                !are_different(rows, cols) || ids.len() as u32 == rows * cols,
+                "{rows} × {cols}"
+            );
+        }
+        assert!(are_different(256, 256));
+        assert!(!are_different(500, 500));
+    }
+
     proptest! {
         #[test]
         fn every_board_is_a_zigzag_rectangle(rows in 3u32..30, cols in 3u32..30) {

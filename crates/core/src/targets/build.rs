@@ -240,6 +240,10 @@ pub fn usual_edge_mm(spec: &BoardSpec, paper: &PaperSpec) -> f64 {
 pub fn largest_edge_mm(spec: &BoardSpec, paper: &PaperSpec) -> Option<f64> {
     // A metre fits next to nothing, and the refusal proposes an edge that does.
     let probe = BoardSpec { edge_mm: 1000.0, ..spec.clone() };
+    if paper.packed {
+        let of_edge = |mm: u32| BoardSpec { edge_mm: f64::from(mm), ..spec.clone() };
+        return (5..=1000).rev().find(|&mm| packed::fits(&of_edge(mm), paper)).map(f64::from);
+    }
     match arrange(&probe, paper) {
         Ok(_) => Some(probe.edge_mm),
         Err(TargetError::DoesNotFit { fitting_edge_mm, .. }) => fitting_edge_mm.map(f64::from),

@@ -61,8 +61,8 @@ pub enum TargetError {
     /// The board is too large for the paper.
     #[error(
         "`PaperSpec::size`: {rows} × {cols} corners with {edge} edges and what is printed around them do \
-         not fit {paper}: take larger paper, several pages by `PaperSpec::poster`, fewer `BoardSpec::rows` or \
-         `BoardSpec::cols`, or {}",
+         not fit {paper}: take larger paper, {}fewer `BoardSpec::rows` or `BoardSpec::cols`, or {}",
+        if *packed { "" } else { "several pages by `PaperSpec::poster`, " },
         match fitting_edge_mm {
             Some(mm) => format!("`BoardSpec::edge_mm` of at most {mm} mm"),
             None => "a smaller `PaperSpec::margin_mm`".to_owned(),
@@ -77,6 +77,8 @@ pub enum TargetError {
         edge: String,
         /// The paper, such as `A4`.
         paper: String,
+        /// Whether there are to be several boards on a sheet.
+        packed: bool,
         /// Largest edge in whole millimetres that fits.
         fitting_edge_mm: Option<u32>,
     },

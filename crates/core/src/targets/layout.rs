@@ -140,6 +140,7 @@ pub(super) fn does_not_fit(
             (Some(size), Orientation::Portrait) => format!("{size} portrait"),
             (Some(size), Orientation::Landscape) => format!("{size} landscape"),
         },
+        packed: paper.packed,
         fitting_edge_mm: (LEAST_PROPOSED_MM..=spec.edge_mm.ceil() as u32)
             .rev()
             .find(|&mm| fits(&BoardSpec { edge_mm: f64::from(mm), ..spec.clone() })),

@@ -15,9 +15,10 @@ use glam::DVec2;
 use super::layout::{Arrangement, Footprint, check_margin, label, label_of_one, on_page};
 use super::paper::{Orientation, PaperSpec};
 use super::{
-    BoardSpec, FamilyRef, Label, LineKind, Panel, Placement, SheetLayout, SheetLine, SheetText,
-    TargetError, layout,
+    BoardSpec, FamilyRef, GridKind, Label, LineKind, Panel, Placement, SheetLayout, SheetLine,
+    SheetText, TargetError, layout,
 };
+use crate::lattice::ROW_HEIGHT;
 
 /// Capital height of a board's label, mm.
 const LABEL_CAP_MM: f64 = 2.0;
@@ -28,12 +29,18 @@ const CUT_GAP_MM: f64 = 0.5;
 /// Width of these lines, mm.
 const LINE_MM: f64 = 0.15;
 
+/// Part of the distance between rows or columns of tiles by which boards side by side are out of step: the golden
+/// section, by which neighbours of neighbours are, too.
+const OUT_OF_STEP: f64 = 0.382;
+
 /// Where a board lies in its part of a sheet.
 struct Cell {
     /// Lower left and upper right end of its ink, in the frame of its panel, mm.
     ink: [DVec2; 2],
     /// Blank around that, mm.
     blank: f64,
+    /// Its size, mm.
+    size: DVec2,
 }
 
 impl Cell {
@@ -41,17 +48,23 @@ impl Cell {
         let [left, lower, right, upper] =
             if panel.inverted { panel.field_mm() } else { panel.bounds_mm() };
         let ink = [DVec2::new(left, lower), DVec2::new(right, upper)];
-        Self { ink, blank: Footprint::new(spec, margin_mm).mark_blank + CUT_GAP_MM }
+        let blank = Footprint::new(spec, margin_mm).mark_blank + CUT_GAP_MM;
+        let below = blank + LABEL_CAP_MM + 2.0 * LABEL_GAP_MM;
+        let least = ink[1] - ink[0] + DVec2::new(2.0 * blank, blank + below);
+        // Tiles of one board are no continuation of those of the next, for whoever looks at the whole sheet. Every second
+        // row of triangles lies half an edge further.
+        let step = spec.edge_mm
+            * match spec.grid {
+                GridKind::Deltille => DVec2::new(0.5, ROW_HEIGHT),
+                GridKind::Checker => DVec2::ONE,
+            };
+        let size = ((least / step - OUT_OF_STEP).ceil() + OUT_OF_STEP) * step;
+        Self { ink, blank, size }
     }
 
     /// Blank below the board, with its label.
     fn below(&self) -> f64 {
-        self.blank + LABEL_CAP_MM + 2.0 * LABEL_GAP_MM
-    }
-
-    fn size(&self) -> DVec2 {
-        let [from, to] = self.ink;
-        to - from + DVec2::new(2.0 * self.blank, self.blank + self.below())
+        self.size.y - self.blank - (self.ink[1].y - self.ink[0].y)
     }
 }
 
@@ -80,7 +93,7 @@ pub(super) fn sheets(
 }
 
 /// Whether a board of this kind finds room.
-fn fits(spec: &BoardSpec, paper: &PaperSpec) -> bool {
+pub(super) fn fits(spec: &BoardSpec, paper: &PaperSpec) -> bool {
     let panels = super::board::untied_panels(&BoardSpec { boards: 1, ..spec.clone() });
     let cell = panels.first().map(|panel| Cell::new(spec, panel, paper.margin_mm));
     cell.is_some_and(|cell| arrange(&cell, 1, paper).is_ok_and(|found| found.is_some()))
@@ -97,7 +110,7 @@ fn arrange(
     // The most boards, in no more room than they need.
     let worth = |[c, r]: [usize; 2]| ((c * r).min(boards), Reverse(c * r), c);
     let on_sheet = |page: DVec2| {
-        let size = cell.size();
+        let size = cell.size;
         let most = (page / size).floor();
         let [columns, rows] = [most.x as usize, most.y as usize];
         let grids = (1..=columns.min(boards))
@@ -133,7 +146,7 @@ fn sheet(
     (panels, spec, family): (&[Panel], &BoardSpec, Option<&FamilyRef>),
     words: String,
 ) -> SheetLayout {
-    let size = cell.size();
+    let size = cell.size;
     let whole = size * DVec2::new(columns as f64, rows as f64);
     let mut sheet = arrangement.sheet(0, [0.0, 0.0, whole.x, whole.y], words);
     let lower_left = sheet.placements[0].origin_mm;

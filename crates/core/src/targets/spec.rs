@@ -30,6 +30,9 @@ pub const fn least_untagged_corners(kind: GridKind) -> u32 {
     }
 }
 
+/// Fewest tiles of a board of place codes: three by four, which tell their place also where some are hidden.
+const LEAST_DENSE_TILES: u32 = 12;
+
 /// Least border of a square tag, bit-widths: that of an AprilTag.
 const LEAST_SQUARE_BORDER_BITS: f64 = 1.0;
 
@@ -254,8 +257,7 @@ impl TagSpec {
         tiles.map(of_tile).collect()
     }
 
-    /// Checks that there are place codes for panels with these ids, whose tiles lie in so many rows and columns of the
-    /// lattice.
+    /// Checks that there are place codes for panels with these ids, whose tiles lie in so many rows and columns.
     fn check_places(
         &self,
         (setting, panels): (&'static str, std::ops::Range<u32>),
@@ -273,7 +275,8 @@ impl TagSpec {
         }
         if !places::are_different(rows, cols) {
             let problem = format!(
-                "places of {} come again after 256 edges, and some would be twice on it: make it smaller",
+                "{rows} rows of {cols} tiles are more than {} tells apart, whose places come again after 256 edges: \
+                 make it smaller",
                 places::NAME
             );
             return Err(TargetError::invalid(size, problem));
@@ -477,7 +480,7 @@ impl SolidSpec {
             let problem = format!("{} leaves no ids for the faces after it", self.board_id);
             return Err(TargetError::invalid("SolidSpec::board_id", problem));
         }
-        if self.tags.is_dense() {
+        if self.tags.is_dense() && self.shape.tag_tiling() == GridKind::Deltille {
             let boards = self.board_id..self.board_id + self.face_count();
             // Faces of other shapes than triangles have up to twice as many rows.
             let rows = if matches!(self.shape, SolidShape::Mesh(_)) { 2 } else { 1 } * self.tiles;
@@ -631,9 +634,16 @@ impl BoardSpec {
                     let problem = "the one square between 2 × 2 corners is black";
                     return Err(TargetError::invalid("TagSpec::tags_in", problem));
                 }
-                if tags.is_dense() {
+                if tags.is_dense() && self.grid == GridKind::Deltille {
                     let boards = self.board_id..self.board_id + self.boards;
-                    let (rows, cols) = (self.rows, self.cols + self.rows / 2);
+                    let (rows, cols) = (self.rows, self.cols);
+                    if (rows - 1) * (cols - 1) < LEAST_DENSE_TILES {
+                        let problem = format!(
+                            "{rows} × {cols} corners have fewer than {LEAST_DENSE_TILES} tiles between them, too few to \
+                             tell a place: take more, or tags of another `TagSpec::family`"
+                        );
+                        return Err(TargetError::invalid("BoardSpec::rows", problem));
+                    }
                     tags.check_places(
                         ("BoardSpec::board_id", boards),
                         ("BoardSpec::rows", rows, cols),

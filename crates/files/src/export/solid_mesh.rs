@@ -51,7 +51,7 @@ type Read = fn(&[u8]) -> Result<Faces, String>;
 pub fn read(bytes: &[u8]) -> Result<(ClosedMesh, bool), MeshFileError> {
     let (format, read): (_, Read) = if bytes.starts_with(b"ply") {
         ("PLY", ply)
-    } else if is_binary_stl(bytes) || bytes.trim_ascii_start().starts_with(b"solid") {
+    } else if bytes.contains(&0) || bytes.trim_ascii_start().starts_with(b"solid") {
         ("STL", stl)
     } else {
         return Ok(obj::read(bytes)?);
@@ -71,6 +71,10 @@ fn is_binary_stl(bytes: &[u8]) -> bool {
 }
 
 fn stl(bytes: &[u8]) -> Result<Faces, String> {
+    // Text has no zeros.
+    if bytes.contains(&0) && !is_binary_stl(bytes) {
+        return Err("its length is not that of the triangles that it states".to_owned());
+    }
     let mesh = stl_io::read_stl(&mut Cursor::new(bytes)).map_err(|error| error.to_string())?;
     let vertices = mesh.vertices.iter().map(|v| DVec3::from(v.0.map(f64::from)));
     let faces = mesh.faces.iter().map(|face| face.vertices.to_vec());

@@ -143,11 +143,17 @@ pub fn id(board: u32, tile: Vertex) -> u32 {
     board * PLACES + along.rem_euclid(PLACES.into()) as u32
 }
 
-/// Whether no place is twice among so many rows and columns of the lattice.
+/// Whether no place is twice on a board of so many rows and columns of tiles, of which every second row lies half an edge
+/// further.
 pub fn are_different(rows: u32, cols: u32) -> bool {
+    let (rows, cols, places) = (i64::from(rows), i64::from(cols), i64::from(PLACES));
     (0..rows).all(|row| {
-        let along = ((SUBFIELD + 1) * row) % PLACES;
-        (row, along) == (0, 0) || along.min(PLACES - along) >= cols
+        let along = (i64::from(SUBFIELD + 1) * row) % places;
+        // Half edges to the tiles of that row that show the same.
+        [-along, places - along]
+            .into_iter()
+            .map(|col| (2 * col + row).abs())
+            .all(|off| (row == 0 && off == 0) || off > 2 * (cols - 1) + 1)
     })
 }
 
