@@ -111,7 +111,7 @@ fn boards_that_are_packed_on_a_sheet_are_proved_each() {
         ("board --rows 3 --cols 4 --boards 4", 4, 1),
         // Without an edge, the largest that fits: one board fills the paper.
         ("board --rows 4 --cols 5 --boards 2 --paper A4", 2, 2),
-        ("board --dense --rows 5 --cols 6 --edge 8mm --boards 9 --paper A4 --invert", 9, 1),
+        ("board --dense --rows 5 --cols 6 --edge 8mm --boards 9 --paper A4 --invert", 9, 2),
         ("checkerboard --rows 4 --cols 5 --edge 15mm --tags t36h11 --boards 7 --paper A4", 7, 2),
     ] {
         let args = format!("{args} --pack --json --name packed --force");
