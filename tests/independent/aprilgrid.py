@@ -54,7 +54,17 @@ def kalibr_corners(grid):
 def check(deltille, folder, name, options, dictionary):
     run(deltille, "aprilgrid", *options.split(), "--name", name, "-o", folder)
     target = json.loads((folder / f"{name}.json").read_text())
-    grid = yaml.safe_load((folder / f"{name}.yaml").read_text())
+    spec = target["spec"]
+    (columns, rows), is_kalibrs = spec["tags"], (spec["family"], spec["border_bits"]) == ("aprilTag36h11", 2.0)
+    grid = {
+        "target_type": "aprilgrid", "tagCols": columns, "tagRows": rows, "tagSize": spec["tag_mm"] / 1000,
+        "tagSpacing": spec["gap"], "codeOffset": spec["first_id"],
+    }
+    # Kalibr's file is there where Kalibr reads the grid.
+    described = folder / f"{name}.yaml"
+    assert described.exists() == is_kalibrs
+    if is_kalibrs:
+        grid = yaml.safe_load(described.read_text())
     panel, sheet = target["panels"][0], target["sheets"][0]
     corners = sorted(panel["corners"], key=lambda corner: corner["id"])
     assert grid["target_type"] == "aprilgrid" and [corner["id"] for corner in corners] == list(range(len(corners)))
