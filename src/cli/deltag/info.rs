@@ -2,7 +2,7 @@ use std::process::ExitCode;
 
 use super::place_codes;
 use crate::cli::output::{self, Telling, say};
-use crate::family::{Family, TagWords, bounds::bounds, places};
+use crate::family::{self, Family, TagWords, bounds::bounds};
 use crate::lattice::GridKind;
 use crate::targets::{BoardSpec, SolidShape, SolidSpec, TagSpec, Target, TargetSpec};
 use crate::words::counted;
@@ -26,8 +26,9 @@ fn tags_of(spec: &TargetSpec) -> anyhow::Result<usize> {
 }
 
 pub(super) fn run(args: Args) -> anyhow::Result<ExitCode> {
-    if args.family == places::NAME {
-        place_codes::about(&Family::shipped(places::NAME)?, args.telling)?;
+    let known = family::resolve(&args.family)?;
+    if known.is_of_places() {
+        place_codes::about(&known, args.telling)?;
         return Ok(ExitCode::SUCCESS);
     }
     let family = super::resolve(&args.family)?;

@@ -193,22 +193,38 @@ impl ClosedMesh {
     /// # Errors
     /// Where the larger faces are not one closed surface.
     pub fn with_whole_faces(&self) -> Result<Self, ClosedMeshError> {
-        let mut group: Vec<usize> = (0..self.faces.len()).collect();
-        let normals: Vec<DVec3> =
-            (0..group.len()).map(|face| normal(&self.corners(face)).normalize_or_zero()).collect();
+        let normals: Vec<DVec3> = (0..self.faces.len())
+            .map(|face| normal(&self.corners(face)).normalize_or_zero())
+            .collect();
+        let mut beside = vec![Vec::new(); self.faces.len()];
         for faces in self.faces_at_edges().values() {
-            let [(a, _), (b, _)] = faces[..] else { continue };
-            if normals[a].cross(normals[b]).length() < LEAST_TURN
-                && normals[a].dot(normals[b]) > 0.0
-                && group[a] != group[b]
-            {
-                let (kept, taken) = (group[a], group[b]);
-                group.iter_mut().filter(|of| **of == taken).for_each(|of| *of = kept);
+            if let [(a, _), (b, _)] = faces[..] {
+                beside[a].push(b);
+                beside[b].push(a);
             }
         }
-        let mut members = BTreeMap::<usize, Vec<usize>>::new();
-        group.iter().enumerate().for_each(|(face, &of)| members.entry(of).or_default().push(face));
-        let outlines = members.values().flat_map(|members| match self.outline_of(members) {
+        let mut members = Vec::new();
+        let mut is_seen = vec![false; self.faces.len()];
+        for first in 0..self.faces.len() {
+            if is_seen[first] {
+                continue;
+            }
+            is_seen[first] = true;
+            let (mut group, mut next) = (vec![first], 0);
+            while let Some(&face) = group.get(next) {
+                next += 1;
+                for &other in &beside[face] {
+                    let is_level = normals[first].cross(normals[other]).length() < LEAST_TURN
+                        && normals[first].dot(normals[other]) > 0.0;
+                    if is_level && !is_seen[other] {
+                        is_seen[other] = true;
+                        group.push(other);
+                    }
+                }
+            }
+            members.push(group);
+        }
+        let outlines = members.iter().flat_map(|members| match self.outline_of(members) {
             Some(outline) => vec![outline],
             None => members.iter().map(|&face| self.faces[face].clone()).collect(),
         });

@@ -75,6 +75,11 @@ fn stl(bytes: &[u8]) -> Result<Faces, String> {
     if bytes.contains(&0) && !is_binary_stl(bytes) {
         return Err("its length is not that of the triangles that it states".to_owned());
     }
+    let mut bytes = bytes.to_vec();
+    // The reader takes what begins with `solid` for text, as many programs begin a binary file, too.
+    if is_binary_stl(&bytes) {
+        bytes[..STL_HEAD - 4].fill(b' ');
+    }
     let mesh = stl_io::read_stl(&mut Cursor::new(bytes)).map_err(|error| error.to_string())?;
     let vertices = mesh.vertices.iter().map(|v| DVec3::from(v.0.map(f64::from)));
     let faces = mesh.faces.iter().map(|face| face.vertices.to_vec());
@@ -171,7 +176,9 @@ mod tests {
             "ply\nformat ascii 1.0\nelement vertex 36\nproperty float x\nproperty float y\nproperty float z\n\
              element face 12\nproperty list uchar int vertex_indices\nend_header\n{vertices}{faces}"
         );
-        for bytes in [&binary[..], ascii.as_bytes(), ply.as_bytes()] {
+        let mut of_others = binary.clone();
+        of_others[..6].copy_from_slice(b"solid ");
+        for bytes in [&binary[..], &of_others, ascii.as_bytes(), ply.as_bytes()] {
             let (mesh, inside_out) = read(bytes).unwrap();
             assert!(!inside_out);
             assert_eq!(mesh.faces().iter().map(Vec::len).collect::<Vec<_>>(), [4; 6]);
