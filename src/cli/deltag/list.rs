@@ -21,7 +21,7 @@ pub(super) fn run(args: Args) -> anyhow::Result<ExitCode> {
                 "codes": family.len(), "fingerprint": family.fingerprint(),
             })
         });
-        let of_places = json!({ "name": places::NAME, "bits": 9, "boards": places::BOARDS, "places": places::PLACES });
+        let of_places = json!({ "name": places::NAME, "bits": places::BITS, "boards": places::BOARDS, "places": places::PLACES });
         output::print_json(&listed.chain([of_places]).collect::<Vec<_>>())?;
         return Ok(ExitCode::SUCCESS);
     }
@@ -39,7 +39,7 @@ pub(super) fn run(args: Args) -> anyhow::Result<ExitCode> {
     say!(
         "{:<12} {:>4}   place codes of {} boards: `deltag info {0}`",
         places::NAME,
-        9,
+        places::BITS,
         places::BOARDS
     );
     Ok(ExitCode::SUCCESS)

@@ -4,7 +4,7 @@ use serde_json::json;
 
 use crate::cli::output::{self, Telling, say};
 use crate::family::Family;
-use crate::family::places::{BOARDS, PLACES, PatchCertificate, certify_places};
+use crate::family::places::{BITS, BOARDS, PLACES, PatchCertificate, certify_places};
 use crate::words::counted;
 
 /// Tells all about them.
@@ -18,7 +18,7 @@ pub(super) fn about(family: &Family, telling: Telling) -> anyhow::Result<()> {
             })
         });
         return output::print_json(&json!({
-            "name": family.name(), "fingerprint": family.fingerprint(), "bits": 9,
+            "name": family.name(), "fingerprint": family.fingerprint(), "bits": BITS,
             "boards": BOARDS, "places": PLACES, "patches": patches.collect::<Vec<_>>(),
         }));
     }
@@ -26,7 +26,7 @@ pub(super) fn about(family: &Family, telling: Telling) -> anyhow::Result<()> {
     say!(
         "  of a kind of its own: every upright tile of a board tells, with some beside it, where it is"
     );
-    say!("  cells           9 in a tile");
+    say!("  cells           {BITS} in a tile");
     say!("  boards          {BOARDS}, by their ids from 0");
     say!("  places          {PLACES} on each, which come again after 256 edges");
     say!("  patches differ, wherever two of them are and however they are turned, at least in");

@@ -149,6 +149,8 @@ pub struct TagLabeller {
     readers: Vec<TagReader>,
     /// Name of the family.
     family: String,
+    /// Whether every tile has a place code.
+    is_dense: bool,
     /// Decoder of the whole family; none of place codes, as each of their words is a code.
     decoder: Option<Decoder>,
     /// Greatest number of misread cells at which a word certainly is a code of the family.
@@ -314,6 +316,7 @@ impl TagLabeller {
         (!ids.is_empty()).then(|| Self {
             readers,
             family: family.name().to_owned(),
+            is_dense: family.is_of_places(),
             decoder: (!family.is_of_places()).then(decoder),
             sure_errors: family.correctable() / 2,
             family_words: family.len() * usize::from(family.kind().turns()),
@@ -636,7 +639,7 @@ impl TagLabeller {
             let but = usize::from(shown.word == word);
             let evidence = sight.evidence[index][word].into();
             // Where every tile has a tag, no plain ones tell how many are hidden.
-            let hidden = |chance| if self.decoder.is_none() { chance } else { SPOILT };
+            let hidden = |chance| if self.is_dense { chance } else { SPOILT };
             let predicted = DIRTY.map(|chance| or_spoilt(evidence, hidden(chance)));
             let other_code = [shown.code[but]; DIRTY.len()];
             let of_board = Some(shown.of_board[but]);

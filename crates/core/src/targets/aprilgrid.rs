@@ -11,6 +11,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::build::needed;
+use super::capacity::{Setting, check_ids};
 use super::length::format_mm;
 use super::single_panel::{SinglePanel, sheet};
 use super::spec::BORDER_BITS;
@@ -19,6 +20,7 @@ use super::{
     TagsIn, TargetError, tag_range,
 };
 use crate::family::Family;
+use crate::lattice::Vertex;
 use crate::quantity;
 
 /// Range of tags along a side: fewer corners than those of four tags may be texture.
@@ -139,7 +141,7 @@ impl AprilGridSpec {
         panel.corners = places
             .zip(0..)
             .map(|((row, col), id)| {
-                let panel_mm = panel.lattice_mm(crate::lattice::Vertex::new(row, col));
+                let panel_mm = panel.lattice_mm(Vertex::new(row, col));
                 let target_mm = panel_mm.extend(0.0);
                 Corner { id, row, col, panel_mm, target_mm, measured: None }
             })
@@ -167,18 +169,9 @@ pub(super) fn parts(
         let problem = format!("{} has triangular tags, not square ones", family.name());
         return Err(TargetError::invalid("TagSpec::family", problem));
     }
-    let needed = u64::from(spec.first_id) + u64::from(spec.count());
-    if needed > family.len() as u64 {
-        return Err(TargetError::IdsRunOut {
-            setting: "TagSpec::first_id",
-            first: spec.first_id,
-            last: needed - 1,
-            family: family.name().to_owned(),
-            end: family.len() as u64 - 1,
-            instead: "make fewer `AprilGridSpec::tags`".to_owned(),
-        });
-    }
-    let family = FamilyRef::of(family);
+    let ids = (spec.first_id, spec.count().into());
+    let family =
+        check_ids(Setting::TAGS, ids, family, || "make fewer `AprilGridSpec::tags`".to_owned())?;
     let label = label(name, spec, &family);
     let single = SinglePanel {
         of_size: &|tag_mm| AprilGridSpec { tag_mm, ..spec.clone() }.panel(),

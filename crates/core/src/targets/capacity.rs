@@ -34,6 +34,27 @@ impl Setting {
     }
 }
 
+/// Checks that a family has `count` codes from the first id on; `instead` says what else to change.
+pub(super) fn check_ids(
+    setting: Setting,
+    (first, count): (u32, u64),
+    family: &Family,
+    instead: impl FnOnce() -> String,
+) -> Result<FamilyRef, TargetError> {
+    let (there, end) = (family.len() as u64, u64::from(first) + count);
+    if end <= there {
+        return Ok(FamilyRef::of(family));
+    }
+    Err(TargetError::IdsRunOut {
+        setting: setting.first_id,
+        first,
+        last: end - 1,
+        family: family.name().to_owned(),
+        end: there - 1,
+        instead: instead(),
+    })
+}
+
 /// Checks that the family is there, for tiles of this kind, and has `needed` codes from the first
 /// id on; `instead` lists
 /// what other than ids and family to change, given how many codes there are from the first id on.
@@ -63,31 +84,23 @@ pub(super) fn check_family(
         };
         return Err(TargetError::invalid(setting.family, format!("{} {problem}", family.name())));
     }
-    let there = family.len() as u64;
-    let first = u64::from(tags.first_id);
-    if first + needed <= there {
-        return Ok(FamilyRef::of(family));
-    }
-    let mut proposals = Vec::new();
-    if let Some(highest) = there.checked_sub(needed) {
-        proposals.push(format!("lower it to at most {highest}"));
-    }
-    proposals.extend(instead(there.saturating_sub(first)));
-    if let Some(larger) = smallest_shipped(kind, first + needed, 0) {
-        let (name, codes) = (larger.name, larger.codes);
-        proposals.push(format!("take `{}` {name} with its {codes} codes", setting.family));
-    }
-    if proposals.is_empty() {
-        proposals
-            .push("make a smaller target, or a larger family by `deltag gen-family`".to_owned());
-    }
-    Err(TargetError::IdsRunOut {
-        setting: setting.first_id,
-        first: tags.first_id,
-        last: first + needed - 1,
-        family: family.name().to_owned(),
-        end: there - 1,
-        instead: proposals.join(", or "),
+    check_ids(setting, (tags.first_id, needed), family, || {
+        let (there, first) = (family.len() as u64, u64::from(tags.first_id));
+        let mut proposals = Vec::new();
+        if let Some(highest) = there.checked_sub(needed) {
+            proposals.push(format!("lower it to at most {highest}"));
+        }
+        proposals.extend(instead(there.saturating_sub(first)));
+        if let Some(larger) = smallest_shipped(kind, first + needed, 0) {
+            let (name, codes) = (larger.name, larger.codes);
+            proposals.push(format!("take `{}` {name} with its {codes} codes", setting.family));
+        }
+        if proposals.is_empty() {
+            proposals.push(
+                "make a smaller target, or a larger family by `deltag gen-family`".to_owned(),
+            );
+        }
+        proposals.join(", or ")
     })
 }
 

@@ -15,6 +15,7 @@ use glam::{DMat3, DVec3};
 use serde::{Deserialize, Serialize};
 
 use super::build::needed;
+use super::capacity::{Setting, check_ids};
 use super::length::format_mm;
 use super::single_panel::{SinglePanel, sheet};
 use super::{
@@ -188,19 +189,10 @@ pub(super) fn parts(
         let given = format!("{} is given", family.name());
         return Err(TargetError::Family { wanted: spec.dictionary.clone(), given });
     }
-    let needed = u64::from(spec.first_id) + u64::from(spec.markers());
-    if needed > family.len() as u64 {
-        return Err(TargetError::IdsRunOut {
-            setting: "TagSpec::first_id",
-            first: spec.first_id,
-            last: needed - 1,
-            family: family.name().to_owned(),
-            end: family.len() as u64 - 1,
-            instead: "take a larger `CharucoSpec::dictionary`, or fewer `CharucoSpec::squares`"
-                .to_owned(),
-        });
-    }
-    let family = FamilyRef::of(family);
+    let ids = (spec.first_id, spec.markers().into());
+    let family = check_ids(Setting::TAGS, ids, family, || {
+        "take a larger `CharucoSpec::dictionary`, or fewer `CharucoSpec::squares`".to_owned()
+    })?;
     let panel = spec.panel(dimension);
     let label = label(name, spec, &family);
     let single = SinglePanel {

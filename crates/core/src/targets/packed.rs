@@ -13,7 +13,7 @@ use std::cmp::Reverse;
 use glam::DVec2;
 
 use super::layout::{Arrangement, Footprint, check_margin, label, label_of_one, on_page};
-use super::paper::{Orientation, PaperSpec};
+use super::paper::PaperSpec;
 use super::{
     BoardSpec, FamilyRef, GridKind, Label, LineKind, Panel, Placement, SheetLayout, SheetLine,
     SheetText, TargetError, layout,
@@ -127,12 +127,7 @@ fn arrange(
         fitting.max_by_key(|(grid, _)| worth(*grid))
     };
     let on_size = |size: &super::PaperSize| {
-        let pages = match paper.orientation {
-            Orientation::Portrait => vec![size.portrait_mm()],
-            Orientation::Landscape => vec![size.landscape_mm()],
-            Orientation::Auto => vec![size.portrait_mm(), size.landscape_mm()],
-        };
-        let found = pages.into_iter().filter_map(on_sheet);
+        let found = paper.pages_mm(size).into_iter().filter_map(on_sheet);
         found.max_by_key(|(grid, _)| worth(*grid))
     };
     Ok(paper.sizes().iter().find_map(on_size))

@@ -59,6 +59,15 @@ pub enum SolidSheets {
 }
 
 impl PaperSpec {
+    /// The pages of a size of paper that may be taken, upright before lying, mm.
+    pub(super) fn pages_mm(&self, size: &PaperSize) -> Vec<DVec2> {
+        match self.orientation {
+            Orientation::Portrait => vec![size.portrait_mm()],
+            Orientation::Landscape => vec![size.landscape_mm()],
+            Orientation::Auto => vec![size.portrait_mm(), size.landscape_mm()],
+        }
+    }
+
     /// The sizes that may be taken, smallest first: the one that is asked for, or those of [`PaperSize::automatic`].
     pub(super) fn sizes(&self) -> Vec<PaperSize> {
         match &self.size {

@@ -407,17 +407,6 @@ impl SolidSpec {
         }
     }
 
-    /// How many faces it has.
-    fn face_count(&self) -> u32 {
-        match &self.shape {
-            SolidShape::Tetrahedron => 4,
-            SolidShape::Octahedron => 8,
-            SolidShape::Icosahedron => 20,
-            SolidShape::Cube | SolidShape::Cuboid(_) => 6,
-            SolidShape::Mesh(mesh) => mesh.faces().len() as u32,
-        }
-    }
-
     /// Checks every number by itself.
     pub(super) fn check(&self) -> Result<(), TargetError> {
         if !SOLID_EDGE_MM.contains(&self.edge_mm) {
@@ -481,7 +470,7 @@ impl SolidSpec {
             return Err(TargetError::invalid("SolidSpec::board_id", problem));
         }
         if self.tags.is_dense() && self.shape.tag_tiling() == GridKind::Deltille {
-            let boards = self.board_id..self.board_id + self.face_count();
+            let boards = self.board_id..self.board_id + self.polyhedron().faces.len() as u32;
             // Faces of other shapes than triangles have up to twice as many rows.
             let rows = if matches!(self.shape, SolidShape::Mesh(_)) { 2 } else { 1 } * self.tiles;
             let size = ("SolidSpec::tiles", rows, rows);

@@ -11,7 +11,7 @@ use glam::DVec2;
 
 use super::layout::{ADVANCE_CAPS, Arrangement, Footprint, check_margin, on_page};
 use super::length::format_mm;
-use super::paper::{Orientation, PaperSize, PaperSpec};
+use super::paper::{PaperSize, PaperSpec};
 use super::spec::BORDER_BITS;
 use super::{
     FamilyRef, GridKind, Label, Outline, Panel, PanelPose, Placement, SheetLayout, SheetText,
@@ -152,11 +152,7 @@ fn arrange(
     let Some(size) = size else {
         return Err(TargetError::invalid("PaperSpec::size", "none is named"));
     };
-    let pages = match paper.orientation {
-        Orientation::Portrait => vec![size.portrait_mm()],
-        Orientation::Landscape => vec![size.landscape_mm()],
-        Orientation::Auto => vec![size.portrait_mm(), size.landscape_mm()],
-    };
+    let pages = paper.pages_mm(&size);
     let pitch = blanks.pitch();
     let tags = spec.ids.len();
     let mut best: Option<([usize; 2], Arrangement)> = None;

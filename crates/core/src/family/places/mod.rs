@@ -34,7 +34,7 @@ pub use distances::{PatchCertificate, PlaceDistances, certify_places, distances,
 pub const NAME: &str = "dense9";
 
 /// Cells of a tile.
-pub(super) const BITS: u32 = 9;
+pub const BITS: u32 = 9;
 
 /// Bits of a state.
 const DEGREE: u32 = 24;
