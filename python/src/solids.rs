@@ -194,7 +194,7 @@ solid!(Cube, SolidShape::Cube, "A cube whose six faces carry tagged checkerboard
 /// Parameters
 /// ----------
 /// mesh : path-like
-///     An OBJ file, in mm.
+///     An OBJ, STL or PLY file, in mm.
 /// scale : float, optional
 ///     Millimetres per unit of the mesh, such as 1000 for metres.
 /// allow_skew : bool, optional

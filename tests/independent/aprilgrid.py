@@ -10,14 +10,14 @@ must find what is seen, no less precisely than OpenCV. Needs numpy, OpenCV, PyYA
 
 import json
 import pathlib
-import subprocess
 import sys
 
 import cv2
 import numpy as np
 import yaml
 
-from photograph import Page, Scene, photograph
+from charuco import SCENES, WRONG_PX, run
+from photograph import Page, photograph
 
 ARUCO = cv2.aruco
 DPI = 300
@@ -28,19 +28,6 @@ GRIDS = {
     "one-bit": ("--tags 5x4 --edge 30mm --gap 0.25 --tag-border 1 --first-id 100", ARUCO.DICT_APRILTAG_36h11),
     "small": ("--tags 3x2 --edge 50mm --gap 0.5 --family aprilTag25h9", ARUCO.DICT_APRILTAG_25h9),
 }
-
-# Photographs of the first grid.
-SCENES = [
-    Scene(tilt_deg=0),
-    Scene(tilt_deg=30, tone="srgb"),
-    Scene(tilt_deg=60, tone="s-curve", noise=0.01, focal_px=1800.0),
-]
-WRONG_PX = 2.0
-
-
-def run(*command):
-    done = subprocess.run([str(part) for part in command], capture_output=True, text=True)
-    assert done.returncode == 0, f"{' '.join(map(str, command))}: {done.stdout}{done.stderr}"
 
 
 def kalibr_corners(grid):

@@ -122,6 +122,20 @@ pub fn stl() -> Vec<u8> {
     stl_writer::to_bytes("t", &spec.polyhedron().triangles_mm())
 }
 
+pub fn ply() -> Vec<u8> {
+    let TargetSpec::Solid(spec) = &SOLID.spec else { unreachable!("it was built as one") };
+    let triangles = spec.polyhedron().triangles_mm();
+    let vertices = triangles.iter().flatten().map(|v| format!("{} {} {}\n", v.x, v.y, v.z));
+    let faces = (0..triangles.len()).map(|i| format!("3 {} {} {}\n", 3 * i, 3 * i + 1, 3 * i + 2));
+    let head = format!(
+        "ply\nformat ascii 1.0\nelement vertex {}\nproperty double x\nproperty double y\nproperty double z\n\
+         element face {}\nproperty list uchar int vertex_indices\nend_header\n",
+        3 * triangles.len(),
+        triangles.len()
+    );
+    (head + &vertices.chain(faces).collect::<String>()).into_bytes()
+}
+
 pub fn threemf() -> Vec<u8> {
     threemf::to_bytes(&InlaidBodies::new(&BOARD, Some(&FAMILY), Meshing::default()).unwrap())
 }

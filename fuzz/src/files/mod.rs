@@ -40,6 +40,8 @@ pub const READERS: &[Reader] = &[
     of("csv", Form::Text, "csv", good::points, read::points),
     of("dsc", Form::Text, "dsc", good::dsc, read::dsc),
     of("mesh", Form::Text, "obj", good::obj, read::mesh),
+    of("mesh_stl", Form::Bytes, "stl", good::stl, read::mesh),
+    of("mesh_ply", Form::Text, "ply", good::ply, read::mesh),
     of("png", Form::Png, "png", good::photograph_png, read::photograph),
     of("jpeg", Form::Bytes, "jpg", good::photograph_jpeg, read::photograph),
     of("tiff", Form::Bytes, "tiff", good::photograph_tiff, read::photograph),

@@ -5,7 +5,7 @@ use std::path::Path;
 use deltille::camera::Camera;
 use deltille::cli::deltille::settings::Settings;
 use deltille::export::dsc::{self, Dialect};
-use deltille::export::{calibration, csv, detection as detections, obj, orpc};
+use deltille::export::{calibration, csv, detection as detections, orpc, solid_mesh};
 use deltille::family::Family;
 use deltille::lattice::GridKind;
 use deltille::limits::Limits;
@@ -110,7 +110,7 @@ pub fn dsc(file: File) -> bool {
 }
 
 pub fn mesh(file: File) -> bool {
-    let Ok((mesh, _)) = obj::read(file.bytes) else { return false };
+    let Ok((mesh, _)) = solid_mesh::read(file.bytes) else { return false };
     assert_finite(mesh.vertices().iter().flat_map(|v| v.to_array()));
     true
 }

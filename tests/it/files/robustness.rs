@@ -2,7 +2,7 @@
 
 use deltille::camera::Camera;
 use deltille::detect::{Detection, Detector, DetectorConfig};
-use deltille::export::{detection, dsc, obj};
+use deltille::export::{detection, dsc, solid_mesh};
 use deltille::family::Family;
 use deltille::lattice::GridKind;
 use deltille::photograph;
@@ -106,7 +106,7 @@ fn recorded_faults_are_refused_or_read() {
         let path = entry.unwrap().path();
         let bytes = std::fs::read(&path).unwrap();
         read_all(&String::from_utf8_lossy(&bytes));
-        drop(obj::read(&bytes));
+        drop(solid_mesh::read(&bytes));
         if let Ok(image) = photograph::read(&path) {
             detectors().iter().for_each(|detector| drop(detector.detect(&image, "")));
         }
