@@ -23,7 +23,7 @@ for (const name of modules) {
   readme = readme.replace(`${name}.size`, `${kilobytes.toFixed(0)} KB`);
 }
 const families = join(root, "crates", "core", "families");
-for (const name of readdirSync(families)) cpSync(join(families, name), join(folder, "families", name));
+for (const name of readdirSync(families).filter((name) => /\.(json|md)$/.test(name))) cpSync(join(families, name), join(folder, "families", name));
 for (const name of ["LICENSE-MIT", "LICENSE-APACHE"]) cpSync(join(root, name), join(folder, name));
 writeFileSync(join(folder, "README.md"), readme);
 const [, version] = /^version = "([^"]+)"/m.exec(readFileSync(join(root, "Cargo.toml"), "utf8"));
