@@ -41,6 +41,7 @@ struct Wanted {
     boards: u32,
     board_id: u32,
     inverted: bool,
+    two_sided_mm: Option<f64>,
     name: String,
     paper: PaperSpec,
 }
@@ -82,6 +83,7 @@ impl Wanted {
             board_id: self.board_id,
             tags,
             inverted: self.inverted,
+            two_sided_mm: self.two_sided_mm,
             ..BoardSpec::new(self.grid, rows, cols, 1.0)
         };
         spec.edge_mm = self.edge_mm.unwrap_or_else(|| usual_edge_mm(&spec, &self.paper));
@@ -136,6 +138,12 @@ pub fn spacing_of(tag_spacing: Option<i64>) -> PyResult<Option<u32>> {
 ///     Whether a board that is larger than the paper is printed over several pages, to be joined.
 /// packed : bool, optional
 ///     Whether as many boards as fit are printed on each sheet, to be cut apart.
+/// two_sided_mm : float, optional
+///     Thickness of a plate that carries a board on its back, too, mm.
+/// tag_ids : bool, optional
+///     Whether the id of each tag is printed beside it, in small type.
+/// guide_page : bool, optional
+///     Whether a page with a picture, what to do, and a ruler is added.
 /// name : str, optional
 ///     Stem of the names of its files, printed on the sheet.
 ///
@@ -158,7 +166,8 @@ impl Board {
     #[new]
     #[pyo3(signature = (rows, cols, *, edge_mm = None, family = None, tags = true, tag_spacing = None,
         tag_border = None, first_id = 0, boards = 1, board_id = 0, inverted = false, paper = None,
-        orientation = "auto", margin_mm = None, poster = false, packed = false, name = "board"))]
+        orientation = "auto", margin_mm = None, poster = false, packed = false, two_sided_mm = None,
+        tag_ids = false, guide_page = false, name = "board"))]
     #[expect(clippy::too_many_arguments, reason = "keywords")]
     fn new(
         rows: i64,
@@ -177,10 +186,13 @@ impl Board {
         margin_mm: Option<f64>,
         poster: bool,
         packed: bool,
+        two_sided_mm: Option<f64>,
+        tag_ids: bool,
+        guide_page: bool,
         name: &str,
     ) -> PyResult<PyClassInitializer<Self>> {
         let paper = self::paper(paper, orientation, margin_mm, SolidSheets::default())?;
-        let paper = PaperSpec { poster, packed, ..paper };
+        let paper = PaperSpec { poster, packed, tag_ids, guide_page, ..paper };
         let spacing = spacing_of(tag_spacing)?;
         let first_id = whole("first_id", first_id, errors::target)?;
         let of_tags =
@@ -193,6 +205,7 @@ impl Board {
             boards: whole("boards", boards, errors::target)?,
             board_id: whole("board_id", board_id, errors::target)?,
             inverted,
+            two_sided_mm,
             name: name.to_owned(),
             paper,
         };
@@ -212,7 +225,8 @@ impl Board {
 ///     ``"aprilTag36h11"``, ``"aprilTag25h9"`` or ``"aprilTag16h5"``; no tags if left out.
 /// tags_in : str, optional
 ///     Squares that carry the tags, ``"black"`` or ``"white"``.
-/// tag_spacing, tag_border, first_id, boards, board_id, inverted, paper, orientation, margin_mm, poster, packed, name
+/// tag_spacing, tag_border, first_id, boards, board_id, inverted, paper, orientation, margin_mm, poster, packed, \
+/// two_sided_mm, tag_ids, guide_page, name
 ///     As of :class:`Board`.
 #[pyclass(frozen, extends = Target, module = "deltille")]
 pub struct Checkerboard;
@@ -222,7 +236,8 @@ impl Checkerboard {
     #[new]
     #[pyo3(signature = (rows, cols, *, edge_mm = None, family = None, tags_in = "black", tag_spacing = None,
         tag_border = None, first_id = 0, boards = 1, board_id = 0, inverted = false, paper = None,
-        orientation = "auto", margin_mm = None, poster = false, packed = false, name = "checkerboard"))]
+        orientation = "auto", margin_mm = None, poster = false, packed = false, two_sided_mm = None,
+        tag_ids = false, guide_page = false, name = "checkerboard"))]
     #[expect(clippy::too_many_arguments, reason = "keywords")]
     fn new(
         rows: i64,
@@ -241,6 +256,9 @@ impl Checkerboard {
         margin_mm: Option<f64>,
         poster: bool,
         packed: bool,
+        two_sided_mm: Option<f64>,
+        tag_ids: bool,
+        guide_page: bool,
         name: &str,
     ) -> PyResult<PyClassInitializer<Self>> {
         let tags_in = match tags_in {
@@ -265,10 +283,13 @@ impl Checkerboard {
             boards: whole("boards", boards, errors::target)?,
             board_id: whole("board_id", board_id, errors::target)?,
             inverted,
+            two_sided_mm,
             name: name.to_owned(),
             paper: PaperSpec {
                 poster,
                 packed,
+                tag_ids,
+                guide_page,
                 ..self::paper(paper, orientation, margin_mm, SolidSheets::default())?
             },
         };

@@ -184,7 +184,8 @@ pub fn render<'py>(
     let wrong = |what: String| raised::TargetError::new_err(what);
     let own = target.clone();
     let of = &own.target;
-    if !matches!(of.spec, TargetSpec::Solid(_)) && of.panels.len() > 1 {
+    let is_listed = matches!(of.spec, TargetSpec::Listed(_)) && of.panels.len() > 1;
+    if of.is_loose() || is_listed {
         let what =
             format!("{} has several loose boards: render targets of one board, or solids", of.name);
         return Err(wrong(what));

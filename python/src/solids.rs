@@ -87,7 +87,7 @@ macro_rules! solid {
         /// allow_seams : bool, optional
         ///     Whether a net that is larger than the paper stays in one piece, over pages that are joined along seams \
         ///     through its tiles, instead of in pieces of whole faces.
-        /// paper, orientation, margin_mm, name
+        /// paper, orientation, margin_mm, tag_ids, guide_page, name
         ///     As of :class:`Board`.
         #[pyclass(frozen, extends = Target, module = "deltille")]
         pub struct $class;
@@ -97,8 +97,8 @@ macro_rules! solid {
             #[new]
             #[pyo3(signature = (*, edge_mm = None, tiles = None, face_margin_mm = None, family = None,
                 tag_spacing = None, tag_border = None, first_id = 0, board_id = 0, skeleton = false,
-                panel_thickness_mm = None, wall_mm = None, rib_mm = None, per_face = false, allow_seams = false, paper = None,
-                orientation = "auto", margin_mm = None, name = None))]
+                panel_thickness_mm = None, wall_mm = None, rib_mm = None, per_face = false, allow_seams = false,
+                tag_ids = false, guide_page = false, paper = None, orientation = "auto", margin_mm = None, name = None))]
             #[expect(clippy::too_many_arguments, reason = "keywords")]
             fn new(
                 edge_mm: Option<f64>,
@@ -115,6 +115,8 @@ macro_rules! solid {
                 rib_mm: Option<f64>,
                 per_face: bool,
                 allow_seams: bool,
+                tag_ids: bool,
+                guide_page: bool,
                 paper: Option<&str>,
                 orientation: &str,
                 margin_mm: Option<f64>,
@@ -130,7 +132,11 @@ macro_rules! solid {
                     board_id: whole("board_id", board_id, errors::target)?,
                     skeleton: frame(skeleton, sizes)?,
                     name,
-                    paper: paper_of(paper, orientation, margin_mm, sheets(per_face, allow_seams)?)?,
+                    paper: PaperSpec {
+                        tag_ids,
+                        guide_page,
+                        ..paper_of(paper, orientation, margin_mm, sheets(per_face, allow_seams)?)?
+                    },
                 };
                 Ok(PyClassInitializer::from(solids.make()?).add_subclass(Self))
             }
@@ -202,7 +208,7 @@ solid!(Cube, SolidShape::Cube, "A cube whose six faces carry tagged checkerboard
 /// edge_mm : float, optional
 ///     Mean edge to which the mesh is scaled, mm; as it is if left out.
 /// tiles, face_margin_mm, family, tag_spacing, tag_border, first_id, board_id, skeleton, panel_thickness_mm, wall_mm, \
-/// rib_mm, per_face, allow_seams, paper, orientation, margin_mm, name
+/// rib_mm, per_face, allow_seams, tag_ids, guide_page, paper, orientation, margin_mm, name
 ///     As of :class:`Icosahedron`.
 #[pyclass(frozen, extends = Target, module = "deltille")]
 pub struct Solid;
@@ -212,8 +218,8 @@ impl Solid {
     #[new]
     #[pyo3(signature = (mesh, *, scale = 1.0, allow_skew = false, edge_mm = None, tiles = None,
         face_margin_mm = None, family = None, tag_spacing = None, tag_border = None, first_id = 0, board_id = 0,
-        skeleton = false, panel_thickness_mm = None, wall_mm = None, rib_mm = None, per_face = false, allow_seams = false, paper = None,
-        orientation = "auto", margin_mm = None, name = None))]
+        skeleton = false, panel_thickness_mm = None, wall_mm = None, rib_mm = None, per_face = false, allow_seams = false,
+        tag_ids = false, guide_page = false, paper = None, orientation = "auto", margin_mm = None, name = None))]
     #[expect(clippy::too_many_arguments, reason = "keywords")]
     fn new(
         mesh: PathBuf,
@@ -233,6 +239,8 @@ impl Solid {
         rib_mm: Option<f64>,
         per_face: bool,
         allow_seams: bool,
+        tag_ids: bool,
+        guide_page: bool,
         paper: Option<&str>,
         orientation: &str,
         margin_mm: Option<f64>,
@@ -249,7 +257,11 @@ impl Solid {
             board_id: whole("board_id", board_id, errors::target)?,
             skeleton: frame(skeleton, sizes)?,
             name: Some(name.unwrap_or(stem)),
-            paper: paper_of(paper, orientation, margin_mm, sheets(per_face, allow_seams)?)?,
+            paper: PaperSpec {
+                tag_ids,
+                guide_page,
+                ..paper_of(paper, orientation, margin_mm, sheets(per_face, allow_seams)?)?
+            },
         };
         Ok(PyClassInitializer::from(solids.make()?).add_subclass(Self))
     }

@@ -1,6 +1,6 @@
 """Models for simulators, opened by what simulates: simulators.py DELTILLE FOLDER.
 
-Makes boards, an icosahedron, a cube, a cuboid, and a cuboctahedron of triangles and squares in FOLDER, and then
+Makes boards, one with two sides, a ChArUco board, an AprilGrid, an icosahedron, a cube, a cuboid, and a cuboctahedron of triangles and squares in FOLDER, and then
 
 - MuJoCo renders each from a ring of cameras, `deltille detect` reads the pictures, and the corners must be where MuJoCo's
   camera puts those of the description: of those on faces that are seen within 60° at least 95 %;
@@ -57,13 +57,15 @@ def rendered(folder, name, target, corners):
     spec.visual.map.znear = 0.01
     places = np.array([place for place, _ in corners.values()]) / 1e3
     middle, size = places.mean(0), np.ptp(places, 0).max()
-    is_flat = len(target["panels"]) == 1
+    sides = len(target["panels"])
     cameras = []
     for k in range(VIEWS):
         angle = 2 * np.pi * k / VIEWS
-        if is_flat:
+        if sides <= 2:
             tilt = np.radians(12 + 6 * k)
             aside = [np.sin(tilt) * np.cos(angle), np.sin(tilt) * np.sin(angle), np.cos(tilt)]
+            if sides == 2 and k % 2:
+                aside[2] *= -1
         else:
             aside = [np.cos(angle), np.sin(angle), 0.8 * np.sin(2 * angle)]
         eye = middle + 2.0 * size * np.array(aside) / np.linalg.norm(aside)
@@ -201,6 +203,9 @@ def main():
     for name, command in {
         "desk": ["board", "--rows", "7", "--cols", "9", "--edge", "30mm", "--name", "desk", *small],
         "squares": ["checkerboard", "--rows", "7", "--cols", "9", "--edge", "30mm", "--name", "squares", *small],
+        "door": ["board", "--rows", "6", "--cols", "7", "--edge", "30mm", "--two-sided", "4mm", "--name", "door", *small],
+        "charuco": ["charuco", "--squares", "8x6", "--edge", "30mm", *small],
+        "aprilgrid": ["aprilgrid", "--tags", "5x4", "--edge", "30mm", *small],
         "icosahedron": ["icosahedron", *small],
         "cube": ["cube", *large],
         "cuboid": ["cuboid", "--size", "200x150x120mm", "--tiles", "6", *large],

@@ -124,15 +124,7 @@ impl Sheet {
 
 /// Whether panels are fixed to each other in space.
 fn is_solid(target: &Target) -> bool {
-    match target.spec {
-        TargetSpec::Solid(_) => true,
-        TargetSpec::Listed(_) => target.panels.len() > 1,
-        TargetSpec::Board(_)
-        | TargetSpec::Tags(_)
-        | TargetSpec::Charuco(_)
-        | TargetSpec::AprilGrid(_)
-        | TargetSpec::Circles(_) => false,
-    }
+    target.panels.len() > 1 && target.spec.is_rigid()
 }
 
 /// How the panel of an id is turned on its sheet, rad; 0 where no sheet is described.

@@ -226,7 +226,7 @@ pub(super) fn check(
             }
         }
         let found_from_stated = AffineMap::IDENTITY;
-        let panel = PlacedPanel::new(page, panel, placement, found_from_stated);
+        let panel = PlacedPanel::new(page, panel, placement, found_from_stated).among(layout);
         match wrong_tones(&panel) {
             Some(finding) => verdict.findings.push(finding),
             None => placed.push(panel),

@@ -86,7 +86,9 @@ impl PlacedPanel<'_> {
         let of_row = |row: usize| -> Vec<([usize; 2], f64)> {
             let of_square = |column: usize| {
                 let at = [column * SQUARE, row * SQUARE];
-                Some((at, self.displaced(at, &is_black)?))
+                let middle = DVec2::from(at.map(|low| low as f64)) + (SQUARE - 1) as f64 / 2.0;
+                let is_clear = !self.is_text(middle, (SQUARE + NEAR) as f64);
+                Some((at, is_clear.then(|| self.displaced(at, &is_black))??))
             };
             columns
                 .clone()

@@ -91,7 +91,7 @@ fn inlaid(verifier: &Verifier, path: &Path, bodies: &[Body; 2]) -> Result<Verdic
         .collect();
     let black_mm2: f64 = fronts.iter().map(|[_, black]| area(black)).sum();
     let plate = match &verifier.target.spec {
-        TargetSpec::Board(_) => {
+        spec if spec.is_on_plate() => {
             let depths =
                 triangles[0].iter().flatten().map(|&v| -faces[0].panel.pose.panel_from_target(v).z);
             Some(depths.fold(0.0, f64::max))
@@ -140,7 +140,7 @@ fn triangles_of(body: &Body) -> Vec<Triangle> {
 fn faces<'a>(verifier: &Verifier<'a>) -> Option<Vec<Face<'a>>> {
     let panels = &verifier.target.panels;
     match (&verifier.target.spec, panels.as_slice()) {
-        (TargetSpec::Board(_), [panel]) => {
+        (spec, [panel]) if spec.is_on_plate() => {
             let [left, lower, right, upper] = panel.field_mm();
             let outline = [(left, lower), (right, lower), (right, upper), (left, upper)];
             Some(vec![Face { panel, outline: outline.map(DVec2::from).to_vec() }])

@@ -523,7 +523,7 @@ impl<'a> Verifier<'a> {
         let found_from_stated = AffineMap::IDENTITY;
         let placed = layout.placements.iter().filter_map(|placement| {
             let panel = self.target.panels.iter().find(|panel| panel.id == placement.panel)?;
-            Some(PlacedPanel::new(page, panel, placement, found_from_stated))
+            Some(PlacedPanel::new(page, panel, placement, found_from_stated).among(layout))
         });
         placed.collect()
     }

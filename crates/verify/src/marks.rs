@@ -22,7 +22,9 @@ use deltille_core::artwork;
 use deltille_core::lattice::{Orientation, Tile};
 use deltille_core::polygon;
 use deltille_core::raster::{Coverage, Gray};
-use deltille_core::targets::{CHECK_BAR_STROKE_MM, Corner, Label, LineKind, SheetLayout};
+use deltille_core::targets::{
+    CHECK_BAR_STROKE_MM, Corner, Label, LineKind, SheetLayout, SheetText,
+};
 
 /// Ink of a mark and of its outline, each the mean of 3 × 3 pixels, may differ by this. An edge
 /// that lies 0.02 mm off at 300 dpi changes a mean by 0.08, a missing stroke by more than 0.5.
@@ -137,7 +139,8 @@ pub(super) fn check(
             |[x0, y0, x1, y1]: [usize; 4]| (x0..x1).contains(&x) && (y0..y1).contains(&y);
         let at = DVec2::new(x as f64, y as f64);
         let is_beside = |ground: &Ground| ground.expected(page, at, EDGE_PX).is_none();
-        !window.is_some_and(in_window) && grounds.iter().all(is_beside)
+        let in_tiles = || panels.iter().any(|panel| panel.is_text(at, 0.0));
+        !window.is_some_and(in_window) && (grounds.iter().all(is_beside) || in_tiles())
     };
     let (mut marks, mut findings) = marks(layout);
     marks.extend(panels.iter().flat_map(discs));
@@ -242,6 +245,20 @@ fn marks(layout: &SheetLayout) -> (Vec<Mark>, Vec<MarkFinding>) {
         marks.push(Mark { what: What::Line(index), outlines, areas });
     }
     (marks, findings)
+}
+
+/// The corners of a rectangle around a text, with the blank that belongs to it, px; `None` where it has no ink, or cannot be
+/// drawn.
+pub(super) fn rectangle_px(page: &Page, text: &SheetText) -> Option<[DVec2; 4]> {
+    let path = artwork::text_outline(text).ok().filter(|path| !path.is_empty())?;
+    let along = Affine::rotate(-text.angle_rad);
+    let blank = BLANK_PX / page.px_per_mm;
+    let Rect { x0, y0, x1, y1 } = (along * &path).bounding_box().inflate(blank, blank);
+    let corners = [(x0, y0), (x1, y0), (x1, y1), (x0, y1)].map(Point::from);
+    Some(corners.map(|corner| {
+        let Point { x, y } = along.inverse() * corner;
+        page.px_from_page(DVec2::new(x, y))
+    }))
 }
 
 /// The discs of a panel, each a polygon of so many sides that it is a circle.

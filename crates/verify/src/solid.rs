@@ -21,7 +21,7 @@ use deltille_core::camera::{Camera, Pose};
 use deltille_core::detect::Detection;
 use deltille_core::lattice::Vertex;
 use deltille_core::raster::Gray;
-use deltille_core::targets::{Corner, Panel, TargetSpec};
+use deltille_core::targets::{Corner, Panel, TagPlacement, Target, TargetSpec};
 use deltille_core::words::counted;
 use deltille_files::export::mesh::{LEAST_TEXELS_PER_BIT, PLATE_TRIANGLES, UNTAGGED_CELLS};
 
@@ -144,8 +144,8 @@ pub(super) fn verify(verifier: &Verifier, path: &Path, model: Model, format: For
     let stated = match &verifier.target.spec {
         // As many as the faces have, all of which are looked at: there is nothing else.
         TargetSpec::Solid(spec) => Some(spec.polyhedron().triangles_mm().len()),
-        TargetSpec::Board(_) => {
-            findings.extend(beside_front(&model, &verifier.target.panels));
+        spec if spec.is_on_plate() => {
+            findings.extend(beside_boards(&model, sides(verifier.target)));
             Some(PLATE_TRIANGLES)
         }
         _ => None,
@@ -184,16 +184,21 @@ pub(super) fn verify(verifier: &Verifier, path: &Path, model: Model, format: For
     Verdict { faces, ..verdict }
 }
 
-/// What of a plate is not the front of its board, and should be white and behind it.
-fn beside_front(model: &Model, panels: &[Panel]) -> Option<Finding> {
-    let panel = panels.first()?;
+/// The panels of a plate: its sides, or that of the first of several boards.
+fn sides(target: &Target) -> &[Panel] {
+    let count = if target.spec.is_rigid() { target.panels.len() } else { 1 };
+    &target.panels[..count.min(target.panels.len())]
+}
+
+/// What of a plate is on no side with a board, and should be white and behind all of them.
+fn beside_boards(model: &Model, sides: &[Panel]) -> Option<Finding> {
     let size = DVec2::new(model.texture.width() as f64, model.texture.height() as f64);
     let problem = model.triangles.iter().find_map(|triangle| {
-        let heights = triangle.vertices_mm.map(|v| panel.pose.panel_from_target(v).z);
-        if heights.iter().any(|&z| z > MESH_TOLERANCE_MM) {
+        let heights = |side: &Panel| triangle.vertices_mm.map(|v| side.pose.panel_from_target(v).z);
+        if sides.iter().flat_map(heights).any(|z| z > MESH_TOLERANCE_MM) {
             return Some("a part of the plate stands before the board");
         }
-        if heights.iter().all(|z| z.abs() <= MESH_TOLERANCE_MM) {
+        if sides.iter().any(|side| heights(side).iter().all(|z| z.abs() <= MESH_TOLERANCE_MM)) {
             return None;
         }
         let [a, b, c] = triangle.uv.map(|uv| uv * size - 0.5);
@@ -285,9 +290,13 @@ fn check_face(verifier: &Verifier, model: &Model, panel: &Panel) -> FaceVerdict 
     if !verdict.findings.is_empty() {
         return verdict;
     }
-    verdict.tags_exact = 0;
     let own = || detection.grids.iter().filter(|grid| grid.panel == Some(panel.id));
-    for tag in &panel.tags {
+    // Tags at the rim, which have no corner of the board at some of theirs, were compared cell by cell alone.
+    let is_read = |tag: &&TagPlacement| {
+        panel.tag_tile(tag).vertices().all(|vertex| panel.corner_at(vertex).is_some())
+    };
+    verdict.tags_exact = panel.tags.len() - panel.tags.iter().filter(is_read).count();
+    for tag in panel.tags.iter().filter(is_read) {
         let same = |found: &&deltille_core::detect::DecodedTag| {
             (found.id, found.row, found.col) == (tag.id, tag.row, tag.col)
         };
@@ -416,7 +425,13 @@ fn texel_px(model: &Model, panel: &Panel, px_per_mm: f64) -> f64 {
 fn wrong_surface(verifier: &Verifier, model: &Model) -> Option<Finding> {
     let stated: Vec<DVec3> = match &verifier.target.spec {
         TargetSpec::Solid(spec) => spec.polyhedron().vertices_mm,
-        TargetSpec::Board(_) => plate_vertices(verifier.target.panels.first()?, model),
+        spec if spec.is_on_plate() => {
+            let thickness_mm = match spec {
+                TargetSpec::Board(board) => board.two_sided_mm,
+                _ => None,
+            };
+            plate_vertices(verifier.target.panels.first()?, thickness_mm, model)
+        }
         _ => return None,
     };
     let body = |problem: String| Some(MeshFinding::Body { problem }.into());
@@ -469,12 +484,13 @@ fn wrong_surface(verifier: &Verifier, model: &Model) -> Option<Finding> {
 const VOLUME_SLACK: f64 = 0.1;
 
 /// The vertices of the plate of a board: the corners of its field, and those behind them by the thickness that it has.
-fn plate_vertices(panel: &Panel, model: &Model) -> Vec<DVec3> {
+fn plate_vertices(panel: &Panel, thickness_mm: Option<f64>, model: &Model) -> Vec<DVec3> {
     let [left, lower, right, upper] = panel.field_mm();
     let front = [(left, lower), (right, lower), (right, upper), (left, upper)]
         .map(|(x, y)| panel.pose.target_from_panel(DVec2::new(x, y)));
     let vertices = model.triangles.iter().flat_map(|triangle| triangle.vertices_mm);
     let depth = vertices.map(|v| -panel.pose.panel_from_target(v).z).fold(0.0, f64::max);
+    let depth = thickness_mm.unwrap_or(depth);
     let behind = front.map(|place| place - depth * panel.pose.matrix().z_axis);
     front.into_iter().chain(behind).collect()
 }

@@ -12,13 +12,13 @@ use super::{Finding, SheetVerdict, TOLERANCE_MM, Verifier};
 use crate::document::Page;
 use deltille_core::targets::{Corner, SheetLayout};
 
-/// Whether all panels of a page are such.
+/// Whether all panels of a page are such, if it has any.
 pub(super) fn is_for(placed: &[PlacedPanel]) -> bool {
     let is_stated = |placed: &PlacedPanel| {
         let panel = placed.panel;
         panel.is_tag_alone() || panel.discs_mm.is_some()
     };
-    !placed.is_empty() && placed.iter().all(is_stated)
+    placed.iter().all(is_stated)
 }
 
 /// Compares the panels of the page.

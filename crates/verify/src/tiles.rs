@@ -12,10 +12,11 @@ use serde::Serialize;
 
 use super::document::{MAX_INK_ERROR, Page};
 use super::fit::AffineMap;
+use super::marks;
 use deltille_core::family::{Decoder, Family};
 use deltille_core::lattice::{Cell, GridKind, TagCells, Tile, Vertex};
 use deltille_core::statistics::median;
-use deltille_core::targets::{Panel, Placement, TagPlacement};
+use deltille_core::targets::{Panel, Placement, SheetLayout, SheetText, TagPlacement};
 
 /// Pixels nearer than this to a change of colour are ignored, px: the half diagonal of a pixel
 /// (0.71), over which an edge is smeared, 0.02 mm at 300 dpi (0.24), and some blur.
@@ -298,6 +299,8 @@ pub(super) struct PlacedPanel<'a> {
     pub found_from_stated: AffineMap,
     /// Where the panel's x axis points on the page.
     along: DVec2,
+    /// The corners of rectangles around texts where they are stated, px: what is in them is compared by itself.
+    texts: Vec<[DVec2; 4]>,
 }
 
 impl<'a> PlacedPanel<'a> {
@@ -308,7 +311,30 @@ impl<'a> PlacedPanel<'a> {
         found_from_stated: AffineMap,
     ) -> Self {
         let along = DVec2::from_angle(placement.angle_rad);
-        Self { page, panel, placement, found_from_stated, along }
+        Self { page, panel, placement, found_from_stated, along, texts: Vec::new() }
+    }
+
+    /// The same among the texts of its sheet, some of which may stand in its tiles.
+    pub fn among(mut self, layout: &SheetLayout) -> Self {
+        let [left, lower, right, upper] = self.panel.bounds_mm();
+        let rectangle = |text: &SheetText| {
+            let first = self.panel_from_page(text.at_mm);
+            let inside = (left..right).contains(&first.x) && (lower..upper).contains(&first.y);
+            inside.then(|| marks::rectangle_px(self.page, text))?
+        };
+        self.texts = layout.texts.iter().filter_map(rectangle).collect();
+        self
+    }
+
+    /// Whether a pixel belongs to a text, or one within `near_px` of it.
+    pub fn is_text(&self, px: DVec2, near_px: f64) -> bool {
+        self.texts.iter().any(|corners| {
+            (0..4).all(|i| {
+                let (a, b) = (corners[i], corners[(i + 1) % 4]);
+                // Counter-clockwise on the page, so clockwise in the picture.
+                (b - a).normalize_or_zero().perp_dot(px - a) <= near_px
+            })
+        })
     }
 
     /// Stated page position of a point of the panel.
@@ -335,6 +361,9 @@ impl<'a> PlacedPanel<'a> {
             let [a, b, c] = self.frame_px(tile);
             let DVec2 { x: u, y: v } = self.panel.kind.middle();
             let centre = a + u * (b - a) + v * (c - a);
+            if self.is_text(centre, 0.0) {
+                continue;
+            }
             inks[usize::from(tile.is_dark() != self.panel.inverted)].push(self.page.ink(centre));
         }
         let tone = |inks: &Vec<f64>| {
@@ -439,7 +468,7 @@ impl<'a> PlacedPanel<'a> {
             for x in low.x.max(0.0) as usize..end(high.x, image.width()) {
                 let position = DVec2::new(x as f64, y as f64);
                 let p = uv(position - a);
-                if !inside(p) {
+                if !inside(p) || self.is_text(position, 0.0) {
                     continue;
                 }
                 let here = bit(p);

@@ -5,6 +5,7 @@ use std::process::ExitCode;
 use anyhow::Context;
 
 use super::files::text_file;
+use super::meshes::PlateMeshes;
 use super::printing::{Printing, page};
 use super::settings::TAGS;
 use crate::cli::output::tell;
@@ -40,10 +41,13 @@ pub struct Args {
     board_id: u32,
     #[command(flatten)]
     printing: Printing,
+    #[command(flatten)]
+    meshes: PlateMeshes,
 }
 
 /// Makes a grid, writes its files and that of Kalibr, and verifies what it wrote.
 pub fn run(args: Args) -> anyhow::Result<ExitCode> {
+    args.meshes.check_use(None)?;
     let Grid(tags) = args.tags;
     let spec = AprilGridSpec {
         gap: args.gap,
@@ -56,7 +60,9 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let family = Some(family::resolve(&spec.family).context("--family")?);
     let family = family.as_ref();
     let target = args.printing.build("aprilgrid", &TargetSpec::AprilGrid(spec.clone()), family)?;
-    let mut files = args.printing.files(&target, family)?;
+    let mut files = args.printing.files(&target, family, args.meshes.is_any())?;
+    let (meshes, texture) = args.meshes.files(&target, family)?;
+    files.extend(meshes);
     match spec.to_kalibr_yaml() {
         Some(yaml) => files.push(text_file(format!("{}.yaml", target.name), yaml)),
         None => tell!(
@@ -67,7 +73,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let [columns, rows] = spec.tags;
     let last = spec.first_id + spec.count() - 1;
     let summary = format!(
-        "{}: {columns} × {rows} tags, edge {} mm, gaps {} mm, {}{}",
+        "{}: {columns} × {rows} tags, edge {} mm, gaps {} mm, {}{}{texture}",
         target.name,
         spec.tag_mm,
         (spec.gap * spec.tag_mm * 1e3).round() / 1e3,

@@ -7,15 +7,15 @@ use anyhow::{Context, bail};
 
 use super::delivery::Delivery;
 use super::files::{File, Formats, drawn, text_file};
-use super::meshes::{MESHES, Meshes};
+use super::meshes::PlateMeshes;
 use super::settings::{Plan, Settings};
+use super::template::Template;
 use crate::artwork;
-use crate::cli::output::{self, tell};
+use crate::cli::output::tell;
 use crate::export::dsc;
-use crate::export::kind::Kind;
 use crate::family::{self, Family, FamilyError, FamilyFileError, square_names};
 use crate::lattice::GridKind;
-use crate::targets::{Target, TargetSpec, parse_length_mm, tag_range};
+use crate::targets::{Target, TargetSpec, tag_range};
 
 /// Arguments of both.
 #[derive(clap::Args)]
@@ -31,10 +31,7 @@ pub struct Args {
     #[command(flatten)]
     delivery: Delivery,
     #[command(flatten)]
-    meshes: Meshes,
-    /// Thickness of the plate that carries the board in a mesh [default: 3mm]
-    #[arg(long, value_name = "LENGTH", value_parser = parse_length_mm, help_heading = MESHES)]
-    plate: Option<f64>,
+    meshes: PlateMeshes,
 }
 
 /// Makes a board, writes its files, and verifies what it wrote.
@@ -46,7 +43,7 @@ pub fn run(grid: GridKind, args: Args) -> anyhow::Result<ExitCode> {
     let mut plan = settings.plan(grid)?;
     // A mesh alone needs no paper.
     plan.pdf &= settings.prints() || !args.meshes.is_any();
-    args.meshes.check_use(args.plate)?;
+    args.meshes.check_use(plan.spec.two_sided_mm)?;
     let family = plan.spec.tags.as_ref().map(|tags| family::resolve(&tags.family)).transpose();
     let family = match (family, grid) {
         (Err(FamilyFileError::Name(FamilyError::Unknown { name })), GridKind::Checker) => bail!(
@@ -76,21 +73,17 @@ pub fn run(grid: GridKind, args: Args) -> anyhow::Result<ExitCode> {
     let paper = is_printed.then_some(&plan.paper);
     let target = Target::build(&plan.name, &spec, family.as_ref(), paper)?;
     args.delivery.check_beside(&target)?;
-    let overwrite = args.delivery.overwrite;
-    let template = args.save_template.as_ref().map(|path| {
-        let toml = settings.with_edge(plan.spec.edge_mm).to_toml(grid);
-        overwrite.check(path, &Kind::of(toml.as_bytes())).context("--save-template")?;
-        Ok::<_, anyhow::Error>((path, toml))
+    let template = args.save_template.as_deref().map(|path| {
+        let text = settings.with_edge(plan.spec.edge_mm).to_toml(grid);
+        Template::new(path, text, args.delivery.overwrite)
     });
     let template = template.transpose()?;
     let mut files = files(&plan, &target, family.as_ref())?;
-    let (meshes, texture) = args.meshes.files(&target, family.as_ref(), args.plate)?;
+    let (meshes, texture) = args.meshes.files(&target, family.as_ref())?;
     files.extend(meshes);
     let told = summary(&target) + &texture;
     let delivered = args.delivery.deliver(&target, family.as_ref(), &files, &told)?;
-    if let Some((path, toml)) = template {
-        output::write(path, toml.as_bytes(), overwrite).context("--save-template")?;
-    }
+    template.map_or(Ok(()), |template| template.write())?;
     Ok(delivered)
 }
 
@@ -114,9 +107,12 @@ fn summary(target: &Target) -> String {
     let panels = &target.panels;
     let TargetSpec::Board(spec) = &target.spec else { return target.name.to_string() };
     let edge = spec.edge_mm;
-    let boards = if panels.len() == 1 { String::new() } else { format!("{} × ", panels.len()) };
+    let boards = if spec.boards == 1 { String::new() } else { format!("{} × ", panels.len()) };
     let mut text =
         format!("{}: {boards}{} × {} corners, edge {edge} mm", target.name, spec.rows, spec.cols);
+    if let Some(thickness_mm) = spec.two_sided_mm {
+        text += &format!(", two sides {thickness_mm} mm apart");
+    }
     let mut ids = panels.iter().flat_map(|panel| &panel.tags).map(|tag| tag.id);
     if let (Some(family), Some(first)) = (&target.family, ids.next()) {
         let last = ids.next_back().unwrap_or(first);

@@ -2,6 +2,7 @@
 
 use std::process::ExitCode;
 
+use super::meshes::PlateMeshes;
 use super::printing::{Printing, page};
 use super::settings::TAGS;
 use crate::cli::values::{Grid, whole};
@@ -37,10 +38,13 @@ pub struct Args {
     board_id: u32,
     #[command(flatten)]
     printing: Printing,
+    #[command(flatten)]
+    meshes: PlateMeshes,
 }
 
 /// Makes a board, writes its files, and verifies what it wrote.
 pub fn run(args: Args) -> anyhow::Result<ExitCode> {
+    args.meshes.check_use(None)?;
     let Grid(squares) = args.squares;
     // A name that is unknown is refused with the other numbers.
     let name = dictionary(&args.dictionary).map_or(args.dictionary, |(name, _)| name.to_owned());
@@ -55,11 +59,13 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let family = Family::shipped(&spec.dictionary).ok();
     let family = family.as_ref();
     let target = args.printing.build("charuco", &TargetSpec::Charuco(spec.clone()), family)?;
-    let files = args.printing.files(&target, family)?;
+    let mut files = args.printing.files(&target, family, args.meshes.is_any())?;
+    let (meshes, texture) = args.meshes.files(&target, family)?;
+    files.extend(meshes);
     let last = spec.first_id + spec.markers() - 1;
     let [columns, rows] = spec.squares;
     let summary = format!(
-        "{}: {columns} × {rows} squares, edge {} mm, markers {} mm, {}{}",
+        "{}: {columns} × {rows} squares, edge {} mm, markers {} mm, {}{}{texture}",
         target.name,
         spec.square_mm,
         spec.marker_mm,

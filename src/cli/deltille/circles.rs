@@ -40,7 +40,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         ..usual
     };
     let target = args.printing.build("circles", &TargetSpec::Circles(spec.clone()), None)?;
-    let files = args.printing.files(&target, None)?;
+    let files = args.printing.files(&target, None, false)?;
     let summary = format!(
         "{}: {} × {} circles, spacing {} mm, diameter {} mm{}",
         target.name,

@@ -5,7 +5,7 @@
 use std::collections::BTreeMap;
 use std::ops::RangeInclusive;
 
-use anyhow::{Context, anyhow};
+use anyhow::{Context, anyhow, bail};
 
 use super::files::{File, bytes_file};
 use crate::cli::values::{number, whole};
@@ -17,7 +17,7 @@ use crate::family::Family;
 use crate::targets::{Target, TargetSpec, parse_length_mm};
 
 /// Heading of these options.
-pub const MESHES: &str = "Meshes and models for simulators";
+const MESHES: &str = "Meshes and models for simulators";
 
 /// Sides of a texture, px.
 const SIDE_PX: RangeInclusive<u32> = 64..=MAX_TEXTURE_PX;
@@ -165,10 +165,45 @@ impl Meshes {
     }
 }
 
+/// Meshes of a plate with a board.
+#[derive(clap::Args, Clone, Copy)]
+pub struct PlateMeshes {
+    #[command(flatten)]
+    meshes: Meshes,
+    /// Thickness of the plate that carries the board in a mesh [default: 3mm]
+    #[arg(long, value_name = "LENGTH", value_parser = parse_length_mm, help_heading = MESHES)]
+    plate: Option<f64>,
+}
+
+impl PlateMeshes {
+    /// Whether any is asked for.
+    pub fn is_any(&self) -> bool {
+        self.meshes.is_any()
+    }
+
+    /// Refuses options of a mesh that is not made, and another thickness than that between two sides.
+    pub fn check_use(&self, two_sided_mm: Option<f64>) -> anyhow::Result<()> {
+        if self.plate.is_some() && two_sided_mm.is_some() {
+            bail!("--plate: the plate is as thick as --two-sided says: leave it out");
+        }
+        self.meshes.check_use(self.plate)
+    }
+
+    /// As [`Meshes::files`].
+    pub fn files(
+        &self,
+        target: &Target,
+        family: Option<&Family>,
+    ) -> anyhow::Result<(Vec<File>, String)> {
+        self.meshes.files(target, family, self.plate)
+    }
+}
+
 /// Why there is no mesh, with the option that is at fault; where no other is, that is `option`.
 fn refusal(error: &MeshError, option: Option<&str>) -> anyhow::Error {
     let option = match error {
         MeshError::Thickness(_) => Some("--plate"),
+        MeshError::TwoSides(_) => Some("--3mf"),
         MeshError::ThinInlay(_) | MeshError::DeepInlay { .. } => Some("--inlay"),
         MeshError::SeveralBoards(..) => Some("--boards"),
         _ => option,

@@ -30,8 +30,10 @@ mod rig;
 pub mod settings;
 mod sightings;
 mod solid;
+mod solid_settings;
 mod tables;
 mod target_file;
+mod template;
 mod undistort;
 mod verify;
 
@@ -83,7 +85,6 @@ enum Command {
     Icosahedron(Box<solid::Args>),
     /// Make a cube with tagged checkerboards on its faces
     #[command(after_help = examples::CUBE)]
-    #[command(mut_arg("edge", |arg| arg.help(solid::squares::EDGE)))]
     #[command(mut_arg("tiles", |arg| arg.help(solid::squares::TILES)))]
     #[command(mut_arg("family", |arg| arg.help(solid::squares::FAMILY)))]
     #[command(mut_arg("tag_spacing", |arg| arg.help(solid::squares::SPACING)))]
@@ -99,6 +100,7 @@ enum Command {
     Cuboid(Box<solid::CuboidArgs>),
     /// Make a solid of any closed mesh: of triangles, rectangles and other convex faces
     #[command(after_help = examples::MESH)]
+    #[command(mut_arg("edge", |arg| arg.help(solid::MEAN_OF_MESH)))]
     Solid(Box<solid::MeshArgs>),
     /// Compare the files of a target with its description
     #[command(after_help = examples::VERIFY)]

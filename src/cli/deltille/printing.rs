@@ -20,6 +20,9 @@ pub struct Printing {
     /// auto, portrait or landscape
     #[arg(long, help_heading = PAPER, default_value = "auto")]
     orientation: String,
+    /// One page more: a picture of the target, what to do with the sheet, and a ruler
+    #[arg(long, help_heading = PAPER)]
+    guide_page: bool,
     /// Blank along the edges of the paper; 0.5 mm are left in any case [default: 5mm]
     #[arg(long, help_heading = PAPER, value_name = "LENGTH", value_parser = parse_length_mm)]
     margin: Option<f64>,
@@ -35,6 +38,9 @@ pub struct Printing {
     /// Resolution of the PNG, 200 to 2400 dots per inch [default: 300]
     #[arg(long, help_heading = PRINT, allow_negative_numbers = true, value_parser = whole(DPI))]
     dpi: Option<u32>,
+    /// Printed on the label of every sheet beside the name, such as whose it is
+    #[arg(long, value_name = "TEXT")]
+    note: Option<String>,
     /// Stem of the files' names, printed on the sheet [default: that of the command]
     #[arg(long, value_parser = name)]
     name: Option<String>,
@@ -57,6 +63,8 @@ impl Printing {
             size: self.paper.as_deref().map(str::parse).transpose().context("--paper")?,
             orientation: self.orientation.parse().context("--orientation")?,
             margin_mm: self.margin.unwrap_or(DEFAULT_MARGIN_MM),
+            note: self.note.clone(),
+            guide_page: self.guide_page,
             ..PaperSpec::default()
         };
         let name = self.name.as_deref().unwrap_or(command);
@@ -65,10 +73,15 @@ impl Printing {
         Ok(target)
     }
 
-    /// The description of a target, and its pages.
-    pub fn files(&self, target: &Target, family: Option<&Family>) -> anyhow::Result<Vec<File>> {
-        let formats =
-            Formats { pdf: self.pdf || !(self.svg || self.png), svg: self.svg, png: self.png };
+    /// The description of a target, and its pages; without a PDF that is not asked for where something else `is_made`.
+    pub fn files(
+        &self,
+        target: &Target,
+        family: Option<&Family>,
+        is_made: bool,
+    ) -> anyhow::Result<Vec<File>> {
+        let (svg, png) = (self.svg, self.png);
+        let formats = Formats { pdf: self.pdf || !(svg || png || is_made), svg, png };
         let dpi = self.dpi.unwrap_or(DEFAULT_DPI);
         let mut files = vec![text_file(format!("{}.json", target.name), target.to_json())];
         files.extend(drawn(&target.name, artwork::draw(target, family)?, formats, dpi));

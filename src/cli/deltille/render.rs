@@ -80,7 +80,8 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let limits = args.limits.limits();
     let target = target_file::read(&args.target, &limits)?;
     let family = target_file::family(&target, args.family.as_deref())?;
-    if !matches!(target.spec, TargetSpec::Solid(_)) && target.panels.len() > 1 {
+    let is_listed = matches!(target.spec, TargetSpec::Listed(_)) && target.panels.len() > 1;
+    if target.is_loose() || is_listed {
         bail!("{} has several loose boards: render targets of one board, or solids", target.name);
     }
     let camera = camera_file::read("--camera", &args.camera)?;

@@ -9,13 +9,11 @@ use std::path::Path;
 use anyhow::{Context, anyhow, bail};
 use serde::{Deserialize, Serialize};
 
+use super::template;
 use crate::cli::values::{number, whole};
-use crate::export::GENERATOR;
 use crate::export::dsc::Dialect;
 use crate::family::places;
 use crate::lattice::GridKind;
-use crate::limits;
-use crate::reading::in_words;
 use crate::targets::{
     BORDER_BITS, BoardSpec, DEFAULT_MARGIN_MM, MOST_ROWS, PaperSpec, SIDES, TagSpec, TagsIn,
     parse_length_mm, usual_edge_mm,
@@ -82,6 +80,10 @@ pub struct Settings {
     /// Id of the first tag; the others follow [default: 0]
     #[arg(long, help_heading = TAGS, value_name = "ID", allow_negative_numbers = true, value_parser = whole(0..=u32::MAX))]
     first_id: Option<u32>,
+    /// The id of each tag beside it, in small type
+    #[arg(long, help_heading = TAGS)]
+    #[serde(skip_serializing_if = "is_false")]
+    tag_ids: bool,
     /// Id of the first board [default: 0]
     #[arg(long, value_name = "ID", allow_negative_numbers = true, value_parser = whole(0..=u32::MAX))]
     board_id: Option<u32>,
@@ -92,6 +94,10 @@ pub struct Settings {
     #[arg(long)]
     #[serde(skip_serializing_if = "is_false")]
     invert: bool,
+    /// A board on the back of its plate, too, on a second sheet: so far apart are the two sides, such as
+    /// 3mm
+    #[arg(long, value_name = "THICKNESS", allow_hyphen_values = true)]
+    two_sided: Option<String>,
     /// A0 to A5, letter, legal, tabloid, or a size such as 297x420mm [default: the smallest of A4
     /// to A0 that takes the board]
     #[arg(long, help_heading = PAPER, value_name = "SIZE")]
@@ -104,6 +110,10 @@ pub struct Settings {
     #[arg(long, help_heading = PAPER, conflicts_with = "poster")]
     #[serde(skip_serializing_if = "is_false")]
     pack: bool,
+    /// One page more: a picture of the board, what to do with the sheets, and a ruler
+    #[arg(long, help_heading = PAPER)]
+    #[serde(skip_serializing_if = "is_false")]
+    guide_page: bool,
     /// auto, portrait or landscape [default: auto]
     #[arg(long, help_heading = PAPER)]
     orientation: Option<String>,
@@ -132,6 +142,9 @@ pub struct Settings {
     /// Resolution of the PNG, 200 to 2400 dots per inch [default: 300]
     #[arg(long, help_heading = PRINT, allow_negative_numbers = true, value_parser = whole(DPI))]
     dpi: Option<u32>,
+    /// Printed on the label of every sheet beside the name, such as whose it is
+    #[arg(long, value_name = "TEXT")]
+    note: Option<String>,
     /// Stem of the files' names, printed on the sheet [default: board, or checkerboard]
     #[arg(long)]
     name: Option<String>,
@@ -146,7 +159,8 @@ fn colour(text: &str) -> Result<TagsIn, String> {
     }
 }
 
-fn is_false(value: &bool) -> bool {
+/// Whether a setting is left out of a template.
+pub(super) fn is_false(value: &bool) -> bool {
     !value
 }
 
@@ -173,31 +187,12 @@ pub struct Plan {
 impl Settings {
     /// Reads a template of boards of a kind.
     pub fn read(path: &Path, grid: GridKind) -> anyhow::Result<Self> {
-        let text =
-            limits::read_short_text(path, limits::MAX_SETTINGS_BYTES).context("--template")?;
-        let settings: Self = toml::from_str(&text).map_err(|error| {
-            let before = error.span().map_or("", |span| &text[..span.start]);
-            let line = before.matches('\n').count();
-            let field = text.lines().nth(line).and_then(|line| line.split_once('='));
-            let field = field.map_or("", |(field, _)| field.trim());
-            let message = in_words(error.message().replace('\n', " "));
-            anyhow!("--template: {} line {}, `{field}`: {message}", path.display(), line + 1)
-        })?;
-        match settings.command.as_deref().filter(|made_for| *made_for != command(grid)) {
-            Some(made_for) => bail!(
-                "--template: {} was made for `{made_for}`, not `{}`",
-                path.display(),
-                command(grid)
-            ),
-            None => Ok(settings),
-        }
+        template::read(path, command(grid), |settings: &Self| settings.command.as_deref())
     }
 
     /// The text of a template.
     pub fn to_toml(&self, grid: GridKind) -> String {
-        let settings = Self { command: Some(command(grid).to_owned()), ..self.clone() };
-        let toml = toml::to_string(&settings).expect("plain settings have a TOML form");
-        format!("# {GENERATOR}, template\n{toml}")
+        template::text(&Self { command: Some(command(grid).to_owned()), ..self.clone() })
     }
 
     /// These settings, and those of a template where these say nothing.
@@ -224,12 +219,15 @@ impl Settings {
             tag_spacing: self.tag_spacing.or(template.tag_spacing.filter(|_| !self.dense)),
             tag_border: self.tag_border.or(template.tag_border),
             first_id: self.first_id.or(template.first_id.filter(|_| !self.dense)),
+            tag_ids: self.tag_ids || (template.tag_ids && !self.untagged && !self.dense),
             board_id: self.board_id.or(template.board_id),
             boards: self.boards.or(template.boards),
             invert: self.invert || template.invert,
+            two_sided: self.two_sided.or(template.two_sided),
             paper: self.paper.or(template.paper),
             poster: self.poster || (template.poster && !self.pack),
             pack: self.pack || (template.pack && !self.poster),
+            guide_page: self.guide_page || template.guide_page,
             orientation: self.orientation.or(template.orientation),
             margin: self.margin.or(template.margin),
             pdf: self.pdf || (template.pdf && !formats),
@@ -239,6 +237,7 @@ impl Settings {
             dsc_dialect: self.dsc_dialect.or(template.dsc_dialect),
             // Of no use where other formats are asked for than in the template.
             dpi: self.dpi.or(template.dpi.filter(|_| png || !template.png)),
+            note: self.note.or(template.note),
             name: self.name.or(template.name),
         }
     }
@@ -266,6 +265,9 @@ impl Settings {
             margin_mm: length("margin", &self.margin)?.unwrap_or(DEFAULT_MARGIN_MM),
             poster: self.poster,
             packed: self.pack,
+            note: self.note.clone(),
+            tag_ids: self.tag_ids,
+            guide_page: self.guide_page,
             ..PaperSpec::default()
         };
         if grid == GridKind::Deltille && self.tags_in.is_some() {
@@ -309,6 +311,7 @@ impl Settings {
             board_id: self.board_id.unwrap_or(0),
             tags,
             inverted: self.invert,
+            two_sided_mm: length("two-sided", &self.two_sided)?,
         };
         spec.edge_mm = match length("edge", &self.edge)? {
             Some(mm) => mm,

@@ -6,5 +6,6 @@ mod meshes;
 mod net;
 mod other_detectors;
 mod plan;
+mod sides_and_pages;
 mod solid;
 mod tag_sheets;

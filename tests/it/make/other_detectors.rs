@@ -13,6 +13,7 @@ fn charuco_boards_are_written_verified_and_found_again() {
     for args in [
         "--squares 5x4 --edge 30mm --marker 22mm --dictionary 5x5_100 --name board --svg --png",
         "--squares 5x4 --dictionary apriltag_36h11 --legacy --first-id 570 -o legacy",
+        "--squares 5x4 --gltf --3mf --plate 2mm -o plate",
     ] {
         assert!(page.run(at, &format!("deltille charuco {args}")).status.success(), "{args}");
     }
@@ -54,6 +55,7 @@ fn april_grids_are_written_with_the_file_of_kalibr_and_found_again() {
     for args in [
         "--tags 4x3 --edge 30mm --name grid --svg --png",
         "--tags 2x2 --edge 60mm --gap 0.5 --tag-border 1 --first-id 583 -o small",
+        "--tags 2x2 --usd --texture 1024 -o plate",
     ] {
         assert!(page.run(at, &format!("deltille aprilgrid {args}")).status.success(), "{args}");
     }

@@ -101,6 +101,7 @@ impl Wanted {
             },
             poster: self.poster,
             packed: self.packed,
+            ..PaperSpec::default()
         })
     }
 

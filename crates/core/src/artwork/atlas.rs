@@ -1,4 +1,4 @@
-//! Texture atlas of a solid, all faces packed in rows on one sheet, and that of a plate with a board.
+//! Texture atlas of a solid, all faces packed in rows on one sheet, and that of a plate with boards.
 
 use std::f64::consts::PI;
 
@@ -12,7 +12,7 @@ use crate::targets::{Face, Panel, Placement, Target};
 /// White between two faces, px: more than the filters of the first mipmap levels reach.
 const PADDING_PX: f64 = 16.0;
 
-/// All faces of a solid, or the front of a plate, on one picture, which is the texture of its mesh.
+/// All faces of a solid, or the sides of a plate that carry boards, on one picture, which is the texture of its mesh.
 ///
 /// ```text
 ///    ╱╲‾‾╱╲‾‾╱      Faces stand alternately upright and upside down in rows. Their own margins and
@@ -26,7 +26,7 @@ pub struct Atlas {
     pub px_per_m: u32,
     /// Width and height of the texture, px.
     pub size_px: [u32; 2],
-    /// Vertices of each face on the sheet, mm, in the order of the faces; of a plate those of its front.
+    /// Vertices of each face on the sheet, mm, in the order of the faces, or of the sides of a plate.
     pub outlines_mm: Vec<Vec<DVec2>>,
 }
 
@@ -62,30 +62,36 @@ impl Atlas {
         Ok(Atlas { sheet, px_per_m, size_px: size_px.as_uvec2().to_array(), outlines_mm })
     }
 
-    /// Lays out the front of a plate: a board with its quiet zone.
+    /// Lays out the sides of a plate, one above the other: boards with their quiet zones, all as large as the first.
     ///
     /// # Errors
     /// As [`Self::new`].
     pub fn of_plate(
         target: &Target,
-        panel: &Panel,
+        sides: &[Panel],
         family: Option<&Family>,
         px_per_m: u32,
     ) -> Result<Atlas, ArtworkError> {
         let mm_per_px = 1e3 / f64::from(px_per_m);
         let padding = DVec2::splat(PADDING_PX * mm_per_px);
-        let [left, lower, right, upper] = panel.field_mm();
+        let [left, lower, right, upper] = sides.first().map_or([0.0; 4], Panel::field_mm);
         let low = DVec2::new(left, lower);
         let plate = DVec2::new(right, upper) - low;
-        let size_px = ((plate + 2.0 * padding) / mm_per_px).ceil();
+        let step = plate.y + padding.y;
+        let all = DVec2::new(plate.x, sides.len() as f64 * step) + DVec2::new(2.0, 1.0) * padding;
+        let size_px = (all / mm_per_px).ceil();
         let DVec2 { x: width_mm, y: height_mm } = size_px * mm_per_px;
-        let placement = Placement { panel: panel.id, angle_rad: 0.0, origin_mm: padding - low };
-        let shapes = draw_panel(target, panel, &placement, family)?;
-        let [a, c] = [padding, padding + plate];
-        let [b, d] = [DVec2::new(c.x, a.y), DVec2::new(a.x, c.y)];
+        let (mut shapes, mut outlines_mm) = (Vec::new(), Vec::new());
+        for (index, panel) in sides.iter().enumerate() {
+            let a = padding + index as f64 * step * DVec2::Y;
+            let placement = Placement { panel: panel.id, angle_rad: 0.0, origin_mm: a - low };
+            shapes.extend(draw_panel(target, panel, &placement, family)?);
+            let c = a + plate;
+            outlines_mm.push(vec![a, DVec2::new(c.x, a.y), c, DVec2::new(a.x, c.y)]);
+        }
         let sheet = Sheet { width_mm, height_mm, shapes };
         let size_px = size_px.as_uvec2().to_array();
-        Ok(Atlas { sheet, px_per_m, size_px, outlines_mm: vec![vec![a, b, c, d]] })
+        Ok(Atlas { sheet, px_per_m, size_px, outlines_mm })
     }
 }
 

@@ -13,7 +13,7 @@ use super::shape::Shape;
 use super::target_map::TargetMap;
 use crate::camera::Pose;
 use crate::detect::{Detection, Grid};
-use crate::targets::{Panel, Target, TargetSpec};
+use crate::targets::{Panel, Target};
 
 /// Corners that a panel needs in a view, so that a few wrong ones show.
 pub(super) const LEAST_CORNERS: usize = 6;
@@ -180,11 +180,7 @@ impl Reference<'_> {
 
     /// Whether its panels are boards that lie about, each for itself.
     pub fn is_loose(&self) -> bool {
-        let is_loose = |target: &Target| {
-            target.panels.len() > 1
-                && !matches!(target.spec, TargetSpec::Solid(_) | TargetSpec::Listed(_))
-        };
-        self.targets().iter().any(is_loose)
+        self.targets().iter().any(|target| target.is_loose())
     }
 
     /// Id of a panel; `None` on an untagged board.

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use glam::DVec2;
+use glam::{DMat3, DVec2, DVec3};
 
 use super::capacity::{Setting, check_family, wider_spacing};
 use super::{
@@ -104,11 +104,12 @@ pub(super) fn panels(
     let Some(tags) = &spec.tags else { return Ok((panels, None)) };
     let vertices = board_vertices(spec.grid, spec.rows, spec.cols);
     let on_each = |spacing| tagged_tiles(spec.grid, &vertices, spacing, tags.tags_in).len() as u64;
-    let boards = u64::from(spec.boards);
+    let boards = u64::from(spec.panel_count());
     let instead = |available: u64| {
         let wider = wider_spacing(tags, available, |spacing| boards * on_each(spacing));
         let fewer = available / on_each(tags.spacing).max(1);
-        let fewer = (fewer > 0).then(|| format!("make at most {fewer} `BoardSpec::boards`"));
+        let fewer = (fewer > 0 && spec.boards > 1)
+            .then(|| format!("make at most {fewer} `BoardSpec::boards`"));
         wider.into_iter().chain(fewer).collect()
     };
     let needed = boards * on_each(tags.spacing);
@@ -152,7 +153,26 @@ pub(super) fn untied_panels(spec: &BoardSpec) -> Vec<Panel> {
             tags.placements(spec.board_id + board, first, &tiles)
         }),
     };
-    (0..spec.boards).map(panel).collect()
+    let mut panels: Vec<Panel> = (0..spec.panel_count()).map(panel).collect();
+    if let (Some(thickness_mm), [front, back]) = (spec.two_sided_mm, panels.as_mut_slice()) {
+        let [left, _, right, _] = front.field_mm();
+        put(back, &behind(left + right, thickness_mm));
+    }
+    panels
+}
+
+/// The pose of what is seen from behind: turned about the upright axis half as far right as `across`, at a depth.
+fn behind(across: f64, thickness_mm: f64) -> PanelPose {
+    let turn = DMat3::from_diagonal(DVec3::new(-1.0, 1.0, -1.0));
+    PanelPose::new(turn, DVec3::new(across, 0.0, -thickness_mm))
+}
+
+/// Puts a panel somewhere else.
+fn put(panel: &mut Panel, pose: &PanelPose) {
+    panel.pose = *pose;
+    for corner in &mut panel.corners {
+        corner.target_mm = pose.target_from_panel(corner.panel_mm);
+    }
 }
 
 #[cfg(test)]

@@ -7,8 +7,8 @@ use super::paper::{PaperSpec, SolidSheets};
 use super::poster::Poster;
 use super::{
     BoardSpec, FamilyRef, LineKind, Name, Panel, Placement, SheetLayout, SheetLine, Target,
-    TargetError, TargetSpec, aprilgrid, board, charuco, circles, face_sheet, net, packed, solid,
-    tag_sheet,
+    TargetError, TargetSpec, aprilgrid, board, charuco, circles, face_sheet, guide, net, packed,
+    solid, tag_ids, tag_sheet,
 };
 use crate::family::{Family, FamilyError, places};
 
@@ -62,42 +62,54 @@ impl Target {
     ) -> Result<Target, TargetError> {
         let name =
             Name::new(name).map_err(|problem| TargetError::invalid("Target::name", problem))?;
+        let title = match layout.and_then(|paper| paper.note.as_ref()) {
+            Some(note) => format!("{name} · {note}"),
+            None => name.to_string(),
+        };
         let (panels, family, sheets) = match spec {
-            TargetSpec::Board(board) => board_parts(&name, board, family, layout)?,
+            TargetSpec::Board(board) => board_parts(&title, board, family, layout)?,
             TargetSpec::Solid(spec) => {
                 let (panels, family) = solid::panels(spec, family)?;
                 let sheets = layout.map(|paper| match paper.solids {
                     SolidSheets::Net | SolidSheets::SeamedNet => {
-                        net::sheets(&name, spec, &panels, family.as_ref(), paper)
+                        net::sheets(&title, spec, &panels, family.as_ref(), paper)
                     }
                     SolidSheets::PerFace => {
-                        face_sheet::sheets(&name, spec, &panels, family.as_ref(), paper)
+                        face_sheet::sheets(&title, spec, &panels, family.as_ref(), paper)
                     }
                 });
                 (panels, family, sheets.transpose()?.unwrap_or_default())
             }
             TargetSpec::Tags(spec) => {
                 let family = needed(family, &spec.family)?;
-                let (panels, family, sheets) = tag_sheet::parts(&name, spec, family, layout)?;
+                let (panels, family, sheets) = tag_sheet::parts(&title, spec, family, layout)?;
                 (panels, Some(family), sheets)
             }
             TargetSpec::Charuco(spec) => {
-                let (panels, family, sheets) = charuco::parts(&name, spec, family, layout)?;
+                let (panels, family, sheets) = charuco::parts(&title, spec, family, layout)?;
                 (panels, Some(family), sheets)
             }
             TargetSpec::AprilGrid(spec) => {
-                let (panels, family, sheets) = aprilgrid::parts(&name, spec, family, layout)?;
+                let (panels, family, sheets) = aprilgrid::parts(&title, spec, family, layout)?;
                 (panels, Some(family), sheets)
             }
             TargetSpec::Circles(spec) => {
-                let (panels, sheets) = circles::parts(&name, spec, layout)?;
+                let (panels, sheets) = circles::parts(&title, spec, layout)?;
                 (panels, None, sheets)
             }
             TargetSpec::Listed(_) => {
                 return Err(TargetError::Listed);
             }
         };
-        Ok(Target { name, spec: spec.clone(), family, panels, sheets })
+        let mut target = Target { name, spec: spec.clone(), family, panels, sheets };
+        if layout.is_some_and(|paper| paper.tag_ids) {
+            tag_ids::add(&mut target)?;
+        }
+        if let Some(paper) = layout.filter(|paper| paper.guide_page) {
+            let guide = guide::sheet(&target, paper)?;
+            target.sheets.push(guide);
+        }
+        Ok(target)
     }
 
     /// Checks that this target can be used together with another one: no tag of the same family
@@ -157,6 +169,10 @@ fn board_parts(
 ) -> Result<Parts, TargetError> {
     board.check()?;
     let packed = layout.filter(|paper| paper.packed);
+    if packed.is_some() && board.two_sided_mm.is_some() {
+        let problem = "each side of a board has a sheet of its own: leave it out";
+        return Err(TargetError::invalid("PaperSpec::packed", problem));
+    }
     let arrangement =
         layout.filter(|_| packed.is_none()).map(|paper| (arrange(board, paper), paper));
     let (panels, family) = board::panels(board, family)?;
@@ -172,6 +188,9 @@ fn board_parts(
                 let ink = if panel.inverted { panel.field_mm() } else { panel.bounds_mm() };
                 let mut sheet = arrangement.sheet(panel.id, ink, words(panel));
                 sheet.texts.extend(arrangement.large_id(board, panel.id, ink));
+                if board.two_sided_mm.is_some() {
+                    sheet.lines.extend(arrangement.crop_marks(panel.id, ink, panel.field_mm()));
+                }
                 sheet
             };
             panels.iter().map(sheet).collect()

@@ -116,6 +116,7 @@ fn arrange(
         height: (upper - lower) - (upper - lower - marks) * shrink,
         edge_blank: paper.margin_mm,
         mark_blank: MARK_BLANK_MM,
+        is_centred: false,
     };
     if let Some(arrangement) = fit(&footprint(0.0), paper)? {
         return Ok(arrangement);

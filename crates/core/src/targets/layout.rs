@@ -18,8 +18,8 @@ use glam::DVec2;
 use super::length::format_mm;
 use super::paper::{Orientation, PaperSize, PaperSpec};
 use super::{
-    BoardSpec, CheckBar, FamilyRef, GridKind, Label, Panel, Placement, SheetLayout, SheetText,
-    TagsIn, TargetError, board,
+    BoardSpec, CheckBar, FamilyRef, GridKind, Label, LineKind, Panel, Placement, SheetLayout,
+    SheetLine, SheetText, TagsIn, TargetError, board,
 };
 use crate::family::places;
 
@@ -47,6 +47,10 @@ const BAR_STEP_MM: f64 = 10.0;
 pub(super) const ADVANCE_CAPS: f64 = 0.76;
 /// Blank between the black field of an inverted board and the marks, mm.
 const FIELD_GAP_MM: f64 = 1.0;
+/// Marks to cut a plate's sheet out begin and end so far from its corners, mm.
+const CROP_MM: [f64; 2] = [1.0, 5.0];
+/// Width of these marks, mm.
+const CROP_WIDTH_MM: f64 = 0.15;
 /// Blank that is left along the edges of the paper whatever the margin, mm: a pixel at 200 dpi has
 /// 0.13 mm, and the stroke of a bar that touches the edge can neither be measured nor trimmed.
 const LEAST_MARGIN_MM: f64 = 0.5;
@@ -61,17 +65,23 @@ pub(super) struct Footprint {
     pub edge_blank: f64,
     /// Distance to the marks.
     pub mark_blank: f64,
+    /// Whether it stands upright in the middle between left and right, so that two sides of a sheet fit each other.
+    pub is_centred: bool,
 }
 
 impl Footprint {
     pub fn new(spec: &BoardSpec, margin_mm: f64) -> Self {
         let DVec2 { x: width, y: height } = board::size_mm(spec);
         let quiet = Panel::quiet_zone_at_mm(spec.edge_mm);
+        let is_centred = spec.two_sided_mm.is_some();
+        let crop_mm = if is_centred { CROP_MM[1] } else { 0.0 };
         if spec.inverted {
             let (width, height) = (width + 2.0 * quiet, height + 2.0 * quiet);
-            return Self { width, height, edge_blank: margin_mm, mark_blank: FIELD_GAP_MM };
+            let (edge_blank, mark_blank) = (margin_mm + crop_mm, FIELD_GAP_MM + crop_mm);
+            return Self { width, height, edge_blank, mark_blank, is_centred };
         }
-        Self { width, height, edge_blank: margin_mm.max(quiet), mark_blank: quiet }
+        let (edge_blank, mark_blank) = (margin_mm.max(quiet + crop_mm), quiet + crop_mm);
+        Self { width, height, edge_blank, mark_blank, is_centred }
     }
 }
 
@@ -152,7 +162,8 @@ pub(super) fn fit(
     footprint: &Footprint,
     paper: &PaperSpec,
 ) -> Result<Option<Arrangement>, TargetError> {
-    fit_turned(footprint, paper, &[false, true])
+    let turns: &[bool] = if footprint.is_centred { &[false] } else { &[false, true] };
+    fit_turned(footprint, paper, turns)
 }
 
 /// Fits a footprint on paper as it stands; `None` where it does not fit.
@@ -211,7 +222,7 @@ pub(super) fn on_page(
     margin: f64,
     turned: bool,
 ) -> Option<Arrangement> {
-    let Footprint { width, height, edge_blank, mark_blank } = *footprint;
+    let Footprint { width, height, edge_blank, mark_blank, is_centred } = *footprint;
     let board = if turned { DVec2::new(height, width) } else { DVec2::new(width, height) };
     // The widest gaps that leave room along one axis, with or without the label there.
     let widest = |axis: usize, label: bool| {
@@ -224,6 +235,9 @@ pub(super) fn on_page(
         let middle = (page - board) / 2.0;
         let right_end = page.x - margin - right.depth() - mark_blank - board.x;
         let lower_end = margin + lower.depth() + mark_blank;
+        if is_centred && right_end < middle.x {
+            return None;
+        }
         let board_at = DVec2::new(middle.x.min(right_end), middle.y.max(lower_end));
         Some(Arrangement { page, margin, turned, board_at, marks: [lower, right] })
     })
@@ -304,6 +318,27 @@ impl Arrangement {
             cap_height_mm,
             max_width_mm: caps_wide * cap_height_mm,
         })
+    }
+
+    /// Marks at the corners of a plate, a rectangle of the board's frame, to cut its sheet out, or to lay one side on the other.
+    pub(super) fn crop_marks(&self, panel: u32, ink: [f64; 4], plate: [f64; 4]) -> Vec<SheetLine> {
+        let placement = self.placement(panel, ink);
+        let [left, lower, right, upper] = plate;
+        let corners =
+            [(left, lower), (right, lower), (right, upper), (left, upper)].map(DVec2::from);
+        let middle = (corners[0] + corners[2]) / 2.0;
+        let marks = corners.into_iter().flat_map(|corner| {
+            let out = (corner - middle).signum();
+            [DVec2::X, DVec2::Y]
+                .map(|axis| CROP_MM.map(|mm| placement.page_from_panel(corner + mm * out * axis)))
+        });
+        let line = |[from_mm, to_mm]: [DVec2; 2]| SheetLine {
+            kind: LineKind::Cut,
+            from_mm,
+            to_mm,
+            width_mm: CROP_WIDTH_MM,
+        };
+        marks.map(line).collect()
     }
 
     /// Width and height of the page, mm.
@@ -397,6 +432,10 @@ pub(super) fn label(
     }
     parts.extend(match panels {
         [] => None,
+        [only] if spec.two_sided_mm.is_some() => {
+            let side = if only.id == spec.board_id { "front" } else { "back" };
+            Some(format!("board {}, {side}", only.id))
+        }
         [only] => Some(format!("board {}", only.id)),
         [first, .., last] => Some(format!("boards {}–{}", first.id, last.id)),
     });

@@ -18,6 +18,7 @@ mod closed_mesh;
 mod error;
 mod face;
 mod face_sheet;
+mod guide;
 pub mod json;
 mod label;
 mod layout;
@@ -33,6 +34,7 @@ mod single_panel;
 mod skeleton;
 mod solid;
 mod spec;
+mod tag_ids;
 mod tag_sheet;
 
 use glam::{DVec2, DVec3};
@@ -353,6 +355,11 @@ impl Target {
             }
         }
         target
+    }
+
+    /// Whether its panels are sheets that lie about, each for itself.
+    pub fn is_loose(&self) -> bool {
+        self.panels.len() > 1 && !self.spec.is_rigid()
     }
 
     /// The tilings of its panels.

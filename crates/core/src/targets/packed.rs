@@ -121,6 +121,7 @@ fn arrange(
                 height: size.y * r as f64,
                 edge_blank: margin,
                 mark_blank: LABEL_GAP_MM,
+                is_centred: false,
             };
             Some((grid, on_page(&footprint, page, margin, false)?))
         });

@@ -42,6 +42,12 @@ pub struct PaperSpec {
     pub poster: bool,
     /// Whether as many boards as fit are printed on a sheet, to be cut apart, instead of one on each.
     pub packed: bool,
+    /// What is printed on the label of every sheet beside the name, such as whose it is.
+    pub note: Option<String>,
+    /// Whether the ids of tags are printed beside them, in small type.
+    pub tag_ids: bool,
+    /// Whether a page with a picture of the target, what to do and a ruler goes with the sheets.
+    pub guide_page: bool,
 }
 
 /// How the faces of a solid are printed.
@@ -86,6 +92,9 @@ impl Default for PaperSpec {
             solids: SolidSheets::default(),
             poster: false,
             packed: false,
+            note: None,
+            tag_ids: false,
+            guide_page: false,
         }
     }
 }

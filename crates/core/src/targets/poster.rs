@@ -86,6 +86,7 @@ impl Poster {
                 height: LEAST_WINDOW_MM + WORDS_MM,
                 edge_blank: paper.margin_mm,
                 mark_blank: 2.0 * BLANK_MM,
+                is_centred: false,
             };
             let Some(page) = fit_upright(&least, &paper)? else { continue };
             for angle in [0.0, std::f64::consts::FRAC_PI_2] {

@@ -30,6 +30,7 @@ impl SinglePanel<'_> {
             height: upper - lower,
             edge_blank: paper.margin_mm.max(quiet),
             mark_blank: quiet,
+            is_centred: false,
         }
     }
 

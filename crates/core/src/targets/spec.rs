@@ -36,6 +36,9 @@ const LEAST_DENSE_TILES: u32 = 12;
 /// Least border of a square tag, bit-widths: that of an AprilTag.
 const LEAST_SQUARE_BORDER_BITS: f64 = 1.0;
 
+/// Range of the thickness of a plate with a board on either side, mm.
+const TWO_SIDED_MM: std::ops::RangeInclusive<f64> = 0.1..=1000.0;
+
 /// Range of a tile's edge, mm.
 const EDGE_MM: std::ops::RangeInclusive<f64> = 1.0..=1000.0;
 
@@ -104,6 +107,10 @@ pub struct BoardSpec {
     pub tags: Option<TagSpec>,
     /// Whether black and white are exchanged: white tiles on a black field.
     pub inverted: bool,
+    /// Thickness of the plate that carries a board on its back, too, mm; `None` for boards with one side. The back, whose
+    /// id follows, is turned about the upright axis through the middle of the plate.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub two_sided_mm: Option<f64>,
 }
 
 fn one() -> u32 {
@@ -533,6 +540,21 @@ impl From<CharucoSpec> for TargetSpec {
 }
 
 impl TargetSpec {
+    /// Whether its panels are fixed to each other: the faces of a solid, the sides of a board, what a list names together.
+    /// Others are sheets that lie about, each for itself.
+    pub fn is_rigid(&self) -> bool {
+        match self {
+            Self::Solid(_) | Self::Listed(_) => true,
+            Self::Board(board) => board.two_sided_mm.is_some(),
+            Self::Tags(_) | Self::Charuco(_) | Self::AprilGrid(_) | Self::Circles(_) => false,
+        }
+    }
+
+    /// Whether each of its panels can be the front of a plate: boards whose corners are detected.
+    pub fn is_on_plate(&self) -> bool {
+        matches!(self, Self::Board(_) | Self::Charuco(_) | Self::AprilGrid(_))
+    }
+
     /// The family that its tags are of, by name or path; `None` for an untagged target, and for a listed
     /// one.
     pub fn family(&self) -> Option<&str> {
@@ -572,11 +594,38 @@ impl BoardSpec {
             GridKind::Deltille => TagSpec::default(),
             GridKind::Checker => TagSpec::for_squares(TagsIn::Black),
         });
-        Self { grid, rows, cols, edge_mm, boards: 1, board_id: 0, tags, inverted: false }
+        let (boards, board_id, inverted, two_sided_mm) = (1, 0, false, None);
+        Self { grid, rows, cols, edge_mm, boards, board_id, tags, inverted, two_sided_mm }
+    }
+
+    /// How many panels they are: one for each side.
+    pub(super) fn panel_count(&self) -> u32 {
+        self.boards * if self.two_sided_mm.is_some() { 2 } else { 1 }
+    }
+
+    /// Checks what two sides need.
+    fn check_sides(&self) -> Result<(), TargetError> {
+        let refused =
+            |problem: String| Err(TargetError::invalid("BoardSpec::two_sided_mm", problem));
+        match self.two_sided_mm {
+            None => Ok(()),
+            Some(mm) if !TWO_SIDED_MM.contains(&mm) => {
+                refused(format!("{} is not between 0.1 mm and 1000 mm", format_mm(mm)))
+            }
+            Some(_) if self.boards > 1 => refused(
+                "the two sides of one board are described together: make one board at a time"
+                    .to_owned(),
+            ),
+            Some(_) if self.tags.is_none() => {
+                refused("untagged sides cannot be told apart: give them tags".to_owned())
+            }
+            Some(_) => Ok(()),
+        }
     }
 
     /// Checks every number by itself.
     pub(super) fn check(&self) -> Result<(), TargetError> {
+        self.check_sides()?;
         for (setting, value) in [("BoardSpec::rows", self.rows), ("BoardSpec::cols", self.cols)] {
             if !SIDES.contains(&value) {
                 let problem = format!("{value} is not between 2 and {MOST_ROWS}");
@@ -592,12 +641,12 @@ impl BoardSpec {
             return Err(TargetError::invalid("BoardSpec::boards", problem));
         }
         let corners =
-            [self.rows, self.cols, self.boards].into_iter().map(u64::from).product::<u64>();
+            [self.rows, self.cols, self.panel_count()].into_iter().map(u64::from).product::<u64>();
         if corners > MOST_CORNERS {
             let problem = format!("{corners} corners are more than {MOST_CORNERS} in one target");
             return Err(TargetError::invalid("BoardSpec::boards", problem));
         }
-        if self.board_id.checked_add(self.boards).is_none() {
+        if self.board_id.checked_add(self.panel_count()).is_none() {
             let problem = format!("{} leaves no ids for the boards after it", self.board_id);
             return Err(TargetError::invalid("BoardSpec::board_id", problem));
         }
@@ -624,7 +673,7 @@ impl BoardSpec {
                     return Err(TargetError::invalid("TagSpec::tags_in", problem));
                 }
                 if tags.is_dense() && self.grid == GridKind::Deltille {
-                    let boards = self.board_id..self.board_id + self.boards;
+                    let boards = self.board_id..self.board_id + self.panel_count();
                     let (rows, cols) = (self.rows, self.cols);
                     if (rows - 1) * (cols - 1) < LEAST_DENSE_TILES {
                         let problem = format!(

@@ -61,6 +61,7 @@ impl Blanks {
             height: pitch.y * rows as f64 - BELOW_ID * self.quiet,
             edge_blank: margin_mm.max(self.quiet),
             mark_blank: self.quiet,
+            is_centred: false,
         }
     }
 }

@@ -74,8 +74,11 @@ impl InlaidBodies {
             return Err(MeshError::ThinInlay(meshing.inlay_mm));
         }
         let [white, black] = match (&target.spec, target.panels.as_slice()) {
-            (TargetSpec::Board(_), [panel]) => {
+            (spec, [panel]) if spec.is_on_plate() => {
                 plate(panel, &panel_shapes(target, panel, family)?, meshing)?
+            }
+            (TargetSpec::Board(spec), _) if spec.two_sided_mm.is_some() => {
+                return Err(MeshError::TwoSides(name));
             }
             (TargetSpec::Board(_), panels) => {
                 return Err(MeshError::SeveralBoards(name, panels.len()));

@@ -10,7 +10,7 @@ use deltille_core::artwork::{ArtworkError, Atlas};
 use deltille_core::family::Family;
 use deltille_core::lattice::GridKind;
 use deltille_core::targets::{
-    ClosedMeshError, Panel, SolidSpec, Target, TargetError, TargetSpec, triangles,
+    BoardSpec, ClosedMeshError, Panel, SolidSpec, Target, TargetError, TargetSpec, triangles,
 };
 
 /// Texels along the edge of a cell of a tag, unless another resolution is asked for, so that a viewer sees it sharp at
@@ -69,6 +69,9 @@ pub enum MeshError {
         /// Least sufficient resolution, in the unit of what was asked for.
         least: String,
     },
+    /// A board with two sides where one is asked for.
+    #[error("{0} has two sides: two bodies are printed with their board on one")]
+    TwoSides(String),
     /// A thickness that no plate has.
     #[error("a plate cannot be {0} mm thick: give 0.1 to 1000 mm")]
     Thickness(f64),
@@ -184,8 +187,8 @@ impl MeshFace {
 #[derive(Clone, Copy)]
 enum Shape<'a> {
     Solid(&'a SolidSpec),
-    /// A plate for a board.
-    Plate(&'a Panel),
+    /// A plate for a board, on one side or on both.
+    Plate(&'a [Panel]),
 }
 
 impl TexturedMesh {
@@ -202,17 +205,23 @@ impl TexturedMesh {
         let name = || target.name.to_string();
         let shape = match (&target.spec, target.panels.as_slice()) {
             (TargetSpec::Solid(spec), _) => Shape::Solid(spec),
-            (TargetSpec::Board(_), [panel]) => Shape::Plate(panel),
+            (spec, panels) if spec.is_on_plate() && (panels.len() == 1 || spec.is_rigid()) => {
+                Shape::Plate(panels)
+            }
             (TargetSpec::Board(_), panels) => {
                 return Err(MeshError::SeveralBoards(name(), panels.len()));
             }
             _ => return Err(MeshError::NoShape(name())),
         };
-        if !(0.1..=1000.0).contains(&meshing.plate_mm) {
-            return Err(MeshError::Thickness(meshing.plate_mm));
+        let plate_mm = match &target.spec {
+            TargetSpec::Board(BoardSpec { two_sided_mm: Some(mm), .. }) => *mm,
+            _ => meshing.plate_mm,
+        };
+        if !(0.1..=1000.0).contains(&plate_mm) {
+            return Err(MeshError::Thickness(plate_mm));
         }
         let atlas = |px_per_m: u32| match shape {
-            Shape::Plate(panel) => Ok(Atlas::of_plate(target, panel, family, px_per_m)?),
+            Shape::Plate(sides) => Ok(Atlas::of_plate(target, sides, family, px_per_m)?),
             Shape::Solid(spec) => Ok(Atlas::new(target, &spec.faces()?, family, px_per_m)?),
         };
         let cell_mm = smallest_cell_mm(target, family);
@@ -232,7 +241,7 @@ impl TexturedMesh {
                 let surface = spec.polyhedron().triangles_mm();
                 surface.into_iter().zip(front).map(|(mm, uv)| MeshFace::new(mm, uv)).collect()
             }
-            Shape::Plate(panel) => plate_faces(panel, meshing.plate_mm, front.collect(), &atlas),
+            Shape::Plate(sides) => plate_faces(sides, plate_mm, &front.collect::<Vec<_>>(), &atlas),
         };
         let px_per_m = f64::from(atlas.px_per_m);
         Ok(Self {
@@ -338,30 +347,32 @@ const CLOSE: f64 = 0.99;
 /// Each attempt is nearer by the part that spaces are of the whole.
 const MOST_ATTEMPTS: usize = 12;
 
-/// The triangles of a plate: the front with its texture, the sides and the back in the colour of the texture's border.
+/// The triangles of a plate: sides with boards with their texture, others in the colour of the texture's border.
 fn plate_faces(
-    panel: &Panel,
+    sides: &[Panel],
     thickness_mm: f64,
-    front: Vec<[DVec2; 3]>,
+    textured: &[[DVec2; 3]],
     atlas: &Atlas,
 ) -> Vec<MeshFace> {
-    let [left, lower, right, upper] = panel.field_mm();
+    let [left, lower, right, upper] = sides[0].field_mm();
     let around = [(left, lower), (right, lower), (right, upper), (left, upper)];
-    let before = around.map(|(x, y)| panel.pose.target_from_panel(DVec2::new(x, y)));
-    let behind = before.map(|place| place - thickness_mm * panel.pose.matrix().z_axis);
-    let [a, b, c, d] = before;
+    let before = around.map(|(x, y)| sides[0].pose.target_from_panel(DVec2::new(x, y)));
+    let behind = before.map(|place| place - thickness_mm * sides[0].pose.matrix().z_axis);
+    let [a, b, c, d] = behind;
+    // Lower left end first, as the board on that side is seen.
+    let back = [b, a, d, c];
     let white = DVec2::splat(BLANK_PX) / DVec2::from(atlas.size_px.map(f64::from));
     let two = |[p, q, r, s]: [DVec3; 4]| [[p, q, r], [p, r, s]];
-    let sides = (0..4).map(|i| {
+    let rims = (0..4).map(|i| {
         let next = (i + 1) % 4;
         [before[next], before[i], behind[i], behind[next]]
     });
-    let [e, f, g, h] = behind;
-    let others = sides.chain([[h, g, f, e]]).flat_map(two);
-    let textured = [[a, b, c], [a, c, d]].into_iter().zip(front);
-    textured
-        .map(|(vertices_mm, uv)| MeshFace::new(vertices_mm, uv))
-        .chain(others.map(|vertices_mm| MeshFace::new(vertices_mm, [white; 3])))
+    let boards = [before, back].into_iter().take(sides.len()).flat_map(two);
+    let blank = rims.chain([back].into_iter().skip(sides.len() - 1)).flat_map(two);
+    boards
+        .zip(textured)
+        .map(|(vertices_mm, uv)| MeshFace::new(vertices_mm, *uv))
+        .chain(blank.map(|vertices_mm| MeshFace::new(vertices_mm, [white; 3])))
         .collect()
 }
 

@@ -5,7 +5,7 @@ use glam::{DMat3, DVec2, DVec3};
 use crate::calibrate::panel::PanelRef;
 use crate::camera::{Camera, Pose, Projection};
 use crate::polygon::hull;
-use crate::targets::{Panel, Target, TargetSpec};
+use crate::targets::{Panel, Target};
 
 /// Corners by which a panel is judged: more tell the same more slowly. Of several panels, of which a picture shows
 /// some, each has fewer.
@@ -88,8 +88,7 @@ pub(super) struct Seen {
 impl Body {
     /// `None` where the target has no corners. Of boards that lie about only the first is taken.
     pub(super) fn new(target: &Target) -> Option<Self> {
-        let is_loose = !matches!(target.spec, TargetSpec::Solid(_) | TargetSpec::Listed(_));
-        let count = if is_loose { 1 } else { target.panels.len() };
+        let count = if target.spec.is_rigid() { target.panels.len() } else { 1 };
         let panels = target.panels.iter().enumerate().filter(|(_, of)| !of.corners.is_empty());
         let panels = panels.take(count);
         let panels: Vec<(usize, &Panel)> = panels.collect();

@@ -185,6 +185,7 @@ fn nested(
             height: LEAST_ROOM_MM + WORDS_MM,
             edge_blank: paper.margin_mm,
             mark_blank: BLANK_MM,
+            is_centred: false,
         };
         let is_last = index + 1 == sizes.len();
         let Some(page) = fit_upright(&least, &paper)? else { continue };
@@ -349,6 +350,7 @@ fn lay<'a>(
                 height: upper - lower + WORDS_MM,
                 edge_blank: paper.margin_mm,
                 mark_blank: BLANK_MM,
+                is_centred: false,
             };
             if let Some(arrangement) = fit_upright(&footprint, &paper)? {
                 let DVec2 { x, y } = arrangement.footprint_at_mm();

@@ -1,0 +1,133 @@
+//! The ids of tags in small type, for people: each in a white tile beside its tag.
+
+use std::collections::BTreeSet;
+
+use glam::DVec2;
+
+use super::layout::ADVANCE_CAPS;
+use super::length::format_mm;
+use super::{
+    GridKind, Label, Panel, Placement, SheetText, TagPlacement, TagsIn, Target, TargetError,
+};
+use crate::family::places;
+use crate::lattice::{Tile, Vertex};
+
+/// Capital height, in edges of a tile, and the most of it, mm: small beside what a corner is measured from.
+const CAP: (f64, f64) = (0.09, 1.8);
+
+/// The least that can be read on paper, mm.
+const LEAST_CAP_MM: f64 = 0.7;
+
+/// Adds the ids to all sheets of a target.
+pub(super) fn add(target: &mut Target) -> Result<(), TargetError> {
+    let refused = |problem: String| Err(TargetError::invalid("PaperSpec::tag_ids", problem));
+    if target.panels.iter().all(|panel| panel.tags.is_empty()) {
+        return refused("there are no tags: leave it out".to_owned());
+    }
+    if target.family.as_ref().is_some_and(|family| family.name == places::NAME) {
+        return refused("place codes have no ids to read: leave it out".to_owned());
+    }
+    for panel in &target.panels {
+        if panel.inverted || panel.tags_in == TagsIn::White {
+            return refused("the tiles beside tags are black: leave it out".to_owned());
+        }
+        if CAP.0 * panel.edge_mm < LEAST_CAP_MM {
+            let least = (LEAST_CAP_MM / CAP.0).ceil();
+            let edge = format_mm(panel.edge_mm);
+            return refused(format!(
+                "beside tiles of {edge} nobody could read them: take tiles of at least {least} mm"
+            ));
+        }
+    }
+    for sheet in &mut target.sheets {
+        for placement in &sheet.placements {
+            let panel = target.panels.iter().find(|panel| panel.id == placement.panel);
+            sheet.texts.extend(panel.into_iter().flat_map(|panel| of_panel(panel, placement)));
+        }
+    }
+    Ok(())
+}
+
+/// The ids of a panel's tags where it lies on its sheet.
+fn of_panel(panel: &Panel, placement: &Placement) -> Vec<SheetText> {
+    let cap_height_mm = (CAP.0 * panel.edge_mm).min(CAP.1);
+    let mut free: BTreeSet<Tile> =
+        panel.tiles().into_iter().filter(|tile| !tile.is_dark()).collect();
+    let text = |tag: &TagPlacement| {
+        let tile = beside(panel.kind, tag).into_iter().find(|tile| free.remove(tile))?;
+        let text = tag.id.to_string();
+        let width = text.len() as f64 * ADVANCE_CAPS * cap_height_mm;
+        let vertices: Vec<DVec2> = tile.vertices().map(|vertex| panel.lattice_mm(vertex)).collect();
+        let middle = vertices.iter().sum::<DVec2>() / vertices.len() as f64;
+        Some(SheetText {
+            text: Label::Words(text),
+            at_mm: placement.page_from_panel(middle - DVec2::new(width, cap_height_mm) / 2.0),
+            angle_rad: placement.angle_rad,
+            cap_height_mm,
+            max_width_mm: width,
+        })
+    };
+    panel.tags.iter().filter_map(text).collect()
+}
+
+/// The tiles that share an edge with that of a tag, to its right first.
+fn beside(kind: GridKind, tag: &TagPlacement) -> Vec<Tile> {
+    let own = Vertex::new(tag.row, tag.col);
+    let at = |row: i32, col: i32| own + Vertex::new(row, col);
+    match kind {
+        GridKind::Deltille => [at(0, 0), at(0, -1), at(-1, 0)].map(Tile::inverted).to_vec(),
+        GridKind::Checker => [at(0, 1), at(0, -1), at(1, 0), at(-1, 0)].map(Tile::square).to_vec(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+    use crate::targets::{BoardSpec, PaperSpec, SolidShape, SolidSpec, TargetSpec};
+
+    fn target(spec: &TargetSpec) -> Result<Target, TargetError> {
+        let paper = PaperSpec { tag_ids: true, ..PaperSpec::default() };
+        let family = spec.family().map(|name| crate::family::Family::shipped(name).unwrap());
+        Target::build("target", spec, family.as_ref(), Some(&paper))
+    }
+
+    proptest! {
+        /// Every tag has its id in a white tile that shares an edge with its own, and no tile has two.
+        #[test]
+        fn every_tag_has_its_id_beside_it(
+            rows in 3u32..9, cols in 3u32..9, spacing in 1u32..4, squares: bool,
+        ) {
+            let kind = if squares { GridKind::Checker } else { GridKind::Deltille };
+            let mut spec = BoardSpec::new(kind, rows, cols, 20.0);
+            spec.tags.as_mut().unwrap().spacing = spacing;
+            let target = target(&spec.into()).unwrap();
+            let (sheet, panel) = (&target.sheets[0], &target.panels[0]);
+            let placement = &sheet.placements[0];
+            let ids: Vec<(String, Tile)> = sheet.texts.iter().rev().take(panel.tags.len()).map(|text| {
+                let half = DVec2::new(text.max_width_mm, text.cap_height_mm) / 2.0;
+                let middle = placement.panel_from_page(text.at_mm) + half;
+                (text.text.to_string(), panel.tile_at(middle / panel.edge_mm))
+            }).collect();
+            let tiles: BTreeSet<Tile> = ids.iter().map(|(_, tile)| *tile).collect();
+            prop_assert_eq!(tiles.len(), panel.tags.len());
+            for (tag, (text, tile)) in panel.tags.iter().rev().zip(&ids) {
+                prop_assert_eq!(&tag.id.to_string(), text);
+                prop_assert!(!tile.is_dark());
+                let own: Vec<Vertex> = panel.tag_tile(tag).vertices().collect();
+                prop_assert_eq!(tile.vertices().filter(|vertex| own.contains(vertex)).count(), 2);
+            }
+        }
+    }
+
+    #[test]
+    fn ids_that_nobody_could_read_are_refused() {
+        let board = |edge_mm| BoardSpec::deltille(5, 6, edge_mm);
+        let said = |spec: BoardSpec| target(&spec.into()).unwrap_err().to_string();
+        assert!(said(board(5.0)).contains("tiles of at least 8 mm"));
+        assert!(said(BoardSpec { inverted: true, ..board(20.0) }).contains("are black"));
+        assert!(said(BoardSpec { tags: None, ..board(20.0) }).contains("no tags"));
+        assert!(target(&SolidSpec::new(SolidShape::Cube).into()).is_ok());
+    }
+}

@@ -1,0 +1,61 @@
+//! Templates: the settings of a command as a TOML file, to be given again.
+
+use std::path::Path;
+
+use anyhow::{Context, anyhow, bail};
+use serde::Serialize;
+use serde::de::DeserializeOwned;
+
+use crate::cli::output::{self, Overwrite};
+use crate::export::GENERATOR;
+use crate::export::kind::Kind;
+use crate::limits;
+use crate::reading::in_words;
+
+/// The settings in a file that was made for a command.
+pub fn read<T: DeserializeOwned>(
+    path: &Path,
+    command: &str,
+    made_for: impl Fn(&T) -> Option<&str>,
+) -> anyhow::Result<T> {
+    let text = limits::read_short_text(path, limits::MAX_SETTINGS_BYTES).context("--template")?;
+    let settings: T = toml::from_str(&text).map_err(|error| {
+        let before = error.span().map_or("", |span| &text[..span.start]);
+        let line = before.matches('\n').count();
+        let field = text.lines().nth(line).and_then(|line| line.split_once('='));
+        let field = field.map_or("", |(field, _)| field.trim());
+        let message = in_words(error.message().replace('\n', " "));
+        anyhow!("--template: {} line {}, `{field}`: {message}", path.display(), line + 1)
+    })?;
+    match made_for(&settings).filter(|made_for| *made_for != command) {
+        Some(made_for) => {
+            bail!("--template: {} was made for `{made_for}`, not `{command}`", path.display())
+        }
+        None => Ok(settings),
+    }
+}
+
+/// The text of a template.
+pub fn text(settings: &impl Serialize) -> String {
+    let toml = toml::to_string(settings).expect("plain settings have a TOML form");
+    format!("# {GENERATOR}, template\n{toml}")
+}
+
+/// A template that is to be written once all else is.
+pub struct Template<'a> {
+    path: &'a Path,
+    text: String,
+    overwrite: Overwrite,
+}
+
+impl<'a> Template<'a> {
+    /// Refused where another file would be replaced.
+    pub fn new(path: &'a Path, text: String, overwrite: Overwrite) -> anyhow::Result<Self> {
+        overwrite.check(path, &Kind::of(text.as_bytes())).context("--save-template")?;
+        Ok(Self { path, text, overwrite })
+    }
+
+    pub fn write(&self) -> anyhow::Result<()> {
+        output::write(self.path, self.text.as_bytes(), self.overwrite).context("--save-template")
+    }
+}

@@ -1,0 +1,110 @@
+//! What a target can have beside its faces: a back, the ids of its tags, a page to take along, a template.
+
+use std::path::Path;
+
+use crate::common::command::deltille;
+use crate::common::folder::names;
+use deltille::targets::Target;
+use glam::DVec3;
+
+fn read(path: &Path) -> Target {
+    Target::from_json(&std::fs::read_to_string(path).unwrap()).unwrap()
+}
+
+/// The pages are proved with the ids in their white tiles, and the proof sees when one of them is another.
+#[test]
+fn ids_in_small_type_are_proved_with_their_tiles() {
+    let folder = tempfile::tempdir().unwrap();
+    let args = "board --rows 6 --cols 7 --tag-ids --guide-page --svg --pdf";
+    deltille(folder.path(), args).success();
+    assert_eq!(names(folder.path()), ["board-1.svg", "board-2.svg", "board.json", "board.pdf"]);
+    let json = folder.path().join("board.json");
+    let mut target = read(&json);
+    let texts = &mut target.sheets[0].texts;
+    let id = texts.iter().rposition(|text| text.text.to_string() == "1").unwrap();
+    texts[id].text = "7".to_owned().into();
+    std::fs::write(&json, target.to_json()).unwrap();
+    let said = deltille(folder.path(), "verify board.json").failure();
+    let said = String::from_utf8(said.get_output().stdout.clone()).unwrap();
+    assert!(said.contains(&format!("label {} differs from the description", id + 1)), "{said}");
+}
+
+#[test]
+fn nets_have_ids_and_a_guide_too_and_are_folded_all_the_same() {
+    let folder = tempfile::tempdir().unwrap();
+    let args = "octahedron --edge 110mm --tiles 7 --pdf --tag-ids --guide-page";
+    let said = deltille(folder.path(), args).success();
+    let said = String::from_utf8(said.get_output().stdout.clone()).unwrap();
+    assert!(said.contains("folds into the solid"), "{said}");
+    let target = read(&folder.path().join("octahedron.json"));
+    let (guide, nets) = target.sheets.split_last().unwrap();
+    assert!(guide.placements.is_empty() && nets.iter().all(|net| !net.placements.is_empty()));
+}
+
+/// The corners of the back lie behind the front, seen from there in the same order, on pages that fit each other when they are
+/// printed on both sides of a sheet.
+#[test]
+fn two_sides_of_a_board_lie_behind_each_other() {
+    let folder = tempfile::tempdir().unwrap();
+    let args =
+        "board --rows 6 --cols 7 --edge 25mm --two-sided 4mm --pdf --gltf --save-template t.toml";
+    deltille(folder.path(), args).success();
+    let target = read(&folder.path().join("board.json"));
+    let [front, back] = &target.panels[..] else { panic!("two panels") };
+    let [left, lower, right, upper] = front.field_mm();
+    for (corner, other) in front.corners.iter().zip(&back.corners) {
+        let DVec3 { x, y, .. } = corner.target_mm;
+        assert!(other.target_mm.distance(DVec3::new(left + right - x, y, -4.0)) < 1e-9);
+    }
+    let middle = |sheet: usize| {
+        target.sheets[sheet].placements[0]
+            .page_from_panel([left + right, lower + upper].map(|v| v / 2.0).into())
+    };
+    assert!((middle(0).x - target.sheets[0].width_mm / 2.0).abs() < 1e-9);
+    assert_eq!(middle(0), middle(1));
+    deltille(folder.path(), "board --template t.toml -o again --pdf --gltf").success();
+    assert_eq!(target, read(&folder.path().join("again/board.json")));
+}
+
+/// From behind the back is seen, and both views tell the same place of the target.
+#[test]
+fn a_board_with_two_sides_is_one_target_for_poses() {
+    let folder = tempfile::tempdir().unwrap();
+    deltille(folder.path(), "board --rows 6 --cols 7 --edge 25mm --two-sided 4mm --pdf").success();
+    let camera = Path::new(env!("CARGO_MANIFEST_DIR")).join("templates/camera.yaml");
+    std::fs::copy(camera, folder.path().join("camera.yaml")).unwrap();
+    for (name, eye) in [("front", "60,-60,420"), ("back", "150,160,-420")] {
+        let render =
+            format!("render board.json --camera camera.yaml --eye {eye} --seed 3 -o {name}.png");
+        deltille(folder.path(), &render).success();
+    }
+    let pose = "pose front.png back.png --camera camera.yaml --target board.json -o poses.ndjson";
+    deltille(folder.path(), pose).success();
+    let read = |name: &str| std::fs::read_to_string(folder.path().join(name)).unwrap();
+    let at = |text: &str| -> Vec<f64> {
+        let value: serde_json::Value = serde_json::from_str(text).unwrap();
+        serde_json::from_value(value["camera_from_target"]["translation_mm"].clone()).unwrap()
+    };
+    for (line, truth) in read("poses.ndjson").lines().zip(["front.json", "back.json"]) {
+        let off = at(line).iter().zip(at(&read(truth))).map(|(a, b)| (a - b).powi(2)).sum::<f64>();
+        assert!(off.sqrt() < 0.1, "{truth}: {} mm", off.sqrt());
+    }
+}
+
+#[test]
+fn a_template_makes_a_solid_again_and_options_win_over_it() {
+    let folder = tempfile::tempdir().unwrap();
+    let args = "tetrahedron --edge 12cm --tiles 7 --family d25h7 --per-face --pdf --skeleton --wall 5mm --name t \
+                --save-template t.toml";
+    deltille(folder.path(), args).success();
+    deltille(folder.path(), "tetrahedron --template t.toml -o again").success();
+    let first = read(&folder.path().join("t.json"));
+    assert_eq!(first, read(&folder.path().join("again/t.json")));
+    deltille(folder.path(), "tetrahedron --template t.toml --dense --svg -o other").success();
+    let other = read(&folder.path().join("other/t.json"));
+    assert_eq!(other.family.unwrap().name, "dense9");
+    assert!(!names(&folder.path().join("other")).contains(&"t.pdf".to_owned()));
+    let said = deltille(folder.path(), "octahedron --template t.toml").code(2);
+    let said = String::from_utf8(said.get_output().stderr.clone()).unwrap();
+    assert!(said.contains("was made for `tetrahedron`, not `octahedron`"), "{said}");
+}
