@@ -58,14 +58,15 @@ def rendered(folder, name, target, corners):
     places = np.array([place for place, _ in corners.values()]) / 1e3
     middle, size = places.mean(0), np.ptp(places, 0).max()
     sides = len(target["panels"])
+    fronts = [panel["pose"]["rotation"][8] for panel in target["panels"]]
     cameras = []
     for k in range(VIEWS):
         angle = 2 * np.pi * k / VIEWS
         if sides <= 2:
             tilt = np.radians(12 + 6 * k)
             aside = [np.sin(tilt) * np.cos(angle), np.sin(tilt) * np.sin(angle), np.cos(tilt)]
-            if sides == 2 and k % 2:
-                aside[2] *= -1
+            # Before the front, which OpenCV has at −z, or every second time before the back.
+            aside[2] *= fronts[k % sides]
         else:
             aside = [np.cos(angle), np.sin(angle), 0.8 * np.sin(2 * angle)]
         eye = middle + 2.0 * size * np.array(aside) / np.linalg.norm(aside)
