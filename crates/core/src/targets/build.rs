@@ -6,7 +6,7 @@ use super::layout::{arrange, label};
 use super::paper::{PaperSpec, SolidSheets};
 use super::poster::Poster;
 use super::{
-    BoardSpec, FamilyRef, LineKind, Name, Panel, Placement, SheetLayout, SheetLine, Target,
+    BoardSpec, FamilyRef, Finish, LineKind, Name, Panel, Placement, SheetLayout, SheetLine, Target,
     TargetError, TargetSpec, aprilgrid, board, charuco, circles, face_sheet, net, packed, solid,
     tag_sheet,
 };
@@ -97,7 +97,7 @@ impl Target {
                 return Err(TargetError::Listed);
             }
         };
-        Ok(Target { name, spec: spec.clone(), family, panels, sheets })
+        Ok(Target { name, spec: spec.clone(), family, panels, sheets, finish: Finish::default() })
     }
 
     /// Checks that this target can be used together with another one: no tag of the same family

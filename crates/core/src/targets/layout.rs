@@ -49,7 +49,7 @@ pub(super) const ADVANCE_CAPS: f64 = 0.76;
 const FIELD_GAP_MM: f64 = 1.0;
 /// Blank that is left along the edges of the paper whatever the margin, mm: a pixel at 200 dpi has
 /// 0.13 mm, and the stroke of a bar that touches the edge can neither be measured nor trimmed.
-const LEAST_MARGIN_MM: f64 = 0.5;
+pub(super) const LEAST_MARGIN_MM: f64 = 0.5;
 /// Finest edge proposed to make a board fit, mm: what office printers resolve in a tag.
 const LEAST_PROPOSED_MM: u32 = 5;
 

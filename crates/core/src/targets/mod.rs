@@ -18,6 +18,7 @@ mod closed_mesh;
 mod error;
 mod face;
 mod face_sheet;
+mod finish;
 pub mod json;
 mod label;
 mod layout;
@@ -53,6 +54,7 @@ pub use closed_mesh::{ClosedMesh, ClosedMeshError, FaceNoun, NEAR_EQUILATERAL};
 pub use error::TargetError;
 pub use face::{Face, FaceBoard};
 pub use face_sheet::{edge_numbers, edge_text, upright_number};
+pub use finish::Finish;
 pub use json::{SCHEMA, TargetFileError};
 pub use label::Label;
 pub use layout::CHECK_BAR_STROKE_MM;
@@ -81,6 +83,8 @@ pub struct Target {
     pub panels: Vec<Panel>,
     /// Where the panels lie on paper; empty when the target came from a file without sheets.
     pub sheets: Vec<SheetLayout>,
+    /// How they are printed.
+    pub finish: Finish,
 }
 
 /// Names a family so that a changed code table cannot go unnoticed.
