@@ -40,6 +40,8 @@ const NAMED: &[Named] = &[
     named("CirclesSpec::spacing_mm", "deltille circles", "--spacing"),
     named("Dialect::Fork", "deltille board", "--dsc-dialect fork"),
     named("Family::to_json", "deltag gen-family", ""),
+    named("Finish::contour", "deltille board", "--contour"),
+    named("Finish::white", "deltille board", "--white"),
     named("ImportSpec::bits", "deltag import", "--bits"),
     named("ImportSpec::distance", "deltag import", "--distance"),
     named("ImportSpec::kind", "deltag import", "--shape"),

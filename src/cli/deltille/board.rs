@@ -7,6 +7,7 @@ use anyhow::{Context, bail};
 
 use super::delivery::Delivery;
 use super::files::{File, Formats, drawn, text_file};
+use super::finishing::Finishing;
 use super::meshes::{MESHES, Meshes};
 use super::settings::{Plan, Settings};
 use crate::artwork;
@@ -35,6 +36,8 @@ pub struct Args {
     /// Thickness of the plate that carries the board in a mesh [default: 3mm]
     #[arg(long, value_name = "LENGTH", value_parser = parse_length_mm, help_heading = MESHES)]
     plate: Option<f64>,
+    #[command(flatten)]
+    finishing: Finishing,
 }
 
 /// Makes a board, writes its files, and verifies what it wrote.
@@ -44,8 +47,8 @@ pub fn run(grid: GridKind, args: Args) -> anyhow::Result<ExitCode> {
         None => args.settings,
     };
     let mut plan = settings.plan(grid)?;
-    // A mesh alone needs no paper.
-    plan.pdf &= settings.prints() || !args.meshes.is_any();
+    // A mesh, or a drawing for a laser, alone needs no paper.
+    plan.pdf &= settings.prints() || !(args.meshes.is_any() || args.finishing.has_laser());
     args.meshes.check_use(args.plate)?;
     let family = plan.spec.tags.as_ref().map(|tags| family::resolve(&tags.family)).transpose();
     let family = match (family, grid) {
@@ -75,6 +78,7 @@ pub fn run(grid: GridKind, args: Args) -> anyhow::Result<ExitCode> {
     let is_printed = plan.pdf || plan.svg || plan.png;
     let paper = is_printed.then_some(&plan.paper);
     let target = Target::build(&plan.name, &spec, family.as_ref(), paper)?;
+    let target = args.finishing.applied(target, plan.paper.margin_mm, plan.pdf)?;
     args.delivery.check_beside(&target)?;
     let overwrite = args.delivery.overwrite;
     let template = args.save_template.as_ref().map(|path| {
@@ -86,6 +90,7 @@ pub fn run(grid: GridKind, args: Args) -> anyhow::Result<ExitCode> {
     let mut files = files(&plan, &target, family.as_ref())?;
     let (meshes, texture) = args.meshes.files(&target, family.as_ref(), args.plate)?;
     files.extend(meshes);
+    files.extend(args.finishing.files(&target, family.as_ref())?);
     let told = summary(&target) + &texture;
     let delivered = args.delivery.deliver(&target, family.as_ref(), &files, &told)?;
     if let Some((path, toml)) = template {

@@ -4,6 +4,7 @@ use anyhow::{Context, bail};
 
 use super::delivery::Delivery;
 use super::files::{File, Formats, drawn, text_file};
+use super::finishing::Finishing;
 use super::settings::{DEFAULT_DPI, DPI, PAPER, PRINT};
 use crate::artwork;
 use crate::cli::values::{name, whole};
@@ -40,9 +41,16 @@ pub struct Printing {
     name: Option<String>,
     #[command(flatten)]
     pub delivery: Delivery,
+    #[command(flatten)]
+    finishing: Finishing,
 }
 
 impl Printing {
+    /// Whether a PDF is written: where nothing else is asked for, too.
+    fn is_pdf(&self) -> bool {
+        self.pdf || !(self.svg || self.png || self.finishing.has_laser())
+    }
+
     /// The target on its paper.
     pub fn build(
         &self,
@@ -61,17 +69,18 @@ impl Printing {
         };
         let name = self.name.as_deref().unwrap_or(command);
         let target = Target::build(name, spec, family, Some(&paper))?;
+        let target = self.finishing.applied(target, paper.margin_mm, self.is_pdf())?;
         self.delivery.check_beside(&target)?;
         Ok(target)
     }
 
     /// The description of a target, and its pages.
     pub fn files(&self, target: &Target, family: Option<&Family>) -> anyhow::Result<Vec<File>> {
-        let formats =
-            Formats { pdf: self.pdf || !(self.svg || self.png), svg: self.svg, png: self.png };
+        let formats = Formats { pdf: self.is_pdf(), svg: self.svg, png: self.png };
         let dpi = self.dpi.unwrap_or(DEFAULT_DPI);
         let mut files = vec![text_file(format!("{}.json", target.name), target.to_json())];
         files.extend(drawn(&target.name, artwork::draw(target, family)?, formats, dpi));
+        files.extend(self.finishing.files(target, family)?);
         Ok(files)
     }
 }
