@@ -49,6 +49,8 @@ pub const KEYWORDS: &[(&str, &str)] = &[
     ("CirclesSpec::spacing_mm", "spacing_mm"),
     ("Dialect::Fork", "dsc-fork"),
     ("Family::to_json", "Family.to_json"),
+    ("Finish::contour", "contour"),
+    ("Finish::white", "white"),
     ("ImportSpec::bits", "bits"),
     ("ImportSpec::distance", "distance"),
     ("ImportSpec::kind", "kind"),

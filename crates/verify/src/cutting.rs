@@ -56,11 +56,9 @@ pub enum CutFinding {
         at_mm: DVec2,
     },
     /// The plate of a board is as much larger than stated as no kerf makes it.
-    #[error(
-        "the outline to cut is {by_mm:.3} mm wider than the plate, which is no kerf for this board"
-    )]
+    #[error("the outline to cut is that of a kerf of {by_mm:.3} mm, which this target cannot have")]
     NoKerf {
-        /// Width of the outlines less that of the finished plates.
+        /// By how much the first outline to cut is larger than its finished plate, along a line across it.
         by_mm: f64,
     },
     /// A drawing as other programs show it has something else in a place.

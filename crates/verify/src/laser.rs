@@ -1,6 +1,6 @@
-//! Verification of drawings of boards for a laser or a plotter, as `.dxf` or `.svg`.
+//! Verification of drawings of boards and faces for a laser or a plotter, as `.dxf` or `.svg`.
 //!
-//! The kerf is measured: by as much the outlines to cut are wider than the finished plates. Every outline must then be where
+//! The kerf is measured: it follows from how much longer the first outline to cut is than the edge of that plate. Every outline must then be where
 //! the target with that kerf has it. Independently of that, what is engraved is given back the half of the kerf that the beam
 //! takes, and the board that comes of it is looked at by the detector like a printed page. An SVG is drawn by resvg, too,
 //! and must show nothing else than was read.
@@ -59,7 +59,11 @@ pub(super) fn verify(
         Ok(found) => found,
         Err(refused) => return Ok(with(cut, vec![refused])),
     };
-    let by_mm = excess_mm(&found, &boards);
+    let Some(by_mm) = kerf_of(&found, &boards) else {
+        let missing =
+            CutFinding::PathMissing { layer: dxf::layer_name(CutLayer::Cut), at_mm: DVec2::ZERO };
+        return Ok(with(cut, vec![missing.into()]));
+    };
     let kerf_mm = (by_mm / KERF_STEP_MM).round() * KERF_STEP_MM;
     let stated = match artwork::to_laser(verifier.target, verifier.family, kerf_mm.max(0.0)) {
         Ok(stated) if kerf_mm >= 0.0 => stated,
@@ -69,12 +73,12 @@ pub(super) fn verify(
         Err(error) => return Err(nothing(error)),
     };
     cut.kerf_mm = Some(kerf_mm);
-    let found = moved(found, &stated);
-    let mut findings = match format {
-        Format::Svg => drawn_otherwise(reader, path, &found)?,
-        _ => Vec::new(),
-    };
-    findings.extend(cutting::compare(found.clone(), stated, &mut cut));
+    let found = if format == Format::Svg { moved(found, &stated) } else { found };
+    let mut findings = cutting::compare(found.clone(), stated, &mut cut);
+    // What is drawn is looked at only where its outlines are in their places, so that it is small enough.
+    if format == Format::Svg && findings.is_empty() {
+        findings = drawn_otherwise(reader, path, &found)?;
+    }
     let mut verdict = with(cut, findings);
     if verdict.passed {
         verdict.sheets = surfaces(verifier, &boards, &found, kerf_mm);
@@ -109,28 +113,28 @@ fn read(
     })
 }
 
-/// Left and right end of the outlines to cut, mm.
-fn cut_ends(drawing: &CutDrawing) -> [f64; 2] {
-    let cuts = drawing.paths.iter().filter(|path| path.layer == CutLayer::Cut);
-    let along = cuts.flat_map(|path| &path.points_mm).map(|point| point.x);
-    along.fold([f64::INFINITY, f64::NEG_INFINITY], |[least, most], x| [least.min(x), most.max(x)])
+/// The kerf for which the first outline to cut is drawn, mm, by its length; `None` where there is none.
+fn kerf_of(found: &CutDrawing, boards: &[LaserBoard]) -> Option<f64> {
+    let length = |outline: &[DVec2]| {
+        let next = outline.iter().cycle().skip(1);
+        outline.iter().zip(next).map(|(from, to)| from.distance(*to)).sum::<f64>()
+    };
+    let cut = found.paths.iter().find(|path| path.layer == CutLayer::Cut);
+    let (cut, board) = cut.zip(boards.first())?;
+    // All edges are moved by the same length, so that corners stay and lengths grow evenly.
+    let finished = length(&board.plate_mm);
+    let by_a_millimetre = length(&artwork::moved_inwards(&board.plate_mm, -0.5)) - finished;
+    Some((length(&cut.points_mm) - finished) / by_a_millimetre)
 }
 
-/// By how much the outlines to cut reach beyond the finished plates, mm; far less than nothing where there are none.
-fn excess_mm(found: &CutDrawing, boards: &[LaserBoard]) -> f64 {
-    let [left, right] = cut_ends(found);
-    let width = boards.iter().map(|board| board.at_mm.x + board.size_mm.x).fold(0.0, f64::max);
-    if right > left { right - left - width } else { f64::MIN }
-}
-
-/// A drawing moved so that it begins where the stated one does: an SVG begins anywhere.
+/// A drawing moved so that what is cut begins where it does in the stated one: an SVG begins anywhere.
 fn moved(mut found: CutDrawing, stated: &CutDrawing) -> CutDrawing {
     let lower_left = |drawing: &CutDrawing| {
-        drawing.bounds_mm().map_or(DVec2::ZERO, |[left, lower, ..]| DVec2::new(left, lower))
+        let cuts = drawing.paths.iter().filter(|path| path.layer == CutLayer::Cut);
+        let points = cuts.flat_map(|path| &path.points_mm).copied();
+        points.reduce(DVec2::min).unwrap_or_default()
     };
     let by = lower_left(stated) - lower_left(&found);
-    // What is engraved may be wrong and reach farther.
-    let by = if by.x.abs().max(by.y.abs()) < 1e6 { by } else { DVec2::ZERO };
     let points = found.paths.iter_mut().flat_map(|path| &mut path.points_mm);
     points.for_each(|point| *point += by);
     found
@@ -188,9 +192,7 @@ fn surfaces(
                 seen
             })
             .collect();
-        let [left, lower, right, upper] = board.panel.field_mm();
-        let plate = [(left, lower), (right, lower), (right, upper), (left, upper)];
-        let picture = FacePicture::new(verifier, board.panel, &plate.map(DVec2::from));
+        let picture = FacePicture::new(verifier, board.panel, &board.plate_mm);
         let dark = engraved.iter().map(|outline| (outline.as_slice(), 1.0));
         let (page, layout) = picture.inked(dark);
         let mut sheet = SheetVerdict::new(index, &page, Vec::new());

@@ -223,6 +223,7 @@ impl fmt::Display for CutVerdict {
         write!(f, "verified, {outlines} to cut, ")?;
         match kerf_mm {
             None => write!(f, "{folds} to fold, {engraved} engraved, ")?,
+            Some(0.0) => write!(f, "{engraved} engraved, ")?,
             Some(kerf) => write!(f, "{engraved} engraved, for a kerf of {kerf:.3} mm, ")?,
         }
         write!(f, "within {max_deviation_mm:.4} mm")

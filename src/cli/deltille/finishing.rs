@@ -29,13 +29,21 @@ pub struct Finishing {
     /// with --pack the lines between boards
     #[arg(long, value_name = "NAME")]
     contour: Option<String>,
-    /// Write <name>-laser.dxf or <name>-laser.svg, what is black as closed outlines to engrave and the plate to cut;
-    /// dxf,svg for both
-    #[arg(long, value_name = "FORMAT", value_delimiter = ',')]
+    #[command(flatten)]
+    laser: Laser,
+}
+
+/// Drawings for a laser.
+#[derive(clap::Args)]
+#[command(next_help_heading = FINISHING)]
+pub struct Laser {
+    /// Write <name>-laser.dxf or <name>-laser.svg: what is black as closed outlines to engrave, and the outline of
+    /// each plate to cut (millimetres)
+    #[arg(long, value_name = "FORMATS", value_delimiter = ',')]
     laser: Vec<LaserFormat>,
-    /// Width that the beam takes away: engraved outlines are drawn smaller by half of it on each side, the plate larger
+    /// Width that the beam takes away: engraved outlines are drawn smaller by half of it on each side, plates larger
     /// [default: 0mm]
-    #[arg(long, value_name = "LENGTH", value_parser = parse_length_mm)]
+    #[arg(long, value_name = "LENGTH", allow_hyphen_values = true, value_parser = parse_length_mm)]
     kerf: Option<f64>,
 }
 
@@ -49,16 +57,12 @@ enum LaserFormat {
 impl Finishing {
     /// Whether a drawing for a laser is asked for.
     pub fn has_laser(&self) -> bool {
-        !self.laser.is_empty()
+        self.laser.is_any()
     }
 
     /// The target with this finish, which is laid out within this margin.
     pub fn applied(&self, target: Target, margin_mm: f64, pdf: bool) -> anyhow::Result<Target> {
-        if self.kerf.is_some() && !self.has_laser() {
-            bail!(
-                "--kerf: it says nothing without a drawing for a laser: add --laser, or leave it out"
-            );
-        }
+        self.laser.check_use()?;
         if self.mirrored && target.sheets.is_empty() && !self.has_laser() {
             bail!("--mirrored: a mesh is never mirrored: add --pdf or --laser, or leave it out");
         }
@@ -72,6 +76,28 @@ impl Finishing {
     }
 
     /// The drawings for a laser that are asked for.
+    pub fn files(&self, target: &Target, family: Option<&Family>) -> anyhow::Result<Vec<File>> {
+        self.laser.files(target, family)
+    }
+}
+
+impl Laser {
+    /// Whether any is asked for.
+    pub fn is_any(&self) -> bool {
+        !self.laser.is_empty()
+    }
+
+    /// Refuses a kerf of nothing.
+    pub fn check_use(&self) -> anyhow::Result<()> {
+        if self.kerf.is_some() && !self.is_any() {
+            bail!(
+                "--kerf: it says nothing without a drawing for a laser: add --laser, or leave it out"
+            );
+        }
+        Ok(())
+    }
+
+    /// The drawings that are asked for.
     pub fn files(&self, target: &Target, family: Option<&Family>) -> anyhow::Result<Vec<File>> {
         let mut making = Making::default();
         making.kerf_mm = self.kerf.unwrap_or(0.0);

@@ -8,6 +8,7 @@ use glam::DVec3;
 
 use super::delivery::Delivery;
 use super::files::{self, File, bytes_file, text_file};
+use super::finishing::Laser;
 use super::meshes::Meshes;
 use super::settings::{DEFAULT_DPI, PAPER, PRINT, TAGS};
 use crate::artwork;
@@ -121,6 +122,8 @@ pub struct Args {
     delivery: Delivery,
     #[command(flatten)]
     meshes: Meshes,
+    #[command(flatten)]
+    laser: Laser,
 }
 
 /// Help of options that say something else of solids with square tags.
@@ -269,8 +272,8 @@ impl Args {
 
     /// The meshes that are asked for; the glTF where nothing is.
     fn meshes(&self) -> Meshes {
-        let nothing =
-            !(self.stl || self.skeleton || self.dxf || self.printed() || self.meshes.is_any());
+        let bodies = self.stl || self.skeleton || self.dxf || self.laser.is_any();
+        let nothing = !(bodies || self.printed() || self.meshes.is_any());
         if nothing { self.meshes.with_gltf() } else { self.meshes }
     }
 
@@ -280,6 +283,7 @@ impl Args {
             Err(anyhow!("{option}: it says nothing without {needed}: add one, or leave it out"))
         };
         self.meshes().check_use(None)?;
+        self.laser.check_use()?;
         if self.dpi.is_some() && !self.png {
             return unused("--dpi", "--png");
         }
@@ -384,6 +388,7 @@ impl Args {
         }
         let (meshes, texture) = self.meshes().files(target, Some(family), None)?;
         files.extend(meshes);
+        files.extend(self.laser.files(target, Some(family))?);
         if self.printed() {
             let artwork = artwork::draw(target, Some(family))?;
             let formats = files::Formats { pdf: self.pdf, svg: self.svg, png: self.png };

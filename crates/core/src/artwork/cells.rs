@@ -164,7 +164,7 @@ fn left_first(kind: GridKind, heading: usize) -> impl Iterator<Item = usize> {
 }
 
 /// The vertices of a loop where its direction changes.
-pub(super) fn bends(steps: &[(Vertex, usize)]) -> Vec<Vertex> {
+fn bends(steps: &[(Vertex, usize)]) -> Vec<Vertex> {
     let before = |i: usize| steps[(i + steps.len() - 1) % steps.len()].1;
     let bends = steps.iter().enumerate().filter(|&(i, &(_, heading))| heading != before(i));
     bends.map(|(_, &(vertex, _))| vertex).collect()

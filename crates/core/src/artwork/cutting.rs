@@ -71,8 +71,8 @@ pub enum CuttingError {
     /// The sheets of the solid are not those of its net, or there are none.
     #[error("{0} is not laid out as a net: there is no net to cut")]
     NotNet(String),
-    /// The target has no board on a plate of its own.
-    #[error("{0} is no board: only boards are engraved by a laser")]
+    /// The target has no plates.
+    #[error("{0} is a sheet of tags: only boards and solids are engraved by a laser")]
     NotBoard(String),
     /// A beam that is too wide, or no width.
     #[error(

@@ -1,4 +1,4 @@
-//! Drawings of boards for a laser or a plotter: what is black as closed outlines to engrave, and the outline of the plate to
+//! Drawings of boards, and faces of solids, for a laser or a plotter: what is black as closed outlines to engrave, and the outline of the plate to
 //! cut, with an allowance for the width of the beam.
 //!
 //! ```text
@@ -12,15 +12,17 @@
 //! Every outline has what is black on its left: outer ones run counter-clockwise, holes clockwise (on a mirrored board
 //! too).
 
+use std::collections::BTreeMap;
 use std::f64::consts::TAU;
 
 use glam::DVec2;
 
+use super::atlas::Packing;
 use super::cutting::{CutDrawing, CutLayer, CutPath, CuttingError, GAP_MM};
 use super::{ArtworkError, board, cells};
 use crate::family::Family;
-use crate::lattice::{GridKind, Vertex};
-use crate::targets::{Panel, TagPlacement, TagsIn, Target, TargetSpec};
+use crate::lattice::{GridKind, Tile, Vertex};
+use crate::targets::{Face, Panel, Placement, TagPlacement, TagsIn, Target, TargetSpec};
 
 /// Widest kerf, mm: less than the gap between two plates.
 const WIDEST_KERF_MM: f64 = 3.0;
@@ -31,43 +33,43 @@ const KERF_PART: f64 = 0.25;
 /// Sides of the polygon that stands for a disc: of a diameter of 50 mm they are within a micrometre of it.
 const DISC_SIDES: u32 = 360;
 
-/// A board in a drawing: its plate is its field, tiles with their quiet zone.
-#[derive(Clone, Copy, Debug, PartialEq)]
+/// A board, or a face of a solid, in a drawing.
+#[derive(Clone, Debug, PartialEq)]
 pub struct LaserBoard<'a> {
     /// The board.
     pub panel: &'a Panel,
-    /// Lower left corner of the finished plate, mm.
-    pub at_mm: DVec2,
-    /// Width and height of the finished plate, mm.
-    pub size_mm: DVec2,
+    /// Outline of the finished plate, counter-clockwise in the frame of the board, mm: tiles with their quiet zone, or the
+    /// panel of a solid.
+    pub plate_mm: Vec<DVec2>,
+    /// Where it lies, as it is seen.
+    placement: Placement,
     /// Right end of all plates, by which a mirrored drawing is mirrored, mm; `None` for one as it is seen.
     mirror_mm: Option<f64>,
 }
 
 impl LaserBoard<'_> {
-    /// A point of the drawing in the frame of the board, or one of that frame in the drawing's where `back` is set, mm.
-    fn moved(&self, point: DVec2, back: bool) -> DVec2 {
-        let [left, lower, ..] = self.panel.field_mm();
-        let shift = self.at_mm - DVec2::new(left, lower);
-        let mirrored = |p: DVec2| self.mirror_mm.map_or(p, |right| DVec2::new(right - p.x, p.y));
-        if back { mirrored(point + shift) } else { mirrored(point) - shift }
+    /// A point of a drawing as it is seen in one that may be mirrored, or back, mm.
+    fn mirrored(&self, point: DVec2) -> DVec2 {
+        self.mirror_mm.map_or(point, |right| DVec2::new(right - point.x, point.y))
     }
 
     /// A point of the drawing in the frame of the board, mm.
     pub fn board_from_drawing(&self, point: DVec2) -> DVec2 {
-        self.moved(point, false)
+        self.placement.panel_from_page(self.mirrored(point))
     }
 
     /// Whether a point of the drawing is on the plate.
     pub fn holds(&self, point: DVec2) -> bool {
         let point = self.board_from_drawing(point);
-        let [left, lower, right, upper] = self.panel.field_mm();
-        (left..=right).contains(&point.x) && (lower..=upper).contains(&point.y)
+        let next = self.plate_mm.iter().cycle().skip(1);
+        let mut sides = self.plate_mm.iter().zip(next);
+        sides.all(|(&from, &to)| (to - from).perp_dot(point - from) >= 0.0)
     }
 
     /// An outline in the frame of the board as a path of the drawing, in the same sense.
-    fn path(&self, layer: CutLayer, outline: impl Iterator<Item = DVec2>) -> CutPath {
-        let mut points_mm: Vec<DVec2> = outline.map(|point| self.moved(point, true)).collect();
+    fn path(&self, layer: CutLayer, outline: &[DVec2]) -> CutPath {
+        let seen = outline.iter().map(|&point| self.placement.page_from_panel(point));
+        let mut points_mm: Vec<DVec2> = seen.map(|point| self.mirrored(point)).collect();
         if self.mirror_mm.is_some() {
             points_mm.reverse();
         }
@@ -75,41 +77,62 @@ impl LaserBoard<'_> {
     }
 }
 
-/// The boards of a target side by side, in rows from below, in true size and as they are mirrored.
+/// The boards or faces of a target side by side, in true size and as they are mirrored.
 ///
 /// # Errors
-/// When the target is not made of boards.
+/// When the target is neither made of boards nor a solid.
 pub fn laser_boards(target: &Target) -> Result<Vec<LaserBoard<'_>>, CuttingError> {
-    if matches!(target.spec, TargetSpec::Solid(_) | TargetSpec::Tags(_)) {
-        return Err(CuttingError::NotBoard(target.name.to_string()));
-    }
-    let columns = (target.panels.len() as f64).sqrt().ceil() as usize;
-    let mut boards = Vec::new();
-    let (mut lower, mut width) = (0.0, 0.0f64);
-    for row in target.panels.chunks(columns.max(1)) {
-        let (mut left, mut height) = (0.0, 0.0f64);
-        for panel in row {
-            let [x0, y0, x1, y1] = panel.field_mm();
-            let size_mm = DVec2::new(x1 - x0, y1 - y0);
-            let at_mm = DVec2::new(left, lower);
-            boards.push(LaserBoard { panel, at_mm, size_mm, mirror_mm: None });
-            width = width.max(left + size_mm.x);
-            height = height.max(size_mm.y);
-            left += size_mm.x + GAP_MM;
-        }
-        lower += height + GAP_MM;
-    }
+    let mut boards = match &target.spec {
+        TargetSpec::Tags(_) => return Err(CuttingError::NotBoard(target.name.to_string())),
+        TargetSpec::Solid(spec) => faces_in_rows(target, &spec.panel_faces()?),
+        _ => plates_in_rows(target),
+    };
     if target.finish.mirrored {
-        boards.iter_mut().for_each(|board| board.mirror_mm = Some(width));
+        let seen = boards.iter().flat_map(|board| {
+            board.plate_mm.iter().map(|&corner| board.placement.page_from_panel(corner).x)
+        });
+        let right = Some(seen.fold(0.0, f64::max));
+        boards.iter_mut().for_each(|board| board.mirror_mm = right);
     }
     Ok(boards)
 }
 
-/// The drawing of all boards of a target for a beam of this width, mm. The lower left corner of the first finished plate is
-/// the origin.
+/// The plates of boards in rows from below, about as many in each as there are rows.
+fn plates_in_rows(target: &Target) -> Vec<LaserBoard<'_>> {
+    let columns = (target.panels.len() as f64).sqrt().ceil() as usize;
+    let mut boards = Vec::new();
+    let mut lower = 0.0;
+    for row in target.panels.chunks(columns.max(1)) {
+        let (mut left, mut height) = (0.0, 0.0f64);
+        for panel in row {
+            let [x0, y0, x1, y1] = panel.field_mm();
+            let origin_mm = DVec2::new(left - x0, lower - y0);
+            let placement = Placement { panel: panel.id, angle_rad: 0.0, origin_mm };
+            let plate_mm = field(panel).to_vec();
+            boards.push(LaserBoard { panel, plate_mm, placement, mirror_mm: None });
+            height = height.max(y1 - y0);
+            left += x1 - x0 + GAP_MM;
+        }
+        lower += height + GAP_MM;
+    }
+    boards
+}
+
+/// The panels of a solid as they are cut without engraving.
+fn faces_in_rows<'a>(target: &'a Target, faces: &[Face]) -> Vec<LaserBoard<'a>> {
+    let placements: Vec<Placement> = Packing::tightest(faces, GAP_MM).placements().collect();
+    let plates = faces.iter().map(|face| face.outline_mm.clone()).zip(placements);
+    let boards = target.panels.iter().zip(plates).map(|(panel, (plate_mm, placement))| {
+        LaserBoard { panel, plate_mm, placement, mirror_mm: None }
+    });
+    boards.collect()
+}
+
+/// The drawing of all boards or faces of a target for a beam of this width, mm. Finished plates lie right of the origin and
+/// above it.
 ///
 /// # Errors
-/// When the target is not made of boards, its family is missing or lacks a code, or the beam is too wide.
+/// When the target is neither made of boards nor a solid, its family is missing or lacks a code, or the beam is too wide.
 pub fn to_laser(
     target: &Target,
     family: Option<&Family>,
@@ -126,9 +149,8 @@ pub fn to_laser(
     for board in &boards {
         let dark = dark_outlines(target, board.panel, family, kerf_mm == 0.0)?;
         let dark = dark.iter().map(|outline| moved_inwards(outline, half));
-        paths.extend(dark.map(|outline| board.path(CutLayer::Engrave, outline.into_iter())));
-        let plate = moved_inwards(&field(board.panel), -half);
-        paths.push(board.path(CutLayer::Cut, plate.into_iter()));
+        paths.extend(dark.map(|outline| board.path(CutLayer::Engrave, &outline)));
+        paths.push(board.path(CutLayer::Cut, &moved_inwards(&board.plate_mm, -half)));
     }
     Ok(CutDrawing { paths })
 }
@@ -211,16 +233,30 @@ fn tag_outlines(
     Ok(dark.iter().map(|outline| outline.iter().map(place).collect()).collect())
 }
 
-/// The outlines of tiles as vertices where they bend, with the tiles on the left, or on the right unless `inside`.
+/// The outlines of tiles as vertices where they bend, with the tiles on the left, or on the right unless `inside`. `simple` ones
+/// have vertices where they meet others, too, so that they still meet there when coordinates are rounded.
 fn outlines(
     kind: GridKind,
-    tiles: impl Iterator<Item = crate::lattice::Tile>,
+    tiles: impl Iterator<Item = Tile>,
     inside: bool,
     simple: bool,
 ) -> Vec<Vec<Vertex>> {
     let walks = cells::walks(kind, tiles, inside).into_iter();
-    let walks = walks.flat_map(|walk| if simple { cells::simple(walk) } else { vec![walk] });
-    walks.map(|walk| cells::bends(&walk)).collect()
+    let parts = walks.flat_map(|walk| if simple { cells::simple(walk) } else { vec![walk] });
+    let walks: Vec<cells::Walk> = parts.collect();
+    let mut passed = BTreeMap::<Vertex, usize>::new();
+    for (vertex, _) in walks.iter().flatten() {
+        *passed.entry(*vertex).or_default() += 1;
+    }
+    let vertices = |walk: &cells::Walk| {
+        let before = walk.iter().cycle().skip(walk.len() - 1);
+        let steps = walk.iter().zip(before);
+        let kept = steps.filter(|((vertex, heading), (_, before))| {
+            heading != before || (simple && passed[vertex] > 1)
+        });
+        kept.map(|((vertex, _), _)| *vertex).collect()
+    };
+    walks.iter().map(vertices).collect()
 }
 
 /// A closed outline with each edge moved to its left by a length, mm, or to its right by a negative one; edges stay as long
