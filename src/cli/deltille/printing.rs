@@ -40,9 +40,9 @@ pub struct Printing {
     #[arg(long, value_parser = name)]
     name: Option<String>,
     #[command(flatten)]
-    finishing: Finishing,
-    #[command(flatten)]
     pub delivery: Delivery,
+    #[command(flatten)]
+    finishing: Finishing,
 }
 
 impl Printing {

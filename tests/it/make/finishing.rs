@@ -135,7 +135,7 @@ fn what_a_laser_would_do_wrong_is_named() {
         (|d| drop(d.paths.remove(3)), "the path on ENGRAVE from"),
         (|d| d.paths[3].points_mm.iter_mut().for_each(|p| p.x += 0.05), "is off by 0.050 mm"),
         (|d| d.paths.retain(|path| path.layer == CutLayer::Engrave), "the path on CUT from"),
-        (|d| d.paths[3].layer = CutLayer::Cut, "the path on"),
+        (|d| d.paths[3].layer = CutLayer::Cut, "which this target cannot have"),
         (
             |d| {
                 let cut = d.paths.iter_mut().find(|path| path.layer == CutLayer::Cut).unwrap();
