@@ -43,6 +43,8 @@ TargetFormat: TypeAlias = Literal[
     "skeleton-3mf",
     "panels",
     "net",
+    "laser-dxf",
+    "laser-svg",
 ]
 CameraFormat: TypeAlias = Literal["own", "opencv", "ros", "kalibr", "colmap", "nerfstudio", "mrcal"]
 

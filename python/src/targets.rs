@@ -221,7 +221,7 @@ impl Target {
     /// format : str
     ///     ``"json"``, ``"pdf"``, ``"svg"``, ``"png"``, ``"dsc"``, ``"dsc-original"``; as meshes ``"gltf"``,
     ///     ``"obj"``, ``"sdf"``, ``"urdf"``, ``"mjcf"``, ``"usd"``, and to print in two colours ``"3mf"``; of a solid also ``"stl"``, ``"skeleton"``, ``"skeleton-3mf"``, ``"panels"`` (DXF)
-    ///     and ``"net"`` (DXF).
+    ///     and ``"net"`` (DXF). For a laser, without an allowance for its kerf, ``"laser-dxf"`` and ``"laser-svg"``.
     /// dpi : float, optional
     ///     Resolution of PNG pages, dots per inch.
     /// texture_dpi : float, optional

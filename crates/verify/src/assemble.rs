@@ -41,6 +41,7 @@ pub(super) fn assemble(
         image: Gray::from_fn(0, 0, |_, _| 255),
         smear_px: 1.0 + px_per_mm / coarsest,
         texel_px: 0.0,
+        left_px: 0.0,
     };
     let at_mm = |x: usize, y: usize| sheet.page_from_px(DVec2::new(x as f64, y as f64));
     let mut pixels = vec![255u8; size_px[0] * size_px[1]];

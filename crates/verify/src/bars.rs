@@ -123,6 +123,7 @@ mod tests {
             image: Gray::new(size[0], size[1]),
             smear_px: 0.0,
             texel_px: 0.0,
+            left_px: 0.0,
         };
         let mut coverage = Coverage::new(size[0], size[1]);
         for [x0, y0, x1, y1] in rectangles {

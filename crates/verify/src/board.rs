@@ -82,6 +82,12 @@ pub enum BoardFinding {
         /// Its id.
         panel: u32,
     },
+    /// The panel is not the mirror image that it should be.
+    #[error("board {panel} is not mirrored, as it should be")]
+    NotMirrored {
+        /// Its id.
+        panel: u32,
+    },
     /// The panel is larger or smaller than stated.
     #[error("scale {scale:.4}")]
     Scale {
@@ -219,7 +225,10 @@ pub(super) fn check(
                 verifier.detector.detect(&page.mirrored().blurred(), "mirror")
             });
             if mirrored.grids.iter().any(|grid| grid.panel == Some(id)) {
-                verdict.findings.push(BoardFinding::Mirrored { panel: id }.into());
+                verdict.findings.push(match verifier.target.finish.mirrored {
+                    true => BoardFinding::NotMirrored { panel: id }.into(),
+                    false => BoardFinding::Mirrored { panel: id }.into(),
+                });
                 let linear = [[-1.0, 0.0], [0.0, 1.0]];
                 mirror = Some(AffineMap { linear, shift: DVec2::X * page.width_mm });
                 continue;

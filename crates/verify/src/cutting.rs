@@ -55,6 +55,18 @@ pub enum CutFinding {
         /// Its start.
         at_mm: DVec2,
     },
+    /// The plate of a board is as much larger than stated as no kerf makes it.
+    #[error("the outline to cut is that of a kerf of {by_mm:.3} mm, which this target cannot have")]
+    NoKerf {
+        /// By how much the first outline to cut is larger than its finished plate, along a line across it.
+        by_mm: f64,
+    },
+    /// A drawing as other programs show it has something else in a place.
+    #[error("drawn otherwise around ({:.2}, {:.2}) mm", at_mm.x, at_mm.y)]
+    DrawnOtherwise {
+        /// The place, from the lower left corner of the drawing.
+        at_mm: DVec2,
+    },
 }
 
 /// Reads a `.dxf` and compares it with the target's panels or its net, as the name of
@@ -95,7 +107,7 @@ fn stated(verifier: &Verifier, path: &Path) -> Result<CutDrawing, VerifyError> {
 }
 
 /// Finds every stated path among those of the file, and names what is left on either side.
-fn compare(found: CutDrawing, stated: CutDrawing, cut: &mut CutVerdict) -> Vec<Finding> {
+pub(super) fn compare(found: CutDrawing, stated: CutDrawing, cut: &mut CutVerdict) -> Vec<Finding> {
     let mut left: Vec<CutPath> = found.paths;
     let mut missing = Vec::new();
     for path in stated.paths.into_iter().flat_map(pieces) {

@@ -81,6 +81,7 @@ pub(super) fn face_page(
         let sum: u32 = rows.flat_map(|at| &shades[at..at + SAMPLES]).map(|&v| u32::from(v)).sum();
         (sum / (SAMPLES * SAMPLES) as u32) as u8
     });
-    let page = Page { width_mm, height_mm, px_per_mm, image, smear_px: 1.0 + texel_px, texel_px };
+    let (smear_px, left_px) = (1.0 + texel_px, 0.0);
+    let page = Page { width_mm, height_mm, px_per_mm, image, smear_px, texel_px, left_px };
     (page, Placement { panel: panel.id, angle_rad: 0.0, origin_mm: DVec2::new(-left, -lower) })
 }

@@ -270,52 +270,88 @@ fn surface(
     face: &Face,
     [white, black]: &[Vec<[DVec2; 3]>; 2],
 ) -> (Page, SheetLayout, Option<String>) {
-    let least = face.outline.iter().copied().reduce(DVec2::min).unwrap_or_default();
-    let most = face.outline.iter().copied().reduce(DVec2::max).unwrap_or_default();
-    let low = least - AROUND_MM;
-    let size = most + AROUND_MM - low;
-    let placement = Placement { panel: face.panel.id, angle_rad: 0.0, origin_mm: -low };
-    let layout = SheetLayout {
-        width_mm: size.x,
-        height_mm: size.y,
-        placements: vec![placement],
-        check_bars: Vec::new(),
-        lines: Vec::new(),
-        texts: Vec::new(),
-        pages: Vec::new(),
-    };
-    let finest = (MAX_PIXELS / (size.x * size.y)).sqrt();
-    let px_per_mm = verifier.wish_px_per_mm(&layout).min(finest);
-    let [width, height] = size.to_array().map(|mm| (mm * px_per_mm).ceil() as usize);
-    let mut page = Page {
-        width_mm: size.x,
-        height_mm: size.y,
-        px_per_mm,
-        image: Gray::new(1, 1),
-        smear_px: 0.0,
-        texel_px: 0.0,
-    };
-    let covered = |parts: Vec<(&[DVec2], f64)>| {
-        let mut cover = Coverage::new(width, height);
-        for (corners, value) in parts {
-            // Clockwise on the screen is positive.
-            let pixels = corners.iter().rev().map(|&corner| page.px_from_page(corner - low));
-            cover.add(&pixels.collect::<Vec<DVec2>>(), value);
-        }
-        cover.finish()
-    };
+    let picture = FacePicture::new(verifier, face.panel, &face.outline);
     let dark = || black.iter().map(|corners| (corners.as_slice(), 1.0));
     let both = white.iter().map(|corners| (corners.as_slice(), 1.0)).chain(dark());
-    let beside = covered(both.chain([(face.outline.as_slice(), -1.0)]).collect());
+    let beside = picture.covered(both.chain([(face.outline.as_slice(), -1.0)]));
     let worst = beside.pixels().iter().position(|part| part.abs() > MOST_BESIDE);
     let problem = worst.map(|index| {
-        let pixel = DVec2::new((index % width) as f64, (index / width) as f64);
-        let place = page.page_from_px(pixel) + low;
-        let [x, y] = place.to_array();
+        let [x, y] = picture.place(index).to_array();
         let id = face.panel.id;
         format!("the bodies overlap, or leave a gap, around ({x:.2}, {y:.2}) mm on board {id}")
     });
-    let light = |ink: f32| (255.0 * (1.0 - ink)).round().clamp(0.0, 255.0) as u8;
-    page.image = covered(dark().collect()).map(light);
+    let (page, layout) = picture.inked(dark());
     (page, layout, problem)
+}
+
+/// A picture of a face, to be compared with what the face should show.
+pub(super) struct FacePicture {
+    page: Page,
+    layout: SheetLayout,
+    /// Width and height, px.
+    size_px: [usize; 2],
+    /// Its lower left corner in the frame of the panel, mm.
+    low: DVec2,
+}
+
+impl FacePicture {
+    /// A blank picture of a face with this outline in the frame of its panel, mm.
+    pub fn new(verifier: &Verifier, panel: &Panel, outline: &[DVec2]) -> Self {
+        let least = outline.iter().copied().reduce(DVec2::min).unwrap_or_default();
+        let most = outline.iter().copied().reduce(DVec2::max).unwrap_or_default();
+        let low = least - AROUND_MM;
+        let size = most + AROUND_MM - low;
+        let placement = Placement { panel: panel.id, angle_rad: 0.0, origin_mm: -low };
+        let layout = SheetLayout {
+            width_mm: size.x,
+            height_mm: size.y,
+            placements: vec![placement],
+            check_bars: Vec::new(),
+            lines: Vec::new(),
+            texts: Vec::new(),
+            pages: Vec::new(),
+        };
+        let finest = (MAX_PIXELS / (size.x * size.y)).sqrt();
+        let px_per_mm = verifier.wish_px_per_mm(&layout).min(finest);
+        let size_px = size.to_array().map(|mm| (mm * px_per_mm).ceil() as usize);
+        let page = Page {
+            width_mm: size.x,
+            height_mm: size.y,
+            px_per_mm,
+            image: Gray::new(1, 1),
+            smear_px: 0.0,
+            texel_px: 0.0,
+            left_px: 0.0,
+        };
+        Self { page, layout, size_px, low }
+    }
+
+    /// The place of a pixel in the frame of the panel, mm.
+    fn place(&self, index: usize) -> DVec2 {
+        let width = self.size_px[0];
+        let pixel = DVec2::new((index % width) as f64, (index / width) as f64);
+        self.page.page_from_px(pixel) + self.low
+    }
+
+    /// How much of each pixel polygons in the frame of the panel cover, each times its value; clockwise ones negative.
+    fn covered<'p>(&self, parts: impl Iterator<Item = (&'p [DVec2], f64)>) -> Gray<f32> {
+        let mut cover = Coverage::new(self.size_px[0], self.size_px[1]);
+        for (corners, value) in parts {
+            // Clockwise on the screen is positive.
+            let pixels = corners.iter().rev();
+            let pixels = pixels.map(|&corner| self.page.px_from_page(corner - self.low));
+            cover.add(&pixels.collect::<Vec<DVec2>>(), value);
+        }
+        cover.finish()
+    }
+
+    /// The face with these polygons in black, and what it should show.
+    pub fn inked<'p>(
+        mut self,
+        dark: impl Iterator<Item = (&'p [DVec2], f64)>,
+    ) -> (Page, SheetLayout) {
+        let light = |ink: f32| (255.0 * (1.0 - ink)).round().clamp(0.0, 255.0) as u8;
+        self.page.image = self.covered(dark).map(light);
+        (self.page, self.layout)
+    }
 }

@@ -42,6 +42,9 @@
 //! by a list of permitted constructs, not refused by a list of forbidden ones. Titles and
 //! descriptions must be those of the target, and unused content is refused.
 //!
+//! Pages that are printed as mirror images are turned over first. Drawings of boards for a laser are put back to what is
+//! left when the beam has taken its part, and that is compared like a printed page.
+//!
 //! Lists for other detectors (`.dsc`) and drawings for a cutter (`.dxf`) are read and compared with
 //! the target number by number.
 //!
@@ -61,6 +64,7 @@ mod finding;
 mod fit;
 mod fold;
 mod inlay;
+mod laser;
 mod listing;
 mod marks;
 mod model;
@@ -166,7 +170,7 @@ pub enum VerifyError {
     },
     /// The file name does not tell what is cut: panels or net.
     #[error(
-        "{}: name the file {target}-panels.dxf or {target}-net.dxf, for what it shows",
+        "{}: name the file {target}-panels.dxf, {target}-net.dxf or {target}-laser.dxf, for what it shows",
         path.display()
     )]
     WhichDrawing {
@@ -387,6 +391,9 @@ impl<'a> Verifier<'a> {
         };
         match format {
             Format::Dsc => return Ok(listing::verify(self, reader, path)?),
+            Format::Dxf | Format::Svg if laser::is_named(self.target, path) => {
+                return laser::verify(self, reader, path, format);
+            }
             Format::Dxf => return cutting::verify(self, reader, path),
             Format::Pdf | Format::Svg | Format::Png => {
                 return self.verify_sheets(reader, path, format);
@@ -546,7 +553,7 @@ impl<'a> Verifier<'a> {
         index: usize,
     ) -> Result<(SheetVerdict, Seen), DocumentError> {
         let layout = &self.target.sheets[index];
-        let (page, findings) = source.render(layout, self.wish_px_per_mm(layout))?;
+        let (page, findings) = source.render(layout, self.wish_px_per_mm(layout), self.target)?;
         let mut verdict = SheetVerdict::new(index, &page, findings);
         let seen = self.verify_sheet(&page, layout, &mut verdict);
         Ok((verdict, seen))
@@ -568,7 +575,7 @@ impl<'a> Verifier<'a> {
         let mut check_bars_mm = Vec::new();
         for (source, SheetPage { label, window_mm, marks, .. }) in sources.iter().zip(&layout.pages)
         {
-            let (page, wrong) = source.render(marks, wish)?;
+            let (page, wrong) = source.render(marks, wish, self.target)?;
             let mut verdict = SheetVerdict::new(index, &page, wrong);
             check_bars(&page, marks, &AffineMap::IDENTITY, &mut verdict);
             marks::check(&page, marks, &[], Some(*window_mm), &mut verdict);
@@ -576,7 +583,7 @@ impl<'a> Verifier<'a> {
             findings.extend(of_page.map(|finding| finding.on_page(label.clone())));
             check_bars_mm.extend(verdict.check_bars_mm);
             // Kept no finer than the sheet is looked at.
-            pages.push(if wish > most { source.render(marks, most)?.0 } else { page });
+            pages.push(if wish > most { source.render(marks, most, self.target)?.0 } else { page });
             // The whole sheet is compared after them.
             self.tell(before + pages.len() - 1, self.target.page_count());
         }
@@ -635,11 +642,12 @@ struct Source<'a> {
 }
 
 impl Source<'_> {
-    /// The page as a picture, and whether it has the stated size.
+    /// The page as a picture, turned over where it is printed as its mirror image, and whether it has the stated size.
     fn render(
         &self,
         layout: &SheetLayout,
         px_per_mm: f64,
+        target: &Target,
     ) -> Result<(Page, Vec<Finding>), DocumentError> {
         let tolerance_mm = self.document.size_tolerance_mm();
         let stated_mm = DVec2::new(layout.width_mm, layout.height_mm);
@@ -648,13 +656,15 @@ impl Source<'_> {
             return Err(self.document.too_large(found_mm, stated_mm));
         }
         let mut page = self.document.render(self.page, px_per_mm)?;
+        let turned = |page: Page| if target.finish.mirrored { page.mirrored() } else { page };
         if (found_mm - stated_mm).abs().max_element() > tolerance_mm {
+            let page = turned(page);
             return Ok((page, vec![PageFinding::PageSize { found_mm, stated_mm }.into()]));
         }
         // Pictures begin at the upper edge and end with a whole pixel: heights are counted from
-        // the true lower edge, not from the end of the last pixel.
-        page.height_mm = layout.height_mm;
-        Ok((page, Vec::new()))
+        // the true lower edge, not from the end of the last pixel; so are those that are turned over, from the other side.
+        (page.width_mm, page.height_mm) = (layout.width_mm, layout.height_mm);
+        Ok((turned(page), Vec::new()))
     }
 }
 

@@ -68,6 +68,9 @@ pub struct CutVerdict {
     pub engraved: usize,
     /// Largest distance of a point of these from its stated position, mm.
     pub max_deviation_mm: f64,
+    /// Allowance for the width of a laser's beam in the drawing of a board, mm.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub kerf_mm: Option<f64>,
 }
 
 /// The result for a body to print.
@@ -189,6 +192,21 @@ impl Verdict {
     }
 }
 
+impl Verdict {
+    /// Goes on with what its surfaces show.
+    fn corners_and_tags(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let sum = |count: fn(&SheetVerdict) -> usize| self.sheets.iter().map(count).sum::<usize>();
+        let deviation = self.sheets.iter().map(|s| s.max_deviation_mm).fold(0.0, f64::max);
+        let what = if self.sheets.iter().all(|s| s.has_discs) { "circle" } else { "corner" };
+        let corners = counted(sum(|s| s.corners_found), what);
+        write!(f, ", {corners} within {deviation:.4} mm")?;
+        match sum(|s| s.tags_exact) {
+            0 => Ok(()),
+            tags => write!(f, ", {} exact", counted(tags, "tag")),
+        }
+    }
+}
+
 impl fmt::Display for ListVerdict {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self { boards, corners, tags, max_deviation_mm } = self;
@@ -200,9 +218,14 @@ impl fmt::Display for ListVerdict {
 
 impl fmt::Display for CutVerdict {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { outlines, folds, engraved, max_deviation_mm } = self;
+        let Self { outlines, folds, engraved, max_deviation_mm, kerf_mm } = self;
         let (outlines, folds) = (counted(*outlines, "outline"), counted(*folds, "line"));
-        write!(f, "verified, {outlines} to cut, {folds} to fold, {engraved} engraved, ")?;
+        write!(f, "verified, {outlines} to cut, ")?;
+        match kerf_mm {
+            None => write!(f, "{folds} to fold, {engraved} engraved, ")?,
+            Some(0.0) => write!(f, "{engraved} engraved, ")?,
+            Some(kerf) => write!(f, "{engraved} engraved, for a kerf of {kerf:.3} mm, ")?,
+        }
         write!(f, "within {max_deviation_mm:.4} mm")
     }
 }
@@ -225,7 +248,8 @@ impl fmt::Display for Verdict {
             return write!(f, "{list}");
         }
         if let Some(cut) = self.cut.as_ref().filter(|_| self.passed) {
-            return write!(f, "{cut}");
+            write!(f, "{cut}")?;
+            return if self.sheets.is_empty() { Ok(()) } else { self.corners_and_tags(f) };
         }
         if let Some(body) = self.body.as_ref().filter(|_| self.passed) {
             let BodyVerdict { triangles, volume_mm3, seats, max_deviation_mm } = body;
@@ -238,15 +262,7 @@ impl fmt::Display for Verdict {
         }
         if let Some(inlay) = self.inlay.as_ref().filter(|_| self.passed) {
             write!(f, "{inlay}")?;
-            let sum =
-                |count: fn(&SheetVerdict) -> usize| self.sheets.iter().map(count).sum::<usize>();
-            let deviation = self.sheets.iter().map(|s| s.max_deviation_mm).fold(0.0, f64::max);
-            let corners = counted(sum(|s| s.corners_found), "corner");
-            write!(f, ", {corners} within {deviation:.4} mm")?;
-            return match sum(|s| s.tags_exact) {
-                0 => Ok(()),
-                tags => write!(f, ", {} exact", counted(tags, "tag")),
-            };
+            return self.corners_and_tags(f);
         }
         if self.passed && !self.faces.is_empty() {
             let sum =

@@ -8,7 +8,7 @@ use deltille::detect::{Detector, DetectorConfig};
 use deltille::export::dsc::{self, Dialect};
 use deltille::export::inlay::InlaidBodies;
 use deltille::export::mesh::{Meshing, TexturedMesh};
-use deltille::export::{detection, dxf, gltf, obj as obj_writer, pdf as pdf_writer};
+use deltille::export::{detection, dxf, gltf, laser_svg, obj as obj_writer, pdf as pdf_writer};
 use deltille::export::{png, stl as stl_writer, svg as svg_writer, threemf};
 use deltille::family::Family;
 use deltille::lattice::GridKind;
@@ -142,6 +142,11 @@ pub fn threemf() -> Vec<u8> {
 
 pub fn dxf() -> Vec<u8> {
     dxf::text(&artwork::panels_to_cut(&SOLID).unwrap()).into_bytes()
+}
+
+pub fn laser() -> Vec<u8> {
+    let drawing = artwork::to_laser(&BOARD, Some(&FAMILY), 0.1).unwrap();
+    laser_svg::text(&drawing, "b", &artwork::subject(&BOARD)).into_bytes()
 }
 
 pub fn pdf() -> Vec<u8> {

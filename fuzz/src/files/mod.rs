@@ -57,6 +57,7 @@ pub const READERS: &[Reader] = &[
     of("verify_stl", Form::Bytes, "stl", good::stl, read::solid),
     of("verify_3mf", Form::Bytes, "3mf", good::threemf, read::page),
     of("verify_dxf", Form::Text, "dxf", good::dxf, read::solid),
+    of("verify_laser", Form::Text, "svg", good::laser, read::page),
 ];
 
 const fn of(
@@ -83,8 +84,11 @@ impl Reader {
             folder.expect("a folder for the files")
         });
         FOLDER.with(|folder| {
-            let path =
-                folder.path().join(format!("{}.{}", good::stem(self.extension), self.extension));
+            let stem = match self.name {
+                "verify_laser" => "b-laser",
+                _ => good::stem(self.extension),
+            };
+            let path = folder.path().join(format!("{stem}.{}", self.extension));
             if self.name == "verify_obj" {
                 for (name, bytes) in good::beside_mesh() {
                     fs::write(folder.path().join(name), bytes)

@@ -8,6 +8,7 @@ use crate::cli::output::{self, Overwrite, say};
 use crate::cli::values::{Ids, name, whole};
 use crate::export::kind::Kind;
 use crate::export::{png, svg};
+use crate::targets::Finish;
 
 /// Most tags on one picture: a sheet of A0 size at the default edge.
 const MOST_TAGS: usize = 600;
@@ -74,7 +75,9 @@ pub(super) fn run(args: Args) -> anyhow::Result<ExitCode> {
     }
     if let Some(path) = svg_path {
         let subject = format!("fingerprint {}", family.fingerprint());
-        svg::write(&Artwork { title, subject, sheets: vec![sheet] }, 0, &path).context("-o")?;
+        let finish = Finish::default();
+        let artwork = Artwork { title, subject, sheets: vec![sheet], finish };
+        svg::write(&artwork, 0, &path).context("-o")?;
         written.push(path);
     }
     for path in written {

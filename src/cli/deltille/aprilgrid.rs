@@ -48,6 +48,7 @@ pub struct Args {
 /// Makes a grid, writes its files and that of Kalibr, and verifies what it wrote.
 pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     args.meshes.check_use(None)?;
+    let is_made = args.meshes.is_any();
     let Grid(tags) = args.tags;
     let spec = AprilGridSpec {
         gap: args.gap,
@@ -59,8 +60,9 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     };
     let family = Some(family::resolve(&spec.family).context("--family")?);
     let family = family.as_ref();
-    let target = args.printing.build("aprilgrid", &TargetSpec::AprilGrid(spec.clone()), family)?;
-    let mut files = args.printing.files(&target, family, args.meshes.is_any())?;
+    let target =
+        args.printing.build("aprilgrid", &TargetSpec::AprilGrid(spec.clone()), family, is_made)?;
+    let mut files = args.printing.files(&target, family, is_made)?;
     let (meshes, texture) = args.meshes.files(&target, family)?;
     files.extend(meshes);
     match spec.to_kalibr_yaml() {

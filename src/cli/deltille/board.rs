@@ -7,6 +7,7 @@ use anyhow::{Context, bail};
 
 use super::delivery::Delivery;
 use super::files::{File, Formats, drawn, text_file};
+use super::finishing::Finishing;
 use super::meshes::PlateMeshes;
 use super::settings::{Plan, Settings};
 use super::template::Template;
@@ -32,6 +33,8 @@ pub struct Args {
     delivery: Delivery,
     #[command(flatten)]
     meshes: PlateMeshes,
+    #[command(flatten)]
+    finishing: Finishing,
 }
 
 /// Makes a board, writes its files, and verifies what it wrote.
@@ -41,8 +44,8 @@ pub fn run(grid: GridKind, args: Args) -> anyhow::Result<ExitCode> {
         None => args.settings,
     };
     let mut plan = settings.plan(grid)?;
-    // A mesh alone needs no paper.
-    plan.pdf &= settings.prints() || !args.meshes.is_any();
+    // A mesh, or a drawing for a laser, alone needs no paper.
+    plan.pdf &= settings.prints() || !(args.meshes.is_any() || args.finishing.has_laser());
     args.meshes.check_use(plan.spec.two_sided_mm)?;
     let family = plan.spec.tags.as_ref().map(|tags| family::resolve(&tags.family)).transpose();
     let family = match (family, grid) {
@@ -72,6 +75,7 @@ pub fn run(grid: GridKind, args: Args) -> anyhow::Result<ExitCode> {
     let is_printed = plan.pdf || plan.svg || plan.png;
     let paper = is_printed.then_some(&plan.paper);
     let target = Target::build(&plan.name, &spec, family.as_ref(), paper)?;
+    let target = args.finishing.applied(target, plan.paper.margin_mm, plan.pdf)?;
     args.delivery.check_beside(&target)?;
     let template = args.save_template.as_deref().map(|path| {
         let text = settings.with_edge(plan.spec.edge_mm).to_toml(grid);
@@ -81,6 +85,7 @@ pub fn run(grid: GridKind, args: Args) -> anyhow::Result<ExitCode> {
     let mut files = files(&plan, &target, family.as_ref())?;
     let (meshes, texture) = args.meshes.files(&target, family.as_ref())?;
     files.extend(meshes);
+    files.extend(args.finishing.files(&target, family.as_ref())?);
     let told = summary(&target) + &texture;
     let delivered = args.delivery.deliver(&target, family.as_ref(), &files, &told)?;
     template.map_or(Ok(()), |template| template.write())?;

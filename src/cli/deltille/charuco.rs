@@ -45,6 +45,7 @@ pub struct Args {
 /// Makes a board, writes its files, and verifies what it wrote.
 pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     args.meshes.check_use(None)?;
+    let is_made = args.meshes.is_any();
     let Grid(squares) = args.squares;
     // A name that is unknown is refused with the other numbers.
     let name = dictionary(&args.dictionary).map_or(args.dictionary, |(name, _)| name.to_owned());
@@ -58,8 +59,9 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     };
     let family = Family::shipped(&spec.dictionary).ok();
     let family = family.as_ref();
-    let target = args.printing.build("charuco", &TargetSpec::Charuco(spec.clone()), family)?;
-    let mut files = args.printing.files(&target, family, args.meshes.is_any())?;
+    let target =
+        args.printing.build("charuco", &TargetSpec::Charuco(spec.clone()), family, is_made)?;
+    let mut files = args.printing.files(&target, family, is_made)?;
     let (meshes, texture) = args.meshes.files(&target, family)?;
     files.extend(meshes);
     let last = spec.first_id + spec.markers() - 1;

@@ -39,7 +39,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         board_id: args.board_id,
         ..usual
     };
-    let target = args.printing.build("circles", &TargetSpec::Circles(spec.clone()), None)?;
+    let target = args.printing.build("circles", &TargetSpec::Circles(spec.clone()), None, false)?;
     let files = args.printing.files(&target, None, false)?;
     let summary = format!(
         "{}: {} × {} circles, spacing {} mm, diameter {} mm{}",

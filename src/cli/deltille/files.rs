@@ -187,7 +187,9 @@ fn is_of_target(name: &str, stem: &str) -> bool {
     let is_page = |part: &str| !part.is_empty() && part.bytes().all(|b| b.is_ascii_digit());
     let is_part = match part.strip_prefix('-') {
         None => part.is_empty(),
-        Some(part) => is_page(part) || ["texture", "skeleton", "panels", "net"].contains(&part),
+        Some(part) => {
+            is_page(part) || ["texture", "skeleton", "panels", "net", "laser"].contains(&part)
+        }
     };
     is_part
         && ["pdf", "svg", "png", "dsc", "glb", "obj", "mtl", "stl", "dxf", "3mf"]
@@ -200,7 +202,7 @@ mod tests {
 
     #[test]
     fn files_of_a_target_are_known_by_their_names() {
-        for name in ["a.pdf", "a-12.svg", "a-texture.png", "a-net.dxf", "a.dsc"] {
+        for name in ["a.pdf", "a-12.svg", "a-texture.png", "a-net.dxf", "a-laser.svg", "a.dsc"] {
             assert!(is_of_target(name, "a"), "{name}");
         }
         for name in ["a.json", "b.pdf", "ab.pdf", "a-b.pdf", "a-.pdf", "a-view.png", "a"] {

@@ -15,6 +15,7 @@ mod examples;
 mod experiment;
 pub(in crate::cli) mod files;
 mod finder;
+mod finishing;
 mod guide;
 mod images;
 mod in_flight;

@@ -4,6 +4,7 @@ use anyhow::{Context, bail};
 
 use super::delivery::Delivery;
 use super::files::{File, Formats, drawn, text_file};
+use super::finishing::Finishing;
 use super::settings::{DEFAULT_DPI, DPI, PAPER, PRINT};
 use crate::artwork;
 use crate::cli::values::{name, whole};
@@ -46,15 +47,23 @@ pub struct Printing {
     name: Option<String>,
     #[command(flatten)]
     pub delivery: Delivery,
+    #[command(flatten)]
+    finishing: Finishing,
 }
 
 impl Printing {
+    /// Whether a PDF is written: where nothing else is asked for, too, and no mesh `is_made`.
+    fn is_pdf(&self, is_made: bool) -> bool {
+        self.pdf || !(self.svg || self.png || self.finishing.has_laser() || is_made)
+    }
+
     /// The target on its paper.
     pub fn build(
         &self,
         command: &str,
         spec: &TargetSpec,
         family: Option<&Family>,
+        is_made: bool,
     ) -> anyhow::Result<Target> {
         if self.dpi.is_some() && !self.png {
             bail!("--dpi: there is no PNG to write: add --png");
@@ -69,6 +78,7 @@ impl Printing {
         };
         let name = self.name.as_deref().unwrap_or(command);
         let target = Target::build(name, spec, family, Some(&paper))?;
+        let target = self.finishing.applied(target, paper.margin_mm, self.is_pdf(is_made))?;
         self.delivery.check_beside(&target)?;
         Ok(target)
     }
@@ -80,11 +90,11 @@ impl Printing {
         family: Option<&Family>,
         is_made: bool,
     ) -> anyhow::Result<Vec<File>> {
-        let (svg, png) = (self.svg, self.png);
-        let formats = Formats { pdf: self.pdf || !(svg || png || is_made), svg, png };
+        let formats = Formats { pdf: self.is_pdf(is_made), svg: self.svg, png: self.png };
         let dpi = self.dpi.unwrap_or(DEFAULT_DPI);
         let mut files = vec![text_file(format!("{}.json", target.name), target.to_json())];
         files.extend(drawn(&target.name, artwork::draw(target, family)?, formats, dpi));
+        files.extend(self.finishing.files(target, family)?);
         Ok(files)
     }
 }

@@ -8,6 +8,7 @@ use anyhow::{Context, bail};
 
 use super::delivery::Delivery;
 use super::files::{self, File, bytes_file, text_file};
+use super::finishing::Laser;
 use super::meshes::Meshes;
 use super::settings::{DEFAULT_DPI, TAGS};
 use super::solid_settings::SolidSettings;
@@ -40,6 +41,8 @@ pub struct Args {
     delivery: Delivery,
     #[command(flatten)]
     meshes: Meshes,
+    #[command(flatten)]
+    laser: Laser,
 }
 
 /// Help of options that say something else of a mesh.
@@ -169,6 +172,7 @@ fn run_with(
     settings.check_use()?;
     let meshes = args.meshes(&settings);
     meshes.check_use(None)?;
+    args.laser.check_use()?;
     let spec = settings.spec(shape)?;
     let paper = settings.paper()?;
     let mut family = family::resolve(&spec.tags.family).context("--family")?;
@@ -190,6 +194,7 @@ fn run_with(
     let mut files = files(&settings, &target, net, &spec, &family)?;
     let (textured, texture) = meshes.files(&target, Some(&family), None)?;
     files.extend(textured);
+    files.extend(args.laser.files(&target, Some(&family))?);
     files.extend(pages(&settings, &target, &family)?);
     let told = summary(&target, &spec)? + &texture;
     let delivered = args.delivery.deliver(&target, Some(&family), &files, &told)?;
@@ -210,7 +215,8 @@ impl Args {
     /// The meshes that are asked for; the glTF where nothing is.
     fn meshes(&self, settings: &SolidSettings) -> Meshes {
         let SolidSettings { stl, skeleton, dxf, .. } = *settings;
-        let nothing = !(stl || skeleton || dxf || settings.printed() || self.meshes.is_any());
+        let bodies = stl || skeleton || dxf || self.laser.is_any();
+        let nothing = !(bodies || settings.printed() || self.meshes.is_any());
         if nothing { self.meshes.with_gltf() } else { self.meshes }
     }
 }

@@ -16,7 +16,7 @@ use crate::cli::output::{self, Overwrite, Telling, say, tell};
 use crate::cli::progress;
 use crate::cli::run::{self, FAILED};
 use crate::export::kind::Kind;
-use crate::export::{sheet_file_name, stl, threemf};
+use crate::export::{laser_file_name, sheet_file_name, stl, threemf};
 use crate::family::Family;
 use crate::limits::Limits;
 use crate::targets::Target;
@@ -151,8 +151,10 @@ fn artifacts_beside(folder: &Path, target: &Target) -> Vec<PathBuf> {
     let meshes = ["glb", "obj", "sdf", "urdf", "xml", "usda", "3mf", "stl", "dsc"];
     let meshes = meshes.map(|extension| format!("{name}.{extension}"));
     let skeletons = [stl::skeleton_name(name), threemf::skeleton_name(name)];
-    let more = [format!("{name}-panels.dxf"), format!("{name}-net.dxf")];
-    let meshes = meshes.into_iter().chain(skeletons).chain(more).filter_map(present);
+    let panels = [format!("{name}-panels.dxf"), format!("{name}-net.dxf")];
+    let laser = ["dxf", "svg"].map(|extension| laser_file_name(name, extension));
+    let more = skeletons.into_iter().chain(panels).chain(laser);
+    let meshes = meshes.into_iter().chain(more).filter_map(present);
     if target.sheets.is_empty() {
         for path in printed {
             tell!(

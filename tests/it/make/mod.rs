@@ -2,6 +2,7 @@ mod board;
 mod checkerboard_targets;
 mod dsc;
 mod export;
+mod finishing;
 mod meshes;
 mod net;
 mod other_detectors;

@@ -142,7 +142,7 @@ pub(super) fn draw_panel(
 }
 
 /// The cells and the code word of a tag.
-fn tag_word(
+pub(super) fn tag_word(
     target: &Target,
     panel: &Panel,
     tag: &TagPlacement,
@@ -179,11 +179,20 @@ pub(super) fn disc(middle: DVec2, diameter: f64) -> BezPath {
 /// The outline of a tile in the frame of its panel, mm, moved inwards by the fraction `inside` of
 /// its edge.
 fn tile_outline(panel: &Panel, tile: Tile, inside: f64) -> BezPath {
+    in_tile(panel, tile, tile_corners(panel, tile, inside))
+}
+
+/// The corners of a tile in its own coordinates, moved inwards by the fraction `inside` of its edge.
+pub(super) fn tile_corners(
+    panel: &Panel,
+    tile: Tile,
+    inside: f64,
+) -> impl Iterator<Item = DVec2> + use<> {
     let middle = panel.kind.middle();
     let left = 1.0 - panel.kind.insets() * inside;
-    let corners = tile.vertices().map(|vertex| vertex - tile.anchor);
+    let corners = tile.vertices().map(move |vertex| vertex - tile.anchor);
     let corners = corners.map(|corner| DVec2::new(corner.col.into(), corner.row.into()));
-    in_tile(panel, tile, corners.map(|corner| middle + left * (corner - middle)))
+    corners.map(move |corner| middle + left * (corner - middle))
 }
 
 /// The outlines of the white areas of a tag in tile coordinates (u along the lower edge, v along

@@ -18,7 +18,7 @@ use crate::lattice::{GridKind, TagCells, Tile, Vertex};
 /// width, with `width` as [`TagCells::width`] gives it. Vertices on a straight run are left out.
 /// The order of the loops is the same in every run.
 pub fn white_outlines(cells: &TagCells, word: u64) -> Vec<Vec<Vertex>> {
-    let mut edges = boundary_edges(cells, word);
+    let mut edges = boundary_edges(cells.kind(), white_cells(cells, word));
     let mut loops = Vec::new();
     while let Some((&start, directions)) = edges.first_key_value() {
         let first = (start, directions[0]);
@@ -27,15 +27,81 @@ pub fn white_outlines(cells: &TagCells, word: u64) -> Vec<Vec<Vertex>> {
     loops
 }
 
-/// Edges between white and black cells, white on the left: for each vertex the directions of the
-/// edges that start there, as indices into [`GridKind::steps`], ascending.
-fn boundary_edges(cells: &TagCells, word: u64) -> BTreeMap<Vertex, Vec<usize>> {
-    let white = cells.cells().iter().enumerate().filter(|&(bit, _)| word >> bit & 1 == 1);
-    let mut edges = BTreeMap::<Vertex, Vec<usize>>::new();
-    for (_, cell) in white {
+/// The white cells of a tag as tiles of the lattice of its cells.
+pub(super) fn white_cells(cells: &TagCells, word: u64) -> impl Iterator<Item = Tile> {
+    let kind = cells.kind();
+    let white = cells.cells().iter().enumerate().filter(move |&(bit, _)| word >> bit & 1 == 1);
+    white.map(move |(_, cell)| {
         let anchor = Vertex::new(cell.row as i32, cell.col as i32);
-        let kind = cells.kind();
-        let tile = if cell.upright { kind.tag_tile(anchor) } else { Tile::inverted(anchor) };
+        if cell.upright { kind.tag_tile(anchor) } else { Tile::inverted(anchor) }
+    })
+}
+
+/// A walk along an outline: the vertices, and the direction in which each is left.
+pub(super) type Walk = Vec<(Vertex, usize)>;
+
+/// Walks around tiles with these on the left, or on the right unless they are `inside`. What lies on the left is kept apart
+/// where it meets in a vertex only: there a walk turns left as sharply as possible, so that it may pass a vertex twice.
+pub(super) fn walks(kind: GridKind, tiles: impl Iterator<Item = Tile>, inside: bool) -> Vec<Walk> {
+    let mut edges = boundary_edges(kind, tiles);
+    if !inside {
+        let half = kind.steps().len() / 2;
+        let all = std::mem::take(&mut edges).into_iter();
+        for (from, heading) in all.flat_map(|(from, all)| all.into_iter().map(move |h| (from, h))) {
+            let back = (heading + half) % (2 * half);
+            edges.entry(from + kind.steps()[heading]).or_default().push(back);
+        }
+        edges.values_mut().for_each(|directions| directions.sort_unstable());
+    }
+    let mut walks = Vec::new();
+    while let Some((&start, directions)) = edges.first_key_value() {
+        let first = (start, directions[0]);
+        walks.push(walk(kind, &mut edges, first));
+    }
+    walks
+}
+
+/// The walk that begins with a step, which is taken out of the edges.
+fn walk(kind: GridKind, edges: &mut BTreeMap<Vertex, Vec<usize>>, first: (Vertex, usize)) -> Walk {
+    remove(edges, first.0, first.1);
+    let mut steps = vec![first];
+    loop {
+        let (from, heading) = steps[steps.len() - 1];
+        let at = from + kind.steps()[heading];
+        let is_open =
+            |turn: &usize| edges.get(&at).is_some_and(|directions| directions.contains(turn));
+        let next = left_first(kind, heading).find(|turn| (at, *turn) == first || is_open(turn));
+        let next = (at, next.expect("as many outlines leave a vertex as reach it"));
+        if next == first {
+            return steps;
+        }
+        remove(edges, next.0, next.1);
+        steps.push(next);
+    }
+}
+
+/// The parts of a walk that pass every vertex once.
+pub(super) fn simple(walk: Walk) -> Vec<Walk> {
+    let mut parts = Vec::new();
+    let mut steps = Walk::new();
+    for step in walk {
+        if let Some(again) = steps.iter().position(|&(vertex, _)| vertex == step.0) {
+            parts.push(steps.split_off(again));
+        }
+        steps.push(step);
+    }
+    parts.push(steps);
+    parts
+}
+
+/// Edges between tiles and what is around them, tiles on the left: for each vertex the directions of the
+/// edges that start there, as indices into [`GridKind::steps`], ascending.
+fn boundary_edges(
+    kind: GridKind,
+    tiles: impl Iterator<Item = Tile>,
+) -> BTreeMap<Vertex, Vec<usize>> {
+    let mut edges = BTreeMap::<Vertex, Vec<usize>>::new();
+    for tile in tiles {
         let vertices = tile.vertices();
         let ends = vertices.clone().cycle().skip(1);
         for (from, to) in vertices.zip(ends) {
@@ -86,12 +152,15 @@ fn trace(
                 break;
             }
         }
-        // All directions except straight back, from the sharpest left turn on.
-        let full = kind.steps().len();
-        let left_first = (1..full).map(|right| (heading + full / 2 + full - right) % full);
-        let next = left_first.into_iter().find(|turn| edges[&at].contains(turn));
+        let next = left_first(kind, heading).find(|turn| edges[&at].contains(turn));
         steps.push((at, next.expect("as many outlines leave a vertex as reach it")));
     }
+}
+
+/// All directions except straight back, from the sharpest left turn on.
+fn left_first(kind: GridKind, heading: usize) -> impl Iterator<Item = usize> {
+    let full = kind.steps().len();
+    (1..full).map(move |right| (heading + full / 2 + full - right) % full)
 }
 
 /// The vertices of a loop where its direction changes.

@@ -12,7 +12,7 @@ use crate::targets::{
 };
 
 /// Blank between panels, mm: more than the width of any cut.
-const GAP_MM: f64 = 4.0;
+pub(super) const GAP_MM: f64 = 4.0;
 
 /// Height of the number of a face, as a fraction of the inradius, and its maximum, mm.
 const FACE_CAP: (f64, f64) = (0.25, 8.0);
@@ -71,6 +71,23 @@ pub enum CuttingError {
     /// The sheets of the solid are not those of its net, or there are none.
     #[error("{0} is not laid out as a net: there is no net to cut")]
     NotNet(String),
+    /// The target has no plates.
+    #[error("{0} is a sheet of tags: only boards and solids are engraved by a laser")]
+    NotBoard(String),
+    /// A beam that is too wide, or no width.
+    #[error(
+        "a kerf of {kerf_mm} mm is not between 0 mm and {:.3} mm, a quarter of the finest thing on the board",
+        most_mm
+    )]
+    Kerf {
+        /// The width asked for, mm.
+        kerf_mm: f64,
+        /// The largest that leaves something of everything, mm.
+        most_mm: f64,
+    },
+    /// The board cannot be drawn.
+    #[error(transparent)]
+    Draw(#[from] super::ArtworkError),
     /// The solid cannot be made.
     #[error(transparent)]
     Target(#[from] TargetError),

@@ -16,16 +16,17 @@ mod cells;
 mod check_bar;
 mod cutting;
 mod gallery;
+mod laser;
 mod line;
 pub mod text;
 mod window;
 
 use glam::DVec2;
-use kurbo::BezPath;
+use kurbo::{Affine, BezPath};
 
 use crate::family::Family;
 use crate::lattice::GridKind;
-use crate::targets::{LineKind, Panel, Placement, SheetText, Target};
+use crate::targets::{Finish, LineKind, Panel, Placement, SheetText, Target};
 use crate::words::counted;
 
 pub use atlas::Atlas;
@@ -34,6 +35,7 @@ pub use cells::white_outlines;
 pub use check_bar::{STROKE_WIDTH_MM, outline as check_bar_outline};
 pub use cutting::{CutDrawing, CutLayer, CutPath, CuttingError, net_to_cut, panels_to_cut};
 pub use gallery::{GalleryTile, tag_gallery};
+pub use laser::{LaserBoard, laser_boards, moved_inwards, to_laser};
 pub use line::strokes_mm;
 
 /// The drawing of one target: all its pages.
@@ -45,6 +47,8 @@ pub struct Artwork {
     pub subject: String,
     /// The pages, in the order of the target's sheets and of the pages of each.
     pub sheets: Vec<Sheet>,
+    /// How they are printed. Shapes are mirrored already where that is so; formats with spot colours have those.
+    pub finish: Finish,
 }
 
 /// One page with its shapes.
@@ -56,6 +60,14 @@ pub struct Sheet {
     pub height_mm: f64,
     /// Shapes, none of which overlaps another.
     pub shapes: Vec<Shape>,
+}
+
+impl Sheet {
+    /// Exchanges left and right.
+    fn mirror(&mut self) {
+        let mirrored = Affine::new([-1.0, 0.0, 0.0, 1.0, self.width_mm, 0.0]);
+        self.shapes.iter_mut().for_each(|shape| shape.path = mirrored * &shape.path);
+    }
 }
 
 /// A mark in solid black.
@@ -195,7 +207,11 @@ pub fn draw(target: &Target, family: Option<&Family>) -> Result<Artwork, Artwork
             sheets.push(board::page(&sheet, layout, page)?);
         }
     }
-    Ok(Artwork { title: target.name.to_string(), subject: subject(target), sheets })
+    if target.finish.mirrored {
+        sheets.iter_mut().for_each(Sheet::mirror);
+    }
+    let (title, subject) = (target.name.to_string(), subject(target));
+    Ok(Artwork { title, subject, sheets, finish: target.finish.clone() })
 }
 
 /// Draws the tiles of one panel in the frame of the panel, mm.

@@ -6,7 +6,7 @@ use super::layout::{arrange, label};
 use super::paper::{PaperSpec, SolidSheets};
 use super::poster::Poster;
 use super::{
-    BoardSpec, FamilyRef, LineKind, Name, Panel, Placement, SheetLayout, SheetLine, Target,
+    BoardSpec, FamilyRef, Finish, LineKind, Name, Panel, Placement, SheetLayout, SheetLine, Target,
     TargetError, TargetSpec, aprilgrid, board, charuco, circles, face_sheet, guide, net, packed,
     solid, tag_ids, tag_sheet,
 };
@@ -101,7 +101,8 @@ impl Target {
                 return Err(TargetError::Listed);
             }
         };
-        let mut target = Target { name, spec: spec.clone(), family, panels, sheets };
+        let mut target =
+            Target { name, spec: spec.clone(), family, panels, sheets, finish: Finish::default() };
         if layout.is_some_and(|paper| paper.tag_ids) {
             tag_ids::add(&mut target)?;
         }

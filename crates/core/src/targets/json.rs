@@ -6,8 +6,8 @@ use glam::DVec2;
 use serde::{Deserialize, Serialize};
 
 use super::{
-    Corner, FamilyRef, GridKind, Name, Panel, SheetLayout, TagPlacement, Target, TargetSpec,
-    aprilgrid, board, charuco, circles, solid, tag_sheet,
+    Corner, FamilyRef, Finish, GridKind, Name, Panel, SheetLayout, TagPlacement, Target,
+    TargetSpec, aprilgrid, board, charuco, circles, solid, tag_sheet,
 };
 use crate::json::{self, ReadError};
 use crate::lattice::Vertex;
@@ -83,6 +83,8 @@ struct TargetFile {
     panels: Vec<Panel>,
     #[serde(default)]
     sheets: Vec<SheetLayout>,
+    #[serde(default, skip_serializing_if = "Finish::is_plain")]
+    finish: Finish,
 }
 
 impl Target {
@@ -103,8 +105,9 @@ impl Target {
         if head.schema != SCHEMA {
             return Err(TargetFileError::Schema { found: head.schema });
         }
-        let TargetFile { schema: _, name, spec, family, panels, sheets } = json::read(text)?;
-        let target = Target { name, spec, family, panels, sheets };
+        let TargetFile { schema: _, name, spec, family, panels, sheets, finish } =
+            json::read(text)?;
+        let target = Target { name, spec, family, panels, sheets, finish };
         check(&target).map_err(|(field, problem)| TargetFileError::Field { field, problem })?;
         Ok(target)
     }
@@ -119,8 +122,9 @@ impl Target {
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
     pub fn to_json(&self) -> String {
-        let Target { name, spec, family, panels, sheets } = self.clone();
-        let file = TargetFile { schema: SCHEMA.to_owned(), name, spec, family, panels, sheets };
+        let Target { name, spec, family, panels, sheets, finish } = self.clone();
+        let schema = SCHEMA.to_owned();
+        let file = TargetFile { schema, name, spec, family, panels, sheets, finish };
         json::to_text(&file, 4)
     }
 }
@@ -191,6 +195,8 @@ pub fn check(target: &Target) -> Result<(), Problem> {
         }
     }
     check_against_spec(target)?;
+    let named = |setting: &str| setting.replace("Finish::", "finish.");
+    target.finish.check().or_else(|(setting, what)| problem(named(setting), what))?;
     for (s, sheet) in target.sheets.iter().enumerate() {
         check_sheet(sheet, &format!("sheets[{s}]"))?;
         for (p, page) in sheet.pages.iter().enumerate() {

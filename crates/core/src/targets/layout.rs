@@ -53,7 +53,7 @@ const CROP_MM: [f64; 2] = [1.0, 5.0];
 const CROP_WIDTH_MM: f64 = 0.15;
 /// Blank that is left along the edges of the paper whatever the margin, mm: a pixel at 200 dpi has
 /// 0.13 mm, and the stroke of a bar that touches the edge can neither be measured nor trimmed.
-const LEAST_MARGIN_MM: f64 = 0.5;
+pub(super) const LEAST_MARGIN_MM: f64 = 0.5;
 /// Finest edge proposed to make a board fit, mm: what office printers resolve in a tag.
 const LEAST_PROPOSED_MM: u32 = 5;
 
@@ -333,7 +333,7 @@ impl Arrangement {
                 .map(|axis| CROP_MM.map(|mm| placement.page_from_panel(corner + mm * out * axis)))
         });
         let line = |[from_mm, to_mm]: [DVec2; 2]| SheetLine {
-            kind: LineKind::Cut,
+            kind: LineKind::Align,
             from_mm,
             to_mm,
             width_mm: CROP_WIDTH_MM,

@@ -18,6 +18,7 @@ mod closed_mesh;
 mod error;
 mod face;
 mod face_sheet;
+mod finish;
 mod guide;
 pub mod json;
 mod label;
@@ -55,6 +56,7 @@ pub use closed_mesh::{ClosedMesh, ClosedMeshError, FaceNoun, NEAR_EQUILATERAL};
 pub use error::TargetError;
 pub use face::{Face, FaceBoard};
 pub use face_sheet::{edge_numbers, edge_text, upright_number};
+pub use finish::Finish;
 pub use json::{SCHEMA, TargetFileError};
 pub use label::Label;
 pub use layout::CHECK_BAR_STROKE_MM;
@@ -83,6 +85,8 @@ pub struct Target {
     pub panels: Vec<Panel>,
     /// Where the panels lie on paper; empty when the target came from a file without sheets.
     pub sheets: Vec<SheetLayout>,
+    /// How they are printed.
+    pub finish: Finish,
 }
 
 /// Names a family so that a changed code table cannot go unnoticed.
@@ -451,7 +455,7 @@ pub enum LineKind {
     /// Between two faces in one plane, not to be folded; dotted.
     Flat,
     /// A stroke of a registration cross: pages that share it are laid on one another, single faces
-    /// on their seats; or of the overview of such pages. Drawn through.
+    /// on their seats; a mark at a corner of a plate; or of the overview of such pages, or another picture. Drawn through.
     Align,
 }
 

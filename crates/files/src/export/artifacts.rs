@@ -19,7 +19,10 @@ use super::inlay::InlaidBodies;
 use super::kind::Kind;
 use super::mesh::{MeshError, Meshing, TexturedMesh};
 use super::staging::Staging;
-use super::{atomic, dxf, gltf, obj, pdf, png, scene, sheet_file_name, stl, svg, threemf};
+use super::{
+    atomic, dxf, gltf, laser_file_name, laser_svg, obj, pdf, png, scene, sheet_file_name, stl, svg,
+    threemf,
+};
 use crate::limits::{Limits, ReadError};
 use deltille_core::artwork::{self, ArtworkError, CuttingError};
 use deltille_core::family::Family;
@@ -66,13 +69,17 @@ pub enum What {
     Panels,
     /// `<name>-net.dxf`, the net of a solid to cut and fold.
     Net,
+    /// `<name>-laser.dxf`, boards to engrave and plates to cut, all boards side by side.
+    LaserDxf,
+    /// `<name>-laser.svg` likewise.
+    LaserSvg,
 }
 
 /// A text that is nothing that can be made.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error(
     "`{0}` is no format: json, pdf, svg, png, dsc, dsc-original, gltf, obj, sdf, urdf, mjcf, usd, 3mf, stl, skeleton, \
-     skeleton-3mf, panels or net"
+     skeleton-3mf, panels, net, laser-dxf or laser-svg"
 )]
 pub struct WhatError(String);
 
@@ -99,6 +106,8 @@ impl FromStr for What {
             "skeleton-3mf" => Self::Skeleton3mf,
             "panels" => Self::Panels,
             "net" => Self::Net,
+            "laser-dxf" => Self::LaserDxf,
+            "laser-svg" => Self::LaserSvg,
             _ => return Err(WhatError(text.to_owned())),
         })
     }
@@ -112,11 +121,13 @@ pub struct Making {
     pub dpi: f64,
     /// How meshes are made.
     pub mesh: Meshing,
+    /// Width that the beam of a laser takes away, mm.
+    pub kerf_mm: f64,
 }
 
 impl Default for Making {
     fn default() -> Self {
-        Self { dpi: DEFAULT_DPI, mesh: Meshing::default() }
+        Self { dpi: DEFAULT_DPI, mesh: Meshing::default(), kerf_mm: 0.0 }
     }
 }
 
@@ -192,6 +203,15 @@ pub fn make(
             named("-panels.dxf", dxf::text(&artwork::panels_to_cut(target)?).into_bytes())
         }
         What::Net => named("-net.dxf", dxf::text(&artwork::net_to_cut(target)?).into_bytes()),
+        What::LaserDxf => {
+            let drawing = artwork::to_laser(target, family, making.kerf_mm)?;
+            vec![(laser_file_name(name, "dxf"), dxf::text(&drawing).into_bytes())]
+        }
+        What::LaserSvg => {
+            let drawing = artwork::to_laser(target, family, making.kerf_mm)?;
+            let text = laser_svg::text(&drawing, name, &artwork::subject(target));
+            vec![(laser_file_name(name, "svg"), text.into_bytes())]
+        }
     })
 }
 

@@ -22,6 +22,8 @@ pub mod gltf;
 #[cfg(feature = "meshes")]
 pub mod inlay;
 pub mod kind;
+#[cfg(feature = "print")]
+pub mod laser_svg;
 #[cfg(feature = "meshes")]
 pub mod mesh;
 mod motion;
@@ -84,6 +86,11 @@ pub enum ExportError {
 
 /// Name and version of this program, as all file formats with a place for it state them.
 pub const GENERATOR: &str = concat!("deltille ", env!("CARGO_PKG_VERSION"));
+
+/// The file name of the drawing of a board for a laser: `name-laser.dxf`, `name-laser.svg`.
+pub fn laser_file_name(name: &str, extension: &str) -> String {
+    format!("{name}-laser.{extension}")
+}
 
 /// The file name of sheet `index` (from 0) of `count`: `name.svg`, or `name-2.svg` when there are
 /// several.

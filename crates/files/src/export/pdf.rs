@@ -1,19 +1,22 @@
 //! PDF: all sheets in one file, one page each.
 //!
-//! Black is pure K (CMYK). The page boxes are the size of the page in points, and viewers are asked
+//! Black is pure K (CMYK). Where a finish names spot colours, a white lies beneath the whole page, and lines to cut along have
+//! theirs; all of it overprints, so that no separation has holes under another. What is not printed with these inks shows
+//! the white as paper and the lines as black. The page boxes are the size of the page in points, and viewers are asked
 //! to print without scaling. The same artwork gives the same bytes: there are no dates, and the
 //! identifier of the file is a digest of its content.
 
 use std::path::Path;
 
-use kurbo::{BezPath, PathEl, Point};
+use kurbo::{BezPath, PathEl, Point, Rect, Shape as _};
 use lopdf::content::{Content, Operation};
 use lopdf::xref::XrefType;
 use lopdf::{Dictionary, Document, Object, Stream, StringFormat, dictionary};
 use sha2::{Digest, Sha256};
 
 use super::{ExportError, GENERATOR, atomic};
-use deltille_core::artwork::{Artwork, Paint, Sheet};
+use deltille_core::artwork::{Artwork, Paint, Part, Sheet};
+use deltille_core::targets::{Finish, LineKind};
 
 /// Version of the PDF format.
 pub const VERSION: &str = "1.6";
@@ -23,6 +26,41 @@ const PT_PER_MM: f64 = 72.0 / 25.4;
 
 /// Longest side of a page that readers have to accept, mm: 14400 points.
 const MAX_PAGE_MM: f64 = 5080.0;
+
+/// Names by which the content of a page calls the space of the white, that of lines to cut along, and the state in which
+/// everything overprints.
+pub const WHITE: &str = "White";
+/// See [`WHITE`].
+pub const CONTOUR: &str = "Contour";
+/// See [`WHITE`].
+pub const OVERPRINT: &str = "Overprint";
+
+/// The colour spaces of a finish: a separation for each spot colour, shown as nothing or as black by what does not have
+/// it.
+pub fn color_spaces(finish: &Finish) -> Dictionary {
+    let mut spaces = Dictionary::new();
+    for (key, name, black) in [(WHITE, &finish.white, 0), (CONTOUR, &finish.contour, 1)] {
+        let Some(name) = name else { continue };
+        let cmyk = |black: i64| -> Vec<Object> { [0, 0, 0, black].map(Object::from).to_vec() };
+        let tint = dictionary! {
+            "FunctionType" => 2, "Domain" => vec![0.into(), 1.into()], "C0" => cmyk(0), "C1" => cmyk(black), "N" => 1,
+        };
+        let name = Object::Name(name.clone().into_bytes());
+        let space = vec!["Separation".into(), name, "DeviceCMYK".into(), tint.into()];
+        spaces.set(key, space);
+    }
+    spaces
+}
+
+/// The graphics states of a finish: where it has spot colours, that in which everything overprints.
+pub fn graphics_states(finish: &Finish) -> Dictionary {
+    let mut states = Dictionary::new();
+    if finish.spots().next().is_some() {
+        let state = dictionary! { "Type" => "ExtGState", "OP" => true, "op" => true, "OPM" => 1 };
+        states.set(OVERPRINT, state);
+    }
+    states
+}
 
 /// Writes all sheets as one PDF file.
 ///
@@ -65,13 +103,22 @@ fn document(artwork: &Artwork) -> Document {
     let mut document = Document::with_version(VERSION);
     document.reference_table.cross_reference_type = XrefType::CrossReferenceTable;
     let pages = document.new_object_id();
-    let [font, xobject, state, shading] = [(); 4].map(|()| document.add_object(Dictionary::new()));
+    let states = graphics_states(&artwork.finish);
+    let [font, xobject, state, shading] =
+        [Dictionary::new(), Dictionary::new(), states, Dictionary::new()]
+            .map(|resource| document.add_object(resource));
+    let spaces = color_spaces(&artwork.finish);
+    let spaces = (!spaces.is_empty()).then(|| document.add_object(spaces));
     let kids: Vec<_> = artwork.sheets.iter().map(|_| document.new_object_id()).collect();
     for (sheet, &kid) in artwork.sheets.iter().zip(&kids) {
-        let resources = document.add_object(dictionary! {
+        let mut resources = dictionary! {
             "Font" => font, "XObject" => xobject, "ExtGState" => state, "Shading" => shading,
-        });
-        let content = Content { operations: operations(sheet) }.encode();
+        };
+        if let Some(spaces) = spaces {
+            resources.set("ColorSpace", spaces);
+        }
+        let resources = document.add_object(resources);
+        let content = Content { operations: operations(sheet, &artwork.finish) }.encode();
         let content = content.expect("writing to memory does not fail");
         let content = document.add_object(Stream::new(Dictionary::new(), content));
         let size = vec![0f32.into(), 0f32.into(), pt(sheet.width_mm), pt(sheet.height_mm)];
@@ -112,11 +159,18 @@ fn saved(document: &mut Document) -> Vec<u8> {
     bytes
 }
 
-/// The operators that draw a sheet, all in black.
-fn operations(sheet: &Sheet) -> Vec<Operation> {
+/// The operators that draw a sheet: what lies beneath it, then all in black but for lines in a spot colour.
+fn operations(sheet: &Sheet, finish: &Finish) -> Vec<Operation> {
     let black: Vec<Object> = [0f32, 0.0, 0.0, 1.0].map(Object::from).to_vec();
-    let mut operations = vec![Operation::new("k", black.clone()), Operation::new("K", black)];
+    let mut operations = beneath(sheet, finish);
+    operations.extend([Operation::new("k", black.clone()), Operation::new("K", black.clone())]);
     for shape in &sheet.shapes {
+        let in_spot = matches!(shape.part, Part::Line { kind: LineKind::Cut, .. })
+            && finish.contour.is_some();
+        if in_spot {
+            operations.push(Operation::new("CS", vec![CONTOUR.into()]));
+            operations.push(Operation::new("SCN", vec![1.into()]));
+        }
         match shape.paint {
             Paint::Fill => {
                 operations
@@ -132,6 +186,25 @@ fn operations(sheet: &Sheet) -> Vec<Operation> {
                 }
             }
         }
+        if in_spot {
+            operations.push(Operation::new("K", black.clone()));
+        }
+    }
+    operations
+}
+
+/// What comes before the marks of a sheet: everything overprints where there are spot colours, and the white.
+fn beneath(sheet: &Sheet, finish: &Finish) -> Vec<Operation> {
+    let mut operations = Vec::new();
+    if finish.spots().next().is_some() {
+        operations.push(Operation::new("gs", vec![OVERPRINT.into()]));
+    }
+    if finish.white.is_some() {
+        operations.push(Operation::new("cs", vec![WHITE.into()]));
+        operations.push(Operation::new("scn", vec![1.into()]));
+        let page = Rect::new(0.0, 0.0, sheet.width_mm, sheet.height_mm).to_path(1.0);
+        operations.extend(contours(&page).into_iter().flat_map(|contour| contour.drawn));
+        operations.extend([Operation::new("h", vec![]), Operation::new("f*", vec![])]);
     }
     operations
 }

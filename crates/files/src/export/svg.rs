@@ -88,7 +88,8 @@ fn name(part: Part) -> String {
     }
 }
 
-fn data(path: &BezPath) -> String {
+/// The data of a path.
+pub(super) fn data(path: &BezPath) -> String {
     let mut data = String::new();
     let p = |p: Point| format!("{} {}", number(p.x), number(p.y));
     for element in path.elements() {
@@ -105,7 +106,7 @@ fn data(path: &BezPath) -> String {
 }
 
 /// A number without trailing zeros.
-fn number(value: f64) -> String {
+pub(super) fn number(value: f64) -> String {
     let fixed = format!("{value:.DECIMALS$}");
     match fixed.trim_end_matches('0').trim_end_matches('.') {
         "-0" => "0".to_owned(),

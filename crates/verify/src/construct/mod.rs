@@ -27,7 +27,7 @@ use serde_json::Value;
 use super::reader::Reader;
 use super::{Artifact, DocumentError, Finding, Format, PageFinding};
 use deltille_core::artwork::subject;
-use deltille_core::targets::Target;
+use deltille_core::targets::{Finish, Target};
 use deltille_files::export::inlay::Body;
 use deltille_files::export::mesh::extras;
 use deltille_files::export::scene;
@@ -142,12 +142,15 @@ struct Words {
     subject: String,
     /// The same facts as JSON, for programs.
     extras: Value,
+    /// How its pages are printed.
+    finish: Finish,
 }
 
 impl Words {
     /// The texts that belong to a target.
     fn of(target: &Target) -> Self {
-        Self { title: target.name.to_string(), subject: subject(target), extras: extras(target) }
+        let (title, finish) = (target.name.to_string(), target.finish.clone());
+        Self { title, subject: subject(target), extras: extras(target), finish }
     }
 
     /// Whether data in a mesh is that of the target; any version of the program may have written it.

@@ -8,7 +8,8 @@ use lopdf::xref::XrefEntry;
 use lopdf::{Dictionary, Document, Object, ObjectId, StringFormat, decode_text_string};
 
 use super::{Findings, Words, is_creator, pdf_content, unpack};
-use deltille_files::export::pdf::VERSION;
+use deltille_core::targets::Finish;
+use deltille_files::export::pdf::{VERSION, color_spaces, graphics_states};
 use deltille_files::limits::Limits;
 
 /// The permitted keys of the trailer, the catalogue, the information, the page tree and a page.
@@ -52,7 +53,8 @@ pub(super) fn check(bytes: &[u8], words: &Words, limits: &Limits) -> Result<Find
     }
     let (between, streams) = split_streams(bytes);
     limits.check_nodes(document.objects.len()).map_err(|exceeded| exceeded.to_string())?;
-    let mut walk = Walk { document: &document, between, streams, limits, found };
+    let finish = &words.finish;
+    let mut walk = Walk { document: &document, between, streams, limits, finish, found };
     walk.names();
     walk.catalog();
     walk.info(words);
@@ -184,6 +186,8 @@ struct Walk<'a> {
     /// The contents of streams in the file.
     streams: Vec<&'a [u8]>,
     limits: &'a Limits,
+    /// How the pages should be printed.
+    finish: &'a Finish,
     found: Findings,
 }
 
@@ -359,15 +363,26 @@ impl<'a> Walk<'a> {
         }
     }
 
-    /// Checks that a page has no resources.
+    /// Checks that a page has no resources but the stated spot colours.
     fn resources(&mut self, page: &'a Dictionary, place: &str) {
         let resources = self.value(page, "Resources").and_then(|object| object.as_dict().ok());
-        let Some(resources) = resources else { return };
+        let (spaces, states) = (color_spaces(self.finish), graphics_states(self.finish));
+        let resources = resources.map(|resources| resources.iter().collect()).unwrap_or_default();
+        let resources: Vec<(&Vec<u8>, &Object)> = resources;
+        for stated in [("ColorSpace", &spaces), ("ExtGState", &states)] {
+            let is_there = resources.iter().any(|(key, _)| *key == stated.0.as_bytes());
+            let complete = is_there || stated.1.is_empty();
+            self.found.unless(complete, place, format!("no {} for its spot colours", stated.0));
+        }
         for (key, object) in resources {
             let key = String::from_utf8_lossy(key);
             let object = self.resolve(object).and_then(|object| object.as_dict().ok());
-            let none = RESOURCES.contains(&&*key) && object.is_some_and(Dictionary::is_empty);
-            self.found.unless(none, place, format!("resources of {key}"));
+            let is_stated = object.is_some_and(|object| match &*key {
+                "ColorSpace" => *object == spaces && !spaces.is_empty(),
+                "ExtGState" => *object == states,
+                key => RESOURCES.contains(&key) && object.is_empty(),
+            });
+            self.found.unless(is_stated, place, format!("resources of {key}"));
         }
     }
 
@@ -390,8 +405,11 @@ impl<'a> Walk<'a> {
         // Some readers show as much as they can unpack, others nothing.
         let most = self.limits.max_bytes;
         match unpack(&stream.content, most, |block| content.extend_from_slice(block)) {
-            Some(_) => pdf_content::check(&content, size_pt, place, self.limits, &mut self.found)
-                .map_err(|exceeded| format!("{place}: {exceeded}")),
+            Some(_) => {
+                let page = pdf_content::Content { size_pt, finish: self.finish, page: place };
+                pdf_content::check(&content, &page, self.limits, &mut self.found)
+                    .map_err(|exceeded| format!("{place}: {exceeded}"))
+            }
             None => {
                 let construct = "content that is cut off, goes on behind its end, is too long, or \
                                  whose check sum is wrong";

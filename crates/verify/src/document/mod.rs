@@ -151,6 +151,9 @@ pub struct Page {
     pub smear_px: f64,
     /// Side of a pixel of the texture that it shows, px; 0 where it shows none.
     pub texel_px: f64,
+    /// How far within the picture the left edge of the page lies, px: a part of a pixel on a page that was turned over,
+    /// whose pictures begin at the other edge.
+    pub left_px: f64,
 }
 
 impl Page {
@@ -259,19 +262,21 @@ impl Document {
                 })?
             }
         };
-        Ok(Page { width_mm, height_mm, px_per_mm, image, smear_px: 0.0, texel_px: 0.0 })
+        let (smear_px, texel_px, left_px) = (0.0, 0.0, 0.0);
+        Ok(Page { width_mm, height_mm, px_per_mm, image, smear_px, texel_px, left_px })
     }
 }
 
 impl Page {
     /// Pixel position of a point of the page frame (mm, y up).
     pub fn px_from_page(&self, place: DVec2) -> DVec2 {
-        DVec2::new(place.x, self.height_mm - place.y) * self.px_per_mm - 0.5
+        let from_top = DVec2::new(place.x, self.height_mm - place.y) * self.px_per_mm;
+        from_top + DVec2::new(self.left_px, 0.0) - 0.5
     }
 
     /// Point of the page frame (mm, y up) of a pixel position.
     pub fn page_from_px(&self, pixel: DVec2) -> DVec2 {
-        let from_top = (pixel + 0.5) / self.px_per_mm;
+        let from_top = (pixel + 0.5 - DVec2::new(self.left_px, 0.0)) / self.px_per_mm;
         DVec2::new(from_top.x, self.height_mm - from_top.y)
     }
 
@@ -301,6 +306,7 @@ impl Page {
         let mut page = self.clone();
         let width = page.image.width();
         page.image.pixels_mut().chunks_exact_mut(width).for_each(<[u8]>::reverse);
+        page.left_px = width as f64 - page.width_mm * page.px_per_mm - page.left_px;
         page
     }
 

@@ -1,0 +1,356 @@
+//! Drawings of boards, and faces of solids, for a laser or a plotter: what is black as closed outlines to engrave, and the outline of the plate to
+//! cut, with an allowance for the width of the beam.
+//!
+//! ```text
+//!    ╲──────────╱      ╲───────╱       A beam takes away half of its width on either side of its
+//!     ╲ engrave╱        ╲─────╱        path. So what is engraved is drawn that much smaller, and the
+//!      ╲      ╱   →      ╲   ╱         plate that much larger; tiles that meet in a corner come
+//!       ╲    ╱            ╲ ╱          apart. Corners stay sharp: each edge is moved along its
+//!        ╳──╳                          normal, and meets its neighbours where they then are.
+//! ```
+//!
+//! Every outline has what is black on its left: outer ones run counter-clockwise, holes clockwise (on a mirrored board
+//! too).
+
+use std::collections::BTreeMap;
+use std::f64::consts::TAU;
+
+use glam::DVec2;
+
+use super::atlas::Packing;
+use super::cutting::{CutDrawing, CutLayer, CutPath, CuttingError, GAP_MM};
+use super::{ArtworkError, board, cells};
+use crate::family::Family;
+use crate::lattice::{GridKind, Tile, Vertex};
+use crate::targets::{Face, Panel, Placement, TagPlacement, TagsIn, Target, TargetSpec};
+
+/// Widest kerf, mm: less than the gap between two plates.
+const WIDEST_KERF_MM: f64 = 3.0;
+
+/// Greatest part of the finest thing on a board that a kerf may take.
+const KERF_PART: f64 = 0.25;
+
+/// Sides of the polygon that stands for a disc: of a diameter of 50 mm they are within a micrometre of it.
+const DISC_SIDES: u32 = 360;
+
+/// A board, or a face of a solid, in a drawing.
+#[derive(Clone, Debug, PartialEq)]
+pub struct LaserBoard<'a> {
+    /// The board.
+    pub panel: &'a Panel,
+    /// Outline of the finished plate, counter-clockwise in the frame of the board, mm: tiles with their quiet zone, or the
+    /// panel of a solid.
+    pub plate_mm: Vec<DVec2>,
+    /// Where it lies, as it is seen.
+    placement: Placement,
+    /// Right end of all plates, by which a mirrored drawing is mirrored, mm; `None` for one as it is seen.
+    mirror_mm: Option<f64>,
+}
+
+impl LaserBoard<'_> {
+    /// A point of a drawing as it is seen in one that may be mirrored, or back, mm.
+    fn mirrored(&self, point: DVec2) -> DVec2 {
+        self.mirror_mm.map_or(point, |right| DVec2::new(right - point.x, point.y))
+    }
+
+    /// A point of the drawing in the frame of the board, mm.
+    pub fn board_from_drawing(&self, point: DVec2) -> DVec2 {
+        self.placement.panel_from_page(self.mirrored(point))
+    }
+
+    /// Whether a point of the drawing is on the plate.
+    pub fn holds(&self, point: DVec2) -> bool {
+        let point = self.board_from_drawing(point);
+        let next = self.plate_mm.iter().cycle().skip(1);
+        let mut sides = self.plate_mm.iter().zip(next);
+        sides.all(|(&from, &to)| (to - from).perp_dot(point - from) >= 0.0)
+    }
+
+    /// An outline in the frame of the board as a path of the drawing, in the same sense.
+    fn path(&self, layer: CutLayer, outline: &[DVec2]) -> CutPath {
+        let seen = outline.iter().map(|&point| self.placement.page_from_panel(point));
+        let mut points_mm: Vec<DVec2> = seen.map(|point| self.mirrored(point)).collect();
+        if self.mirror_mm.is_some() {
+            points_mm.reverse();
+        }
+        CutPath { layer, closed: true, points_mm }
+    }
+}
+
+/// The boards or faces of a target side by side, in true size and as they are mirrored.
+///
+/// # Errors
+/// When the target is neither made of boards nor a solid.
+pub fn laser_boards(target: &Target) -> Result<Vec<LaserBoard<'_>>, CuttingError> {
+    let mut boards = match &target.spec {
+        TargetSpec::Tags(_) => return Err(CuttingError::NotBoard(target.name.to_string())),
+        TargetSpec::Solid(spec) => faces_in_rows(target, &spec.panel_faces()?),
+        _ => plates_in_rows(target),
+    };
+    if target.finish.mirrored {
+        let seen = boards.iter().flat_map(|board| {
+            board.plate_mm.iter().map(|&corner| board.placement.page_from_panel(corner).x)
+        });
+        let right = Some(seen.fold(0.0, f64::max));
+        boards.iter_mut().for_each(|board| board.mirror_mm = right);
+    }
+    Ok(boards)
+}
+
+/// The plates of boards in rows from below, about as many in each as there are rows.
+fn plates_in_rows(target: &Target) -> Vec<LaserBoard<'_>> {
+    let columns = (target.panels.len() as f64).sqrt().ceil() as usize;
+    let mut boards = Vec::new();
+    let mut lower = 0.0;
+    for row in target.panels.chunks(columns.max(1)) {
+        let (mut left, mut height) = (0.0, 0.0f64);
+        for panel in row {
+            let [x0, y0, x1, y1] = panel.field_mm();
+            let origin_mm = DVec2::new(left - x0, lower - y0);
+            let placement = Placement { panel: panel.id, angle_rad: 0.0, origin_mm };
+            let plate_mm = field(panel).to_vec();
+            boards.push(LaserBoard { panel, plate_mm, placement, mirror_mm: None });
+            height = height.max(y1 - y0);
+            left += x1 - x0 + GAP_MM;
+        }
+        lower += height + GAP_MM;
+    }
+    boards
+}
+
+/// The panels of a solid as they are cut without engraving.
+fn faces_in_rows<'a>(target: &'a Target, faces: &[Face]) -> Vec<LaserBoard<'a>> {
+    let placements: Vec<Placement> = Packing::tightest(faces, GAP_MM).placements().collect();
+    let plates = faces.iter().map(|face| face.outline_mm.clone()).zip(placements);
+    let boards = target.panels.iter().zip(plates).map(|(panel, (plate_mm, placement))| {
+        LaserBoard { panel, plate_mm, placement, mirror_mm: None }
+    });
+    boards.collect()
+}
+
+/// The drawing of all boards or faces of a target for a beam of this width, mm. Finished plates lie right of the origin and
+/// above it.
+///
+/// # Errors
+/// When the target is neither made of boards nor a solid, its family is missing or lacks a code, or the beam is too wide.
+pub fn to_laser(
+    target: &Target,
+    family: Option<&Family>,
+    kerf_mm: f64,
+) -> Result<CutDrawing, CuttingError> {
+    let boards = laser_boards(target)?;
+    let finest = target.panels.iter().map(|panel| finest_mm(panel, family));
+    let most_mm = (KERF_PART * finest.fold(f64::INFINITY, f64::min)).min(WIDEST_KERF_MM);
+    if !(0.0..=most_mm).contains(&kerf_mm) {
+        return Err(CuttingError::Kerf { kerf_mm, most_mm });
+    }
+    let half = kerf_mm / 2.0;
+    let mut paths = Vec::new();
+    for board in &boards {
+        let dark = dark_outlines(target, board.panel, family, kerf_mm == 0.0)?;
+        let dark = dark.iter().map(|outline| moved_inwards(outline, half));
+        paths.extend(dark.map(|outline| board.path(CutLayer::Engrave, &outline)));
+        paths.push(board.path(CutLayer::Cut, &moved_inwards(&board.plate_mm, -half)));
+    }
+    Ok(CutDrawing { paths })
+}
+
+/// The smallest length on a board, mm: the edge of a cell of its tags, of a tile, or the diameter of a disc.
+fn finest_mm(panel: &Panel, family: Option<&Family>) -> f64 {
+    let family = family.and_then(|family| family.of_tiling(panel.kind));
+    let cell = panel
+        .border_bits
+        .and(family)
+        .map(|family| panel.edge_mm / family.cells().width(panel.tag_inset_bits()));
+    let gap = panel.gap_edges.map(|gap| gap * panel.edge_mm);
+    [cell, gap, panel.discs_mm].into_iter().flatten().fold(panel.edge_mm, f64::min)
+}
+
+/// The corners of a plate, counter-clockwise in the frame of its board, mm.
+fn field(panel: &Panel) -> [DVec2; 4] {
+    let [left, lower, right, upper] = panel.field_mm();
+    [(left, lower), (right, lower), (right, upper), (left, upper)].map(DVec2::from)
+}
+
+/// The outlines of what is black on a board, in its frame, mm. Where black meets black in a corner only, they keep apart;
+/// `simple` ones pass no corner twice.
+fn dark_outlines(
+    target: &Target,
+    panel: &Panel,
+    family: Option<&Family>,
+    simple: bool,
+) -> Result<Vec<Vec<DVec2>>, ArtworkError> {
+    if let Some(diameter) = panel.discs_mm {
+        let angles = || (0..DISC_SIDES).map(|n| TAU * f64::from(n) / f64::from(DISC_SIDES));
+        let disc = |middle: DVec2| {
+            angles().map(|angle| middle + diameter / 2.0 * DVec2::from_angle(angle)).collect()
+        };
+        return Ok(panel.corners.iter().map(|corner| disc(corner.panel_mm)).collect());
+    }
+    // Dark tiles of an inverted board are white on print.
+    let inside = !panel.inverted;
+    let around = outlines(panel.kind, panel.dark_tiles().into_iter(), inside, simple);
+    let mut dark: Vec<Vec<DVec2>> = around
+        .into_iter()
+        .map(|outline| outline.into_iter().map(|vertex| panel.lattice_mm(vertex)).collect())
+        .collect();
+    if panel.inverted {
+        dark.push(field(panel).to_vec());
+    }
+    for tag in &panel.tags {
+        dark.extend(tag_outlines(target, panel, tag, family, simple)?);
+    }
+    Ok(dark)
+}
+
+/// The outlines of the black of a tag, in the frame of its board, mm.
+fn tag_outlines(
+    target: &Target,
+    panel: &Panel,
+    tag: &TagPlacement,
+    family: Option<&Family>,
+    simple: bool,
+) -> Result<Vec<Vec<DVec2>>, ArtworkError> {
+    let (cells, word) = board::tag_word(target, panel, tag, family)?;
+    let inset = panel.tag_inset_bits();
+    let width = cells.width(inset);
+    let at = |cell: i32| (inset + f64::from(cell)) / width;
+    let white = cells::white_cells(&cells, word);
+    let mut dark: Vec<Vec<DVec2>> = outlines(cells.kind(), white, panel.inverted, simple)
+        .into_iter()
+        .map(|outline| outline.into_iter().map(|v| DVec2::new(at(v.col), at(v.row))).collect())
+        .collect();
+    let tile = panel.tag_tile(tag);
+    if panel.tags_in == TagsIn::White {
+        let border = board::tile_corners(panel, tile, panel.tag_margin_bits() / width);
+        let mut border: Vec<DVec2> = border.collect();
+        if panel.inverted {
+            border.reverse();
+        }
+        dark.push(border);
+    }
+    let place = |at: &DVec2| panel.place_in_tile(tile, *at) * panel.edge_mm;
+    Ok(dark.iter().map(|outline| outline.iter().map(place).collect()).collect())
+}
+
+/// The outlines of tiles as vertices where they bend, with the tiles on the left, or on the right unless `inside`. `simple` ones
+/// have vertices where they meet others, too, so that they still meet there when coordinates are rounded.
+fn outlines(
+    kind: GridKind,
+    tiles: impl Iterator<Item = Tile>,
+    inside: bool,
+    simple: bool,
+) -> Vec<Vec<Vertex>> {
+    let walks = cells::walks(kind, tiles, inside).into_iter();
+    let parts = walks.flat_map(|walk| if simple { cells::simple(walk) } else { vec![walk] });
+    let walks: Vec<cells::Walk> = parts.collect();
+    let mut passed = BTreeMap::<Vertex, usize>::new();
+    for (vertex, _) in walks.iter().flatten() {
+        *passed.entry(*vertex).or_default() += 1;
+    }
+    let vertices = |walk: &cells::Walk| {
+        let before = walk.iter().cycle().skip(walk.len() - 1);
+        let steps = walk.iter().zip(before);
+        let kept = steps.filter(|((vertex, heading), (_, before))| {
+            heading != before || (simple && passed[vertex] > 1)
+        });
+        kept.map(|((vertex, _), _)| *vertex).collect()
+    };
+    walks.iter().map(vertices).collect()
+}
+
+/// A closed outline with each edge moved to its left by a length, mm, or to its right by a negative one; edges stay as long
+/// as their neighbours leave them.
+pub fn moved_inwards(outline: &[DVec2], by_mm: f64) -> Vec<DVec2> {
+    let count = outline.len();
+    let normal =
+        |from: usize| (outline[(from + 1) % count] - outline[from % count]).normalize().perp();
+    let corner = |i: usize| {
+        let (before, after) = (normal(i + count - 1), normal(i));
+        outline[i] + (before + after) * (by_mm / (1.0 + before.dot(after)))
+    };
+    (0..count).map(corner).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+    use crate::polygon;
+    use crate::targets::BoardSpec;
+
+    /// The area on a layer, mm².
+    fn area(drawing: &CutDrawing, layer: CutLayer) -> f64 {
+        let of_layer = drawing.paths.iter().filter(|path| path.layer == layer);
+        of_layer.map(|path| polygon::area(&path.points_mm)).sum()
+    }
+
+    /// The area of what is drawn in the frame of a board, mm².
+    fn drawn(target: &Target, family: Option<&Family>) -> f64 {
+        let shapes = super::super::panel_shapes(target, &target.panels[0], family).unwrap();
+        // Loops of white run the other way than those of black, inside a field as inside a tile.
+        shapes.iter().map(|shape| even_odd(&shape.path)).sum()
+    }
+
+    /// The area of a path whose loops lie in each other, by the even-odd rule.
+    fn even_odd(path: &kurbo::BezPath) -> f64 {
+        use kurbo::Shape;
+        let elements = path.elements();
+        let loops = elements.chunk_by(|_, next| !matches!(next, kurbo::PathEl::MoveTo(_)));
+        let loops: Vec<kurbo::BezPath> =
+            loops.map(|l| kurbo::BezPath::from_vec(l.to_vec())).collect();
+        let depth = |of: &kurbo::BezPath| {
+            // A point just inside of the first edge.
+            let Some(kurbo::PathSeg::Line(edge)) = of.segments().next() else { return 0 };
+            let along = edge.p1 - edge.p0;
+            let side = of.area().signum();
+            let inside =
+                edge.p0.midpoint(edge.p1) + kurbo::Vec2::new(-along.y, along.x) * (1e-6 * side);
+            loops.iter().filter(|around| around.winding(inside) != 0).count()
+        };
+        loops.iter().map(|l| if depth(l) % 2 == 1 { l.area().abs() } else { -l.area().abs() }).sum()
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(24))]
+        /// The black of a drawing is that of the print; with a kerf, each edge takes half of that off along its length, and
+        /// moved back by as much it is the same again.
+        #[test]
+        fn black_is_that_of_the_print(
+            rows in 2u32..6, cols in 2u32..6, kind in 0..4, inverted: bool, first_id in 0u32..40,
+        ) {
+            let mut spec = match kind {
+                0 => BoardSpec::deltille(rows, cols, 20.0),
+                1 => BoardSpec { tags: None, ..BoardSpec::deltille(rows, cols, 20.0) },
+                2 => BoardSpec::checkerboard(rows, cols, 20.0),
+                _ => BoardSpec { tags: None, ..BoardSpec::checkerboard(rows, cols, 20.0) },
+            };
+            spec.inverted = inverted;
+            if let Some(tags) = &mut spec.tags {
+                tags.first_id = first_id;
+                tags.spacing = 2;
+            }
+            let target = Target::new("board", spec).unwrap();
+            let family = target.family().unwrap();
+            let family = family.as_ref();
+            let exact = to_laser(&target, family, 0.0).unwrap();
+            let black = drawn(&target, family);
+            prop_assert!((area(&exact, CutLayer::Engrave) / black - 1.0).abs() < 1e-9);
+            let kerf = 0.1;
+            let narrow = to_laser(&target, family, kerf).unwrap();
+            let back = |path: &CutPath| match path.layer {
+                CutLayer::Engrave => moved_inwards(&path.points_mm, -kerf / 2.0),
+                _ => moved_inwards(&path.points_mm, kerf / 2.0),
+            };
+            let paths: Vec<CutPath> = narrow.paths.iter()
+                .map(|path| CutPath { points_mm: back(path), ..path.clone() }).collect();
+            let again = CutDrawing { paths };
+            prop_assert!((area(&again, CutLayer::Engrave) / black - 1.0).abs() < 1e-9);
+            for layer in [CutLayer::Engrave, CutLayer::Cut] {
+                let less = area(&again, layer) - area(&narrow, layer);
+                prop_assert!(less.abs() > 0.0 && (less > 0.0) == (layer == CutLayer::Engrave));
+            }
+        }
+    }
+}

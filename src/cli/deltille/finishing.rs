@@ -1,0 +1,115 @@
+//! Options of boards that are not plain prints: mirror images, spot colours, drawings for a laser.
+
+#![allow(rustdoc::invalid_html_tags)] // The comments on options are the help of the program, too.
+
+use anyhow::{Context, bail};
+
+use super::files::{File, bytes_file};
+use crate::artwork::CuttingError;
+use crate::export::artifacts::{MakeError, Making, What, make};
+use crate::family::Family;
+use crate::targets::{Finish, Target, parse_length_mm};
+
+/// Heading of these options.
+const FINISHING: &str = "Glass, print shops, lasers";
+
+/// How a board is finished.
+#[derive(clap::Args)]
+#[command(next_help_heading = FINISHING)]
+pub struct Finishing {
+    /// Print the mirror image, for the back of glass: the description, and labels, are what is seen through the
+    /// glass
+    #[arg(long)]
+    mirrored: bool,
+    /// A white spot colour of that name, such as White or RDG_WHITE, beneath all of each page of the PDF, and
+    /// everything overprints
+    #[arg(long, value_name = "NAME")]
+    white: Option<String>,
+    /// A line to cut along in the middle of the margin, in the PDF in a spot colour of that name, such as CutContour;
+    /// with --pack the lines between boards
+    #[arg(long, value_name = "NAME")]
+    contour: Option<String>,
+    #[command(flatten)]
+    laser: Laser,
+}
+
+/// Drawings for a laser.
+#[derive(clap::Args)]
+#[command(next_help_heading = FINISHING)]
+pub struct Laser {
+    /// Write <name>-laser.dxf or <name>-laser.svg: what is black as closed outlines to engrave, and the outline of
+    /// each plate to cut (millimetres)
+    #[arg(long, value_name = "FORMATS", value_delimiter = ',')]
+    laser: Vec<LaserFormat>,
+    /// Width that the beam takes away: engraved outlines are drawn smaller by half of it on each side, plates larger
+    /// [default: 0mm]
+    #[arg(long, value_name = "LENGTH", allow_hyphen_values = true, value_parser = parse_length_mm)]
+    kerf: Option<f64>,
+}
+
+/// Format of a drawing for a laser.
+#[derive(Clone, Copy, PartialEq, clap::ValueEnum)]
+enum LaserFormat {
+    Dxf,
+    Svg,
+}
+
+impl Finishing {
+    /// Whether a drawing for a laser is asked for.
+    pub fn has_laser(&self) -> bool {
+        self.laser.is_any()
+    }
+
+    /// The target with this finish, which is laid out within this margin.
+    pub fn applied(&self, target: Target, margin_mm: f64, pdf: bool) -> anyhow::Result<Target> {
+        self.laser.check_use()?;
+        if self.mirrored && target.sheets.is_empty() && !self.has_laser() {
+            bail!("--mirrored: a mesh is never mirrored: add --pdf or --laser, or leave it out");
+        }
+        let spots = [("--white", self.white.is_some()), ("--contour", self.contour.is_some())];
+        if let Some((option, _)) = spots.into_iter().find(|(_, given)| *given && !pdf) {
+            bail!("{option}: only a PDF has spot colours: add --pdf, or leave it out");
+        }
+        let (white, contour) = (self.white.clone(), self.contour.clone());
+        let finish = Finish { mirrored: self.mirrored, white, contour };
+        Ok(target.finished(finish, margin_mm)?)
+    }
+
+    /// The drawings for a laser that are asked for.
+    pub fn files(&self, target: &Target, family: Option<&Family>) -> anyhow::Result<Vec<File>> {
+        self.laser.files(target, family)
+    }
+}
+
+impl Laser {
+    /// Whether any is asked for.
+    pub fn is_any(&self) -> bool {
+        !self.laser.is_empty()
+    }
+
+    /// Refuses a kerf of nothing.
+    pub fn check_use(&self) -> anyhow::Result<()> {
+        if self.kerf.is_some() && !self.is_any() {
+            bail!(
+                "--kerf: it says nothing without a drawing for a laser: add --laser, or leave it out"
+            );
+        }
+        Ok(())
+    }
+
+    /// The drawings that are asked for.
+    pub fn files(&self, target: &Target, family: Option<&Family>) -> anyhow::Result<Vec<File>> {
+        let mut making = Making::default();
+        making.kerf_mm = self.kerf.unwrap_or(0.0);
+        let formats = [(LaserFormat::Dxf, What::LaserDxf), (LaserFormat::Svg, What::LaserSvg)];
+        let asked = formats.into_iter().filter(|(format, _)| self.laser.contains(format));
+        let mut files = Vec::new();
+        for (_, what) in asked {
+            let made = make(target, family, what, making);
+            let is_kerf = matches!(made, Err(MakeError::Cutting(CuttingError::Kerf { .. })));
+            let made = made.context(if is_kerf { "--kerf" } else { "--laser" })?;
+            files.extend(made.into_iter().map(|(name, bytes)| bytes_file(name, bytes)));
+        }
+        Ok(files)
+    }
+}
