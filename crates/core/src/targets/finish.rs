@@ -74,7 +74,7 @@ impl Finish {
 
 impl Target {
     /// The same target printed otherwise. A contour is a line to cut along in the middle of what the paper's margin leaves
-    /// blank; where boards are to be cut apart, it is the lines for that. `margin_mm` is that margin.
+    /// blank; where boards are to be cut apart, it is the lines for that, of a board with two sides the outline of its plate. `margin_mm` is that margin.
     ///
     /// # Errors
     /// When a name is none of a spot colour, a board is to be joined of several pages, there is a guide, or two sides are to be
@@ -103,7 +103,22 @@ impl Target {
             return Err(TargetError::invalid("BoardSpec::two_sided_mm", problem));
         }
         if finish.contour.is_some() {
-            self.sheets.iter_mut().for_each(|sheet| add_contour(sheet, margin_mm));
+            for sheet in &mut self.sheets {
+                let side = sheet.placements.first().filter(|_| self.spec.is_rigid());
+                let side = side.and_then(|placed| {
+                    let panel = self.panels.iter().find(|panel| panel.id == placed.panel)?;
+                    Some((panel.field_mm(), *placed))
+                });
+                match side {
+                    Some((field_mm, placed)) => {
+                        // Instead of the marks at the plate's corners.
+                        sheet.lines.clear();
+                        let corners = corners_of(field_mm);
+                        add_outline(sheet, corners.map(|corner| placed.page_from_panel(corner)));
+                    }
+                    None => add_contour(sheet, margin_mm),
+                }
+            }
         }
         Ok(Self { finish, ..self })
     }
@@ -116,7 +131,16 @@ fn add_contour(sheet: &mut SheetLayout, margin_mm: f64) {
     }
     let inset = margin_mm.max(super::layout::LEAST_MARGIN_MM) / 2.0;
     let (right, upper) = (sheet.width_mm - inset, sheet.height_mm - inset);
-    let corners = [(inset, inset), (right, inset), (right, upper), (inset, upper)].map(DVec2::from);
+    add_outline(sheet, corners_of([inset, inset, right, upper]));
+}
+
+/// The corners of a rectangle by its left, lower, right and upper end.
+fn corners_of([left, lower, right, upper]: [f64; 4]) -> [DVec2; 4] {
+    [(left, lower), (right, lower), (right, upper), (left, upper)].map(DVec2::from)
+}
+
+/// Adds the sides of a rectangle as lines to cut along.
+fn add_outline(sheet: &mut SheetLayout, corners: [DVec2; 4]) {
     let sides = corners.into_iter().zip(corners.into_iter().cycle().skip(1));
     sheet.lines.extend(sides.map(|(from_mm, to_mm)| SheetLine {
         kind: LineKind::Cut,
