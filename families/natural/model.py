@@ -23,7 +23,7 @@ import tags
 
 FOLDER = pathlib.Path(__file__).parent
 FAMILIES = ["d16h5", "delTag16h5", "d25h7", "delTag25h7", "d25h9", "d36h9", "delTag36h9", "d36h11", "delTag36h11", "d49h12"]
-# Of these only the first codes in order are listed, whose apex is black: they are predicted too low.
+# Of these only the first codes in order are listed, which have a black corner: they are predicted too low.
 LISTED_IN_PART = ["d49h12"]
 # Words with a number of differing pairs that were seen less often are extrapolated, from so many numbers before.
 SEEN_OFTEN = 30
