@@ -1,4 +1,7 @@
-"""The plot in docs/families.md of what rules for complexity cost and save: frontier.py DELTAG, writes frontier.svg beside this.
+"""The plot in docs/families.md of what rules for complexity cost and save.
+
+    frontier.py DELTAG            writes frontier.svg beside this script
+    frontier.py DELTAG --check    fails where it is not that of the program
 
 A curve for each number of corrected cells: codes that satisfy the rule, and natural false positives.
 """
@@ -74,7 +77,11 @@ def main():
                 if choice["min_pairs"] in WRITTEN:
                     parts.append(text(px, py + 17, choice["min_pairs"], 'text-anchor="middle" font-size="11" fill="#555"'))
     parts.append("</svg>")
-    pathlib.Path(__file__).with_name("frontier.svg").write_text("\n".join(parts) + "\n")
+    path, drawn = pathlib.Path(__file__).with_name("frontier.svg"), "\n".join(parts) + "\n"
+    if "--check" not in sys.argv:
+        path.write_text(drawn)
+    elif path.read_text() != drawn:
+        sys.exit(f"{path.name} is not what {FAMILY} gives: run this without --check")
 
 
 if __name__ == "__main__":

@@ -149,7 +149,7 @@ impl Family {
     /// Probability that a triangle with a border in a natural picture is taken for a tag, for 0, 1, …,
     /// [`Self::correctable`] corrected bits; `None` of square tags and of place codes. Beside
     /// [`Self::false_positive_rates`], which are those of fair coins. Beyond some 100,000 words the words near the codes
-    /// are drawn, always the same ones, and the figures are right to some per cent.
+    /// are drawn, always the same ones, and the figures are right to a tenth.
     pub fn natural_false_positive_rates(&self) -> Option<Vec<f64>> {
         if self.kind() != GridKind::Deltille || self.is_of_places() {
             return None;
