@@ -1,9 +1,9 @@
-"""Every shipped family, verified from its file alone: families.py DELTAG [FAMILY …].
+"""Every shipped family, verified from its file alone: families.py DELTAG [--hidden] [FAMILY …].
 
 Shares no code with the generator. Cells are triangles and squares in the plane; turns, mirrors and neighbours come from
 where their middles come to lie. Checked are distance, distance histogram, rules, false positives by fair coins and the
-fingerprint, against the file; and what `deltag verify-family` says of the distance and of that in a mirror.
-Needs numpy.
+fingerprint, against the file; and what `deltag verify-family` says of the distance and of that in a mirror. With --hidden
+it is told what distance is left where a corner, or the cells along an edge, are hidden. Needs numpy.
 """
 
 import hashlib
@@ -63,7 +63,26 @@ def distances(words, others):
     return counts
 
 
-def check(path, program):
+def left_of(turned, hidden):
+    """Least distance of any two words in the cells that are not hidden."""
+    seen = np.uint64(sum(1 << int(bit) for bit in np.nonzero(~hidden)[0]))
+    counts = distances(turned & seen, turned & seen)
+    counts[0] -= len(turned)
+    return int(np.nonzero(counts)[0][0])
+
+
+def with_hidden_cells(turned, places):
+    """Distances left where the four cells of a corner, and where all cells along an edge are hidden."""
+    height = places.imag
+    rows = math.isqrt(len(places))
+    # A corner of four is the uppermost two rows of cells; along the lower edge lie those that have a side or a corner on it.
+    corner = height > np.sort(height)[-4] - 1e-6
+    edge = height < height.min() + math.sqrt(3) / 6 + 1e-6
+    assert (corner.sum(), edge.sum()) == (4, 2 * rows - 1)
+    return left_of(turned, corner), left_of(turned, edge)
+
+
+def check(path, program, hidden):
     text = json.loads(path.read_text())
     kind, bits, distance = text.get("kind", "deltille"), text["bits"], text["distance"]
     rows, codes = math.isqrt(bits), np.array([int(code, 16) for code in text["codes"]], np.uint64)
@@ -103,15 +122,18 @@ def check(path, program):
     told = json.loads(subprocess.run([program, "verify-family", path, "--json"], check=True, capture_output=True).stdout)[0]
     assert (told["holds"], told["distance"], told["mirror_distance"]) == (True, least, in_mirror), told
     print(f"{path.stem}: {len(codes)} codes of {bits} bits, distance {least}, in a mirror {in_mirror}, {differing.min()} of {len(beside)} pairs differ")
+    if hidden and kind != "checker":
+        corner, edge = with_hidden_cells(turned, places)
+        print(f"{path.stem}: with a corner of 4 cells hidden {corner}, with an edge of {2 * rows - 1} hidden {edge}", flush=True)
 
 
 def main():
-    program, names = sys.argv[1], sys.argv[2:]
+    program, names = sys.argv[1], [name for name in sys.argv[2:] if name != "--hidden"]
     paths = [FOLDER / f"{name}.json" for name in names] or sorted(FOLDER.glob("*.json"))
     # Place codes are no family like others: tests/independent/dense.py.
     paths = [path for path in paths if path.stem != "dense9"]
     for path in paths:
-        check(path, program)
+        check(path, program, "--hidden" in sys.argv)
     print(f"{len(paths)} families hold, by cells in the plane")
 
 

@@ -1,9 +1,9 @@
 //! What is known of the sizes of binary codes, from tables that others keep.
 //!
-//! A. E. Brouwer's *Bounds for general binary codes* (https://www.win.tue.nl/~aeb/codes/binary-1.html), which continues
+//! A. E. Brouwer's *Bounds for general binary codes* (<https://www.win.tue.nl/~aeb/codes/binary-1.html>), which continues
 //! Best, Brouwer, MacWilliams, Odlyzko and Sloane, "Bounds for binary codes of length less than 25" (1978); its upper bounds
 //! include those of Schrijver (2005) and of Gijswijt, Mittelmann and Schrijver (2012) by semidefinite programming, which
-//! E. Agrell's tables (https://codes.se/bounds/unr.html) name one by one. They end at length 28.
+//! E. Agrell's tables (<https://codes.se/bounds/unr.html>) name one by one. They end at length 28.
 
 use crate::lattice::{GridKind, TagCells};
 
