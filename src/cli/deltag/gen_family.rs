@@ -9,6 +9,7 @@ use anyhow::{bail, ensure};
 use clap::ValueEnum;
 
 use super::checkpoint::CheckpointFile;
+use super::frontier::{self, ChoiceArgs};
 use super::parameters::Parameters;
 use super::rules::RuleArgs;
 use super::verify_family::proof_of;
@@ -74,6 +75,8 @@ pub(super) struct Args {
     limit: Option<u64>,
     #[command(flatten)]
     rules: RuleArgs,
+    #[command(flatten)]
+    choice: ChoiceArgs,
     /// For the methods lexicode and search: keep a checkpoint in this file, and go on from it if
     /// it is there; removed at the end
     #[arg(long, value_name = "FILE")]
@@ -150,7 +153,7 @@ pub(super) fn run(args: Args) -> anyhow::Result<ExitCode> {
     if let Err(FamilyError::Claim { problem, .. }) = check_name(&name, dimension, distance) {
         bail!("--name: {problem}");
     }
-    let rules = args.rules.rules(args.family)?;
+    let rules = args.chosen_rules()?;
     args.check_replaced(&path)?;
     output::check_writable("-o", &path)?;
     if let Some(threads) = args.threads {
@@ -274,6 +277,30 @@ impl Args {
         }
     }
 
+    /// The rules asked for; with `--false-positives` that for complexity is the best for the construction on record.
+    fn chosen_rules(&self) -> anyhow::Result<Rules> {
+        let rules = self.rules.rules(self.family)?;
+        if self.choice.false_positives.is_none() {
+            return Ok(rules);
+        }
+        ensure!(
+            !self.rules.has_complexity(),
+            "--false-positives: chooses the complexity; leave --min-complexity out"
+        );
+        let distance = self.family.distance;
+        let choices = frontier::choices(self.family, &rules)?;
+        let Some(best) = self.choice.best(&choices, distance)? else { return Ok(rules) };
+        let corrected = self.choice.corrected(distance)?;
+        tell!(
+            "rule: {} pairs of cells differ at least, which {} of the codes on record satisfy; natural false positives {:.1e} with \
+             {corrected} corrected",
+            best.min_pairs,
+            best.codes,
+            best.natural[corrected as usize]
+        );
+        Ok(Rules { min_complexity: best.min_complexity, ..rules })
+    }
+
     /// Refuses what the method would ignore or cannot do.
     fn check_options(&self) -> anyhow::Result<()> {
         use Method::{Algebraic, Best, Lexicode, Search};
@@ -293,6 +320,7 @@ impl Args {
         refuse("--time", self.time.is_some(), &[Algebraic, Best, Search])?;
         refuse("--work", self.work.is_some(), &[Algebraic, Best])?;
         refuse("--from-nothing", self.from_nothing, &[Algebraic, Best])?;
+        refuse("--false-positives", self.choice.false_positives.is_some(), &[Algebraic, Best])?;
         refuse("--limit", self.limit.is_some(), &[Algebraic, Best])?;
         refuse("--rounds", self.rounds.is_some(), &[Search])?;
         ensure!(

@@ -1,6 +1,8 @@
 use std::process::ExitCode;
 
-use super::place_codes;
+use serde_json::Value;
+
+use super::{confusion, false_positives, place_codes};
 use crate::cli::output::{self, Telling, say};
 use crate::family::{self, Family, TagWords, bounds::bounds};
 use crate::lattice::GridKind;
@@ -9,8 +11,9 @@ use crate::words::counted;
 
 #[derive(clap::Args)]
 pub(super) struct Args {
-    /// A shipped family, or a family file
-    family: String,
+    /// A shipped family, or a family file; of two it is told how far they are from each other
+    #[arg(required = true, num_args = 1..=2, value_names = ["FAMILY", "OTHER"])]
+    families: Vec<String>,
     #[command(flatten)]
     telling: Telling,
 }
@@ -26,22 +29,33 @@ fn tags_of(spec: &TargetSpec) -> anyhow::Result<usize> {
 }
 
 pub(super) fn run(args: Args) -> anyhow::Result<ExitCode> {
-    let known = family::resolve(&args.family)?;
+    if let [of, other] = &args.families[..] {
+        let [of, other] = [super::resolve(of)?, super::resolve(other)?];
+        confusion::about(&of, &other, args.telling)?;
+        return Ok(ExitCode::SUCCESS);
+    }
+    let name = &args.families[0];
+    let known = family::resolve(name)?;
     if known.is_of_places() {
         place_codes::about(&known, args.telling)?;
         return Ok(ExitCode::SUCCESS);
     }
-    let family = super::resolve(&args.family)?;
+    let family = super::resolve(name)?;
     if args.telling.is_json() {
         let bounds = bounds(family.kind(), family.dimension(), family.distance());
-        output::print_json(&serde_json::json!({
+        let mut told = serde_json::json!({
             "name": family.name(), "fingerprint": family.fingerprint(), "codes": family.len(),
             "bits": family.dimension().bits(), "distance": family.distance(),
             "corrects": family.correctable(), "rules": family.rules(),
             "construction": family.construction(), "upper_bound": bounds.linear_programming,
-            "false_positive_rate": family.false_positive_rates(),
             "distance_histogram": family.histogram(),
-        }))?;
+        });
+        if let (Some(told), Value::Object(rates)) =
+            (told.as_object_mut(), false_positives::json(&family))
+        {
+            told.extend(rates);
+        }
+        output::print_json(&told)?;
         return Ok(ExitCode::SUCCESS);
     }
     let (bits, rules) = (family.dimension().bits(), family.rules());
@@ -59,7 +73,7 @@ pub(super) fn run(args: Args) -> anyhow::Result<ExitCode> {
         rules.white_distance
     );
     let construction = match serde_json::to_value(family.construction())? {
-        serde_json::Value::Object(mut fields) => {
+        Value::Object(mut fields) => {
             let method = fields.remove("method").unwrap_or_default();
             let source = fields.remove("source").unwrap_or_default();
             [method, source].iter().filter_map(|v| v.as_str()).collect::<Vec<_>>().join(", ")
@@ -82,15 +96,7 @@ pub(super) fn run(args: Args) -> anyhow::Result<ExitCode> {
         "  enough for      {} of {rows} x {cols} corners ({board} tags each) or {solids} ({solid} tags each)",
         counted(family.len() / board, "board")
     );
-    say!("  a random pattern is taken for a tag with probability");
-    for (corrected, rate) in family.false_positive_rates().iter().enumerate() {
-        let corrected = match corrected {
-            0 => "nothing is".to_owned(),
-            1 => "1 cell is".to_owned(),
-            n => format!("up to {n} cells are"),
-        };
-        say!("    {rate:>9.2e}  when {corrected} corrected");
-    }
+    false_positives::tell(&family)?;
     if family.histogram().is_empty() {
         say!("  distances       of so many codes are not counted");
         return Ok(ExitCode::SUCCESS);

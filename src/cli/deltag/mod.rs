@@ -3,7 +3,10 @@
 mod bounds;
 mod by_rank;
 mod checkpoint;
+mod confusion;
 mod export;
+mod false_positives;
+mod frontier;
 mod gen_family;
 mod import;
 mod info;
@@ -43,8 +46,11 @@ enum Command {
     /// Check what a family file claims from nothing but its codes
     #[command(after_help = verify_family::HELP)]
     VerifyFamily(verify_family::Args),
-    /// Tell all about a family
+    /// Tell all about a family, or how far two are from each other
     Info(info::Args),
+    /// Print what rules for complexity leave of a construction: codes, and natural false positives
+    #[command(after_help = frontier::HELP)]
+    Frontier(frontier::Args),
     /// Print upper bounds for the size of a family, and how close the shipped ones come
     Bounds(bounds::Args),
     /// Name the smallest shipped family that suffices for a target
@@ -74,6 +80,7 @@ pub fn run(deltag: Deltag) -> anyhow::Result<ExitCode> {
         Command::GenFamily(args) => gen_family::run(args),
         Command::VerifyFamily(args) => verify_family::run(args),
         Command::Info(args) => info::run(args),
+        Command::Frontier(args) => frontier::run(args),
         Command::Bounds(args) => bounds::run(args),
         Command::Plan(args) => plan::run(args),
         Command::ByRank(args) => by_rank::run(args),

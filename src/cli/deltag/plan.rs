@@ -2,6 +2,9 @@
 
 use std::process::ExitCode;
 
+use serde_json::Value;
+
+use super::false_positives;
 use super::gen_family::{FILE_LIMIT, bytes_per_code};
 use crate::cli::output::{self, Telling, say};
 use crate::cli::values::whole;
@@ -55,14 +58,8 @@ pub(super) fn run(args: Args) -> anyhow::Result<ExitCode> {
     };
     let more = smallest_shipped(GridKind::Deltille, needed, best.correctable() + 1);
     if args.telling.is_json() {
-        let of = |family: &ShippedFamily| {
-            serde_json::json!({
-                "name": family.name, "bits": family.bits, "distance": family.distance,
-                "codes": family.codes, "corrects": family.correctable(),
-            })
-        };
         output::print_json(&serde_json::json!({
-            "tags": needed, "best": of(best), "corrects_more": more.map(of),
+            "tags": needed, "best": of(best)?, "corrects_more": more.map(of).transpose()?,
         }))?;
         return Ok(ExitCode::SUCCESS);
     }
@@ -80,15 +77,32 @@ pub(super) fn run(args: Args) -> anyhow::Result<ExitCode> {
     Ok(ExitCode::SUCCESS)
 }
 
+/// A family as `--json` has it.
+fn of(family: &ShippedFamily) -> anyhow::Result<Value> {
+    let mut told = serde_json::json!({
+        "name": family.name, "bits": family.bits, "distance": family.distance,
+        "codes": family.codes, "corrects": family.correctable(),
+    });
+    if let (Some(told), Value::Object(rates)) =
+        (told.as_object_mut(), false_positives::json(&Family::shipped(family.name)?))
+    {
+        told.extend(rates);
+    }
+    Ok(told)
+}
+
 fn about(family: &Family) -> String {
-    let rate = family.false_positive_rates().last().copied().unwrap_or_default();
+    let coins = family.false_positive_rates();
+    let natural = family.natural_false_positive_rates().unwrap_or_default();
+    let [coins, natural] = [coins, natural].map(|rates| rates.last().copied().unwrap_or_default());
     format!(
-        "{}, {} codes of {} bits, distance {}; corrects {} cells, then takes a random pattern for a \
-         tag with probability {rate:.1e}",
+        "{}, {} codes of {} bits, distance {}; corrects {} cells, then takes for a tag a word of fair coins with \
+         probability {coins:.1e}, a bordered triangle of a natural picture with {natural:.1e}; {}",
         family.name(),
         family.len(),
         family.dimension().bits(),
         family.distance(),
-        family.correctable()
+        family.correctable(),
+        false_positives::recommended(family)
     )
 }

@@ -27,6 +27,11 @@ pub(super) struct RuleArgs {
 }
 
 impl RuleArgs {
+    /// Whether the complexity is given.
+    pub(super) fn has_complexity(&self) -> bool {
+        self.min_complexity.is_some()
+    }
+
     /// The rules asked for, checked for the bits of the family.
     pub(super) fn rules(&self, parameters: Parameters) -> anyhow::Result<Rules> {
         let Parameters { dimension, distance } = parameters;

@@ -28,9 +28,10 @@ pub(super) fn run(args: Args) -> anyhow::Result<ExitCode> {
     let (mut all_hold, mut all_read) = (true, true);
     let mut told = Vec::new();
     for name in &args.families {
+        let mut certificate = None;
         let (holds, what) = match family::resolve(name) {
             Ok(family) if family.is_of_places() => place_codes::verify(&family),
-            Ok(family) => verify(&family),
+            Ok(family) => verify(&family, certificate.insert(certify(&family))),
             Err(error) if error.is_broken_claim() => (false, reason(&error).to_string()),
             Err(error) => {
                 report(&error.into());
@@ -40,7 +41,11 @@ pub(super) fn run(args: Args) -> anyhow::Result<ExitCode> {
         };
         all_hold &= holds;
         if args.telling.is_json() {
-            told.push(json!({ "family": name, "holds": holds, "text": line(&what).trim_end() }));
+            told.push(json!({
+                "family": name, "holds": holds, "text": line(&what).trim_end(),
+                "distance": certificate.as_ref().map(|found| found.min_distance),
+                "mirror_distance": certificate.and_then(|found| found.mirror_distance),
+            }));
         } else if holds {
             say!("{name}: holds. {what}");
         } else {
@@ -58,12 +63,11 @@ pub(super) fn run(args: Args) -> anyhow::Result<ExitCode> {
 }
 
 /// Whether what a family claims holds, and what was found.
-fn verify(family: &Family) -> (bool, String) {
-    let certificate = certify(family);
+fn verify(family: &Family, certificate: &Certificate) -> (bool, String) {
     if !certificate.holds() {
         return (false, certificate.failures.join("; "));
     }
-    let how = proof_of(&certificate, family.distance());
+    let how = proof_of(certificate, family.distance());
     let unchecked = match certificate.unchecked.as_str() {
         "" => String::new(),
         what => format!("; not checked: {what}"),
@@ -87,9 +91,13 @@ pub(super) fn proof_of(certificate: &Certificate, claimed: u32) -> String {
         );
     }
     let known = format!("any two, in any turn, differ in at least {cells}");
-    match found > claimed {
+    let known = match found > claimed {
         true => format!("{known}, more than the {claimed} asked for"),
         false => known,
+    };
+    match certificate.mirror_distance {
+        Some(cells) => format!("{known}; from one seen in a mirror in {cells}"),
+        None => known,
     }
 }
 

@@ -149,6 +149,15 @@ fn bad_arguments_are_one_line_and_exit_code_2() {
         "gen-family d25h7 --black-distance 99",
         "gen-family d25h7 --black-distance 26",
         "gen-family d25h7 --min-complexity 2",
+        "gen-family d25h7 --corrects 2",
+        "gen-family d25h7 --false-positives 2",
+        "gen-family d25h7 --false-positives 1e-4 --corrects 9",
+        "gen-family d25h7 --false-positives 1e-4 --min-complexity 0.5",
+        "gen-family d25h7 --false-positives 1e-4 --method search",
+        "gen-family d9h3 --false-positives 1e-4",
+        "frontier d36h9 --false-positives 1e-12",
+        "info d16h5 d25h7",
+        "info d16h5 d16h5 d16h5",
         "gen-family d25h7 --rules nowhere.toml",
         "gen-family d25h7 --name a/b",
         "gen-family d25h7 --name ''",
@@ -245,10 +254,34 @@ fn families_are_told_by_what_they_cover() {
         "plan --faces 20 --tags-per-face 10",
         "plan --faces 6 --tags-per-face 10",
         "plan --tags-per-face 10 --corrects 4",
+        "info d16h5 delTag16h5",
+        "frontier d25h9 --false-positives 1e-4 --corrects 2",
+        "bounds d25h7",
     ] {
         assert!(page.run(folder.path(), &format!("deltag {args}")).status.success(), "{args}");
     }
     page.is("deltag-info");
+}
+
+/// The rule that is chosen is the one with the most codes of those whose natural false positives are few enough, and the
+/// family that is made with it keeps them so.
+#[test]
+fn a_rule_is_chosen_by_the_false_positives_it_leaves() {
+    let folder = tempfile::tempdir().unwrap();
+    let made = |args: &str| {
+        let mut command = deltag();
+        command.args(["gen-family", "d36h11", "--time", "0.1", "--force", "-o"]).arg(folder.path());
+        command.args(args.split(' ')).assert().success();
+        let text = std::fs::read_to_string(folder.path().join("d36h11.json")).unwrap();
+        Family::from_json(&text).unwrap()
+    };
+    let shipped = Family::shipped("d36h11").unwrap();
+    for (accepted, corrects, more) in [(2e-4, 3, true), (1e-5, 3, false)] {
+        let family = made(&format!("--false-positives {accepted} --corrects {corrects}"));
+        let rates = family.natural_false_positive_rates().unwrap();
+        assert!(rates[corrects] <= 1.02 * accepted, "{rates:?}");
+        assert_eq!(family.len() > shipped.len(), more, "{}", family.len());
+    }
 }
 
 /// `deltag info d16h5 | head -1` is no error.

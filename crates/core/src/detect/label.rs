@@ -29,6 +29,16 @@
 //! beyond the end of the panel. Comparison with the better of the two, with its best codes, only
 //! reduces the evidence.
 //!
+//! Where a single tag speaks for a placement, it must also be told from what natural pictures show: with the probabilities P
+//! of words w in these ([`NaturalWords`]),
+//!
+//! ```text
+//!     Λ = Σ l s − ln Σ P(w) exp Σ l s(w)
+//! ```
+//!
+//! has to be as great. Codes that the rules of the shipped families admit are rarer there than among codes that are drawn, so
+//! this decides where a family has simpler codes.
+//!
 //! Limits: codes are assumed to be drawn from their family; other lattices on the same board are
 //! not considered. The faces of a solid may lie in one grid, so that tiles beyond a panel do not
 //! count there; but all placements in a grid together must explain its codes better than a board
@@ -41,8 +51,8 @@ use super::grow::SaddleGrid;
 use super::labels::mirrored;
 use super::tag_words::TargetWords;
 use super::tags::{Read, Reading, TagPlace, TagReader};
-use crate::family::{Decoder, Family};
-use crate::lattice::{LatticeMap, Orientation, Tile, Vertex};
+use crate::family::{Decoder, Family, NaturalWords};
+use crate::lattice::{GridKind, LatticeMap, Orientation, Tile, Vertex};
 use crate::raster::ImageView;
 use crate::targets::{Panel, TagsIn, Target};
 
@@ -153,6 +163,8 @@ pub struct TagLabeller {
     is_dense: bool,
     /// Decoder of the whole family; none of place codes, as each of their words is a code.
     decoder: Option<Decoder>,
+    /// How likely words are in natural pictures, of triangular tags that tell a place alone.
+    natural: Option<NaturalWords>,
     /// Greatest number of misread cells at which a word certainly is a code of the family.
     sure_errors: u32,
     /// The number of words of the family.
@@ -318,6 +330,8 @@ impl TagLabeller {
             family: family.name().to_owned(),
             is_dense: family.is_of_places(),
             decoder: (!family.is_of_places()).then(decoder),
+            natural: (family.kind() == GridKind::Deltille && !family.is_of_places())
+                .then(|| NaturalWords::new(family.dimension())),
             sure_errors: family.correctable() / 2,
             family_words: family.len() * usize::from(family.kind().turns()),
             max_errors,
@@ -511,12 +525,13 @@ impl TagLabeller {
             let is_ambiguous = rivals.into_iter().any(|rival| {
                 self.on_panel(sights, grid, rival).keys().any(|v| vertices.contains_key(v))
             });
-            // An ambiguous one takes its corners, too: nothing else is to label them.
+            // One that does not count takes its corners, too: nothing else is to label them.
             let before = taken.len();
             taken.extend(vertices.into_keys());
+            let over_nature = self.over_nature(&sights[best.sight], best);
             if is_ambiguous {
                 placed.is_ambiguous = true;
-            } else {
+            } else if over_nature.is_none_or(|evidence| evidence - ways >= MIN_EVIDENCE) {
                 placed.placements.push(*best);
             }
             if taken.len() == before {
@@ -578,6 +593,22 @@ impl TagLabeller {
             add(&mut of_board, tile.of_board.unwrap_or_default());
         }
         mean(predicted) - greatest(of_board).max(mean(other_codes))
+    }
+
+    /// Evidence for a placement over natural pictures, nats, where a single tag speaks for it.
+    fn over_nature(&self, sight: &Sight, placement: &Placement) -> Option<f64> {
+        let natural = self.natural.as_ref()?;
+        let mut speaking = self.expected(placement).filter_map(|(tile, tag, turns)| {
+            let reading = *sight.index.get(&tile)?;
+            let word = self.words.turns() * tag.code + turns;
+            (f64::from(sight.evidence[reading][word]) > PROPOSING).then_some((reading, word))
+        });
+        let (Some((reading, word)), None) = (speaking.next(), speaking.next()) else { return None };
+        let half_odds = &sight.readings[reading].half_odds;
+        let white = |bit: usize| self.words.word(word) >> bit & 1 == 1;
+        let sum = |(bit, &odds): (usize, &f32)| f64::from(if white(bit) { odds } else { -odds });
+        let of_code: f64 = half_odds.iter().enumerate().map(sum).sum();
+        Some(of_code - natural.log_likelihood(half_odds))
     }
 
     /// Numbers of tiles that agree and that disagree with a placement; a tile disagrees if a board that
@@ -984,6 +1015,36 @@ mod tests {
             for (from, to) in found.iter().flat_map(|found| &found.vertices) {
                 assert_eq!(from, to, "{what}");
             }
+        }
+    }
+
+    /// A white corner, as natural pictures show it, is a code of a family without a rule for complexity: alone it labels
+    /// nothing. With another tag beside it, it does, and so does a complex code alone.
+    #[test]
+    fn what_natural_pictures_show_labels_nothing_alone() {
+        let complex = Family::shipped("d36h9").unwrap();
+        let codes = [&[0xf_0000_0000], &complex.codes()[..20]].concat();
+        let source = crate::family::Construction::Imported { source: "here".to_owned() };
+        let rules = crate::family::Rules::NONE;
+        let family = Family::new("plain", complex.dimension(), 9, codes.clone(), rules, source);
+        let family = family.unwrap();
+        let target = board(&family, 0).unwrap();
+        let labeller = TagLabeller::new(&target, &family, None).unwrap();
+        let panel = &target.panels[0];
+        let placed = PlacedSaddle { position: DVec2::ZERO, amplitude: 1.0 };
+        for (shown, labelled) in [(vec![0], false), (vec![0, 1], true), (vec![1], true)] {
+            let reading = |&id: &usize| {
+                let odds = |bit: u32| if codes[id] >> bit & 1 == 1 { SURE } else { -SURE };
+                let tag = panel.tags.iter().find(|tag| tag.id as usize == id).unwrap();
+                Reading { tile: panel.tag_tile(tag), half_odds: (0..36).map(odds).collect() }
+            };
+            let readings: Vec<Reading> = shown.iter().map(reading).collect();
+            let vertices = readings.iter().flat_map(|reading| reading.tile.vertices());
+            let grid: SaddleGrid = vertices.map(|v| (v, placed)).collect();
+            let mut evidence = TagEvidence::default();
+            let sight = labeller.sight((0, false, false), readings, &mut evidence);
+            let found = labeller.decide(vec![sight], &grid, evidence).found;
+            assert_eq!(!found.is_empty(), labelled, "{shown:?}");
         }
     }
 

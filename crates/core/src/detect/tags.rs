@@ -9,7 +9,7 @@ use super::grow::SaddleGrid;
 use super::soft_cells::{CellModel, Mixings, Sample, TileBlur, in_tile};
 use super::tile_map::TileMap;
 use crate::family::Family;
-use crate::lattice::{GridKind, TagCells, Tile, Vertex};
+use crate::lattice::{GridKind, Tile, Vertex};
 use crate::raster::ImageView;
 use crate::targets::{Panel, TagsIn};
 
@@ -95,7 +95,7 @@ pub struct TagReader {
     model: CellModel,
     clear: ClearDepth,
     /// For each bit the one whose cell takes its place in a mirror.
-    mirror: Vec<usize>,
+    mirror: Vec<u8>,
 }
 
 /// What was read in a grid.
@@ -122,7 +122,7 @@ impl TagReader {
             TagsIn::White => ClearDepth { dark: PLAIN_DEPTH, bright: depth(margin_bits) },
         };
         let model = CellModel::new(&cells, inset_bits, margin_bits);
-        Self { kind: family.kind(), tags_in, gap_edges, model, clear, mirror: mirror(&cells) }
+        Self { kind: family.kind(), tags_in, gap_edges, model, clear, mirror: cells.mirror() }
     }
 
     /// Reads tiles of a grid whose corners are known: those that may carry a tag of a board that is not
@@ -169,7 +169,7 @@ impl TagReader {
         let tile = reading.tile;
         Reading {
             tile: Tile { anchor: Vertex::new(tile.anchor.col, tile.anchor.row), ..tile },
-            half_odds: self.mirror.iter().map(|&bit| reading.half_odds[bit]).collect(),
+            half_odds: self.mirror.iter().map(|&bit| reading.half_odds[usize::from(bit)]).collect(),
         }
     }
 
@@ -232,15 +232,6 @@ impl TagReader {
         let length = |step: DVec2| step.x.hypot(step.y);
         Some((Reading { tile, half_odds }, length(along[0]).max(length(along[1]))))
     }
-}
-
-/// For each bit the one whose cell takes its place when rows and columns are exchanged.
-fn mirror(cells: &TagCells) -> Vec<usize> {
-    let of = |cell: &crate::lattice::Cell| {
-        let mirrored = crate::lattice::Cell { row: cell.col, col: cell.row, upright: cell.upright };
-        cells.cells().iter().position(|&other| other == mirrored)
-    };
-    cells.cells().iter().enumerate().map(|(bit, cell)| of(cell).unwrap_or(bit)).collect()
 }
 
 /// Contrast between dark and bright around the corners of a tile, in units of the image.

@@ -2,7 +2,9 @@ use std::collections::BTreeMap;
 
 use super::file::parse_word;
 use super::lexicode::Lexicode;
-use super::{Construction, Control, Family, PAIRS_COUNTED, Screen, TagWords, distance_histogram};
+use super::{
+    Confusion, Construction, Control, Family, PAIRS_COUNTED, Screen, TagWords, distance_histogram,
+};
 use crate::lattice::TagCells;
 
 /// What was found out about a family from nothing but its codes.
@@ -11,6 +13,9 @@ use crate::lattice::TagCells;
 pub struct Certificate {
     /// Smallest distance between any two words, among the codes compared and their turns.
     pub min_distance: u32,
+    /// Smallest distance between a code and a word, a code in any turn, seen in a mirror; `None` where not all pairs were
+    /// compared. No family claims one: a mirror shows all tags of a board alike.
+    pub mirror_distance: Option<u32>,
     /// Two codes (or one, twice) that are this close, when that is too close; else zeros.
     pub closest: [u32; 2],
     /// Whether all pairs were compared; if not, a sample was, and the structure was proved.
@@ -168,8 +173,12 @@ pub fn certify_codes(family: &Family) -> Certificate {
         failures.push("distance_histogram: differs from that of the codes".to_owned());
     }
     let unchecked = String::new();
+    let mirror_distance = all_compared
+        .then(|| Confusion::between(family, family)?.mirrored.into_keys().next())
+        .flatten();
     Certificate {
         min_distance,
+        mirror_distance,
         closest,
         all_compared,
         rule_breakers,

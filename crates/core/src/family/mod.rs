@@ -30,17 +30,21 @@ mod aruco;
 pub mod best;
 pub mod bounds;
 mod certificate;
+mod confusion;
 mod control;
 mod decoder;
 mod error;
 mod export;
 mod file;
+mod frontier;
 mod import;
 mod independent;
 mod kernels;
 pub mod lexicode;
+mod natural;
 pub mod places;
 mod polish;
+mod published_bounds;
 mod reading;
 mod rules;
 pub mod search;
@@ -52,13 +56,17 @@ use std::collections::BTreeMap;
 
 pub use aruco::{dictionary, dictionary_names};
 pub use certificate::{Certificate, certify, certify_codes};
+pub use confusion::Confusion;
 pub use control::{Control, Progress};
 pub use decoder::{Decoded, Decoder};
 pub use error::FamilyError;
 pub use export::{ExportFormat, export};
 pub use file::check_name;
 pub use file::{Construction, SCHEMA};
+pub use frontier::{RuleChoice, best_rule, rule_choices};
 pub use import::{ImportError, ImportSpec, import};
+pub use natural::{ACCEPTED_FALSE_POSITIVES, NaturalWords, TRIANGLES_PER_MEGAPIXEL};
+pub use published_bounds::{PublishedBounds, published_bounds};
 pub use reading::Reading;
 pub use rules::{Rules, Screen};
 pub use shipped::{ShippedFamily, shipped_families, shipped_names, smallest_shipped, square_names};
@@ -280,7 +288,8 @@ impl Family {
     }
 
     /// Probability that a word of fair coin tosses is taken for a tag, for 0, 1, …,
-    /// [`Self::correctable`] corrected bits; of place codes every word is one of a place.
+    /// [`Self::correctable`] corrected bits; of place codes every word is one of a place. What pictures show is seldom so
+    /// complex: [`Self::natural_false_positive_rates`].
     pub fn false_positive_rates(&self) -> Vec<f64> {
         if self.is_of_places() {
             return vec![1.0];

@@ -32,14 +32,37 @@ pub fn distance_histogram(
             }
             counts
         })
-        .reduce(
-            || [0; 65],
-            |mut sum, counts| {
-                sum.iter_mut().zip(counts).for_each(|(s, c)| *s += c);
-                sum
-            },
-        );
+        .reduce(|| [0; 65], sum_of);
     (0..).zip(counts).filter(|&(_, n)| n > 0).collect()
+}
+
+/// Number of pairs of a code of `codes` and a word, a code of `others` in any turn, at each distance.
+pub(super) fn cross_distances(
+    kind: GridKind,
+    dimension: Dimension,
+    codes: &[u64],
+    others: &[u64],
+) -> BTreeMap<u32, u64> {
+    let words = TagWords::of(kind, dimension);
+    let turns = |&code: &u64| std::iter::successors(Some(code), |&word| Some(words.turn(word)));
+    let turned: Vec<u64> =
+        others.iter().flat_map(|code| turns(code).take(usize::from(kind.turns()))).collect();
+    let counts = codes
+        .par_iter()
+        .fold(
+            || [0; 65],
+            |mut counts, &code| {
+                count_distances(code, &turned, &mut counts);
+                counts
+            },
+        )
+        .reduce(|| [0; 65], sum_of);
+    (0..).zip(counts).filter(|&(_, n)| n > 0).collect()
+}
+
+fn sum_of(mut sum: [u64; 65], counts: [u64; 65]) -> [u64; 65] {
+    sum.iter_mut().zip(counts).for_each(|(s, c)| *s += c);
+    sum
 }
 
 /// Probability that a random word is within t cells of a code or one of its turns, for

@@ -178,6 +178,15 @@ impl TagCells {
             .fold(0, |turned, (to, &from)| turned | ((word >> from & 1) << to))
     }
 
+    /// For each bit that whose cell takes its place in a mirror, where rows and columns are exchanged.
+    pub fn mirror(&self) -> Vec<u8> {
+        let of = |cell: &Cell| {
+            let mirrored = Cell { row: cell.col, col: cell.row, upright: cell.upright };
+            bit_of(self.kind, self.dimension.rows(), mirrored) as u8
+        };
+        self.cells.iter().map(of).collect()
+    }
+
     /// Length of the tile's edge in bit-widths, for cells that begin `inset` bit-widths, measured
     /// along the edge, from each side: the border of the tag and what is around it.
     pub fn width(&self, inset: f64) -> f64 {
@@ -289,6 +298,21 @@ mod tests {
                 let turned = DVec2::new(1.0 - u - v, u);
                 assert!(tag.centre(to as u32, 1.5).abs_diff_eq(turned, 1e-12));
             }
+        }
+    }
+
+    /// Two mirrors are none, and a mirror turns turns round.
+    #[test]
+    fn mirrors_and_turns_are_the_symmetries_of_a_tag() {
+        for tag in all().chain(squares()) {
+            let (mirror, turn) = (tag.mirror(), tag.rotation().to_vec());
+            let then = |first: &[u8], next: &[u8]| -> Vec<u8> {
+                next.iter().map(|&from| first[usize::from(from)]).collect()
+            };
+            let stays: Vec<u8> = (0..tag.dimension().bits() as u8).collect();
+            assert_eq!(then(&mirror, &mirror), stays);
+            let turned = then(&then(&then(&mirror, &turn), &mirror), &turn);
+            assert_eq!(turned, stays, "{:?}", tag.kind());
         }
     }
 

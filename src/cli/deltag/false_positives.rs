@@ -1,0 +1,58 @@
+//! What `deltag` says of false positives: by fair coins, and in natural pictures.
+
+use serde_json::{Value, json};
+
+use crate::cli::output::say;
+use crate::family::{ACCEPTED_FALSE_POSITIVES, Family, TRIANGLES_PER_MEGAPIXEL};
+use crate::words::counted;
+
+/// Fields of `--json`.
+pub(super) fn json(family: &Family) -> Value {
+    let natural = family.natural_false_positive_rates();
+    json!({
+        "false_positive_rate": family.false_positive_rates(),
+        "natural_false_positive_rate": natural,
+        "natural_false_positives_per_megapixel_at_most": natural.map(|rates| {
+            rates.iter().map(|rate| rate * TRIANGLES_PER_MEGAPIXEL).collect::<Vec<_>>()
+        }),
+        "accepted_false_positive_rate": ACCEPTED_FALSE_POSITIVES,
+        "recommended_correction": family.recommended_correction(ACCEPTED_FALSE_POSITIVES),
+    })
+}
+
+/// Says both rates for each number of corrected cells.
+pub(super) fn tell(family: &Family) -> anyhow::Result<()> {
+    let natural = family.natural_false_positive_rates();
+    say!("  a triangle with a border that is no tag is taken for one with probability");
+    say!("    fair coins  natural pictures  when");
+    for (corrected, rate) in family.false_positive_rates().iter().enumerate() {
+        let natural =
+            natural.as_ref().map_or("-".to_owned(), |all| format!("{:.1e}", all[corrected]));
+        let corrected = match corrected {
+            0 => "nothing is".to_owned(),
+            1 => "1 cell is".to_owned(),
+            n => format!("up to {n} cells are"),
+        };
+        say!("    {rate:>10.1e}  {natural:>16}  {corrected} corrected");
+    }
+    say!(
+        "  of a natural picture `detect` reads {TRIANGLES_PER_MEGAPIXEL} triangles in a megapixel, or fewer"
+    );
+    say!("  recommended     {}", recommended(family));
+    Ok(())
+}
+
+/// How many cells of a single tag may be corrected.
+pub(super) fn recommended(family: &Family) -> String {
+    let rate = format!("{ACCEPTED_FALSE_POSITIVES:.0e}");
+    match family.recommended_correction(ACCEPTED_FALSE_POSITIVES) {
+        Some(0) => format!(
+            "whoever believes single tags corrects nothing: natural false positives below {rate}"
+        ),
+        Some(most) => format!(
+            "whoever believes single tags corrects {} at most: natural false positives below {rate}",
+            counted(most as usize, "cell")
+        ),
+        None => format!("believe no single tag: natural false positives are above {rate}"),
+    }
+}

@@ -1,0 +1,141 @@
+"""Every shipped family, verified from its file alone: families.py DELTAG [--hidden] [FAMILY …].
+
+Shares no code with the generator. Cells are triangles and squares in the plane; turns, mirrors and neighbours come from
+where their middles come to lie. Checked are distance, distance histogram, rules, false positives by fair coins and the
+fingerprint, against the file; and what `deltag verify-family` says of the distance and of that in a mirror. With --hidden
+it is told what distance is left where a corner, or the cells along an edge, are hidden. Needs numpy.
+"""
+
+import hashlib
+import itertools
+import json
+import math
+import pathlib
+import subprocess
+import sys
+
+import numpy as np
+
+FOLDER = pathlib.Path(__file__).parents[2] / "families"
+# Words compared at once.
+CHUNK = 1 << 24
+
+
+def middles(kind, rows):
+    """Middle of the cell of each bit, from the middle of the tag; edges of cells are 1 long."""
+    places = {}
+    for row in range(rows):
+        if kind == "checker":
+            for k in range(rows):
+                places[row * rows + rows - 1 - k] = complex(k + 0.5, row + 0.5)
+            continue
+        for k in range(2 * (rows - row) - 1):
+            # The lower left corner of an upright cell, and its middle a third of the height above; an inverted one lies
+            # half an edge to the right, two thirds above.
+            left, height = k // 2 + row / 2, math.sqrt(3) / 2
+            middle = complex(left + 0.5, (row + 1 / 3) * height) if k % 2 == 0 else complex(left + 1, (row + 2 / 3) * height)
+            places[rows**2 - 1 - (rows - 1 - row) ** 2 - k] = middle
+    found = np.array([places[bit] for bit in range(rows**2)])
+    return found - found.mean()
+
+
+def moved(places, onto):
+    """For each bit the one whose cell comes to lie on its cell."""
+    apart = np.abs(places[:, None] - onto[None])
+    assert (apart.min(1) < 1e-9).all()
+    return apart.argmin(1)
+
+
+def permuted(words, sources):
+    result = np.zeros_like(words)
+    for bit, source in enumerate(sources):
+        result |= (words >> np.uint64(source) & np.uint64(1)) << np.uint64(bit)
+    return result
+
+
+def distances(words, others):
+    """Number of pairs at each distance."""
+    counts = np.zeros(65, np.int64)
+    step = max(1, CHUNK // len(others))
+    for i in range(0, len(words), step):
+        apart = np.bitwise_count(words[i : i + step, None] ^ others[None])
+        counts += np.bincount(apart.ravel(), minlength=65)
+    return counts
+
+
+def left_of(turned, hidden):
+    """Least distance of any two words in the cells that are not hidden."""
+    seen = np.uint64(sum(1 << int(bit) for bit in np.nonzero(~hidden)[0]))
+    counts = distances(turned & seen, turned & seen)
+    counts[0] -= len(turned)
+    return int(np.nonzero(counts)[0][0])
+
+
+def with_hidden_cells(turned, places):
+    """Distances left where the four cells of a corner, and where all cells along an edge are hidden."""
+    height = places.imag
+    rows = math.isqrt(len(places))
+    # A corner of four is the uppermost two rows of cells; along the lower edge lie those that have a side or a corner on it.
+    corner = height > np.sort(height)[-4] - 1e-6
+    edge = height < height.min() + math.sqrt(3) / 6 + 1e-6
+    assert (corner.sum(), edge.sum()) == (4, 2 * rows - 1)
+    return left_of(turned, corner), left_of(turned, edge)
+
+
+def check(path, program, hidden):
+    text = json.loads(path.read_text())
+    kind, bits, distance = text.get("kind", "deltille"), text["bits"], text["distance"]
+    rows, codes = math.isqrt(bits), np.array([int(code, 16) for code in text["codes"]], np.uint64)
+    places = middles(kind, rows)
+    turns, edge = (4, 1.0) if kind == "checker" else (3, 1 / math.sqrt(3))
+    turn = moved(places, places * np.exp(2j * np.pi / turns))
+    # Any mirror does, as all turns are looked at: here the one that leaves the tag's vertical axis.
+    mirror = moved(places, -places.conjugate())
+
+    turned = [codes]
+    while len(turned) < turns:
+        turned.append(permuted(turned[-1], turn))
+    assert (permuted(turned[-1], turn) == codes).all(), "that many turns are none"
+    turned = np.concatenate(turned)
+    pairs = distances(codes, turned)
+    assert pairs[0] == len(codes), "no word is there twice"
+    pairs[0] = 0
+    least = int(np.nonzero(pairs)[0][0])
+    assert least >= distance, (least, distance)
+    histogram = {str(d): turns * int(n) // 2 for d, n in enumerate(pairs) if n}
+    assert histogram == text["distance_histogram"], "distance_histogram"
+
+    beside = [(a, b) for a, b in itertools.combinations(range(bits), 2) if abs(abs(places[a] - places[b]) - edge) < 1e-6]
+    differing = sum((codes >> np.uint64(a) ^ codes >> np.uint64(b)) & np.uint64(1) for a, b in beside)
+    white, rules = np.bitwise_count(codes), text["rules"]
+    assert differing.min() >= rules["min_complexity"] * len(beside) - 1e-6
+    assert white.min() >= rules["black_distance"] and bits - white.max() >= rules["white_distance"]
+
+    rates = [turns * len(codes) * sum(math.comb(bits, i) for i in range(t + 1)) / 2**bits for t in range((distance - 1) // 2 + 1)]
+    assert np.allclose(rates, text["false_positive_rate"], rtol=1e-9)
+    digits = -(-bits // 4)
+    head = ["deltille/family"] + (["kind checker"] if kind == "checker" else []) + [f"bits {bits}", f"distance {distance}"]
+    lines = head + [f"0x{int(code):0{digits}x}" for code in codes]
+    assert hashlib.sha256("".join(line + "\n" for line in lines).encode()).hexdigest()[:16] == text["fingerprint"]
+
+    in_mirror = int(np.nonzero(distances(permuted(codes, mirror), turned))[0][0])
+    told = json.loads(subprocess.run([program, "verify-family", path, "--json"], check=True, capture_output=True).stdout)[0]
+    assert (told["holds"], told["distance"], told["mirror_distance"]) == (True, least, in_mirror), told
+    print(f"{path.stem}: {len(codes)} codes of {bits} bits, distance {least}, in a mirror {in_mirror}, {differing.min()} of {len(beside)} pairs differ")
+    if hidden and kind != "checker":
+        corner, edge = with_hidden_cells(turned, places)
+        print(f"{path.stem}: with a corner of 4 cells hidden {corner}, with an edge of {2 * rows - 1} hidden {edge}", flush=True)
+
+
+def main():
+    program, names = sys.argv[1], [name for name in sys.argv[2:] if name != "--hidden"]
+    paths = [FOLDER / f"{name}.json" for name in names] or sorted(FOLDER.glob("*.json"))
+    # Place codes are no family like others: tests/independent/dense.py.
+    paths = [path for path in paths if path.stem != "dense9"]
+    for path in paths:
+        check(path, program, "--hidden" in sys.argv)
+    print(f"{len(paths)} families hold, by cells in the plane")
+
+
+if __name__ == "__main__":
+    main()
