@@ -6,18 +6,17 @@ use crate::cli::output::say;
 use crate::family::{ACCEPTED_FALSE_POSITIVES, Family, TRIANGLES_PER_MEGAPIXEL};
 use crate::words::counted;
 
-/// Fields of `--json`.
-pub(super) fn json(family: &Family) -> Value {
+/// Adds the fields of `--json` to what is told of a family.
+pub(super) fn add_to(told: &mut Value, family: &Family) {
     let natural = family.natural_false_positive_rates();
-    json!({
-        "false_positive_rate": family.false_positive_rates(),
-        "natural_false_positive_rate": natural,
-        "natural_false_positives_per_megapixel_at_most": natural.map(|rates| {
-            rates.iter().map(|rate| rate * TRIANGLES_PER_MEGAPIXEL).collect::<Vec<_>>()
-        }),
-        "accepted_false_positive_rate": ACCEPTED_FALSE_POSITIVES,
-        "recommended_correction": family.recommended_correction(ACCEPTED_FALSE_POSITIVES),
-    })
+    let per_megapixel = natural
+        .as_ref()
+        .map(|rates| rates.iter().map(|rate| rate * TRIANGLES_PER_MEGAPIXEL).collect::<Vec<_>>());
+    told["false_positive_rate"] = json!(family.false_positive_rates());
+    told["natural_false_positive_rate"] = json!(natural);
+    told["natural_false_positives_per_megapixel_at_most"] = json!(per_megapixel);
+    told["accepted_false_positive_rate"] = json!(ACCEPTED_FALSE_POSITIVES);
+    told["recommended_correction"] = json!(family.recommended_correction(ACCEPTED_FALSE_POSITIVES));
 }
 
 /// Says both rates for each number of corrected cells.

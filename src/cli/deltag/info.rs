@@ -50,11 +50,7 @@ pub(super) fn run(args: Args) -> anyhow::Result<ExitCode> {
             "construction": family.construction(), "upper_bound": bounds.linear_programming,
             "distance_histogram": family.histogram(),
         });
-        if let (Some(told), Value::Object(rates)) =
-            (told.as_object_mut(), false_positives::json(&family))
-        {
-            told.extend(rates);
-        }
+        false_positives::add_to(&mut told, &family);
         output::print_json(&told)?;
         return Ok(ExitCode::SUCCESS);
     }

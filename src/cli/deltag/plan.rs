@@ -83,11 +83,7 @@ fn of(family: &ShippedFamily) -> anyhow::Result<Value> {
         "name": family.name, "bits": family.bits, "distance": family.distance,
         "codes": family.codes, "corrects": family.correctable(),
     });
-    if let (Some(told), Value::Object(rates)) =
-        (told.as_object_mut(), false_positives::json(&Family::shipped(family.name)?))
-    {
-        told.extend(rates);
-    }
+    false_positives::add_to(&mut told, &Family::shipped(family.name)?);
     Ok(told)
 }
 

@@ -11,7 +11,7 @@
 //! within t cells of a code is predicted by that to a tenth, and for other photographs mostly within a factor of 2
 //! (`docs/families.md`, “False positives”).
 //!
-//! Limits: triangular tags. Textures are worse than the mean by a factor of three, other tags are no natural pictures.
+//! Limits: triangular tags. Textures show more than the mean, grass 2.4 times as much; other tags are no natural pictures.
 
 use std::collections::BTreeMap;
 
