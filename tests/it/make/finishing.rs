@@ -98,6 +98,10 @@ fn spot_colours_are_those_of_the_description() {
         (("/Overprint gs\n", ""), "a mark that does not overprint"),
         (("/Contour CS\n1 SCN\n", ""), "a line that is not in the colour of the contour"),
         (("1 scn", "0.5 scn"), "operator scn with [0.5]"),
+        (
+            ("/Contour CS\n1 SCN\n", "/Contour CS\n1 SCN\n0.3 w\n9 9 m\n9 60 l\nS\n"),
+            "lines to cut along that are not",
+        ),
     ] {
         let wrong = said(&stated, "desk.pdf", with_content(&bytes(&stated), change));
         assert!(wrong.contains(problem), "{problem}: {wrong}");

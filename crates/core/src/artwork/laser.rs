@@ -318,7 +318,7 @@ mod tests {
         /// moved back by as much it is the same again.
         #[test]
         fn black_is_that_of_the_print(
-            rows in 2u32..6, cols in 2u32..6, kind in 0..4, inverted: bool, first_id in 0u32..40,
+            rows in 3u32..7, cols in 3u32..7, kind in 0..4, inverted: bool, first_id in 0u32..40,
         ) {
             let mut spec = match kind {
                 0 => BoardSpec::deltille(rows, cols, 20.0),

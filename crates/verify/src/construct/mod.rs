@@ -26,8 +26,8 @@ use serde_json::Value;
 
 use super::reader::Reader;
 use super::{Artifact, DocumentError, Finding, Format, PageFinding};
-use deltille_core::artwork::subject;
-use deltille_core::targets::{Finish, Target};
+use deltille_core::artwork::{drawn_lines, subject};
+use deltille_core::targets::{Finish, LineKind, SheetLayout, Target};
 use deltille_files::export::inlay::Body;
 use deltille_files::export::mesh::extras;
 use deltille_files::export::scene;
@@ -144,13 +144,19 @@ struct Words {
     extras: Value,
     /// How its pages are printed.
     finish: Finish,
+    /// Number of lines to cut along on each sheet.
+    cut_lines: Vec<usize>,
 }
 
 impl Words {
     /// The texts that belong to a target.
     fn of(target: &Target) -> Self {
         let (title, finish) = (target.name.to_string(), target.finish.clone());
-        Self { title, subject: subject(target), extras: extras(target), finish }
+        let cut = |layout: &SheetLayout| {
+            drawn_lines(layout).filter(|(_, line)| line.kind == LineKind::Cut).count()
+        };
+        let cut_lines = target.sheets.iter().map(cut).collect();
+        Self { title, subject: subject(target), extras: extras(target), finish, cut_lines }
     }
 
     /// Whether data in a mesh is that of the target; any version of the program may have written it.

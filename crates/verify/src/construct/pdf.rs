@@ -53,13 +53,13 @@ pub(super) fn check(bytes: &[u8], words: &Words, limits: &Limits) -> Result<Find
     }
     let (between, streams) = split_streams(bytes);
     limits.check_nodes(document.objects.len()).map_err(|exceeded| exceeded.to_string())?;
-    let finish = &words.finish;
-    let mut walk = Walk { document: &document, between, streams, limits, finish, found };
+    let (finish, cut_lines) = (&words.finish, 0);
+    let mut walk = Walk { document: &document, between, streams, limits, finish, cut_lines, found };
     walk.names();
     walk.catalog();
     walk.info(words);
     walk.identifier();
-    walk.pages()?;
+    walk.pages(&words.cut_lines)?;
     walk.unused();
     let mut found = walk.found;
     if !found.refuse() {
@@ -188,6 +188,8 @@ struct Walk<'a> {
     limits: &'a Limits,
     /// How the pages should be printed.
     finish: &'a Finish,
+    /// Number of lines to cut along on the page that is looked at.
+    cut_lines: usize,
     found: Findings,
 }
 
@@ -295,7 +297,7 @@ impl<'a> Walk<'a> {
 
     /// Checks the page tree, which is one list, and every page; the error says that a page exceeds the
     /// limits.
-    fn pages(&mut self) -> Result<(), String> {
+    fn pages(&mut self, cut_lines: &[usize]) -> Result<(), String> {
         let document = self.document;
         let place = "the page tree";
         let root = document.catalog().ok().and_then(|catalog| catalog.get(b"Pages").ok());
@@ -319,6 +321,7 @@ impl<'a> Walk<'a> {
         let mut seen = BTreeSet::new();
         for (index, kid) in kids.iter().enumerate() {
             let place = format!("page {}", index + 1);
+            self.cut_lines = cut_lines.get(index).copied().unwrap_or_default();
             let new = kid.as_reference().is_ok_and(|kid| seen.insert(kid));
             self.found.unless(new, &place, "a page that is listed twice, or within the list");
             match self.resolve(kid).and_then(|page| page.as_dict().ok()) {
@@ -406,7 +409,8 @@ impl<'a> Walk<'a> {
         let most = self.limits.max_bytes;
         match unpack(&stream.content, most, |block| content.extend_from_slice(block)) {
             Some(_) => {
-                let page = pdf_content::Content { size_pt, finish: self.finish, page: place };
+                let (finish, cut_lines) = (self.finish, self.cut_lines);
+                let page = pdf_content::Content { size_pt, finish, cut_lines, page: place };
                 pdf_content::check(&content, &page, self.limits, &mut self.found)
                     .map_err(|exceeded| format!("{place}: {exceeded}"))
             }

@@ -64,6 +64,8 @@ pub(super) struct Content<'a> {
     pub size_pt: DVec2,
     /// How it should be printed.
     pub finish: &'a Finish,
+    /// Number of its lines to cut along, each of which is in the colour of the contour if there is one.
+    pub cut_lines: usize,
     /// Its name in findings.
     pub page: &'a str,
 }
@@ -76,7 +78,7 @@ pub(super) struct Content<'a> {
 /// There are more operators than the limits allow.
 pub(super) fn check(
     content: &[u8],
-    &Content { size_pt, finish, page }: &Content,
+    &Content { size_pt, finish, cut_lines, page }: &Content,
     limits: &Limits,
     found: &mut Findings,
 ) -> Result<(), Exceeded> {
@@ -90,6 +92,7 @@ pub(super) fn check(
         resource: None,
         spots: [false; 2],
         marks: 0,
+        contours_drawn: 0,
         said: Vec::new(),
         width_pt: 0.0,
         path: None,
@@ -129,6 +132,8 @@ pub(super) fn check(
     found.unless(ended, page, "content that ends within a path");
     let has_white = finish.white.is_none() || painter.said.contains(&WHITE);
     found.unless(has_white, page, "no white beneath it");
+    let has_contour = finish.contour.is_none() || painter.contours_drawn == cut_lines;
+    found.unless(has_contour, page, "lines to cut along that are not in the colour of the contour");
     Ok(())
 }
 
@@ -144,6 +149,8 @@ struct Painter<'a> {
     spots: [bool; 2],
     /// Number of marks so far.
     marks: usize,
+    /// Number of these that are lines in the colour of the contour.
+    contours_drawn: usize,
     /// Operators so far that set colour or line width, and the white once it is there.
     said: Vec<&'static str>,
     /// Line width, points.
@@ -213,6 +220,7 @@ impl Painter<'_> {
             }
             ("f*", _) => return self.paint(&["k"], path, None),
             ("S", _) if self.spots[1] => {
+                self.contours_drawn += 1;
                 return self.paint(&["CS", "SCN", "w"], path, Some(self.width_pt));
             }
             ("S", _) if self.finish.contour.is_some() => {
