@@ -63,6 +63,7 @@ pub const KEYWORDS: &[(&str, &str)] = &[
     ("Limits::max_seconds", "max_seconds"),
     ("PaperSpec::guide_page", "guide_page"),
     ("PaperSpec::margin_mm", "margin_mm"),
+    ("PaperSpec::note", "note"),
     ("PaperSpec::packed", "packed"),
     ("PaperSpec::poster", "poster"),
     ("PaperSpec::size", "paper"),

@@ -54,6 +54,7 @@ const NAMED: &[Named] = &[
     named("Limits::max_seconds", "deltille verify", "--max-seconds"),
     named("PaperSpec::guide_page", "deltille board", "--guide-page"),
     named("PaperSpec::margin_mm", "deltille board", "--margin"),
+    named("PaperSpec::note", "deltille board", "--note"),
     named("PaperSpec::packed", "deltille board", "--pack"),
     named("PaperSpec::poster", "deltille board", "--poster"),
     named("PaperSpec::size", "deltille board", "--paper"),

@@ -32,6 +32,12 @@ pub enum SheetUseError {
          `Calibration::refine_panels`"
     )]
     OneByOne,
+    /// A board with two sides.
+    #[error(
+        "`Print::scale`: the sides of a board are printed one by one, and how they lie to each other is found by \
+         `Calibration::refine_panels`: leave it out"
+    )]
+    Sides,
     /// A scale of a target that was measured.
     #[error("`Print::scale`: {0} says where its corners were measured, as they were printed")]
     ScaleOfMeasured(String),
@@ -75,6 +81,9 @@ impl Sheet {
         let Some([across, up]) = self.print_scale.filter(|_| is_solid(target)) else {
             return Ok(1.0);
         };
+        if matches!(target.spec, TargetSpec::Board(_)) {
+            return Err(SheetUseError::Sides);
+        }
         if across != up {
             return Err(SheetUseError::Skewed);
         }

@@ -9,6 +9,7 @@ use super::delivery::Delivery;
 use super::files::{File, Formats, drawn, text_file};
 use super::finishing::Finishing;
 use super::meshes::PlateMeshes;
+use super::printing::idle_without_pages;
 use super::settings::{Plan, Settings};
 use super::template::Template;
 use crate::artwork;
@@ -26,7 +27,7 @@ pub struct Args {
     /// Take what is not given here from a TOML file
     #[arg(long, value_name = "FILE")]
     template: Option<PathBuf>,
-    /// Write the settings as a TOML file
+    /// Write the settings as a TOML file, but for meshes, lasers and inks
     #[arg(long, value_name = "FILE")]
     save_template: Option<PathBuf>,
     #[command(flatten)]
@@ -73,6 +74,9 @@ pub fn run(grid: GridKind, args: Args) -> anyhow::Result<ExitCode> {
     }
     let spec = TargetSpec::Board(plan.spec.clone());
     let is_printed = plan.pdf || plan.svg || plan.png;
+    if !is_printed {
+        idle_without_pages(&plan.paper)?;
+    }
     let paper = is_printed.then_some(&plan.paper);
     let target = Target::build(&plan.name, &spec, family.as_ref(), paper)?;
     let target = args.finishing.applied(target, plan.paper.margin_mm, plan.pdf)?;
@@ -116,7 +120,7 @@ fn summary(target: &Target) -> String {
     let mut text =
         format!("{}: {boards}{} × {} corners, edge {edge} mm", target.name, spec.rows, spec.cols);
     if let Some(thickness_mm) = spec.two_sided_mm {
-        text += &format!(", two sides {thickness_mm} mm apart");
+        text += &format!(", two sides {} mm apart", (thickness_mm * 1e3).round() / 1e3);
     }
     let mut ids = panels.iter().flat_map(|panel| &panel.tags).map(|tag| tag.id);
     if let (Some(family), Some(first)) = (&target.family, ids.next()) {
@@ -128,7 +132,7 @@ fn summary(target: &Target) -> String {
     let [width, height] = [page.width_mm, page.height_mm].map(|mm| (mm * 1e3).round() / 1e3);
     let pages = match sheet.page_count() {
         1 => "page".to_owned(),
-        count => format!("{count} pages"),
+        _ => format!("{} pages", target.page_count()),
     };
     text + &format!(", {pages} {width} × {height} mm")
 }

@@ -77,7 +77,11 @@ impl Printing {
             ..PaperSpec::default()
         };
         let name = self.name.as_deref().unwrap_or(command);
-        let target = Target::build(name, spec, family, Some(&paper))?;
+        let is_printed = self.is_pdf(is_made) || self.svg || self.png;
+        if !is_printed {
+            idle_without_pages(&paper)?;
+        }
+        let target = Target::build(name, spec, family, is_printed.then_some(&paper))?;
         let target = self.finishing.applied(target, paper.margin_mm, self.is_pdf(is_made))?;
         self.delivery.check_beside(&target)?;
         Ok(target)
@@ -93,9 +97,28 @@ impl Printing {
         let formats = Formats { pdf: self.is_pdf(is_made), svg: self.svg, png: self.png };
         let dpi = self.dpi.unwrap_or(DEFAULT_DPI);
         let mut files = vec![text_file(format!("{}.json", target.name), target.to_json())];
-        files.extend(drawn(&target.name, artwork::draw(target, family)?, formats, dpi));
+        if !target.sheets.is_empty() {
+            files.extend(drawn(&target.name, artwork::draw(target, family)?, formats, dpi));
+        }
         files.extend(self.finishing.files(target, family)?);
         Ok(files)
+    }
+}
+
+/// Refuses what is to be on pages where there are none.
+pub fn idle_without_pages(paper: &PaperSpec) -> anyhow::Result<()> {
+    let on_pages = [
+        ("--guide-page", paper.guide_page),
+        ("--tag-ids", paper.tag_ids),
+        ("--note", paper.note.is_some()),
+    ];
+    match on_pages.into_iter().find(|(_, is_given)| *is_given) {
+        Some((option, _)) => {
+            bail!(
+                "{option}: it says nothing without --pdf, --svg or --png: add one, or leave it out"
+            )
+        }
+        None => Ok(()),
     }
 }
 

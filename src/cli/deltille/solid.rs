@@ -34,7 +34,7 @@ pub struct Args {
     /// Take what is not given here from a TOML file
     #[arg(long, value_name = "FILE")]
     template: Option<PathBuf>,
-    /// Write the settings as a TOML file
+    /// Write the settings as a TOML file, but for meshes, lasers and inks
     #[arg(long, value_name = "FILE")]
     save_template: Option<PathBuf>,
     #[command(flatten)]
@@ -206,10 +206,12 @@ impl Args {
     /// What is given, and what a template says beyond it.
     fn settings(&self, command: &str) -> anyhow::Result<SolidSettings> {
         let given = self.settings.clone();
-        Ok(match &self.template {
+        let settings = match &self.template {
             Some(path) => given.or(SolidSettings::read(path, command)?),
             None => given,
-        })
+        };
+        settings.check_shape(command)?;
+        Ok(settings)
     }
 
     /// The meshes that are asked for; the glTF where nothing is.

@@ -212,6 +212,24 @@ impl SolidSettings {
         }
     }
 
+    /// Refuses what a template says of the shape of another solid.
+    pub fn check_shape(&self, command: &str) -> anyhow::Result<()> {
+        let keys = [
+            ("size", self.size.is_some(), "cuboid"),
+            ("mesh", self.mesh.is_some(), "solid"),
+            ("scale", self.scale.is_some(), "solid"),
+            ("allow-skew", self.allow_skew, "solid"),
+            ("square-family", self.square_family.is_some(), "solid"),
+            ("first-square-id", self.first_square_id.is_some(), "solid"),
+        ];
+        match keys.into_iter().find(|(_, is_given, of)| *is_given && *of != command) {
+            Some((key, _, of)) => {
+                bail!("--template: `{key}` is of `{of}`, not of `{command}`: leave it out")
+            }
+            None => Ok(()),
+        }
+    }
+
     /// Whether a format to print is asked for.
     pub fn printed(&self) -> bool {
         self.pdf || self.svg || self.png

@@ -51,6 +51,9 @@ pub struct Template<'a> {
 impl<'a> Template<'a> {
     /// Refused where another file would be replaced.
     pub fn new(path: &'a Path, text: String, overwrite: Overwrite) -> anyhow::Result<Self> {
+        if path.is_dir() {
+            bail!("--save-template: {} is a folder: give a file", path.display());
+        }
         overwrite.check(path, &Kind::of(text.as_bytes())).context("--save-template")?;
         Ok(Self { path, text, overwrite })
     }

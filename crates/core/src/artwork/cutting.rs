@@ -145,7 +145,8 @@ pub fn net_to_cut(target: &Target) -> Result<CutDrawing, CuttingError> {
     let no_net = || CuttingError::NotNet(target.name.to_string());
     let mut drawing = CutDrawing::default();
     let mut right_mm = 0.0;
-    for sheet in &target.sheets {
+    // The guide has no piece of it.
+    for sheet in target.sheets.iter().filter(|sheet| !sheet.placements.is_empty()) {
         let mut piece = CutDrawing::default();
         for points_mm in outlines(sheet).ok_or_else(no_net)? {
             piece.paths.push(CutPath { layer: CutLayer::Cut, closed: true, points_mm });

@@ -62,8 +62,8 @@ impl Target {
     ) -> Result<Target, TargetError> {
         let name =
             Name::new(name).map_err(|problem| TargetError::invalid("Target::name", problem))?;
-        let title = match layout.and_then(|paper| paper.note.as_ref()) {
-            Some(note) => format!("{name} · {note}"),
+        let title = match layout.and_then(|paper| paper.note.as_deref()) {
+            Some(note) => format!("{name} · {}", checked_note(note)?),
             None => name.to_string(),
         };
         let (panels, family, sheets) = match spec {
@@ -107,7 +107,7 @@ impl Target {
             tag_ids::add(&mut target)?;
         }
         if let Some(paper) = layout.filter(|paper| paper.guide_page) {
-            let guide = guide::sheet(&target, paper)?;
+            let guide = guide::sheet(&title, &target, paper)?;
             target.sheets.push(guide);
         }
         Ok(target)
@@ -146,6 +146,28 @@ impl Target {
             _ => "BoardSpec::board_id",
         };
         overlap(board_id, "board ids", &boards(self), &boards(other))
+    }
+}
+
+/// Most characters of a note: with more the label that it stands in could not be read any more.
+const LONGEST_NOTE: usize = 80;
+
+/// A note that can be printed.
+fn checked_note(note: &str) -> Result<&str, TargetError> {
+    let refused = |problem: String| Err(TargetError::invalid("PaperSpec::note", problem));
+    let is_printed = |c: char| (' '..='~').contains(&c) || "°±·×–−".contains(c);
+    let count = note.chars().count();
+    match note.chars().find(|&c| !is_printed(c)) {
+        Some(other) => {
+            refused(format!("the built-in font has no {other:?}: use ASCII and ° ± · × – −"))
+        }
+        None if count > LONGEST_NOTE => {
+            refused(format!("{count} characters are more than {LONGEST_NOTE}: take fewer"))
+        }
+        None if note.trim().is_empty() => {
+            refused("there is nothing in it: leave it out".to_owned())
+        }
+        None => Ok(note.trim()),
     }
 }
 

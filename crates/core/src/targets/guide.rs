@@ -12,20 +12,22 @@
 //!   └──────────────────────┘
 //! ```
 
+use std::f64::consts::TAU;
+
 use glam::{DVec2, DVec3};
 
 use super::layout::{ADVANCE_CAPS, Footprint, fit_upright};
 use super::length::format_mm;
 use super::paper::{Orientation, PaperSize, PaperSpec, SolidSheets};
 use super::{
-    BoardSpec, Incircle, Label, LineKind, Panel, Polyhedron, SheetLayout, SheetLine, SheetText,
-    SolidSpec, Target, TargetError, TargetSpec,
+    BoardSpec, Corner, Incircle, Label, LineKind, Panel, Polyhedron, SheetLayout, SheetLine,
+    SheetText, SolidSpec, Target, TargetError, TargetSpec,
 };
 use crate::lattice::{GridKind, Tile};
 use crate::words::counted;
 
 /// Sides of the paper that is taken as it is, mm: what is printed at a desk. Else the page is an A4.
-const AT_A_DESK_MM: [f64; 2] = [195.0, 360.0];
+const AT_A_DESK_MM: [f64; 2] = [140.0, 360.0];
 /// Capital heights of the name, of the steps and of small words, mm.
 const NAME_CAP_MM: f64 = 6.0;
 const STEP_CAP_MM: f64 = 2.3;
@@ -51,6 +53,8 @@ const PIECES: usize = 60;
 const MOST_TILES: usize = 250;
 /// Thickness of the plate in the picture, in its diagonals.
 const PLATE_PART: f64 = 0.02;
+/// Sides of the polygon that stands for a circle.
+const DISC_SIDES: usize = 24;
 /// Heights of the lines by which a black tile is hatched, in its own.
 const HATCHING: [f64; 6] = [0.0, 0.16, 0.32, 0.48, 0.64, 0.8];
 /// Length of the axes in the picture, mm.
@@ -59,12 +63,16 @@ const AXIS_MM: f64 = 12.0;
 const LEAST_SINE: f64 = 0.3;
 /// Capital heights of the numbers of faces, mm.
 const NUMBER_CAP_MM: std::ops::RangeInclusive<f64> = 1.5..=6.0;
-/// From where solids are seen, and boards, whose front is towards +z.
+/// From where solids are seen, and in the frame of its panel a board.
 const SOLID_FROM: DVec3 = DVec3::new(0.55, -0.75, 0.42);
-const BOARD_FROM: DVec3 = DVec3::new(-0.3, -0.4, 0.85);
+const BOARD_FROM: DVec3 = DVec3::new(-0.3, 0.4, 0.85);
 
 /// The page for a target that was laid out on `paper`.
-pub(super) fn sheet(target: &Target, paper: &PaperSpec) -> Result<SheetLayout, TargetError> {
+pub(super) fn sheet(
+    title: &str,
+    target: &Target,
+    paper: &PaperSpec,
+) -> Result<SheetLayout, TargetError> {
     let paper = PaperSpec {
         size: Some(at_a_desk(paper)),
         orientation: Orientation::Portrait,
@@ -83,7 +91,7 @@ pub(super) fn sheet(target: &Target, paper: &PaperSpec) -> Result<SheetLayout, T
             format!("{} leaves no room for the guide: take less", format_mm(paper.margin_mm));
         TargetError::invalid("PaperSpec::margin_mm", problem)
     })?;
-    let mut sheet = arrangement.sheet(0, [0.0; 4], description(target));
+    let mut sheet = arrangement.sheet(0, [0.0; 4], description(title, target));
     sheet.placements.clear();
     let [left, lower, right, upper] = arrangement.clear_mm();
     let (least, most) = (DVec2::new(left, lower + BLANK_MM), DVec2::new(right - BLANK_MM, upper));
@@ -101,13 +109,18 @@ fn at_a_desk(paper: &PaperSpec) -> PaperSize {
 }
 
 /// What the target is, in a line.
-fn description(target: &Target) -> String {
+fn description(title: &str, target: &Target) -> String {
+    let what = if matches!(target.spec, TargetSpec::Circles(_)) { "circle" } else { "corner" };
     let corners: usize = target.panels.iter().map(|panel| panel.corners.len()).sum();
-    let tags: usize = target.panels.iter().map(|panel| panel.tags.len()).sum();
-    let family =
-        target.family.as_ref().map_or_else(String::new, |family| format!(" of {}", family.name));
-    let [corners, tags] = [counted(corners, "corner"), counted(tags, "tag")];
-    format!("guide · {corners} · {tags}{family} · deltille {}", env!("CARGO_PKG_VERSION"))
+    let mut parts = vec![title.to_owned(), "guide".to_owned(), counted(corners, what)];
+    for kind in target.tilings() {
+        if let Some((family, ids)) = target.tags_of_tiling(kind).filter(|(_, ids)| !ids.is_empty())
+        {
+            parts.push(format!("{} of {}", counted(ids.len(), "tag"), family.name));
+        }
+    }
+    parts.push(format!("deltille {}", env!("CARGO_PKG_VERSION")));
+    parts.join(" · ")
 }
 
 /// The page, and what of it is still free, mm.
@@ -128,7 +141,7 @@ impl Page {
         let height = (room - height(&steps) - BLANK_MM)
             .clamp(PICTURE_SHARE.0 * room, PICTURE_SHARE.1 * room);
         let lower = DVec2::new(self.least.x, self.most.y - height);
-        self.picture(target, [lower, self.most]);
+        self.pictures(target, [lower, self.most]);
         self.most.y -= height + BLANK_MM;
         self.steps(steps);
         self.sheet
@@ -193,36 +206,49 @@ impl Page {
         }
     }
 
-    /// The target, as large as a rectangle takes it, and its axes.
-    fn picture(&mut self, target: &Target, [lower, upper]: [DVec2; 2]) {
-        let model = Model::of(target);
+    /// The target: a solid from two sides, of which one shows what the other hides.
+    fn pictures(&mut self, target: &Target, [lower, upper]: [DVec2; 2]) {
+        let front = Model::of(target);
+        if front.numbers.is_empty() {
+            self.picture(&front, [lower, upper]);
+            return;
+        }
+        let middle = lower.midpoint(upper).x;
+        self.picture(&front, [lower, DVec2::new(middle, upper.y)]);
+        let back = Model { view: View::from(-front.view.towards, DVec3::Z), ..front };
+        self.picture(&back, [DVec2::new(middle, lower.y), upper]);
+    }
+
+    /// What is to be built, as large as a rectangle takes it, and its axes.
+    fn picture(&mut self, model: &Model, [lower, upper]: [DVec2; 2]) {
         let seen = model.faces.iter().flatten().map(|&point| model.view.projected(point));
         let seen: Vec<DVec2> = seen.collect();
         let bounds = [DVec2::min, DVec2::max]
             .map(|most| seen.iter().copied().reduce(most).unwrap_or_default());
-        let room = upper - lower - 2.0 * BLANK_MM - DVec2::new(2.0 * AXIS_MM, 0.0);
+        // The axes lie below a solid, which is seen twice, or at the left.
+        let axes = match model.numbers.is_empty() {
+            true => DVec2::new(2.0 * AXIS_MM, 0.0),
+            false => DVec2::new(0.0, 2.0 * AXIS_MM),
+        };
+        let room = upper - lower - axes - BLANK_MM;
         let size = bounds[1] - bounds[0];
         let scale = (room.x / size.x).min(room.y / size.y);
-        // The axes lie at the left.
-        let middle = (lower + upper) / 2.0 + DVec2::new(AXIS_MM, 0.0);
-        let on_page = |point: DVec2| middle + scale * (point - (bounds[0] + bounds[1]) / 2.0);
+        let middle = (lower + axes).midpoint(upper);
+        let on_page = |point: DVec2| middle + scale * (point - bounds[0].midpoint(bounds[1]));
         for (line, width) in &model.lines {
             for [from, to] in model.seen_of(*line) {
                 self.line(on_page(from), on_page(to), *width);
             }
         }
         for (face, number) in model.numbers.iter().enumerate() {
-            self.number(&model, face, number, scale, on_page);
+            self.number(model, face, number, scale, on_page);
         }
-        let origin = lower + DVec2::splat(AXIS_MM);
+        let origin = lower + DVec2::splat(1.2 * AXIS_MM);
         for (axis, name) in [(DVec3::X, "x"), (DVec3::Y, "y"), (DVec3::Z, "z")] {
             let way = AXIS_MM * model.view.projected(axis);
             self.arrow(origin, origin + way, THICK_MM);
-            self.centred(
-                name.to_owned(),
-                origin + way + 2.5 * way.normalize_or_zero(),
-                STEP_CAP_MM,
-            );
+            let beside = origin + way + 2.5 * way.normalize_or_zero();
+            self.centred(name.to_owned(), beside, STEP_CAP_MM);
         }
     }
 
@@ -333,6 +359,7 @@ impl Model {
         let [left, lower, right, upper] = panel.field_mm();
         let plate = [(left, lower), (right, lower), (right, upper), (left, upper)]
             .map(|(x, y)| at(DVec2::new(x, y)));
+        let front = panel.pose.matrix();
         let depth = PLATE_PART * plate[0].distance(plate[2]);
         let behind = plate.map(|corner| corner - depth * panel.pose.matrix().z_axis);
         let next = |i: usize| (i + 1) % 4;
@@ -344,7 +371,7 @@ impl Model {
         Self {
             faces: [plate.to_vec()].into_iter().chain(rims).collect(),
             lines: edges.map(|edge| (edge, THICK_MM)).chain(tiles).collect(),
-            ..Self::blank(BOARD_FROM, DVec3::Y)
+            ..Self::blank(front * BOARD_FROM, front * DVec3::Y)
         }
     }
 
@@ -392,8 +419,16 @@ impl Model {
 /// Outlines and hatching of the black tiles of a panel, in its frame, mm; none where they are too many to be seen.
 fn tile_lines(panel: &Panel) -> Vec<[DVec2; 2]> {
     let tiles = panel.dark_tiles();
-    if tiles.len() > MOST_TILES || panel.discs_mm.is_some() || panel.corners.is_empty() {
+    if tiles.len().max(panel.corners.len()) > MOST_TILES || panel.corners.is_empty() {
         return Vec::new();
+    }
+    if let Some(diameter) = panel.discs_mm {
+        let rim = |corner: &Corner, n: usize| {
+            let angle = TAU * n as f64 / DISC_SIDES as f64;
+            corner.panel_mm + diameter / 2.0 * DVec2::from_angle(angle)
+        };
+        let of_disc = |corner| (0..DISC_SIDES).map(move |n| [rim(corner, n), rim(corner, n + 1)]);
+        return panel.corners.iter().flat_map(of_disc).collect();
     }
     let of_tile = |tile: Tile| {
         let [a, b, c] = tile.frame().map(|vertex| panel.lattice_mm(vertex));
@@ -419,39 +454,45 @@ fn steps(target: &Target, paper: &PaperSpec) -> Vec<String> {
         TargetSpec::Solid(spec) => steps.extend(steps_of_solid(spec, paper)),
         _ => steps.extend(steps_of_board(target)),
     }
+    if matches!(target.spec, TargetSpec::Circles(_)) {
+        steps.push(format!(
+            "Keep {name}.json: target_mm says where every circle is, in the order in which OpenCV's findCirclesGrid finds them."
+        ));
+        return steps;
+    }
     steps.push(format!(
-        "Keep {name}.json: it says where every corner is. To find \
-         corners in photographs:\ndeltille detect photos --target {name}.json -o corners"
+        "Keep {name}.json: it says where every corner is. To find corners in photographs:\n\
+         deltille detect photos --target {name}.json -o corners"
     ));
     steps.push(format!(
         "Ten photographs or more, near, tilted and to the rims, make a camera:\n\
-         deltille calibrate corners --target {name}.json --report camera.html"
+         deltille calibrate corners --target {name}.json --model auto --report camera.html"
     ));
     steps
 }
 
 fn steps_of_board(target: &Target) -> Vec<String> {
     let mut steps = Vec::new();
-    if let TargetSpec::Board(BoardSpec { two_sided_mm: Some(mm), .. }) = &target.spec {
-        steps.push(format!(
-            "Cut both sheets from mark to mark and glue one on each side of a plate, so that the sides are {} apart with \
-             their paper; or print both on the plate, turned about its upright edge. The marks of one side lie behind \
-             those of the other.",
-            format_mm(*mm)
-        ));
-    }
     if target.sheets.iter().any(|sheet| !sheet.pages.is_empty()) {
-        steps.push("Trim pages along the line at their left or upper end, and lay them on the crosses of the next.".to_owned());
+        let trim = "Trim pages along the line at their left and upper end, and lay them on the crosses of the pages that they name.";
+        steps.push(trim.to_owned());
     }
     if target.sheets.iter().any(|sheet| sheet.placements.len() > 1) {
         steps.push("Cut the boards apart along the lines; each has a label of its own.".to_owned());
     }
-    steps.push(
-        "Glue it without bubbles on a plate that stays flat: glass, aluminium composite or a stone tile, larger than the \
-         tiles by a fifth of an edge all around. Lay a straightedge on it: what bends by a millimetre is worth less than \
-         a smaller board that does not."
-            .to_owned(),
-    );
+    let flat = "Lay a straightedge on it: what bends by a millimetre is worth less than a smaller board that does not.";
+    steps.push(match &target.spec {
+        TargetSpec::Board(BoardSpec { two_sided_mm: Some(mm), .. }) => format!(
+            "Cut both sides from mark to mark and glue them without bubbles on the two sides of a plate that stays flat and is as \
+             large, so that they are {} apart with their paper; or print them on the plate, turned about its upright edge. The \
+             marks of one side lie behind those of the other. {flat}",
+            format_mm(*mm)
+        ),
+        _ => format!(
+            "Glue it without bubbles on a plate that stays flat: glass, aluminium composite or a stone tile, larger than the \
+             tiles by a fifth of an edge all around. {flat}"
+        ),
+    });
     steps
 }
 
@@ -475,8 +516,8 @@ fn steps_of_solid(spec: &SolidSpec, paper: &PaperSpec) -> Vec<String> {
         }
         (_, skeleton) => {
             steps.push(
-                "Cut along lines that are drawn through. Score the others; fold dashed lines away from the print, dash-dotted \
-                 ones towards it, dotted ones not at all."
+                "Cut along lines that are drawn through. Score dashed lines and fold them away from the print; score dash-dotted \
+                 ones from behind and fold them towards it; leave dotted ones."
                     .to_owned(),
             );
             steps.push(
@@ -490,12 +531,12 @@ fn steps_of_solid(spec: &SolidSpec, paper: &PaperSpec) -> Vec<String> {
         }
     }
     steps.push(
-        "Compare with the picture: numbers run as printed, arrows show the upper end of each face."
+        "Compare with the pictures: numbers run as printed, arrows show the upper end of each face."
             .to_owned(),
     );
     steps.push(
-        "Paper folds within some tenths of a millimetre. With several cameras or many views, deltille rig measures where the \
-         faces are."
+        "By hand faces come to lie within some tenths of a millimetre. With several cameras or many views, deltille rig \
+         --refine-target measures where they are."
             .to_owned(),
     );
     steps
@@ -523,7 +564,7 @@ mod tests {
 
     fn guide(spec: impl Into<TargetSpec>) -> SheetLayout {
         let target = Target::new("target", spec).unwrap();
-        sheet(&target, &PaperSpec::default()).unwrap()
+        sheet("target", &target, &PaperSpec::default()).unwrap()
     }
 
     /// Of an icosahedron that hides nothing but its own back, every edge of a face towards the eye is seen, whole, and
@@ -550,7 +591,7 @@ mod tests {
     fn everything_lies_on_the_page_and_says_what_to_do() {
         let board = guide(BoardSpec::deltille(10, 11, 20.0));
         let solid = guide(SolidSpec::new(SolidShape::Cube));
-        for (sheet, words) in [(&board, "bubbles"), (&solid, "Score")] {
+        for (sheet, words) in [(&board, "bubbles"), (&solid, "Score dashed")] {
             assert_eq!((sheet.width_mm, sheet.height_mm), (210.0, 297.0));
             let on_page =
                 |p: DVec2| p.cmpge(DVec2::splat(5.0)).all() && p.x <= 205.0 && p.y <= 292.0;

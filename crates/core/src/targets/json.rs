@@ -195,7 +195,7 @@ pub fn check(target: &Target) -> Result<(), Problem> {
         }
     }
     check_against_spec(target)?;
-    let named = |setting: &str| setting.replace("Finish::", "finish.");
+    let named = |setting: &str| setting.replacen("Finish", "finish", 1).replace("::", ".");
     target.finish.check().or_else(|(setting, what)| problem(named(setting), what))?;
     for (s, sheet) in target.sheets.iter().enumerate() {
         check_sheet(sheet, &format!("sheets[{s}]"))?;

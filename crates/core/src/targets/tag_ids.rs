@@ -4,7 +4,6 @@ use std::collections::BTreeSet;
 
 use glam::DVec2;
 
-use super::layout::ADVANCE_CAPS;
 use super::length::format_mm;
 use super::{
     GridKind, Label, Panel, Placement, SheetText, TagPlacement, TagsIn, Target, TargetError,
@@ -14,6 +13,9 @@ use crate::lattice::{Tile, Vertex};
 
 /// Capital height, in edges of a tile, and the most of it, mm: small beside what a corner is measured from.
 const CAP: (f64, f64) = (0.09, 1.8);
+
+/// Mean advance of a digit, in capital heights.
+const DIGIT_CAPS: f64 = 0.85;
 
 /// The least that can be read on paper, mm.
 const LEAST_CAP_MM: f64 = 0.7;
@@ -32,7 +34,7 @@ pub(super) fn add(target: &mut Target) -> Result<(), TargetError> {
             return refused("the tiles beside tags are black: leave it out".to_owned());
         }
         if CAP.0 * panel.edge_mm < LEAST_CAP_MM {
-            let least = (LEAST_CAP_MM / CAP.0).ceil();
+            let least = (10.0 * LEAST_CAP_MM / CAP.0).ceil() / 10.0;
             let edge = format_mm(panel.edge_mm);
             return refused(format!(
                 "beside tiles of {edge} nobody could read them: take tiles of at least {least} mm"
@@ -56,7 +58,7 @@ fn of_panel(panel: &Panel, placement: &Placement) -> Vec<SheetText> {
     let text = |tag: &TagPlacement| {
         let tile = beside(panel.kind, tag).into_iter().find(|tile| free.remove(tile))?;
         let text = tag.id.to_string();
-        let width = text.len() as f64 * ADVANCE_CAPS * cap_height_mm;
+        let width = text.len() as f64 * DIGIT_CAPS * cap_height_mm;
         let vertices: Vec<DVec2> = tile.vertices().map(|vertex| panel.lattice_mm(vertex)).collect();
         let middle = vertices.iter().sum::<DVec2>() / vertices.len() as f64;
         Some(SheetText {
@@ -64,7 +66,7 @@ fn of_panel(panel: &Panel, placement: &Placement) -> Vec<SheetText> {
             at_mm: placement.page_from_panel(middle - DVec2::new(width, cap_height_mm) / 2.0),
             angle_rad: placement.angle_rad,
             cap_height_mm,
-            max_width_mm: width,
+            max_width_mm: 1.1 * width,
         })
     };
     panel.tags.iter().filter_map(text).collect()
@@ -106,7 +108,7 @@ mod tests {
             let (sheet, panel) = (&target.sheets[0], &target.panels[0]);
             let placement = &sheet.placements[0];
             let ids: Vec<(String, Tile)> = sheet.texts.iter().rev().take(panel.tags.len()).map(|text| {
-                let half = DVec2::new(text.max_width_mm, text.cap_height_mm) / 2.0;
+                let half = DVec2::new(text.max_width_mm / 1.1, text.cap_height_mm) / 2.0;
                 let middle = placement.panel_from_page(text.at_mm) + half;
                 (text.text.to_string(), panel.tile_at(middle / panel.edge_mm))
             }).collect();
@@ -125,7 +127,7 @@ mod tests {
     fn ids_that_nobody_could_read_are_refused() {
         let board = |edge_mm| BoardSpec::deltille(5, 6, edge_mm);
         let said = |spec: BoardSpec| target(&spec.into()).unwrap_err().to_string();
-        assert!(said(board(5.0)).contains("tiles of at least 8 mm"));
+        assert!(said(board(5.0)).contains("tiles of at least 7.8 mm"));
         assert!(said(BoardSpec { inverted: true, ..board(20.0) }).contains("are black"));
         assert!(said(BoardSpec { tags: None, ..board(20.0) }).contains("no tags"));
         assert!(target(&SolidSpec::new(SolidShape::Cube).into()).is_ok());
