@@ -195,7 +195,10 @@ pub fn check(target: &Target) -> Result<(), Problem> {
         }
     }
     check_against_spec(target)?;
-    let named = |setting: &str| setting.replacen("Finish", "finish", 1).replace("::", ".");
+    let named = |setting: &str| {
+        let field = setting.rsplit_once(':').map_or(setting, |(_, field)| field);
+        format!("finish.{field}")
+    };
     target.finish.check().or_else(|(setting, what)| problem(named(setting), what))?;
     for (s, sheet) in target.sheets.iter().enumerate() {
         check_sheet(sheet, &format!("sheets[{s}]"))?;
