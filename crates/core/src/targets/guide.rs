@@ -60,7 +60,7 @@ const HATCHING: [f64; 6] = [0.0, 0.16, 0.32, 0.48, 0.64, 0.8];
 /// Length of the axes in the picture, mm.
 const AXIS_MM: f64 = 12.0;
 /// Faces seen at a lower angle than this sine have no number.
-const LEAST_SINE: f64 = 0.3;
+const LEAST_SINE: f64 = 0.2;
 /// Capital heights of the numbers of faces, mm.
 const NUMBER_CAP_MM: std::ops::RangeInclusive<f64> = 1.5..=6.0;
 /// From where solids are seen, and in the frame of its panel a board.
@@ -437,7 +437,10 @@ fn tile_lines(panel: &Panel) -> Vec<[DVec2; 2]> {
             GridKind::Checker => b + c - a,
         };
         let sides = [[a, c], [b, last]];
-        sides.into_iter().chain(HATCHING.map(|part| sides.map(|[foot, top]| foot.lerp(top, part))))
+        // Of a triangle it is a point.
+        let top = (panel.kind == GridKind::Checker).then_some([c, last]);
+        let hatched = HATCHING.map(|part| sides.map(|[foot, top]| foot.lerp(top, part)));
+        sides.into_iter().chain(top).chain(hatched)
     };
     tiles.into_iter().flat_map(of_tile).collect()
 }
