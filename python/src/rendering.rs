@@ -7,7 +7,6 @@ use deltille::glam::DVec3;
 use deltille::limits::Limits;
 use deltille::quantity::{blur_px, light_gradient, of_full_scale, place_mm};
 use deltille::synth::{Light, TruthCorner, scene_of_target};
-use deltille::targets::TargetSpec;
 use numpy::ndarray::Array2;
 use numpy::{IntoPyArray, PyArray1, PyArray2};
 use pyo3::prelude::*;
@@ -184,8 +183,7 @@ pub fn render<'py>(
     let wrong = |what: String| raised::TargetError::new_err(what);
     let own = target.clone();
     let of = &own.target;
-    let is_listed = matches!(of.spec, TargetSpec::Listed(_)) && of.panels.len() > 1;
-    if of.is_loose() || is_listed {
+    if !of.is_one_scene() {
         let what =
             format!("{} has several loose boards: render targets of one board, or solids", of.name);
         return Err(wrong(what));

@@ -15,6 +15,11 @@ pub fn area(polygon: &[DVec2]) -> f64 {
     0.5 * polygon.iter().zip(next).map(|(p, &q)| p.perp_dot(q)).sum::<f64>()
 }
 
+/// A rectangle by its left, lower, right and upper end, counterclockwise with y up from the lower left corner.
+pub fn rectangle([left, lower, right, upper]: [f64; 4]) -> [DVec2; 4] {
+    [(left, lower), (right, lower), (right, upper), (left, upper)].map(DVec2::from)
+}
+
 /// The convex hull of points, counterclockwise with y up (Andrew's monotone chain); of fewer than three, these.
 pub fn hull(mut points: Vec<DVec2>) -> Vec<DVec2> {
     points.sort_by(|a, b| a.x.total_cmp(&b.x).then(a.y.total_cmp(&b.y)));

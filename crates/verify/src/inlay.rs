@@ -20,6 +20,7 @@ use super::{
     construct,
 };
 use deltille_core::polygon;
+use deltille_core::polygon::rectangle;
 use deltille_core::raster::{Coverage, Gray};
 use deltille_core::targets::{Panel, Placement, SheetLayout, TargetSpec};
 use deltille_files::export::inlay::Body;
@@ -141,9 +142,7 @@ fn faces<'a>(verifier: &Verifier<'a>) -> Option<Vec<Face<'a>>> {
     let panels = &verifier.target.panels;
     match (&verifier.target.spec, panels.as_slice()) {
         (spec, [panel]) if spec.is_on_plate() => {
-            let [left, lower, right, upper] = panel.field_mm();
-            let outline = [(left, lower), (right, lower), (right, upper), (left, upper)];
-            Some(vec![Face { panel, outline: outline.map(DVec2::from).to_vec() }])
+            Some(vec![Face { panel, outline: rectangle(panel.field_mm()).to_vec() }])
         }
         (TargetSpec::Solid(spec), _) => {
             let solid = spec.polyhedron();

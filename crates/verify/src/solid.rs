@@ -20,6 +20,7 @@ use super::{FaceVerdict, Finding, Format, Verdict, Verifier};
 use deltille_core::camera::{Camera, Pose};
 use deltille_core::detect::Detection;
 use deltille_core::lattice::Vertex;
+use deltille_core::polygon::rectangle;
 use deltille_core::raster::Gray;
 use deltille_core::targets::{Corner, Panel, TagPlacement, Target, TargetSpec};
 use deltille_core::words::counted;
@@ -426,11 +427,7 @@ fn wrong_surface(verifier: &Verifier, model: &Model) -> Option<Finding> {
     let stated: Vec<DVec3> = match &verifier.target.spec {
         TargetSpec::Solid(spec) => spec.polyhedron().vertices_mm,
         spec if spec.is_on_plate() => {
-            let thickness_mm = match spec {
-                TargetSpec::Board(board) => board.two_sided_mm,
-                _ => None,
-            };
-            plate_vertices(verifier.target.panels.first()?, thickness_mm, model)
+            plate_vertices(verifier.target.panels.first()?, spec.two_sided_mm(), model)
         }
         _ => return None,
     };
@@ -485,9 +482,7 @@ const VOLUME_SLACK: f64 = 0.1;
 
 /// The vertices of the plate of a board: the corners of its field, and those behind them by the thickness that it has.
 fn plate_vertices(panel: &Panel, thickness_mm: Option<f64>, model: &Model) -> Vec<DVec3> {
-    let [left, lower, right, upper] = panel.field_mm();
-    let front = [(left, lower), (right, lower), (right, upper), (left, upper)]
-        .map(|(x, y)| panel.pose.target_from_panel(DVec2::new(x, y)));
+    let front = rectangle(panel.field_mm()).map(|corner| panel.pose.target_from_panel(corner));
     let vertices = model.triangles.iter().flat_map(|triangle| triangle.vertices_mm);
     let depth = vertices.map(|v| -panel.pose.panel_from_target(v).z).fold(0.0, f64::max);
     let depth = thickness_mm.unwrap_or(depth);

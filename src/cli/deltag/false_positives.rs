@@ -3,7 +3,7 @@
 use serde_json::{Value, json};
 
 use crate::cli::output::say;
-use crate::family::{ACCEPTED_FALSE_POSITIVES, Family, TRIANGLES_PER_MEGAPIXEL};
+use crate::family::{ACCEPTED_FALSE_POSITIVES, Family, TRIANGLES_PER_MEGAPIXEL, corrected_within};
 use crate::words::counted;
 
 /// Adds the fields of `--json` to what is told of a family.
@@ -13,10 +13,10 @@ pub(super) fn add_to(told: &mut Value, family: &Family) {
         .as_ref()
         .map(|rates| rates.iter().map(|rate| rate * TRIANGLES_PER_MEGAPIXEL).collect::<Vec<_>>());
     told["false_positive_rate"] = json!(family.false_positive_rates());
-    told["natural_false_positive_rate"] = json!(natural);
+    told["natural_false_positive_rate"] = json!(&natural);
     told["natural_false_positives_per_megapixel_at_most"] = json!(per_megapixel);
     told["accepted_false_positive_rate"] = json!(ACCEPTED_FALSE_POSITIVES);
-    told["recommended_correction"] = json!(family.recommended_correction(ACCEPTED_FALSE_POSITIVES));
+    told["recommended_correction"] = json!(recommended_correction(natural.as_deref()));
 }
 
 /// Says both rates for each number of corrected cells.
@@ -37,14 +37,18 @@ pub(super) fn tell(family: &Family) -> anyhow::Result<()> {
     say!(
         "  of a natural picture `detect` reads {TRIANGLES_PER_MEGAPIXEL} triangles in a megapixel, or fewer"
     );
-    say!("  recommended     {}", recommended(family));
+    say!("  recommended     {}", recommended(natural.as_deref()));
     Ok(())
 }
 
-/// How many cells of a single tag may be corrected.
-pub(super) fn recommended(family: &Family) -> String {
+fn recommended_correction(natural: Option<&[f64]>) -> Option<u32> {
+    corrected_within(natural?, ACCEPTED_FALSE_POSITIVES)
+}
+
+/// How many cells of a single tag may be corrected, by a family's natural rates.
+pub(super) fn recommended(natural: Option<&[f64]>) -> String {
     let rate = format!("{ACCEPTED_FALSE_POSITIVES:.0e}");
-    match family.recommended_correction(ACCEPTED_FALSE_POSITIVES) {
+    match recommended_correction(natural) {
         Some(0) => format!(
             "whoever believes single tags corrects nothing: natural false positives below {rate}"
         ),

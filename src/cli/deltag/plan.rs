@@ -89,8 +89,9 @@ fn of(family: &ShippedFamily) -> anyhow::Result<Value> {
 
 fn about(family: &Family) -> String {
     let coins = family.false_positive_rates();
-    let natural = family.natural_false_positive_rates().unwrap_or_default();
-    let [coins, natural] = [coins, natural].map(|rates| rates.last().copied().unwrap_or_default());
+    let rates = family.natural_false_positive_rates();
+    let last = |rates: &[f64]| rates.last().copied().unwrap_or_default();
+    let [coins, natural] = [last(&coins), last(rates.as_deref().unwrap_or_default())];
     format!(
         "{}, {} codes of {} bits, distance {}; corrects {} cells, then takes for a tag a word of fair coins with \
          probability {coins:.1e}, a bordered triangle of a natural picture with {natural:.1e}; {}",
@@ -99,6 +100,6 @@ fn about(family: &Family) -> String {
         family.dimension().bits(),
         family.distance(),
         family.correctable(),
-        false_positives::recommended(family)
+        false_positives::recommended(rates.as_deref())
     )
 }

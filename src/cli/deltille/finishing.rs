@@ -5,6 +5,7 @@
 use anyhow::{Context, bail};
 
 use super::files::{File, bytes_file};
+use super::settings::refuse_idle;
 use crate::artwork::CuttingError;
 use crate::export::artifacts::{MakeError, Making, What, make};
 use crate::family::Family;
@@ -89,12 +90,8 @@ impl Laser {
 
     /// Refuses a kerf of nothing.
     pub fn check_use(&self) -> anyhow::Result<()> {
-        if self.kerf.is_some() && !self.is_any() {
-            bail!(
-                "--kerf: it says nothing without a drawing for a laser: add --laser, or leave it out"
-            );
-        }
-        Ok(())
+        let needed = "a drawing for a laser: add --laser";
+        refuse_idle(&[("--kerf", self.kerf.is_some(), self.is_any(), needed)])
     }
 
     /// The drawings that are asked for.

@@ -8,6 +8,7 @@ use std::ops::RangeInclusive;
 use anyhow::{Context, anyhow, bail};
 
 use super::files::{File, bytes_file};
+use super::settings::refuse_idle;
 use crate::cli::values::{number, whole};
 use crate::export::artifacts::{Making, What, make, of_mesh};
 use crate::export::inlay::InlaidBodies;
@@ -86,16 +87,12 @@ impl Meshes {
     /// Refuses options of a mesh that is not made.
     pub fn check_use(&self, plate_mm: Option<f64>) -> anyhow::Result<()> {
         let (textured, any) = (self.is_textured(), self.is_any());
-        let options = [
+        refuse_idle(&[
             ("--texture", self.texture.is_some(), textured, "a mesh: add --gltf"),
             ("--texture-dpi", self.texture_dpi.is_some(), textured, "a mesh: add --gltf"),
             ("--plate", plate_mm.is_some(), any, "a mesh: add --gltf"),
             ("--inlay", self.inlay.is_some(), self.threemf, "two bodies: add --3mf"),
-        ];
-        let idle = options.into_iter().find(|(_, is_given, is_used, _)| *is_given && !is_used);
-        idle.map_or(Ok(()), |(option, .., without)| {
-            Err(anyhow!("{option}: it says nothing without {without}, or leave it out"))
-        })
+        ])
     }
 
     /// The files that are asked for, and a line on their texture to be told after others; empty where there is none.

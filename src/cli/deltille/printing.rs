@@ -5,7 +5,7 @@ use anyhow::{Context, bail};
 use super::delivery::Delivery;
 use super::files::{File, Formats, drawn, text_file};
 use super::finishing::Finishing;
-use super::settings::{DEFAULT_DPI, DPI, PAPER, PRINT};
+use super::settings::{DEFAULT_DPI, DPI, PAPER, PRINT, refuse_idle};
 use crate::artwork;
 use crate::cli::values::{name, whole};
 use crate::family::Family;
@@ -107,19 +107,12 @@ impl Printing {
 
 /// Refuses what is to be on pages where there are none.
 pub fn idle_without_pages(paper: &PaperSpec) -> anyhow::Result<()> {
-    let on_pages = [
-        ("--guide-page", paper.guide_page),
-        ("--tag-ids", paper.tag_ids),
-        ("--note", paper.note.is_some()),
-    ];
-    match on_pages.into_iter().find(|(_, is_given)| *is_given) {
-        Some((option, _)) => {
-            bail!(
-                "{option}: it says nothing without --pdf, --svg or --png: add one, or leave it out"
-            )
-        }
-        None => Ok(()),
-    }
+    let needed = "--pdf, --svg or --png: add one";
+    refuse_idle(&[
+        ("--guide-page", paper.guide_page, false, needed),
+        ("--tag-ids", paper.tag_ids, false, needed),
+        ("--note", paper.note.is_some(), false, needed),
+    ])
 }
 
 /// The paper of a target in words.

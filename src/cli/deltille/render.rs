@@ -17,7 +17,6 @@ use crate::export::kind::signed_png;
 use crate::export::truth;
 use crate::quantity::{Range, blur_px, light_gradient, of_full_scale, place_mm};
 use crate::synth::{Light, scene_of_target};
-use crate::targets::TargetSpec;
 
 /// Arguments of `deltille render`.
 #[derive(clap::Args)]
@@ -80,8 +79,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let limits = args.limits.limits();
     let target = target_file::read(&args.target, &limits)?;
     let family = target_file::family(&target, args.family.as_deref())?;
-    let is_listed = matches!(target.spec, TargetSpec::Listed(_)) && target.panels.len() > 1;
-    if target.is_loose() || is_listed {
+    if !target.is_one_scene() {
         bail!("{} has several loose boards: render targets of one board, or solids", target.name);
     }
     let camera = camera_file::read("--camera", &args.camera)?;

@@ -159,6 +159,16 @@ fn colour(text: &str) -> Result<TagsIn, String> {
     }
 }
 
+/// Refuses the first option of these that is given and not used; the last of each says what it needs, and how to have it.
+pub(super) fn refuse_idle(options: &[(&str, bool, bool, &str)]) -> anyhow::Result<()> {
+    match options.iter().find(|(_, is_given, is_used, _)| *is_given && !is_used) {
+        Some((option, .., needed)) => {
+            bail!("{option}: it says nothing without {needed}, or leave it out")
+        }
+        None => Ok(()),
+    }
+}
+
 /// Whether a setting is left out of a template.
 pub(super) fn is_false(value: &bool) -> bool {
     !value

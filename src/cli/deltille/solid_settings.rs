@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, anyhow, bail};
 use serde::{Deserialize, Serialize};
 
-use super::settings::{DPI, PAPER, PRINT, TAGS, is_false};
+use super::settings::{DPI, PAPER, PRINT, TAGS, is_false, refuse_idle};
 use super::template;
 use crate::cli::values::{number, whole};
 use crate::export::dsc::Dialect;
@@ -238,9 +238,9 @@ impl SolidSettings {
     /// Refuses options that nothing asked for makes use of.
     pub fn check_use(&self) -> anyhow::Result<()> {
         let layout = self.printed() || self.dxf;
-        let needed = "--pdf, --svg, --png or --dxf";
-        let options = [
-            ("--dpi", self.dpi.is_some(), self.png, "--png"),
+        let needed = "--pdf, --svg, --png or --dxf: add one";
+        refuse_idle(&[
+            ("--dpi", self.dpi.is_some(), self.png, "--png: add one"),
             ("--paper", self.paper.is_some(), layout, needed),
             ("--orientation", self.orientation.is_some(), layout, needed),
             ("--margin", self.margin.is_some(), layout, needed),
@@ -249,14 +249,15 @@ impl SolidSettings {
             ("--guide-page", self.guide_page, layout, needed),
             ("--tag-ids", self.tag_ids, layout, needed),
             ("--note", self.note.is_some(), layout, needed),
-            ("--panel-thickness", self.panel_thickness.is_some(), self.skeleton, "--skeleton"),
-            ("--wall", self.wall.is_some(), self.skeleton, "--skeleton"),
-            ("--rib", self.rib.is_some(), self.skeleton, "--skeleton"),
-        ];
-        let idle = options.into_iter().find(|(_, is_given, is_used, _)| *is_given && !is_used);
-        if let Some((option, .., needed)) = idle {
-            bail!("{option}: it says nothing without {needed}: add one, or leave it out");
-        }
+            (
+                "--panel-thickness",
+                self.panel_thickness.is_some(),
+                self.skeleton,
+                "--skeleton: add one",
+            ),
+            ("--wall", self.wall.is_some(), self.skeleton, "--skeleton: add one"),
+            ("--rib", self.rib.is_some(), self.skeleton, "--skeleton: add one"),
+        ])?;
         match self.dpi {
             Some(dpi) if !DPI.contains(&dpi) => {
                 bail!("--dpi: {dpi} is not between {} and {}", DPI.start(), DPI.end())

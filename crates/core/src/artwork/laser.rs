@@ -22,6 +22,7 @@ use super::cutting::{CutDrawing, CutLayer, CutPath, CuttingError, GAP_MM};
 use super::{ArtworkError, board, cells};
 use crate::family::Family;
 use crate::lattice::{GridKind, Tile, Vertex};
+use crate::polygon::rectangle;
 use crate::targets::{Face, Panel, Placement, TagPlacement, TagsIn, Target, TargetSpec};
 
 /// Widest kerf, mm: less than the gap between two plates.
@@ -108,7 +109,7 @@ fn plates_in_rows(target: &Target) -> Vec<LaserBoard<'_>> {
             let [x0, y0, x1, y1] = panel.field_mm();
             let origin_mm = DVec2::new(left - x0, lower - y0);
             let placement = Placement { panel: panel.id, angle_rad: 0.0, origin_mm };
-            let plate_mm = field(panel).to_vec();
+            let plate_mm = rectangle(panel.field_mm()).to_vec();
             boards.push(LaserBoard { panel, plate_mm, placement, mirror_mm: None });
             height = height.max(y1 - y0);
             left += x1 - x0 + GAP_MM;
@@ -166,12 +167,6 @@ fn finest_mm(panel: &Panel, family: Option<&Family>) -> f64 {
     [cell, gap, panel.discs_mm].into_iter().flatten().fold(panel.edge_mm, f64::min)
 }
 
-/// The corners of a plate, counter-clockwise in the frame of its board, mm.
-fn field(panel: &Panel) -> [DVec2; 4] {
-    let [left, lower, right, upper] = panel.field_mm();
-    [(left, lower), (right, lower), (right, upper), (left, upper)].map(DVec2::from)
-}
-
 /// The outlines of what is black on a board, in its frame, mm. Where black meets black in a corner only, they keep apart;
 /// `simple` ones pass no corner twice.
 fn dark_outlines(
@@ -195,7 +190,7 @@ fn dark_outlines(
         .map(|outline| outline.into_iter().map(|vertex| panel.lattice_mm(vertex)).collect())
         .collect();
     if panel.inverted {
-        dark.push(field(panel).to_vec());
+        dark.push(rectangle(panel.field_mm()).to_vec());
     }
     for tag in &panel.tags {
         dark.extend(tag_outlines(target, panel, tag, family, simple)?);

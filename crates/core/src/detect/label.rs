@@ -528,10 +528,13 @@ impl TagLabeller {
             // One that does not count takes its corners, too: nothing else is to label them.
             let before = taken.len();
             taken.extend(vertices.into_keys());
-            let over_nature = self.over_nature(&sights[best.sight], best);
+            let is_told_from_nature = || {
+                let over_nature = self.over_nature(&sights[best.sight], best);
+                over_nature.is_none_or(|evidence| evidence - ways >= MIN_EVIDENCE)
+            };
             if is_ambiguous {
                 placed.is_ambiguous = true;
-            } else if over_nature.is_none_or(|evidence| evidence - ways >= MIN_EVIDENCE) {
+            } else if is_told_from_nature() {
                 placed.placements.push(*best);
             }
             if taken.len() == before {

@@ -65,7 +65,9 @@ pub use file::check_name;
 pub use file::{Construction, SCHEMA};
 pub use frontier::{RuleChoice, best_rule, rule_choices};
 pub use import::{ImportError, ImportSpec, import};
-pub use natural::{ACCEPTED_FALSE_POSITIVES, NaturalWords, TRIANGLES_PER_MEGAPIXEL};
+pub use natural::{
+    ACCEPTED_FALSE_POSITIVES, NaturalWords, TRIANGLES_PER_MEGAPIXEL, corrected_within,
+};
 pub use published_bounds::{PublishedBounds, published_bounds};
 pub use reading::Reading;
 pub use rules::{Rules, Screen};

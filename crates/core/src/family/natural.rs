@@ -163,10 +163,15 @@ impl Family {
     /// a border, for whoever believes single tags; usually of [`ACCEPTED_FALSE_POSITIVES`]. `None` where they do not even
     /// with nothing corrected, and where natural rates are not known.
     pub fn recommended_correction(&self, accepted: f64) -> Option<u32> {
-        let rates = self.natural_false_positive_rates()?;
-        let fitting = rates.iter().take_while(|rate| **rate <= accepted).count();
-        fitting.checked_sub(1).map(|most| most as u32)
+        corrected_within(&self.natural_false_positive_rates()?, accepted)
     }
+}
+
+/// The largest number of corrected cells whose rate is at most `accepted`, of rates for 0, 1, … of them; `None` where there is
+/// none.
+pub fn corrected_within(rates: &[f64], accepted: f64) -> Option<u32> {
+    let fitting = rates.iter().take_while(|rate| **rate <= accepted).count();
+    fitting.checked_sub(1).map(|most| most as u32)
 }
 
 /// Sums of some rows, then over distances up to each.

@@ -1,9 +1,8 @@
-use glam::DVec2;
-
 use super::sheet::black_areas;
 use super::{Scene, Surface};
 use crate::artwork::{self, ArtworkError};
 use crate::family::Family;
+use crate::polygon::rectangle;
 use crate::targets::{Panel, Target, TargetSpec};
 
 /// The panels of a target where they are in space: the faces of a solid, or boards cut out along
@@ -26,10 +25,7 @@ pub fn scene_of_target(target: &Target, family: Option<&Family>) -> Result<Scene
     let surface = |(index, panel): (usize, &Panel)| -> Result<Surface, ArtworkError> {
         let paper_mm = match faces.as_ref().and_then(|faces| faces.get(index)) {
             Some(face) => face.outline_mm.clone(),
-            None => {
-                let [x0, y0, x1, y1] = panel.field_mm();
-                [(x0, y0), (x1, y0), (x1, y1), (x0, y1)].map(DVec2::from).to_vec()
-            }
+            None => rectangle(panel.field_mm()).to_vec(),
         };
         let corners = panel.corners.iter().map(|c| (c.id, c.row, c.col, c.panel_mm));
         Ok(Surface {

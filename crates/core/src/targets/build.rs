@@ -1,5 +1,3 @@
-use glam::DVec2;
-
 use super::angles::turn_of;
 use super::capacity::Setting;
 use super::layout::{arrange, label};
@@ -11,6 +9,7 @@ use super::{
     solid, tag_ids, tag_sheet,
 };
 use crate::family::{Family, FamilyError, places};
+use crate::polygon::rectangle;
 
 impl Target {
     /// Makes what `spec` asks for with a family that is shipped, laid out on the smallest paper that takes it.
@@ -234,8 +233,7 @@ fn poster(
     paper: &PaperSpec,
     label: &str,
 ) -> Result<SheetLayout, TargetError> {
-    let [left, lower, right, upper] = panel.field_mm();
-    let corners = [(left, lower), (right, lower), (right, upper), (left, upper)].map(DVec2::from);
+    let corners = rectangle(panel.field_mm());
     let poster = Poster::new(&corners, paper)?;
     poster.check("the board", ("BoardSpec::edge_mm", board.edge_mm), "", paper)?;
     let mut sheet = poster.sheet();

@@ -5,6 +5,7 @@ use glam::DVec2;
 use serde::{Deserialize, Serialize};
 
 use super::{LineKind, SheetLayout, SheetLine, Target, TargetError};
+use crate::polygon::rectangle;
 
 /// Width of the line to cut along, mm: the quarter of a point that print shops ask for.
 const CONTOUR_MM: f64 = 0.1;
@@ -98,13 +99,13 @@ impl Target {
             let problem = "the guide is for paper, to be read as it is: make it with a plain print";
             return Err(TargetError::invalid("PaperSpec::guide_page", problem));
         }
-        if finish.mirrored && self.spec.is_rigid() {
+        if finish.mirrored && self.spec.two_sided_mm().is_some() {
             let problem = "each side is seen from its own front: leave the mirror image out";
             return Err(TargetError::invalid("BoardSpec::two_sided_mm", problem));
         }
         if finish.contour.is_some() {
             for sheet in &mut self.sheets {
-                let side = sheet.placements.first().filter(|_| self.spec.is_rigid());
+                let side = sheet.placements.first().filter(|_| self.spec.two_sided_mm().is_some());
                 let side = side.and_then(|placed| {
                     let panel = self.panels.iter().find(|panel| panel.id == placed.panel)?;
                     Some((panel.field_mm(), *placed))
@@ -113,7 +114,7 @@ impl Target {
                     Some((field_mm, placed)) => {
                         // Instead of the marks at the plate's corners.
                         sheet.lines.clear();
-                        let corners = corners_of(field_mm);
+                        let corners = rectangle(field_mm);
                         add_outline(sheet, corners.map(|corner| placed.page_from_panel(corner)));
                     }
                     None => add_contour(sheet, margin_mm),
@@ -131,12 +132,7 @@ fn add_contour(sheet: &mut SheetLayout, margin_mm: f64) {
     }
     let inset = margin_mm.max(super::layout::LEAST_MARGIN_MM) / 2.0;
     let (right, upper) = (sheet.width_mm - inset, sheet.height_mm - inset);
-    add_outline(sheet, corners_of([inset, inset, right, upper]));
-}
-
-/// The corners of a rectangle by its left, lower, right and upper end.
-fn corners_of([left, lower, right, upper]: [f64; 4]) -> [DVec2; 4] {
-    [(left, lower), (right, lower), (right, upper), (left, upper)].map(DVec2::from)
+    add_outline(sheet, rectangle([inset, inset, right, upper]));
 }
 
 /// Adds the sides of a rectangle as lines to cut along.

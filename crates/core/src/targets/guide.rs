@@ -24,6 +24,7 @@ use super::{
     SheetText, SolidSpec, Target, TargetError, TargetSpec,
 };
 use crate::lattice::{GridKind, Tile};
+use crate::polygon::rectangle;
 use crate::words::counted;
 
 /// Sides of the paper that is taken as it is, mm: what is printed at a desk. Else the page is an A4.
@@ -356,9 +357,7 @@ impl Model {
     /// A board on its plate, with its black tiles.
     fn of_board(panel: &Panel) -> Self {
         let at = |point: DVec2| panel.pose.target_from_panel(point);
-        let [left, lower, right, upper] = panel.field_mm();
-        let plate = [(left, lower), (right, lower), (right, upper), (left, upper)]
-            .map(|(x, y)| at(DVec2::new(x, y)));
+        let plate = rectangle(panel.field_mm()).map(at);
         let front = panel.pose.matrix();
         let depth = PLATE_PART * plate[0].distance(plate[2]);
         let behind = plate.map(|corner| corner - depth * panel.pose.matrix().z_axis);

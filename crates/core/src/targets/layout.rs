@@ -22,6 +22,7 @@ use super::{
     SheetLine, SheetText, TagsIn, TargetError, board,
 };
 use crate::family::places;
+use crate::polygon::rectangle;
 
 /// Capital height of the words on a check bar, mm: 7 pt, small print that is still easy to read.
 const BAR_CAP_MM: f64 = 1.8;
@@ -323,9 +324,7 @@ impl Arrangement {
     /// Marks at the corners of a plate, a rectangle of the board's frame, to cut its sheet out, or to lay one side on the other.
     pub(super) fn crop_marks(&self, panel: u32, ink: [f64; 4], plate: [f64; 4]) -> Vec<SheetLine> {
         let placement = self.placement(panel, ink);
-        let [left, lower, right, upper] = plate;
-        let corners =
-            [(left, lower), (right, lower), (right, upper), (left, upper)].map(DVec2::from);
+        let corners = rectangle(plate);
         let middle = (corners[0] + corners[2]) / 2.0;
         let marks = corners.into_iter().flat_map(|corner| {
             let out = (corner - middle).signum();

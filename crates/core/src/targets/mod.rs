@@ -366,6 +366,12 @@ impl Target {
         self.panels.len() > 1 && !self.spec.is_rigid()
     }
 
+    /// Whether its panels have places in one scene, as far as is known: a list tells nothing of what is around several.
+    pub fn is_one_scene(&self) -> bool {
+        let is_list = matches!(self.spec, TargetSpec::Listed(_));
+        self.panels.len() <= 1 || !(self.is_loose() || is_list)
+    }
+
     /// The tilings of its panels.
     pub fn tilings(&self) -> impl Iterator<Item = GridKind> {
         let has = |kind: &GridKind| self.panels.iter().any(|panel| panel.kind == *kind);

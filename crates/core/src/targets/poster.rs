@@ -16,6 +16,7 @@ use super::layout::{ADVANCE_CAPS, Arrangement, Footprint, fit_upright};
 use super::net::plane::{Motion, bounds, gap_mm};
 use super::paper::{Orientation, PaperSize, PaperSpec};
 use super::{Label, LineKind, SheetLayout, SheetLine, SheetPage, SheetText, TargetError};
+use crate::polygon::rectangle;
 
 /// Width of what neighbouring windows share, mm.
 const OVERLAP_MM: f64 = 10.0;
@@ -347,11 +348,6 @@ fn joining(left: Option<usize>, above: Option<usize>) -> String {
         }
     };
     format!("Trim along {line}; glue it on {pages}, its edge on the ticks, cross on cross.")
-}
-
-/// A rectangle, counter-clockwise.
-fn rectangle([left, lower, right, upper]: [f64; 4]) -> [DVec2; 4] {
-    [(left, lower), (right, lower), (right, upper), (left, upper)].map(DVec2::from)
 }
 
 /// Everything printed on a sheet, as convex polygons.

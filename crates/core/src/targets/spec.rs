@@ -545,8 +545,16 @@ impl TargetSpec {
     pub fn is_rigid(&self) -> bool {
         match self {
             Self::Solid(_) | Self::Listed(_) => true,
-            Self::Board(board) => board.two_sided_mm.is_some(),
+            Self::Board(_) => self.two_sided_mm().is_some(),
             Self::Tags(_) | Self::Charuco(_) | Self::AprilGrid(_) | Self::Circles(_) => false,
+        }
+    }
+
+    /// The distance between the sides of a board that has two, mm.
+    pub fn two_sided_mm(&self) -> Option<f64> {
+        match self {
+            Self::Board(board) => board.two_sided_mm,
+            _ => None,
         }
     }
 

@@ -19,6 +19,7 @@ use spade::{ConstrainedDelaunayTriangulation, Point2, Triangulation};
 use super::mesh::{MeshError, Meshing};
 use deltille_core::artwork::{Part, Shape, panel_shapes, subject};
 use deltille_core::family::Family;
+use deltille_core::polygon::rectangle;
 use deltille_core::targets::{Panel, Polyhedron, Target, TargetSpec};
 
 /// Depth of the inlay, mm, unless another is asked for: two layers of most printers.
@@ -101,8 +102,7 @@ fn plate(panel: &Panel, shapes: &[Shape], meshing: Meshing) -> Result<[Body; 2],
     if inlay_mm >= plate_mm {
         return Err(MeshError::DeepInlay { inlay_mm, most_mm: plate_mm });
     }
-    let [left, lower, right, upper] = panel.field_mm();
-    let outline = [(left, lower), (right, lower), (right, upper), (left, upper)].map(DVec2::from);
+    let outline = rectangle(panel.field_mm());
     let face = Face::new(&outline, shapes)?;
     let place = |point: DVec2, depth_mm: f64| below(panel, point, depth_mm);
     let (mut white, mut black) = (Body::default(), Body::default());

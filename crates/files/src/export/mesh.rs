@@ -9,8 +9,9 @@ use super::{GENERATOR, png};
 use deltille_core::artwork::{ArtworkError, Atlas};
 use deltille_core::family::Family;
 use deltille_core::lattice::GridKind;
+use deltille_core::polygon::rectangle;
 use deltille_core::targets::{
-    BoardSpec, ClosedMeshError, Panel, SolidSpec, Target, TargetError, TargetSpec, triangles,
+    ClosedMeshError, Panel, SolidSpec, Target, TargetError, TargetSpec, triangles,
 };
 
 /// Texels along the edge of a cell of a tag, unless another resolution is asked for, so that a viewer sees it sharp at
@@ -213,10 +214,7 @@ impl TexturedMesh {
             }
             _ => return Err(MeshError::NoShape(name())),
         };
-        let plate_mm = match &target.spec {
-            TargetSpec::Board(BoardSpec { two_sided_mm: Some(mm), .. }) => *mm,
-            _ => meshing.plate_mm,
-        };
+        let plate_mm = target.spec.two_sided_mm().unwrap_or(meshing.plate_mm);
         if !(0.1..=1000.0).contains(&plate_mm) {
             return Err(MeshError::Thickness(plate_mm));
         }
@@ -354,9 +352,8 @@ fn plate_faces(
     textured: &[[DVec2; 3]],
     atlas: &Atlas,
 ) -> Vec<MeshFace> {
-    let [left, lower, right, upper] = sides[0].field_mm();
-    let around = [(left, lower), (right, lower), (right, upper), (left, upper)];
-    let before = around.map(|(x, y)| sides[0].pose.target_from_panel(DVec2::new(x, y)));
+    let around = rectangle(sides[0].field_mm());
+    let before = around.map(|corner| sides[0].pose.target_from_panel(corner));
     let behind = before.map(|place| place - thickness_mm * sides[0].pose.matrix().z_axis);
     let [a, b, c, d] = behind;
     // Lower left end first, as the board on that side is seen.
