@@ -46,7 +46,7 @@ impl Solids {
             edge_mm: self.edge_mm.unwrap_or(usual.edge_mm),
             tiles: self.tiles.unwrap_or(usual.tiles),
             board_id: self.board_id,
-            tags,
+            tags: Some(tags),
             skeleton: self.skeleton,
             ..usual
         };

@@ -248,10 +248,7 @@ fn target(object: Object) -> Result<(Target, Family), RigExperimentError> {
             TargetSpec::Board(BoardSpec { boards: 6, ..board })
         }
     };
-    let family = match &spec {
-        TargetSpec::Solid(spec) => Family::shipped(&spec.tags.family)?,
-        _ => Family::shipped("aprilTag36h11")?,
-    };
+    let family = Family::shipped(spec.family().unwrap_or_default())?;
     let target = Target::build(object.name(), &spec, Some(&family), None)?;
     if object == Object::Icosahedron {
         return Ok((target, family));

@@ -45,6 +45,17 @@ pub fn hull(mut points: Vec<DVec2>) -> Vec<DVec2> {
     [lower, upper].concat()
 }
 
+/// A convex polygon, counterclockwise with y up, whose sides are moved outwards.
+pub fn grown(polygon: &[DVec2], by: f64) -> Vec<DVec2> {
+    let count = polygon.len();
+    let outwards = |i: usize| -(polygon[(i + 1) % count] - polygon[i]).perp().normalize_or_zero();
+    let corner = |i: usize| {
+        let (before, after) = (outwards((i + count - 1) % count), outwards(i));
+        polygon[i] + by * (before + after) / (1.0 + before.dot(after))
+    };
+    (0..count).map(corner).collect()
+}
+
 /// The part of a polygon where a linear function is positive (Sutherland and Hodgman 1974). Where the polygon is not
 /// convex, parts stay joined along the line, where they enclose nothing.
 pub fn clip(polygon: &[DVec2], at: impl Fn(DVec2) -> f64) -> Vec<DVec2> {

@@ -221,6 +221,8 @@ quantities! {
     side_of_matrix: 0.0 to 10_000.0 "";
     /// A border of a tag.
     border_bits: 0.0 to 100.0 "bit-widths";
+    /// The width of the black around the tiles of a face.
+    rim_mm: 1e-3 to 1e5 "mm";
     /// The width of a gap between tags, in tags.
     gap_edges: 0.01 to 1.0 "edges";
     /// A measured length over the stated one.

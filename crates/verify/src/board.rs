@@ -17,7 +17,7 @@ use deltille_core::words::counted;
 
 /// An unlabelled corner is taken for a stated one within this many edges of it: less than half the
 /// way to the next.
-const MATCH_EDGES: f64 = 0.25;
+pub(super) const MATCH_EDGES: f64 = 0.25;
 
 /// Greatest share of tiles of the wrong colour that are named one by one; with more, the picture
 /// does not show the panel.

@@ -20,7 +20,7 @@ use super::tiles::{EDGE_PX, PROBES, PlacedPanel};
 use super::{Finding, SheetVerdict};
 use deltille_core::artwork;
 use deltille_core::lattice::{Orientation, Tile};
-use deltille_core::polygon;
+use deltille_core::polygon::{self, rectangle};
 use deltille_core::raster::{Coverage, Gray};
 use deltille_core::targets::{
     CHECK_BAR_STROKE_MM, Corner, Label, LineKind, SheetLayout, SheetText,
@@ -506,8 +506,9 @@ struct Ground<'a> {
     /// Directions in which tiles are looked for beside a pixel: fine enough that no tip of a tile, also a lone
     /// one, slips between two.
     probes: Vec<DVec2>,
-    /// The tiles and the black field of an inverted panel: left, lower, right, upper end, mm.
-    field: [f64; 4],
+    /// Outline of the tiles, or of the black field of an inverted panel, counter-clockwise: from where each side begins, and
+    /// which way is inwards, mm.
+    field: Vec<[DVec2; 2]>,
     /// Where on the picture that may be: left, upper, right, lower end, px.
     around_px: [f64; 4],
 }
@@ -515,13 +516,17 @@ struct Ground<'a> {
 impl<'a> Ground<'a> {
     fn new(placed: &'a PlacedPanel<'a>) -> Self {
         let panel = placed.panel;
-        let field = if panel.inverted { panel.field_mm() } else { panel.bounds_mm() };
-        let [left, lower, right, upper] = field;
-        let ends = [(left, lower), (right, lower), (right, upper), (left, upper)];
-        let [a, b, c, d] = ends.map(|p| placed.page.px_from_page(placed.page_from_panel(p.into())));
+        let outline = match panel.inverted {
+            true => panel.field_outline_mm(),
+            false => rectangle(panel.bounds_mm()).to_vec(),
+        };
+        let ends = || outline.iter().map(|&p| placed.page.px_from_page(placed.page_from_panel(p)));
         let reach_px = 2.0 * EDGE_PX + placed.page.smear_px;
-        let first = a.min(b).min(c).min(d) - reach_px;
-        let last = a.max(b).max(c).max(d) + reach_px;
+        let first = ends().fold(DVec2::INFINITY, DVec2::min) - reach_px;
+        let last = ends().fold(DVec2::NEG_INFINITY, DVec2::max) + reach_px;
+        let next = outline.iter().cycle().skip(1);
+        let inwards = |from: DVec2, to: DVec2| [from, (to - from).perp().normalize_or_zero()];
+        let field = outline.iter().zip(next).map(|(&from, &to)| inwards(from, to)).collect();
         let around_px = [first.x, first.y, last.x, last.y];
         let angles = (0..PROBES).map(|n| f64::from(n) * TAU / f64::from(PROBES));
         let probes = angles.map(DVec2::from_angle).collect();
@@ -541,9 +546,8 @@ impl<'a> Ground<'a> {
             return None;
         }
         let place = self.placed.panel_from_page(page.page_from_px(pixel));
-        let DVec2 { x: u, y: v } = place;
-        let [left, lower, right, upper] = self.field;
-        let inside = (u - left).min(right - u).min(v - lower).min(upper - v) * page.px_per_mm;
+        let depths = self.field.iter().map(|[from, inwards]| (place - from).dot(*inwards));
+        let inside = depths.fold(f64::INFINITY, f64::min) * page.px_per_mm;
         if inside < -near_px {
             return None;
         }

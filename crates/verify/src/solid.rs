@@ -9,7 +9,7 @@ use glam::{DVec2, DVec3};
 use rayon::prelude::*;
 use serde::Serialize;
 
-use super::board::{BoardFinding, wrong_tones};
+use super::board::{BoardFinding, MATCH_EDGES, wrong_tones};
 use super::face_page::face_page;
 use super::finding::shown;
 use super::fit::AffineMap;
@@ -269,7 +269,8 @@ fn check_face(verifier: &Verifier, model: &Model, panel: &Panel) -> FaceVerdict 
         max_deviation_mm: 0.0,
         findings: Vec::new(),
     };
-    if !sees(&detection, panel.id) {
+    let seen = seen_corners(verifier, panel, &detection, |pixel| view.meet(model, pixel));
+    if !seen.iter().any(|seen| seen.panel.id == panel.id) {
         let mirrored = sees(&verifier.detector.detect(&mirror(image), "mirror"), panel.id);
         let panel = panel.id;
         let finding = if mirrored {
@@ -280,7 +281,7 @@ fn check_face(verifier: &Verifier, model: &Model, panel: &Panel) -> FaceVerdict 
         verdict.findings.push(finding.into());
         return verdict;
     }
-    check_corners(verifier, model, panel, &view, &detection, &mut verdict);
+    check_corners(model, panel, &seen, &mut verdict);
     let is_off =
         |finding: &Finding| matches!(finding, Finding::Mesh(MeshFinding::CornerOff3d { .. }));
     if verdict.findings.iter().any(is_off) {
@@ -364,43 +365,64 @@ impl Verifier<'_> {
     }
 }
 
-/// Follows every labelled corner back onto the mesh; neighbouring faces in the picture must be
-/// where they belong, too.
-fn check_corners(
-    verifier: &Verifier,
-    model: &Model,
-    panel: &Panel,
-    view: &View,
+/// A corner that is seen in the picture of a face.
+struct Seen<'a> {
+    /// The panel that it is of.
+    panel: &'a Panel,
+    stated: &'a Corner,
+    /// Where it is on the mesh, mm; not a number where its ray misses that.
+    at_mm: DVec3,
+}
+
+/// The corners in the picture of a face: those of all panels that are labelled, or, where the panel has no tags, those
+/// that are near to its own.
+fn seen_corners<'a>(
+    verifier: &'a Verifier,
+    panel: &'a Panel,
     detection: &Detection,
-    verdict: &mut FaceVerdict,
-) {
+    meet: impl Fn(DVec2) -> Option<DVec3>,
+) -> Vec<Seen<'a>> {
+    let mut all = Vec::new();
+    for grid in &detection.grids {
+        let labelled = verifier.target.panels.iter().find(|panel| Some(panel.id) == grid.panel);
+        for corner in &grid.corners {
+            let at_mm = meet(corner.position()).unwrap_or(DVec3::NAN);
+            let stated = match labelled {
+                Some(panel) => panel
+                    .corner_at(Vertex::new(corner.row, corner.col))
+                    .filter(|stated| corner.id == Some(stated.id)),
+                None if panel.tags.is_empty() => panel.corners.iter().find(|stated| {
+                    stated.target_mm.distance(at_mm) < MATCH_EDGES * panel.edge_mm
+                }),
+                None => None,
+            };
+            let panel = labelled.unwrap_or(panel);
+            all.extend(stated.map(|stated| Seen { panel, stated, at_mm }));
+        }
+    }
+    all
+}
+
+/// Compares every corner with where it should be on the mesh; neighbouring faces in the picture must be where they belong,
+/// too.
+fn check_corners(model: &Model, panel: &Panel, seen: &[Seen], verdict: &mut FaceVerdict) {
     let mut found = BTreeSet::new();
     let located_mm = LOCATED_PX.max(LOCATED_TEXELS * texel_px(model, panel, verdict.px_per_mm))
         / verdict.px_per_mm;
-    for grid in &detection.grids {
-        let Some(seen) = verifier.target.panels.iter().find(|p| Some(p.id) == grid.panel) else {
-            continue;
-        };
-        let own = seen.id == panel.id;
+    for Seen { panel: of, stated, at_mm } in seen {
+        let own = of.id == panel.id;
         let tolerance_mm = if own { MESH_TOLERANCE_MM } else { GRAZING_TOLERANCE_MM };
         let tolerance_mm = tolerance_mm.max(located_mm);
-        for corner in &grid.corners {
-            let vertex = Vertex::new(corner.row, corner.col);
-            let Some(stated) = seen.corner_at(vertex).filter(|c| corner.id == Some(c.id)) else {
-                continue;
-            };
-            let at = view.meet(model, corner.position()).unwrap_or(DVec3::NAN);
-            let by_mm = at - stated.target_mm;
-            let deviation_mm = by_mm.length();
-            if own {
-                found.insert(stated.id);
-                verdict.max_deviation_mm = verdict.max_deviation_mm.max(deviation_mm);
-            }
-            // A ray that misses the mesh counts as off.
-            if deviation_mm.is_nan() || deviation_mm > tolerance_mm {
-                let (id, row, col) = (stated.id, stated.row, stated.col);
-                verdict.findings.push(MeshFinding::CornerOff3d { id, row, col, by_mm }.into());
-            }
+        let by_mm = at_mm - stated.target_mm;
+        let deviation_mm = by_mm.length();
+        if own {
+            found.insert(stated.id);
+            verdict.max_deviation_mm = verdict.max_deviation_mm.max(deviation_mm);
+        }
+        // A ray that misses the mesh counts as off.
+        if deviation_mm.is_nan() || deviation_mm > tolerance_mm {
+            let (id, row, col) = (stated.id, stated.row, stated.col);
+            verdict.findings.push(MeshFinding::CornerOff3d { id, row, col, by_mm }.into());
         }
     }
     verdict.corners_found = found.len();

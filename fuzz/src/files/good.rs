@@ -39,9 +39,11 @@ pub static SOLID: LazyLock<Target> = LazyLock::new(|| {
         margin_mm: 3.0,
         ..SolidSpec::new(SolidShape::Tetrahedron)
     };
-    spec.tags.family = "delTag16h5".to_owned();
-    // The wider the bits, the smaller is the texture.
-    spec.tags.border_bits = 0.6;
+    if let Some(tags) = &mut spec.tags {
+        tags.family = "delTag16h5".to_owned();
+        // The wider the bits, the smaller is the texture.
+        tags.border_bits = 0.6;
+    }
     Target::build("t", &TargetSpec::Solid(spec), Some(&FAMILY), Some(&PaperSpec::default()))
         .unwrap()
 });

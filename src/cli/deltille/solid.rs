@@ -175,31 +175,38 @@ fn run_with(
     args.laser.check_use()?;
     let spec = settings.spec(shape)?;
     let paper = settings.paper()?;
-    let mut family = family::resolve(&spec.tags.family).context("--family")?;
-    if let Some(tags) = &spec.square_tags {
-        family = family.with_squares(family::resolve(&tags.family).context("--square-family")?);
-    }
+    let family = family_of(&spec)?;
+    let family = family.as_ref();
     let name = settings.name.clone().unwrap_or_else(|| spec.shape.name().to_owned());
     // What is cut is the net that is printed, or would be: the description has it in either case.
     let net = settings.dxf && !settings.per_face;
     let layout = (settings.printed() || net).then_some(&paper);
     let solid = TargetSpec::Solid(spec.clone());
-    let target = Target::build(&name, &solid, Some(&family), layout)?;
+    let target = Target::build(&name, &solid, family, layout)?;
     args.delivery.check_beside(&target)?;
     let template = args
         .save_template
         .as_deref()
         .map(|path| Template::new(path, settings.to_toml(command), args.delivery.overwrite));
     let template = template.transpose()?;
-    let mut files = files(&settings, &target, net, &spec, &family)?;
-    let (textured, texture) = meshes.files(&target, Some(&family), None)?;
+    let mut files = files(&settings, &target, net, &spec, family)?;
+    let (textured, texture) = meshes.files(&target, family, None)?;
     files.extend(textured);
-    files.extend(args.laser.files(&target, Some(&family))?);
-    files.extend(pages(&settings, &target, &family)?);
+    files.extend(args.laser.files(&target, family)?);
+    files.extend(pages(&settings, &target, family)?);
     let told = summary(&target, &spec)? + &texture;
-    let delivered = args.delivery.deliver(&target, Some(&family), &files, &told)?;
+    let delivered = args.delivery.deliver(&target, family, &files, &told)?;
     template.map_or(Ok(()), |template| template.write())?;
     Ok(delivered)
+}
+
+/// The family of the tags, with that of square ones where there are both.
+fn family_of(spec: &SolidSpec) -> anyhow::Result<Option<Family>> {
+    let Some(tags) = &spec.tags else { return Ok(None) };
+    let family = family::resolve(&tags.family).context("--family")?;
+    let Some(squares) = &spec.square_tags else { return Ok(Some(family)) };
+    let squares = family::resolve(&squares.family).context("--square-family")?;
+    Ok(Some(family.with_squares(squares)))
 }
 
 impl Args {
@@ -229,7 +236,7 @@ fn files(
     target: &Target,
     net: bool,
     spec: &SolidSpec,
-    family: &Family,
+    family: Option<&Family>,
 ) -> anyhow::Result<Vec<File>> {
     let name = &target.name;
     let mut files = vec![text_file(format!("{name}.json"), target.to_json())];
@@ -244,18 +251,22 @@ fn files(
         (net, What::Net),
     ];
     for (_, what) in asked.into_iter().filter(|(is_asked, _)| *is_asked) {
-        let made = artifacts::make(target, Some(family), what, Making::default())?;
+        let made = artifacts::make(target, family, what, Making::default())?;
         files.extend(made.into_iter().map(|(name, bytes)| bytes_file(name, bytes)));
     }
     Ok(files)
 }
 
 /// The pages that are asked for.
-fn pages(settings: &SolidSettings, target: &Target, family: &Family) -> anyhow::Result<Vec<File>> {
+fn pages(
+    settings: &SolidSettings,
+    target: &Target,
+    family: Option<&Family>,
+) -> anyhow::Result<Vec<File>> {
     if !settings.printed() {
         return Ok(Vec::new());
     }
-    let artwork = artwork::draw(target, Some(family))?;
+    let artwork = artwork::draw(target, family)?;
     let SolidSettings { pdf, svg, png, .. } = *settings;
     let dpi = settings.dpi.unwrap_or(DEFAULT_DPI);
     Ok(files::drawn(&target.name, artwork, files::Formats { pdf, svg, png }, dpi))

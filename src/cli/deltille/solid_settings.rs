@@ -12,6 +12,7 @@ use super::template;
 use crate::cli::values::{number, whole};
 use crate::export::dsc::Dialect;
 use crate::family::places;
+use crate::lattice::GridKind;
 use crate::targets::{
     BORDER_BITS, DEFAULT_MARGIN_MM, FACE_TILES, MOST_ROWS, PaperSpec, SkeletonSpec, SolidShape,
     SolidSheets, SolidSpec, TagSpec, TagsIn, parse_length_mm,
@@ -59,6 +60,15 @@ pub struct SolidSettings {
     #[arg(long, help_heading = TAGS, conflicts_with_all = ["family", "tag_spacing", "first_id"])]
     #[serde(skip_serializing_if = "is_false")]
     pub dense: bool,
+    /// No tags; faces are not told apart
+    #[arg(long, help_heading = TAGS,
+          conflicts_with_all = ["family", "dense", "tag_spacing", "tag_border", "first_id", "tag_ids"])]
+    #[serde(skip_serializing_if = "is_false")]
+    pub untagged: bool,
+    /// White tiles on black, which takes a part of the margin [default margin: 8mm]
+    #[arg(long)]
+    #[serde(skip_serializing_if = "is_false")]
+    pub invert: bool,
     /// A tag in every n-th row and column of a face [default: 3]
     #[arg(long, help_heading = TAGS, value_name = "N", allow_negative_numbers = true, value_parser = whole(1..=MOST_ROWS))]
     pub tag_spacing: Option<u32>,
@@ -167,15 +177,29 @@ impl SolidSettings {
     pub fn or(self, template: Self) -> Self {
         let formats = self.printed();
         let png = self.png || (template.png && !formats);
-        let is_dense = self.dense || (template.dense && self.family.is_none());
+        let says_tags = self.family.is_some()
+            || self.tag_spacing.is_some()
+            || self.tag_border.is_some()
+            || self.first_id.is_some();
+        let is_dense = self.dense || (template.dense && self.family.is_none() && !self.untagged);
+        let untagged = self.untagged || (template.untagged && !self.dense && !says_tags);
         Self {
             command: None,
             // Which tags there are, is said as a whole.
             dense: is_dense,
-            tag_ids: self.tag_ids || (template.tag_ids && !is_dense),
-            family: self.family.or(template.family.filter(|_| !is_dense)),
-            tag_spacing: self.tag_spacing.or(template.tag_spacing.filter(|_| !is_dense)),
-            first_id: self.first_id.or(template.first_id.filter(|_| !is_dense)),
+            untagged,
+            tag_ids: self.tag_ids || (template.tag_ids && !is_dense && !untagged),
+            family: self.family.or(template.family.filter(|_| !is_dense && !untagged)),
+            tag_spacing: self
+                .tag_spacing
+                .or(template.tag_spacing.filter(|_| !is_dense && !untagged)),
+            first_id: self.first_id.or(template.first_id.filter(|_| !is_dense && !untagged)),
+            tag_border: self.tag_border.or(template.tag_border.filter(|_| !untagged)),
+            square_family: self.square_family.or(template.square_family.filter(|_| !untagged)),
+            first_square_id: self
+                .first_square_id
+                .or(template.first_square_id.filter(|_| !untagged)),
+            invert: self.invert || template.invert,
             // A mesh has one size.
             scale: self.scale.or(template.scale.filter(|_| self.edge.is_none())),
             edge: self.edge.or(template.edge.filter(|_| self.scale.is_none())),
@@ -188,12 +212,9 @@ impl SolidSettings {
             dpi: self.dpi.or(template.dpi.filter(|_| png || !template.png)),
             size: self.size.or(template.size),
             mesh: self.mesh.or(template.mesh),
-            square_family: self.square_family.or(template.square_family),
-            first_square_id: self.first_square_id.or(template.first_square_id),
             allow_skew: self.allow_skew || template.allow_skew,
             tiles: self.tiles.or(template.tiles),
             face_margin: self.face_margin.or(template.face_margin),
-            tag_border: self.tag_border.or(template.tag_border),
             board_id: self.board_id.or(template.board_id),
             stl: self.stl || template.stl,
             skeleton: self.skeleton || template.skeleton,
@@ -269,19 +290,13 @@ impl SolidSettings {
     /// The solid of a shape.
     pub fn spec(&self, shape: SolidShape) -> anyhow::Result<SolidSpec> {
         let default = SolidSpec::new(shape);
-        let family = if self.dense { Some(places::NAME) } else { self.family.as_deref() };
-        let tags = TagSpec::usual(default.shape.tag_tiling(), family, TagsIn::Black);
         let mut spec = SolidSpec {
             edge_mm: length("--edge", &self.edge)?.unwrap_or(default.edge_mm),
             tiles: self.tiles.unwrap_or(default.tiles),
             margin_mm: default.margin_mm,
             board_id: self.board_id.unwrap_or(default.board_id),
-            tags: TagSpec {
-                first_id: self.first_id.unwrap_or(tags.first_id),
-                spacing: self.tag_spacing.unwrap_or(tags.spacing),
-                border_bits: self.tag_border.unwrap_or(tags.border_bits),
-                ..tags
-            },
+            tags: self.tags(default.shape.tag_tiling())?,
+            inverted: self.invert,
             square_tags: self.square_tags(default.square_tags)?,
             skeleton: self.skeleton()?,
             shape: default.shape,
@@ -293,6 +308,34 @@ impl SolidSettings {
         Ok(spec)
     }
 
+    /// The tags of all faces, or of those of a tiling where there are two.
+    fn tags(&self, tiling: GridKind) -> anyhow::Result<Option<TagSpec>> {
+        let of_tags = [
+            ("family", self.family.is_some()),
+            ("dense", self.dense),
+            ("tag-spacing", self.tag_spacing.is_some()),
+            ("tag-border", self.tag_border.is_some()),
+            ("first-id", self.first_id.is_some()),
+            ("square-family", self.square_family.is_some()),
+            ("first-square-id", self.first_square_id.is_some()),
+            ("tag-ids", self.tag_ids),
+        ];
+        if self.untagged {
+            return match of_tags.iter().find(|(_, is_given)| *is_given) {
+                Some((option, _)) => bail!("--untagged: there are no tags: leave --{option} out"),
+                None => Ok(None),
+            };
+        }
+        let family = if self.dense { Some(places::NAME) } else { self.family.as_deref() };
+        let tags = TagSpec::usual(tiling, family, TagsIn::Black);
+        Ok(Some(TagSpec {
+            first_id: self.first_id.unwrap_or(tags.first_id),
+            spacing: self.tag_spacing.unwrap_or(tags.spacing),
+            border_bits: self.tag_border.unwrap_or(tags.border_bits),
+            ..tags
+        }))
+    }
+
     /// The tags of rectangular faces, `usual` where there are such beside others.
     fn square_tags(&self, usual: Option<TagSpec>) -> anyhow::Result<Option<TagSpec>> {
         let is_asked = self.square_family.is_some() || self.first_square_id.is_some();
@@ -302,6 +345,7 @@ impl SolidSettings {
                  or --first-id"
             ),
             None => Ok(None),
+            Some(_) if self.untagged => Ok(None),
             Some(usual) => Ok(Some(TagSpec {
                 family: self.square_family.clone().unwrap_or(usual.family),
                 first_id: self.first_square_id.unwrap_or(usual.first_id),

@@ -17,7 +17,7 @@ use rand_chacha::ChaCha8Rng;
 
 fn solid(shape: SolidShape, first_id: u32, board_id: u32) -> (Target, Family, Scene) {
     let tags = TagSpec { first_id, ..TagSpec::default() };
-    let spec = SolidSpec { board_id, tags, ..SolidSpec::new(shape) };
+    let spec = SolidSpec { board_id, tags: Some(tags), ..SolidSpec::new(shape) };
     let family = Family::shipped("delTag25h7").unwrap();
     let target = Target::build("solid", &TargetSpec::Solid(spec), Some(&family), None).unwrap();
     let scene = scene_of_target(&target, Some(&family)).unwrap();
@@ -368,4 +368,26 @@ fn three_hundred_views_of_an_icosahedron() {
     assert_eq!(labelled, due);
     assert!(wrong.is_empty() && displaced.is_empty());
     assert!(rms < 0.05);
+}
+
+/// Faces with white tiles are labelled in a picture; bare ones are found, and not named.
+#[test]
+fn inverted_faces_are_labelled_and_bare_ones_are_not() {
+    for (tags, inverted) in [(true, true), (false, false)] {
+        let mut spec = SolidSpec { inverted, ..SolidSpec::new(SolidShape::Octahedron) };
+        spec.margin_mm = spec.comfortable_margin_mm().unwrap();
+        spec.tags = spec.tags.filter(|_| tags);
+        let family = spec.tags.as_ref().map(|tags| Family::shipped(&tags.family).unwrap());
+        let spec = TargetSpec::Solid(spec);
+        let target = Target::build("o", &spec, family.as_ref(), None).unwrap();
+        let scene = scene_of_target(&target, family.as_ref()).unwrap();
+        let camera = Camera::pinhole(1200, 900, 1500.0);
+        let eye = DVec3::new(260.0, 180.0, 330.0);
+        let image =
+            scene.render(&camera, &Pose::looking_at(eye, DVec3::ZERO, DVec3::Z), &Light::default());
+        let detector = Detector::for_target(&target, family.as_ref(), DetectorConfig::default());
+        let grids = detector.detect(&eight_bits(&image), "o").grids;
+        assert!(grids.len() >= 3, "{} grids", grids.len());
+        assert!(grids.iter().all(|grid| grid.panel.is_some() == tags));
+    }
 }

@@ -8,7 +8,7 @@ use crate::common::page::Page;
 use crate::common::solids::{cuboctahedron, rhombic_dodecahedron, truncated_tetrahedron};
 use deltille::export::dsc;
 use deltille::lattice::GridKind;
-use deltille::targets::{LineKind, Target};
+use deltille::targets::{LineKind, Target, TargetSpec};
 use glam::DVec2;
 
 #[test]
@@ -661,4 +661,25 @@ fn what_cannot_be_made_is_refused_in_one_line_and_leaves_nothing() {
     std::fs::create_dir(at.join("octahedron.stl")).unwrap();
     page.refused(at, "deltille octahedron --stl");
     page.is("icosahedron");
+}
+
+/// Bare tilings, white tiles on black, and both: pages, meshes, bodies and drawings are proved like all others.
+#[test]
+fn solids_are_untagged_and_inverted() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path();
+    let formats = "--pdf --gltf --obj --3mf --laser dxf,svg";
+    for solid in ["tetrahedron --edge 90mm --tiles 6", "cube --edge 90mm --tiles 6"] {
+        for (how, face_margin) in
+            [("--untagged", 5.0), ("--invert", 8.0), ("--untagged --invert", 8.0)]
+        {
+            deltille(path, &format!("{solid} {how} {formats} --name s --force")).success();
+            let target = std::fs::read_to_string(path.join("s.json")).unwrap();
+            let target = Target::from_json(&target).unwrap();
+            let TargetSpec::Solid(spec) = &target.spec else { panic!("{solid} is a solid") };
+            assert_eq!(spec.margin_mm, face_margin, "{solid} {how}");
+            assert_eq!(target.family.is_none(), how.contains("untagged"));
+            assert!(target.panels.iter().all(|panel| panel.inverted == how.contains("invert")));
+        }
+    }
 }

@@ -116,12 +116,14 @@ impl Wanted {
         }
     }
 
+    /// The tags of a board or of the faces of a solid, unless there are none.
+    fn wanted_tags(&self, grid: GridKind, is_usual: bool) -> Option<TagSpec> {
+        let is_wanted = self.family.as_ref().map_or(is_usual, |family| !family.is_empty());
+        is_wanted.then(|| self.tags(grid))
+    }
+
     fn board(&self, grid: GridKind, paper: &PaperSpec) -> TargetSpec {
-        let has_tags = match (&self.family, grid) {
-            (Some(family), _) => !family.is_empty(),
-            (None, grid) => grid == GridKind::Deltille,
-        };
-        let tags = has_tags.then(|| self.tags(grid));
+        let tags = self.wanted_tags(grid, grid == GridKind::Deltille);
         let mut spec = BoardSpec {
             boards: self.boards,
             board_id: self.board_id,
@@ -156,7 +158,8 @@ impl Wanted {
             edge_mm: self.edge_mm.unwrap_or(usual.edge_mm),
             tiles: self.tiles.unwrap_or(usual.tiles),
             board_id: self.board_id,
-            tags: self.tags(usual.shape.tag_tiling()),
+            tags: self.wanted_tags(usual.shape.tag_tiling(), true),
+            inverted: self.inverted,
             skeleton: self.skeleton.then(SkeletonSpec::default),
             ..usual
         };

@@ -129,7 +129,8 @@ pub(super) fn draw_panel(
     }
     let paths = drawn.into_iter().map(|(tile, path)| (tile, page_from_panel * path));
     if panel.inverted {
-        let mut field = page_from_panel * rectangle(panel.field_mm());
+        let field = panel.field_outline_mm().into_iter().map(|p| Point::new(p.x, p.y));
+        let mut field = page_from_panel * polygon(field);
         paths.for_each(|(_, path)| field.extend(path));
         let part = Part::Field { panel: panel.id };
         return Ok(vec![Shape { part, paint: Paint::Fill, path: field }]);
@@ -226,8 +227,4 @@ pub(super) fn polygon(points: impl IntoIterator<Item = Point>) -> BezPath {
     }
     path.close_path();
     path
-}
-
-fn rectangle([x0, y0, x1, y1]: [f64; 4]) -> BezPath {
-    polygon([(x0, y0), (x1, y0), (x1, y1), (x0, y1)].map(Point::from))
 }

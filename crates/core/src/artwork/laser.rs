@@ -190,7 +190,7 @@ fn dark_outlines(
         .map(|outline| outline.into_iter().map(|vertex| panel.lattice_mm(vertex)).collect())
         .collect();
     if panel.inverted {
-        dark.push(rectangle(panel.field_mm()).to_vec());
+        dark.push(panel.field_outline_mm());
     }
     for tag in &panel.tags {
         dark.extend(tag_outlines(target, panel, tag, family, simple)?);

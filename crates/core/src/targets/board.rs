@@ -132,6 +132,7 @@ pub(super) fn untied_panels(spec: &BoardSpec) -> Vec<Panel> {
         tag_margin_bits: None,
         gap_edges: None,
         discs_mm: None,
+        rim_mm: None,
         inverted: spec.inverted,
         outline: match spec.grid {
             GridKind::Deltille => Outline::Zigzag,

@@ -106,6 +106,7 @@ impl CirclesSpec {
             tag_margin_bits: None,
             gap_edges: None,
             discs_mm: Some(self.diameter_mm),
+            rim_mm: None,
             inverted: false,
             outline: Outline::Touching,
             matrix: [if self.asymmetric { 2 * columns } else { columns }, rows].map(|n| n as u32),

@@ -250,7 +250,7 @@ fn check_against_spec(target: &Target) -> Result<(), Problem> {
         TargetSpec::Board(spec) => {
             (spec.check().map(|()| board::untied_panels(spec)), spec.tags.is_some())
         }
-        TargetSpec::Solid(spec) => (solid::untied_panels(spec), true),
+        TargetSpec::Solid(spec) => (solid::untied_panels(spec), spec.tags.is_some()),
         TargetSpec::Tags(spec) => (Ok(tag_sheet::panels(spec)), true),
         TargetSpec::Charuco(spec) => (charuco::untied_panels(spec), true),
         TargetSpec::AprilGrid(spec) => (aprilgrid::untied_panels(spec), true),
@@ -287,6 +287,7 @@ fn check_against_spec(target: &Target) -> Result<(), Problem> {
             ("discs_mm", near(panel.discs_mm, made.discs_mm)),
             ("tag_margin_bits", near(panel.tag_margin_bits, made.tag_margin_bits)),
             ("inverted", panel.inverted == made.inverted),
+            ("rim_mm", near(panel.rim_mm, made.rim_mm)),
             ("outline", panel.outline == made.outline),
             ("matrix", panel.matrix == made.matrix),
         ];

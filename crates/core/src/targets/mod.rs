@@ -193,6 +193,13 @@ pub struct Panel {
     pub discs_mm: Option<f64>,
     /// Whether the colours are exchanged: white upright tiles, or squares, on a black field.
     pub inverted: bool,
+    /// Width of the black around the tiles, mm, where that follows their outline: on an inverted face of a solid.
+    #[serde(
+        default,
+        skip_serializing_if = "Option::is_none",
+        deserialize_with = "quantity::rim_mm::de"
+    )]
+    pub rim_mm: Option<f64>,
     /// Which tiles are drawn around the corners.
     #[serde(default)]
     pub outline: Outline,

@@ -4,6 +4,7 @@ use glam::{DVec2, DVec3};
 
 use super::{Corner, Outline, Panel, TagPlacement, TagsIn};
 use crate::lattice::{Tile, Vertex};
+use crate::polygon::{grown, hull, rectangle};
 
 /// White left around the tiles of a panel, in edges. All six tiles of every corner lie inside the
 /// tiles' bounding box, so that nothing is measured beyond it; the quiet zone only has to keep
@@ -175,6 +176,17 @@ impl Panel {
         let quiet = self.quiet_zone_mm();
         let [left, lower, right, upper] = self.bounds_mm();
         [left - quiet, lower - quiet, right + quiet, upper + quiet]
+    }
+
+    /// Outline of the field, mm, counter-clockwise: the rectangle of [`Self::field_mm`], or what lies around the tiles of
+    /// an inverted face.
+    pub fn field_outline_mm(&self) -> Vec<DVec2> {
+        let Some(rim_mm) = self.rim_mm else { return rectangle(self.field_mm()).to_vec() };
+        // Among whole numbers, so that what is straight has no corners.
+        let at = |vertex: Vertex| DVec2::new(vertex.col.into(), vertex.row.into());
+        let around = hull(self.tiles().iter().flat_map(|tile| tile.vertices()).map(at).collect());
+        let place = |at: DVec2| self.lattice_mm(Vertex::new(at.y as i32, at.x as i32));
+        grown(&around.into_iter().map(place).collect::<Vec<_>>(), rim_mm)
     }
 
     /// Width of the quiet zone around tiles of a given edge, mm.

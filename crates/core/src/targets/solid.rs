@@ -10,7 +10,7 @@ use super::length::format_mm;
 use super::spec::MOST_ROWS;
 use super::{
     Corner, Face, FaceBoard, FamilyRef, GridKind, Incircle, Panel, Polyhedron, Skeleton,
-    SolidShape, SolidSpec, TagSpec, TargetError,
+    SolidShape, SolidSpec, TagSpec, TagsIn, TargetError,
 };
 use crate::family::Family;
 use crate::lattice::Vertex;
@@ -62,7 +62,8 @@ impl SolidSpec {
                     return Err(TargetError::invalid("SolidSpec::tiles", problem));
                 }
                 let is_filled = matches!(face.board, FaceBoard::Filled { .. });
-                if is_filled && tagged(&face.board, &self.tags).is_empty() {
+                let is_bare = |tags: &TagSpec| tagged(&face.board, tags).is_empty();
+                if is_filled && self.tags.as_ref().is_some_and(is_bare) {
                     let problem = format!(
                         "{} leave face {index}, of {} sides, no room for a tag: take more",
                         self.tiles,
@@ -95,7 +96,7 @@ impl SolidSpec {
     /// # Errors
     /// Where seats, ledges and windows find no room.
     pub fn comfortable_margin_mm(&self) -> Result<f64, TargetError> {
-        let usual = Self::new(self.shape.clone()).margin_mm;
+        let usual = self.usual_margin_mm();
         let Some(skeleton) = &self.skeleton else { return Ok(usual) };
         let inset_mm = Skeleton::new(&self.polyhedron(), skeleton)?.panel_inset_mm;
         Ok(usual.max((inset_mm + LEAST_PANEL_MARGIN_MM).ceil()))
@@ -178,26 +179,29 @@ pub(super) fn panels(
 ) -> Result<(Vec<Panel>, Option<FamilyRef>), TargetError> {
     let faces = spec.faces()?;
     let has = |kind: GridKind| faces.iter().any(|face| face.board.kind() == kind);
-    let of_kind = |kind: GridKind| family_of(spec, &faces, kind, family);
+    let of_kind = |kind: GridKind| {
+        let tags = spec.tags_of(kind);
+        tags.map(|tags| family_of(spec, tags, &faces, kind, family)).transpose()
+    };
     let family = match [GridKind::Deltille, GridKind::Checker].map(has) {
         [true, true] => {
-            let squares = Some(Box::new(of_kind(GridKind::Checker)?));
-            FamilyRef { squares, ..of_kind(GridKind::Deltille)? }
+            let squares = of_kind(GridKind::Checker)?.map(Box::new);
+            of_kind(GridKind::Deltille)?.map(|family| FamilyRef { squares, ..family })
         }
         [false, _] => of_kind(GridKind::Checker)?,
         [true, false] => of_kind(GridKind::Deltille)?,
     };
-    Ok((on_faces(spec, &faces), Some(family)))
+    Ok((on_faces(spec, &faces), family))
 }
 
 /// The family of the tags on faces of a tiling.
 fn family_of(
     spec: &SolidSpec,
+    tags: &TagSpec,
     faces: &[Face],
     kind: GridKind,
     family: Option<&Family>,
 ) -> Result<FamilyRef, TargetError> {
-    let tags = spec.tags_of(kind);
     let has_both = spec.square_tags.is_some();
     let instead = |available: u64| {
         let count = |spacing| tag_count(faces, kind, &TagSpec { spacing, ..tags.clone() });
@@ -227,14 +231,16 @@ pub(super) fn untied_panels(spec: &SolidSpec) -> Result<Vec<Panel>, TargetError>
 fn on_faces(spec: &SolidSpec, faces: &[Face]) -> Vec<Panel> {
     let mut of_board = BTreeMap::new();
     let mut next_corner = 0u32;
-    let mut next_tags =
-        [GridKind::Deltille, GridKind::Checker].map(|kind| spec.tags_of(kind).first_id);
+    let mut next_tags = [GridKind::Deltille, GridKind::Checker]
+        .map(|kind| spec.tags_of(kind).map_or(0, |tags| tags.first_id));
     let numbered = (spec.board_id..).zip(faces);
     let panels = numbered.map(|(id, face)| {
         let board = &face.board;
         let tags = spec.tags_of(board.kind());
         let (vertices, tiles) =
-            of_board.entry(board).or_insert_with(|| (board.corners(), tagged(board, tags)));
+            of_board.entry(board).or_insert_with(|| {
+                (board.corners(), tags.map_or_else(Vec::new, |tags| tagged(board, tags)))
+            });
         let next_tag = &mut next_tags[usize::from(board.kind() == GridKind::Checker)];
         let (first_corner, first_tag) = (next_corner, *next_tag);
         next_corner += vertices.len() as u32;
@@ -243,12 +249,13 @@ fn on_faces(spec: &SolidSpec, faces: &[Face]) -> Vec<Panel> {
             id,
             kind: board.kind(),
             edge_mm: face.tile_edge_mm,
-            border_bits: Some(tags.border_bits),
-            tags_in: tags.tags_in,
+            border_bits: tags.map(|tags| tags.border_bits),
+            tags_in: tags.map_or_else(TagsIn::default, |tags| tags.tags_in),
             tag_margin_bits: None,
             gap_edges: None,
             discs_mm: None,
-            inverted: false,
+            inverted: spec.inverted,
+            rim_mm: spec.rim_mm(),
             outline: board.outline(),
             matrix: board.matrix(),
             pose: face.pose,
@@ -262,7 +269,7 @@ fn on_faces(spec: &SolidSpec, faces: &[Face]) -> Vec<Panel> {
                     Corner { id, row: v.row, col: v.col, panel_mm, target_mm, measured: None }
                 })
                 .collect(),
-            tags: tags.placements(id, first_tag, tiles),
+            tags: tags.map_or_else(Vec::new, |tags| tags.placements(id, first_tag, tiles)),
         }
     });
     panels.collect()
@@ -286,7 +293,7 @@ mod tests {
     ];
 
     fn build(spec: &SolidSpec) -> Result<Target, TargetError> {
-        let family = Family::shipped(&spec.tags.family).unwrap();
+        let family = Family::shipped(&spec.tags.as_ref().unwrap().family).unwrap();
         Target::build("solid", &TargetSpec::Solid(spec.clone()), Some(&family), None)
     }
 
@@ -305,14 +312,14 @@ mod tests {
     #[test]
     fn ids_that_run_out_are_refused_with_what_would_do() {
         let mut spec = SolidSpec { tiles: 13, ..SolidSpec::new(SolidShape::Icosahedron) };
-        spec.tags.first_id = 200;
+        spec.tags.as_mut().unwrap().first_id = 200;
         let said = build(&spec).unwrap_err().to_string();
         assert!(said.contains("lower it to at most 143"), "{said}");
-        spec.tags.family = "delTag16h5".to_owned();
+        spec.tags.as_mut().unwrap().family = "delTag16h5".to_owned();
         let said = build(&spec).unwrap_err().to_string();
         // Twenty faces with a tag each are more than are left of the family.
         assert!(said.contains("take `TagSpec::family` d25h7 with its"), "{said}");
-        spec.tags.first_id = 0;
+        spec.tags.as_mut().unwrap().first_id = 0;
         let said = build(&spec).unwrap_err().to_string();
         assert!(
             said.contains(
@@ -333,9 +340,9 @@ mod tests {
             shape in 0usize..5, tiles in 6u32..16, edge_mm in 100.0f64..400.0, spacing in 3u32..5,
         ) {
             let mut spec = SolidSpec { tiles, edge_mm, ..SolidSpec::new(SHAPES[shape].clone()) };
-            spec.tags.spacing = spacing;
+            spec.tags.as_mut().unwrap().spacing = spacing;
             if shape < 3 {
-                spec.tags.family = "delTag36h11".to_owned();
+                spec.tags.as_mut().unwrap().family = "delTag36h11".to_owned();
             }
             let target = build(&spec).unwrap();
             let ids: BTreeSet<u32> =

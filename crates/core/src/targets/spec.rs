@@ -49,6 +49,17 @@ const SOLID_EDGE_MM: std::ops::RangeInclusive<f64> = 10.0..=5000.0;
 /// and the detector takes so few for no grid.
 pub const FACE_TILES: std::ops::RangeInclusive<u32> = 6..=200;
 
+/// Least margin of a face with white tiles on black, mm: it has the black around the tiles, and beyond that the numbers of
+/// the face.
+const LEAST_INVERTED_MARGIN_MM: f64 = 5.0;
+
+/// Usual margin of a face, mm: room to fold and glue; and of one with white tiles on black.
+const MARGIN_MM: f64 = 5.0;
+const INVERTED_MARGIN_MM: f64 = 8.0;
+
+/// So much of the margin of a face with white tiles is black.
+const RIM_PART: f64 = 0.4;
+
 /// Farthest a mesh may lie from its origin, mm: meshes and bodies are written in single precision,
 /// which at 100 m leaves 0.01 mm.
 const FARTHEST_MM: f64 = 1e5;
@@ -117,6 +128,10 @@ fn one() -> u32 {
     1
 }
 
+fn is_false(flag: &bool) -> bool {
+    !flag
+}
+
 fn is_deltille(kind: &GridKind) -> bool {
     *kind == GridKind::Deltille
 }
@@ -169,11 +184,14 @@ pub struct SolidSpec {
     pub margin_mm: f64,
     /// Id of the first face's board; the others follow in the order of the faces.
     pub board_id: u32,
-    /// The tags, without which faces could not be told apart.
-    pub tags: TagSpec,
+    /// The tags; `None` for bare tilings, whose faces are not told apart.
+    pub tags: Option<TagSpec>,
     /// The tags of rectangular faces, where other faces have deltille tiles.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub square_tags: Option<TagSpec>,
+    /// Whether black and white are exchanged: white tiles on a black field, which takes a part of the margin.
+    #[serde(default, skip_serializing_if = "is_false")]
+    pub inverted: bool,
     /// A frame that holds the faces as panels, if one is to be printed.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub skeleton: Option<SkeletonSpec>,
@@ -392,8 +410,8 @@ impl SolidSpec {
     pub fn new(shape: SolidShape) -> Self {
         let squares = || TagSpec::for_squares(TagsIn::Black);
         let (tags, square_tags) = match shape.tilings() {
-            [false, _] => (squares(), None),
-            [true, has_squares] => (TagSpec::default(), has_squares.then(squares)),
+            [false, _] => (Some(squares()), None),
+            [true, has_squares] => (Some(TagSpec::default()), has_squares.then(squares)),
         };
         let edge_mm = match &shape {
             SolidShape::Mesh(mesh) => mesh.mean_edge(),
@@ -402,15 +420,30 @@ impl SolidSpec {
         };
         // A square has room for more corners and tags than a triangle, so its tiles may be larger.
         let tiles = if shape.tilings()[0] { 10 } else { 8 };
-        let (margin_mm, board_id, skeleton) = (5.0, 0, None);
-        Self { shape, edge_mm, tiles, margin_mm, board_id, tags, square_tags, skeleton }
+        let (margin_mm, board_id, inverted, skeleton) = (MARGIN_MM, 0, false, None);
+        Self { shape, edge_mm, tiles, margin_mm, board_id, tags, square_tags, inverted, skeleton }
+    }
+
+    /// The margin that it has unless a skeleton needs more, mm.
+    pub(super) fn usual_margin_mm(&self) -> f64 {
+        if self.inverted { INVERTED_MARGIN_MM } else { MARGIN_MM }
+    }
+
+    /// Width of the black around the tiles, mm; `None` where tiles are black on white.
+    pub(super) fn rim_mm(&self) -> Option<f64> {
+        self.inverted.then_some(RIM_PART * self.margin_mm)
+    }
+
+    /// Width of the white along the edges of a face, mm.
+    pub(super) fn white_margin_mm(&self) -> f64 {
+        self.margin_mm - self.rim_mm().unwrap_or_default()
     }
 
     /// The tags of faces of a tiling.
-    pub(super) fn tags_of(&self, kind: GridKind) -> &TagSpec {
+    pub(super) fn tags_of(&self, kind: GridKind) -> Option<&TagSpec> {
         match (kind, &self.square_tags) {
-            (GridKind::Checker, Some(tags)) => tags,
-            _ => &self.tags,
+            (GridKind::Checker, Some(tags)) => Some(tags),
+            _ => self.tags.as_ref(),
         }
     }
 
@@ -476,12 +509,29 @@ impl SolidSpec {
             let problem = format!("{} leaves no ids for the faces after it", self.board_id);
             return Err(TargetError::invalid("SolidSpec::board_id", problem));
         }
-        if self.tags.is_dense() && self.shape.tag_tiling() == GridKind::Deltille {
+        if self.inverted && self.margin_mm < LEAST_INVERTED_MARGIN_MM {
+            let problem = format!(
+                "{} leaves no room for a black field around white tiles: take at least {}",
+                format_mm(self.margin_mm),
+                format_mm(LEAST_INVERTED_MARGIN_MM)
+            );
+            return Err(TargetError::invalid("SolidSpec::margin_mm", problem));
+        }
+        let Some(tags) = &self.tags else {
+            return match self.square_tags {
+                Some(_) => {
+                    let problem = "the other faces have no tags: leave it out";
+                    Err(TargetError::invalid("SolidSpec::square_tags", problem))
+                }
+                None => Ok(()),
+            };
+        };
+        if tags.is_dense() && self.shape.tag_tiling() == GridKind::Deltille {
             let boards = self.board_id..self.board_id + self.polyhedron().faces.len() as u32;
             // Faces of other shapes than triangles have up to twice as many rows.
             let rows = if matches!(self.shape, SolidShape::Mesh(_)) { 2 } else { 1 } * self.tiles;
             let size = ("SolidSpec::tiles", rows, rows);
-            self.tags.check_places(("SolidSpec::board_id", boards), size)?;
+            tags.check_places(("SolidSpec::board_id", boards), size)?;
         }
         let kind = match (self.shape.tilings(), &self.square_tags) {
             ([true, true], Some(tags)) => {
@@ -499,7 +549,7 @@ impl SolidSpec {
                 return Err(TargetError::invalid("SolidSpec::square_tags", problem));
             }
         };
-        self.tags.check(kind)
+        tags.check(kind)
     }
 }
 
@@ -568,7 +618,7 @@ impl TargetSpec {
     pub fn family(&self) -> Option<&str> {
         match self {
             Self::Board(board) => board.tags.as_ref().map(|tags| tags.family.as_str()),
-            Self::Solid(solid) => Some(&solid.tags.family),
+            Self::Solid(solid) => solid.tags.as_ref().map(|tags| tags.family.as_str()),
             Self::Tags(tags) => Some(&tags.family),
             Self::Charuco(charuco) => Some(&charuco.dictionary),
             Self::AprilGrid(grid) => Some(&grid.family),

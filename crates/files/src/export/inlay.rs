@@ -204,8 +204,10 @@ impl Face {
             .iter()
             .flat_map(|shape| {
                 let mut loops = loops(shape.path.elements());
-                // The field of an inverted board is all that is there.
-                if let (Part::Field { .. }, Some(field)) = (shape.part, loops.first_mut()) {
+                // The field of an inverted board is all that is there, to the last bit.
+                if let (Part::Field { .. }, Some(field)) = (shape.part, loops.first_mut())
+                    && field.iter().zip(outline).all(|(p, q)| p.distance(*q) < SAME_MM)
+                {
                     *field = outline.to_vec();
                 }
                 loops

@@ -507,7 +507,7 @@ impl<'a> Drawing<'a> {
 
     /// Words in the margin of a face along one of its sides, centred at a part of its length.
     fn margin_words(&self, ends: [DVec2; 2], text: Label, part: f64) -> SheetText {
-        let margin = self.spec.margin_mm;
+        let margin = self.spec.white_margin_mm();
         let cap = (NUMBER_CAP.0 * margin).min(NUMBER_CAP.1);
         let room = (ends[0].distance(ends[1]) - 4.0 * margin).max(cap);
         let cap = cap.min(cap * room / width(&text, cap));
@@ -643,8 +643,9 @@ mod tests {
             let edge_mm = if has_squares { 0.8 * edge_mm } else { edge_mm };
             let shape = [Tetrahedron, Octahedron, Icosahedron, Cube, box_of][shape].clone();
             let mut spec = SolidSpec { edge_mm, tiles, margin_mm, ..SolidSpec::new(shape) };
-            spec.tags.family = if has_squares { "aprilTag36h11" } else { "delTag36h11" }.to_owned();
-            let family = Family::shipped(&spec.tags.family).unwrap();
+            let name = if has_squares { "aprilTag36h11" } else { "delTag36h11" };
+            spec.tags.as_mut().unwrap().family = name.to_owned();
+            let family = Family::shipped(name).unwrap();
             let size = [None, Some("A4".parse().unwrap()), Some("A2".parse().unwrap())];
             let solids = if seams { SolidSheets::SeamedNet } else { SolidSheets::Net };
             let paper = PaperSpec { size: size[paper].clone(), solids, ..PaperSpec::default() };
@@ -747,7 +748,7 @@ mod tests {
         let (mesh, _) = crate::targets::ClosedMesh::new(&vertices, &faces).unwrap();
         let mut spec =
             SolidSpec { tiles: 6, edge_mm: 130.0, ..SolidSpec::new(SolidShape::Mesh(mesh)) };
-        spec.tags.family = "d36h9".to_owned();
+        spec.tags.as_mut().unwrap().family = "d36h9".to_owned();
         let family = Family::shipped("d36h9").unwrap();
         let paper = PaperSpec::default();
         let target =

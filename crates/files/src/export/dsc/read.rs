@@ -229,6 +229,7 @@ impl<'a> Block<'a> {
             tag_margin_bits: None,
             gap_edges: None,
             discs_mm: None,
+            rim_mm: None,
             inverted: false,
             outline: Outline::Touching,
             matrix: self.matrix,
