@@ -10,8 +10,8 @@ use super::finding::shown;
 use super::fit::AffineMap;
 use super::fold::Seen;
 use super::tiles::PlacedPanel;
-use super::{Finding, SheetVerdict, TOLERANCE_MM, Verifier};
-use deltille_core::detect::{Detection, Detector, DetectorConfig, GridCorner, Ink, Tone};
+use super::{Finding, SheetVerdict, TOLERANCE_MM, Verifier, detector_config};
+use deltille_core::detect::{Detection, Detector, GridCorner};
 use deltille_core::targets::{Corner, Panel, SheetLayout};
 use deltille_core::words::counted;
 
@@ -284,11 +284,7 @@ fn another_board(verifier: &Verifier, page: &Page, verdict: &mut SheetVerdict) {
     else {
         return;
     };
-    let any_grid = Detector::for_grid(
-        kind,
-        None,
-        DetectorConfig::default().tone(Tone::Linear).ink(Ink::Um(0.0)),
-    );
+    let any_grid = Detector::for_grid(kind, None, detector_config());
     let grids = any_grid.detect(&page.blurred(), "page").grids;
     let found: usize = grids.iter().map(|grid| grid.corners.len()).sum();
     let stated = verdict.corners;

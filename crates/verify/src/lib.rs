@@ -287,11 +287,7 @@ impl<'a> Verifier<'a> {
                 return Err(VerifyError::Family { needed, given });
             }
         }
-        let detector = Detector::for_target(
-            target,
-            family,
-            DetectorConfig::default().tone(Tone::Linear).ink(Ink::Um(0.0)),
-        );
+        let detector = Detector::for_target(target, family, detector_config());
         Ok(Self {
             target,
             family,
@@ -620,6 +616,11 @@ impl<'a> Verifier<'a> {
         }
         seen
     }
+}
+
+/// What is looked at is drawn: as bright as it is stated, and without ink that spreads.
+fn detector_config() -> DetectorConfig {
+    DetectorConfig::default().tone(Tone::Linear).ink(Ink::Um(0.0))
 }
 
 /// The name of a file, or of the first and the last of several.

@@ -16,9 +16,9 @@ use super::fit::AffineMap;
 use super::marks::spots;
 use super::model::{Model, View};
 use super::tiles::PlacedPanel;
-use super::{FaceVerdict, Finding, Format, Verdict, Verifier};
+use super::{FaceVerdict, Finding, Format, Verdict, Verifier, detector_config};
 use deltille_core::camera::{Camera, Pose};
-use deltille_core::detect::Detection;
+use deltille_core::detect::{Detection, Detector};
 use deltille_core::lattice::Vertex;
 use deltille_core::polygon::rectangle;
 use deltille_core::raster::Gray;
@@ -258,7 +258,11 @@ fn view(verifier: &Verifier, model: &Model, panel: &Panel) -> (View, f64) {
 fn check_face(verifier: &Verifier, model: &Model, panel: &Panel) -> FaceVerdict {
     let (view, px_per_mm) = view(verifier, model, panel);
     let image = view.render(model);
-    let detection = verifier.detector.detect(&image, "face");
+    let detection = match panel.tags.is_empty() {
+        // A grid may have a corner of a face beside it, too, which one of a known size may not.
+        true => Detector::for_grid(panel.kind, None, detector_config()).detect(&image, "face"),
+        false => verifier.detector.detect(&image, "face"),
+    };
     let mut verdict = FaceVerdict {
         panel: panel.id,
         px_per_mm,
@@ -391,9 +395,10 @@ fn seen_corners<'a>(
                 Some(panel) => panel
                     .corner_at(Vertex::new(corner.row, corner.col))
                     .filter(|stated| corner.id == Some(stated.id)),
-                None if panel.tags.is_empty() => panel.corners.iter().find(|stated| {
-                    stated.target_mm.distance(at_mm) < MATCH_EDGES * panel.edge_mm
-                }),
+                None if panel.tags.is_empty() => panel
+                    .corners
+                    .iter()
+                    .find(|stated| stated.target_mm.distance(at_mm) < MATCH_EDGES * panel.edge_mm),
                 None => None,
             };
             let panel = labelled.unwrap_or(panel);

@@ -965,7 +965,8 @@ mod tests {
             let tags = TagSpec { family: name.to_owned(), ..TagSpec::default() };
             for tiles in [7, 10] {
                 let tags = tags.clone();
-                let spec = SolidSpec { tiles, tags: Some(tags), ..SolidSpec::new(SolidShape::Octahedron) };
+                let spec =
+                    SolidSpec { tiles, tags: Some(tags), ..SolidSpec::new(SolidShape::Octahedron) };
                 let Ok(solid) = Target::build("o", &TargetSpec::Solid(spec), Some(&family), None)
                 else {
                     continue;

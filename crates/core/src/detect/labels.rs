@@ -144,6 +144,9 @@ impl Labels {
                     }
                     let why = match &evidence {
                         Some(evidence) => why::no_labels(evidence, grid, size),
+                        None if are_alike(panels, grid) => {
+                            Reason::new(ReasonKind::Ambiguous, [("corners", grid.len() as f64)])
+                        }
                         None => why::no_outline(grid, self.most_corners(), size),
                     };
                     return vec![(unlabelled(found), Some(why))];
@@ -287,6 +290,12 @@ fn on_panel(found: FoundGrid, panel: &TargetPanel, labelled: &Labelled) -> Grid 
     };
     let labels = relabelled(found, label, Some(panel.id), labelled.tags.clone());
     Grid { mirrored: labelled.mirrored, ..labels }
+}
+
+/// Whether a grid has all corners of several untagged panels, such as those of a solid, which nothing tells apart.
+fn are_alike(panels: &[TargetPanel], grid: &SaddleGrid) -> bool {
+    let is_full = |panel: &&TargetPanel| !panel.tagged && panel.corner_ids.len() == grid.len();
+    panels.iter().filter(is_full).count() > 1
 }
 
 /// The grid, as it is seen or in a mirror, on the one untagged panel whose outline it fills.

@@ -237,10 +237,9 @@ fn on_faces(spec: &SolidSpec, faces: &[Face]) -> Vec<Panel> {
     let panels = numbered.map(|(id, face)| {
         let board = &face.board;
         let tags = spec.tags_of(board.kind());
-        let (vertices, tiles) =
-            of_board.entry(board).or_insert_with(|| {
-                (board.corners(), tags.map_or_else(Vec::new, |tags| tagged(board, tags)))
-            });
+        let (vertices, tiles) = of_board.entry(board).or_insert_with(|| {
+            (board.corners(), tags.map_or_else(Vec::new, |tags| tagged(board, tags)))
+        });
         let next_tag = &mut next_tags[usize::from(board.kind() == GridKind::Checker)];
         let (first_corner, first_tag) = (next_corner, *next_tag);
         next_corner += vertices.len() as u32;

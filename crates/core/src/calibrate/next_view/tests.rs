@@ -228,7 +228,9 @@ fn a_solid_shows_several_faces_and_boards_without_tags_are_whole() {
 
 fn spec_family(spec: &TargetSpec) -> Option<crate::family::Family> {
     match spec {
-        TargetSpec::Solid(_) => spec.family().and_then(|name| crate::family::Family::shipped(name).ok()),
+        TargetSpec::Solid(_) => {
+            spec.family().and_then(|name| crate::family::Family::shipped(name).ok())
+        }
         _ => None,
     }
 }
