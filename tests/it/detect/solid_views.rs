@@ -387,7 +387,7 @@ fn inverted_faces_are_labelled_and_bare_ones_are_not() {
             scene.render(&camera, &Pose::looking_at(eye, DVec3::ZERO, DVec3::Z), &Light::default());
         let detector = Detector::for_target(&target, family.as_ref(), DetectorConfig::default());
         let grids = detector.detect(&eight_bits(&image), "o").grids;
-        assert!(grids.len() >= 3, "{} grids", grids.len());
+        assert!(grids.iter().any(|grid| grid.corners.len() == 36), "{} grids", grids.len());
         assert!(grids.iter().all(|grid| grid.panel.is_some() == tags));
     }
 }
