@@ -10,13 +10,17 @@ right-handed with x right, y up on the print, z towards the viewer; that of a ca
 """
 
 from ._core import (
+    AprilGrid,
     Board,
     CalibratedCamera,
     Calibration,
     Camera,
+    Charuco,
     Checkerboard,
+    Circles,
     Comparison,
     Cube,
+    Cuboid,
     DecodedTag,
     Detection,
     Detector,
@@ -74,6 +78,7 @@ Detection.plot = _plot  # type: ignore[method-assign]
 Detection._repr_html_ = _repr_html  # type: ignore[method-assign]
 
 __all__ = [
+    "AprilGrid",
     "ArgumentError",
     "Board",
     "CalibratedCamera",
@@ -81,9 +86,12 @@ __all__ = [
     "CalibrationError",
     "Camera",
     "CameraError",
+    "Charuco",
     "Checkerboard",
+    "Circles",
     "Comparison",
     "Cube",
+    "Cuboid",
     "DecodedTag",
     "Detection",
     "DetectionError",

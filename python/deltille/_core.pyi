@@ -25,13 +25,17 @@ from .typing import (
 )
 
 __all__ = [
+    "AprilGrid",
     "Board",
     "CalibratedCamera",
     "Calibration",
     "Camera",
+    "Charuco",
     "Checkerboard",
+    "Circles",
     "Comparison",
     "Cube",
+    "Cuboid",
     "DecodedTag",
     "Detection",
     "Detector",
@@ -119,6 +123,9 @@ class Target:
         dpi: float = 300.0,
         texture_dpi: float | None = None,
         texture_px: int | None = None,
+        plate_mm: float | None = None,
+        inlay_mm: float | None = None,
+        kerf_mm: float | None = None,
     ) -> dict[str, bytes]: ...
     def save(
         self,
@@ -128,8 +135,12 @@ class Target:
         dpi: float = 300.0,
         texture_dpi: float | None = None,
         texture_px: int | None = None,
+        plate_mm: float | None = None,
+        inlay_mm: float | None = None,
+        kerf_mm: float | None = None,
         force: bool = False,
     ) -> list[Path]: ...
+    def check_beside(self, other: Target) -> None: ...
     def verify(self, artifact: AnyPath | bytes | None = None, *, name: str | None = None) -> Verdict: ...
     def dsc(self, dialect: Literal["fork", "original"] = "fork") -> str: ...
     def _repr_html_(self) -> str: ...
@@ -154,14 +165,18 @@ class Board(Target):
         boards: int = 1,
         board_id: int = 0,
         inverted: bool = False,
-        paper: str | None = None,
-        orientation: Orientation = "auto",
-        margin_mm: float | None = None,
         poster: bool = False,
         packed: bool = False,
         two_sided_mm: float | None = None,
         tag_ids: bool = False,
+        paper: str | None = None,
+        orientation: Orientation = "auto",
+        margin_mm: float | None = None,
+        note: str | None = None,
         guide_page: bool = False,
+        mirrored: bool = False,
+        white: str | None = None,
+        contour: str | None = None,
         name: str = "board",
     ) -> Board: ...
 
@@ -181,16 +196,87 @@ class Checkerboard(Target):
         boards: int = 1,
         board_id: int = 0,
         inverted: bool = False,
-        paper: str | None = None,
-        orientation: Orientation = "auto",
-        margin_mm: float | None = None,
         poster: bool = False,
         packed: bool = False,
         two_sided_mm: float | None = None,
         tag_ids: bool = False,
+        paper: str | None = None,
+        orientation: Orientation = "auto",
+        margin_mm: float | None = None,
+        note: str | None = None,
         guide_page: bool = False,
+        mirrored: bool = False,
+        white: str | None = None,
+        contour: str | None = None,
         name: str = "checkerboard",
     ) -> Checkerboard: ...
+
+@final
+class Charuco(Target):
+    def __new__(
+        cls,
+        squares: tuple[int, int],
+        *,
+        square_mm: float = 30.0,
+        marker_mm: float | None = None,
+        dictionary: str = "5x5_100",
+        first_id: int = 0,
+        legacy: bool = False,
+        board_id: int = 0,
+        paper: str | None = None,
+        orientation: Orientation = "auto",
+        margin_mm: float | None = None,
+        note: str | None = None,
+        guide_page: bool = False,
+        mirrored: bool = False,
+        white: str | None = None,
+        contour: str | None = None,
+        name: str = "charuco",
+    ) -> Charuco: ...
+
+@final
+class AprilGrid(Target):
+    def __new__(
+        cls,
+        tags: tuple[int, int],
+        *,
+        tag_mm: float = 25.0,
+        gap: float = 0.3,
+        family: Family | AnyPath | None = None,
+        first_id: int = 0,
+        tag_border: float = 2.0,
+        board_id: int = 0,
+        paper: str | None = None,
+        orientation: Orientation = "auto",
+        margin_mm: float | None = None,
+        note: str | None = None,
+        guide_page: bool = False,
+        mirrored: bool = False,
+        white: str | None = None,
+        contour: str | None = None,
+        name: str = "aprilgrid",
+    ) -> AprilGrid: ...
+
+@final
+class Circles(Target):
+    def __new__(
+        cls,
+        circles: tuple[int, int],
+        *,
+        asymmetric: bool = False,
+        spacing_mm: float = 20.0,
+        diameter_mm: float | None = None,
+        board_id: int = 0,
+        paper: str | None = None,
+        orientation: Orientation = "auto",
+        margin_mm: float | None = None,
+        note: str | None = None,
+        guide_page: bool = False,
+        mirrored: bool = False,
+        white: str | None = None,
+        contour: str | None = None,
+        name: str = "circles",
+    ) -> Circles: ...
 
 @final
 class Tetrahedron(Target):
@@ -201,10 +287,12 @@ class Tetrahedron(Target):
         tiles: int | None = None,
         face_margin_mm: float | None = None,
         family: Family | AnyPath | None = None,
+        tags: bool = True,
         tag_spacing: int | None = None,
         tag_border: float | None = None,
         first_id: int = 0,
         board_id: int = 0,
+        inverted: bool = False,
         skeleton: bool = False,
         panel_thickness_mm: float | None = None,
         wall_mm: float | None = None,
@@ -216,6 +304,7 @@ class Tetrahedron(Target):
         paper: str | None = None,
         orientation: Orientation = "auto",
         margin_mm: float | None = None,
+        note: str | None = None,
         name: str | None = None,
     ) -> Tetrahedron: ...
 
@@ -228,10 +317,12 @@ class Octahedron(Target):
         tiles: int | None = None,
         face_margin_mm: float | None = None,
         family: Family | AnyPath | None = None,
+        tags: bool = True,
         tag_spacing: int | None = None,
         tag_border: float | None = None,
         first_id: int = 0,
         board_id: int = 0,
+        inverted: bool = False,
         skeleton: bool = False,
         panel_thickness_mm: float | None = None,
         wall_mm: float | None = None,
@@ -243,6 +334,7 @@ class Octahedron(Target):
         paper: str | None = None,
         orientation: Orientation = "auto",
         margin_mm: float | None = None,
+        note: str | None = None,
         name: str | None = None,
     ) -> Octahedron: ...
 
@@ -255,10 +347,12 @@ class Icosahedron(Target):
         tiles: int | None = None,
         face_margin_mm: float | None = None,
         family: Family | AnyPath | None = None,
+        tags: bool = True,
         tag_spacing: int | None = None,
         tag_border: float | None = None,
         first_id: int = 0,
         board_id: int = 0,
+        inverted: bool = False,
         skeleton: bool = False,
         panel_thickness_mm: float | None = None,
         wall_mm: float | None = None,
@@ -270,6 +364,7 @@ class Icosahedron(Target):
         paper: str | None = None,
         orientation: Orientation = "auto",
         margin_mm: float | None = None,
+        note: str | None = None,
         name: str | None = None,
     ) -> Icosahedron: ...
 
@@ -282,10 +377,12 @@ class Cube(Target):
         tiles: int | None = None,
         face_margin_mm: float | None = None,
         family: Family | AnyPath | None = None,
+        tags: bool = True,
         tag_spacing: int | None = None,
         tag_border: float | None = None,
         first_id: int = 0,
         board_id: int = 0,
+        inverted: bool = False,
         skeleton: bool = False,
         panel_thickness_mm: float | None = None,
         wall_mm: float | None = None,
@@ -297,8 +394,40 @@ class Cube(Target):
         paper: str | None = None,
         orientation: Orientation = "auto",
         margin_mm: float | None = None,
+        note: str | None = None,
         name: str | None = None,
     ) -> Cube: ...
+
+@final
+class Cuboid(Target):
+    def __new__(
+        cls,
+        size_mm: Sequence[float],
+        *,
+        edge_mm: float | None = None,
+        tiles: int | None = None,
+        face_margin_mm: float | None = None,
+        family: Family | AnyPath | None = None,
+        tags: bool = True,
+        tag_spacing: int | None = None,
+        tag_border: float | None = None,
+        first_id: int = 0,
+        board_id: int = 0,
+        inverted: bool = False,
+        skeleton: bool = False,
+        panel_thickness_mm: float | None = None,
+        wall_mm: float | None = None,
+        rib_mm: float | None = None,
+        per_face: bool = False,
+        allow_seams: bool = False,
+        tag_ids: bool = False,
+        guide_page: bool = False,
+        paper: str | None = None,
+        orientation: Orientation = "auto",
+        margin_mm: float | None = None,
+        note: str | None = None,
+        name: str | None = None,
+    ) -> Cuboid: ...
 
 @final
 class Solid(Target):
@@ -308,14 +437,18 @@ class Solid(Target):
         *,
         scale: float = 1.0,
         allow_skew: bool = False,
+        square_family: Family | AnyPath | None = None,
+        first_square_id: int | None = None,
         edge_mm: float | None = None,
         tiles: int | None = None,
         face_margin_mm: float | None = None,
         family: Family | AnyPath | None = None,
+        tags: bool = True,
         tag_spacing: int | None = None,
         tag_border: float | None = None,
         first_id: int = 0,
         board_id: int = 0,
+        inverted: bool = False,
         skeleton: bool = False,
         panel_thickness_mm: float | None = None,
         wall_mm: float | None = None,
@@ -327,6 +460,7 @@ class Solid(Target):
         paper: str | None = None,
         orientation: Orientation = "auto",
         margin_mm: float | None = None,
+        note: str | None = None,
         name: str | None = None,
     ) -> Solid: ...
 
@@ -384,6 +518,9 @@ class Family:
     @property
     def codes(self) -> Words: ...
     def distances(self) -> tuple[Ints, Ints]: ...
+    def false_positive_rates(self) -> Floats: ...
+    def natural_false_positive_rates(self) -> Floats | None: ...
+    def recommended_correction(self, accepted: float = 1e-4) -> int | None: ...
     def decode(
         self, words: Words | Sequence[int], max_errors: int | None = None
     ) -> tuple[Ints, Ints, Ints]: ...
@@ -1008,7 +1145,7 @@ def render(
 ) -> tuple[NDArray[Any], Truth]: ...
 def _run(name: str, arguments: Sequence[str]) -> None: ...
 def _keywords() -> list[tuple[str, str]]: ...
-def _target(class_: str, json: str, family: str | None) -> Target: ...
+def _target(class_: str, json: str, family: str | None, squares: str | None) -> Target: ...
 def _detector(targets: Sequence[Target], asked: Mapping[str, Any], ink: str | None) -> Detector: ...
 def _detection(json: str, targets: Sequence[Target]) -> Detection: ...
 def _grid(of: Detection, index: int) -> Grid: ...

@@ -45,6 +45,7 @@ TargetFormat: TypeAlias = Literal[
     "net",
     "laser-dxf",
     "laser-svg",
+    "kalibr",
 ]
 CameraFormat: TypeAlias = Literal["own", "opencv", "ros", "kalibr", "colmap", "nerfstudio", "mrcal"]
 

@@ -5,45 +5,28 @@ use std::sync::Arc;
 
 use deltille::family;
 use deltille::lattice::GridKind;
-use deltille::targets::{
-    self, BoardSpec, DEFAULT_MARGIN_MM, PaperSpec, SolidSheets, TagSpec, TagsIn, TargetSpec,
-    usual_edge_mm,
-};
+use deltille::targets::{BoardSpec, PaperSpec, TagSpec, TagsIn, TargetSpec, usual_edge_mm};
 use pyo3::prelude::*;
 
 use crate::arrays::whole;
-use crate::errors::{self, Raise, raised};
+use crate::errors::{self, raised};
 use crate::families::FamilyChoice;
+use crate::paper::flat;
 use crate::targets::Target;
 
-/// What a target is printed on.
-pub fn paper(
-    size: Option<&str>,
-    orientation: &str,
-    margin_mm: Option<f64>,
-    solids: SolidSheets,
-) -> PyResult<PaperSpec> {
-    Ok(PaperSpec {
-        size: size.map(str::parse).transpose().raise(errors::target)?,
-        orientation: orientation.parse().raise(errors::target)?,
-        margin_mm: margin_mm.unwrap_or(DEFAULT_MARGIN_MM),
-        solids,
-        ..PaperSpec::default()
-    })
-}
+/// What a board is, and the family of its tags.
+pub type Made = (TargetSpec, Option<Arc<family::Family>>);
 
-/// A board of a kind.
+/// A board of a kind; what has a default of its own is added.
 struct Wanted {
     grid: GridKind,
-    size: [u32; 2],
+    size: [i64; 2],
     edge_mm: Option<f64>,
     tags: Option<Tags>,
-    boards: u32,
-    board_id: u32,
+    boards: i64,
+    board_id: i64,
     inverted: bool,
     two_sided_mm: Option<f64>,
-    name: String,
-    paper: PaperSpec,
 }
 
 /// Tags as they are asked for.
@@ -74,29 +57,23 @@ impl Tags {
 }
 
 impl Wanted {
-    fn make(self) -> PyResult<Target> {
+    fn make(self, paper: &PaperSpec) -> PyResult<Made> {
         let tags = self.tags.map(|tags| tags.spec(self.grid));
         let (tags, family) = tags.transpose()?.unzip();
         let [rows, cols] = self.size;
+        let rows = whole("rows", rows, errors::target)?;
+        let cols = whole("cols", cols, errors::target)?;
         let mut spec = BoardSpec {
-            boards: self.boards,
-            board_id: self.board_id,
+            boards: whole("boards", self.boards, errors::target)?,
+            board_id: whole("board_id", self.board_id, errors::target)?,
             tags,
             inverted: self.inverted,
             two_sided_mm: self.two_sided_mm,
             ..BoardSpec::new(self.grid, rows, cols, 1.0)
         };
-        spec.edge_mm = self.edge_mm.unwrap_or_else(|| usual_edge_mm(&spec, &self.paper));
-        let spec = TargetSpec::Board(spec);
-        let target =
-            targets::Target::build(&self.name, &spec, family.as_deref(), Some(&self.paper));
-        Ok(Target { target: Arc::new(target.raise(errors::target)?), family })
+        spec.edge_mm = self.edge_mm.unwrap_or_else(|| usual_edge_mm(&spec, paper));
+        Ok((TargetSpec::Board(spec), family))
     }
-}
-
-/// Rows and columns of corners.
-fn size_of(rows: i64, cols: i64) -> PyResult<[u32; 2]> {
-    Ok([whole("rows", rows, errors::target)?, whole("cols", cols, errors::target)?])
 }
 
 /// How far tags are from each other.
@@ -104,163 +81,111 @@ pub fn spacing_of(tag_spacing: Option<i64>) -> PyResult<Option<u32>> {
     tag_spacing.map(|rows| whole("tag_spacing", rows, errors::target)).transpose()
 }
 
-/// A flat deltille board with tags.
-///
-/// Parameters
-/// ----------
-/// rows, cols : int
-///     Rows of corners, and corners in each row, 2 to 500.
-/// edge_mm : float, optional
-///     Edge of a tile, mm; 20, or with ``paper`` the largest in whole mm that fits it.
-/// family : Family, str or path-like, optional
-///     Family of the tags, see :meth:`Family.shipped`; delTag25h7 if left out.
-/// tags : bool, optional
-///     ``False`` for a board without tags.
-/// tag_spacing : int, optional
-///     A tag in every n-th row and column.
-/// tag_border : float, optional
-///     Black border of a tag, in widths of a bit.
-/// first_id : int, optional
-///     Id of the first tag; the others follow.
-/// boards : int, optional
-///     Number of boards, alike but for their ids, each on a sheet of its own.
-/// board_id : int, optional
-///     Id of the first board.
-/// inverted : bool, optional
-///     Whether black and white are exchanged.
-/// paper : str, optional
-///     ``"A4"``, ``"letter"``, ``"297x420mm"``, …; the smallest of A4 to A0 that takes the board if left out.
-/// orientation : str, optional
-///     ``"auto"``, ``"portrait"`` or ``"landscape"``.
-/// margin_mm : float, optional
-///     Blank along the edges of the paper, mm.
-/// poster : bool, optional
-///     Whether a board that is larger than the paper is printed over several pages, to be joined.
-/// packed : bool, optional
-///     Whether as many boards as fit are printed on each sheet, to be cut apart.
-/// two_sided_mm : float, optional
-///     Thickness of a plate that carries a board on its back, too, mm.
-/// tag_ids : bool, optional
-///     Whether the id of each tag is printed beside it, in small type.
-/// guide_page : bool, optional
-///     Whether a page with a picture, what to do, and a ruler is added.
-/// name : str, optional
-///     Stem of the names of its files, printed on the sheet.
-///
-/// Raises
-/// ------
-/// TargetError
-///     Where no such board can be made.
-///
-/// Examples
-/// --------
-/// >>> import deltille
-/// >>> board = deltille.Board(10, 11, edge_mm=20)
-/// >>> board.corners.shape
-/// (110, 3)
-#[pyclass(frozen, extends = Target, module = "deltille")]
-pub struct Board;
-
-#[pymethods]
-impl Board {
-    #[new]
-    #[pyo3(signature = (rows, cols, *, edge_mm = None, family = None, tags = true, tag_spacing = None,
-        tag_border = None, first_id = 0, boards = 1, board_id = 0, inverted = false, paper = None,
-        orientation = "auto", margin_mm = None, poster = false, packed = false, two_sided_mm = None,
-        tag_ids = false, guide_page = false, name = "board"))]
-    #[expect(clippy::too_many_arguments, reason = "keywords")]
-    fn new(
-        rows: i64,
-        cols: i64,
-        edge_mm: Option<f64>,
-        family: Option<FamilyChoice>,
-        tags: bool,
-        tag_spacing: Option<i64>,
-        tag_border: Option<f64>,
-        first_id: i64,
-        boards: i64,
-        board_id: i64,
-        inverted: bool,
-        paper: Option<&str>,
-        orientation: &str,
-        margin_mm: Option<f64>,
-        poster: bool,
-        packed: bool,
-        two_sided_mm: Option<f64>,
-        tag_ids: bool,
-        guide_page: bool,
-        name: &str,
-    ) -> PyResult<PyClassInitializer<Self>> {
-        let paper = self::paper(paper, orientation, margin_mm, SolidSheets::default())?;
-        let paper = PaperSpec { poster, packed, tag_ids, guide_page, ..paper };
+flat! {
+    /// A flat deltille board with tags.
+    ///
+    /// Parameters
+    /// ----------
+    /// rows, cols : int
+    ///     Rows of corners, and corners in each row, 2 to 500.
+    /// edge_mm : float, optional
+    ///     Edge of a tile, mm; 20, or with ``paper`` the largest in whole mm that fits it.
+    /// family : Family, str or path-like, optional
+    ///     Family of the tags, see :meth:`Family.shipped`; delTag25h7 if left out. ``"dense9"`` for a place code in every
+    ///     upright tile.
+    /// tags : bool, optional
+    ///     ``False`` for a board without tags.
+    /// tag_spacing : int, optional
+    ///     A tag in every n-th row and column.
+    /// tag_border : float, optional
+    ///     Black border of a tag, in widths of a bit.
+    /// first_id : int, optional
+    ///     Id of the first tag; the others follow.
+    /// boards : int, optional
+    ///     Number of boards, alike but for their ids, each on a sheet of its own.
+    /// board_id : int, optional
+    ///     Id of the first board.
+    /// inverted : bool, optional
+    ///     Whether black and white are exchanged.
+    /// poster : bool, optional
+    ///     Whether a board that is larger than the paper is printed over several pages, to be joined.
+    /// packed : bool, optional
+    ///     Whether as many boards as fit are printed on each sheet, to be cut apart.
+    /// two_sided_mm : float, optional
+    ///     Thickness of a plate that carries a board on its back, too, mm.
+    /// tag_ids : bool, optional
+    ///     Whether the id of each tag is printed beside it, in small type.
+    Board, "board",
+    (rows: i64, cols: i64),
+    (
+        edge_mm: Option<f64> = None,
+        family: Option<FamilyChoice> = None,
+        tags: bool = true,
+        tag_spacing: Option<i64> = None,
+        tag_border: Option<f64> = None,
+        first_id: i64 = 0,
+        boards: i64 = 1,
+        board_id: i64 = 0,
+        inverted: bool = false,
+        poster: bool = false,
+        packed: bool = false,
+        two_sided_mm: Option<f64> = None,
+        tag_ids: bool = false,
+    ),
+    |on| {
+        on = PaperSpec { poster, packed, tag_ids, ..on };
         let spacing = spacing_of(tag_spacing)?;
         let first_id = whole("first_id", first_id, errors::target)?;
         let of_tags =
             || Tags { family, tags_in: TagsIn::Black, spacing, border_bits: tag_border, first_id };
         let wanted = Wanted {
             grid: GridKind::Deltille,
-            size: size_of(rows, cols)?,
+            size: [rows, cols],
             edge_mm,
             tags: tags.then(of_tags),
-            boards: whole("boards", boards, errors::target)?,
-            board_id: whole("board_id", board_id, errors::target)?,
+            boards,
+            board_id,
             inverted,
             two_sided_mm,
-            name: name.to_owned(),
-            paper,
         };
-        Ok(PyClassInitializer::from(wanted.make()?).add_subclass(Self))
+        wanted.make(&on)?
     }
 }
 
-/// A flat checkerboard, plain or with square tags.
-///
-/// Parameters
-/// ----------
-/// rows, cols : int
-///     Rows of inner corners, and corners in each row, 2 to 500.
-/// edge_mm : float, optional
-///     Edge of a square, mm; 20, or with ``paper`` the largest in whole mm that fits it.
-/// family : Family, str or path-like, optional
-///     ``"aprilTag36h11"``, ``"aprilTag25h9"`` or ``"aprilTag16h5"``; no tags if left out.
-/// tags_in : str, optional
-///     Squares that carry the tags, ``"black"`` or ``"white"``.
-/// tag_spacing, tag_border, first_id, boards, board_id, inverted, paper, orientation, margin_mm, poster, packed, \
-/// two_sided_mm, tag_ids, guide_page, name
-///     As of :class:`Board`.
-#[pyclass(frozen, extends = Target, module = "deltille")]
-pub struct Checkerboard;
-
-#[pymethods]
-impl Checkerboard {
-    #[new]
-    #[pyo3(signature = (rows, cols, *, edge_mm = None, family = None, tags_in = "black", tag_spacing = None,
-        tag_border = None, first_id = 0, boards = 1, board_id = 0, inverted = false, paper = None,
-        orientation = "auto", margin_mm = None, poster = false, packed = false, two_sided_mm = None,
-        tag_ids = false, guide_page = false, name = "checkerboard"))]
-    #[expect(clippy::too_many_arguments, reason = "keywords")]
-    fn new(
-        rows: i64,
-        cols: i64,
-        edge_mm: Option<f64>,
-        family: Option<FamilyChoice>,
-        tags_in: &str,
-        tag_spacing: Option<i64>,
-        tag_border: Option<f64>,
-        first_id: i64,
-        boards: i64,
-        board_id: i64,
-        inverted: bool,
-        paper: Option<&str>,
-        orientation: &str,
-        margin_mm: Option<f64>,
-        poster: bool,
-        packed: bool,
-        two_sided_mm: Option<f64>,
-        tag_ids: bool,
-        guide_page: bool,
-        name: &str,
-    ) -> PyResult<PyClassInitializer<Self>> {
+flat! {
+    /// A flat checkerboard, plain or with square tags.
+    ///
+    /// Parameters
+    /// ----------
+    /// rows, cols : int
+    ///     Rows of inner corners, and corners in each row, 2 to 500.
+    /// edge_mm : float, optional
+    ///     Edge of a square, mm; 20, or with ``paper`` the largest in whole mm that fits it.
+    /// family : Family, str or path-like, optional
+    ///     ``"aprilTag36h11"``, ``"aprilTag25h9"`` or ``"aprilTag16h5"``; no tags if left out.
+    /// tags_in : str, optional
+    ///     Squares that carry the tags, ``"black"`` or ``"white"``.
+    /// tag_spacing, tag_border, first_id, boards, board_id, inverted, poster, packed, two_sided_mm, tag_ids
+    ///     As of :class:`Board`.
+    Checkerboard, "checkerboard",
+    (rows: i64, cols: i64),
+    (
+        edge_mm: Option<f64> = None,
+        family: Option<FamilyChoice> = None,
+        tags_in: &str = "black",
+        tag_spacing: Option<i64> = None,
+        tag_border: Option<f64> = None,
+        first_id: i64 = 0,
+        boards: i64 = 1,
+        board_id: i64 = 0,
+        inverted: bool = false,
+        poster: bool = false,
+        packed: bool = false,
+        two_sided_mm: Option<f64> = None,
+        tag_ids: bool = false,
+    ),
+    |on| {
+        on = PaperSpec { poster, packed, tag_ids, ..on };
         let tags_in = match tags_in {
             "black" => TagsIn::Black,
             "white" => TagsIn::White,
@@ -277,22 +202,14 @@ impl Checkerboard {
         };
         let wanted = Wanted {
             grid: GridKind::Checker,
-            size: size_of(rows, cols)?,
+            size: [rows, cols],
             edge_mm,
             tags: family.map(of_tags),
-            boards: whole("boards", boards, errors::target)?,
-            board_id: whole("board_id", board_id, errors::target)?,
+            boards,
+            board_id,
             inverted,
             two_sided_mm,
-            name: name.to_owned(),
-            paper: PaperSpec {
-                poster,
-                packed,
-                tag_ids,
-                guide_page,
-                ..self::paper(paper, orientation, margin_mm, SolidSheets::default())?
-            },
         };
-        Ok(PyClassInitializer::from(wanted.make()?).add_subclass(Self))
+        wanted.make(&on)?
     }
 }

@@ -176,6 +176,51 @@ impl Family {
         Ok((distances, arrays::column(py, found.values().map(number))))
     }
 
+    /// How likely fair coins are taken for a tag.
+    ///
+    /// Returns
+    /// -------
+    /// ndarray of :attr:`correctable` + 1, float64
+    ///     Probabilities with 0, 1, … corrected cells.
+    fn false_positive_rates<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+        arrays::column(py, self.family.false_positive_rates().into_iter())
+    }
+
+    /// How likely a triangle with a border in a natural picture is taken for a tag.
+    ///
+    /// Returns
+    /// -------
+    /// ndarray of :attr:`correctable` + 1, float64, or None
+    ///     Probabilities with 0, 1, … corrected cells; ``None`` of square tags and of place codes.
+    fn natural_false_positive_rates<'py>(
+        &self,
+        py: Python<'py>,
+    ) -> PyResult<Option<Bound<'py, PyArray1<f64>>>> {
+        let family = self.family.clone();
+        let rates = unlocked(py, move || family.natural_false_positive_rates())?;
+        Ok(rates.map(|rates| arrays::column(py, rates.into_iter())))
+    }
+
+    /// How many cells whoever believes single tags may correct, so that natural false positives stay rare.
+    ///
+    /// Parameters
+    /// ----------
+    /// accepted : float, optional
+    ///     Greatest probability that a triangle with a border in a natural picture is taken for a tag.
+    ///
+    /// Returns
+    /// -------
+    /// int or None
+    ///     ``None`` where that is greater even with nothing corrected, and where natural rates are not known.
+    #[pyo3(signature = (accepted = 1e-4))]
+    fn recommended_correction(&self, py: Python<'_>, accepted: f64) -> PyResult<Option<u32>> {
+        if !(0.0..=1.0).contains(&accepted) {
+            return Err(raised::FamilyError::new_err("accepted: give a probability, 0 to 1"));
+        }
+        let family = self.family.clone();
+        unlocked(py, move || family.recommended_correction(accepted))
+    }
+
     /// Finds the nearest codes, in any turn, to words that were read.
     ///
     /// Parameters

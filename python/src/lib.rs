@@ -4,7 +4,8 @@
 //! |---|---|
 //! | `errors`, `interrupt` | exceptions in the words of Python; long work that Ctrl-C ends |
 //! | `image`, `arrays` | arrays to pictures and points, and back |
-//! | `targets`, `boards`, `solids`, `verdict` | targets, their making and their files |
+//! | `targets`, `making`, `verdict` | targets, and their files |
+//! | `paper`, `boards`, `other_detectors`, `solids` | targets from what is asked for |
 //! | `families` | codes of tags |
 //! | `detector`, `detection` | pictures to corners |
 //! | `camera`, `pose` | cameras and rigid motions |
@@ -28,7 +29,10 @@ mod errors;
 mod families;
 mod image;
 mod interrupt;
+mod making;
 mod next_view;
+mod other_detectors;
+mod paper;
 mod pose;
 mod programs;
 mod rendering;
@@ -95,13 +99,15 @@ mod _core {
     #[pymodule_export]
     use super::next_view::{NextView, next_view};
     #[pymodule_export]
+    use super::other_detectors::{AprilGrid, Charuco, Circles};
+    #[pymodule_export]
     use super::pose::Pose;
     #[pymodule_export]
     use super::programs::_run;
     #[pymodule_export]
     use super::rendering::{Truth, render};
     #[pymodule_export]
-    use super::solids::{Cube, Icosahedron, Octahedron, Solid, Tetrahedron};
+    use super::solids::{Cube, Cuboid, Icosahedron, Octahedron, Solid, Tetrahedron};
     #[pymodule_export]
     use super::targets::{_target, Tag, Target};
     #[pymodule_export]

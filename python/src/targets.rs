@@ -4,11 +4,11 @@ use std::path::PathBuf;
 use std::sync::Arc;
 
 use deltille::export::artifacts::{Files, Making, What, make, write_set};
+use deltille::lattice::GridKind;
 use deltille::limits::Limits;
 use deltille::targets::{self, Corner, Panel};
 use deltille::{export, target_file};
 use export::dsc::Dialect;
-use export::mesh::{MAX_TEXTURE_PX, Resolution};
 use numpy::{PyArray1, PyArray2};
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict};
@@ -19,8 +19,10 @@ use crate::boards::{Board, Checkerboard};
 use crate::errors::{self, Raise, RaiseFile, raised, unlocked};
 use crate::families::{Family, FamilyChoice};
 use crate::interrupt::interruptible;
+use crate::making::{Formats, Keywords};
+use crate::other_detectors::{AprilGrid, Charuco, Circles};
 use crate::pickles;
-use crate::solids::{Cube, Icosahedron, Octahedron, Solid, Tetrahedron};
+use crate::solids::{Cube, Cuboid, Icosahedron, Octahedron, Solid, Tetrahedron};
 use crate::verdict::{Proof, Verdict};
 
 /// What is printed, photographed and found: panels with corners and tags, in millimetres.
@@ -53,8 +55,7 @@ impl Target {
         Ok(Self { target: Arc::new(target), family })
     }
 
-    fn made(&self, what: &str, making: Making) -> PyResult<Files> {
-        let what = what.parse::<What>().raise(errors::target)?;
+    fn made(&self, what: What, making: Making) -> PyResult<Files> {
         make(&self.target, self.family.as_deref(), what, making).raise(errors::target)
     }
 }
@@ -191,7 +192,7 @@ impl Target {
     /// -------
     /// bytes
     fn pdf(&self) -> PyResult<Vec<u8>> {
-        Ok(self.made("pdf", Making::default())?.remove(0).1)
+        Ok(self.made(What::Pdf, Making::default())?.remove(0).1)
     }
 
     /// A page as SVG.
@@ -206,7 +207,7 @@ impl Target {
     /// str
     #[pyo3(signature = (page = 0))]
     fn svg(&self, page: i64) -> PyResult<String> {
-        let pages = self.made("svg", Making::default())?;
+        let pages = self.made(What::Svg, Making::default())?;
         let count = pages.len();
         let found = usize::try_from(page).ok().and_then(|page| pages.into_iter().nth(page));
         let none =
@@ -221,19 +222,28 @@ impl Target {
     /// format : str
     ///     ``"json"``, ``"pdf"``, ``"svg"``, ``"png"``, ``"dsc"``, ``"dsc-original"``; as meshes ``"gltf"``,
     ///     ``"obj"``, ``"sdf"``, ``"urdf"``, ``"mjcf"``, ``"usd"``, and to print in two colours ``"3mf"``; of a solid also ``"stl"``, ``"skeleton"``, ``"skeleton-3mf"``, ``"panels"`` (DXF)
-    ///     and ``"net"`` (DXF). For a laser, without an allowance for its kerf, ``"laser-dxf"`` and ``"laser-svg"``.
+    ///     and ``"net"`` (DXF). For a laser ``"laser-dxf"`` and ``"laser-svg"``; of an AprilGrid ``"kalibr"``.
     /// dpi : float, optional
     ///     Resolution of PNG pages, dots per inch.
     /// texture_dpi : float, optional
     ///     Resolution of the texture of a mesh; 20 px for a bit of a tag if left out.
     /// texture_px : int, optional
     ///     Or its longest side; at least 4 px for a bit, of a checkerboard 12.
+    /// plate_mm : float, optional
+    ///     Thickness of the plate of a board in a mesh, mm; 3 if left out.
+    /// inlay_mm : float, optional
+    ///     Depth of what is black in a 3MF, mm; 0.4 if left out.
+    /// kerf_mm : float, optional
+    ///     Width that the beam of a laser takes away, mm: engraved outlines are drawn smaller by half of it on each side,
+    ///     plates larger.
     ///
     /// Returns
     /// -------
     /// dict of str to bytes
     ///     Contents by names of files.
-    #[pyo3(signature = (format, *, dpi = 300.0, texture_dpi = None, texture_px = None))]
+    #[pyo3(signature = (format, *, dpi = 300.0, texture_dpi = None, texture_px = None, plate_mm = None,
+        inlay_mm = None, kerf_mm = None))]
+    #[expect(clippy::too_many_arguments, reason = "keywords")]
     fn files<'py>(
         &self,
         py: Python<'py>,
@@ -241,10 +251,15 @@ impl Target {
         dpi: f64,
         texture_dpi: Option<f64>,
         texture_px: Option<i64>,
+        plate_mm: Option<f64>,
+        inlay_mm: Option<f64>,
+        kerf_mm: Option<f64>,
     ) -> PyResult<Bound<'py, PyDict>> {
-        let making = making(dpi, texture_dpi, texture_px)?;
+        let given = Keywords { dpi, texture_dpi, texture_px, plate_mm, inlay_mm, kerf_mm };
+        let what = Formats::One(format.to_owned()).parsed()?;
+        let making = given.making(&self.target, &what)?;
         let files = PyDict::new(py);
-        for (name, bytes) in unlocked(py, || self.made(format, making))?? {
+        for (name, bytes) in unlocked(py, || self.made(what[0], making))?? {
             files.set_item(name, PyBytes::new(py, &bytes))?;
         }
         Ok(files)
@@ -258,12 +273,8 @@ impl Target {
     ///     Where they go; it is made where there is none.
     /// formats : sequence of str, optional
     ///     Of those of :meth:`files`; PDF if left out. The ``.json`` is always written.
-    /// dpi : float, optional
-    ///     Resolution of PNG pages, dots per inch.
-    /// texture_dpi : float, optional
-    ///     Resolution of the texture of a mesh; 20 px for a bit of a tag if left out.
-    /// texture_px : int, optional
-    ///     Or its longest side; at least 4 px for a bit, of a checkerboard 12.
+    /// dpi, texture_dpi, texture_px, plate_mm, inlay_mm, kerf_mm
+    ///     As of :meth:`files`.
     /// force : bool, optional
     ///     Whether files of another kind are replaced.
     ///
@@ -271,7 +282,8 @@ impl Target {
     /// -------
     /// list of pathlib.Path
     ///     The files, the description first.
-    #[pyo3(signature = (folder, formats = None, *, dpi = 300.0, texture_dpi = None, texture_px = None, force = false))]
+    #[pyo3(signature = (folder, formats = None, *, dpi = 300.0, texture_dpi = None, texture_px = None, plate_mm = None,
+        inlay_mm = None, kerf_mm = None, force = false))]
     #[expect(clippy::too_many_arguments, reason = "keywords")]
     fn save(
         &self,
@@ -281,17 +293,41 @@ impl Target {
         dpi: f64,
         texture_dpi: Option<f64>,
         texture_px: Option<i64>,
+        plate_mm: Option<f64>,
+        inlay_mm: Option<f64>,
+        kerf_mm: Option<f64>,
         force: bool,
     ) -> PyResult<Vec<PathBuf>> {
-        let making = making(dpi, texture_dpi, texture_px)?;
+        let given = Keywords { dpi, texture_dpi, texture_px, plate_mm, inlay_mm, kerf_mm };
+        let formats = formats.map_or_else(|| Ok(vec![What::Pdf]), Formats::parsed)?;
+        let making = given.making(&self.target, &formats)?;
         unlocked(py, || {
-            let mut files = self.made("json", making)?;
-            let formats = formats.map_or_else(|| vec!["pdf".to_owned()], Formats::into_vec);
-            for format in formats.iter().filter(|format| *format != "json") {
-                files.extend(self.made(format, making)?);
+            let mut files = self.made(What::Json, making)?;
+            for &what in formats.iter().filter(|what| **what != What::Json) {
+                for (name, bytes) in self.made(what, making)? {
+                    // Models for simulators have the files of the OBJ in common.
+                    if files.iter().all(|(other, _)| *other != name) {
+                        files.push((name, bytes));
+                    }
+                }
             }
             write_set(&folder, &files, force).raise_of_file(&folder, errors::file)
         })?
+    }
+
+    /// Checks that this target can be used together with another one: no tag of the same family and no board has the same
+    /// id.
+    ///
+    /// Parameters
+    /// ----------
+    /// other : Target
+    ///
+    /// Raises
+    /// ------
+    /// TargetError
+    ///     Where both have an id; it names the first that is free.
+    fn check_beside(&self, other: &Self) -> PyResult<()> {
+        self.target.check_beside(&other.target).raise(errors::target)
     }
 
     /// Reads a file back and compares it with this target: every corner, tile and cell.
@@ -325,7 +361,8 @@ impl Target {
             }
             Some(Proof::Path(path)) => (path.to_string_lossy().into_owned(), None),
             None => {
-                let usual = if self.target.sheets.is_empty() { "gltf" } else { "pdf" };
+                let no_pages = self.target.sheets.is_empty();
+                let usual = if no_pages { What::Gltf } else { What::Pdf };
                 let files = self.made(usual, Making::default())?;
                 (files[0].0.clone(), Some(files))
             }
@@ -352,7 +389,7 @@ impl Target {
 
     /// A small picture of the first page for notebooks.
     fn _repr_html_(&self) -> String {
-        let Ok(pages) = self.made("svg", Making::default()) else { return self.__repr__() };
+        let Ok(pages) = self.made(What::Svg, Making::default()) else { return self.__repr__() };
         let page = String::from_utf8_lossy(&pages[0].1).into_owned();
         // Its size is that of the paper: only the view box is kept.
         let start = page.find("<svg").unwrap_or(0);
@@ -388,12 +425,17 @@ impl Target {
 
     fn __reduce__<'py>(
         slf: &Bound<'py, Self>,
-    ) -> crate::Reduced<'py, (String, String, Option<String>)> {
+    ) -> crate::Reduced<'py, (String, String, Option<String>, Option<String>)> {
         let restore = slf.py().import("deltille._core")?.getattr("_target")?;
         let own = slf.get();
         let family = own.family.as_ref().map(|family| family.to_json());
+        // A family has no file in common with that of its squares.
+        let is_mixed = own.target.family.as_ref().is_some_and(|family| family.squares.is_some());
+        let squares = own.family.as_ref().filter(|_| is_mixed);
+        let squares = squares.and_then(|family| family.of_tiling(GridKind::Checker));
+        let squares = squares.map(|family| family.to_json());
         let class = slf.get_type().name()?.to_string();
-        Ok((restore, (class, own.target.to_json(), family)))
+        Ok((restore, (class, own.target.to_json(), family, squares)))
     }
 }
 
@@ -404,13 +446,12 @@ pub fn _target<'py>(
     class_: &str,
     json: &str,
     family: Option<&str>,
+    squares: Option<&str>,
 ) -> PyResult<Bound<'py, PyAny>> {
     let target = targets::Target::from_json(json).raise(errors::target)?;
-    let family =
-        family.map(deltille::family::Family::from_json).transpose().raise(errors::family)?;
-    let squares = target.family.as_ref().and_then(|family| family.squares.as_ref());
-    let squares = squares.map(|family| deltille::family::Family::shipped(&family.name));
-    let squares = squares.transpose().raise(errors::family)?;
+    let read = |text| deltille::family::Family::from_json(text).raise(errors::family);
+    let [family, squares] = [family, squares].map(|text| text.map(read).transpose());
+    let (family, squares) = (family?, squares?);
     let family = deltille::family::Family::paired(family, squares);
     let target = Target { target: Arc::new(target), family: family.map(Arc::new) };
     macro_rules! of_class {
@@ -424,30 +465,19 @@ pub fn _target<'py>(
             }
         };
     }
-    of_class!(Board, Checkerboard, Tetrahedron, Octahedron, Icosahedron, Cube, Solid)
-}
-
-fn making(dpi: f64, texture_dpi: Option<f64>, texture_px: Option<i64>) -> PyResult<Making> {
-    if !(1.0..=1e5).contains(&dpi) || texture_dpi.is_some_and(|dpi| !(1.0..=1e5).contains(&dpi)) {
-        return Err(raised::TargetError::new_err("dpi: give dots per inch from 1 to 100000"));
-    }
-    let mut making = Making::default();
-    making.dpi = dpi;
-    making.mesh.resolution = match (texture_dpi, texture_px) {
-        (None, None) => Resolution::Usual,
-        (Some(dpi), None) => Resolution::Dpi(dpi),
-        (None, Some(px)) => {
-            let side = u32::try_from(px).ok().filter(|px| (1..=MAX_TEXTURE_PX).contains(px));
-            let refused = || format!("texture_px: give 1 to {MAX_TEXTURE_PX}");
-            Resolution::Side(side.ok_or_else(|| raised::TargetError::new_err(refused()))?)
-        }
-        (Some(_), Some(_)) => {
-            return Err(raised::TargetError::new_err(
-                "texture_dpi and texture_px: give one of them",
-            ));
-        }
-    };
-    Ok(making)
+    of_class!(
+        Board,
+        Checkerboard,
+        Charuco,
+        AprilGrid,
+        Circles,
+        Tetrahedron,
+        Octahedron,
+        Icosahedron,
+        Cube,
+        Cuboid,
+        Solid
+    )
 }
 
 /// A tag of a target.
@@ -472,21 +502,5 @@ pickles!(Tag);
 impl Tag {
     fn __repr__(&self) -> String {
         format!("Tag(id={}, panel={}, row={}, col={})", self.id, self.panel, self.row, self.col)
-    }
-}
-
-/// One format, or several.
-#[derive(FromPyObject)]
-pub enum Formats {
-    One(String),
-    Many(Vec<String>),
-}
-
-impl Formats {
-    fn into_vec(self) -> Vec<String> {
-        match self {
-            Self::One(format) => vec![format],
-            Self::Many(formats) => formats,
-        }
     }
 }

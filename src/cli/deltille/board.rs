@@ -7,7 +7,7 @@ use anyhow::{Context, bail};
 
 use super::delivery::Delivery;
 use super::files::{File, Formats, drawn, text_file};
-use super::finishing::Finishing;
+use super::finishing::{Finishing, Laser};
 use super::meshes::PlateMeshes;
 use super::printing::idle_without_pages;
 use super::settings::{Plan, Settings};
@@ -27,7 +27,7 @@ pub struct Args {
     /// Take what is not given here from a TOML file
     #[arg(long, value_name = "FILE")]
     template: Option<PathBuf>,
-    /// Write the settings as a TOML file, but for meshes, lasers and inks
+    /// Write the settings as a TOML file
     #[arg(long, value_name = "FILE")]
     save_template: Option<PathBuf>,
     #[command(flatten)]
@@ -36,18 +36,22 @@ pub struct Args {
     meshes: PlateMeshes,
     #[command(flatten)]
     finishing: Finishing,
+    #[command(flatten)]
+    laser: Laser,
 }
 
 /// Makes a board, writes its files, and verifies what it wrote.
 pub fn run(grid: GridKind, args: Args) -> anyhow::Result<ExitCode> {
+    let given = args.settings.with(args.meshes, args.laser, args.finishing);
     let settings = match &args.template {
-        Some(path) => args.settings.or(Settings::read(path, grid)?),
-        None => args.settings,
+        Some(path) => given.or(Settings::read(path, grid)?),
+        None => given,
     };
+    let (meshes, laser) = (settings.meshes(), &settings.laser);
     let mut plan = settings.plan(grid)?;
     // A mesh, or a drawing for a laser, alone needs no paper.
-    plan.pdf &= settings.prints() || !(args.meshes.is_any() || args.finishing.has_laser());
-    args.meshes.check_use(plan.spec.two_sided_mm)?;
+    plan.pdf &= settings.prints() || !(meshes.is_any() || laser.is_any());
+    meshes.check_use(plan.spec.two_sided_mm)?;
     let family = plan.spec.tags.as_ref().map(|tags| family::resolve(&tags.family)).transpose();
     let family = match (family, grid) {
         (Err(FamilyFileError::Name(FamilyError::Unknown { name })), GridKind::Checker) => bail!(
@@ -79,17 +83,18 @@ pub fn run(grid: GridKind, args: Args) -> anyhow::Result<ExitCode> {
     }
     let paper = is_printed.then_some(&plan.paper);
     let target = Target::build(&plan.name, &spec, family.as_ref(), paper)?;
-    let target = args.finishing.applied(target, plan.paper.margin_mm, plan.pdf)?;
+    let finishing = &settings.finishing;
+    let target = finishing.applied(target, plan.paper.margin_mm, plan.pdf, laser)?;
     args.delivery.check_beside(&target)?;
     let template = args.save_template.as_deref().map(|path| {
-        let text = settings.with_edge(plan.spec.edge_mm).to_toml(grid);
+        let text = settings.clone().with_edge(plan.spec.edge_mm).to_toml(grid);
         Template::new(path, text, args.delivery.overwrite)
     });
     let template = template.transpose()?;
     let mut files = files(&plan, &target, family.as_ref())?;
-    let (meshes, texture) = args.meshes.files(&target, family.as_ref())?;
+    let (meshes, texture) = meshes.files(&target, family.as_ref())?;
     files.extend(meshes);
-    files.extend(args.finishing.files(&target, family.as_ref())?);
+    files.extend(laser.files(&target, family.as_ref())?);
     let told = summary(&target) + &texture;
     let delivered = args.delivery.deliver(&target, family.as_ref(), &files, &told)?;
     template.map_or(Ok(()), |template| template.write())?;

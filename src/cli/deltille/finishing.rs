@@ -3,24 +3,27 @@
 #![allow(rustdoc::invalid_html_tags)] // The comments on options are the help of the program, too.
 
 use anyhow::{Context, bail};
+use serde::{Deserialize, Serialize};
 
 use super::files::{File, bytes_file};
-use super::settings::refuse_idle;
+use super::settings::{is_false, length, refuse_idle};
 use crate::artwork::CuttingError;
 use crate::export::artifacts::{MakeError, Making, What, make};
 use crate::family::Family;
-use crate::targets::{Finish, Target, parse_length_mm};
+use crate::targets::{Finish, Target};
 
 /// Heading of these options.
 const FINISHING: &str = "Glass, print shops, lasers";
 
 /// How a board is finished.
-#[derive(clap::Args)]
+#[derive(Clone, Debug, Default, PartialEq, clap::Args, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case", deny_unknown_fields, default)]
 #[command(next_help_heading = FINISHING)]
 pub struct Finishing {
     /// Print the mirror image, for the back of glass: the description, and labels, are what is seen through the
     /// glass
     #[arg(long)]
+    #[serde(skip_serializing_if = "is_false")]
     mirrored: bool,
     /// A white spot colour of that name, such as White or RDG_WHITE, beneath all of each page of the PDF, and
     /// everything overprints
@@ -30,41 +33,52 @@ pub struct Finishing {
     /// with --pack the lines between boards
     #[arg(long, value_name = "NAME")]
     contour: Option<String>,
-    #[command(flatten)]
-    laser: Laser,
 }
 
 /// Drawings for a laser.
-#[derive(clap::Args)]
+#[derive(Clone, Debug, Default, PartialEq, clap::Args, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case", deny_unknown_fields, default)]
 #[command(next_help_heading = FINISHING)]
 pub struct Laser {
     /// Write <name>-laser.dxf or <name>-laser.svg: what is black as closed outlines to engrave, and the outline of
     /// each plate to cut (millimetres)
     #[arg(long, value_name = "FORMATS", value_delimiter = ',')]
+    #[serde(rename = "formats", skip_serializing_if = "Vec::is_empty")]
     laser: Vec<LaserFormat>,
     /// Width that the beam takes away: engraved outlines are drawn smaller by half of it on each side, plates larger
     /// [default: 0mm]
-    #[arg(long, value_name = "LENGTH", allow_hyphen_values = true, value_parser = parse_length_mm)]
-    kerf: Option<f64>,
+    #[arg(long, value_name = "LENGTH", allow_hyphen_values = true)]
+    kerf: Option<String>,
 }
 
 /// Format of a drawing for a laser.
-#[derive(Clone, Copy, PartialEq, clap::ValueEnum)]
+#[derive(Clone, Copy, Debug, PartialEq, clap::ValueEnum, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
 enum LaserFormat {
     Dxf,
     Svg,
 }
 
 impl Finishing {
-    /// Whether a drawing for a laser is asked for.
-    pub fn has_laser(&self) -> bool {
-        self.laser.is_any()
+    /// This finish, and what a template says of it where it says nothing; its spot colours where a PDF `is_kept`.
+    pub fn or(self, template: Self, is_kept: bool) -> Self {
+        Self {
+            mirrored: self.mirrored || template.mirrored,
+            white: self.white.or(template.white.filter(|_| is_kept)),
+            contour: self.contour.or(template.contour.filter(|_| is_kept)),
+        }
     }
 
     /// The target with this finish, which is laid out within this margin.
-    pub fn applied(&self, target: Target, margin_mm: f64, pdf: bool) -> anyhow::Result<Target> {
-        self.laser.check_use()?;
-        if self.mirrored && target.sheets.is_empty() && !self.has_laser() {
+    pub fn applied(
+        &self,
+        target: Target,
+        margin_mm: f64,
+        pdf: bool,
+        laser: &Laser,
+    ) -> anyhow::Result<Target> {
+        laser.check_use()?;
+        if self.mirrored && target.sheets.is_empty() && !laser.is_any() {
             bail!("--mirrored: a mesh is never mirrored: add --pdf or --laser, or leave it out");
         }
         let spots = [("--white", self.white.is_some()), ("--contour", self.contour.is_some())];
@@ -75,14 +89,15 @@ impl Finishing {
         let finish = Finish { mirrored: self.mirrored, white, contour };
         Ok(target.finished(finish, margin_mm)?)
     }
-
-    /// The drawings for a laser that are asked for.
-    pub fn files(&self, target: &Target, family: Option<&Family>) -> anyhow::Result<Vec<File>> {
-        self.laser.files(target, family)
-    }
 }
 
 impl Laser {
+    /// These drawings, and what a template says of them where these say nothing.
+    pub fn or(self, template: Self) -> Self {
+        let laser = if self.laser.is_empty() { template.laser } else { self.laser };
+        Self { laser, kerf: self.kerf.or(template.kerf) }
+    }
+
     /// Whether any is asked for.
     pub fn is_any(&self) -> bool {
         !self.laser.is_empty()
@@ -97,7 +112,7 @@ impl Laser {
     /// The drawings that are asked for.
     pub fn files(&self, target: &Target, family: Option<&Family>) -> anyhow::Result<Vec<File>> {
         let mut making = Making::default();
-        making.kerf_mm = self.kerf.unwrap_or(0.0);
+        making.kerf_mm = length("kerf", &self.kerf)?.unwrap_or(0.0);
         let formats = [(LaserFormat::Dxf, What::LaserDxf), (LaserFormat::Svg, What::LaserSvg)];
         let asked = formats.into_iter().filter(|(format, _)| self.laser.contains(format));
         let mut files = Vec::new();

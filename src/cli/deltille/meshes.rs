@@ -6,16 +6,17 @@ use std::collections::BTreeMap;
 use std::ops::RangeInclusive;
 
 use anyhow::{Context, anyhow, bail};
+use serde::{Deserialize, Serialize};
 
 use super::files::{File, bytes_file};
-use super::settings::refuse_idle;
+use super::settings::{is_false, length, refuse_idle};
 use crate::cli::values::{number, whole};
 use crate::export::artifacts::{Making, What, make, of_mesh};
 use crate::export::inlay::InlaidBodies;
 use crate::export::mesh::{MAX_TEXTURE_PX, MeshError, Meshing, Resolution, TexturedMesh};
 use crate::export::threemf;
 use crate::family::Family;
-use crate::targets::{Target, TargetSpec, parse_length_mm};
+use crate::targets::{Target, TargetSpec};
 
 /// Heading of these options.
 const MESHES: &str = "Meshes and models for simulators";
@@ -23,47 +24,76 @@ const MESHES: &str = "Meshes and models for simulators";
 /// Sides of a texture, px.
 const SIDE_PX: RangeInclusive<u32> = 64..=MAX_TEXTURE_PX;
 
+/// Resolution of a texture, dots per inch.
+const TEXTURE_DPI: RangeInclusive<f64> = 1.0..=1e5;
+
 /// Which meshes are written.
-#[derive(clap::Args, Clone, Copy)]
+#[derive(Clone, Debug, Default, PartialEq, clap::Args, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case", deny_unknown_fields, default)]
 #[command(next_help_heading = MESHES)]
 pub struct Meshes {
     /// Write <name>.glb, the textured mesh as glTF 2.0 (metres); of a solid also where nothing else
     /// is asked for
     #[arg(long)]
+    #[serde(skip_serializing_if = "is_false")]
     gltf: bool,
     /// Write <name>.obj, <name>.mtl and <name>-texture.png (millimetres)
     #[arg(long)]
+    #[serde(skip_serializing_if = "is_false")]
     obj: bool,
     /// Write <name>.sdf, a static model for Gazebo, with the files of --obj
     #[arg(long)]
+    #[serde(skip_serializing_if = "is_false")]
     sdf: bool,
     /// Write <name>.urdf, a link for ROS, with the files of --obj
     #[arg(long)]
+    #[serde(skip_serializing_if = "is_false")]
     urdf: bool,
     /// Write <name>.xml, a body for MuJoCo, with the files of --obj
     #[arg(long)]
+    #[serde(skip_serializing_if = "is_false")]
     mjcf: bool,
     /// Write <name>.usda, for Isaac Sim, Omniverse or Blender, with its texture (metres)
     #[arg(long)]
+    #[serde(skip_serializing_if = "is_false")]
     usd: bool,
     /// Write <name>.3mf to print in two colours: two bodies, what is black inlaid into the white
     /// plate or solid (millimetres); of a solid with --skeleton that frame, too
     #[arg(long = "3mf")]
+    #[serde(rename = "3mf", skip_serializing_if = "is_false")]
     threemf: bool,
     /// Depth of what is black in a 3MF, less than the plate is thick, or than where faces meet [default: 0.4mm]
-    #[arg(long, value_name = "LENGTH", value_parser = parse_length_mm)]
-    inlay: Option<f64>,
+    #[arg(long, value_name = "LENGTH", allow_hyphen_values = true)]
+    inlay: Option<String>,
     /// Longest side of the texture, px; at least 4 px are needed for a bit of a tag, of a
     /// checkerboard 12 [default: 20 px for a bit, or as many as 16384 px take]
     #[arg(long, value_name = "PX", allow_negative_numbers = true, value_parser = whole(SIDE_PX))]
     texture: Option<u32>,
     /// Resolution of the texture, dots per inch, instead of its size
     #[arg(long, value_name = "DPI", allow_negative_numbers = true, conflicts_with = "texture",
-          value_parser = number(1.0..=1e5))]
+          value_parser = number(TEXTURE_DPI))]
     texture_dpi: Option<f64>,
 }
 
 impl Meshes {
+    /// These, and those of a template, with what it says of them where these say nothing.
+    pub fn or(self, template: Self) -> Self {
+        let is_sized = self.texture.is_some() || self.texture_dpi.is_some();
+        Self {
+            gltf: self.gltf || template.gltf,
+            obj: self.obj || template.obj,
+            sdf: self.sdf || template.sdf,
+            urdf: self.urdf || template.urdf,
+            mjcf: self.mjcf || template.mjcf,
+            usd: self.usd || template.usd,
+            threemf: self.threemf || template.threemf,
+            inlay: self.inlay.or(template.inlay),
+            // A texture has one size.
+            texture: self.texture.or(template.texture.filter(|_| !is_sized)),
+            texture_dpi: self.texture_dpi.or(template.texture_dpi.filter(|_| !is_sized)),
+        }
+    }
+
     /// Whether any is asked for.
     pub fn is_any(&self) -> bool {
         self.is_textured() || self.threemf
@@ -85,14 +115,28 @@ impl Meshes {
     }
 
     /// Refuses options of a mesh that is not made.
-    pub fn check_use(&self, plate_mm: Option<f64>) -> anyhow::Result<()> {
+    pub fn check_use(&self, plate: Option<&str>) -> anyhow::Result<()> {
         let (textured, any) = (self.is_textured(), self.is_any());
         refuse_idle(&[
             ("--texture", self.texture.is_some(), textured, "a mesh: add --gltf"),
             ("--texture-dpi", self.texture_dpi.is_some(), textured, "a mesh: add --gltf"),
-            ("--plate", plate_mm.is_some(), any, "a mesh: add --gltf"),
+            ("--plate", plate.is_some(), any, "a mesh: add --gltf"),
             ("--inlay", self.inlay.is_some(), self.threemf, "two bodies: add --3mf"),
-        ])
+        ])?;
+        // A template says what the parser of options would refuse.
+        if self.texture.is_some() && self.texture_dpi.is_some() {
+            bail!("--texture, --texture-dpi: give one of them");
+        }
+        match (self.texture, self.texture_dpi) {
+            (Some(px), _) if !SIDE_PX.contains(&px) => {
+                bail!("--texture: {px} is not between {} and {}", SIDE_PX.start(), SIDE_PX.end())
+            }
+            (_, Some(dpi)) if !TEXTURE_DPI.contains(&dpi) => {
+                let (least, most) = (TEXTURE_DPI.start(), TEXTURE_DPI.end());
+                bail!("--texture-dpi: {dpi} is not between {least} and {most}")
+            }
+            _ => Ok(()),
+        }
     }
 
     /// The files that are asked for, and a line on their texture to be told after others; empty where there is none.
@@ -104,7 +148,7 @@ impl Meshes {
     ) -> anyhow::Result<(Vec<File>, String)> {
         let mut meshing = Meshing::default();
         meshing.plate_mm = plate_mm.unwrap_or(meshing.plate_mm);
-        meshing.inlay_mm = self.inlay.unwrap_or(meshing.inlay_mm);
+        meshing.inlay_mm = length("inlay", &self.inlay)?.unwrap_or(meshing.inlay_mm);
         let (mut files, told) = match self.is_textured() {
             true => self.textured(target, family, meshing)?,
             false => (Vec::new(), String::new()),
@@ -163,13 +207,13 @@ impl Meshes {
 }
 
 /// Meshes of a plate with a board.
-#[derive(clap::Args, Clone, Copy)]
+#[derive(Clone, Debug, Default, PartialEq, clap::Args)]
 pub struct PlateMeshes {
     #[command(flatten)]
-    meshes: Meshes,
+    pub meshes: Meshes,
     /// Thickness of the plate that carries the board in a mesh [default: 3mm]
-    #[arg(long, value_name = "LENGTH", value_parser = parse_length_mm, help_heading = MESHES)]
-    plate: Option<f64>,
+    #[arg(long, value_name = "LENGTH", allow_hyphen_values = true, help_heading = MESHES)]
+    pub plate: Option<String>,
 }
 
 impl PlateMeshes {
@@ -183,7 +227,7 @@ impl PlateMeshes {
         if self.plate.is_some() && two_sided_mm.is_some() {
             bail!("--plate: the plate is as thick as --two-sided says: leave it out");
         }
-        self.meshes.check_use(self.plate)
+        self.meshes.check_use(self.plate.as_deref())
     }
 
     /// As [`Meshes::files`].
@@ -192,7 +236,7 @@ impl PlateMeshes {
         target: &Target,
         family: Option<&Family>,
     ) -> anyhow::Result<(Vec<File>, String)> {
-        self.meshes.files(target, family, self.plate)
+        self.meshes.files(target, family, length("plate", &self.plate)?)
     }
 }
 

@@ -4,7 +4,7 @@ use anyhow::{Context, bail};
 
 use super::delivery::Delivery;
 use super::files::{File, Formats, drawn, text_file};
-use super::finishing::Finishing;
+use super::finishing::{Finishing, Laser};
 use super::settings::{DEFAULT_DPI, DPI, PAPER, PRINT, refuse_idle};
 use crate::artwork;
 use crate::cli::values::{name, whole};
@@ -49,12 +49,14 @@ pub struct Printing {
     pub delivery: Delivery,
     #[command(flatten)]
     finishing: Finishing,
+    #[command(flatten)]
+    laser: Laser,
 }
 
 impl Printing {
     /// Whether a PDF is written: where nothing else is asked for, too, and no mesh `is_made`.
     fn is_pdf(&self, is_made: bool) -> bool {
-        self.pdf || !(self.svg || self.png || self.finishing.has_laser() || is_made)
+        self.pdf || !(self.svg || self.png || self.laser.is_any() || is_made)
     }
 
     /// The target on its paper.
@@ -82,7 +84,8 @@ impl Printing {
             idle_without_pages(&paper)?;
         }
         let target = Target::build(name, spec, family, is_printed.then_some(&paper))?;
-        let target = self.finishing.applied(target, paper.margin_mm, self.is_pdf(is_made))?;
+        let pdf = self.is_pdf(is_made);
+        let target = self.finishing.applied(target, paper.margin_mm, pdf, &self.laser)?;
         self.delivery.check_beside(&target)?;
         Ok(target)
     }
@@ -100,7 +103,7 @@ impl Printing {
         if !target.sheets.is_empty() {
             files.extend(drawn(&target.name, artwork::draw(target, family)?, formats, dpi));
         }
-        files.extend(self.finishing.files(target, family)?);
+        files.extend(self.laser.files(target, family)?);
         Ok(files)
     }
 }

@@ -9,6 +9,8 @@ use std::path::Path;
 use anyhow::{Context, anyhow, bail};
 use serde::{Deserialize, Serialize};
 
+use super::finishing::{Finishing, Laser};
+use super::meshes::{Meshes, PlateMeshes};
 use super::template;
 use crate::cli::values::{number, whole};
 use crate::export::dsc::Dialect;
@@ -148,6 +150,21 @@ pub struct Settings {
     /// Stem of the files' names, printed on the sheet [default: board, or checkerboard]
     #[arg(long)]
     name: Option<String>,
+    /// Thickness of the plate in a mesh, which [`PlateMeshes`] asks for.
+    #[arg(skip)]
+    plate: Option<String>,
+    /// Meshes, which it asks for, too.
+    #[arg(skip)]
+    #[serde(skip_serializing_if = "is_usual")]
+    meshes: Meshes,
+    /// Drawings for a laser.
+    #[arg(skip)]
+    #[serde(skip_serializing_if = "is_usual")]
+    pub laser: Laser,
+    /// How it is finished.
+    #[arg(skip)]
+    #[serde(skip_serializing_if = "is_usual")]
+    pub finishing: Finishing,
 }
 
 /// Reads the colour of the squares that carry tags.
@@ -172,6 +189,17 @@ pub(super) fn refuse_idle(options: &[(&str, bool, bool, &str)]) -> anyhow::Resul
 /// Whether a setting is left out of a template.
 pub(super) fn is_false(value: &bool) -> bool {
     !value
+}
+
+/// Whether settings say nothing.
+pub(super) fn is_usual<T: Default + PartialEq>(settings: &T) -> bool {
+    *settings == T::default()
+}
+
+/// A length in millimetres that an option gives, if it is given.
+pub(super) fn length(option: &str, text: &Option<String>) -> anyhow::Result<Option<f64>> {
+    let parsed = text.as_deref().map(parse_length_mm).transpose();
+    parsed.with_context(|| format!("--{option}"))
 }
 
 /// Settings understood.
@@ -214,6 +242,7 @@ impl Settings {
             || self.tag_border.is_some()
             || self.first_id.is_some();
         let formats = self.pdf || self.svg || self.png;
+        let two_sided = self.two_sided.is_some();
         let png = self.png || (template.png && !formats);
         let dsc = self.dsc || template.dsc;
         Self {
@@ -249,7 +278,23 @@ impl Settings {
             dpi: self.dpi.or(template.dpi.filter(|_| png || !template.png)),
             note: self.note.or(template.note),
             name: self.name.or(template.name),
+            // Of two sides the distance is the thickness.
+            plate: self.plate.or(template.plate.filter(|_| !two_sided)),
+            meshes: self.meshes.or(template.meshes),
+            laser: self.laser.or(template.laser),
+            finishing: self.finishing.or(template.finishing, self.pdf || !formats),
         }
+    }
+
+    /// The meshes of its plate that are asked for.
+    pub fn meshes(&self) -> PlateMeshes {
+        PlateMeshes { meshes: self.meshes.clone(), plate: self.plate.clone() }
+    }
+
+    /// These settings, with what is not printed.
+    pub fn with(self, meshes: PlateMeshes, laser: Laser, finishing: Finishing) -> Self {
+        let PlateMeshes { meshes, plate } = meshes;
+        Self { plate, meshes, laser, finishing, ..self }
     }
 
     /// Whether a format to print is asked for.
@@ -261,10 +306,6 @@ impl Settings {
     pub fn plan(&self, grid: GridKind) -> anyhow::Result<Plan> {
         let (Some(rows), Some(cols)) = (self.rows, self.cols) else {
             bail!("--rows and --cols are needed, here or in a --template");
-        };
-        let length = |option: &str, text: &Option<String>| {
-            let parsed = text.as_deref().map(parse_length_mm).transpose();
-            parsed.with_context(|| format!("--{option}"))
         };
         let paper = PaperSpec {
             size: self.paper.as_deref().map(str::parse).transpose().context("--paper")?,

@@ -34,7 +34,7 @@ pub struct Args {
     /// Take what is not given here from a TOML file
     #[arg(long, value_name = "FILE")]
     template: Option<PathBuf>,
-    /// Write the settings as a TOML file, but for meshes, lasers and inks
+    /// Write the settings as a TOML file
     #[arg(long, value_name = "FILE")]
     save_template: Option<PathBuf>,
     #[command(flatten)]
@@ -152,7 +152,7 @@ pub fn run_mesh(mesh: MeshArgs) -> anyhow::Result<ExitCode> {
     }
     let stem = path.file_stem().unwrap_or_default().to_string_lossy();
     let name = settings.name.clone().unwrap_or_else(|| Name::like(&stem).to_string());
-    if args.meshes.has_obj() && args.delivery.would_replace(&format!("{name}.obj"), &path) {
+    if settings.meshes.has_obj() && args.delivery.would_replace(&format!("{name}.obj"), &path) {
         bail!("--name: {name}.obj would be written over the mesh: give another name or folder");
     }
     let faces = solid.faces();
@@ -170,9 +170,9 @@ fn run_with(
     args: &Args,
 ) -> anyhow::Result<ExitCode> {
     settings.check_use()?;
-    let meshes = args.meshes(&settings);
+    let meshes = meshes_of(&settings);
     meshes.check_use(None)?;
-    args.laser.check_use()?;
+    settings.laser.check_use()?;
     let spec = settings.spec(shape)?;
     let paper = settings.paper()?;
     let family = family_of(&spec)?;
@@ -192,7 +192,7 @@ fn run_with(
     let mut files = files(&settings, &target, net, &spec, family)?;
     let (textured, texture) = meshes.files(&target, family, None)?;
     files.extend(textured);
-    files.extend(args.laser.files(&target, family)?);
+    files.extend(settings.laser.files(&target, family)?);
     files.extend(pages(&settings, &target, family)?);
     let told = summary(&target, &spec)? + &texture;
     let delivered = args.delivery.deliver(&target, family, &files, &told)?;
@@ -212,7 +212,8 @@ fn family_of(spec: &SolidSpec) -> anyhow::Result<Option<Family>> {
 impl Args {
     /// What is given, and what a template says beyond it.
     fn settings(&self, command: &str) -> anyhow::Result<SolidSettings> {
-        let given = self.settings.clone();
+        let (meshes, laser) = (self.meshes.clone(), self.laser.clone());
+        let given = SolidSettings { meshes, laser, ..self.settings.clone() };
         let settings = match &self.template {
             Some(path) => given.or(SolidSettings::read(path, command)?),
             None => given,
@@ -220,14 +221,15 @@ impl Args {
         settings.check_shape(command)?;
         Ok(settings)
     }
+}
 
-    /// The meshes that are asked for; the glTF where nothing is.
-    fn meshes(&self, settings: &SolidSettings) -> Meshes {
-        let SolidSettings { stl, skeleton, dxf, .. } = *settings;
-        let bodies = stl || skeleton || dxf || self.laser.is_any();
-        let nothing = !(bodies || settings.printed() || self.meshes.is_any());
-        if nothing { self.meshes.with_gltf() } else { self.meshes }
-    }
+/// The meshes that are asked for; the glTF where nothing is.
+fn meshes_of(settings: &SolidSettings) -> Meshes {
+    let SolidSettings { stl, skeleton, dxf, .. } = *settings;
+    let bodies = stl || skeleton || dxf || settings.laser.is_any();
+    let meshes = settings.meshes.clone();
+    let nothing = !(bodies || settings.printed() || meshes.is_any());
+    if nothing { meshes.with_gltf() } else { meshes }
 }
 
 /// The description, bodies, and files to cut and to list. What can be refused is refused here, before anything is written.

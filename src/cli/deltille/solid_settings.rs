@@ -7,7 +7,9 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, anyhow, bail};
 use serde::{Deserialize, Serialize};
 
-use super::settings::{DPI, PAPER, PRINT, TAGS, is_false, refuse_idle};
+use super::finishing::Laser;
+use super::meshes::Meshes;
+use super::settings::{DPI, PAPER, PRINT, TAGS, is_false, is_usual, length, refuse_idle};
 use super::template;
 use crate::cli::values::{number, whole};
 use crate::export::dsc::Dialect;
@@ -15,7 +17,7 @@ use crate::family::places;
 use crate::lattice::GridKind;
 use crate::targets::{
     BORDER_BITS, DEFAULT_MARGIN_MM, FACE_TILES, MOST_ROWS, PaperSpec, SkeletonSpec, SolidShape,
-    SolidSheets, SolidSpec, TagSpec, TagsIn, parse_length_mm,
+    SolidSheets, SolidSpec, TagSpec, TagsIn,
 };
 
 /// Heading of the help.
@@ -160,6 +162,14 @@ pub struct SolidSettings {
     /// Stem of the files' names, printed on the sheets [default: the solid's name]
     #[arg(long)]
     pub name: Option<String>,
+    /// Meshes.
+    #[arg(skip)]
+    #[serde(skip_serializing_if = "is_usual")]
+    pub meshes: Meshes,
+    /// Drawings for a laser.
+    #[arg(skip)]
+    #[serde(skip_serializing_if = "is_usual")]
+    pub laser: Laser,
 }
 
 impl SolidSettings {
@@ -230,6 +240,8 @@ impl SolidSettings {
             margin: self.margin.or(template.margin),
             note: self.note.or(template.note),
             name: self.name.or(template.name),
+            meshes: self.meshes.or(template.meshes),
+            laser: self.laser.or(template.laser),
         }
     }
 
@@ -291,7 +303,7 @@ impl SolidSettings {
     pub fn spec(&self, shape: SolidShape) -> anyhow::Result<SolidSpec> {
         let default = SolidSpec::new(shape);
         let mut spec = SolidSpec {
-            edge_mm: length("--edge", &self.edge)?.unwrap_or(default.edge_mm),
+            edge_mm: length("edge", &self.edge)?.unwrap_or(default.edge_mm),
             tiles: self.tiles.unwrap_or(default.tiles),
             margin_mm: default.margin_mm,
             board_id: self.board_id.unwrap_or(default.board_id),
@@ -301,7 +313,7 @@ impl SolidSettings {
             skeleton: self.skeleton()?,
             shape: default.shape,
         };
-        spec.margin_mm = match length("--face-margin", &self.face_margin)? {
+        spec.margin_mm = match length("face-margin", &self.face_margin)? {
             Some(given) => given,
             None => spec.comfortable_margin_mm()?,
         };
@@ -359,11 +371,11 @@ impl SolidSettings {
             return Ok(None);
         }
         let default = SkeletonSpec::default();
-        let thickness = length("--panel-thickness", &self.panel_thickness)?;
+        let thickness = length("panel-thickness", &self.panel_thickness)?;
         Ok(Some(SkeletonSpec {
             panel_thickness_mm: thickness.unwrap_or(default.panel_thickness_mm),
-            wall_mm: length("--wall", &self.wall)?.unwrap_or(default.wall_mm),
-            rib_mm: length("--rib", &self.rib)?,
+            wall_mm: length("wall", &self.wall)?.unwrap_or(default.wall_mm),
+            rib_mm: length("rib", &self.rib)?,
         }))
     }
 
@@ -375,7 +387,7 @@ impl SolidSettings {
                 Some(text) => text.parse().context("--orientation")?,
                 None => Default::default(),
             },
-            margin_mm: length("--margin", &self.margin)?.unwrap_or(DEFAULT_MARGIN_MM),
+            margin_mm: length("margin", &self.margin)?.unwrap_or(DEFAULT_MARGIN_MM),
             solids: match (self.per_face, self.allow_seams) {
                 (true, _) => SolidSheets::PerFace,
                 (false, true) => SolidSheets::SeamedNet,
@@ -397,8 +409,4 @@ impl SolidSettings {
             None => Ok(self.dsc.then(Dialect::default)),
         }
     }
-}
-
-fn length(option: &str, text: &Option<String>) -> anyhow::Result<Option<f64>> {
-    text.as_deref().map(parse_length_mm).transpose().with_context(|| option.to_owned())
 }

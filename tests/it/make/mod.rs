@@ -10,3 +10,4 @@ mod plan;
 mod sides_and_pages;
 mod solid;
 mod tag_sheets;
+mod templates;

@@ -73,13 +73,15 @@ pub enum What {
     LaserDxf,
     /// `<name>-laser.svg` likewise.
     LaserSvg,
+    /// `<name>.yaml`, Kalibr's target file of an AprilGrid.
+    Kalibr,
 }
 
 /// A text that is nothing that can be made.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error(
     "`{0}` is no format: json, pdf, svg, png, dsc, dsc-original, gltf, obj, sdf, urdf, mjcf, usd, 3mf, stl, skeleton, \
-     skeleton-3mf, panels, net, laser-dxf or laser-svg"
+     skeleton-3mf, panels, net, laser-dxf, laser-svg or kalibr"
 )]
 pub struct WhatError(String);
 
@@ -108,6 +110,7 @@ impl FromStr for What {
             "net" => Self::Net,
             "laser-dxf" => Self::LaserDxf,
             "laser-svg" => Self::LaserSvg,
+            "kalibr" => Self::Kalibr,
             _ => return Err(WhatError(text.to_owned())),
         })
     }
@@ -159,6 +162,11 @@ pub enum MakeError {
     /// Its specification makes none.
     #[error(transparent)]
     Target(#[from] TargetError),
+    /// Kalibr does not read it.
+    #[error(
+        "{0} is nothing that Kalibr reads: take an AprilGrid of aprilTag36h11 with a border of 2 bits"
+    )]
+    NotKalibr(String),
     /// There is nothing to cut.
     #[error(transparent)]
     Cutting(#[from] CuttingError),
@@ -211,6 +219,14 @@ pub fn make(
             let drawing = artwork::to_laser(target, family, making.kerf_mm)?;
             let text = laser_svg::text(&drawing, name, &artwork::subject(target));
             vec![(laser_file_name(name, "svg"), text.into_bytes())]
+        }
+        What::Kalibr => {
+            let yaml = match &target.spec {
+                TargetSpec::AprilGrid(spec) => spec.to_kalibr_yaml(),
+                _ => None,
+            };
+            let yaml = yaml.ok_or_else(|| MakeError::NotKalibr(name.to_string()))?;
+            named(".yaml", yaml.into_bytes())
         }
     })
 }

@@ -1,0 +1,111 @@
+//! What targets are printed on, and how: keywords that all of them have.
+
+use std::sync::Arc;
+
+use deltille::family::Family;
+use deltille::targets::{self, DEFAULT_MARGIN_MM, Finish, PaperSpec, SolidSheets, TargetSpec};
+use pyo3::prelude::*;
+
+use crate::errors::{self, Raise};
+use crate::targets::Target;
+
+/// What a target is printed on.
+pub fn paper(
+    size: Option<&str>,
+    orientation: &str,
+    margin_mm: Option<f64>,
+    solids: SolidSheets,
+) -> PyResult<PaperSpec> {
+    Ok(PaperSpec {
+        size: size.map(str::parse).transpose().raise(errors::target)?,
+        orientation: orientation.parse().raise(errors::target)?,
+        margin_mm: margin_mm.unwrap_or(DEFAULT_MARGIN_MM),
+        solids,
+        ..PaperSpec::default()
+    })
+}
+
+/// A target on its paper.
+pub fn build(
+    name: &str,
+    spec: &TargetSpec,
+    family: Option<Arc<Family>>,
+    paper: &PaperSpec,
+    finish: Finish,
+) -> PyResult<Target> {
+    let target = targets::Target::build(name, spec, family.as_deref(), Some(paper));
+    let target = target.and_then(|target| target.finished(finish, paper.margin_mm));
+    Ok(Target { target: Arc::new(target.raise(errors::target)?), family })
+}
+
+/// A class of flat targets: its name, that of its files, what must be given, keywords of its own with their defaults, and
+/// a block that makes a specification and its family with them. Keywords of paper and print are added, and told at the end
+/// of its documentation; the block may change the paper.
+macro_rules! flat {
+    (
+        $(#[$doc:meta])*
+        $class:ident, $name:tt,
+        ($($given:ident: $given_type:ty),*),
+        ($($keyword:ident: $type:ty = $default:tt),* $(,)?),
+        |$paper:ident| $make:block
+    ) => {
+        $(#[$doc])*
+        /// paper : str, optional
+        ///     ``"A4"``, ``"letter"``, ``"297x420mm"``, …; the smallest of A4 to A0 that takes the target if left out.
+        /// orientation : str, optional
+        ///     ``"auto"``, ``"portrait"`` or ``"landscape"``.
+        /// margin_mm : float, optional
+        ///     Blank along the edges of the paper, mm.
+        /// note : str, optional
+        ///     Printed on the label of every sheet beside the name, such as whose it is.
+        /// guide_page : bool, optional
+        ///     Whether a page with a picture, what to do, and a ruler is added.
+        /// mirrored : bool, optional
+        ///     Whether the mirror image is printed, for the back of glass; positions are those that are seen through it.
+        /// white : str, optional
+        ///     Name of a spot colour of the PDF, such as ``"White"``, that lies beneath all of each page.
+        /// contour : str, optional
+        ///     Name of a spot colour of the PDF, such as ``"CutContour"``, of a line to cut along.
+        /// name : str, optional
+        ///     Stem of the names of its files, printed on the sheet.
+        ///
+        /// Raises
+        /// ------
+        /// TargetError
+        ///     Where no such target can be made.
+        #[pyclass(frozen, extends = Target, module = "deltille")]
+        pub struct $class;
+
+        #[pymethods]
+        impl $class {
+            #[new]
+            #[pyo3(signature = ($($given,)* *, $($keyword = $default,)* paper = None, orientation = "auto",
+                margin_mm = None, note = None, guide_page = false, mirrored = false, white = None, contour = None,
+                name = $name))]
+            #[expect(clippy::too_many_arguments, reason = "keywords")]
+            fn new(
+                $($given: $given_type,)*
+                $($keyword: $type,)*
+                paper: Option<&str>,
+                orientation: &str,
+                margin_mm: Option<f64>,
+                note: Option<String>,
+                guide_page: bool,
+                mirrored: bool,
+                white: Option<String>,
+                contour: Option<String>,
+                name: &str,
+            ) -> PyResult<PyClassInitializer<Self>> {
+                let solids = deltille::targets::SolidSheets::default();
+                let of_all = crate::paper::paper(paper, orientation, margin_mm, solids)?;
+                #[allow(unused_mut, reason = "few targets have a say in it")]
+                let mut $paper = PaperSpec { note, guide_page, ..of_all };
+                let (spec, family) = $make;
+                let finish = deltille::targets::Finish { mirrored, white, contour };
+                let target = crate::paper::build(name, &spec, family, &$paper, finish)?;
+                Ok(PyClassInitializer::from(target).add_subclass(Self))
+            }
+        }
+    };
+}
+pub(crate) use flat;

@@ -1,0 +1,169 @@
+//! Templates remember all that is said of the product: whatever option is given, the template that is saved makes the
+//! same files without it.
+
+use std::collections::BTreeSet;
+use std::path::Path;
+
+use crate::common::command::deltille;
+use crate::common::folder::names;
+
+/// Options that say where files go, what is read and how it is told: they are of a run, not of a target.
+const OF_A_RUN: [&str; 16] = [
+    "template",
+    "save-template",
+    "with",
+    "output",
+    "force",
+    "no-verify",
+    "json",
+    "quiet",
+    "help",
+    "progress",
+    "max-bytes",
+    "max-depth",
+    "max-nodes",
+    "max-pixels",
+    "max-pixels-per-byte",
+    "max-seconds",
+];
+
+/// The options of a command, as its help shows them.
+fn options(command: &str) -> BTreeSet<String> {
+    let folder = tempfile::tempdir().unwrap();
+    let said = deltille(folder.path(), &format!("{command} --help")).success();
+    let said = String::from_utf8(said.get_output().stdout.clone()).unwrap();
+    let option = |line: &str| {
+        let line = line.trim_start();
+        let line = line.split_once(", --").map_or(line, |(_, long)| long);
+        let name = line.trim_start_matches("--");
+        let end = name.find(|c: char| !(c.is_ascii_alphanumeric() || c == '-'));
+        let is_option = line.len() > name.len() || said.contains(&format!(", --{name}"));
+        is_option.then(|| name[..end.unwrap_or(name.len())].to_owned())
+    };
+    let is_shown = |line: &&str| line.starts_with("  ") && line.trim_start().starts_with('-');
+    said.lines().filter(is_shown).filter_map(option).collect()
+}
+
+/// Makes the target of each case, and again of its template; says which options were given.
+fn made_twice(command: &str, cases: &[&str]) -> BTreeSet<String> {
+    let mut given = BTreeSet::new();
+    for case in cases {
+        let folder = tempfile::tempdir().unwrap();
+        std::fs::write(folder.path().join("prism.obj"), PRISM).unwrap();
+        let first = format!("{command} {case} --save-template t.toml -o first --no-verify");
+        deltille(folder.path(), &first).success();
+        let again =
+            format!("{command} --template t.toml --save-template u.toml -o again --no-verify");
+        deltille(folder.path(), &again).success();
+        let bytes = |at: &Path| std::fs::read(at).unwrap();
+        let [first, again] = ["first", "again"].map(|name| folder.path().join(name));
+        assert_eq!(names(&first), names(&again), "{case}");
+        for name in names(&first) {
+            assert!(bytes(&first.join(&name)) == bytes(&again.join(&name)), "{case}: {name}");
+        }
+        let text = |name: &str| std::fs::read_to_string(folder.path().join(name)).unwrap();
+        assert_eq!(text("t.toml"), text("u.toml"), "{case}");
+        given.extend(case.split(' ').filter_map(|word| word.strip_prefix("--").map(str::to_owned)));
+    }
+    given
+}
+
+/// Three rectangles between two triangles.
+const PRISM: &str = "v 0 0 0\nv 120 0 0\nv 60 103.923048454 0\nv 0 0 150\nv 120 0 150\nv 60 103.923048454 150\n\
+                     f 1 3 2\nf 4 5 6\nf 1 2 5 4\nf 2 3 6 5\nf 3 1 4 6\n";
+
+/// The cases give every option that the command has.
+fn are_all(command: &str, given: &BTreeSet<String>) {
+    let of_run: BTreeSet<String> = OF_A_RUN.map(str::to_owned).into();
+    let forgotten: Vec<_> = options(command)
+        .into_iter()
+        .filter(|o| !given.contains(o) && !of_run.contains(o))
+        .collect();
+    assert!(forgotten.is_empty(), "no case of {command} gives {forgotten:?}");
+}
+
+#[test]
+fn every_option_of_a_board_is_in_its_template() {
+    let boards = [
+        "--rows 4 --cols 5 --edge 0.8in --family d36h9 --tag-spacing 2 --tag-border 1.2 --first-id 4 --tag-ids",
+        "--rows 4 --cols 5 --edge 20mm --name desk --note Lab-3 --board-id 7 --invert --guide-page --orientation landscape",
+        "--rows 4 --cols 5 --paper A5 --margin 8mm --svg --png --dpi 250 --dsc --dsc-dialect original",
+        "--rows 4 --cols 5 --untagged --edge 60mm --paper A4 --poster",
+        "--rows 4 --cols 5 --dense --boards 4 --pack --edge 8mm --contour CutContour",
+        "--rows 4 --cols 5 --two-sided 3mm --pdf --gltf",
+        "--rows 4 --cols 5 --mirrored --white White --contour Cut --pdf --laser dxf,svg --kerf 0.2mm",
+        "--rows 4 --cols 5 --gltf --obj --sdf --urdf --mjcf --usd --texture 900 --plate 5mm",
+        "--rows 4 --cols 5 --3mf --inlay 0.6mm --plate 0.2in --gltf --texture-dpi 150",
+        "--rows 4 --cols 5 --laser svg",
+    ];
+    let squares = [
+        "--rows 4 --cols 5 --family aprilTag36h11 --tags-in white --tag-spacing 2 --pdf --laser dxf --kerf 0.1mm",
+        "--rows 4 --cols 5 --mirrored --white White --usd --pdf",
+    ];
+    let given = &made_twice("board", &boards) | &made_twice("checkerboard", &squares);
+    are_all("board", &given);
+    are_all("checkerboard", &given);
+}
+
+#[test]
+fn every_option_of_a_solid_is_in_its_template() {
+    let solids = [
+        "--edge 12cm --tiles 7 --family d36h9 --tag-spacing 2 --tag-border 1.2 --first-id 4 --tag-ids --pdf --board-id 3",
+        "--edge 120mm --dense --svg --png --dpi 210 --per-face --note Lab-3 --name t --guide-page",
+        "--pdf --paper A3 --orientation portrait --margin 9mm --dsc --dsc-dialect original",
+        "--pdf --paper A5 --allow-seams --dxf --stl",
+        "--skeleton --panel-thickness 2mm --wall 5mm --rib 9mm --face-margin 6mm --3mf --inlay 0.3mm",
+        "--gltf --obj --sdf --urdf --mjcf --usd --texture 1500",
+        "--edge 100mm",
+        "--laser dxf,svg --kerf 0.2mm",
+    ];
+    let cuboids = ["--size 80x60x50mm --pdf --laser dxf", "--size 8x6x5cm --edge 7cm --gltf"];
+    let meshes = [
+        "--mesh prism.obj --allow-skew --square-family aprilTag25h9 --first-square-id 4 --gltf --texture-dpi 100",
+        "--mesh prism.obj --scale 1.2 --pdf --laser svg",
+    ];
+    let of_all = &made_twice("tetrahedron", &solids) | &made_twice("solid", &meshes);
+    are_all("tetrahedron", &of_all);
+    are_all("solid", &of_all);
+    are_all("cuboid", &(&of_all | &made_twice("cuboid", &cuboids)));
+}
+
+#[test]
+fn options_win_over_what_a_template_says_of_meshes_lasers_and_inks() {
+    let folder = tempfile::tempdir().unwrap();
+    let made = |args: &str, files: &[&str]| {
+        deltille(folder.path(), &format!("{args} -o made --no-verify")).success();
+        assert_eq!(names(&folder.path().join("made")), files, "{args}");
+        std::fs::remove_dir_all(folder.path().join("made")).unwrap();
+    };
+    let all = "board --rows 4 --cols 5 --pdf --white White --gltf --texture-dpi 150 --plate 5mm --laser dxf --kerf 0.1mm";
+    let saved = ["board-laser.dxf", "board.glb", "board.json", "board.pdf"];
+    made(&format!("{all} --save-template t.toml"), &saved);
+    made("board --template t.toml", &saved);
+    // Pages without spot colours, another size of the texture, another format of the drawing, another thickness.
+    let other = "board --template t.toml --svg --texture 900 --laser svg --two-sided 4mm";
+    made(other, &["board-laser.svg", "board.glb", "board.json", "board.svg"]);
+
+    for (text, said) in [
+        ("rows = 4\ncols = 5\ngltf = true\n", "line 3, `gltf`: unknown field `gltf`"),
+        ("rows = 4\ncols = 5\n[meshes]\nglb = true\n", "line 4, `glb`: unknown field `glb`"),
+        (
+            "rows = 4\ncols = 5\n[laser]\nformats = [\"png\"]\n",
+            "line 4, `formats`: unknown variant `png`",
+        ),
+        ("rows = 4\ncols = 5\n[meshes]\ngltf = true\ntexture = 3\n", "--texture: 3 is not between"),
+        (
+            "rows = 4\ncols = 5\n[meshes]\nusd = true\ntexture-dpi = 0.0\n",
+            "--texture-dpi: 0 is not between",
+        ),
+        ("rows = 4\ncols = 5\n[laser]\nformats = [\"dxf\"]\nkerf = \"much\"\n", "--kerf: "),
+        ("rows = 4\ncols = 5\n[laser]\nkerf = \"1mm\"\n", "--kerf: it says nothing without"),
+        ("rows = 4\ncols = 5\nplate = \"3mm\"\n", "--plate: it says nothing without"),
+        ("rows = 4\ncols = 5\n[finishing]\nwhite = \"Black\"\n", "--white: `Black`"),
+    ] {
+        std::fs::write(folder.path().join("own.toml"), text).unwrap();
+        let error = deltille(folder.path(), "board --template own.toml").code(2);
+        let error = String::from_utf8(error.get_output().stderr.clone()).unwrap();
+        assert!(error.contains(said) && error.lines().count() == 1, "{error}");
+    }
+}
