@@ -71,6 +71,7 @@ pub use natural::{
 pub use published_bounds::{PublishedBounds, published_bounds};
 pub use reading::Reading;
 pub use rules::{Rules, Screen};
+pub(crate) use shipped::shipped_name;
 pub use shipped::{ShippedFamily, shipped_families, shipped_names, smallest_shipped, square_names};
 pub use statistics::{ball, distance_histogram, false_positive_rates};
 pub use tagwords::TagWords;

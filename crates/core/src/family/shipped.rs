@@ -1,3 +1,6 @@
+use std::borrow::Cow;
+
+use super::{aruco::dictionary, places};
 use crate::lattice::GridKind;
 
 /// What is known of a family without its codes, which a program in a browser fetches when it needs them: so a name, or a
@@ -91,9 +94,7 @@ pub fn smallest_shipped(
 
 /// The text of a family that comes with the crate.
 pub(super) fn json(name: &str) -> Option<&'static str> {
-    let square =
-        name.strip_prefix('t').filter(|rest| rest.starts_with(|c: char| c.is_ascii_digit()));
-    Some(match square.map(|rest| format!("aprilTag{rest}")).as_deref().unwrap_or(name) {
+    Some(match whole(name).as_ref() {
         "d16h5" => include_str!("../../families/d16h5.json"),
         "d25h7" => include_str!("../../families/d25h7.json"),
         "d25h9" => include_str!("../../families/d25h9.json"),
@@ -105,12 +106,28 @@ pub(super) fn json(name: &str) -> Option<&'static str> {
         "delTag25h9" => include_str!("../../families/delTag25h9.json"),
         "delTag36h9" => include_str!("../../families/delTag36h9.json"),
         "delTag36h11" => include_str!("../../families/delTag36h11.json"),
-        super::places::NAME => include_str!("../../families/dense9.json"),
+        places::NAME => include_str!("../../families/dense9.json"),
         "aprilTag16h5" => include_str!("../../families/aprilTag16h5.json"),
         "aprilTag25h9" => include_str!("../../families/aprilTag25h9.json"),
         "aprilTag36h11" => include_str!("../../families/aprilTag36h11.json"),
         _ => return None,
     })
+}
+
+/// A name without AprilTag's abbreviation.
+fn whole(name: &str) -> Cow<'_, str> {
+    let square =
+        name.strip_prefix('t').filter(|rest| rest.starts_with(|c: char| c.is_ascii_digit()));
+    square.map_or(name.into(), |rest| format!("aprilTag{rest}").into())
+}
+
+/// The name of the family that comes with the crate and is called so, a dictionary of OpenCV among them; it needs no codes.
+pub(crate) fn shipped_name(called: &str) -> Option<Cow<'_, str>> {
+    let name = whole(called);
+    if name == places::NAME || shipped_families().any(|family| family.name == name) {
+        return Some(name);
+    }
+    dictionary(called).map(|(name, _)| name.into())
 }
 
 #[cfg(test)]
@@ -127,6 +144,7 @@ mod tests {
             assert_eq!(read, known);
             assert_eq!(family.correctable(), known.correctable());
             assert_eq!(family.name(), known.name);
+            assert_eq!(shipped_name(known.name).as_deref(), Some(known.name));
         }
     }
 }

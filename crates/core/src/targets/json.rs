@@ -6,8 +6,7 @@ use glam::DVec2;
 use serde::{Deserialize, Serialize};
 
 use super::{
-    Corner, FamilyRef, Finish, GridKind, Name, Panel, SheetLayout, TagPlacement, Target,
-    TargetSpec, aprilgrid, board, charuco, circles, solid, tag_sheet,
+    FamilyRef, Finish, GridKind, Name, Panel, SheetLayout, Target, TargetSpec, against_spec,
 };
 use crate::json::{self, ReadError};
 use crate::lattice::Vertex;
@@ -28,9 +27,6 @@ const MEASURED_SLACK_EDGES: f64 = 0.5;
 /// How far its target position may be from that by its panel's pose, in edges: what six written digits of a
 /// rotation leave on a panel of a thousand edges.
 const POSE_SLACK_EDGES: f64 = 0.001;
-
-/// How far an edge may be from that of the spec, mm: what written digits leave.
-const SPEC_SLACK_MM: f64 = 1e-6;
 
 /// Longest side of a sheet, mm: more than any paper, and than the net of any solid that is made.
 const LONGEST_SHEET_MM: f64 = 20_000.0;
@@ -141,7 +137,10 @@ impl From<ReadError> for TargetFileError {
 /// A field, and what is wrong with it.
 pub type Problem = (String, String);
 
-fn problem<T>(field: impl Into<String>, problem: impl Into<String>) -> Result<T, Problem> {
+pub(super) fn problem<T>(
+    field: impl Into<String>,
+    problem: impl Into<String>,
+) -> Result<T, Problem> {
     Err((field.into(), problem.into()))
 }
 
@@ -194,7 +193,7 @@ pub fn check(target: &Target) -> Result<(), Problem> {
             return problem("family", "there are tags, so there must be a family");
         }
     }
-    check_against_spec(target)?;
+    against_spec::check(target)?;
     let named = |setting: &str| {
         let field = setting.rsplit_once(':').map_or(setting, |(_, field)| field);
         format!("finish.{field}")
@@ -241,81 +240,6 @@ fn check_sheet(sheet: &SheetLayout, field: &str) -> Result<(), Problem> {
         Some(line) => problem(format!("{field}.lines[{line}]"), "it does not lie on the sheet"),
         None => Ok(()),
     }
-}
-
-/// Compares the panels with those that the spec makes: a file in which one of them was changed
-/// contradicts itself. Poses and measured positions may differ.
-fn check_against_spec(target: &Target) -> Result<(), Problem> {
-    let (made, tagged) = match &target.spec {
-        TargetSpec::Board(spec) => {
-            (spec.check().map(|()| board::untied_panels(spec)), spec.tags.is_some())
-        }
-        TargetSpec::Solid(spec) => (solid::untied_panels(spec), spec.tags.is_some()),
-        TargetSpec::Tags(spec) => (Ok(tag_sheet::panels(spec)), true),
-        TargetSpec::Charuco(spec) => (charuco::untied_panels(spec), true),
-        TargetSpec::AprilGrid(spec) => (aprilgrid::untied_panels(spec), true),
-        TargetSpec::Circles(spec) => (circles::untied_panels(spec), false),
-        TargetSpec::Listed(_) => return Ok(()),
-    };
-    let made = made.or_else(|error| problem("spec", error.to_string()))?;
-    let differs = |field: String, found: &dyn std::fmt::Display, made: &dyn std::fmt::Display| {
-        problem(field, format!("it is {found}, but that of `spec` has {made}"))
-    };
-    let near = |a: Option<f64>, b: Option<f64>| match (a, b) {
-        (Some(a), Some(b)) => (a - b).abs() <= SPEC_SLACK_MM,
-        (a, b) => a == b,
-    };
-    if target.panels.len() != made.len() {
-        return differs("panels.length".to_owned(), &target.panels.len(), &made.len());
-    }
-    if target.family.is_some() != tagged {
-        return problem("family", "it must be there if, and only if, `spec.tags` is");
-    }
-    for (p, (panel, made)) in target.panels.iter().zip(&made).enumerate() {
-        let field = |key: &str| format!("panels[{p}].{key}");
-        if panel.id != made.id {
-            return differs(field("id"), &panel.id, &made.id);
-        }
-        if (panel.edge_mm - made.edge_mm).abs() > SPEC_SLACK_MM {
-            return differs(field("edge_mm"), &panel.edge_mm, &made.edge_mm);
-        }
-        let plain = [
-            ("kind", panel.kind == made.kind),
-            ("border_bits", panel.border_bits == made.border_bits),
-            ("tags_in", panel.tags_in == made.tags_in),
-            ("gap_edges", near(panel.gap_edges, made.gap_edges)),
-            ("discs_mm", near(panel.discs_mm, made.discs_mm)),
-            ("tag_margin_bits", near(panel.tag_margin_bits, made.tag_margin_bits)),
-            ("inverted", panel.inverted == made.inverted),
-            ("rim_mm", near(panel.rim_mm, made.rim_mm)),
-            ("outline", panel.outline == made.outline),
-            ("matrix", panel.matrix == made.matrix),
-        ];
-        if let Some((key, _)) = plain.iter().find(|(_, same)| !same) {
-            return problem(field(key), "it is not that of `spec`");
-        }
-        if panel.corners.len() != made.corners.len() {
-            let (found, made) = (panel.corners.len(), made.corners.len());
-            return differs(field("corners.length"), &found, &made);
-        }
-        for (i, (corner, made)) in panel.corners.iter().zip(&made.corners).enumerate() {
-            if (corner.id, corner.row, corner.col) != (made.id, made.row, made.col) {
-                let place = |c: &Corner| format!("corner {} at row {} col {}", c.id, c.row, c.col);
-                return differs(field(&format!("corners[{i}]")), &place(corner), &place(made));
-            }
-        }
-        if panel.tags.len() != made.tags.len() {
-            return differs(field("tags.length"), &panel.tags.len(), &made.tags.len());
-        }
-        for (i, (tag, made)) in panel.tags.iter().zip(&made.tags).enumerate() {
-            if tag != made {
-                let place =
-                    |t: &TagPlacement| format!("tag {} at row {} col {}", t.id, t.row, t.col);
-                return differs(field(&format!("tags[{i}]")), &place(tag), &place(made));
-            }
-        }
-    }
-    Ok(())
 }
 
 fn check_panel(panel: &Panel, field: &str) -> Result<(), Problem> {
@@ -489,36 +413,6 @@ mod tests {
         for (from, to, field) in cases {
             let said = complaint(from, to);
             assert!(said.starts_with(&format!("field `{field}")), "{from}: {said}");
-        }
-    }
-
-    #[test]
-    fn a_file_that_contradicts_its_spec_is_refused() {
-        let edit = |change: fn(&mut Target)| {
-            let mut target = board(4, 4, 20.0, true, 1);
-            change(&mut target);
-            Target::from_json(&target.to_json()).unwrap_err().to_string()
-        };
-        fn spec(target: &mut Target) -> &mut BoardSpec {
-            let TargetSpec::Board(spec) = &mut target.spec else { panic!("a board") };
-            spec
-        }
-        type Edit = fn(&mut Target);
-        let cases: [(Edit, &str); 5] = [
-            (
-                |t| {
-                    t.panels[0].corners.pop();
-                },
-                "panels[0].corners.length",
-            ),
-            (|t| spec(t).rows = 11, "panels[0].matrix"),
-            (|t| spec(t).edge_mm = 21.0, "panels[0].edge_mm"),
-            (|t| t.panels[0].tags[0].id += 100, "panels[0].tags[0]"),
-            (|t| spec(t).cols = 0, "spec"),
-        ];
-        for (change, field) in cases {
-            let said = edit(change);
-            assert!(said.starts_with(&format!("field `{field}`")), "{said}");
         }
     }
 }

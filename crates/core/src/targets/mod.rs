@@ -7,6 +7,7 @@
 //! Frames: a *panel* frame has its origin on the panel's lattice vertex (0,0), x along the rows, y
 //! up on the print, z towards the viewer; `target = rotation · panel + translation`.
 
+mod against_spec;
 mod angles;
 mod aprilgrid;
 mod board;
