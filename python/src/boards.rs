@@ -5,6 +5,8 @@ use std::sync::Arc;
 
 use deltille::family;
 use deltille::lattice::GridKind;
+use deltille::limits;
+use deltille::logo::{self, LogoError, MAX_LOGO_BYTES};
 use deltille::targets::{
     self, BoardSpec, DEFAULT_MARGIN_MM, PaperSpec, SolidSheets, TagSpec, TagsIn, TargetSpec,
     usual_edge_mm,
@@ -12,7 +14,7 @@ use deltille::targets::{
 use pyo3::prelude::*;
 
 use crate::arrays::whole;
-use crate::errors::{self, Raise, raised};
+use crate::errors::{self, Raise, RaiseFile, raised};
 use crate::families::FamilyChoice;
 use crate::targets::Target;
 
@@ -30,6 +32,29 @@ pub fn paper(
         solids,
         ..PaperSpec::default()
     })
+}
+
+/// A paper with a logo, which is a file or the text of an SVG.
+pub fn with_logo(
+    paper: PaperSpec,
+    logo: Option<PathBuf>,
+    logo_height_mm: Option<f64>,
+) -> PyResult<PaperSpec> {
+    let Some(given) = logo else { return Ok(PaperSpec { logo_height_mm, ..paper }) };
+    let is_text = given.to_str().is_some_and(|text| text.trim_start().starts_with('<'));
+    let text = match given.to_str().filter(|_| is_text) {
+        Some(text) => text.to_owned(),
+        None => {
+            limits::read_short_text(&given, MAX_LOGO_BYTES).raise_of_file(&given, errors::target)?
+        }
+    };
+    let refused = |error| match error {
+        LogoError::Outline(error) => error.to_string(),
+        error if is_text => format!("logo: {error}"),
+        error => format!("logo: {}: {error}", given.display()),
+    };
+    let logo = logo::from_svg(&text).map_err(refused).raise(errors::target)?;
+    Ok(PaperSpec { logo: Some(logo), logo_height_mm, ..paper })
 }
 
 /// A board of a kind.
@@ -144,6 +169,11 @@ pub fn spacing_of(tag_spacing: Option<i64>) -> PyResult<Option<u32>> {
 ///     Whether the id of each tag is printed beside it, in small type.
 /// guide_page : bool, optional
 ///     Whether a page with a picture, what to do, and a ruler is added.
+/// logo : str or path-like, optional
+///     An SVG, or the text of one, that is printed black at the other end of the label's strip: filled paths and strokes; \
+///     white is paper.
+/// logo_height_mm : float, optional
+///     Height of the logo, mm; that of the strip if left out.
 /// name : str, optional
 ///     Stem of the names of its files, printed on the sheet.
 ///
@@ -167,7 +197,7 @@ impl Board {
     #[pyo3(signature = (rows, cols, *, edge_mm = None, family = None, tags = true, tag_spacing = None,
         tag_border = None, first_id = 0, boards = 1, board_id = 0, inverted = false, paper = None,
         orientation = "auto", margin_mm = None, poster = false, packed = false, two_sided_mm = None,
-        tag_ids = false, guide_page = false, name = "board"))]
+        tag_ids = false, guide_page = false, logo = None, logo_height_mm = None, name = "board"))]
     #[expect(clippy::too_many_arguments, reason = "keywords")]
     fn new(
         rows: i64,
@@ -189,10 +219,13 @@ impl Board {
         two_sided_mm: Option<f64>,
         tag_ids: bool,
         guide_page: bool,
+        logo: Option<PathBuf>,
+        logo_height_mm: Option<f64>,
         name: &str,
     ) -> PyResult<PyClassInitializer<Self>> {
         let paper = self::paper(paper, orientation, margin_mm, SolidSheets::default())?;
         let paper = PaperSpec { poster, packed, tag_ids, guide_page, ..paper };
+        let paper = with_logo(paper, logo, logo_height_mm)?;
         let spacing = spacing_of(tag_spacing)?;
         let first_id = whole("first_id", first_id, errors::target)?;
         let of_tags =
@@ -226,7 +259,7 @@ impl Board {
 /// tags_in : str, optional
 ///     Squares that carry the tags, ``"black"`` or ``"white"``.
 /// tag_spacing, tag_border, first_id, boards, board_id, inverted, paper, orientation, margin_mm, poster, packed, \
-/// two_sided_mm, tag_ids, guide_page, name
+/// two_sided_mm, tag_ids, guide_page, logo, logo_height_mm, name
 ///     As of :class:`Board`.
 #[pyclass(frozen, extends = Target, module = "deltille")]
 pub struct Checkerboard;
@@ -237,7 +270,7 @@ impl Checkerboard {
     #[pyo3(signature = (rows, cols, *, edge_mm = None, family = None, tags_in = "black", tag_spacing = None,
         tag_border = None, first_id = 0, boards = 1, board_id = 0, inverted = false, paper = None,
         orientation = "auto", margin_mm = None, poster = false, packed = false, two_sided_mm = None,
-        tag_ids = false, guide_page = false, name = "checkerboard"))]
+        tag_ids = false, guide_page = false, logo = None, logo_height_mm = None, name = "checkerboard"))]
     #[expect(clippy::too_many_arguments, reason = "keywords")]
     fn new(
         rows: i64,
@@ -259,6 +292,8 @@ impl Checkerboard {
         two_sided_mm: Option<f64>,
         tag_ids: bool,
         guide_page: bool,
+        logo: Option<PathBuf>,
+        logo_height_mm: Option<f64>,
         name: &str,
     ) -> PyResult<PyClassInitializer<Self>> {
         let tags_in = match tags_in {
@@ -266,6 +301,9 @@ impl Checkerboard {
             "white" => TagsIn::White,
             _ => return Err(raised::TargetError::new_err("tags_in: give black or white")),
         };
+        let paper = self::paper(paper, orientation, margin_mm, SolidSheets::default())?;
+        let paper = PaperSpec { poster, packed, tag_ids, guide_page, ..paper };
+        let paper = with_logo(paper, logo, logo_height_mm)?;
         let spacing = spacing_of(tag_spacing)?;
         let first_id = whole("first_id", first_id, errors::target)?;
         let of_tags = |family| Tags {
@@ -285,13 +323,7 @@ impl Checkerboard {
             inverted,
             two_sided_mm,
             name: name.to_owned(),
-            paper: PaperSpec {
-                poster,
-                packed,
-                tag_ids,
-                guide_page,
-                ..self::paper(paper, orientation, margin_mm, SolidSheets::default())?
-            },
+            paper,
         };
         Ok(PyClassInitializer::from(wanted.make()?).add_subclass(Self))
     }

@@ -13,7 +13,7 @@ use deltille::targets::{
 use pyo3::prelude::*;
 
 use crate::arrays::whole;
-use crate::boards::{Tags, paper as paper_of, spacing_of};
+use crate::boards::{Tags, paper as paper_of, spacing_of, with_logo};
 use crate::errors::{self, Raise, RaiseFile, raised};
 use crate::families::FamilyChoice;
 use crate::targets::Target;
@@ -87,7 +87,7 @@ macro_rules! solid {
         /// allow_seams : bool, optional
         ///     Whether a net that is larger than the paper stays in one piece, over pages that are joined along seams \
         ///     through its tiles, instead of in pieces of whole faces.
-        /// paper, orientation, margin_mm, tag_ids, guide_page, name
+        /// paper, orientation, margin_mm, tag_ids, guide_page, logo, logo_height_mm, name
         ///     As of :class:`Board`.
         #[pyclass(frozen, extends = Target, module = "deltille")]
         pub struct $class;
@@ -98,7 +98,8 @@ macro_rules! solid {
             #[pyo3(signature = (*, edge_mm = None, tiles = None, face_margin_mm = None, family = None,
                 tag_spacing = None, tag_border = None, first_id = 0, board_id = 0, skeleton = false,
                 panel_thickness_mm = None, wall_mm = None, rib_mm = None, per_face = false, allow_seams = false,
-                tag_ids = false, guide_page = false, paper = None, orientation = "auto", margin_mm = None, name = None))]
+                tag_ids = false, guide_page = false, logo = None, logo_height_mm = None, paper = None,
+                orientation = "auto", margin_mm = None, name = None))]
             #[expect(clippy::too_many_arguments, reason = "keywords")]
             fn new(
                 edge_mm: Option<f64>,
@@ -117,6 +118,8 @@ macro_rules! solid {
                 allow_seams: bool,
                 tag_ids: bool,
                 guide_page: bool,
+                logo: Option<PathBuf>,
+                logo_height_mm: Option<f64>,
                 paper: Option<&str>,
                 orientation: &str,
                 margin_mm: Option<f64>,
@@ -132,10 +135,11 @@ macro_rules! solid {
                     board_id: whole("board_id", board_id, errors::target)?,
                     skeleton: frame(skeleton, sizes)?,
                     name,
-                    paper: PaperSpec {
-                        tag_ids,
-                        guide_page,
-                        ..paper_of(paper, orientation, margin_mm, sheets(per_face, allow_seams)?)?
+                    paper: {
+                        let solids = sheets(per_face, allow_seams)?;
+                        let paper = paper_of(paper, orientation, margin_mm, solids)?;
+                        let paper = PaperSpec { tag_ids, guide_page, ..paper };
+                        with_logo(paper, logo, logo_height_mm)?
                     },
                 };
                 Ok(PyClassInitializer::from(solids.make()?).add_subclass(Self))
@@ -208,7 +212,7 @@ solid!(Cube, SolidShape::Cube, "A cube whose six faces carry tagged checkerboard
 /// edge_mm : float, optional
 ///     Mean edge to which the mesh is scaled, mm; as it is if left out.
 /// tiles, face_margin_mm, family, tag_spacing, tag_border, first_id, board_id, skeleton, panel_thickness_mm, wall_mm, \
-/// rib_mm, per_face, allow_seams, tag_ids, guide_page, paper, orientation, margin_mm, name
+/// rib_mm, per_face, allow_seams, tag_ids, guide_page, logo, logo_height_mm, paper, orientation, margin_mm, name
 ///     As of :class:`Icosahedron`.
 #[pyclass(frozen, extends = Target, module = "deltille")]
 pub struct Solid;
@@ -219,7 +223,8 @@ impl Solid {
     #[pyo3(signature = (mesh, *, scale = 1.0, allow_skew = false, edge_mm = None, tiles = None,
         face_margin_mm = None, family = None, tag_spacing = None, tag_border = None, first_id = 0, board_id = 0,
         skeleton = false, panel_thickness_mm = None, wall_mm = None, rib_mm = None, per_face = false, allow_seams = false,
-        tag_ids = false, guide_page = false, paper = None, orientation = "auto", margin_mm = None, name = None))]
+        tag_ids = false, guide_page = false, logo = None, logo_height_mm = None, paper = None,
+        orientation = "auto", margin_mm = None, name = None))]
     #[expect(clippy::too_many_arguments, reason = "keywords")]
     fn new(
         mesh: PathBuf,
@@ -241,6 +246,8 @@ impl Solid {
         allow_seams: bool,
         tag_ids: bool,
         guide_page: bool,
+        logo: Option<PathBuf>,
+        logo_height_mm: Option<f64>,
         paper: Option<&str>,
         orientation: &str,
         margin_mm: Option<f64>,
@@ -257,10 +264,11 @@ impl Solid {
             board_id: whole("board_id", board_id, errors::target)?,
             skeleton: frame(skeleton, sizes)?,
             name: Some(name.unwrap_or(stem)),
-            paper: PaperSpec {
-                tag_ids,
-                guide_page,
-                ..paper_of(paper, orientation, margin_mm, sheets(per_face, allow_seams)?)?
+            paper: {
+                let solids = sheets(per_face, allow_seams)?;
+                let paper = paper_of(paper, orientation, margin_mm, solids)?;
+                let paper = PaperSpec { tag_ids, guide_page, ..paper };
+                with_logo(paper, logo, logo_height_mm)?
             },
         };
         Ok(PyClassInitializer::from(solids.make()?).add_subclass(Self))
