@@ -33,6 +33,8 @@ pub use deltille_core::{
     Clock, Name, artwork, calibrate, camera, detect, glam, json, lattice, nalgebra, name, quantity,
     raster, reading, statistics, synth, targets, words,
 };
+#[cfg(feature = "print")]
+pub use deltille_files::logo;
 #[cfg(feature = "report")]
 pub use deltille_files::report;
 #[cfg(feature = "files")]

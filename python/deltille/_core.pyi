@@ -173,6 +173,8 @@ class Board(Target):
         orientation: Orientation = "auto",
         margin_mm: float | None = None,
         note: str | None = None,
+        logo: AnyPath | None = None,
+        logo_height_mm: float | None = None,
         guide_page: bool = False,
         mirrored: bool = False,
         white: str | None = None,
@@ -204,6 +206,8 @@ class Checkerboard(Target):
         orientation: Orientation = "auto",
         margin_mm: float | None = None,
         note: str | None = None,
+        logo: AnyPath | None = None,
+        logo_height_mm: float | None = None,
         guide_page: bool = False,
         mirrored: bool = False,
         white: str | None = None,
@@ -227,6 +231,8 @@ class Charuco(Target):
         orientation: Orientation = "auto",
         margin_mm: float | None = None,
         note: str | None = None,
+        logo: AnyPath | None = None,
+        logo_height_mm: float | None = None,
         guide_page: bool = False,
         mirrored: bool = False,
         white: str | None = None,
@@ -250,6 +256,8 @@ class AprilGrid(Target):
         orientation: Orientation = "auto",
         margin_mm: float | None = None,
         note: str | None = None,
+        logo: AnyPath | None = None,
+        logo_height_mm: float | None = None,
         guide_page: bool = False,
         mirrored: bool = False,
         white: str | None = None,
@@ -271,6 +279,8 @@ class Circles(Target):
         orientation: Orientation = "auto",
         margin_mm: float | None = None,
         note: str | None = None,
+        logo: AnyPath | None = None,
+        logo_height_mm: float | None = None,
         guide_page: bool = False,
         mirrored: bool = False,
         white: str | None = None,
@@ -305,6 +315,8 @@ class Tetrahedron(Target):
         orientation: Orientation = "auto",
         margin_mm: float | None = None,
         note: str | None = None,
+        logo: AnyPath | None = None,
+        logo_height_mm: float | None = None,
         name: str | None = None,
     ) -> Tetrahedron: ...
 
@@ -335,6 +347,8 @@ class Octahedron(Target):
         orientation: Orientation = "auto",
         margin_mm: float | None = None,
         note: str | None = None,
+        logo: AnyPath | None = None,
+        logo_height_mm: float | None = None,
         name: str | None = None,
     ) -> Octahedron: ...
 
@@ -365,6 +379,8 @@ class Icosahedron(Target):
         orientation: Orientation = "auto",
         margin_mm: float | None = None,
         note: str | None = None,
+        logo: AnyPath | None = None,
+        logo_height_mm: float | None = None,
         name: str | None = None,
     ) -> Icosahedron: ...
 
@@ -395,6 +411,8 @@ class Cube(Target):
         orientation: Orientation = "auto",
         margin_mm: float | None = None,
         note: str | None = None,
+        logo: AnyPath | None = None,
+        logo_height_mm: float | None = None,
         name: str | None = None,
     ) -> Cube: ...
 
@@ -426,6 +444,8 @@ class Cuboid(Target):
         orientation: Orientation = "auto",
         margin_mm: float | None = None,
         note: str | None = None,
+        logo: AnyPath | None = None,
+        logo_height_mm: float | None = None,
         name: str | None = None,
     ) -> Cuboid: ...
 
@@ -461,6 +481,8 @@ class Solid(Target):
         orientation: Orientation = "auto",
         margin_mm: float | None = None,
         note: str | None = None,
+        logo: AnyPath | None = None,
+        logo_height_mm: float | None = None,
         name: str | None = None,
     ) -> Solid: ...
 

@@ -62,6 +62,8 @@ pub const KEYWORDS: &[(&str, &str)] = &[
     ("Limits::max_pixels_per_byte", "max_pixels_per_byte"),
     ("Limits::max_seconds", "max_seconds"),
     ("PaperSpec::guide_page", "guide_page"),
+    ("PaperSpec::logo", "logo"),
+    ("PaperSpec::logo_height_mm", "logo_height_mm"),
     ("PaperSpec::margin_mm", "margin_mm"),
     ("PaperSpec::note", "note"),
     ("PaperSpec::packed", "packed"),

@@ -1,12 +1,15 @@
 //! What targets are printed on, and how: keywords that all of them have.
 
+use std::path::PathBuf;
 use std::sync::Arc;
 
 use deltille::family::Family;
+use deltille::limits;
+use deltille::logo::{self, LogoError, MAX_LOGO_BYTES};
 use deltille::targets::{self, DEFAULT_MARGIN_MM, Finish, PaperSpec, SolidSheets, TargetSpec};
 use pyo3::prelude::*;
 
-use crate::errors::{self, Raise};
+use crate::errors::{self, Raise, RaiseFile};
 use crate::targets::Target;
 
 /// What a target is printed on.
@@ -23,6 +26,29 @@ pub fn paper(
         solids,
         ..PaperSpec::default()
     })
+}
+
+/// A paper with a logo, which is a file or the text of an SVG.
+pub fn with_logo(
+    paper: PaperSpec,
+    logo: Option<PathBuf>,
+    logo_height_mm: Option<f64>,
+) -> PyResult<PaperSpec> {
+    let Some(given) = logo else { return Ok(PaperSpec { logo_height_mm, ..paper }) };
+    let is_text = given.to_str().is_some_and(|text| text.trim_start().starts_with('<'));
+    let text = match given.to_str().filter(|_| is_text) {
+        Some(text) => text.to_owned(),
+        None => {
+            limits::read_short_text(&given, MAX_LOGO_BYTES).raise_of_file(&given, errors::target)?
+        }
+    };
+    let refused = |error| match error {
+        LogoError::Outline(error) => error.to_string(),
+        error if is_text => format!("logo: {error}"),
+        error => format!("logo: {}: {error}", given.display()),
+    };
+    let logo = logo::from_svg(&text).map_err(refused).raise(errors::target)?;
+    Ok(PaperSpec { logo: Some(logo), logo_height_mm, ..paper })
 }
 
 /// A target on its paper.
@@ -58,6 +84,11 @@ macro_rules! flat {
         ///     Blank along the edges of the paper, mm.
         /// note : str, optional
         ///     Printed on the label of every sheet beside the name, such as whose it is.
+        /// logo : str or path-like, optional
+        ///     An SVG, or the text of one, that is printed black at the other end of the label's strip: filled paths and
+        ///     strokes; white is paper.
+        /// logo_height_mm : float, optional
+        ///     Height of the logo, mm; that of the strip if left out.
         /// guide_page : bool, optional
         ///     Whether a page with a picture, what to do, and a ruler is added.
         /// mirrored : bool, optional
@@ -80,7 +111,7 @@ macro_rules! flat {
         impl $class {
             #[new]
             #[pyo3(signature = ($($given,)* *, $($keyword = $default,)* paper = None, orientation = "auto",
-                margin_mm = None, note = None, guide_page = false, mirrored = false, white = None, contour = None,
+                margin_mm = None, note = None, logo = None, logo_height_mm = None, guide_page = false, mirrored = false, white = None, contour = None,
                 name = $name))]
             #[expect(clippy::too_many_arguments, reason = "keywords")]
             fn new(
@@ -90,6 +121,8 @@ macro_rules! flat {
                 orientation: &str,
                 margin_mm: Option<f64>,
                 note: Option<String>,
+                logo: Option<std::path::PathBuf>,
+                logo_height_mm: Option<f64>,
                 guide_page: bool,
                 mirrored: bool,
                 white: Option<String>,
@@ -99,7 +132,11 @@ macro_rules! flat {
                 let solids = deltille::targets::SolidSheets::default();
                 let of_all = crate::paper::paper(paper, orientation, margin_mm, solids)?;
                 #[allow(unused_mut, reason = "few targets have a say in it")]
-                let mut $paper = PaperSpec { note, guide_page, ..of_all };
+                let mut $paper = crate::paper::with_logo(
+                    PaperSpec { note, guide_page, ..of_all },
+                    logo,
+                    logo_height_mm,
+                )?;
                 let (spec, family) = $make;
                 let finish = deltille::targets::Finish { mirrored, white, contour };
                 let target = crate::paper::build(name, &spec, family, &$paper, finish)?;

@@ -16,7 +16,7 @@ use crate::arrays::whole;
 use crate::boards::{Tags, spacing_of};
 use crate::errors::{self, Raise, RaiseFile, raised};
 use crate::families::FamilyChoice;
-use crate::paper::{build, paper as paper_of};
+use crate::paper::{build, paper as paper_of, with_logo};
 use crate::targets::Target;
 
 /// A shape, and what is said of its solids alone.
@@ -139,7 +139,7 @@ macro_rules! solid {
         /// allow_seams : bool, optional
         ///     Whether a net that is larger than the paper stays in one piece, over pages that are joined along seams
         ///     through its tiles, instead of in pieces of whole faces.
-        /// tag_ids, guide_page, paper, orientation, margin_mm, note, name
+        /// tag_ids, guide_page, paper, orientation, margin_mm, note, logo, logo_height_mm, name
         ///     As of :class:`Board`.
         ///
         /// Raises
@@ -156,7 +156,7 @@ macro_rules! solid {
                 face_margin_mm = None, family = None, tags = true, tag_spacing = None, tag_border = None, first_id = 0,
                 board_id = 0, inverted = false, skeleton = false, panel_thickness_mm = None, wall_mm = None, rib_mm = None, per_face = false,
                 allow_seams = false, tag_ids = false, guide_page = false, paper = None, orientation = "auto",
-                margin_mm = None, note = None, name = None))]
+                margin_mm = None, note = None, logo = None, logo_height_mm = None, name = None))]
             #[expect(clippy::too_many_arguments, reason = "keywords")]
             fn new(
                 $($given: $given_type,)*
@@ -179,10 +179,14 @@ macro_rules! solid {
                 allow_seams: bool,
                 tag_ids: bool,
                 guide_page: bool,
+                logo: Option<PathBuf>,
+                logo_height_mm: Option<f64>,
                 paper: Option<&str>,
                 orientation: &str,
                 margin_mm: Option<f64>,
                 note: Option<String>,
+                logo: Option<PathBuf>,
+                logo_height_mm: Option<f64>,
                 name: Option<String>,
             ) -> PyResult<PyClassInitializer<Self>> {
                 let of_tags = Tags {
@@ -205,6 +209,7 @@ macro_rules! solid {
                 let of_all =
                     paper_of(paper, orientation, margin_mm, sheets(per_face, allow_seams)?)?;
                 let paper = PaperSpec { note, tag_ids, guide_page, ..of_all };
+                let paper = with_logo(paper, logo, logo_height_mm)?;
                 Ok(PyClassInitializer::from(solids.make(name, &paper)?).add_subclass(Self))
             }
         }

@@ -53,6 +53,8 @@ const NAMED: &[Named] = &[
     named("Limits::max_pixels_per_byte", "deltille verify", "--max-pixels-per-byte"),
     named("Limits::max_seconds", "deltille verify", "--max-seconds"),
     named("PaperSpec::guide_page", "deltille board", "--guide-page"),
+    named("PaperSpec::logo", "deltille board", "--logo"),
+    named("PaperSpec::logo_height_mm", "deltille board", "--logo-height"),
     named("PaperSpec::margin_mm", "deltille board", "--margin"),
     named("PaperSpec::note", "deltille board", "--note"),
     named("PaperSpec::packed", "deltille board", "--pack"),

@@ -9,6 +9,7 @@
 //! | [`target_file`] | targets from their files, with the families that they name |
 //! | [`camera_file`] | cameras from their files |
 //! | [`photograph`] | photographs in common formats as grey images |
+//! | [`logo`] | logos from SVG |
 //! | [`export`] | artwork, targets and results to files and back, one module for each format |
 //! | [`report`] | a calibration as an HTML page |
 
@@ -17,6 +18,8 @@ pub mod clock;
 pub mod export;
 pub mod family_file;
 pub mod limits;
+#[cfg(feature = "logo")]
+pub mod logo;
 #[cfg(feature = "photographs")]
 pub mod photograph;
 #[cfg(feature = "photographs")]

@@ -308,6 +308,7 @@ impl FacePicture {
             check_bars: Vec::new(),
             lines: Vec::new(),
             texts: Vec::new(),
+            logos: Vec::new(),
             pages: Vec::new(),
         };
         let finest = (MAX_PIXELS / (size.x * size.y)).sqrt();

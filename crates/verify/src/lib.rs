@@ -574,7 +574,8 @@ impl<'a> Verifier<'a> {
             let (page, wrong) = source.render(marks, wish, self.target)?;
             let mut verdict = SheetVerdict::new(index, &page, wrong);
             check_bars(&page, marks, &AffineMap::IDENTITY, &mut verdict);
-            marks::check(&page, marks, &[], Some(*window_mm), &mut verdict);
+            let logo = self.target.logo.as_ref();
+            marks::check(&page, (marks, logo), &[], Some(*window_mm), &mut verdict);
             let of_page = verdict.findings.into_iter();
             findings.extend(of_page.map(|finding| finding.on_page(label.clone())));
             check_bars_mm.extend(verdict.check_bars_mm);
@@ -612,7 +613,8 @@ impl<'a> Verifier<'a> {
         let in_place = verdict.findings.iter().all(Finding::is_local);
         check_bars(page, layout, &found_from_stated, verdict);
         if in_place {
-            marks::check(page, layout, &placed, None, verdict);
+            let logo = self.target.logo.as_ref();
+            marks::check(page, (layout, logo), &placed, None, verdict);
         }
         seen
     }

@@ -1,4 +1,4 @@
-//! Verification outside the tiles: every text, check bar and line has its ink, and there is nothing
+//! Verification outside the tiles: every text, check bar, line and logo has its ink, and there is nothing
 //! else on the sheet.
 //!
 //! The expected outlines come from the same code as the printed ones; so this proves that the sheet
@@ -23,7 +23,7 @@ use deltille_core::lattice::{Orientation, Tile};
 use deltille_core::polygon::{self, rectangle};
 use deltille_core::raster::{Coverage, Gray};
 use deltille_core::targets::{
-    CHECK_BAR_STROKE_MM, Corner, Label, LineKind, SheetLayout, SheetText,
+    CHECK_BAR_STROKE_MM, Corner, Label, LineKind, Logo, LogoPlacement, SheetLayout, SheetText,
 };
 
 /// Ink of a mark and of its outline, each the mean of 3 × 3 pixels, may differ by this. An edge
@@ -78,6 +78,12 @@ pub enum MarkFinding {
         /// The stated text.
         stated: Label,
     },
+    /// A logo is missing, or differs.
+    #[error("logo {logo} differs from the description")]
+    LogoDiffers {
+        /// Which logo of the sheet, from 1.
+        logo: usize,
+    },
     /// A line is missing, or differs.
     #[error("line {line}, to {}, differs from the description", purpose.name())]
     LineDiffers {
@@ -94,7 +100,7 @@ pub enum MarkFinding {
         /// Lattice column.
         col: i32,
     },
-    /// Ink, or on a black field a lack of it, outside the tiles, texts and check bars.
+    /// Ink, or on a black field a lack of it, outside the tiles, texts, check bars and logos.
     #[error("spot of {area_mm2:.3} mm² at ({:.2}, {:.2}) mm", at_mm.x, at_mm.y)]
     Spot {
         /// The middle of the spot.
@@ -126,7 +132,7 @@ fn measured(found_mm: Option<f64>, stated_mm: f64) -> String {
 /// (left, lower, right, upper end, mm), the part of a larger sheet, is left to others.
 pub(super) fn check(
     page: &Page,
-    layout: &SheetLayout,
+    (layout, logo): (&SheetLayout, Option<&Logo>),
     panels: &[PlacedPanel],
     window: Option<[f64; 4]>,
     verdict: &mut SheetVerdict,
@@ -143,6 +149,8 @@ pub(super) fn check(
         !window.is_some_and(in_window) && (grounds.iter().all(is_beside) || in_tiles())
     };
     let (mut marks, mut findings) = marks(layout);
+    let logos = layout.logos.iter().enumerate();
+    marks.extend(logos.filter_map(|(index, place)| Some(of_logo(logo?, place, index))));
     marks.extend(panels.iter().flat_map(discs));
     let drawn = Drawn::new(page, &marks);
     findings.par_extend(marks.par_iter().filter_map(|mark| {
@@ -177,6 +185,7 @@ enum What {
     Text(usize),
     CheckBar(usize),
     Line(usize),
+    Logo(usize),
     /// By row and column of its panel.
     Disc(i32, i32),
 }
@@ -192,6 +201,7 @@ impl What {
             Self::Line(i) => {
                 MarkFinding::LineDiffers { line: i + 1, purpose: layout.lines[i].kind }
             }
+            Self::Logo(i) => MarkFinding::LogoDiffers { logo: i + 1 },
             Self::Disc(row, col) => MarkFinding::DiscDiffers { row, col },
         }
     }
@@ -214,7 +224,16 @@ struct Area {
     bounds: Rect,
 }
 
-/// All marks of a layout, and findings for texts that cannot be drawn.
+/// A logo where it lies.
+fn of_logo(logo: &Logo, place: &LogoPlacement, index: usize) -> Mark {
+    let along =
+        Affine::rotate(-place.angle_rad) * Affine::translate((-place.at_mm.x, -place.at_mm.y));
+    let bounds = Rect::new(0.0, 0.0, logo.width() * place.height_mm, place.height_mm);
+    let areas = vec![Area { along, bounds }];
+    Mark { what: What::Logo(index), outlines: logo.outlines_mm(place), areas }
+}
+
+/// All marks of a layout but its logos, and findings for texts that cannot be drawn.
 fn marks(layout: &SheetLayout) -> (Vec<Mark>, Vec<MarkFinding>) {
     let (mut marks, mut findings) = (Vec::new(), Vec::new());
     for (index, text) in layout.texts.iter().enumerate() {
@@ -327,7 +346,7 @@ impl Area {
     }
 }
 
-/// An outline in the picture, by the rectangle around it, and whether it is of a letter.
+/// An outline in the picture, by the rectangle around it, and whether it is of a letter or a logo.
 type Outline = GeomWithData<Rectangle<[f64; 2]>, (Vec<DVec2>, bool)>;
 
 /// The marks that a page should show.
@@ -339,13 +358,13 @@ struct Drawn<'a> {
 impl<'a> Drawn<'a> {
     fn new(page: &'a Page, marks: &[Mark]) -> Self {
         let of_mark = |mark: &Mark| {
-            let is_text = matches!(mark.what, What::Text(_));
+            let has_holes = matches!(mark.what, What::Text(_) | What::Logo(_));
             let of = move |polygon: &Vec<DVec2>| {
                 let polygon: Vec<DVec2> = polygon.iter().map(|&p| page.px_from_page(p)).collect();
                 let end = |of: fn(DVec2, DVec2) -> DVec2| polygon.iter().copied().reduce(of);
                 let (least, most) = (end(DVec2::min)?, end(DVec2::max)?);
                 let around = Rectangle::from_corners(least.to_array(), most.to_array());
-                Some(GeomWithData::new(around, (polygon, is_text)))
+                Some(GeomWithData::new(around, (polygon, has_holes)))
             };
             mark.outlines.iter().filter_map(of).collect::<Vec<_>>()
         };
@@ -382,10 +401,10 @@ impl<'a> Drawn<'a> {
         let part = AABB::from_corners(first.to_array(), (first + size).to_array());
         let [mut letters, mut strokes] = [0, 1].map(|_| Coverage::new(width, height));
         for outline in self.outlines.locate_in_envelope_intersecting(part) {
-            let (polygon, is_text) = &outline.data;
+            let (polygon, has_holes) = &outline.data;
             let polygon: Vec<DVec2> = polygon.iter().map(|&p| p - origin).collect();
             // Which way outlines of letters run is the font's business; those of strokes cross each other.
-            match is_text {
+            match has_holes {
                 true => letters.add(&polygon, 1.0),
                 false => strokes.add(&polygon, polygon::area(&polygon).signum()),
             }

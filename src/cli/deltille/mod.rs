@@ -20,6 +20,7 @@ mod guide;
 mod images;
 mod in_flight;
 mod limits;
+mod logo;
 mod meshes;
 mod page;
 mod plan;

@@ -1,10 +1,13 @@
 //! What every target of one panel is told about paper and files.
 
+use std::path::PathBuf;
+
 use anyhow::{Context, bail};
 
 use super::delivery::Delivery;
 use super::files::{File, Formats, drawn, text_file};
 use super::finishing::{Finishing, Laser};
+use super::logo;
 use super::settings::{DEFAULT_DPI, DPI, PAPER, PRINT, refuse_idle};
 use crate::artwork;
 use crate::cli::values::{name, whole};
@@ -42,6 +45,12 @@ pub struct Printing {
     /// Printed on the label of every sheet beside the name, such as whose it is
     #[arg(long, value_name = "TEXT")]
     note: Option<String>,
+    /// An SVG that is printed black at the other end of the label's strip: filled paths and strokes; white is paper
+    #[arg(long, value_name = "FILE")]
+    logo: Option<PathBuf>,
+    /// Height of the logo [default: that of the strip]
+    #[arg(long, value_name = "LENGTH", value_parser = parse_length_mm)]
+    logo_height: Option<f64>,
     /// Stem of the files' names, printed on the sheet [default: that of the command]
     #[arg(long, value_parser = name)]
     name: Option<String>,
@@ -78,6 +87,7 @@ impl Printing {
             guide_page: self.guide_page,
             ..PaperSpec::default()
         };
+        let paper = logo::on(paper, self.logo.as_deref(), self.logo_height)?;
         let name = self.name.as_deref().unwrap_or(command);
         let is_printed = self.is_pdf(is_made) || self.svg || self.png;
         if !is_printed {
@@ -115,6 +125,8 @@ pub fn idle_without_pages(paper: &PaperSpec) -> anyhow::Result<()> {
         ("--guide-page", paper.guide_page, false, needed),
         ("--tag-ids", paper.tag_ids, false, needed),
         ("--note", paper.note.is_some(), false, needed),
+        ("--logo", paper.logo.is_some(), false, needed),
+        ("--logo-height", paper.logo_height_mm.is_some(), false, "--logo: add one"),
     ])
 }
 

@@ -11,7 +11,7 @@ use serde::{Deserialize, Serialize};
 
 use super::finishing::{Finishing, Laser};
 use super::meshes::{Meshes, PlateMeshes};
-use super::template;
+use super::{logo, template};
 use crate::cli::values::{number, whole};
 use crate::export::dsc::Dialect;
 use crate::family::places;
@@ -147,6 +147,12 @@ pub struct Settings {
     /// Printed on the label of every sheet beside the name, such as whose it is
     #[arg(long, value_name = "TEXT")]
     note: Option<String>,
+    /// An SVG that is printed black at the other end of the label's strip: filled paths and strokes; white is paper
+    #[arg(long, value_name = "FILE")]
+    logo: Option<String>,
+    /// Height of the logo [default: that of the strip]
+    #[arg(long, value_name = "LENGTH", allow_hyphen_values = true)]
+    logo_height: Option<String>,
     /// Stem of the files' names, printed on the sheet [default: board, or checkerboard]
     #[arg(long)]
     name: Option<String>,
@@ -277,6 +283,8 @@ impl Settings {
             // Of no use where other formats are asked for than in the template.
             dpi: self.dpi.or(template.dpi.filter(|_| png || !template.png)),
             note: self.note.or(template.note),
+            logo: self.logo.or(template.logo),
+            logo_height: self.logo_height.or(template.logo_height),
             name: self.name.or(template.name),
             // Of two sides the distance is the thickness.
             plate: self.plate.or(template.plate.filter(|_| !two_sided)),
@@ -321,6 +329,8 @@ impl Settings {
             guide_page: self.guide_page,
             ..PaperSpec::default()
         };
+        let height = length("logo-height", &self.logo_height)?;
+        let paper = logo::on(paper, self.logo.as_deref(), height)?;
         if grid == GridKind::Deltille && self.tags_in.is_some() {
             bail!("--tags-in: the tags of a deltille board are in its black tiles: leave it out");
         }

@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 use super::finishing::Laser;
 use super::meshes::Meshes;
 use super::settings::{DPI, PAPER, PRINT, TAGS, is_false, is_usual, length, refuse_idle};
-use super::template;
+use super::{logo, template};
 use crate::cli::values::{number, whole};
 use crate::export::dsc::Dialect;
 use crate::family::places;
@@ -159,6 +159,12 @@ pub struct SolidSettings {
     /// Printed on the label of every sheet beside the name, such as whose it is
     #[arg(long, value_name = "TEXT")]
     pub note: Option<String>,
+    /// An SVG that is printed black at the other end of the label's strip: filled paths and strokes; white is paper
+    #[arg(long, value_name = "FILE")]
+    pub logo: Option<String>,
+    /// Height of the logo [default: that of the strip]
+    #[arg(long, value_name = "LENGTH", allow_hyphen_values = true)]
+    pub logo_height: Option<String>,
     /// Stem of the files' names, printed on the sheets [default: the solid's name]
     #[arg(long)]
     pub name: Option<String>,
@@ -239,6 +245,8 @@ impl SolidSettings {
             orientation: self.orientation.or(template.orientation),
             margin: self.margin.or(template.margin),
             note: self.note.or(template.note),
+            logo: self.logo.or(template.logo),
+            logo_height: self.logo_height.or(template.logo_height),
             name: self.name.or(template.name),
             meshes: self.meshes.or(template.meshes),
             laser: self.laser.or(template.laser),
@@ -282,6 +290,8 @@ impl SolidSettings {
             ("--guide-page", self.guide_page, layout, needed),
             ("--tag-ids", self.tag_ids, layout, needed),
             ("--note", self.note.is_some(), layout, needed),
+            ("--logo", self.logo.is_some(), layout, needed),
+            ("--logo-height", self.logo_height.is_some(), self.logo.is_some(), "--logo: add one"),
             (
                 "--panel-thickness",
                 self.panel_thickness.is_some(),
@@ -381,7 +391,7 @@ impl SolidSettings {
 
     /// What it is printed on.
     pub fn paper(&self) -> anyhow::Result<PaperSpec> {
-        Ok(PaperSpec {
+        let paper = PaperSpec {
             size: self.paper.as_deref().map(str::parse).transpose().context("--paper")?,
             orientation: match &self.orientation {
                 Some(text) => text.parse().context("--orientation")?,
@@ -397,7 +407,8 @@ impl SolidSettings {
             tag_ids: self.tag_ids,
             guide_page: self.guide_page,
             ..PaperSpec::default()
-        })
+        };
+        logo::on(paper, self.logo.as_deref(), length("--logo-height", &self.logo_height)?)
     }
 
     /// Whose list of corners and tags is written, if any.

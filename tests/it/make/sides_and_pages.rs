@@ -108,3 +108,75 @@ fn a_template_makes_a_solid_again_and_options_win_over_it() {
     let said = String::from_utf8(said.get_output().stderr.clone()).unwrap();
     assert!(said.contains("was made for `tetrahedron`, not `octahedron`"), "{said}");
 }
+
+/// A logo goes with every kind of target, is proved in every format, and its file draws it again; the board is the same
+/// without it.
+#[test]
+fn every_kind_of_target_carries_a_logo() {
+    let folder = tempfile::tempdir().unwrap();
+    let logo = Path::new(env!("CARGO_MANIFEST_DIR")).join("docs/gallery/logo.svg");
+    std::fs::copy(logo, folder.path().join("logo.svg")).unwrap();
+    for args in [
+        "board --rows 6 --cols 7 --paper A3 --logo-height 15mm --pdf --svg --png",
+        "board --rows 6 --cols 7 --edge 25mm --two-sided 3mm --mirrored --guide-page --pdf",
+        "board --rows 4 --cols 5 --edge 12mm --boards 4 --pack --paper A4 --pdf",
+        "board --rows 6 --cols 7 --edge 40mm --paper A4 --poster --pdf",
+        "checkerboard --rows 5 --cols 7 --tags t36h11 --svg",
+        "charuco --squares 8x6 --edge 30mm --marker 22mm --dictionary 5x5_100 --pdf",
+        "aprilgrid --tags 4x4 --edge 30mm --pdf",
+        "circles --circles 9x7 --spacing 20mm --pdf",
+        "icosahedron --edge 90mm --pdf --guide-page",
+        "tetrahedron --edge 110mm --tiles 7 --per-face --pdf",
+    ] {
+        let made = format!("{args} --logo logo.svg -o logo --force");
+        deltille(folder.path(), &made).success();
+        let plain = args.replace(" --logo-height 15mm", "");
+        deltille(folder.path(), &format!("{plain} -o plain --force --no-verify")).success();
+        let name = format!("{}.json", args.split(' ').next().unwrap());
+        let [with, without] = ["logo", "plain"].map(|at| read(&folder.path().join(at).join(&name)));
+        assert_eq!(with.panels, without.panels, "{args}");
+        for (with, without) in with.sheets.iter().zip(&without.sheets) {
+            assert_eq!(with.placements, without.placements, "{args}");
+            let pages = with.pages.iter().map(|page| &page.marks);
+            let logos = pages.chain([with]).map(|page| page.logos.len()).sum::<usize>();
+            assert!(logos > 0, "{args}");
+        }
+    }
+}
+
+#[test]
+fn a_template_keeps_the_logo_and_what_cannot_be_printed_is_refused_in_a_line() {
+    let folder = tempfile::tempdir().unwrap();
+    let write = |name: &str, body: &str| {
+        let svg = format!(r#"<svg xmlns="http://www.w3.org/2000/svg">{body}</svg>"#);
+        std::fs::write(folder.path().join(name), svg).unwrap();
+    };
+    write("logo.svg", r#"<path d="M0 9H20L10 0Z"/>"#);
+    write("text.svg", r#"<text id="name">deltille</text>"#);
+    write("nothing.svg", "");
+    let board = "board --rows 5 --cols 6 --edge 20mm";
+    let saved = format!("{board} --logo logo.svg --logo-height 6.5mm --save-template t.toml");
+    deltille(folder.path(), &saved).success();
+    deltille(folder.path(), "board --template t.toml -o again").success();
+    let first = read(&folder.path().join("board.json"));
+    assert_eq!(first.sheets[0].logos[0].height_mm, 6.5);
+    assert_eq!(first, read(&folder.path().join("again/board.json")));
+    for (args, expected) in [
+        (
+            "--logo text.svg",
+            "--logo: text.svg: `text` with the id `name` cannot be printed: convert it to paths",
+        ),
+        ("--logo nothing.svg", "`--logo`: nothing of it is black"),
+        ("--logo missing.svg", "--logo: cannot read missing.svg"),
+        (
+            "--logo logo.svg --logo-height 90mm",
+            "`--logo-height`: beside what else is printed there is no room",
+        ),
+        ("--logo-height 9mm", "`--logo-height`: there is no logo: give `--logo`"),
+        ("--logo logo.svg --gltf", "--logo: it says nothing without --pdf, --svg or --png"),
+    ] {
+        let said = deltille(folder.path(), &format!("{board} {args} -o refused")).code(2);
+        let said = String::from_utf8(said.get_output().stderr.clone()).unwrap();
+        assert!(said.contains(expected) && said.trim().lines().count() == 1, "{args}: {said}");
+    }
+}

@@ -6,8 +6,9 @@ use crate::common::verdict::assert_found;
 use deltille::artwork::{self, Artwork, Paint, Part, Shape, Sheet};
 use deltille::export::{pdf, png, svg};
 use deltille::family::Family;
+use deltille::glam::DVec2;
 use deltille::lattice::{GridKind, Vertex};
-use deltille::targets::{BoardSpec, PaperSpec, TagSpec, TagsIn, Target, TargetSpec};
+use deltille::targets::{BoardSpec, Logo, PaperSpec, TagSpec, TagsIn, Target, TargetSpec};
 use deltille::verify::{Finding, TileFinding, Verdict, Verifier};
 use kurbo::{Affine, BezPath, Point};
 use serde_json::json;
@@ -47,10 +48,14 @@ fn all_specs() -> [BoardSpec; 3] {
 }
 
 fn board(spec: BoardSpec) -> Board {
+    board_on(spec, &PaperSpec::default())
+}
+
+fn board_on(spec: BoardSpec, paper: &PaperSpec) -> Board {
     let family = spec.tags.as_ref().map_or("delTag25h7", |tags| &tags.family);
     let family = Family::shipped(family).unwrap();
     let spec = TargetSpec::Board(spec);
-    let target = Target::build("b", &spec, Some(&family), Some(&PaperSpec::default())).unwrap();
+    let target = Target::build("b", &spec, Some(&family), Some(paper)).unwrap();
     Board { target, family }
 }
 
@@ -386,4 +391,56 @@ fn a_bar_much_shorter_than_stated_is_measured() {
     assert_found(&verdict, [json!({ "kind": "check_bar", "bar": 1 })]);
     let (_, found) = verdict.sheets[0].check_bars_mm[0];
     assert!((found.unwrap() - printed).abs() < 0.02, "{verdict}");
+}
+
+/// A triangle with a round hole.
+fn logo(apex: f64) -> Logo {
+    let triangle = [(0.0, 80.0), (100.0, 80.0), (apex, 0.0)].map(DVec2::from).to_vec();
+    let turns = (0..60).map(|n| f64::from(n) / 60.0 * -std::f64::consts::TAU);
+    let hole = turns.map(|turn| DVec2::new(50.0, 55.0) + 12.0 * DVec2::from_angle(turn)).collect();
+    Logo::from_outlines(&[triangle, hole]).unwrap()
+}
+
+#[test]
+fn a_logo_that_is_missing_moved_or_altered_is_found() {
+    let paper = PaperSpec { logo: Some(logo(50.0)), ..PaperSpec::default() };
+    let board = board_on(spec(), &paper);
+    let part = Part::Logo { index: 0 };
+    let [place] = board.target.sheets[0].logos[..] else { panic!("a logo") };
+    let mut erased = board.artwork();
+    erased.sheets[0].shapes.retain(|shape| shape.part != part);
+    let mut moved = board.artwork();
+    let shape = moved.sheets[0].shapes.iter_mut().find(|shape| shape.part == part).unwrap();
+    shape.path.apply_affine(Affine::translate((0.15, 0.0)));
+    let mut altered = board.target.clone();
+    altered.logo = Some(logo(45.0));
+    let altered = artwork::draw(&altered, Some(&board.family)).unwrap();
+    let blot = |x: f64, y: f64| {
+        let mut blot = board.artwork();
+        let at = place.at_mm + place.height_mm * DVec2::new(x, y);
+        let path = kurbo::Shape::to_path(&kurbo::Circle::new((at.x, at.y), 0.4), 0.001);
+        blot.sheets[0].shapes.push(Shape {
+            part: Part::Label { index: 9 },
+            paint: Paint::Fill,
+            path,
+        });
+        blot
+    };
+    let differs = || json!({ "kind": "logo_differs", "logo": 1 });
+    let cases = [
+        (erased, differs()),
+        (moved, differs()),
+        (altered, differs()),
+        // In its hole, beside its apex, and outside.
+        (blot(0.625, 0.3125), differs()),
+        (blot(0.1, 0.9), differs()),
+        (blot(0.5, 1.3), json!({ "kind": "spot" })),
+    ];
+    for format in ALL {
+        let good = board.verify(&board.artwork(), format);
+        assert!(good.passed, "{good}");
+        for (artwork, finding) in &cases {
+            assert_found(&board.verify(artwork, format), [finding.clone()]);
+        }
+    }
 }

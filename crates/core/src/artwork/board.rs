@@ -1,4 +1,4 @@
-//! Shapes of the sheets and pages of a target: tiles with tags, check bars, lines and texts.
+//! Shapes of the sheets and pages of a target: tiles with tags, check bars, lines, texts and logos.
 
 use std::collections::BTreeMap;
 
@@ -9,7 +9,8 @@ use super::{ArtworkError, Paint, Part, Shape, Sheet, cells, check_bar, strokes_m
 use crate::family::Family;
 use crate::lattice::{TagCells, Tile};
 use crate::targets::{
-    Panel, Placement, SheetLayout, SheetLine, SheetPage, SheetText, TagPlacement, TagsIn, Target,
+    Logo, Panel, Placement, SheetLayout, SheetLine, SheetPage, SheetText, TagPlacement, TagsIn,
+    Target,
 };
 
 /// How far the curves of a disc may be from a circle, mm.
@@ -29,13 +30,14 @@ pub(super) fn sheet(
             panel.ok_or(ArtworkError::NoSuchPanel { sheet: index + 1, panel: placement.panel })?;
         shapes.extend(draw_panel(target, panel, placement, family)?);
     }
-    shapes.extend(marks(layout)?);
+    shapes.extend(marks(layout, target.logo.as_ref())?);
     Ok(Sheet { width_mm: layout.width_mm, height_mm: layout.height_mm, shapes })
 }
 
 /// Draws a page that shows a part of a sheet, in the frame of the page, mm.
 pub(super) fn page(
     sheet: &Sheet,
+    target: &Target,
     layout: &SheetLayout,
     page: &SheetPage,
 ) -> Result<Sheet, ArtworkError> {
@@ -46,12 +48,14 @@ pub(super) fn page(
         window::clip(Shape { path, ..shape.clone() }, Rect::new(x0, y0, x1, y1))
     });
     let mut shapes: Vec<Shape> = in_window.collect();
-    // Lines and texts of the page itself are numbered on from those of the sheet.
+    // Lines, texts and logos of the page itself are numbered on from those of the sheet.
     let (lines, texts) = (layout.lines.len(), layout.texts.len());
-    shapes.extend(marks(&page.marks)?.into_iter().map(|shape| {
+    let logos = layout.logos.len();
+    shapes.extend(marks(&page.marks, target.logo.as_ref())?.into_iter().map(|shape| {
         let part = match shape.part {
             Part::Line { kind, index } => Part::Line { kind, index: index + lines },
             Part::Label { index } => Part::Label { index: index + texts },
+            Part::Logo { index } => Part::Logo { index: index + logos },
             part => part,
         };
         Shape { part, ..shape }
@@ -60,8 +64,8 @@ pub(super) fn page(
     Ok(Sheet { width_mm, height_mm, shapes })
 }
 
-/// Draws the check bars, lines and texts of a layout.
-fn marks(layout: &SheetLayout) -> Result<Vec<Shape>, ArtworkError> {
+/// Draws the check bars, lines, texts and logos of a layout.
+fn marks(layout: &SheetLayout, logo: Option<&Logo>) -> Result<Vec<Shape>, ArtworkError> {
     let mut shapes = Vec::new();
     for (index, bar) in layout.check_bars.iter().enumerate() {
         let path = check_bar::outline(bar);
@@ -79,6 +83,14 @@ fn marks(layout: &SheetLayout) -> Result<Vec<Shape>, ArtworkError> {
     for (index, label) in layout.texts.iter().enumerate() {
         let path = draw_text(label)?;
         shapes.push(Shape { part: Part::Label { index }, paint: Paint::Fill, path });
+    }
+    for (index, place) in layout.logos.iter().enumerate() {
+        let outlines = logo.into_iter().flat_map(|logo| logo.outlines_mm(place));
+        let mut path = BezPath::new();
+        for outline in outlines {
+            path.extend(polygon(outline.into_iter().map(|p| Point::new(p.x, p.y))));
+        }
+        shapes.push(Shape { part: Part::Logo { index }, paint: Paint::Fill, path });
     }
     Ok(shapes)
 }

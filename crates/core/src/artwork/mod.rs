@@ -129,6 +129,11 @@ pub enum Part {
         /// Position among the texts of the sheet, those of a page after those of its sheet.
         index: usize,
     },
+    /// The logo of the target.
+    Logo {
+        /// Position among the logos of the sheet, those of a page after those of its sheet.
+        index: usize,
+    },
 }
 
 /// Why a target cannot be drawn.
@@ -204,7 +209,7 @@ pub fn draw(target: &Target, family: Option<&Family>) -> Result<Artwork, Artwork
             continue;
         }
         for page in &layout.pages {
-            sheets.push(board::page(&sheet, layout, page)?);
+            sheets.push(board::page(&sheet, target, layout, page)?);
         }
     }
     if target.finish.mirrored {

@@ -5,8 +5,8 @@ use super::paper::{PaperSpec, SolidSheets};
 use super::poster::Poster;
 use super::{
     BoardSpec, FamilyRef, Finish, LineKind, Name, Panel, Placement, SheetLayout, SheetLine, Target,
-    TargetError, TargetSpec, aprilgrid, board, charuco, circles, face_sheet, guide, net, packed,
-    solid, tag_ids, tag_sheet,
+    TargetError, TargetSpec, aprilgrid, board, charuco, circles, face_sheet, guide, logo, net,
+    packed, solid, tag_ids, tag_sheet,
 };
 use crate::family::{Family, FamilyError, places};
 use crate::polygon::rectangle;
@@ -65,6 +65,7 @@ impl Target {
             Some(note) => format!("{name} · {}", checked_note(note)?),
             None => name.to_string(),
         };
+        layout.map_or(Ok(()), logo::check)?;
         let (panels, family, sheets) = match spec {
             TargetSpec::Board(board) => board_parts(&title, board, family, layout)?,
             TargetSpec::Solid(spec) => {
@@ -100,8 +101,10 @@ impl Target {
                 return Err(TargetError::Listed);
             }
         };
-        let mut target =
-            Target { name, spec: spec.clone(), family, panels, sheets, finish: Finish::default() };
+        layout.map_or(Ok(()), |paper| logo::check_sheets(&sheets, paper))?;
+        let logo = layout.and_then(|paper| paper.logo.clone());
+        let (spec, finish) = (spec.clone(), Finish::default());
+        let mut target = Target { name, spec, family, panels, sheets, finish, logo };
         if layout.is_some_and(|paper| paper.tag_ids) {
             tag_ids::add(&mut target)?;
         }
@@ -209,7 +212,8 @@ fn board_parts(
             let sheet = |panel: &Panel| {
                 let ink = if panel.inverted { panel.field_mm() } else { panel.bounds_mm() };
                 let mut sheet = arrangement.sheet(panel.id, ink, words(panel));
-                sheet.texts.extend(arrangement.large_id(board, panel.id, ink));
+                let large_id = arrangement.large_id(board, panel.id, ink);
+                sheet.texts.extend(large_id.filter(|id| !arrangement.logo_meets(&sheet, id)));
                 if board.two_sided_mm.is_some() {
                     sheet.lines.extend(arrangement.crop_marks(panel.id, ink, panel.field_mm()));
                 }

@@ -6,7 +6,7 @@ use glam::DVec2;
 use serde::{Deserialize, Serialize};
 
 use super::{
-    FamilyRef, Finish, GridKind, Name, Panel, SheetLayout, Target, TargetSpec, against_spec,
+    FamilyRef, Finish, GridKind, Logo, Name, Panel, SheetLayout, Target, TargetSpec, against_spec,
 };
 use crate::json::{self, ReadError};
 use crate::lattice::Vertex;
@@ -81,6 +81,8 @@ struct TargetFile {
     sheets: Vec<SheetLayout>,
     #[serde(default, skip_serializing_if = "Finish::is_plain")]
     finish: Finish,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    logo: Option<Logo>,
 }
 
 impl Target {
@@ -101,9 +103,9 @@ impl Target {
         if head.schema != SCHEMA {
             return Err(TargetFileError::Schema { found: head.schema });
         }
-        let TargetFile { schema: _, name, spec, family, panels, sheets, finish } =
+        let TargetFile { schema: _, name, spec, family, panels, sheets, finish, logo } =
             json::read(text)?;
-        let target = Target { name, spec, family, panels, sheets, finish };
+        let target = Target { name, spec, family, panels, sheets, finish, logo };
         check(&target).map_err(|(field, problem)| TargetFileError::Field { field, problem })?;
         Ok(target)
     }
@@ -118,9 +120,9 @@ impl Target {
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
     pub fn to_json(&self) -> String {
-        let Target { name, spec, family, panels, sheets, finish } = self.clone();
+        let Target { name, spec, family, panels, sheets, finish, logo } = self.clone();
         let schema = SCHEMA.to_owned();
-        let file = TargetFile { schema, name, spec, family, panels, sheets, finish };
+        let file = TargetFile { schema, name, spec, family, panels, sheets, finish, logo };
         json::to_text(&file, 4)
     }
 }
@@ -200,10 +202,10 @@ pub fn check(target: &Target) -> Result<(), Problem> {
     };
     target.finish.check().or_else(|(setting, what)| problem(named(setting), what))?;
     for (s, sheet) in target.sheets.iter().enumerate() {
-        check_sheet(sheet, &format!("sheets[{s}]"))?;
+        check_sheet(sheet, target, &format!("sheets[{s}]"))?;
         for (p, page) in sheet.pages.iter().enumerate() {
             let field = format!("sheets[{s}].pages[{p}]");
-            check_sheet(&page.marks, &format!("{field}.marks"))?;
+            check_sheet(&page.marks, target, &format!("{field}.marks"))?;
             if !page.marks.placements.is_empty() || !page.marks.pages.is_empty() {
                 let what = "a page has no panels and no pages of its own, its sheet has them";
                 return problem(format!("{field}.marks"), what);
@@ -223,8 +225,8 @@ pub fn check(target: &Target) -> Result<(), Problem> {
     Ok(())
 }
 
-/// Checks the size of a sheet, and that its lines lie on it.
-fn check_sheet(sheet: &SheetLayout, field: &str) -> Result<(), Problem> {
+/// Checks the size of a sheet, that its lines lie on it, and that there is a logo where it has one.
+fn check_sheet(sheet: &SheetLayout, target: &Target, field: &str) -> Result<(), Problem> {
     let sides = [("width_mm", sheet.width_mm), ("height_mm", sheet.height_mm)];
     if let Some((side, _)) = sides.iter().find(|(_, mm)| *mm <= 0.0) {
         return problem(format!("{field}.{side}"), "it must be positive");
@@ -232,6 +234,9 @@ fn check_sheet(sheet: &SheetLayout, field: &str) -> Result<(), Problem> {
     if let Some((side, _)) = sides.iter().find(|(_, mm)| *mm > LONGEST_SHEET_MM) {
         let what = format!("it is more than {LONGEST_SHEET_MM} mm");
         return problem(format!("{field}.{side}"), what);
+    }
+    if !sheet.logos.is_empty() && target.logo.is_none() {
+        return problem("logo", format!("`{field}.logos` places one, so there must be one"));
     }
     let on_sheet = |DVec2 { x, y }: DVec2| {
         (0.0..=sheet.width_mm).contains(&x) && (0.0..=sheet.height_mm).contains(&y)

@@ -16,6 +16,7 @@ use std::f64::consts::FRAC_PI_2;
 use glam::DVec2;
 
 use super::length::format_mm;
+use super::logo::{LogoPlacement, LogoSize};
 use super::paper::{Orientation, PaperSize, PaperSpec};
 use super::{
     BoardSpec, CheckBar, FamilyRef, GridKind, Label, LineKind, Panel, Placement, SheetLayout,
@@ -97,6 +98,10 @@ pub(super) struct Arrangement {
     board_at: DVec2,
     /// What lies along the lower and the right margin.
     marks: [Marks; 2],
+    /// From these margins to what stays blank around the footprint.
+    rooms: [f64; 2],
+    /// How large the logo is to be, where there is one.
+    logo: Option<LogoSize>,
 }
 
 /// A check bar and perhaps the label, along a margin: distances from the margin inwards, mm.
@@ -183,7 +188,8 @@ fn fit_turned(
     let margin = check_margin(paper)?;
     let sizes = paper.sizes();
     let fitting = |size| on_size(footprint, size, paper.orientation, margin, turns);
-    Ok(sizes.iter().find_map(fitting))
+    let found: Option<Arrangement> = sizes.iter().find_map(fitting);
+    Ok(found.map(|arrangement| arrangement.with_logo(paper)))
 }
 
 /// The margin asked for, mm, and never less than what must stay blank.
@@ -240,26 +246,47 @@ pub(super) fn on_page(
             return None;
         }
         let board_at = DVec2::new(middle.x.min(right_end), middle.y.max(lower_end));
-        Some(Arrangement { page, margin, turned, board_at, marks: [lower, right] })
+        let right_room = page.x - margin - mark_blank - board.x - board_at.x;
+        let rooms = [board_at.y - margin - mark_blank, right_room];
+        let marks = [lower, right];
+        Some(Arrangement { page, margin, turned, board_at, marks, rooms, logo: None })
     })
 }
 
 impl Arrangement {
-    /// The sheet of one panel, whose `ink` is a rectangle of its frame.
+    /// The same with the logo of a paper.
+    pub(super) fn with_logo(self, paper: &PaperSpec) -> Self {
+        Self { logo: LogoSize::of(paper), ..self }
+    }
+
+    /// The sheet of one panel, whose `ink` is a rectangle of its frame; one of no area where the sheet is filled otherwise,
+    /// up to its strips.
     pub(super) fn sheet(&self, panel: u32, ink: [f64; 4], label: String) -> SheetLayout {
         let DVec2 { x: width_mm, y: height_mm } = self.page;
         let [lower_marks, right_marks] = self.marks;
         let corner = right_marks.depth() + right_marks.gap;
-        let lower = Strip {
+        let mut lower = Strip {
             start: DVec2::splat(self.margin),
             turned: false,
             length: width_mm - 2.0 * self.margin - corner,
         };
-        let right = Strip {
+        let mut right = Strip {
             start: DVec2::new(width_mm - self.margin, self.margin),
             turned: true,
             length: height_mm - 2.0 * self.margin,
         };
+        let logo = self.logo.map(|size| {
+            let (strip, marks, room) = match lower_marks.label {
+                true => (&mut lower, lower_marks, self.rooms[0]),
+                false => (&mut right, right_marks, self.rooms[1]),
+            };
+            let deep = marks.depth();
+            let most = if ink[0] < ink[2] { room.max(deep) } else { deep };
+            let DVec2 { x: width, y: height_mm } = size.in_strip(strip.length, deep, most);
+            let (at_mm, angle_rad) = (strip.at(strip.length - width, 0.0), strip.angle());
+            strip.length -= LogoSize::taken(width);
+            LogoPlacement { at_mm, angle_rad, height_mm }
+        });
         let strips = [(lower, lower_marks), (right, right_marks)];
         let label = strips.iter().filter(|(_, marks)| marks.label).map(|(strip, _)| SheetText {
             text: Label::Words(label.clone()),
@@ -287,6 +314,7 @@ impl Arrangement {
             lines: Vec::new(),
             check_bars,
             texts,
+            logos: logo.into_iter().collect(),
             pages: Vec::new(),
         }
     }
@@ -318,6 +346,23 @@ impl Arrangement {
             angle_rad: placement.angle_rad,
             cap_height_mm,
             max_width_mm: caps_wide * cap_height_mm,
+        })
+    }
+
+    /// Whether a text meets the logo of its sheet.
+    pub(super) fn logo_meets(&self, sheet: &SheetLayout, text: &SheetText) -> bool {
+        let box_of = |at: DVec2, angle_rad: f64, size: DVec2| {
+            let turn = DVec2::from_angle(angle_rad);
+            let end = at + turn.rotate(size);
+            [at.min(end), at.max(end)]
+        };
+        let size = DVec2::new(text.max_width_mm, text.cap_height_mm);
+        let words = box_of(text.at_mm, text.angle_rad, size);
+        let width = self.logo.map_or(0.0, LogoSize::width);
+        sheet.logos.iter().any(|logo| {
+            let size = logo.height_mm * DVec2::new(width, 1.0);
+            let [least, most] = box_of(logo.at_mm, logo.angle_rad, size);
+            words[0].cmplt(most).all() && words[1].cmpgt(least).all()
         })
     }
 

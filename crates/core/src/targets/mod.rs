@@ -25,6 +25,7 @@ pub mod json;
 mod label;
 mod layout;
 mod length;
+mod logo;
 mod net;
 mod packed;
 mod panel;
@@ -63,6 +64,7 @@ pub use label::Label;
 pub use layout::CHECK_BAR_STROKE_MM;
 pub use layout::tag_range;
 pub use length::{BoxError, LengthError, parse_box_mm, parse_length_mm};
+pub use logo::{Logo, LogoPlacement, MOST_LOGO_BYTES};
 pub use net::Hinge;
 pub use paper::{DEFAULT_MARGIN_MM, Orientation, PaperError, PaperSize, PaperSpec, SolidSheets};
 pub use polyhedron::{Polyhedron, triangles};
@@ -88,6 +90,8 @@ pub struct Target {
     pub sheets: Vec<SheetLayout>,
     /// How they are printed.
     pub finish: Finish,
+    /// The logo on them.
+    pub logo: Option<Logo>,
 }
 
 /// Names a family so that a changed code table cannot go unnoticed.
@@ -316,6 +320,9 @@ pub struct SheetLayout {
     pub lines: Vec<SheetLine>,
     /// The label and the words on the check bars.
     pub texts: Vec<SheetText>,
+    /// Where the logo of the target lies.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub logos: Vec<LogoPlacement>,
     /// The pages that show this sheet in parts, where it is larger than the paper; it is then
     /// printed on none of its own.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]

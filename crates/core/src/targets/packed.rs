@@ -13,6 +13,7 @@ use std::cmp::Reverse;
 use glam::DVec2;
 
 use super::layout::{Arrangement, Footprint, check_margin, label, label_of_one, on_page};
+use super::logo::{LogoPlacement, LogoSize};
 use super::paper::PaperSpec;
 use super::{
     BoardSpec, FamilyRef, GridKind, Label, LineKind, Panel, Placement, SheetLayout, SheetLine,
@@ -24,6 +25,8 @@ use crate::lattice::ROW_HEIGHT;
 const LABEL_CAP_MM: f64 = 2.0;
 /// Blank around that label, mm.
 const LABEL_GAP_MM: f64 = 1.5;
+/// Blank above and below a logo beside that label, mm.
+const LOGO_GAP_MM: f64 = 0.75;
 /// Blank between a quiet zone and the line to cut along, mm.
 const CUT_GAP_MM: f64 = 0.5;
 /// Width of these lines, mm.
@@ -87,7 +90,7 @@ pub(super) fn sheets(
         if count > 1 {
             words += &format!(" · page {} of {count}", index + 1);
         }
-        sheet(&cell, grid, &arrangement, (panels, spec, family), words)
+        sheet(&cell, grid, (&arrangement, LogoSize::of(paper)), (panels, spec, family), words)
     });
     Ok(sheets.collect())
 }
@@ -134,11 +137,11 @@ fn arrange(
     Ok(paper.sizes().iter().find_map(on_size))
 }
 
-/// One sheet: boards from the upper left, row by row, and the lines between them.
+/// One sheet: boards from the upper left, row by row, each with its logo, and the lines between them.
 fn sheet(
     cell: &Cell,
     [columns, rows]: [usize; 2],
-    arrangement: &Arrangement,
+    (arrangement, logo): (&Arrangement, Option<LogoSize>),
     (panels, spec, family): (&[Panel], &BoardSpec, Option<&FamilyRef>),
     words: String,
 ) -> SheetLayout {
@@ -156,12 +159,21 @@ fn sheet(
         let corner = at(index % columns, rows - 1 - index / columns);
         let origin_mm = corner + DVec2::new(cell.blank, cell.below()) - cell.ink[0];
         sheet.placements.push(Placement { panel: panel.id, angle_rad: 0.0, origin_mm });
+        let mut length = size.x - 2.0 * cell.blank;
+        if let Some(logo) = logo {
+            let least = LABEL_CAP_MM + 2.0 * LABEL_GAP_MM;
+            let [deep, most] = [least, cell.below() - cell.blank].map(|mm| mm - 2.0 * LOGO_GAP_MM);
+            let DVec2 { x: width, y: height_mm } = logo.in_strip(length, deep, most);
+            let at_mm = corner + DVec2::new(cell.blank + length - width, LOGO_GAP_MM);
+            sheet.logos.push(LogoPlacement { at_mm, angle_rad: 0.0, height_mm });
+            length -= LogoSize::taken(width);
+        }
         sheet.texts.push(SheetText {
             text: Label::Words(label_of_one(spec, panel, family)),
             at_mm: corner + DVec2::new(cell.blank, LABEL_GAP_MM + LABEL_CAP_MM / 3.0),
             angle_rad: 0.0,
             cap_height_mm: LABEL_CAP_MM,
-            max_width_mm: size.x - 2.0 * cell.blank,
+            max_width_mm: length,
         });
     }
     sheet

@@ -3,6 +3,7 @@ use std::str::FromStr;
 
 use glam::DVec2;
 
+use super::Logo;
 use super::length::{format_mm, parse_length_mm};
 
 /// Sizes with a name: short and long side, mm (ISO 216; ANSI A and B, US legal).
@@ -44,6 +45,10 @@ pub struct PaperSpec {
     pub packed: bool,
     /// What is printed on the label of every sheet beside the name, such as whose it is.
     pub note: Option<String>,
+    /// A logo that is printed on every sheet, at the other end of the strip in which the label begins.
+    pub logo: Option<Logo>,
+    /// Its height, mm; where none is asked for, that of the strip, or less where it would be too wide.
+    pub logo_height_mm: Option<f64>,
     /// Whether the ids of tags are printed beside them, in small type.
     pub tag_ids: bool,
     /// Whether a page with a picture of the target, what to do and a ruler goes with the sheets.
@@ -93,6 +98,8 @@ impl Default for PaperSpec {
             poster: false,
             packed: false,
             note: None,
+            logo: None,
+            logo_height_mm: None,
             tag_ids: false,
             guide_page: false,
         }

@@ -172,6 +172,7 @@ impl Poster {
             check_bars: Vec::new(),
             lines: Vec::new(),
             texts: Vec::new(),
+            logos: Vec::new(),
             pages: Vec::new(),
         }
     }

@@ -166,7 +166,7 @@ fn arrange(
                 // Of two equal blocks the later, wider one.
                 let more = columns * rows > most || (columns * rows == most && columns > rows);
                 if more && let Some(found) = on_page(&footprint, page, margin, false) {
-                    best = Some(([columns, rows], found));
+                    best = Some(([columns, rows], found.with_logo(paper)));
                 }
             }
         }

@@ -85,6 +85,7 @@ fn name(part: Part) -> String {
         Part::CheckBar { index } => format!("check-bar-{index}"),
         Part::Line { kind, index } => format!("{}-{index}", kind.name()),
         Part::Label { index } => format!("label-{index}"),
+        Part::Logo { index } => format!("logo-{index}"),
     }
 }
 

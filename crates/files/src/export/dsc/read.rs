@@ -87,6 +87,7 @@ fn read_in(text: &str, name: &str, units: &[Units]) -> Result<Target, DscError> 
         family: Some(family_ref(&family, &blocks)?),
         sheets: Vec::new(),
         finish: Finish::default(),
+        logo: None,
     };
     deltille_core::targets::json::check(&target)
         .map_err(|(field, problem)| DscError::Target(format!("{field}: {problem}")))?;

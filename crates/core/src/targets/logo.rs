@@ -1,0 +1,473 @@
+//! A logo: a black outline in the margin of sheets, so that a target is told apart and known to be somebody's.
+//!
+//! ```text
+//!   ├──────────── 230 mm ───────────┤   ▲▲    It lies at the end of the strip in which the label begins; the check bar
+//!   name · 10 × 11 corners · …         ▲▲▲▲   of that strip is shorter by it, and the board stays where it is.
+//! ```
+
+use std::fmt;
+
+use glam::DVec2;
+use kurbo::{BezPath, PathEl, Point};
+use serde::{Deserialize, Serialize};
+
+use super::length::format_mm;
+use super::{PaperSpec, SheetLayout, TargetError};
+use crate::quantity;
+
+/// Height of a logo in the units of its outline: of one that is 12 mm high a unit is 1.2 µm.
+const UNITS: i32 = 10_000;
+
+/// Most characters of the data of an outline: some 6,000 corners, more than a printer shows on a few square centimetres;
+/// every target file has them.
+pub const MOST_LOGO_BYTES: usize = 65_536;
+
+/// Most width of a logo, in heights, and most height in widths.
+const MOST_RATIO: f64 = 30.0;
+
+/// Most of the length of a strip that a logo may take: the check bar beside it must stay long enough to be measured.
+const MOST_PART: f64 = 0.3;
+
+/// Blank between a logo and what is beside it, mm.
+const BESIDE_MM: f64 = 2.0;
+
+/// Heights that may be asked for, mm: with less nothing can be told apart.
+const HEIGHT_MM: std::ops::RangeInclusive<f64> = 3.0..=200.0;
+
+/// Room that is missing by no more than this is what rounding leaves, mm.
+const SLACK_MM: f64 = 1e-6;
+
+/// The black outline of a logo, in whole units of a ten-thousandth of its height.
+///
+/// In files it is the data of an SVG path of straight lines, x right, y down, whose ink begins at 0 0; to be filled by
+/// the even-odd rule.
+///
+/// ```
+/// use deltille_core::targets::Logo;
+/// use glam::DVec2;
+///
+/// let triangle = [(0.0, 7.0), (4.0, 0.0), (8.0, 7.0)].map(DVec2::from).to_vec();
+/// let logo = Logo::from_outlines(&[triangle])?;
+/// assert_eq!(logo.to_string(), "M0 10000L5714 0L11429 10000Z");
+/// # Ok::<(), deltille_core::targets::TargetError>(())
+/// ```
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(try_from = "String", into = "String")]
+pub struct Logo {
+    rings: Vec<Vec<[i32; 2]>>,
+    width: i32,
+}
+
+impl Logo {
+    /// A logo of closed outlines in any unit, x right, y down. They do not cross; outer ones run one way, holes the
+    /// other.
+    ///
+    /// # Errors
+    /// When nothing is left of it, it is far wider than high or far higher than wide, or has too many corners.
+    pub fn from_outlines(outlines: &[Vec<DVec2>]) -> Result<Self, TargetError> {
+        let points = || outlines.iter().flatten().copied();
+        let end = |of: fn(DVec2, DVec2) -> DVec2| points().reduce(of).unwrap_or_default();
+        let (least, size) = (end(DVec2::min), end(DVec2::max) - end(DVec2::min));
+        if !(size.x > 0.0 && size.y > 0.0 && size.is_finite()) {
+            return refused("nothing of it is black");
+        }
+        if size.x > MOST_RATIO * size.y || size.y > MOST_RATIO * size.x {
+            let [x, y] = [size.x, size.y].map(|side| side / size.min_element());
+            return refused(format!(
+                "its width is to its height as {x:.0} to {y:.0}: take one that is at most {MOST_RATIO} times as long \
+                 as broad"
+            ));
+        }
+        let scale = f64::from(UNITS) / size.y;
+        let ring = |outline: &Vec<DVec2>| {
+            let whole = outline.iter().map(|&point| {
+                let place = ((point - least) * scale).round();
+                [place.x as i32, place.y as i32]
+            });
+            let mut ring: Vec<[i32; 2]> = whole.collect();
+            ring.dedup();
+            if ring.len() > 1 && ring.first() == ring.last() {
+                ring.pop();
+            }
+            ring
+        };
+        let rings: Vec<_> = outlines.iter().map(ring).filter(|ring| ring.len() > 2).collect();
+        let logo = Self::new(rings).or_else(refused)?;
+        if logo.to_string().len() > MOST_LOGO_BYTES {
+            return refused(format!(
+                "its outline has {} corners, of which some 6,000 find room in a target file: simplify its paths",
+                logo.rings.iter().map(Vec::len).sum::<usize>()
+            ));
+        }
+        Ok(logo)
+    }
+
+    fn new(rings: Vec<Vec<[i32; 2]>>) -> Result<Self, String> {
+        let end = |axis: usize| {
+            let values = || rings.iter().flatten().map(move |point| point[axis]);
+            [values().min().unwrap_or_default(), values().max().unwrap_or_default()]
+        };
+        let ([left, right], [upper, lower]) = (end(0), end(1));
+        if rings.iter().any(|ring| ring.len() < 3) {
+            return Err("an outline has less than three corners".to_owned());
+        }
+        if [left, upper, lower] != [0, 0, UNITS] {
+            return Err(format!("its ink does not reach from 0 0 to a height of {UNITS}"));
+        }
+        let ratio = f64::from(right) / f64::from(UNITS);
+        // Rounded.
+        if !(0.99 / MOST_RATIO..=1.01 * MOST_RATIO).contains(&ratio) {
+            return Err(format!("it is more than {MOST_RATIO} times as long as broad"));
+        }
+        Ok(Self { rings, width: right })
+    }
+
+    /// Its width, in heights.
+    pub fn width(&self) -> f64 {
+        f64::from(self.width) / f64::from(UNITS)
+    }
+
+    /// Its closed outlines where it lies, in the frame of the page, mm.
+    pub fn outlines_mm(&self, place: &LogoPlacement) -> Vec<Vec<DVec2>> {
+        let turn = DVec2::from_angle(place.angle_rad);
+        let unit = place.height_mm / f64::from(UNITS);
+        let at = |&[x, y]: &[i32; 2]| {
+            let (x, y) = (f64::from(x), f64::from(UNITS - y));
+            place.at_mm + turn.rotate(unit * DVec2::new(x, y))
+        };
+        self.rings.iter().map(|ring| ring.iter().map(at).collect()).collect()
+    }
+}
+
+fn refused<T>(problem: impl Into<String>) -> Result<T, TargetError> {
+    Err(TargetError::invalid("PaperSpec::logo", problem.into()))
+}
+
+impl fmt::Display for Logo {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        for ring in &self.rings {
+            for (index, [x, y]) in ring.iter().enumerate() {
+                write!(f, "{}{x} {y}", if index == 0 { 'M' } else { 'L' })?;
+            }
+            f.write_str("Z")?;
+        }
+        Ok(())
+    }
+}
+
+impl From<Logo> for String {
+    fn from(logo: Logo) -> Self {
+        logo.to_string()
+    }
+}
+
+impl TryFrom<String> for Logo {
+    type Error = String;
+
+    fn try_from(text: String) -> Result<Self, String> {
+        if text.len() > MOST_LOGO_BYTES {
+            return Err(format!("it has more than {MOST_LOGO_BYTES} characters"));
+        }
+        let path = BezPath::from_svg(&text).map_err(|_| "it is no data of an SVG path")?;
+        let whole = |Point { x, y }: Point| {
+            let is_whole = [x, y]
+                .iter()
+                .all(|value| (0.0..=f64::from(i32::MAX)).contains(value) && value.fract() == 0.0);
+            is_whole.then_some([x as i32, y as i32]).ok_or("its coordinates are not whole")
+        };
+        let mut rings: Vec<Vec<[i32; 2]>> = Vec::new();
+        for element in path.elements() {
+            match (*element, rings.last_mut()) {
+                (PathEl::MoveTo(to), _) => rings.push(vec![whole(to)?]),
+                (PathEl::LineTo(to), Some(ring)) => ring.push(whole(to)?),
+                (PathEl::ClosePath, _) => {}
+                _ => return Err("it has curves".to_owned()),
+            }
+        }
+        Self::new(rings)
+    }
+}
+
+/// Where a logo lies on a page.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct LogoPlacement {
+    /// Its lower left corner on the page, mm.
+    #[serde(deserialize_with = "quantity::place_mm::de")]
+    pub at_mm: DVec2,
+    /// Counter-clockwise turn about it, radians.
+    #[serde(deserialize_with = "quantity::angle_rad::de")]
+    pub angle_rad: f64,
+    /// Its height, mm.
+    #[serde(deserialize_with = "quantity::length_mm::de")]
+    pub height_mm: f64,
+}
+
+/// How large a logo is to be.
+#[derive(Clone, Copy)]
+pub(super) struct LogoSize {
+    /// Width, in heights.
+    width: f64,
+    /// The height that is asked for, mm.
+    height_mm: Option<f64>,
+}
+
+impl LogoSize {
+    /// That of the logo of a paper.
+    pub fn of(paper: &PaperSpec) -> Option<Self> {
+        let width = paper.logo.as_ref()?.width();
+        Some(Self { width, height_mm: paper.logo_height_mm })
+    }
+
+    /// Its width, in heights.
+    pub fn width(self) -> f64 {
+        self.width
+    }
+
+    /// Width and height in a strip of some length: as high as asked for, else as the strip is `deep`, and not higher
+    /// than the `most` for which there is room.
+    pub fn in_strip(self, length: f64, deep: f64, most: f64) -> DVec2 {
+        let most = most.min(MOST_PART * length / self.width);
+        let height = self.height_mm.unwrap_or(deep).min(most);
+        DVec2::new(self.width * height, height)
+    }
+
+    /// How much of the length of a strip a logo of that width takes, mm.
+    pub fn taken(width_mm: f64) -> f64 {
+        width_mm + BESIDE_MM
+    }
+}
+
+/// Refuses a height without a logo, or one that no logo has.
+pub(super) fn check(paper: &PaperSpec) -> Result<(), TargetError> {
+    let refused = |problem| Err(TargetError::invalid("PaperSpec::logo_height_mm", problem));
+    match paper.logo_height_mm {
+        Some(_) if paper.logo.is_none() => {
+            refused("there is no logo: give `PaperSpec::logo`, or leave it out".to_owned())
+        }
+        Some(height) if !HEIGHT_MM.contains(&height) => {
+            let [least, most] = [*HEIGHT_MM.start(), *HEIGHT_MM.end()].map(format_mm);
+            refused(format!("{} is not between {least} and {most}", format_mm(height)))
+        }
+        _ => Ok(()),
+    }
+}
+
+/// Refuses sheets on which the logo found too little room.
+pub(super) fn check_sheets(sheets: &[SheetLayout], paper: &PaperSpec) -> Result<(), TargetError> {
+    let pages = sheets.iter().flat_map(|sheet| {
+        let pages = sheet.pages.iter().map(|page| &page.marks);
+        std::iter::once(sheet).chain(pages)
+    });
+    let least = pages.flat_map(|page| &page.logos).map(|logo| logo.height_mm).reduce(f64::min);
+    let (Some(least), Some(logo)) = (least, &paper.logo) else { return Ok(()) };
+    let fitting = format_mm((10.0 * least).floor() / 10.0);
+    match paper.logo_height_mm {
+        Some(asked) if least < asked - SLACK_MM => {
+            let remedy = if least < *HEIGHT_MM.start() {
+                "take larger `PaperSpec::size`".to_owned()
+            } else {
+                format!("take at most {fitting}, or larger `PaperSpec::size`")
+            };
+            let problem = format!(
+                "beside what else is printed there is no room for a logo {} high: {remedy}",
+                format_mm(asked)
+            );
+            Err(TargetError::invalid("PaperSpec::logo_height_mm", problem))
+        }
+        None if least < *HEIGHT_MM.start() => refused(format!(
+            "{:.1} times as wide as high it would find room only {fitting} high, less than {}: take larger \
+             `PaperSpec::size`, or a logo that is less wide",
+            logo.width(),
+            format_mm(*HEIGHT_MM.start()),
+        )),
+        _ => Ok(()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use kurbo::Shape;
+    use proptest::prelude::*;
+
+    use super::*;
+    use crate::artwork;
+    use crate::family::Family;
+    use crate::targets::{
+        BoardSpec, CHECK_BAR_STROKE_MM, CirclesSpec, GridKind, SolidShape, SolidSheets, SolidSpec,
+        Target, TargetSpec,
+    };
+
+    /// A frame that is `width` times as wide as high.
+    fn frame(width: f64) -> Logo {
+        let rectangle = |inside: f64| {
+            let (x, y) = (width - inside, 1.0 - inside);
+            [(inside, inside), (x, inside), (x, y), (inside, y)].map(DVec2::from).to_vec()
+        };
+        let mut hole = rectangle(0.1 * width.min(1.0));
+        hole.reverse();
+        Logo::from_outlines(&[rectangle(0.0), hole]).unwrap()
+    }
+
+    fn build(spec: &TargetSpec, paper: &PaperSpec) -> Result<Target, TargetError> {
+        let family = spec.family().map(|name| Family::shipped(name).unwrap());
+        Target::build("target", spec, family.as_ref(), Some(paper))
+    }
+
+    fn rectangle_of(points: &[DVec2]) -> [DVec2; 2] {
+        let end = |of: fn(DVec2, DVec2) -> DVec2| points.iter().copied().reduce(of).unwrap();
+        [end(DVec2::min), end(DVec2::max)]
+    }
+
+    fn apart([a, b]: [DVec2; 2], [c, d]: [DVec2; 2], blank: f64) -> bool {
+        (b + blank).cmple(c + SLACK_MM).any() || (d + blank).cmple(a + SLACK_MM).any()
+    }
+
+    /// Checks that logos keep off everything, and that nothing else moved.
+    fn check_place(spec: &TargetSpec, paper: &PaperSpec) -> Result<(), TestCaseError> {
+        let plain = PaperSpec { logo: None, logo_height_mm: None, ..paper.clone() };
+        let (Ok(plain), Ok(target)) = (build(spec, &plain), build(spec, paper)) else {
+            return Ok(());
+        };
+        prop_assert_eq!(&Target::from_json(&target.to_json()).unwrap(), &target);
+        prop_assert_eq!(&plain.panels, &target.panels);
+        let logo = target.logo.as_ref().unwrap();
+        for (sheet, plain) in target.sheets.iter().zip(&plain.sheets) {
+            prop_assert_eq!(&sheet.placements, &plain.placements);
+            prop_assert_eq!(&sheet.lines, &plain.lines);
+            prop_assert!(!sheet.logos.is_empty() || !sheet.pages.is_empty());
+            for page in std::iter::once(sheet).chain(sheet.pages.iter().map(|page| &page.marks)) {
+                for place in &page.logos {
+                    let points: Vec<DVec2> = logo.outlines_mm(place).concat();
+                    let around = rectangle_of(&points);
+                    let margin = if paper.packed { 0.0 } else { paper.margin_mm };
+                    let end = DVec2::new(page.width_mm, page.height_mm) - margin + SLACK_MM;
+                    prop_assert!(around[0].cmpge(DVec2::splat(margin - SLACK_MM)).all());
+                    prop_assert!(around[1].cmple(end).all());
+                    for bar in &page.check_bars {
+                        let bar = rectangle_of(&[bar.from_mm, bar.to_mm]);
+                        prop_assert!(apart(around, bar, CHECK_BAR_STROKE_MM / 2.0), "{bar:?}");
+                    }
+                    for text in &page.texts {
+                        let ink = artwork::text_outline(text).unwrap().bounding_box();
+                        let ink = [DVec2::new(ink.x0, ink.y0), DVec2::new(ink.x1, ink.y1)];
+                        prop_assert!(apart(around, ink, 0.3), "{around:?} meets {text:?}");
+                    }
+                    for line in &page.lines {
+                        let line = rectangle_of(&[line.from_mm, line.to_mm]);
+                        prop_assert!(apart(around, line, 0.0), "{around:?} meets {line:?}");
+                    }
+                    for placement in &page.placements {
+                        let panel = &target.panels[usize::try_from(placement.panel).unwrap()];
+                        let quiet = if panel.inverted { 0.0 } else { panel.quiet_zone_mm() };
+                        let [x0, y0, x1, y1] =
+                            if panel.inverted { panel.field_mm() } else { panel.bounds_mm() };
+                        let ends = [(x0, y0), (x1, y0), (x1, y1), (x0, y1)];
+                        let ends = ends.map(|end| placement.page_from_panel(end.into()));
+                        let ink = rectangle_of(&ends);
+                        prop_assert!(apart(around, ink, quiet), "{around:?} meets {ink:?}");
+                    }
+                }
+            }
+        }
+        Ok(())
+    }
+
+    proptest! {
+        #[test]
+        fn a_logo_moves_nothing_and_keeps_off_everything(
+            rows in 3u32..12, cols in 3u32..12, edge in 10.0f64..40.0, width in 0.1f64..12.0,
+            height in 3.0f64..30.0, free: bool, checker: bool, inverted: bool, kind in 0usize..4,
+            size in 0usize..4,
+        ) {
+            let grid = if checker { GridKind::Checker } else { GridKind::Deltille };
+            let board = BoardSpec { inverted, boards: 3, ..BoardSpec::new(grid, rows, cols, edge) };
+            let paper = PaperSpec {
+                size: [None, Some("A4"), Some("A3"), Some("A5")][size].map(|size| size.parse().unwrap()),
+                logo: Some(frame(width)),
+                logo_height_mm: (!free).then_some(height),
+                packed: kind == 1,
+                poster: kind == 2,
+                guide_page: kind == 3,
+                ..PaperSpec::default()
+            };
+            let two_sided_mm = (kind == 3).then_some(3.0);
+            check_place(&BoardSpec { two_sided_mm, ..board }.into(), &paper)?;
+        }
+    }
+
+    #[test]
+    fn solids_and_other_targets_have_a_place_for_it() {
+        let solid = TargetSpec::from(SolidSpec::new(SolidShape::Icosahedron));
+        let circles =
+            CirclesSpec { circles: [7, 5], spacing_mm: 20.0, diameter_mm: 10.0, asymmetric: false };
+        for (spec, solids) in [
+            (solid.clone(), SolidSheets::Net),
+            (solid.clone(), SolidSheets::SeamedNet),
+            (solid, SolidSheets::PerFace),
+            (circles.into(), SolidSheets::Net),
+        ] {
+            let size = Some("A3".parse().unwrap());
+            let paper = PaperSpec { size, solids, logo: Some(frame(2.5)), ..PaperSpec::default() };
+            let target = build(&spec, &paper).unwrap();
+            assert!(
+                target
+                    .sheets
+                    .iter()
+                    .all(|sheet| !sheet.logos.is_empty() || !sheet.pages.is_empty())
+            );
+            check_place(&spec, &paper).unwrap();
+        }
+    }
+
+    #[test]
+    fn sizes_that_find_no_room_are_refused() {
+        let said = |logo: Option<Logo>, logo_height_mm: Option<f64>, size: &str| {
+            let size = Some(size.parse().unwrap());
+            let paper = PaperSpec { size, logo, logo_height_mm, ..PaperSpec::default() };
+            let board = BoardSpec::deltille(10, 11, 20.0);
+            build(&board.into(), &paper).map(|_| ()).map_err(|error| error.to_string())
+        };
+        let logo = || Some(frame(2.0));
+        assert_eq!(said(logo(), None, "A4"), Ok(()));
+        assert_eq!(said(logo(), Some(12.0), "A3"), Ok(()));
+        let refused = |found: Result<(), String>| found.unwrap_err();
+        let error = refused(said(logo(), Some(12.0), "A4"));
+        let most = error.split("at most ").nth(1).and_then(|e| e.split(' ').next()).unwrap();
+        let most: f64 = most.parse().unwrap();
+        assert_eq!(said(logo(), Some(most), "A4"), Ok(()));
+        assert!(said(logo(), Some(most + 0.11), "A4").is_err());
+        assert!(refused(said(None, Some(9.0), "A4")).contains("there is no logo"));
+        assert!(refused(said(logo(), Some(2.0), "A4")).contains("between 3 mm and 200 mm"));
+        let narrow = BoardSpec::deltille(4, 4, 5.0);
+        let paper = PaperSpec {
+            size: Some("60x60mm".parse().unwrap()),
+            logo: Some(frame(25.0)),
+            ..PaperSpec::default()
+        };
+        let error = build(&narrow.into(), &paper).unwrap_err().to_string();
+        assert!(error.contains("less than 3 mm"), "{error}");
+    }
+
+    #[test]
+    fn files_hold_outlines_and_nothing_else() {
+        let read = |text: &str| Logo::try_from(text.to_owned());
+        let logo = read("M0 0L20000 0L20000 10000L0 10000Z").unwrap();
+        assert_eq!((logo.width(), read(&logo.to_string())), (2.0, Ok(logo)));
+        for wrong in [
+            "",
+            "x",
+            "M0 0L9 9Z",
+            "M0 0L20000 0L20000 9000L0 9000Z",
+            "M0 0L2.5 0L0 10000Z",
+            "M0 0C1 1 2 2 20000 0L0 10000Z",
+            "M1 0L20000 0L20000 10000Z",
+            "M0 0L9 0L0 10000Z",
+            "M0 0L1e20 0L0 10000Z",
+            "M-1 0L20000 0L0 10000Z",
+        ] {
+            assert!(read(wrong).is_err(), "{wrong}");
+        }
+        assert!(read(&"M0 0".repeat(20_000)).is_err());
+    }
+}

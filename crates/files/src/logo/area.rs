@@ -1,0 +1,59 @@
+//! Areas of the plane within closed outlines, and what is common to them.
+
+use glam::DVec2;
+use i_overlay::core::fill_rule::FillRule;
+use i_overlay::core::overlay_rule::OverlayRule;
+use i_overlay::float::simplify::SimplifyShape;
+use i_overlay::float::single::SingleFloatOverlay;
+
+/// What an area is printed in.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Tone {
+    /// Ink.
+    Black,
+    /// Bare paper.
+    White,
+}
+
+/// An area; its outlines do not cross, outer ones run one way and holes the other.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Area {
+    outlines: Vec<Vec<[f64; 2]>>,
+}
+
+impl Area {
+    /// What is within outlines that may cross.
+    pub fn within(outlines: &[Vec<[f64; 2]>], rule: FillRule) -> Self {
+        Self::of(outlines.to_vec().simplify_shape(rule))
+    }
+
+    /// All that is in one of several.
+    pub fn union<'a>(areas: impl IntoIterator<Item = &'a Self>) -> Self {
+        let outlines: Vec<_> = areas.into_iter().flat_map(|area| area.outlines.clone()).collect();
+        Self::within(&outlines, FillRule::NonZero)
+    }
+
+    /// What is in this and not in another.
+    pub fn without(&self, other: &Self) -> Self {
+        self.combined(other, OverlayRule::Difference)
+    }
+
+    /// What is in both.
+    pub fn common(&self, other: &Self) -> Self {
+        self.combined(other, OverlayRule::Intersect)
+    }
+
+    fn combined(&self, other: &Self, rule: OverlayRule) -> Self {
+        Self::of(self.outlines.overlay(&other.outlines, rule, FillRule::NonZero))
+    }
+
+    fn of(shapes: Vec<Vec<Vec<[f64; 2]>>>) -> Self {
+        Self { outlines: shapes.into_iter().flatten().collect() }
+    }
+
+    /// Its outlines.
+    pub fn into_outlines(self) -> Vec<Vec<DVec2>> {
+        let outline = |outline: Vec<[f64; 2]>| outline.into_iter().map(DVec2::from).collect();
+        self.outlines.into_iter().map(outline).collect()
+    }
+}

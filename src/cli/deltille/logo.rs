@@ -1,0 +1,25 @@
+//! The logo that is asked for.
+
+use std::path::Path;
+
+use anyhow::anyhow;
+
+use crate::limits;
+use crate::logo::{self, LogoError, MAX_LOGO_BYTES};
+use crate::targets::PaperSpec;
+
+/// A paper with the logo of a file, so high.
+pub fn on(
+    paper: PaperSpec,
+    file: Option<impl AsRef<Path>>,
+    logo_height_mm: Option<f64>,
+) -> anyhow::Result<PaperSpec> {
+    let Some(file) = file else { return Ok(PaperSpec { logo_height_mm, ..paper }) };
+    let file = file.as_ref();
+    let text = limits::read_short_text(file, MAX_LOGO_BYTES).map_err(|e| anyhow!("--logo: {e}"))?;
+    let logo = logo::from_svg(&text).map_err(|error| match error {
+        LogoError::Outline(error) => anyhow!(error),
+        error => anyhow!("--logo: {}: {error}", file.display()),
+    })?;
+    Ok(PaperSpec { logo: Some(logo), logo_height_mm, ..paper })
+}
