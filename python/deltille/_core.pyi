@@ -119,6 +119,7 @@ class Target:
         dpi: float = 300.0,
         texture_dpi: float | None = None,
         texture_px: int | None = None,
+        textures: int = 1,
     ) -> dict[str, bytes]: ...
     def save(
         self,
@@ -128,6 +129,7 @@ class Target:
         dpi: float = 300.0,
         texture_dpi: float | None = None,
         texture_px: int | None = None,
+        textures: int = 1,
         force: bool = False,
     ) -> list[Path]: ...
     def verify(self, artifact: AnyPath | bytes | None = None, *, name: str | None = None) -> Verdict: ...

@@ -9,6 +9,7 @@ use deltille::targets::{self, Corner, Panel};
 use deltille::{export, target_file};
 use export::dsc::Dialect;
 use export::mesh::{MAX_TEXTURE_PX, Resolution};
+use export::texture::MAX_TEXTURES;
 use numpy::{PyArray1, PyArray2};
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict};
@@ -228,12 +229,14 @@ impl Target {
     ///     Resolution of the texture of a mesh; 20 px for a bit of a tag if left out.
     /// texture_px : int, optional
     ///     Or its longest side; at least 4 px for a bit, of a checkerboard 12.
+    /// textures : int, optional
+    ///     Among how many textures the faces are shared, up to 64, each of that resolution or size.
     ///
     /// Returns
     /// -------
     /// dict of str to bytes
     ///     Contents by names of files.
-    #[pyo3(signature = (format, *, dpi = 300.0, texture_dpi = None, texture_px = None))]
+    #[pyo3(signature = (format, *, dpi = 300.0, texture_dpi = None, texture_px = None, textures = 1))]
     fn files<'py>(
         &self,
         py: Python<'py>,
@@ -241,8 +244,9 @@ impl Target {
         dpi: f64,
         texture_dpi: Option<f64>,
         texture_px: Option<i64>,
+        textures: i64,
     ) -> PyResult<Bound<'py, PyDict>> {
-        let making = making(dpi, texture_dpi, texture_px)?;
+        let making = making(dpi, texture_dpi, texture_px, textures)?;
         let files = PyDict::new(py);
         for (name, bytes) in unlocked(py, || self.made(format, making))?? {
             files.set_item(name, PyBytes::new(py, &bytes))?;
@@ -264,6 +268,8 @@ impl Target {
     ///     Resolution of the texture of a mesh; 20 px for a bit of a tag if left out.
     /// texture_px : int, optional
     ///     Or its longest side; at least 4 px for a bit, of a checkerboard 12.
+    /// textures : int, optional
+    ///     Among how many textures the faces are shared, up to 64, each of that resolution or size.
     /// force : bool, optional
     ///     Whether files of another kind are replaced.
     ///
@@ -271,7 +277,7 @@ impl Target {
     /// -------
     /// list of pathlib.Path
     ///     The files, the description first.
-    #[pyo3(signature = (folder, formats = None, *, dpi = 300.0, texture_dpi = None, texture_px = None, force = false))]
+    #[pyo3(signature = (folder, formats = None, *, dpi = 300.0, texture_dpi = None, texture_px = None, textures = 1, force = false))]
     #[expect(clippy::too_many_arguments, reason = "keywords")]
     fn save(
         &self,
@@ -281,9 +287,10 @@ impl Target {
         dpi: f64,
         texture_dpi: Option<f64>,
         texture_px: Option<i64>,
+        textures: i64,
         force: bool,
     ) -> PyResult<Vec<PathBuf>> {
-        let making = making(dpi, texture_dpi, texture_px)?;
+        let making = making(dpi, texture_dpi, texture_px, textures)?;
         unlocked(py, || {
             let mut files = self.made("json", making)?;
             let formats = formats.map_or_else(|| vec!["pdf".to_owned()], Formats::into_vec);
@@ -427,7 +434,12 @@ pub fn _target<'py>(
     of_class!(Board, Checkerboard, Tetrahedron, Octahedron, Icosahedron, Cube, Solid)
 }
 
-fn making(dpi: f64, texture_dpi: Option<f64>, texture_px: Option<i64>) -> PyResult<Making> {
+fn making(
+    dpi: f64,
+    texture_dpi: Option<f64>,
+    texture_px: Option<i64>,
+    textures: i64,
+) -> PyResult<Making> {
     if !(1.0..=1e5).contains(&dpi) || texture_dpi.is_some_and(|dpi| !(1.0..=1e5).contains(&dpi)) {
         return Err(raised::TargetError::new_err("dpi: give dots per inch from 1 to 100000"));
     }
@@ -447,6 +459,9 @@ fn making(dpi: f64, texture_dpi: Option<f64>, texture_px: Option<i64>) -> PyResu
             ));
         }
     };
+    let count = u32::try_from(textures).ok().filter(|count| (1..=MAX_TEXTURES).contains(count));
+    let refused = || format!("textures: give 1 to {MAX_TEXTURES}");
+    making.mesh.textures = count.ok_or_else(|| raised::TargetError::new_err(refused()))?;
     Ok(making)
 }
 

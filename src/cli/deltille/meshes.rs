@@ -13,6 +13,7 @@ use crate::cli::values::{number, whole};
 use crate::export::artifacts::{Making, What, make, of_mesh};
 use crate::export::inlay::InlaidBodies;
 use crate::export::mesh::{MAX_TEXTURE_PX, MeshError, Meshing, Resolution, TexturedMesh};
+use crate::export::texture::MAX_TEXTURES;
 use crate::export::threemf;
 use crate::family::Family;
 use crate::targets::{Target, TargetSpec, parse_length_mm};
@@ -31,7 +32,8 @@ pub struct Meshes {
     /// is asked for
     #[arg(long)]
     gltf: bool,
-    /// Write <name>.obj, <name>.mtl and <name>-texture.png (millimetres)
+    /// Write <name>.obj, <name>.mtl and <name>-texture.png (millimetres), of several textures
+    /// <name>-texture-1.png and so on
     #[arg(long)]
     obj: bool,
     /// Write <name>.sdf, a static model for Gazebo, with the files of --obj
@@ -40,7 +42,8 @@ pub struct Meshes {
     /// Write <name>.urdf, a link for ROS, with the files of --obj
     #[arg(long)]
     urdf: bool,
-    /// Write <name>.xml, a body for MuJoCo, with the files of --obj
+    /// Write <name>.xml, a body for MuJoCo, with the files of --obj, and of several textures
+    /// <name>-1.obj and so on
     #[arg(long)]
     mjcf: bool,
     /// Write <name>.usda, for Isaac Sim, Omniverse or Blender, with its texture (metres)
@@ -57,6 +60,11 @@ pub struct Meshes {
     /// checkerboard 12 [default: 20 px for a bit, or as many as 16384 px take]
     #[arg(long, value_name = "PX", allow_negative_numbers = true, value_parser = whole(SIDE_PX))]
     texture: Option<u32>,
+    /// Share the faces among so many textures, each of the size that --texture says, so that they are
+    /// sharper, or smaller where nothing is said of it [default: 1]
+    #[arg(long, value_name = "N", allow_negative_numbers = true,
+          value_parser = whole(1..=MAX_TEXTURES))]
+    textures: Option<u32>,
     /// Resolution of the texture, dots per inch, instead of its size
     #[arg(long, value_name = "DPI", allow_negative_numbers = true, conflicts_with = "texture",
           value_parser = number(1.0..=1e5))]
@@ -89,6 +97,7 @@ impl Meshes {
         let (textured, any) = (self.is_textured(), self.is_any());
         refuse_idle(&[
             ("--texture", self.texture.is_some(), textured, "a mesh: add --gltf"),
+            ("--textures", self.textures.is_some(), textured, "a mesh: add --gltf"),
             ("--texture-dpi", self.texture_dpi.is_some(), textured, "a mesh: add --gltf"),
             ("--plate", plate_mm.is_some(), any, "a mesh: add --gltf"),
             ("--inlay", self.inlay.is_some(), self.threemf, "two bodies: add --3mf"),
@@ -140,6 +149,7 @@ impl Meshes {
             }
             (None, None) => None,
         };
+        meshing.textures = self.textures.unwrap_or(meshing.textures);
         let mesh = TexturedMesh::new(target, family, meshing);
         let mesh = mesh.map_err(|error| refusal(&error, option))?;
         let asked = [
@@ -155,11 +165,22 @@ impl Meshes {
         let files: BTreeMap<String, Vec<u8>> =
             asked.flat_map(|(_, what)| of_mesh(&mesh, what)).collect();
         let files = files.into_iter().map(|(name, bytes)| bytes_file(name, bytes)).collect();
-        let [width, height] = mesh.texture_px;
-        let texels = mesh.texels_per_bit;
-        let texels = texels.map_or(String::new(), |px| format!(", {px:.1} px for a bit of a tag"));
-        Ok((files, format!("\ntexture: {width} × {height} px{texels}")))
+        Ok((files, told(&mesh)))
     }
+}
+
+/// A line on the textures of a mesh.
+fn told(mesh: &TexturedMesh) -> String {
+    let sizes = || mesh.textures.iter().map(|texture| texture.size_px);
+    let [width, height] = [0, 1].map(|axis| sizes().map(|size| size[axis]).max().unwrap_or(0));
+    let texels = mesh.texels_per_bit;
+    let texels = texels.map_or(String::new(), |px| format!(", {px:.1} px for a bit of a tag"));
+    let textures = match mesh.textures.len() {
+        1 => "texture:".to_owned(),
+        count if sizes().all(|size| size == [width, height]) => format!("textures: {count} of"),
+        count => format!("textures: {count} of up to"),
+    };
+    format!("\n{textures} {width} × {height} px{texels}")
 }
 
 /// Meshes of a plate with a board.
@@ -203,6 +224,7 @@ fn refusal(error: &MeshError, option: Option<&str>) -> anyhow::Error {
         MeshError::TwoSides(_) => Some("--3mf"),
         MeshError::ThinInlay(_) | MeshError::DeepInlay { .. } => Some("--inlay"),
         MeshError::SeveralBoards(..) => Some("--boards"),
+        MeshError::Textures { .. } => Some("--textures"),
         _ => option,
     };
     option.map_or_else(|| anyhow!("{error}"), |option| anyhow!("{option}: {error}"))
