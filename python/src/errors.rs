@@ -61,6 +61,7 @@ pub const KEYWORDS: &[(&str, &str)] = &[
     ("Limits::max_pixels", "max_pixels"),
     ("Limits::max_pixels_per_byte", "max_pixels_per_byte"),
     ("Limits::max_seconds", "max_seconds"),
+    ("Meshing::textures", "textures"),
     ("PaperSpec::guide_page", "guide_page"),
     ("PaperSpec::logo", "logo"),
     ("PaperSpec::logo_height_mm", "logo_height_mm"),

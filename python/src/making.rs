@@ -2,6 +2,7 @@
 
 use deltille::export::artifacts::{Making, What};
 use deltille::export::mesh::{MAX_TEXTURE_PX, Resolution};
+use deltille::export::texture::MAX_TEXTURES;
 use deltille::targets::{Target, TargetSpec};
 use pyo3::prelude::*;
 
@@ -31,6 +32,7 @@ pub struct Keywords {
     pub dpi: f64,
     pub texture_dpi: Option<f64>,
     pub texture_px: Option<i64>,
+    pub textures: Option<i64>,
     pub plate_mm: Option<f64>,
     pub inlay_mm: Option<f64>,
     pub kerf_mm: Option<f64>,
@@ -60,6 +62,11 @@ impl Keywords {
                 ));
             }
         };
+        if let Some(textures) = self.textures {
+            let count = u32::try_from(textures).ok().filter(|n| (1..=MAX_TEXTURES).contains(n));
+            let refused = || format!("textures: give 1 to {MAX_TEXTURES}");
+            making.mesh.textures = count.ok_or_else(|| raised::TargetError::new_err(refused()))?;
+        }
         making.mesh.plate_mm = self.plate_mm.unwrap_or(making.mesh.plate_mm);
         making.mesh.inlay_mm = self.inlay_mm.unwrap_or(making.mesh.inlay_mm);
         making.kerf_mm = self.kerf_mm.unwrap_or(making.kerf_mm);
@@ -86,6 +93,7 @@ impl Keywords {
         let idle = [
             ("texture_dpi", self.texture_dpi.is_some(), textured, mesh),
             ("texture_px", self.texture_px.is_some(), textured, mesh),
+            ("textures", self.textures.is_some(), textured, mesh),
             ("plate_mm", self.plate_mm.is_some(), any, mesh),
             ("inlay_mm", self.inlay_mm.is_some(), asked(&[ThreeMf]), "3mf among the formats"),
             (

@@ -229,6 +229,8 @@ impl Target {
     ///     Resolution of the texture of a mesh; 20 px for a bit of a tag if left out.
     /// texture_px : int, optional
     ///     Or its longest side; at least 4 px for a bit, of a checkerboard 12.
+    /// textures : int, optional
+    ///     Among how many textures the faces are shared, up to 64, each of that resolution or size; one if left out.
     /// plate_mm : float, optional
     ///     Thickness of the plate of a board in a mesh, mm; 3 if left out.
     /// inlay_mm : float, optional
@@ -241,8 +243,8 @@ impl Target {
     /// -------
     /// dict of str to bytes
     ///     Contents by names of files.
-    #[pyo3(signature = (format, *, dpi = 300.0, texture_dpi = None, texture_px = None, plate_mm = None,
-        inlay_mm = None, kerf_mm = None))]
+    #[pyo3(signature = (format, *, dpi = 300.0, texture_dpi = None, texture_px = None, textures = None,
+        plate_mm = None, inlay_mm = None, kerf_mm = None))]
     #[expect(clippy::too_many_arguments, reason = "keywords")]
     fn files<'py>(
         &self,
@@ -251,11 +253,13 @@ impl Target {
         dpi: f64,
         texture_dpi: Option<f64>,
         texture_px: Option<i64>,
+        textures: Option<i64>,
         plate_mm: Option<f64>,
         inlay_mm: Option<f64>,
         kerf_mm: Option<f64>,
     ) -> PyResult<Bound<'py, PyDict>> {
-        let given = Keywords { dpi, texture_dpi, texture_px, plate_mm, inlay_mm, kerf_mm };
+        let given =
+            Keywords { dpi, texture_dpi, texture_px, textures, plate_mm, inlay_mm, kerf_mm };
         let what = Formats::One(format.to_owned()).parsed()?;
         let making = given.making(&self.target, &what)?;
         let files = PyDict::new(py);
@@ -273,7 +277,7 @@ impl Target {
     ///     Where they go; it is made where there is none.
     /// formats : sequence of str, optional
     ///     Of those of :meth:`files`; PDF if left out. The ``.json`` is always written.
-    /// dpi, texture_dpi, texture_px, plate_mm, inlay_mm, kerf_mm
+    /// dpi, texture_dpi, texture_px, textures, plate_mm, inlay_mm, kerf_mm
     ///     As of :meth:`files`.
     /// force : bool, optional
     ///     Whether files of another kind are replaced.
@@ -282,8 +286,8 @@ impl Target {
     /// -------
     /// list of pathlib.Path
     ///     The files, the description first.
-    #[pyo3(signature = (folder, formats = None, *, dpi = 300.0, texture_dpi = None, texture_px = None, plate_mm = None,
-        inlay_mm = None, kerf_mm = None, force = false))]
+    #[pyo3(signature = (folder, formats = None, *, dpi = 300.0, texture_dpi = None, texture_px = None, textures = None,
+        plate_mm = None, inlay_mm = None, kerf_mm = None, force = false))]
     #[expect(clippy::too_many_arguments, reason = "keywords")]
     fn save(
         &self,
@@ -293,12 +297,14 @@ impl Target {
         dpi: f64,
         texture_dpi: Option<f64>,
         texture_px: Option<i64>,
+        textures: Option<i64>,
         plate_mm: Option<f64>,
         inlay_mm: Option<f64>,
         kerf_mm: Option<f64>,
         force: bool,
     ) -> PyResult<Vec<PathBuf>> {
-        let given = Keywords { dpi, texture_dpi, texture_px, plate_mm, inlay_mm, kerf_mm };
+        let given =
+            Keywords { dpi, texture_dpi, texture_px, textures, plate_mm, inlay_mm, kerf_mm };
         let formats = formats.map_or_else(|| Ok(vec![What::Pdf]), Formats::parsed)?;
         let making = given.making(&self.target, &formats)?;
         unlocked(py, || {

@@ -52,6 +52,7 @@ const NAMED: &[Named] = &[
     named("Limits::max_pixels", "deltille verify", "--max-pixels"),
     named("Limits::max_pixels_per_byte", "deltille verify", "--max-pixels-per-byte"),
     named("Limits::max_seconds", "deltille verify", "--max-seconds"),
+    named("Meshing::textures", "deltille icosahedron", "--textures"),
     named("PaperSpec::guide_page", "deltille board", "--guide-page"),
     named("PaperSpec::logo", "deltille board", "--logo"),
     named("PaperSpec::logo_height_mm", "deltille board", "--logo-height"),

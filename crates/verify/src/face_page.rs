@@ -32,8 +32,6 @@ pub(super) fn face_page(
     let [width, height] =
         [width_mm, height_mm].map(|mm| (mm * px_per_mm).ceil().max(1.0) as usize * SAMPLES);
     let scale = px_per_mm * SAMPLES as f64;
-    let texture = &model.texture;
-    let size = DVec2::new(texture.width() as f64, texture.height() as f64);
     let mut shades = vec![u8::MAX; width * height];
     // Side of the largest pixel of the texture, px of the page: it smears edges by as much.
     let mut texel_px = 0.0f64;
@@ -56,7 +54,8 @@ pub(super) fn face_page(
         if area >= 0.0 {
             continue;
         }
-        texel_px = texel_px.max(triangle.texel_mm(size) * px_per_mm);
+        let (texture, size) = model.texture(triangle);
+        texel_px = texel_px.max(model.texel_mm(triangle) * px_per_mm);
         let low = a.min(b).min(c).ceil().max(DVec2::ZERO);
         let high = a.max(b).max(c).floor() + 1.0;
         let end = |high: f64, size: usize| (high.max(0.0) as usize).min(size);

@@ -27,7 +27,7 @@
 //! within [`FOLD_TOLERANCE_MM`] of their stated positions in space; the two sides of each edge must
 //! meet, and carry the same number where they are cut.
 //!
-//! A mesh (`.glb`, `.obj`, `.usda`) is loaded with its texture, and rendered by a virtual camera before each
+//! A mesh (`.glb`, `.obj`, `.usda`) is loaded with its textures, and rendered by a virtual camera before each
 //! face; every detected corner is projected along its ray onto the loaded triangles and must lie
 //! within [`MESH_TOLERANCE_MM`] of its stated position in space. The texture on each face is then
 //! laid out flat and compared like a sheet: every tile, every cell of every tag, and no other mark.
@@ -85,7 +85,7 @@ use deltille_core::artwork::CuttingError;
 use deltille_core::detect::{Detector, DetectorConfig, Ink, Tone};
 use deltille_core::family::Family;
 use deltille_core::targets::{SheetLayout, SheetPage, Target};
-use deltille_files::export::{obj, sheet_file_name};
+use deltille_files::export::sheet_file_name;
 use deltille_files::limits::{Guard, Limits};
 use fit::AffineMap;
 use fold::Seen;
@@ -201,7 +201,7 @@ pub enum VerifyError {
 /// given if the target has tags. The extension of the name tells the [`Format`].
 ///
 /// An artifact may consist of several files. All of them must be among `files`, in any order: the
-/// other pages of a net (`net-1.svg`, `net-2.svg`), the material library and the texture that an
+/// other pages of a net (`net-1.svg`, `net-2.svg`), the material library and the textures that an
 /// OBJ names. Other files are ignored.
 ///
 /// Deviations of the artifact are in the [`Verdict`]. An error means that nothing can be compared:
@@ -364,7 +364,7 @@ impl<'a> Verifier<'a> {
 
     /// Compares the artifact named `name` among files in memory with the target. A PDF shows all
     /// sheets, an SVG or PNG the one that its name tells. All files of the artifact must be among
-    /// `files`: all pages of [`set_of`](Self::set_of) for a net, material library and texture for
+    /// `files`: all pages of [`set_of`](Self::set_of) for a net, material library and textures for
     /// an OBJ.
     ///
     /// # Errors
@@ -377,9 +377,7 @@ impl<'a> Verifier<'a> {
     /// Compares an artifact whose files come from `reader`.
     fn verify_by(&self, reader: &Reader, path: &Path) -> Result<Verdict, VerifyError> {
         let name = file_name(path);
-        let of_mesh = [".mtl", &obj::texture_name("")].map(|end| name.strip_suffix(end));
-        if let Some(mesh) = of_mesh.into_iter().flatten().next() {
-            let whole = format!("{mesh}.obj");
+        if let Some(whole) = whole_of(&self.target.name, &name) {
             return Err(VerifyError::PartOf { path: path.to_owned(), whole });
         }
         let Some(format) = Format::of(path) else {
@@ -690,6 +688,26 @@ impl SheetVerdict {
             findings,
         }
     }
+}
+
+/// The mesh, or the model for MuJoCo, with which a file is compared that is a part of it: a material library, a texture, or
+/// the part of a mesh that has one. `target` is the name of the target.
+pub fn whole_of(target: &str, name: &str) -> Option<String> {
+    let number = |part: &str| {
+        let (part, number) = part.rsplit_once('-')?;
+        number.parse::<u32>().ok().map(|_| part.to_owned())
+    };
+    if let Some(part) = name.strip_suffix(".obj") {
+        return number(part).filter(|mesh| mesh == target).map(|mesh| format!("{mesh}.xml"));
+    }
+    let picture = || {
+        // A page of a target whose name ends so is none.
+        let stem = name.strip_suffix(".png").filter(|stem| *stem != target)?;
+        let of = |stem: &str| stem.strip_suffix("-texture").map(str::to_owned);
+        of(stem).or_else(|| of(&number(stem)?).filter(|mesh| mesh == target))
+    };
+    let mesh = name.strip_suffix(".mtl").map(str::to_owned).or_else(picture)?;
+    Some(format!("{mesh}.obj"))
 }
 
 /// Measures the check bars. Where the boards lie only tells where to look for them.

@@ -19,6 +19,10 @@ pub(super) fn verify(
         return Ok(Verdict::new(path, format, refused));
     }
     let mesh = path.with_file_name(format!("{}.obj", verifier.target.name));
-    let of_mesh = verifier.verify_by(reader, &mesh)?;
-    Ok(Verdict { artifact: super::file_name(path), format, ..of_mesh })
+    let mut verdict = verifier.verify_by(reader, &mesh)?;
+    if format == Format::Mjcf && verdict.passed {
+        verdict.findings = construct::check_parts(reader, path, &mesh, verifier.target)?;
+        verdict.passed = verdict.findings.is_empty();
+    }
+    Ok(Verdict { artifact: super::file_name(path), format, ..verdict })
 }

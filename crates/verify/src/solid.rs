@@ -193,7 +193,6 @@ fn sides(target: &Target) -> &[Panel] {
 
 /// What of a plate is on no side with a board, and should be white and behind all of them.
 fn beside_boards(model: &Model, sides: &[Panel]) -> Option<Finding> {
-    let size = DVec2::new(model.texture.width() as f64, model.texture.height() as f64);
     let problem = model.triangles.iter().find_map(|triangle| {
         let heights = |side: &Panel| triangle.vertices_mm.map(|v| side.pose.panel_from_target(v).z);
         if sides.iter().flat_map(heights).any(|z| z > MESH_TOLERANCE_MM) {
@@ -202,9 +201,10 @@ fn beside_boards(model: &Model, sides: &[Panel]) -> Option<Finding> {
         if sides.iter().any(|side| heights(side).iter().all(|z| z.abs() <= MESH_TOLERANCE_MM)) {
             return None;
         }
+        let (texture, size) = model.texture(triangle);
         let [a, b, c] = triangle.uv.map(|uv| uv * size - 0.5);
         let is_one = a.distance(b) + a.distance(c) < 1e-6;
-        let is_white = is_one && model.texture.bilinear(a.x, a.y) > 254.5;
+        let is_white = is_one && texture.bilinear(a.x, a.y) > 254.5;
         (!is_white).then_some("a side or the back of the plate is not white")
     });
     problem.map(|problem| MeshFinding::Body { problem: problem.to_owned() }.into())
@@ -441,10 +441,9 @@ fn check_corners(model: &Model, panel: &Panel, seen: &[Seen], verdict: &mut Face
 
 /// Side of the largest pixel of the texture on the front of a panel, px of a picture of it.
 fn texel_px(model: &Model, panel: &Panel, px_per_mm: f64) -> f64 {
-    let size = DVec2::new(model.texture.width() as f64, model.texture.height() as f64);
     let sides = model.triangles.iter().filter_map(|triangle| {
         let is_front = |v: &DVec3| panel.pose.panel_from_target(*v).z.abs() <= MESH_TOLERANCE_MM;
-        triangle.vertices_mm.iter().all(is_front).then(|| triangle.texel_mm(size))
+        triangle.vertices_mm.iter().all(is_front).then(|| model.texel_mm(triangle))
     });
     (sides.fold(0.0, f64::max) * px_per_mm).min(MOST_TEXEL_PX)
 }

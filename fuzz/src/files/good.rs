@@ -64,7 +64,7 @@ pub fn stem(extension: &str) -> &'static str {
 pub fn beside_mesh() -> [(&'static str, Vec<u8>); 2] {
     [
         ("t.mtl", obj_writer::material(&MESH).into_bytes()),
-        ("t-texture.png", MESH.texture_png.clone()),
+        ("t-texture.png", MESH.textures[0].png.clone()),
     ]
 }
 

@@ -11,11 +11,10 @@ use super::limits::FileLimits;
 use super::target_file;
 use super::verify::{self, Proof};
 use crate::cli::output::{self, Overwrite, Telling, say};
-use crate::export::obj;
 use crate::family::Family;
 use crate::limits::Limits;
 use crate::targets::Target;
-use crate::verify::Format;
+use crate::verify::{Format, whole_of};
 
 /// Schema and version of what `--json` prints.
 const SCHEMA: &str = "deltille/delivery/1";
@@ -91,13 +90,12 @@ impl Delivery {
                 say!("wrote {}", path.display());
             }
         }
-        let texture = obj::texture_name(&target.name);
         // A model for a simulator is proved together with the OBJ that it names.
         let models = [Format::Sdf, Format::Urdf, Format::Mjcf].map(Some);
         let is_in_model = written.iter().any(|path| models.contains(&Format::of(path)));
         let artifacts: Vec<PathBuf> = written
             .iter()
-            .filter(|path| is_proved(path, &texture))
+            .filter(|path| is_proved(path, &target.name))
             .filter(|path| !(is_in_model && Format::of(path) == Some(Format::Obj)))
             .cloned()
             .collect();
@@ -121,7 +119,8 @@ impl Delivery {
     }
 }
 
-/// Whether a file is compared by itself; a texture is with its mesh.
-fn is_proved(path: &Path, texture: &str) -> bool {
-    Format::of(path).is_some() && path.file_name().is_none_or(|name| name != texture)
+/// Whether a file is compared by itself, and not as a part of another.
+fn is_proved(path: &Path, target: &str) -> bool {
+    let name = path.file_name().unwrap_or_default().to_string_lossy();
+    Format::of(path).is_some() && whole_of(target, &name).is_none()
 }

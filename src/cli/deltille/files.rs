@@ -188,7 +188,9 @@ fn is_of_target(name: &str, stem: &str) -> bool {
     let is_part = match part.strip_prefix('-') {
         None => part.is_empty(),
         Some(part) => {
-            is_page(part) || ["texture", "skeleton", "panels", "net", "laser"].contains(&part)
+            let is_texture = part.strip_prefix("texture-").is_some_and(is_page);
+            let is_other = ["texture", "skeleton", "panels", "net", "laser"].contains(&part);
+            is_page(part) || is_texture || is_other
         }
     };
     is_part
@@ -202,7 +204,16 @@ mod tests {
 
     #[test]
     fn files_of_a_target_are_known_by_their_names() {
-        for name in ["a.pdf", "a-12.svg", "a-texture.png", "a-net.dxf", "a-laser.svg", "a.dsc"] {
+        for name in [
+            "a.pdf",
+            "a-12.svg",
+            "a-texture.png",
+            "a-texture-2.png",
+            "a-2.obj",
+            "a-net.dxf",
+            "a-laser.svg",
+            "a.dsc",
+        ] {
             assert!(is_of_target(name, "a"), "{name}");
         }
         for name in ["a.json", "b.pdf", "ab.pdf", "a-b.pdf", "a-.pdf", "a-view.png", "a"] {

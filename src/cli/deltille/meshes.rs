@@ -14,6 +14,7 @@ use crate::cli::values::{number, whole};
 use crate::export::artifacts::{Making, What, make, of_mesh};
 use crate::export::inlay::InlaidBodies;
 use crate::export::mesh::{MAX_TEXTURE_PX, MeshError, Meshing, Resolution, TexturedMesh};
+use crate::export::texture::MAX_TEXTURES;
 use crate::export::threemf;
 use crate::family::Family;
 use crate::targets::{Target, TargetSpec};
@@ -37,7 +38,8 @@ pub struct Meshes {
     #[arg(long)]
     #[serde(skip_serializing_if = "is_false")]
     gltf: bool,
-    /// Write <name>.obj, <name>.mtl and <name>-texture.png (millimetres)
+    /// Write <name>.obj, <name>.mtl and <name>-texture.png (millimetres), of several textures
+    /// <name>-texture-1.png and so on
     #[arg(long)]
     #[serde(skip_serializing_if = "is_false")]
     obj: bool,
@@ -49,7 +51,8 @@ pub struct Meshes {
     #[arg(long)]
     #[serde(skip_serializing_if = "is_false")]
     urdf: bool,
-    /// Write <name>.xml, a body for MuJoCo, with the files of --obj
+    /// Write <name>.xml, a body for MuJoCo, with the files of --obj, and of several textures
+    /// <name>-1.obj and so on
     #[arg(long)]
     #[serde(skip_serializing_if = "is_false")]
     mjcf: bool,
@@ -69,6 +72,11 @@ pub struct Meshes {
     /// checkerboard 12 [default: 20 px for a bit, or as many as 16384 px take]
     #[arg(long, value_name = "PX", allow_negative_numbers = true, value_parser = whole(SIDE_PX))]
     texture: Option<u32>,
+    /// Share the faces among so many textures, each of the size that --texture says, so that they are
+    /// sharper, or smaller where nothing is said of it [default: 1]
+    #[arg(long, value_name = "N", allow_negative_numbers = true,
+          value_parser = whole(1..=MAX_TEXTURES))]
+    textures: Option<u32>,
     /// Resolution of the texture, dots per inch, instead of its size
     #[arg(long, value_name = "DPI", allow_negative_numbers = true, conflicts_with = "texture",
           value_parser = number(TEXTURE_DPI))]
@@ -119,6 +127,7 @@ impl Meshes {
         let (textured, any) = (self.is_textured(), self.is_any());
         refuse_idle(&[
             ("--texture", self.texture.is_some(), textured, "a mesh: add --gltf"),
+            ("--textures", self.textures.is_some(), textured, "a mesh: add --gltf"),
             ("--texture-dpi", self.texture_dpi.is_some(), textured, "a mesh: add --gltf"),
             ("--plate", plate.is_some(), any, "a mesh: add --gltf"),
             ("--inlay", self.inlay.is_some(), self.threemf, "two bodies: add --3mf"),
@@ -184,6 +193,7 @@ impl Meshes {
             }
             (None, None) => None,
         };
+        meshing.textures = self.textures.unwrap_or(meshing.textures);
         let mesh = TexturedMesh::new(target, family, meshing);
         let mesh = mesh.map_err(|error| refusal(&error, option))?;
         let asked = [
@@ -199,11 +209,22 @@ impl Meshes {
         let files: BTreeMap<String, Vec<u8>> =
             asked.flat_map(|(_, what)| of_mesh(&mesh, what)).collect();
         let files = files.into_iter().map(|(name, bytes)| bytes_file(name, bytes)).collect();
-        let [width, height] = mesh.texture_px;
-        let texels = mesh.texels_per_bit;
-        let texels = texels.map_or(String::new(), |px| format!(", {px:.1} px for a bit of a tag"));
-        Ok((files, format!("\ntexture: {width} × {height} px{texels}")))
+        Ok((files, told(&mesh)))
     }
+}
+
+/// A line on the textures of a mesh.
+fn told(mesh: &TexturedMesh) -> String {
+    let sizes = || mesh.textures.iter().map(|texture| texture.size_px);
+    let [width, height] = [0, 1].map(|axis| sizes().map(|size| size[axis]).max().unwrap_or(0));
+    let texels = mesh.texels_per_bit;
+    let texels = texels.map_or(String::new(), |px| format!(", {px:.1} px for a bit of a tag"));
+    let textures = match mesh.textures.len() {
+        1 => "texture:".to_owned(),
+        count if sizes().all(|size| size == [width, height]) => format!("textures: {count} of"),
+        count => format!("textures: {count} of up to"),
+    };
+    format!("\n{textures} {width} × {height} px{texels}")
 }
 
 /// Meshes of a plate with a board.
@@ -247,6 +268,7 @@ fn refusal(error: &MeshError, option: Option<&str>) -> anyhow::Error {
         MeshError::TwoSides(_) => Some("--3mf"),
         MeshError::ThinInlay(_) | MeshError::DeepInlay { .. } => Some("--inlay"),
         MeshError::SeveralBoards(..) => Some("--boards"),
+        MeshError::Textures { .. } => Some("--textures"),
         _ => option,
     };
     option.map_or_else(|| anyhow!("{error}"), |option| anyhow!("{option}: {error}"))

@@ -34,6 +34,37 @@ fn boards_and_solids_are_models_for_simulators() {
 }
 
 #[test]
+fn faces_are_shared_among_textures() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    let mut page = Page::default();
+    let all = "--gltf --obj --sdf --urdf --mjcf --usd";
+    // Two textures for four faces, one for each, and as many as the error proposes.
+    page.run(
+        at,
+        &format!("deltille tetrahedron --edge 100mm --tiles 6 --name four {all} --textures 2"),
+    );
+    page.run(
+        at,
+        "deltille tetrahedron --edge 100mm --tiles 6 --name each --mjcf --texture 512 --textures 4",
+    );
+    page.refused(at, "deltille octahedron --edge 100mm --gltf --texture 700");
+    page.run(at, "deltille octahedron --edge 100mm --gltf --texture 700 --textures 2");
+    page.run(at, "deltille cube --edge 80mm --tiles 6 --usd --texture-dpi 300 --textures 5");
+    page.run(at, &format!("deltille board --rows 5 --cols 6 --edge 30mm --two-sided 4mm --name door {all} --textures 2"));
+    page.title("Parts are compared with what they are parts of");
+    for file in ["four.mtl", "four-texture-2.png", "four-2.obj"] {
+        page.run(at, &format!("deltille verify four.json {file}"));
+    }
+    page.title("A mesh of another number of textures than the model for MuJoCo");
+    deltille(at, "tetrahedron --edge 100mm --tiles 6 --name four --obj --textures 3 --no-verify")
+        .success();
+    page.run(at, "deltille verify four.json four.xml");
+    page.run(at, "deltille verify four.json four.usda");
+    page.is("several-textures");
+}
+
+#[test]
 fn boards_and_solids_are_two_bodies_to_print() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
@@ -155,6 +186,12 @@ fn meshes_that_cannot_be_made_are_refused_in_a_line() {
     let mut page = Page::default();
     for arguments in [
         "board --rows 5 --cols 6 --gltf --boards 2",
+        "board --rows 5 --cols 6 --gltf --textures 2",
+        "board --rows 5 --cols 6 --pdf --textures 2",
+        "tetrahedron --gltf --textures 5",
+        "icosahedron --gltf --textures 65",
+        "icosahedron --gltf --texture 1024",
+        "icosahedron --gltf --texture 300",
         "board --rows 5 --cols 6 --gltf --texture 64",
         "board --rows 5 --cols 6 --gltf --texture-dpi 20",
         "board --rows 5 --cols 6 --gltf --texture 1000 --texture-dpi 200",

@@ -66,7 +66,7 @@ fn solid_files(target: &Target, spec: &SolidSpec) -> Vec<Artifact> {
         Artifact::new("i.glb", gltf::to_bytes(&mesh)),
         Artifact::new("i.obj", obj::text(&mesh)),
         Artifact::new("i.mtl", obj::material(&mesh)),
-        Artifact::new(obj::texture_name("i"), mesh.texture_png.as_slice()),
+        Artifact::new(obj::texture_name("i", 0, 1), mesh.textures[0].png.as_slice()),
         Artifact::new("i.stl", body),
         Artifact::new("i-panels.dxf", cut(artwork::panels_to_cut(target).unwrap())),
         Artifact::new("i-net.dxf", cut(artwork::net_to_cut(target).unwrap())),
@@ -144,7 +144,7 @@ fn a_solid_is_proved_in_memory_with_the_files_that_belong_together() {
     let spec = icosahedron();
     let target = build("i", TargetSpec::Solid(spec.clone()), PaperSpec::default());
     let files = solid_files(&target, &spec);
-    let with_their_mesh = ["i.mtl", &obj::texture_name("i")].map(str::to_owned);
+    let with_their_mesh = ["i.mtl", &obj::texture_name("i", 0, 1)].map(str::to_owned);
     for file in files.iter().filter(|file| !with_their_mesh.contains(&file.name().to_owned())) {
         let verdict = compare(&target, file.name(), &files);
         assert!(verdict.passed, "{verdict}");

@@ -12,7 +12,7 @@ use crate::targets::{Face, Panel, Placement, Target};
 /// White between two faces, px: more than the filters of the first mipmap levels reach.
 const PADDING_PX: f64 = 16.0;
 
-/// All faces of a solid, or the sides of a plate that carry boards, on one picture, which is the texture of its mesh.
+/// Faces of a solid, or sides of a plate that carry boards, on one picture, which is a texture of its mesh.
 ///
 /// ```text
 ///    ╱╲‾‾╱╲‾‾╱      Faces stand alternately upright and upside down in rows. Their own margins and
@@ -20,58 +20,33 @@ const PADDING_PX: f64 = 16.0;
 /// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct Atlas {
-    /// The drawing of all faces, mm; each side is a whole number of pixels.
-    pub sheet: Sheet,
     /// Resolution, pixels per metre.
     pub px_per_m: u32,
     /// Width and height of the texture, px.
     pub size_px: [u32; 2],
-    /// Vertices of each face on the sheet, mm, in the order of the faces, or of the sides of a plate.
+    /// Vertices of each face on the picture, mm, in the order of the faces, or of the sides of a plate.
     pub outlines_mm: Vec<Vec<DVec2>>,
+    /// Where the panel of each face lies, likewise.
+    placements: Vec<Placement>,
 }
 
 impl Atlas {
-    /// Lays out the faces of a target, one for each of its panels and in their order, at a
-    /// resolution of `px_per_m` pixels per metre. `family` holds the codes of the tags; it may be
-    /// `None` for a target without tags only.
-    ///
-    /// # Errors
-    /// When the target has tags and the family is missing or lacks a code. The size of the texture
-    /// is not limited here.
-    pub fn new(
-        target: &Target,
-        faces: &[Face],
-        family: Option<&Family>,
-        px_per_m: u32,
-    ) -> Result<Atlas, ArtworkError> {
+    /// Lays out faces at a resolution of `px_per_m` pixels per metre. The size of the texture is not limited here.
+    pub fn of_faces(faces: &[Face], px_per_m: u32) -> Self {
         let mm_per_px = 1e3 / f64::from(px_per_m);
-        let padding = PADDING_PX * mm_per_px;
-        let packing = Packing::tightest(faces, padding);
-        let size_px = (packing.size_mm / mm_per_px).ceil();
-        let DVec2 { x: width_mm, y: height_mm } = size_px * mm_per_px;
-
-        let mut shapes = Vec::new();
-        let mut outlines_mm = Vec::with_capacity(faces.len());
-        for ((face, panel), placement) in faces.iter().zip(&target.panels).zip(packing.placements())
-        {
-            shapes.extend(draw_panel(target, panel, &placement, family)?);
-            let outline = face.outline_mm.iter();
-            outlines_mm.push(outline.map(|&p| placement.page_from_panel(p)).collect());
-        }
-        let sheet = Sheet { width_mm, height_mm, shapes };
-        Ok(Atlas { sheet, px_per_m, size_px: size_px.as_uvec2().to_array(), outlines_mm })
+        let packing = Packing::tightest(faces, PADDING_PX * mm_per_px);
+        let placements: Vec<Placement> = packing.placements().collect();
+        let placed = faces.iter().zip(&placements);
+        let outlines_mm = placed.map(|(face, placement)| {
+            face.outline_mm.iter().map(|&p| placement.page_from_panel(p)).collect()
+        });
+        let outlines_mm = outlines_mm.collect();
+        let size_px = (packing.size_mm / mm_per_px).ceil().as_uvec2().to_array();
+        Self { px_per_m, size_px, outlines_mm, placements }
     }
 
-    /// Lays out the sides of a plate, one above the other: boards with their quiet zones, all as large as the first.
-    ///
-    /// # Errors
-    /// As [`Self::new`].
-    pub fn of_plate(
-        target: &Target,
-        sides: &[Panel],
-        family: Option<&Family>,
-        px_per_m: u32,
-    ) -> Result<Atlas, ArtworkError> {
+    /// Lays out sides of a plate, one above the other: boards with their quiet zones, all as large as the first.
+    pub fn of_plate(sides: &[Panel], px_per_m: u32) -> Self {
         let mm_per_px = 1e3 / f64::from(px_per_m);
         let padding = DVec2::splat(PADDING_PX * mm_per_px);
         let [left, lower, right, upper] = sides.first().map_or([0.0; 4], Panel::field_mm);
@@ -79,19 +54,39 @@ impl Atlas {
         let plate = DVec2::new(right, upper) - low;
         let step = plate.y + padding.y;
         let all = DVec2::new(plate.x, sides.len() as f64 * step) + DVec2::new(2.0, 1.0) * padding;
-        let size_px = (all / mm_per_px).ceil();
-        let DVec2 { x: width_mm, y: height_mm } = size_px * mm_per_px;
-        let (mut shapes, mut outlines_mm) = (Vec::new(), Vec::new());
+        let (mut placements, mut outlines_mm) = (Vec::new(), Vec::new());
         for (index, panel) in sides.iter().enumerate() {
             let a = padding + index as f64 * step * DVec2::Y;
-            let placement = Placement { panel: panel.id, angle_rad: 0.0, origin_mm: a - low };
-            shapes.extend(draw_panel(target, panel, &placement, family)?);
+            placements.push(Placement { panel: panel.id, angle_rad: 0.0, origin_mm: a - low });
             let c = a + plate;
             outlines_mm.push(vec![a, DVec2::new(c.x, a.y), c, DVec2::new(a.x, c.y)]);
         }
-        let sheet = Sheet { width_mm, height_mm, shapes };
-        let size_px = size_px.as_uvec2().to_array();
-        Ok(Atlas { sheet, px_per_m, size_px, outlines_mm })
+        let size_px = (all / mm_per_px).ceil().as_uvec2().to_array();
+        Self { px_per_m, size_px, outlines_mm, placements }
+    }
+
+    /// Width and height of the picture, mm: whole numbers of pixels.
+    pub fn size_mm(&self) -> DVec2 {
+        DVec2::from(self.size_px.map(f64::from)) * (1e3 / f64::from(self.px_per_m))
+    }
+
+    /// Draws what is on the faces, whose `panels` are in their order. `family` holds the codes of the tags; it may be
+    /// `None` for a target without tags only.
+    ///
+    /// # Errors
+    /// When the target has tags and the family is missing or lacks a code.
+    pub fn drawn(
+        &self,
+        target: &Target,
+        panels: &[Panel],
+        family: Option<&Family>,
+    ) -> Result<Sheet, ArtworkError> {
+        let mut shapes = Vec::new();
+        for (panel, placement) in panels.iter().zip(&self.placements) {
+            shapes.extend(draw_panel(target, panel, placement, family)?);
+        }
+        let DVec2 { x: width_mm, y: height_mm } = self.size_mm();
+        Ok(Sheet { width_mm, height_mm, shapes })
     }
 }
 

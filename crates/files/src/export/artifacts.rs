@@ -47,15 +47,15 @@ pub enum What {
     Dsc(Dialect),
     /// `<name>.glb` of a solid, or of a plate with a board.
     Gltf,
-    /// `<name>.obj`, with its material and texture.
+    /// `<name>.obj`, with its materials and textures.
     Obj,
     /// `<name>.sdf`, a model for Gazebo, with the files of [`What::Obj`].
     Sdf,
     /// `<name>.urdf`, likewise for ROS.
     Urdf,
-    /// `<name>.xml`, likewise for MuJoCo.
+    /// `<name>.xml`, likewise for MuJoCo; where there are several textures, with an OBJ for each, too.
     Mjcf,
-    /// `<name>.usda`, with its texture.
+    /// `<name>.usda`, with its textures.
     Usd,
     /// `<name>.3mf`, two bodies, black inlaid into white, of a solid, or of a plate with a board.
     ThreeMf,
@@ -234,20 +234,25 @@ pub fn make(
 /// The files of a mesh in one format: [`What::Gltf`], [`What::Obj`], or a model for a simulator; none of what is not made of a
 /// mesh.
 pub fn of_mesh(mesh: &TexturedMesh, what: What) -> Files {
-    let name = &mesh.name;
+    let (name, count) = (&mesh.name, mesh.textures.len());
     let named = |end: &str, text: String| (format!("{name}{end}"), text.into_bytes());
-    let texture = || (obj::texture_name(name), mesh.texture_png.clone());
+    let textures =
+        (0..count).map(|i| (obj::texture_name(name, i, count), mesh.textures[i].png.clone()));
     let scene = match what {
         What::Gltf => return vec![(format!("{name}.glb"), gltf::to_bytes(mesh))],
-        What::Usd => return vec![named(".usda", scene::usda(mesh)), texture()],
+        What::Usd => {
+            return [named(".usda", scene::usda(mesh))].into_iter().chain(textures).collect();
+        }
         What::Obj => None,
         What::Sdf => Some(named(".sdf", scene::sdf(name))),
         What::Urdf => Some(named(".urdf", scene::urdf(name))),
-        What::Mjcf => Some(named(".xml", scene::mjcf(name))),
+        What::Mjcf => Some(named(".xml", scene::mjcf(name, count))),
         _ => return Files::new(),
     };
-    let parts = [named(".obj", obj::text(mesh)), named(".mtl", obj::material(mesh)), texture()];
-    scene.into_iter().chain(parts).collect()
+    let parts = (0..count).filter(|_| what == What::Mjcf && count > 1);
+    let parts = parts.map(|i| (obj::part_name(name, i), obj::part(mesh, i).into_bytes()));
+    let of_obj = [named(".obj", obj::text(mesh)), named(".mtl", obj::material(mesh))];
+    scene.into_iter().chain(parts).chain(of_obj).chain(textures).collect()
 }
 
 fn solid(target: &Target) -> Result<&SolidSpec, MakeError> {

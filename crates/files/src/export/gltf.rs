@@ -1,13 +1,14 @@
-//! Binary glTF 2.0 (`.glb`): one mesh with its texture embedded, in metres, in the axes of the
+//! Binary glTF 2.0 (`.glb`): one mesh with its textures embedded, in metres, in the axes of the
 //! target frame.
 
 use std::borrow::Cow;
 use std::path::Path;
 
-use serde_json::json;
+use serde_json::{Value, json};
 
 use super::atomic;
 use super::mesh::TexturedMesh;
+use super::obj::{material_name, numbered};
 
 /// Component type `f32`. Like the constants below, a number of the glTF 2.0 specification.
 pub const FLOAT: u32 = 5126;
@@ -24,9 +25,6 @@ pub const LINEAR_MIPMAP_LINEAR: u32 = 9987;
 /// Texture wrapping: the outermost texels are repeated.
 pub const CLAMP_TO_EDGE: u32 = 33071;
 
-/// Name of the only material.
-pub const MATERIAL: &str = "print";
-
 /// Writes the mesh as a `.glb` file.
 ///
 /// # Errors
@@ -36,78 +34,121 @@ pub fn write(mesh: &TexturedMesh, path: &Path) -> Result<(), atomic::WriteError>
     atomic::write(path, |file| file.write_all(&bytes))
 }
 
-/// The bytes of the mesh as a `.glb` file. Faces do not share vertices, so that normals are exact.
-/// Indices have 16 bits, which suffice for the 20 000 triangles that a solid may have.
+/// The bytes of the mesh as a `.glb` file: for each texture a list of triangles and a material. Faces do not share
+/// vertices, so that normals are exact. Indices have 16 bits, which suffice for the 20 000 triangles that a solid may
+/// have.
 pub fn to_bytes(mesh: &TexturedMesh) -> Vec<u8> {
-    let corners = || mesh.faces.iter().flat_map(|face| (0..3).map(move |i| (face, i)));
-    let positions: Vec<[f32; 3]> =
-        corners().map(|(face, i)| (face.vertices_mm[i] / 1e3).as_vec3().to_array()).collect();
-    let normals: Vec<[f32; 3]> =
-        corners().map(|(face, _)| face.normal.as_vec3().normalize().to_array()).collect();
-    let uvs: Vec<[f32; 2]> = corners().map(|(face, i)| face.uv[i].as_vec2().to_array()).collect();
-    let count = positions.len();
-    let bound = |pick: fn(f32, f32) -> f32| {
-        [0, 1, 2].map(|axis| positions.iter().map(|p| p[axis]).reduce(pick).unwrap_or_default())
+    let count = mesh.textures.len();
+    let mut binary = Binary::default();
+    let mut accessors = Vec::new();
+    let primitives: Vec<Value> = (0..count)
+        .map(|texture| {
+            let first = accessors.len();
+            accessors.extend(binary.triangles(mesh, texture));
+            json!({
+                "attributes": {"POSITION": first, "NORMAL": first + 1, "TEXCOORD_0": first + 2},
+                "indices": first + 3,
+                "material": texture,
+            })
+        })
+        .collect();
+    let image = |texture: usize| {
+        let view = binary.view(mesh.textures[texture].png.clone(), None);
+        json!({"name": image_name(&mesh.name, texture, count), "mimeType": "image/png", "bufferView": view})
     };
-    let (least, most) = (bound(f32::min), bound(f32::max));
-
-    let mut buffer = Vec::new();
-    let mut views = Vec::new();
-    let mut view = |bytes: Vec<u8>, target: Option<u32>| {
-        let mut view = json!({"buffer": 0, "byteOffset": buffer.len(), "byteLength": bytes.len()});
-        if let Some(target) = target {
-            view["target"] = json!(target);
-        }
-        views.push(view);
-        buffer.extend(bytes);
-        buffer.resize(buffer.len().next_multiple_of(4), 0);
+    let images: Vec<Value> = (0..count).map(image).collect();
+    let material = |texture: usize| {
+        json!({"name": material_name(texture, count), "pbrMetallicRoughness": {
+            "baseColorTexture": {"index": texture}, "metallicFactor": 0.0, "roughnessFactor": 1.0,
+        }})
     };
-    view(floats(positions.as_flattened()), Some(ARRAY_BUFFER));
-    view(floats(normals.as_flattened()), Some(ARRAY_BUFFER));
-    view(floats(uvs.as_flattened()), Some(ARRAY_BUFFER));
-    let indices = (0..count as u32).flat_map(|i| (i as u16).to_le_bytes()).collect();
-    view(indices, Some(ELEMENT_ARRAY_BUFFER));
-    view(mesh.texture_png.clone(), None);
+    let texture = |texture: usize| json!({"sampler": 0, "source": texture});
 
     let document = json!({
         "asset": {"version": "2.0", "generator": mesh.extras["generator"], "extras": mesh.extras},
         "scene": 0,
         "scenes": [{"nodes": [0]}],
         "nodes": [{"name": mesh.name, "mesh": 0}],
-        "meshes": [{"name": mesh.name, "primitives": [{
-            "attributes": {"POSITION": 0, "NORMAL": 1, "TEXCOORD_0": 2},
-            "indices": 3,
-            "material": 0,
-        }]}],
-        "materials": [{"name": MATERIAL, "pbrMetallicRoughness": {
-            "baseColorTexture": {"index": 0}, "metallicFactor": 0.0, "roughnessFactor": 1.0,
-        }}],
-        "textures": [{"sampler": 0, "source": 0}],
+        "meshes": [{"name": mesh.name, "primitives": primitives}],
+        "materials": (0..count).map(material).collect::<Vec<_>>(),
+        "textures": (0..count).map(texture).collect::<Vec<_>>(),
         "samplers": [{
             "magFilter": LINEAR, "minFilter": LINEAR_MIPMAP_LINEAR,
             "wrapS": CLAMP_TO_EDGE, "wrapT": CLAMP_TO_EDGE,
         }],
-        "images": [{"name": mesh.name, "mimeType": "image/png", "bufferView": 4}],
-        "accessors": [
-            {"bufferView": 0, "componentType": FLOAT, "count": count, "type": "VEC3",
-             "min": least, "max": most},
-            {"bufferView": 1, "componentType": FLOAT, "count": count, "type": "VEC3"},
-            {"bufferView": 2, "componentType": FLOAT, "count": count, "type": "VEC2"},
-            {"bufferView": 3, "componentType": UNSIGNED_SHORT, "count": count, "type": "SCALAR"},
-        ],
-        "bufferViews": views,
-        "buffers": [{"byteLength": buffer.len()}],
+        "images": images,
+        "accessors": accessors,
+        "bufferViews": binary.views,
+        "buffers": [{"byteLength": binary.bytes.len()}],
     });
     let json = document.to_string().into_bytes();
     let glb = gltf::binary::Glb {
         // The length is filled in by the writer.
         header: gltf::binary::Header { magic: *b"glTF", version: 2, length: 0 },
         json: Cow::Owned(json),
-        bin: Some(Cow::Owned(buffer)),
+        bin: Some(Cow::Owned(binary.bytes)),
     };
     glb.to_vec().expect("a texture within its limits fits into a file")
 }
 
-fn floats(values: &[f32]) -> Vec<u8> {
-    values.iter().flat_map(|v| v.to_le_bytes()).collect()
+/// Name of the picture of a texture, counted from 0, of a target of this name, among so many.
+pub fn image_name(name: &str, texture: usize, count: usize) -> String {
+    numbered(name.to_owned(), "-texture-", texture, count)
+}
+
+/// The binary part and its views.
+#[derive(Default)]
+struct Binary {
+    bytes: Vec<u8>,
+    views: Vec<Value>,
+}
+
+impl Binary {
+    /// Adds bytes and returns the number of their view.
+    fn view(&mut self, bytes: Vec<u8>, target: Option<u32>) -> usize {
+        let mut view =
+            json!({"buffer": 0, "byteOffset": self.bytes.len(), "byteLength": bytes.len()});
+        if let Some(target) = target {
+            view["target"] = json!(target);
+        }
+        self.views.push(view);
+        self.bytes.extend(bytes);
+        self.bytes.resize(self.bytes.len().next_multiple_of(4), 0);
+        self.views.len() - 1
+    }
+
+    /// Adds the triangles of a texture, and returns the accessors of positions, normals, texture coordinates and
+    /// indices.
+    fn triangles(&mut self, mesh: &TexturedMesh, texture: usize) -> [Value; 4] {
+        let faces = || mesh.faces_of(texture);
+        let corners = || faces().flat_map(|face| (0..3).map(move |i| (face, i)));
+        let positions: Vec<[f32; 3]> =
+            corners().map(|(face, i)| (face.vertices_mm[i] / 1e3).as_vec3().to_array()).collect();
+        let normals: Vec<[f32; 3]> =
+            corners().map(|(face, _)| face.normal.as_vec3().normalize().to_array()).collect();
+        let uvs: Vec<[f32; 2]> =
+            corners().map(|(face, i)| face.uv[i].as_vec2().to_array()).collect();
+        let count = positions.len();
+        let bound = |pick: fn(f32, f32) -> f32| {
+            [0, 1, 2].map(|axis| positions.iter().map(|p| p[axis]).reduce(pick).unwrap_or_default())
+        };
+        let (least, most) = (bound(f32::min), bound(f32::max));
+        let mut floats = |values: &[f32]| {
+            let bytes = values.iter().flat_map(|v| v.to_le_bytes()).collect();
+            self.view(bytes, Some(ARRAY_BUFFER))
+        };
+        let position = floats(positions.as_flattened());
+        let normal = floats(normals.as_flattened());
+        let uv = floats(uvs.as_flattened());
+        let indices = (0..count as u32).flat_map(|i| (i as u16).to_le_bytes()).collect();
+        let index = self.view(indices, Some(ELEMENT_ARRAY_BUFFER));
+        [
+            json!({"bufferView": position, "componentType": FLOAT, "count": count, "type": "VEC3",
+                   "min": least, "max": most}),
+            json!({"bufferView": normal, "componentType": FLOAT, "count": count, "type": "VEC3"}),
+            json!({"bufferView": uv, "componentType": FLOAT, "count": count, "type": "VEC2"}),
+            json!({"bufferView": index, "componentType": UNSIGNED_SHORT, "count": count,
+                   "type": "SCALAR"}),
+        ]
+    }
 }

@@ -5,14 +5,16 @@ use std::io;
 use glam::{DVec2, DVec3};
 
 use super::inlay::{INLAY_MM, LEAST_INLAY_MM};
+use super::texture::{Picture, Surface, pictures};
 use super::{GENERATOR, png};
-use deltille_core::artwork::{ArtworkError, Atlas};
+use deltille_core::artwork::ArtworkError;
 use deltille_core::family::Family;
 use deltille_core::lattice::GridKind;
 use deltille_core::polygon::rectangle;
 use deltille_core::targets::{
     ClosedMeshError, Panel, SolidSpec, Target, TargetError, TargetSpec, triangles,
 };
+use deltille_core::words::counted;
 
 /// Texels along the edge of a cell of a tag, unless another resolution is asked for, so that a viewer sees it sharp at
 /// close range.
@@ -46,7 +48,7 @@ pub enum MeshError {
     /// Several boards that lie about have no place beside each other.
     #[error("{0} has {1} boards, of which each is a mesh of its own: make one at a time")]
     SeveralBoards(String, usize),
-    /// The texture would be too large.
+    /// A texture would be too large.
     #[error(
         "the texture would have {width} x {height} px, more than {MAX_TEXTURE_PX} a side: {instead}"
     )]
@@ -60,15 +62,25 @@ pub enum MeshError {
     },
     /// The requested resolution leaves the tags unsharp.
     #[error(
-        "the texture would have {texels:.1} texels per tag bit, at least {needed} are needed: give {least} or more"
+        "the texture would have {texels:.1} texels per tag bit, at least {needed} are needed: give {least}"
     )]
     Unsharp {
         /// Texels per bit.
         texels: f64,
         /// How many are needed.
         needed: f64,
-        /// Least sufficient resolution, in the unit of what was asked for.
+        /// What would do: a resolution in the unit of what was asked for, or more textures.
         least: String,
+    },
+    /// More textures than faces, or none.
+    #[error("the texture of {} cannot be split in {asked}: give {}", counted(*faces, "face"), up_to(*most))]
+    Textures {
+        /// Number of textures.
+        asked: u32,
+        /// Faces that carry a board.
+        faces: usize,
+        /// Most textures.
+        most: u32,
     },
     /// A board with two sides where one is asked for.
     #[error("{0} has two sides: two bodies are printed with their board on one")]
@@ -115,16 +127,22 @@ pub enum Resolution {
     Usual,
     /// Dots per inch on the target.
     Dpi(f64),
-    /// No side of the texture is longer than this, px.
+    /// No side of a texture is longer than this, px.
     Side(u32),
+}
+
+fn up_to(most: u32) -> String {
+    if most == 1 { "1".to_owned() } else { format!("1 to {most}") }
 }
 
 /// How a mesh is made.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct Meshing {
-    /// Of the texture.
+    /// Of the textures.
     pub resolution: Resolution,
+    /// Among how many textures the faces are shared, 1 to [`MAX_TEXTURES`](super::texture::MAX_TEXTURES).
+    pub textures: u32,
     /// Thickness of the plate of a board, mm.
     pub plate_mm: f64,
     /// Depth of what is dark, mm, where it is a body of its own.
@@ -133,7 +151,8 @@ pub struct Meshing {
 
 impl Default for Meshing {
     fn default() -> Self {
-        Self { resolution: Resolution::Usual, plate_mm: PLATE_MM, inlay_mm: INLAY_MM }
+        let resolution = Resolution::Usual;
+        Self { resolution, textures: 1, plate_mm: PLATE_MM, inlay_mm: INLAY_MM }
     }
 }
 
@@ -147,22 +166,31 @@ pub fn extras(target: &Target) -> serde_json::Value {
     })
 }
 
-/// Triangles with a texture, in the target frame, mm.
+/// Triangles with textures, in the target frame, mm.
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct TexturedMesh {
     /// Name of the target.
     pub name: String,
     /// The triangles: those of the faces of a solid in the order of its panels, or those of a plate, the front first.
+    /// Those of a texture follow each other.
     pub faces: Vec<MeshFace>,
-    /// The texture as a grey 8-bit PNG file.
-    pub texture_png: Vec<u8>,
-    /// Width and height of the texture, px.
-    pub texture_px: [u32; 2],
+    /// The textures, all of the same resolution.
+    pub textures: Vec<Texture>,
     /// Texels along the edge of the smallest cell of a tag; `None` where there are no tags.
     pub texels_per_bit: Option<f64>,
     /// Specification and family of the target, for the metadata of the file.
     pub extras: serde_json::Value,
+}
+
+/// A texture of a mesh.
+#[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
+pub struct Texture {
+    /// A grey 8-bit PNG file.
+    pub png: Vec<u8>,
+    /// Width and height, px.
+    pub size_px: [u32; 2],
 }
 
 /// A triangle of the mesh.
@@ -175,12 +203,21 @@ pub struct MeshFace {
     pub normal: DVec3,
     /// Texture coordinates: (0,0) is the upper left corner of the picture, (1,1) the lower right.
     pub uv: [DVec2; 3],
+    /// Which texture they are of.
+    pub texture: usize,
+}
+
+/// Where a triangle is on a texture.
+#[derive(Clone, Copy)]
+struct Textured {
+    uv: [DVec2; 3],
+    texture: usize,
 }
 
 impl MeshFace {
-    fn new(vertices_mm: [DVec3; 3], uv: [DVec2; 3]) -> Self {
+    fn new(vertices_mm: [DVec3; 3], Textured { uv, texture }: Textured) -> Self {
         let [a, b, c] = vertices_mm;
-        Self { vertices_mm, normal: (b - a).cross(c - a).normalize(), uv }
+        Self { vertices_mm, normal: (b - a).cross(c - a).normalize(), uv, texture }
     }
 }
 
@@ -218,38 +255,48 @@ impl TexturedMesh {
         if !(0.1..=1000.0).contains(&plate_mm) {
             return Err(MeshError::Thickness(plate_mm));
         }
-        let atlas = |px_per_m: u32| match shape {
-            Shape::Plate(sides) => Ok(Atlas::of_plate(target, sides, family, px_per_m)?),
-            Shape::Solid(spec) => Ok(Atlas::new(target, &spec.faces()?, family, px_per_m)?),
+        let faces;
+        let (surface, panels) = match shape {
+            Shape::Plate(sides) => (Surface::Plate(sides), sides),
+            Shape::Solid(spec) => {
+                faces = spec.faces()?;
+                (Surface::Faces(&faces), target.panels.as_slice())
+            }
         };
         let cell_mm = smallest_cell_mm(target, family);
         let is_square = target.panels.iter().any(|panel| panel.kind == GridKind::Checker);
         let needed = if is_square { LEAST_TEXELS_PER_SQUARE_BIT } else { LEAST_TEXELS_PER_BIT };
-        let atlas = drawn(atlas, meshing.resolution, (cell_mm, needed))?;
-        let size_mm = DVec2::new(atlas.sheet.width_mm, atlas.sheet.height_mm);
-        let front =
-            atlas.outlines_mm.iter().flat_map(|outline| triangles(outline)).map(|triangle| {
-                triangle.map(|corner| {
-                    let part = corner / size_mm;
-                    DVec2::new(part.x, 1.0 - part.y)
-                })
-            });
+        let pictures = pictures(surface, meshing.textures, meshing.resolution, (cell_mm, needed))?;
+        let px_per_m = pictures.first().map_or(0.0, |first| f64::from(first.atlas.px_per_m));
+        let (mut textures, mut textured) = (Vec::new(), Vec::new());
+        for (texture, Picture { faces, atlas }) in pictures.into_iter().enumerate() {
+            let sheet = atlas.drawn(target, &panels[faces], family)?;
+            let png = png::to_bytes(&sheet, &target.name, px_per_m * 0.0254)?;
+            textures.push(Texture { png, size_px: atlas.size_px });
+            let size_mm = atlas.size_mm();
+            let place = |corner: DVec2| {
+                let part = corner / size_mm;
+                DVec2::new(part.x, 1.0 - part.y)
+            };
+            let outlines = atlas.outlines_mm.iter();
+            let corners = outlines.flat_map(|outline| triangles(outline));
+            textured.extend(corners.map(|corners| Textured { uv: corners.map(place), texture }));
+        }
         let faces = match shape {
             Shape::Solid(spec) => {
-                let surface = spec.polyhedron().triangles_mm();
-                surface.into_iter().zip(front).map(|(mm, uv)| MeshFace::new(mm, uv)).collect()
+                let surface = spec.polyhedron().triangles_mm().into_iter();
+                surface.zip(textured).map(|(mm, on)| MeshFace::new(mm, on)).collect()
             }
-            Shape::Plate(sides) => plate_faces(sides, plate_mm, &front.collect::<Vec<_>>(), &atlas),
+            Shape::Plate(sides) => plate_faces(sides, plate_mm, &textured, &textures),
         };
-        let px_per_m = f64::from(atlas.px_per_m);
-        Ok(Self {
-            name: name(),
-            faces,
-            texture_png: png::to_bytes(&atlas.sheet, &target.name, px_per_m * 0.0254)?,
-            texture_px: atlas.size_px,
-            texels_per_bit: target.family.is_some().then_some(px_per_m * cell_mm / 1e3),
-            extras: extras(target),
-        })
+        let texels_per_bit = target.family.is_some().then_some(px_per_m * cell_mm / 1e3);
+        let extras = extras(target);
+        Ok(Self { name: name(), faces, textures, texels_per_bit, extras })
+    }
+
+    /// The triangles of a texture.
+    pub fn faces_of(&self, texture: usize) -> impl Iterator<Item = &MeshFace> + Clone {
+        self.faces.iter().filter(move |face| face.texture == texture)
     }
 }
 
@@ -264,93 +311,12 @@ fn smallest_cell_mm(target: &Target, family: Option<&Family>) -> f64 {
     edges.fold(f64::INFINITY, f64::min)
 }
 
-/// The atlas at the resolution that was asked for, of cells of this size in mm, which need so many texels.
-fn drawn(
-    atlas: impl Fn(u32) -> Result<Atlas, MeshError>,
-    resolution: Resolution,
-    (cell_mm, needed): (f64, f64),
-) -> Result<Atlas, MeshError> {
-    // Pixels per metre that so many texels a cell are.
-    let per_m = |texels: f64| 1e3 * texels / cell_mm;
-    let whole = |per_m: f64| per_m.ceil().clamp(1.0, u32::MAX.into()) as u32;
-    let atlas = match resolution {
-        Resolution::Usual => {
-            let usual = atlas(whole(per_m(TEXELS_PER_BIT)))?;
-            match usual.size_px.into_iter().max() {
-                Some(side) if side > MAX_TEXTURE_PX => within(usual, MAX_TEXTURE_PX, &atlas)?,
-                _ => usual,
-            }
-        }
-        Resolution::Dpi(dpi) => atlas(whole(dpi / 0.0254))?,
-        Resolution::Side(side) => {
-            let usual = atlas(whole(per_m(TEXELS_PER_BIT)))?;
-            within(usual, side.min(MAX_TEXTURE_PX), &atlas)?
-        }
-    };
-    let [width, height] = atlas.size_px;
-    // A resolution in whole dots per inch may be the least one, rounded.
-    let texels = f64::from(atlas.px_per_m) * cell_mm / 1e3;
-    if texels < needed * (1.0 - 1e-9) {
-        // And some for spaces, which are in px.
-        let more = 1.02 * needed / texels;
-        let least = match resolution {
-            Resolution::Side(_) | Resolution::Usual => {
-                format!("{:.0} px", (f64::from(width.max(height)) * more).ceil())
-            }
-            Resolution::Dpi(_) => {
-                format!("{:.0} dpi", (per_m(needed) * 0.0254).ceil())
-            }
-        };
-        return Err(match resolution {
-            Resolution::Usual => too_large(width, height, TOO_MANY_CELLS),
-            _ => MeshError::Unsharp { texels, needed, least },
-        });
-    }
-    match width.max(height) > MAX_TEXTURE_PX {
-        true => Err(too_large(width, height, "choose a lower resolution")),
-        false => Ok(atlas),
-    }
-}
-
-const TOO_MANY_CELLS: &str =
-    "its tags would be unsharp in a smaller one; take fewer tiles, or a family of fewer bits";
-
-fn too_large(width: u32, height: u32, instead: &str) -> MeshError {
-    MeshError::Texture { width, height, instead: instead.to_owned() }
-}
-
-/// The finest atlas whose sides have no more than `side` px. Space between faces is in px, so that sizes are not quite
-/// in proportion to the resolution.
-fn within(
-    first: Atlas,
-    side: u32,
-    atlas: impl Fn(u32) -> Result<Atlas, MeshError>,
-) -> Result<Atlas, MeshError> {
-    let longest = |atlas: &Atlas| atlas.size_px.into_iter().max().unwrap_or(1);
-    let mut found = first;
-    for _ in 0..MOST_ATTEMPTS {
-        let is = longest(&found);
-        if is <= side && f64::from(is) > CLOSE * f64::from(side) {
-            break;
-        }
-        let part = CLOSE.midpoint(1.0) * f64::from(side) / f64::from(is);
-        found = atlas((f64::from(found.px_per_m) * part).max(1.0) as u32)?;
-    }
-    Ok(found)
-}
-
-/// A texture that is so much of the longest side is as large as can be.
-const CLOSE: f64 = 0.99;
-
-/// Each attempt is nearer by the part that spaces are of the whole.
-const MOST_ATTEMPTS: usize = 12;
-
-/// The triangles of a plate: sides with boards with their texture, others in the colour of the texture's border.
+/// The triangles of a plate: sides with boards with their texture, others in the colour of the border of the last.
 fn plate_faces(
     sides: &[Panel],
     thickness_mm: f64,
-    textured: &[[DVec2; 3]],
-    atlas: &Atlas,
+    textured: &[Textured],
+    textures: &[Texture],
 ) -> Vec<MeshFace> {
     let around = rectangle(sides[0].field_mm());
     let before = around.map(|corner| sides[0].pose.target_from_panel(corner));
@@ -358,7 +324,9 @@ fn plate_faces(
     let [a, b, c, d] = behind;
     // Lower left end first, as the board on that side is seen.
     let back = [b, a, d, c];
-    let white = DVec2::splat(BLANK_PX) / DVec2::from(atlas.size_px.map(f64::from));
+    let last = textures.len() - 1;
+    let white = DVec2::splat(BLANK_PX) / DVec2::from(textures[last].size_px.map(f64::from));
+    let white = Textured { uv: [white; 3], texture: last };
     let two = |[p, q, r, s]: [DVec3; 4]| [[p, q, r], [p, r, s]];
     let rims = (0..4).map(|i| {
         let next = (i + 1) % 4;
@@ -368,8 +336,8 @@ fn plate_faces(
     let blank = rims.chain([back].into_iter().skip(sides.len() - 1)).flat_map(two);
     boards
         .zip(textured)
-        .map(|(vertices_mm, uv)| MeshFace::new(vertices_mm, *uv))
-        .chain(blank.map(|vertices_mm| MeshFace::new(vertices_mm, [white; 3])))
+        .map(|(vertices_mm, on)| MeshFace::new(vertices_mm, *on))
+        .chain(blank.map(|vertices_mm| MeshFace::new(vertices_mm, white)))
         .collect()
 }
 

@@ -54,6 +54,8 @@ pub mod svg;
 #[cfg(feature = "parquet")]
 pub mod tables;
 #[cfg(feature = "meshes")]
+pub mod texture;
+#[cfg(feature = "meshes")]
 pub mod threemf;
 pub mod truth;
 pub mod undistortion;

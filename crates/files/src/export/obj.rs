@@ -1,7 +1,8 @@
-//! Wavefront OBJ: textured meshes are written with material and texture, in millimetres, and closed
+//! Wavefront OBJ: textured meshes are written with materials and textures, in millimetres, and closed
 //! meshes are read as solids.
 
 use std::fmt::Write;
+use std::ops::Range;
 
 use glam::{DVec2, DVec3};
 
@@ -64,14 +65,28 @@ fn first_not_finite(text: &[u8]) -> Option<usize> {
     lines.position(|line| !line.split_whitespace().all(finite)).map(|index| index + 1)
 }
 
-/// The text of `<name>.obj`, which refers to `<name>.mtl`; lengths in mm.
+/// The text of `<name>.obj`, which refers to `<name>.mtl`; lengths in mm. The faces of a texture follow its material.
 pub fn text(mesh: &TexturedMesh) -> String {
+    listed(mesh, 0..mesh.textures.len())
+}
+
+/// The text of [`part_name`]: what [`text`] has of one texture, for readers that take one for a mesh.
+pub fn part(mesh: &TexturedMesh, texture: usize) -> String {
+    listed(mesh, texture..texture + 1)
+}
+
+/// File name of the part of a mesh that has a texture, counted from 0.
+pub fn part_name(name: &str, texture: usize) -> String {
+    format!("{name}-{}.obj", texture + 1)
+}
+
+fn listed(mesh: &TexturedMesh, textures: Range<usize>) -> String {
     let name = &mesh.name;
     let generator = mesh.extras["generator"].as_str().unwrap_or("deltille");
     let mut text = format!("# {generator}, millimetres\n# {}\n", mesh.extras);
     // Writing to a string does not fail.
     let _ = writeln!(text, "mtllib {name}.mtl\no {name}");
-    for face in &mesh.faces {
+    for face in textures.clone().flat_map(|texture| mesh.faces_of(texture)) {
         for v in face.vertices_mm {
             let _ = writeln!(text, "v {:.6} {:.6} {:.6}", v.x, v.y, v.z);
         }
@@ -81,23 +96,44 @@ pub fn text(mesh: &TexturedMesh) -> String {
         let n = face.normal;
         let _ = writeln!(text, "vn {:.9} {:.9} {:.9}", n.x, n.y, n.z);
     }
-    let _ = writeln!(text, "usemtl print");
-    for index in 0..mesh.faces.len() {
-        let corner = |i: usize| format!("{0}/{0}/{1}", 3 * index + i + 1, index + 1);
-        let _ = writeln!(text, "f {} {} {}", corner(0), corner(1), corner(2));
+    let mut index = 0;
+    for texture in textures {
+        let _ = writeln!(text, "usemtl {}", material_name(texture, mesh.textures.len()));
+        for _ in mesh.faces_of(texture) {
+            let corner = |i: usize| format!("{0}/{0}/{1}", 3 * index + i + 1, index + 1);
+            let _ = writeln!(text, "f {} {} {}", corner(0), corner(1), corner(2));
+            index += 1;
+        }
     }
     text
 }
 
-/// The text of `<name>.mtl`, which refers to the texture `<name>-texture.png`.
+/// The text of `<name>.mtl`, which refers to the textures.
 pub fn material(mesh: &TexturedMesh) -> String {
-    let texture = texture_name(&mesh.name);
-    format!(
-        "# {GENERATOR}, material\nnewmtl print\nKa 0 0 0\nKd 1 1 1\nKs 0 0 0\nillum 1\nmap_Kd {texture}\n"
-    )
+    let count = mesh.textures.len();
+    let material = |texture: usize| {
+        let (name, picture) =
+            (material_name(texture, count), texture_name(&mesh.name, texture, count));
+        format!("newmtl {name}\nKa 0 0 0\nKd 1 1 1\nKs 0 0 0\nillum 1\nmap_Kd {picture}\n")
+    };
+    format!("# {GENERATOR}, material\n") + &(0..count).map(material).collect::<String>()
 }
 
-/// File name of the texture of a target of this name.
-pub fn texture_name(name: &str) -> String {
-    format!("{name}-texture.png")
+/// Name of the material of a texture, counted from 0, among so many.
+pub fn material_name(texture: usize, count: usize) -> String {
+    numbered(MATERIAL.to_owned(), "-", texture, count)
+}
+
+/// Name of the only material.
+pub const MATERIAL: &str = "print";
+
+/// File name of a texture, counted from 0, of a target of this name, among so many: `<name>-texture.png`, or
+/// `<name>-texture-1.png` and so on.
+pub fn texture_name(name: &str, texture: usize, count: usize) -> String {
+    numbered(format!("{name}-texture"), "-", texture, count) + ".png"
+}
+
+/// A word for one of so many, counted from 0, with its number where there are several.
+pub(super) fn numbered(word: String, between: &str, index: usize, count: usize) -> String {
+    if count == 1 { word } else { format!("{word}{between}{}", index + 1) }
 }

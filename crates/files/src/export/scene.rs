@@ -1,13 +1,13 @@
 //! Targets as models for simulators: SDF (Gazebo), URDF (ROS), MJCF (MuJoCo) and USD (Isaac, Omniverse, Blender).
 //!
-//! SDF, URDF and MJCF name the mesh in `<name>.obj`, which is in mm, with its material and texture; USD holds the mesh and
-//! names the texture. The frame of the model is the target frame; models are fixed where they are put.
+//! SDF, URDF and MJCF name the mesh in `<name>.obj`, which is in mm, with its materials and textures; USD holds the mesh
+//! and names the textures. The frame of the model is the target frame; models are fixed where they are put.
 
 use glam::{DVec2, DVec3};
 
 use super::GENERATOR;
 use super::mesh::TexturedMesh;
-use super::obj::texture_name;
+use super::obj::{numbered, part_name, texture_name};
 
 /// Metres per millimetre, along each axis, as the formats have it.
 pub const SCALE: &str = "0.001 0.001 0.001";
@@ -39,40 +39,88 @@ pub fn urdf(name: &str) -> String {
     )
 }
 
-/// `<name>.xml` for MuJoCo, a body without joints. The texture is seen as it is, without gloss.
-pub fn mjcf(name: &str) -> String {
+/// `<name>.xml` for MuJoCo, a body without joints. Textures are seen as they are, without gloss.
+///
+/// A mesh has one texture there. Of several, each is shown on its part of the mesh, see [`part_name`], which has no
+/// volume; what meets others is the whole mesh, which is in a group that is not shown.
+pub fn mjcf(name: &str, textures: usize) -> String {
     let body = model_name(name);
-    let texture = texture_name(name);
+    let mesh = format!("<mesh name=\"{name}\" file=\"{name}.obj\" scale=\"{SCALE}\"/>");
+    let (assets, geoms) = match textures {
+        1 => (
+            format!("{}    {mesh}\n", mjcf_material(name, &texture_name(name, 0, 1))),
+            format!("      <geom type=\"mesh\" mesh=\"{name}\" material=\"{name}\"/>\n"),
+        ),
+        _ => {
+            let part = |texture: usize| {
+                let (part, file) = (format!("{name}-{}", texture + 1), part_name(name, texture));
+                let asset = mjcf_material(&part, &texture_name(name, texture, textures));
+                (
+                    format!(
+                        "{asset}    <mesh name=\"{part}\" file=\"{file}\" scale=\"{SCALE}\" inertia=\"shell\"/>\n"
+                    ),
+                    format!(
+                        "      <geom type=\"mesh\" mesh=\"{part}\" material=\"{part}\" contype=\"0\" \
+                         conaffinity=\"0\" mass=\"0\"/>\n"
+                    ),
+                )
+            };
+            let (assets, geoms): (String, String) = (0..textures).map(part).unzip();
+            (
+                format!("{assets}    {mesh}\n"),
+                format!("{geoms}      <geom type=\"mesh\" mesh=\"{name}\" group=\"3\"/>\n"),
+            )
+        }
+    };
     format!(
-        "{}<mujoco model=\"{name}\">\n  <asset>\n    <texture name=\"{name}\" type=\"2d\" file=\"{texture}\"/>\n    \
-         <material name=\"{name}\" texture=\"{name}\" specular=\"0\" shininess=\"0\"/>\n    \
-         <mesh name=\"{name}\" file=\"{name}.obj\" scale=\"{SCALE}\"/>\n  </asset>\n  <worldbody>\n    \
-         <body name=\"{body}\">\n      <geom type=\"mesh\" mesh=\"{name}\" material=\"{name}\"/>\n    </body>\n  \
-         </worldbody>\n</mujoco>\n",
+        "{}<mujoco model=\"{name}\">\n  <asset>\n{assets}  </asset>\n  <worldbody>\n    <body name=\"{body}\">\n\
+         {geoms}    </body>\n  </worldbody>\n</mujoco>\n",
         head()
     )
 }
 
-/// `<name>.usda`, a mesh in metres, z up, with a `UsdPreviewSurface`. Corners of triangles are not shared, so that
-/// normals are exact.
+/// A texture and its material, which have the same name.
+fn mjcf_material(name: &str, texture: &str) -> String {
+    format!(
+        "    <texture name=\"{name}\" type=\"2d\" file=\"{texture}\"/>\n    \
+         <material name=\"{name}\" texture=\"{name}\" specular=\"0\" shininess=\"0\"/>\n"
+    )
+}
+
+/// `<name>.usda`, a mesh in metres, z up, with a `UsdPreviewSurface`, of several textures one for each on a subset of
+/// the faces. Corners of triangles are not shared, so that normals are exact.
 pub fn usda(mesh: &TexturedMesh) -> String {
-    let corners = || mesh.faces.iter().flat_map(|face| (0..3).map(move |i| (face, i)));
+    let count = mesh.textures.len();
+    let faces = || (0..count).flat_map(|texture| mesh.faces_of(texture));
+    let corners = || faces().flat_map(|face| (0..3).map(move |i| (face, i)));
     let metres: Vec<DVec3> = corners().map(|(face, i)| face.vertices_mm[i] / 1e3).collect();
     let triple = |v: DVec3| format!("({:.9}, {:.9}, {:.9})", v.x, v.y, v.z);
     let pair = |DVec2 { x: u, y: v }| format!("({u:.9}, {:.9})", 1.0 - v);
     let least = metres.iter().copied().reduce(DVec3::min).unwrap_or_default();
     let most = metres.iter().copied().reduce(DVec3::max).unwrap_or_default();
-    let values = USD_LISTS.map(|list| match list {
-        "float3[] extent" => listed([least, most].map(triple)),
-        "int[] faceVertexCounts" => listed(mesh.faces.iter().map(|_| "3".to_owned())),
-        "int[] faceVertexIndices" => listed((0..metres.len()).map(|index| index.to_string())),
-        "normal3f[] normals" => listed(corners().map(|(face, _)| triple(face.normal))),
-        "point3f[] points" => listed(metres.iter().copied().map(triple)),
-        _ => listed(corners().map(|(face, i)| pair(face.uv[i]))),
-    });
-    let mut text = usda_frame(&mesh.name);
-    for (list, values) in USD_LISTS.into_iter().zip(values) {
-        text = text.replacen(&format!("{list} = []"), &format!("{list} = {values}"), 1);
+    let mut text = usda_frame(&mesh.name, count);
+    let mut fill = |list: &str, values: Vec<String>| {
+        let values = format!("{list} = [{}]", values.join(", "));
+        text = text.replacen(&format!("{list} = []"), &values, 1);
+    };
+    for list in USD_LISTS {
+        fill(
+            list,
+            match list {
+                "float3[] extent" => [least, most].map(triple).to_vec(),
+                "int[] faceVertexCounts" => faces().map(|_| "3".to_owned()).collect(),
+                "int[] faceVertexIndices" => (0..metres.len()).map(|i| i.to_string()).collect(),
+                "normal3f[] normals" => corners().map(|(face, _)| triple(face.normal)).collect(),
+                "point3f[] points" => metres.iter().copied().map(triple).collect(),
+                _ => corners().map(|(face, i)| pair(face.uv[i])).collect(),
+            },
+        );
+    }
+    let mut first = 0;
+    for texture in (0..count).filter(|_| count > 1) {
+        let end = first + mesh.faces_of(texture).count();
+        fill(USD_SUBSET, (first..end).map(|face| face.to_string()).collect());
+        first = end;
     }
     text
 }
@@ -87,10 +135,37 @@ pub const USD_LISTS: [&str; 6] = [
     "texCoord2f[] primvars:st",
 ];
 
-/// A [`usda`] whose [`USD_LISTS`] are empty.
-pub fn usda_frame(name: &str) -> String {
-    let texture = texture_name(name);
+/// And, where there are several textures, the faces of each, in their order.
+pub const USD_SUBSET: &str = "int[] indices";
+
+/// A [`usda`] of so many textures whose lists are empty.
+pub fn usda_frame(name: &str, textures: usize) -> String {
     let prim = identifier(name);
+    let binding = |texture: usize, indent: &str| {
+        let material = numbered("material".to_owned(), "_", texture, textures);
+        format!("{indent}rel material:binding = </{prim}/{material}>\n")
+    };
+    let subset = |texture: usize| {
+        let (part, bound) = (texture + 1, binding(texture, "            "));
+        format!(
+            r#"
+        def GeomSubset "print_{part}" (
+            prepend apiSchemas = ["MaterialBindingAPI"]
+        )
+        {{
+            uniform token elementType = "face"
+            uniform token familyName = "materialBind"
+            {USD_SUBSET} = []
+{bound}        }}
+"#
+        )
+    };
+    let (schemas, bound, family, subsets) = match textures {
+        1 => (MATERIAL_SCHEMA, binding(0, "        "), "", String::new()),
+        _ => ("", String::new(), SUBSETS_COVER_ALL, (0..textures).map(subset).collect()),
+    };
+    let materials: String =
+        (0..textures).map(|texture| usda_material(name, texture, textures)).collect();
     format!(
         r#"#usda 1.0
 # {GENERATOR}
@@ -104,15 +179,12 @@ def Xform "{prim}" (
     kind = "component"
 )
 {{
-    def Mesh "mesh" (
-        prepend apiSchemas = ["MaterialBindingAPI"]
-    )
+    def Mesh "mesh"{schemas}
     {{
         float3[] extent = []
         int[] faceVertexCounts = []
         int[] faceVertexIndices = []
-        rel material:binding = </{prim}/material>
-        normal3f[] normals = [] (
+{bound}        normal3f[] normals = [] (
             interpolation = "faceVarying"
         )
         point3f[] points = []
@@ -120,16 +192,33 @@ def Xform "{prim}" (
             interpolation = "faceVarying"
         )
         uniform token subdivisionScheme = "none"
-    }}
+{family}{subsets}    }}
+{materials}}}
+"#
+    )
+}
 
-    def Material "material"
+/// What a mesh with one material says of itself.
+const MATERIAL_SCHEMA: &str = " (\n        prepend apiSchemas = [\"MaterialBindingAPI\"]\n    )";
+
+/// What one with several says of their subsets.
+const SUBSETS_COVER_ALL: &str =
+    "        uniform token subsetFamily:materialBind:familyType = \"partition\"\n";
+
+/// A material with a texture, counted from 0, among so many.
+fn usda_material(name: &str, texture: usize, textures: usize) -> String {
+    let (prim, file) = (identifier(name), texture_name(name, texture, textures));
+    let material = numbered("material".to_owned(), "_", texture, textures);
+    format!(
+        r#"
+    def Material "{material}"
     {{
-        token outputs:surface.connect = </{prim}/material/surface.outputs:surface>
+        token outputs:surface.connect = </{prim}/{material}/surface.outputs:surface>
 
         def Shader "surface"
         {{
             uniform token info:id = "UsdPreviewSurface"
-            color3f inputs:diffuseColor.connect = </{prim}/material/texture.outputs:rgb>
+            color3f inputs:diffuseColor.connect = </{prim}/{material}/texture.outputs:rgb>
             float inputs:metallic = 0
             float inputs:roughness = 1
             token outputs:surface
@@ -138,8 +227,8 @@ def Xform "{prim}" (
         def Shader "texture"
         {{
             uniform token info:id = "UsdUVTexture"
-            asset inputs:file = @{texture}@
-            float2 inputs:st.connect = </{prim}/material/st.outputs:result>
+            asset inputs:file = @{file}@
+            float2 inputs:st.connect = </{prim}/{material}/st.outputs:result>
             token inputs:wrapS = "clamp"
             token inputs:wrapT = "clamp"
             color3f outputs:rgb
@@ -152,7 +241,6 @@ def Xform "{prim}" (
             float2 outputs:result
         }}
     }}
-}}
 "#
     )
 }
@@ -175,8 +263,4 @@ pub fn identifier(name: &str) -> String {
         true => format!("_{name}"),
         false => name,
     }
-}
-
-fn listed(values: impl IntoIterator<Item = String>) -> String {
-    format!("[{}]", values.into_iter().collect::<Vec<_>>().join(", "))
 }

@@ -46,8 +46,8 @@ pub struct Limits {
     /// Bytes of a file, and of what is decompressed from it; pictures are limited by their pixels
     /// instead.
     pub max_bytes: u64,
-    /// Pixels of a picture: of a photograph, of a page or texture as PNG, and of all photographs
-    /// that are in memory at a time.
+    /// Pixels of a picture: of a photograph, of a page or texture as PNG, and of all photographs, or
+    /// textures of a mesh, that are in memory at a time.
     pub max_pixels: u64,
     /// Pixels for each byte of its file, of a photograph of more than 10 megapixels. The noise of a
     /// sensor cannot be compressed away: a compressed photograph has some 5, and a file with far
@@ -231,7 +231,15 @@ impl Limits {
     /// # Errors
     /// The limit that it passes.
     pub fn check_pixels(&self, width: u32, height: u32) -> Result<(), Exceeded> {
-        self.check(Kind::Pixels, u64::from(width) * u64::from(height), self.max_pixels)
+        self.check_all_pixels(u64::from(width) * u64::from(height))
+    }
+
+    /// Refuses pictures that have more than [`max_pixels`](Self::max_pixels) together.
+    ///
+    /// # Errors
+    /// The limit that they pass.
+    pub fn check_all_pixels(&self, pixels: u64) -> Result<(), Exceeded> {
+        self.check(Kind::Pixels, pixels, self.max_pixels)
     }
 
     /// Refuses a photograph of too many pixels, or of too many for a file of `bytes` bytes.

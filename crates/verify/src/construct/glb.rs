@@ -1,5 +1,5 @@
 //! The parts of a `.glb` that every viewer shows alike: one scene, a tree of nodes, triangles with
-//! one opaque, unlit-white material, and its texture inside.
+//! opaque, unlit-white materials, and a texture inside for each.
 
 use std::collections::BTreeSet;
 
@@ -7,13 +7,15 @@ use glam::{DMat4, DQuat, DVec3};
 
 use serde_json::Value;
 
-use super::glb_json::{Accessor, Material, Node, Primitive, Root, Sampler, Surface};
+use super::glb_json::{Accessor, Node, Primitive, Root, Sampler, Surface};
 use super::{Findings, Words, is_creator, png};
 use deltille_core::reading::in_words;
 use deltille_files::export::gltf::{
     ARRAY_BUFFER, CLAMP_TO_EDGE, ELEMENT_ARRAY_BUFFER, FLOAT, LINEAR, LINEAR_MIPMAP_LINEAR,
-    MATERIAL, UNSIGNED_SHORT,
+    UNSIGNED_SHORT, image_name,
 };
+use deltille_files::export::obj::material_name;
+use deltille_files::export::texture::MAX_TEXTURES;
 use deltille_files::limits::{Exceeded, Limits};
 
 /// The mode of a primitive that is a list of triangles, in glTF.
@@ -67,8 +69,11 @@ pub(super) fn check(bytes: &[u8], words: &Words, limits: &Limits) -> Result<Find
         walk.sizes(limits).map_err(|exceeded| exceeded.to_string())?;
         walk.nodes(limits).map_err(|exceeded| exceeded.to_string())?;
         walk.primitives();
-        walk.material(&root.materials[0]);
-        walk.texture(&root.samplers[0], limits)?;
+        walk.sampler(&root.samplers[0]);
+        for index in 0..root.materials.len() {
+            walk.material(index);
+            walk.texture(index, limits)?;
+        }
         walk.names();
         walk.layout();
         walk.unused();
@@ -139,21 +144,24 @@ struct Walk<'a> {
 }
 
 impl Walk<'_> {
-    /// Checks that there is one of each thing of which the reader takes the first, and that views and
-    /// accessors lie within the binary chunk.
+    /// Checks that there is one of each thing of which the reader takes the first, a material and a picture for each
+    /// texture, and that views and accessors lie within the binary chunk.
     fn counts(&mut self) {
         let root = self.root;
         let version = &root.asset.version;
         self.found.unless(version == "2.0", "asset", format!("version {version}"));
-        for (place, count) in [
-            ("scenes", root.scenes.len()),
-            ("materials", root.materials.len()),
-            ("textures", root.textures.len()),
-            ("samplers", root.samplers.len()),
-            ("images", root.images.len()),
-            ("buffers", root.buffers.len()),
+        let textures = root.textures.len().clamp(1, MAX_TEXTURES as usize);
+        for (place, count, stated) in [
+            ("scenes", root.scenes.len(), 1),
+            ("materials", root.materials.len(), textures),
+            ("textures", root.textures.len(), textures),
+            ("samplers", root.samplers.len(), 1),
+            ("images", root.images.len(), textures),
+            ("buffers", root.buffers.len(), 1),
         ] {
-            self.found.unless(count == 1, place, format!("{count} entries instead of one"));
+            let instead = if stated == 1 { "one".to_owned() } else { stated.to_string() };
+            let problem = format!("{count} entries instead of {instead}");
+            self.found.unless(count == stated, place, problem);
         }
         self.found.unless(root.scene == 0, "scene", "a default scene that is not there");
         for buffer in &root.buffers {
@@ -252,15 +260,22 @@ impl Walk<'_> {
         );
         let extras = self.words.are_extras(&root.asset.extras);
         self.found.unseen_unless(extras, "asset", "extras that do not describe the target");
-        let material = root.materials[0].name.as_deref();
-        let print = material.is_none_or(|name| name == MATERIAL);
-        self.found.unseen_unless(print, "materials[0]", format!("a name other than {MATERIAL}"));
-        let nodes = root.nodes.iter().map(|node| &node.name);
-        let meshes = root.meshes.iter().map(|mesh| &mesh.name);
-        let images = root.images.iter().map(|image| &image.name);
-        for name in nodes.chain(meshes).chain(images).flatten().filter(|name| *name != title) {
-            let problem = format!("{name:?} for the target's name");
-            self.found.unseen_unless(false, "the names", problem);
+        let count = root.materials.len();
+        for (i, material) in root.materials.iter().enumerate() {
+            let usual = material_name(i, count);
+            let holds = material.name.as_ref().is_none_or(|name| *name == usual);
+            let place = format!("materials[{i}]");
+            self.found.unseen_unless(holds, place, format!("a name other than {usual}"));
+        }
+        let nodes = root.nodes.iter().map(|node| (&node.name, title.clone()));
+        let meshes = root.meshes.iter().map(|mesh| (&mesh.name, title.clone()));
+        let images = root.images.iter().enumerate();
+        let images = images.map(|(i, image)| (&image.name, image_name(title, i, count)));
+        for (name, usual) in nodes.chain(meshes).chain(images) {
+            if let Some(name) = name.as_ref().filter(|name| **name != usual) {
+                let problem = format!("{name:?} for the target's name");
+                self.found.unseen_unless(false, "the names", problem);
+            }
         }
     }
 
@@ -293,22 +308,29 @@ impl Walk<'_> {
             let holds = view.target.is_none_or(|stated| stated == target);
             self.found.unless(holds, &place, "a view for values of another kind");
         }
-        let picture = root.buffer_views.get(root.images[0].buffer_view);
-        let bare = picture.is_some_and(|view| view.target.is_none());
-        self.found.unless(bare, "images[0]", "a view for values");
+        for (i, image) in root.images.iter().enumerate() {
+            let picture = root.buffer_views.get(image.buffer_view);
+            let bare = picture.is_some_and(|view| view.target.is_none());
+            self.found.unless(bare, format!("images[{i}]"), "a view for values");
+        }
     }
 
-    /// Checks that every accessor and every view is part of what is shown.
+    /// Checks that every material, accessor and view is part of what is shown.
     fn unused(&mut self) {
         let root = self.root;
-        let primitives = root.meshes.iter().flat_map(|mesh| &mesh.primitives);
-        let accessors: BTreeSet<usize> = primitives
+        let primitives = || root.meshes.iter().flat_map(|mesh| &mesh.primitives);
+        for i in 0..root.materials.len() {
+            let is_used = primitives().any(|primitive| primitive.material == i);
+            self.found.unless(is_used, format!("materials[{i}]"), "a material of no use");
+        }
+        let accessors: BTreeSet<usize> = primitives()
             .flat_map(|Primitive { attributes: a, indices, .. }| {
                 [a.position, a.normal, a.texcoord_0, *indices]
             })
             .collect();
         let views = accessors.iter().filter_map(|&i| Some(root.accessors.get(i)?.buffer_view));
-        let views: BTreeSet<usize> = views.chain([root.images[0].buffer_view]).collect();
+        let pictures = root.images.iter().map(|image| image.buffer_view);
+        let views: BTreeSet<usize> = views.chain(pictures).collect();
         for i in (0..root.accessors.len()).filter(|i| !accessors.contains(i)) {
             self.found.add(format!("accessors[{i}]"), "values of no use");
         }
@@ -327,12 +349,13 @@ impl Walk<'_> {
         }
     }
 
-    /// Checks that a primitive is a list of triangles with the one material, that its attributes are
+    /// Checks that a primitive is a list of triangles with a material, that its attributes are
     /// finite floats of equal number, and that texture coordinates lie on the texture.
     fn primitive(&mut self, primitive: &Primitive, place: &str) {
         let mode = primitive.mode.unwrap_or(TRIANGLES);
         self.found.unless(mode == TRIANGLES, place, format!("mode {mode} instead of triangles"));
-        self.found.unless(primitive.material == 0, place, "a material that is not there");
+        let dressed = primitive.material < self.root.materials.len();
+        self.found.unless(dressed, place, "a material that is not there");
         let attributes = &primitive.attributes;
         let mut count = None;
         for (name, index, kind) in [
@@ -409,17 +432,18 @@ impl Walk<'_> {
         self.found.unless(inside, place, "an index that points nowhere");
     }
 
-    /// Checks that the material shows the texture as it is, on opaque triangles that are seen from
+    /// Checks that a material shows the texture of its number as it is, on opaque triangles that are seen from
     /// outside only.
-    fn material(&mut self, material: &Material) {
-        let place = "materials[0]";
+    fn material(&mut self, index: usize) {
+        let place = format!("materials[{index}]");
+        let material = &self.root.materials[index];
         let Surface { base_color_texture, base_color_factor, metallic_factor, roughness_factor } =
             &material.pbr_metallic_roughness;
         let texture = base_color_texture;
         let checks = [
             (
-                texture.index == 0 && texture.tex_coord.unwrap_or(0) == 0,
-                "texCoord or index other than 0",
+                texture.index == index && texture.tex_coord.unwrap_or(0) == 0,
+                "texCoord other than 0, or index other than its own",
             ),
             (
                 base_color_factor.is_none_or(|factor| factor == [1.0; 4]),
@@ -438,31 +462,36 @@ impl Walk<'_> {
             (material.double_sided != Some(true), "doubleSided"),
         ];
         for (holds, construct) in checks {
-            self.found.unless(holds, place, construct);
+            self.found.unless(holds, &place, construct);
         }
     }
 
-    /// Checks the sampler, and the texture as a PNG; the error says that this exceeds the limits.
-    fn texture(&mut self, sampler: &Sampler, limits: &Limits) -> Result<(), String> {
-        let root = self.root;
+    /// Checks the sampler, which all textures have.
+    fn sampler(&mut self, sampler: &Sampler) {
         let Sampler { mag_filter, min_filter, wrap_s, wrap_t } = *sampler;
         let filters = [mag_filter, min_filter] == [LINEAR, LINEAR_MIPMAP_LINEAR];
         self.found.unless(filters, "samplers[0]", "a filter other than linear");
         let wraps = [wrap_s, wrap_t] == [CLAMP_TO_EDGE; 2];
         self.found.unless(wraps, "samplers[0]", "a wrap mode other than clamping");
-        let (texture, image) = (&root.textures[0], &root.images[0]);
-        let first = (texture.sampler, texture.source) == (0, 0);
-        self.found.unless(first, "textures[0]", "a sampler or an image that is not there");
-        let kind = &image.mime_type;
-        self.found.unless(kind == "image/png", "images[0]", format!("mimeType {kind}"));
+    }
+
+    /// Checks a texture, and its picture as a PNG; the error says that this exceeds the limits.
+    fn texture(&mut self, index: usize, limits: &Limits) -> Result<(), String> {
+        let root = self.root;
+        let (texture, image) = (&root.textures[index], &root.images[index]);
+        let own = (texture.sampler, texture.source) == (0, index);
+        let problem = "a sampler or an image that is not its own";
+        self.found.unless(own, format!("textures[{index}]"), problem);
+        let (place, kind) = (format!("images[{index}]"), &image.mime_type);
+        self.found.unless(kind == "image/png", &place, format!("mimeType {kind}"));
         let view = root.buffer_views.get(image.buffer_view);
         let bytes = view.and_then(|v| self.binary.get(v.byte_offset..)?.get(..v.byte_length));
         png::check_pixels(bytes.unwrap_or_default(), limits)
             .map_err(|exceeded| format!("its texture: {exceeded}"))?;
         match bytes.map(|bytes| png::check(bytes, &self.words.title, limits)) {
-            Some(Ok(picture)) => self.found.add_of("images[0]", picture),
-            Some(Err(problem)) => self.found.add("images[0]", problem),
-            None => self.found.add("images[0]", "a view that is not there"),
+            Some(Ok(picture)) => self.found.add_of(&place, picture),
+            Some(Err(problem)) => self.found.add(place, problem),
+            None => self.found.add(place, "a view that is not there"),
         }
         Ok(())
     }

@@ -190,7 +190,8 @@ pub(super) fn check(
     let bytes = reader.read(path)?;
     let (words, limits) = (Words::of(target), reader.limits);
     if format == Format::Obj {
-        return obj::check(reader, path, &bytes, &words).map(|(found, parts)| (found.0, parts));
+        let checked = obj::check(reader, path, &bytes, &words);
+        return checked.map(|(found, parts)| (found.0, parts));
     }
     if format == Format::Usda {
         return usda::check(reader, path, &bytes, &words).map(|(found, parts)| (found.0, parts));
@@ -203,7 +204,7 @@ pub(super) fn check(
         Format::Stl => stl::check(&bytes, &words.title, &limits),
         Format::Sdf => model(&bytes, &scene::sdf(&words.title)),
         Format::Urdf => model(&bytes, &scene::urdf(&words.title)),
-        Format::Mjcf => model(&bytes, &scene::mjcf(&words.title)),
+        Format::Mjcf => model(&bytes, &scene::mjcf(&words.title, textures_of_mjcf(&bytes))),
         // Their readers know nothing but what is written.
         Format::Obj | Format::Usda | Format::ThreeMf | Format::Dsc | Format::Dxf => {
             Ok(Findings::default())
@@ -227,6 +228,27 @@ pub(super) fn bodies(
     let check = move || threemf::check(&bytes, names, &words, &limits);
     let (found, bodies) = reader.run(path, check)?;
     Ok((found.0, bodies))
+}
+
+/// Compares what the model for MuJoCo at `path` takes of the OBJ beside it, `mesh`, which was inspected: its textures, and
+/// its parts where there are several.
+///
+/// # Errors
+///
+/// A file cannot be read at all.
+pub(super) fn check_parts(
+    reader: &Reader,
+    path: &Path,
+    mesh: &Path,
+    target: &Target,
+) -> Result<Vec<Finding>, DocumentError> {
+    let count = textures_of_mjcf(&reader.read(path)?);
+    Ok(obj::check_parts(reader, mesh, count, &Words::of(target))?.0)
+}
+
+/// Number of textures of a model for MuJoCo.
+fn textures_of_mjcf(bytes: &[u8]) -> usize {
+    std::str::from_utf8(bytes).map_or(1, |text| usda::textures_by(text, "<texture "))
 }
 
 /// Inspects a model that puts the mesh of an OBJ in its place and does nothing else.

@@ -1,4 +1,4 @@
-//! The lines of an OBJ that every viewer takes alike: triangles with one material, each corner with
+//! The lines of an OBJ that every viewer takes alike: triangles with their material, each corner with
 //! its position, texture coordinate and normal.
 
 use std::collections::BTreeSet;
@@ -9,8 +9,10 @@ use serde_json::Value;
 use super::{Findings, Words, decimal, is_creator, is_plain_file_name, mtl, png, start, text};
 use crate::reader::Reader;
 use crate::{Artifact, DocumentError};
+use deltille_files::export::obj::{part_name, texture_name};
+use deltille_files::export::texture::MAX_TEXTURES;
 
-/// Inspects an OBJ, its material library and its texture; returns the findings, and these two files as
+/// Inspects an OBJ, its material library and its textures; returns the findings, and these files as
 /// far as nothing before them was refused.
 ///
 /// # Errors
@@ -26,19 +28,24 @@ pub(super) fn check(
     let count = text.lines().count();
     let few = reader.limits.check_nodes(count);
     few.map_err(|exceeded| DocumentError::unreadable(path, exceeded.to_string()))?;
-    let Lines { mut found, library, material: used, .. } = lines(text, words);
+    let Lines { mut found, library, materials: used, .. } = lines(text, words);
     let mut parts = Vec::new();
     let Some(library) = library.filter(|_| !found.refuse()) else {
         found.unless(found.refuse(), "the file", "no material library");
         return Ok((found, parts));
     };
     let written = reader.read_text(&path.with_file_name(&library))?;
-    let (material, of_library) = mtl::check(&written);
+    let (materials, of_library) = mtl::check(&written);
     found.add_of(&library, of_library);
     parts.push(Artifact::new(library, written));
-    let known = material.name.is_some() && material.name == used;
-    found.unless(known, "the file", "a material other than that of its library");
-    if let Some(texture) = material.texture.filter(|_| !found.refuse()) {
+    let few = materials.len() <= MAX_TEXTURES as usize;
+    found.unless(few, "the file", format!("more than {MAX_TEXTURES} materials"));
+    let known = materials.iter().map(|material| &material.name).eq(used.iter());
+    found.unless(known, "the file", "materials other than those of its library");
+    for texture in materials.into_iter().filter_map(|material| material.texture) {
+        if found.refuse() {
+            break;
+        }
         let file = path.with_file_name(&texture);
         let picture = reader.read(&file)?;
         let of_texture = png::check(&picture, &words.title, &reader.limits)
@@ -47,6 +54,62 @@ pub(super) fn check(
         parts.push(Artifact::of(texture, picture));
     }
     Ok((found, parts))
+}
+
+/// Compares what a model for MuJoCo, of `count` textures, takes from an OBJ that was inspected: textures of the usual
+/// names, and where there are several, for each a part of the mesh in an OBJ of its own.
+///
+/// # Errors
+///
+/// One of the files cannot be read, or is no text.
+pub(super) fn check_parts(
+    reader: &Reader,
+    path: &Path,
+    count: usize,
+    words: &Words,
+) -> Result<Findings, DocumentError> {
+    let mut found = Findings::default();
+    let whole = reader.read_text(path)?;
+    let library = whole.lines().find_map(|line| line.strip_prefix("mtllib ")).unwrap_or_default();
+    let materials = mtl::check(&reader.read_text(&path.with_file_name(library))?).0;
+    let textures = materials.into_iter().filter_map(|material| material.texture);
+    let usual = (0..count).map(|texture| texture_name(&words.title, texture, count));
+    found.unless(textures.eq(usual), library, "textures other than those of the model");
+    let groups = groups(&whole);
+    for texture in (0..count).filter(|_| count > 1) {
+        let name = part_name(&words.title, texture);
+        let part = reader.read_text(&path.with_file_name(&name))?;
+        let Lines { found: of_part, library: of, .. } = lines(&part, words);
+        found.add_of(&name, of_part);
+        let same =
+            self::groups(&part).iter().eq(groups.get(texture)) && of.as_deref() == Some(library);
+        found.unless(same, name, "faces other than those of that texture in the mesh");
+    }
+    Ok(found)
+}
+
+/// The materials of an OBJ, each with the places, texture coordinates and normals of its corners as they are written.
+fn groups(text: &str) -> Vec<(&str, Vec<&str>)> {
+    let mut lists = [const { Vec::new() }; 3];
+    let mut groups: Vec<(&str, Vec<&str>)> = Vec::new();
+    for (word, rest) in text.lines().filter_map(|line| line.split_once(' ')) {
+        match word {
+            "v" => lists[0].push(rest),
+            "vt" => lists[1].push(rest),
+            "vn" => lists[2].push(rest),
+            "usemtl" => groups.push((rest, Vec::new())),
+            "f" => {
+                let corners =
+                    rest.split(' ').flat_map(|corner| lists.iter().zip(corner.split('/')));
+                let values = corners.filter_map(|(list, at)| list.get(index(at)?.checked_sub(1)?));
+                if let Some((_, faces)) = groups.last_mut() {
+                    faces.extend(values);
+                }
+            }
+            _ => {}
+        }
+    }
+    groups
 }
 
 /// Inspects the lines of an OBJ.
@@ -66,6 +129,7 @@ fn lines(text: &str, words: &Words) -> Lines {
     }
     let named = lines.object.as_deref() == Some(&*words.title);
     lines.found.unseen_unless(named, "the file", "an object other than the target's name");
+    lines.found.unless(!lines.is_bare, "the file", "a material that no face has");
     lines
 }
 
@@ -77,8 +141,10 @@ struct Lines {
     library: Option<String>,
     /// Name of the object.
     object: Option<String>,
-    /// Name of the material.
-    material: Option<String>,
+    /// Names of the materials.
+    materials: Vec<String>,
+    /// Whether no face came after the last of them.
+    is_bare: bool,
     /// Numbers of positions, texture coordinates and normals so far.
     counts: [usize; 3],
     /// Indices, from 1 on, of those that faces use.
@@ -110,13 +176,19 @@ impl Lines {
         let holds = match word {
             "o" => once(&mut self.object),
             "mtllib" => once(&mut self.library) && is_plain_file_name(rest),
-            "usemtl" => once(&mut self.material),
+            "usemtl" => {
+                let first = !self.is_bare && !self.materials.iter().any(|name| name == rest);
+                self.materials.push(rest.to_owned());
+                self.is_bare = true;
+                first
+            }
             "v" => self.numbers(rest, 0, 3),
             "vt" => self.numbers(rest, 1, 2) && rest.split(' ').all(on_texture),
             "vn" => self.numbers(rest, 2, 3),
             "f" => {
-                let dressed = self.material.is_some();
+                let dressed = !self.materials.is_empty();
                 self.found.unless(dressed, place, "a face before its material");
+                self.is_bare = false;
                 self.is_triangle(rest)
             }
             _ => {

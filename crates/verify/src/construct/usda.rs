@@ -1,4 +1,4 @@
-//! The lines of a USD that this program writes: one mesh of triangles with one texture.
+//! The lines of a USD that this program writes: one mesh of triangles with its textures.
 
 use std::path::Path;
 
@@ -6,9 +6,10 @@ use super::{Findings, Words, decimal, png, text};
 use crate::reader::Reader;
 use crate::{Artifact, DocumentError};
 use deltille_files::export::obj::texture_name;
-use deltille_files::export::scene::{USD_LISTS, usda_frame};
+use deltille_files::export::scene::{USD_LISTS, USD_SUBSET, usda_frame};
+use deltille_files::export::texture::MAX_TEXTURES;
 
-/// Inspects a USD and its texture; returns the findings, and the texture if nothing was refused.
+/// Inspects a USD and its textures; returns the findings, and the textures as far as nothing before them was refused.
 ///
 /// # Errors
 ///
@@ -21,18 +22,28 @@ pub(super) fn check(
 ) -> Result<(Findings, Vec<Artifact>), DocumentError> {
     let unreadable = |problem: String| DocumentError::unreadable(path, problem);
     let text = text(bytes).map_err(unreadable)?;
-    let mut found = Findings::default();
-    same_lines(text, &usda_frame(&words.title), list_of, &mut found);
-    if found.refuse() {
-        return Ok((found, Vec::new()));
+    let count = textures_by(text, "def GeomSubset ");
+    let (mut found, mut parts) = (Findings::default(), Vec::new());
+    same_lines(text, &usda_frame(&words.title, count), list_of, &mut found);
+    for texture in 0..count {
+        if found.refuse() {
+            break;
+        }
+        let texture = texture_name(&words.title, texture, count);
+        let file = path.with_file_name(&texture);
+        let picture = reader.read(&file)?;
+        let of_texture = png::check(&picture, &words.title, &reader.limits)
+            .map_err(|problem| DocumentError::unreadable(&file, problem))?;
+        found.add_of(&texture, of_texture);
+        parts.push(Artifact::of(texture, picture));
     }
-    let texture = texture_name(&words.title);
-    let file = path.with_file_name(&texture);
-    let picture = reader.read(&file)?;
-    let of_texture = png::check(&picture, &words.title, &reader.limits)
-        .map_err(|problem| DocumentError::unreadable(&file, problem))?;
-    found.add_of(&texture, of_texture);
-    Ok((found, vec![Artifact::of(texture, picture)]))
+    Ok((found, parts))
+}
+
+/// Number of textures of a file, by the lines that begin so: where there are several, each has one.
+pub(super) fn textures_by(text: &str, start: &str) -> usize {
+    let lines = text.lines().filter(|line| line.trim_start().starts_with(start));
+    lines.count().clamp(1, MAX_TEXTURES as usize)
 }
 
 /// Adds the first line that is not that of `stated`, after `plain` was taken of both; the versions of the program that
@@ -86,13 +97,17 @@ fn brackets(line: &str) -> [usize; 2] {
 /// The list that a line has: its name and its numbers.
 pub(crate) fn list(line: &str) -> Option<(&'static str, Vec<f64>)> {
     let trimmed = line.trim_start();
-    let name = USD_LISTS.into_iter().find(|name| trimmed.starts_with(&format!("{name} = [")))?;
+    let mut names = USD_LISTS.into_iter().chain([USD_SUBSET]);
+    let name = names.find(|name| trimmed.starts_with(&format!("{name} = [")))?;
     let [from, to] = brackets(line);
     let inside = line[from..to].strip_prefix('[')?.strip_suffix(']')?;
-    let numbers = inside.split(',').map(|word| decimal(word.trim().trim_matches(['(', ')'])));
+    let number = |word: &str| match name.starts_with("int[]") {
+        true => decimal(word).filter(|_| !word.contains(['.', '-'])),
+        false => decimal(word.trim_matches(['(', ')'])),
+    };
     let numbers: Option<Vec<f64>> = match inside.is_empty() {
         true => Some(Vec::new()),
-        false => numbers.collect(),
+        false => inside.split(',').map(|word| number(word.trim())).collect(),
     };
     Some((name, numbers?))
 }

@@ -7,7 +7,7 @@
 //!
 //! [`construct`]: crate::construct
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::io::Cursor;
 use std::path::Path;
 
@@ -19,14 +19,15 @@ use crate::construct::usda::list;
 use crate::reader::Reader;
 use crate::{Artifact, DocumentError, Format};
 use deltille_core::raster::Gray;
+use deltille_files::export::scene::USD_SUBSET;
 use deltille_files::limits::Limits;
 
-/// Loads a `.glb`, or an `.obj` with its `parts`: material library and texture.
+/// Loads a `.glb`, or an `.obj` with its `parts`: material library and textures.
 ///
 /// # Errors
 ///
 /// The file cannot be read or exceeds the limits, the crate that loads it refuses it, a vertex lacks
-/// its normal or texture coordinate, or there are no triangles or no texture.
+/// its normal or texture coordinate, or there are no triangles, or some without texture.
 pub(crate) fn load(
     reader: &Reader,
     path: &Path,
@@ -51,29 +52,35 @@ fn glb(bytes: &[u8], limits: &Limits) -> Result<Model, String> {
     let file = gltf::Gltf::from_slice(bytes).map_err(|error| format!("not glTF: {error}"))?;
     let blob = file.blob.as_deref().ok_or("it has no binary part")?;
     let mut triangles = Vec::new();
-    let mut texture = None;
     // By index: for each child, the crate would count through all nodes.
     let nodes: Vec<gltf::Node> = file.nodes().collect();
     let roots = file.default_scene().into_iter().flat_map(|scene| scene.nodes());
     // Every node is reached once, as was checked before, so this ends.
     let mut open: Vec<(usize, DMat4)> = roots.map(|node| (node.index(), DMat4::IDENTITY)).collect();
     while let Some((index, parent)) = open.pop() {
-        let here = visit(&nodes[index], parent, blob, &mut triangles, &mut texture)?;
+        let here = visit(&nodes[index], parent, blob, &mut triangles)?;
         let children = file.as_json().nodes[index].children.iter().flatten();
         open.extend(children.map(|child| (child.value(), here)));
     }
-    let texture = texture.ok_or("it has no texture")?;
-    Ok(Model { triangles, texture: image(texture, limits)? })
+    let textures = file.materials().map(|material| {
+        let texture = material.pbr_metallic_roughness().base_color_texture()?;
+        match texture.texture().source().source() {
+            gltf::image::Source::View { view, .. } => {
+                blob.get(view.offset()..view.offset() + view.length())
+            }
+            gltf::image::Source::Uri { .. } => None,
+        }
+    });
+    model(triangles, textures, limits)
 }
 
-/// Adds the triangles of a node, converted from the metres of glTF to mm, and notes its texture;
-/// returns the transform from the node to the scene.
-fn visit<'a>(
-    node: &gltf::Node<'a>,
+/// Adds the triangles of a node, converted from the metres of glTF to mm; returns the transform from the node to the
+/// scene.
+fn visit(
+    node: &gltf::Node,
     parent: DMat4,
-    blob: &'a [u8],
+    blob: &[u8],
     triangles: &mut Vec<Triangle>,
-    texture: &mut Option<&'a [u8]>,
 ) -> Result<DMat4, String> {
     let columns = node.transform().matrix().map(|column| column.map(f64::from));
     let here = parent * DMat4::from_cols_array_2d(&columns);
@@ -92,17 +99,13 @@ fn visit<'a>(
             Some(indices) => indices.into_u32().collect(),
             None => (0..positions.len() as u32).collect(),
         };
-        add(triangles, &indices, &positions, (&indices, &normals), (&indices, &uvs))?;
-        let material = primitive.material().pbr_metallic_roughness();
-        let source = material.base_color_texture().map(|info| info.texture().source().source());
-        if let Some(gltf::image::Source::View { view, .. }) = source {
-            *texture = blob.get(view.offset()..view.offset() + view.length());
-        }
+        let texture = primitive.material().index().ok_or("it has no texture")?;
+        add(triangles, texture, &indices, &positions, (&indices, &normals), (&indices, &uvs))?;
     }
     Ok(here)
 }
 
-/// Loads an `.obj`, which is in mm, with its material library and texture from `parts`.
+/// Loads an `.obj`, which is in mm, with its material library and textures from `parts`.
 fn obj(bytes: &[u8], parts: &[Artifact], limits: &Limits) -> Result<Model, String> {
     let part = |name: &Path| parts.iter().find(|part| Path::new(part.name()) == name);
     let options = tobj::LoadOptions { triangulate: true, ..Default::default() };
@@ -113,7 +116,6 @@ fn obj(bytes: &[u8], parts: &[Artifact], limits: &Limits) -> Result<Model, Strin
     .map_err(|error| error.to_string())?;
     let materials = materials.map_err(|error| format!("its material library: {error}"))?;
     let mut triangles = Vec::new();
-    let mut texture: Option<String> = None;
     for mesh in models.iter().map(|model| &model.mesh) {
         let points = |values: &[f64]| -> Vec<DVec3> {
             values.as_chunks::<3>().0.iter().copied().map(DVec3::from).collect()
@@ -123,22 +125,26 @@ fn obj(bytes: &[u8], parts: &[Artifact], limits: &Limits) -> Result<Model, Strin
         let uvs: Vec<DVec2> = uvs.map(|&[u, v]| DVec2::new(u, 1.0 - v)).collect();
         add(
             &mut triangles,
+            mesh.material_id.ok_or("it has no texture")?,
             &mesh.indices,
             &points(&mesh.positions),
             (&mesh.normal_indices, &points(&mesh.normals)),
             (&mesh.texcoord_indices, &uvs),
         )?;
-        let material = mesh.material_id.and_then(|id| materials.get(id));
-        texture = material.and_then(|material| material.diffuse_texture.clone()).or(texture);
     }
-    let texture = texture.and_then(|name| part(Path::new(&name))).ok_or("it has no texture")?;
-    Ok(Model { triangles, texture: image(texture.bytes(), limits)? })
+    let textures = materials.iter().map(|material| {
+        let name = material.diffuse_texture.as_ref()?;
+        part(Path::new(name)).map(Artifact::bytes)
+    });
+    model(triangles, textures, limits)
 }
 
-/// Loads a `.usda`, which is in metres, with its texture.
+/// Loads a `.usda`, which is in metres, with its textures in the order of its materials.
 fn usda(bytes: &[u8], parts: &[Artifact], limits: &Limits) -> Result<Model, String> {
     let text = std::str::from_utf8(bytes).map_err(|error| error.to_string())?;
-    let mut lists: BTreeMap<&str, Vec<f64>> = text.lines().filter_map(list).collect();
+    let (subsets, lists): (Vec<_>, Vec<_>) =
+        text.lines().filter_map(list).partition(|(name, _)| *name == USD_SUBSET);
+    let mut lists: BTreeMap<&str, Vec<f64>> = lists.into_iter().collect();
     let mut take = |name: &str| lists.remove(name).ok_or_else(|| format!("it has no {name}"));
     let points = |values: Vec<f64>| -> Vec<DVec3> {
         values.as_chunks::<3>().0.iter().copied().map(DVec3::from).collect()
@@ -164,15 +170,53 @@ fn usda(bytes: &[u8], parts: &[Artifact], limits: &Limits) -> Result<Model, Stri
     // Normals and texture coordinates are of the corners of faces, one after the other.
     let corners: Vec<u32> = (0..indices.len() as u32).collect();
     let mut triangles = Vec::new();
-    add(&mut triangles, &indices, &positions, (&corners, &normals), (&corners, &uvs))?;
-    let texture = parts.first().ok_or("it has no texture")?;
-    Ok(Model { triangles, texture: image(texture.bytes(), limits)? })
+    add(&mut triangles, 0, &indices, &positions, (&corners, &normals), (&corners, &uvs))?;
+    if !subsets.is_empty() {
+        of_subsets(&mut triangles, subsets.into_iter().map(|(_, faces)| faces))?;
+    }
+    model(triangles, parts.iter().map(|part| Some(part.bytes())), limits)
 }
 
-/// Adds the triangles of indexed lists: three entries each of the indices into positions, mm, and of
+/// Gives each triangle the texture of its subset; each must be in one.
+fn of_subsets(
+    triangles: &mut [Triangle],
+    subsets: impl Iterator<Item = Vec<f64>>,
+) -> Result<(), String> {
+    let mut left: BTreeSet<usize> = (0..triangles.len()).collect();
+    for (texture, faces) in subsets.enumerate() {
+        for face in faces {
+            let face = face as usize;
+            if !left.remove(&face) {
+                return Err("a face in two subsets, or one that is not there".to_owned());
+            }
+            triangles[face].texture = texture;
+        }
+    }
+    if left.is_empty() { Ok(()) } else { Err("a face in no subset".to_owned()) }
+}
+
+/// A model with its textures decoded; they have no more pixels together than a picture may have.
+fn model<'a>(
+    triangles: Vec<Triangle>,
+    pictures: impl Iterator<Item = Option<&'a [u8]>>,
+    limits: &Limits,
+) -> Result<Model, String> {
+    let mut textures = Vec::new();
+    let mut pixels = 0;
+    for picture in pictures {
+        textures.push(image(picture.ok_or("it has no texture")?, &mut pixels, limits)?);
+    }
+    match triangles.iter().all(|triangle| triangle.texture < textures.len()) {
+        true => Ok(Model { triangles, textures }),
+        false => Err("it has no texture".to_owned()),
+    }
+}
+
+/// Adds the triangles of a texture from indexed lists: three entries each of the indices into positions, mm, and of
 /// those into normals and texture coordinates.
 fn add(
     triangles: &mut Vec<Triangle>,
+    texture: usize,
     indices: &[u32],
     positions: &[DVec3],
     normals: (&[u32], &[DVec3]),
@@ -188,6 +232,7 @@ fn add(
             vertices_mm: [DVec3::ZERO; 3],
             normals: [DVec3::ZERO; 3],
             uv: [DVec2::ZERO; 3],
+            texture,
         };
         for (i, at) in three.into_iter().enumerate() {
             triangle.vertices_mm[i] = pick(positions, indices.get(at))?;
@@ -199,15 +244,16 @@ fn add(
     Ok(())
 }
 
-/// Decodes a texture to grey values.
-fn image(bytes: &[u8], limits: &Limits) -> Result<Gray<u8>, String> {
+/// Decodes a texture to grey values, after so many pixels of others.
+fn image(bytes: &[u8], before: &mut u64, limits: &Limits) -> Result<Gray<u8>, String> {
     let broken = |error: &dyn std::fmt::Display| format!("its texture: {error}");
     // Only PNG comes so far.
     let mut reader = image::ImageReader::with_format(Cursor::new(bytes), image::ImageFormat::Png);
     reader.no_limits();
     let decoder = reader.into_decoder().map_err(|error| broken(&error))?;
     let (width, height) = decoder.dimensions();
-    limits.check_pixels(width, height).map_err(|error| broken(&error))?;
+    *before += u64::from(width) * u64::from(height);
+    limits.check_all_pixels(*before).map_err(|error| broken(&error))?;
     let decoded = image::DynamicImage::from_decoder(decoder).map_err(|error| broken(&error))?;
     let grey = decoded.into_luma8();
     let (width, height) = (grey.width() as usize, grey.height() as usize);

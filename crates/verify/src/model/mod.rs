@@ -12,12 +12,27 @@ pub(super) use load::load;
 pub(super) use stl::{Facet, load_stl};
 pub(super) use view::View;
 
-/// A loaded mesh with one texture, in the target frame.
+/// A loaded mesh with its textures, in the target frame.
 pub(super) struct Model {
-    /// Its triangles.
+    /// Its triangles, each with a texture that is there.
     pub triangles: Vec<Triangle>,
-    /// Its texture as grey values.
-    pub texture: Gray<u8>,
+    /// Its textures as grey values.
+    pub textures: Vec<Gray<u8>>,
+}
+
+impl Model {
+    /// The texture of a triangle, and its size, px.
+    pub fn texture(&self, triangle: &Triangle) -> (&Gray<u8>, DVec2) {
+        let texture = &self.textures[triangle.texture];
+        (texture, DVec2::new(texture.width() as f64, texture.height() as f64))
+    }
+
+    /// Side of a pixel of its texture on a triangle, mm.
+    pub fn texel_mm(&self, triangle: &Triangle) -> f64 {
+        let (_, size_px) = self.texture(triangle);
+        let [a, b, c] = triangle.uv.map(|uv| uv * size_px);
+        (triangle.winding().length() / (b - a).perp_dot(c - a).abs()).sqrt()
+    }
 }
 
 /// A triangle as loaded, with the attributes of its three vertices.
@@ -30,6 +45,8 @@ pub(super) struct Triangle {
     /// Texture coordinates, 0 to 1: (0, 0) is the upper left corner of the texture, (1, 1) the lower
     /// right one.
     pub uv: [DVec2; 3],
+    /// Which texture they are of.
+    pub texture: usize,
 }
 
 impl Triangle {
@@ -37,11 +54,5 @@ impl Triangle {
     pub fn winding(&self) -> DVec3 {
         let [a, b, c] = self.vertices_mm;
         (b - a).cross(c - a)
-    }
-
-    /// Side of a pixel of the texture of this size, px, on the triangle, mm.
-    pub fn texel_mm(&self, texture_px: DVec2) -> f64 {
-        let [a, b, c] = self.uv.map(|uv| uv * texture_px);
-        (self.winding().length() / (b - a).perp_dot(c - a).abs()).sqrt()
     }
 }

@@ -30,9 +30,8 @@ impl View {
         let mut shades = vec![BACKGROUND; width * height];
         let scale = SAMPLES as f64;
         let sample = |pixel: DVec2| (pixel + 0.5) * scale - 0.5;
-        let texture = &model.texture;
-        let size = DVec2::new(texture.width() as f64, texture.height() as f64);
         for triangle in &model.triangles {
+            let (texture, size) = model.texture(triangle);
             let seen = triangle.vertices_mm.map(|v| self.camera_from_target.apply(v));
             let normal = (seen[1] - seen[0]).cross(seen[2] - seen[0]);
             if normal.dot(seen[0]) >= 0.0 {

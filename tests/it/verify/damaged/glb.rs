@@ -8,7 +8,7 @@ use super::{Case, Damage, cases};
 use crate::common::glb::Parts;
 
 /// Changes the JSON.
-fn json(edit: impl Fn(&mut Value) + 'static) -> Damage {
+pub fn json(edit: impl Fn(&mut Value) + 'static) -> Damage {
     Box::new(move |bytes| {
         let mut parts = Parts::of(bytes);
         let mut root: Value = serde_json::from_slice(&parts.json).unwrap();

@@ -10,14 +10,17 @@ mod lists;
 mod obj;
 mod pdf;
 mod png;
+mod split;
 mod stl;
 mod svg;
 
+use std::ffi::OsStr;
 use std::fs;
 use std::path::{MAIN_SEPARATOR, Path};
 use std::sync::LazyLock;
 
 use deltille::artwork;
+use deltille::export::artifacts::{Making, What, make};
 use deltille::export::dsc::{self, Dialect};
 use deltille::export::mesh::{Meshing, TexturedMesh};
 use deltille::export::{dxf, gltf, obj as obj_writer, pdf as pdf_writer, png as png_writer};
@@ -25,7 +28,7 @@ use deltille::export::{stl as stl_writer, svg as svg_writer};
 use deltille::family::Family;
 use deltille::lattice::GridKind;
 use deltille::targets::{BoardSpec, PaperSpec, SolidShape, SolidSpec, Target, TargetSpec};
-use deltille::verify::{Finding, Format, Verdict, Verifier};
+use deltille::verify::{Finding, Format, Verdict, Verifier, whole_of};
 use deltille::words::shown;
 use tempfile::TempDir;
 
@@ -87,10 +90,28 @@ static SOLID: LazyLock<Artifacts> = LazyLock::new(|| {
     write("t.glb", &gltf::to_bytes(&mesh));
     write("t.obj", obj_writer::text(&mesh).as_bytes());
     write("t.mtl", obj_writer::material(&mesh).as_bytes());
-    write("t-texture.png", &mesh.texture_png);
+    write("t-texture.png", &mesh.textures[0].png);
     write("t.stl", &stl_writer::to_bytes("t", &spec.polyhedron().triangles_mm()));
     write("t-panels.dxf", dxf::text(&artwork::panels_to_cut(target).unwrap()).as_bytes());
     write("t-net.dxf", dxf::text(&artwork::net_to_cut(target).unwrap()).as_bytes());
+    artifacts
+});
+
+/// A small tetrahedron as meshes with two textures.
+static SPLIT: LazyLock<Artifacts> = LazyLock::new(|| {
+    let spec = SolidSpec {
+        edge_mm: 60.0,
+        tiles: 7,
+        margin_mm: 4.0,
+        ..SolidSpec::new(SolidShape::Tetrahedron)
+    };
+    let artifacts = Artifacts::new("s", &TargetSpec::Solid(spec));
+    let mut making = Making::default();
+    making.mesh.textures = 2;
+    for what in [What::Gltf, What::Mjcf, What::Usd] {
+        let files = make(&artifacts.target, Some(&artifacts.family), what, making).unwrap();
+        files.iter().for_each(|(name, bytes)| artifacts.write(name, bytes));
+    }
     artifacts
 });
 
@@ -128,13 +149,19 @@ impl Artifacts {
         let bad = (case.damage)(&good);
         assert!(bad != good, "{}, {}: nothing is damaged", case.file, case.name);
         let folder = TempDir::new().unwrap();
-        // A material library and a texture are verified with their mesh.
-        for name in ["t.obj", "t.mtl", "t-texture.png"] {
-            let _ = fs::copy(self.folder.path().join(name), folder.path().join(name));
+        // Material libraries and textures are verified with their mesh, parts of it with the model for MuJoCo.
+        for entry in fs::read_dir(self.folder.path()).unwrap() {
+            let path = entry.unwrap().path();
+            let is_part = ["obj", "mtl", "png", "xml"].map(OsStr::new);
+            if path.extension().is_some_and(|extension| is_part.contains(&extension)) {
+                fs::copy(&path, folder.path().join(path.file_name().unwrap())).unwrap();
+            }
         }
         fs::write(folder.path().join(case.file), bad).unwrap();
         let verified = match case.file {
             "t.mtl" | "t-texture.png" => "t.obj",
+            "s.mtl" | "s-texture-2.png" => "s.obj",
+            "s-2.obj" => "s.xml",
             file => file,
         };
         match self.verify(&folder.path().join(verified)) {
@@ -179,11 +206,12 @@ fn found(verdict: &Verdict) -> String {
 
 #[test]
 fn undamaged_artifacts_pass() {
-    for (artifacts, least) in [(&*BOARD, 4), (&*SOLID, 9)] {
+    for (artifacts, least) in [(&*BOARD, 4), (&*SOLID, 9), (&*SPLIT, 4)] {
         let mut passed = 0;
         for entry in fs::read_dir(artifacts.folder.path()).unwrap() {
             let path = entry.unwrap().path();
-            if Format::of(&path).is_none() || path.ends_with("t-texture.png") {
+            let name = path.file_name().unwrap().to_string_lossy();
+            if Format::of(&path).is_none() || whole_of(&artifacts.target.name, &name).is_some() {
                 continue;
             }
             let verdict = artifacts.verify(&path).unwrap();
@@ -207,7 +235,15 @@ fn the_corpus_is_large_and_its_names_are_unique() {
         lists::net(),
         lists::panels(),
     ];
-    let all: Vec<Case> = board.into_iter().chain(solid).flatten().collect();
+    let split = [
+        split::glb(),
+        split::obj(),
+        split::material(),
+        split::texture(),
+        split::usd(),
+        split::mujoco(),
+    ];
+    let all: Vec<Case> = board.into_iter().chain(solid).chain(split).flatten().collect();
     assert!(all.len() >= LEAST, "{} cases", all.len());
     let mut names: Vec<_> = all.iter().map(|case| (case.file, case.name)).collect();
     names.sort_unstable();
@@ -251,6 +287,18 @@ fn damaged_obj_fails() {
     SOLID.all_fail(&obj::material(), &mut page);
     SOLID.all_fail(&obj::texture(), &mut page);
     page.is("damaged-obj");
+}
+
+#[test]
+fn damaged_meshes_of_two_textures_fail() {
+    let mut page = Page::default();
+    SPLIT.all_fail(&split::glb(), &mut page);
+    SPLIT.all_fail(&split::obj(), &mut page);
+    SPLIT.all_fail(&split::material(), &mut page);
+    SPLIT.all_fail(&split::texture(), &mut page);
+    SPLIT.all_fail(&split::usd(), &mut page);
+    SPLIT.all_fail(&split::mujoco(), &mut page);
+    page.is("damaged-split");
 }
 
 #[test]

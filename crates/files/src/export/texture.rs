@@ -1,0 +1,213 @@
+//! How large the textures of a mesh are, and which faces each of them shows.
+//!
+//! ```text
+//!   faces  0 1 2 3 4 5 6 7 8     in their order, so that each texture has about as much to show
+//!          ╰──╮──╯ ╰─╮─╯ ╰╮╯     and all are as sharp
+//!   texture   1      2    3
+//! ```
+
+use std::ops::Range;
+
+use super::mesh::{MAX_TEXTURE_PX, MeshError, Resolution, TEXELS_PER_BIT};
+use deltille_core::artwork::Atlas;
+use deltille_core::polygon::area;
+use deltille_core::targets::{Face, Panel};
+
+/// Most textures of a mesh: readers hold all of them at the same time.
+pub const MAX_TEXTURES: u32 = 64;
+
+/// What carries boards: the faces of a solid, or the sides of a plate.
+#[derive(Clone, Copy)]
+pub(super) enum Surface<'a> {
+    Faces(&'a [Face]),
+    Plate(&'a [Panel]),
+}
+
+impl Surface<'_> {
+    fn len(self) -> usize {
+        match self {
+            Self::Faces(faces) => faces.len(),
+            Self::Plate(sides) => sides.len(),
+        }
+    }
+
+    /// The areas of the faces, in any unit.
+    fn areas(self) -> Vec<f64> {
+        match self {
+            Self::Faces(faces) => faces.iter().map(|face| area(&face.outline_mm)).collect(),
+            Self::Plate(sides) => vec![1.0; sides.len()],
+        }
+    }
+
+    fn atlas(self, share: Range<usize>, px_per_m: u32) -> Atlas {
+        match self {
+            Self::Faces(faces) => Atlas::of_faces(&faces[share], px_per_m),
+            Self::Plate(sides) => Atlas::of_plate(&sides[share], px_per_m),
+        }
+    }
+}
+
+/// Some faces, by their numbers, and how they lie on their texture.
+pub(super) struct Picture {
+    pub faces: Range<usize>,
+    pub atlas: Atlas,
+}
+
+/// The textures of a surface, `count` of them, at the resolution that is asked for. Cells of tags have an edge of
+/// `cell_mm`, and need so many texels.
+///
+/// # Errors
+/// When there are fewer faces than textures, or a texture would be too large, or too coarse for the tags.
+pub(super) fn pictures(
+    surface: Surface,
+    count: u32,
+    resolution: Resolution,
+    (cell_mm, needed): (f64, f64),
+) -> Result<Vec<Picture>, MeshError> {
+    let (faces, asked) = (surface.len(), count);
+    let most = MAX_TEXTURES.min(faces as u32).max(1);
+    if !(1..=most).contains(&asked) {
+        return Err(MeshError::Textures { asked, faces, most });
+    }
+    // Pixels per metre that so many texels a cell are.
+    let per_m = |texels: f64| (1e3 * texels / cell_mm).ceil().clamp(1.0, u32::MAX.into()) as u32;
+    let set = Set { surface, shares: shares(&surface.areas(), count as usize) };
+    let pictures = match resolution {
+        Resolution::Usual => set.within(MAX_TEXTURE_PX, per_m(TEXELS_PER_BIT), false),
+        Resolution::Dpi(dpi) => set.at((dpi / 0.0254).ceil().clamp(1.0, u32::MAX.into()) as u32),
+        Resolution::Side(side) => set.within(side.min(MAX_TEXTURE_PX), per_m(TEXELS_PER_BIT), true),
+    };
+    // A resolution in whole dots per inch may be the least one, rounded.
+    let texels =
+        pictures.first().map_or(0.0, |first| f64::from(first.atlas.px_per_m) * cell_mm / 1e3);
+    let is_unsharp = texels < needed * (1.0 - 1e-9);
+    let side = longest(&pictures);
+    if !is_unsharp && side <= MAX_TEXTURE_PX {
+        return Ok(pictures);
+    }
+    // So many more textures of that size would do, with some pixels to spare for spaces, which are in px.
+    let or_more = |side: u32, px_per_m: u32| {
+        let enough = |&count: &u32| {
+            let set = Set { surface, shares: shares(&surface.areas(), count as usize) };
+            longest(&set.at(px_per_m)) <= side
+        };
+        let found = (count + 1..=most).find(enough);
+        found.map_or(String::new(), |count| format!(", or `Meshing::textures` {count}"))
+    };
+    let sharp = per_m(SPARE * needed);
+    Err(match resolution {
+        Resolution::Usual => {
+            let or_more = or_more(MAX_TEXTURE_PX, sharp);
+            too_large(&set.at(per_m(needed)), format!("{TOO_MANY_CELLS}{or_more}"))
+        }
+        Resolution::Side(asked) if is_unsharp => {
+            let least = (f64::from(side) * SPARE * needed / texels).ceil();
+            let or_more = or_more(asked.min(MAX_TEXTURE_PX), sharp);
+            MeshError::Unsharp { texels, needed, least: format!("{least:.0} px or more{or_more}") }
+        }
+        Resolution::Dpi(_) if is_unsharp => {
+            let least = (1e3 * needed / cell_mm * 0.0254).ceil();
+            MeshError::Unsharp { texels, needed, least: format!("{least:.0} dpi or more") }
+        }
+        _ => {
+            let or_more = or_more(MAX_TEXTURE_PX, pictures[0].atlas.px_per_m);
+            too_large(&pictures, format!("choose a lower resolution{or_more}"))
+        }
+    })
+}
+
+/// Some for spaces between faces.
+const SPARE: f64 = 1.02;
+
+const TOO_MANY_CELLS: &str =
+    "its tags would be unsharp in a smaller one; take fewer tiles, or a family of fewer bits";
+
+fn too_large(pictures: &[Picture], instead: String) -> MeshError {
+    let sizes = pictures.iter().map(|picture| picture.atlas.size_px);
+    let [width, height] = sizes.max_by_key(|size| size[0].max(size[1])).unwrap_or_default();
+    MeshError::Texture { width, height, instead }
+}
+
+/// The longest side of all textures, px.
+fn longest(pictures: &[Picture]) -> u32 {
+    pictures.iter().flat_map(|picture| picture.atlas.size_px).max().unwrap_or(1)
+}
+
+/// A surface whose faces are shared among textures.
+struct Set<'a> {
+    surface: Surface<'a>,
+    shares: Vec<Range<usize>>,
+}
+
+impl Set<'_> {
+    fn at(&self, px_per_m: u32) -> Vec<Picture> {
+        let picture = |faces: &Range<usize>| {
+            let (faces, atlas) = (faces.clone(), self.surface.atlas(faces.clone(), px_per_m));
+            Picture { faces, atlas }
+        };
+        self.shares.iter().map(picture).collect()
+    }
+
+    /// The finest textures whose sides have no more than `side` px, or, unless that is to be `filled`, those of the
+    /// usual resolution where these are smaller. Space between faces is in px, so that sizes are not quite in
+    /// proportion to the resolution.
+    fn within(&self, side: u32, usual_px_per_m: u32, filled: bool) -> Vec<Picture> {
+        let mut px_per_m = usual_px_per_m;
+        let mut found = self.at(px_per_m);
+        if !filled && longest(&found) <= side {
+            return found;
+        }
+        for _ in 0..MOST_ATTEMPTS {
+            let is = longest(&found);
+            if is <= side && f64::from(is) > CLOSE * f64::from(side) {
+                break;
+            }
+            let part = CLOSE.midpoint(1.0) * f64::from(side) / f64::from(is);
+            px_per_m = (f64::from(px_per_m) * part).max(1.0) as u32;
+            found = self.at(px_per_m);
+        }
+        found
+    }
+}
+
+/// A texture that is so much of the longest side is as large as can be.
+const CLOSE: f64 = 0.99;
+
+/// Each attempt is nearer by the part that spaces are of the whole.
+const MOST_ATTEMPTS: usize = 12;
+
+/// So many runs of faces of about the same area each, none of them empty; there are at least as many faces.
+fn shares(areas: &[f64], count: usize) -> Vec<Range<usize>> {
+    let mut left: f64 = areas.iter().sum();
+    let mut end = 0;
+    let share = |index: usize| {
+        let (start, after) = (end, count - 1 - index);
+        let aim = left / (after + 1) as f64;
+        let mut taken = 0.0;
+        // A face belongs to the share that has its middle; those after need one each, the last takes all.
+        while end < areas.len() - after
+            && (end == start || after == 0 || taken + areas[end] / 2.0 <= aim)
+        {
+            taken += areas[end];
+            end += 1;
+        }
+        left -= taken;
+        start..end
+    };
+    (0..count).map(share).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::shares;
+
+    #[test]
+    fn faces_are_shared_by_their_areas_and_no_texture_is_without() {
+        assert_eq!(shares(&[1.0; 10], 3), [0..3, 3..7, 7..10]);
+        assert_eq!(shares(&[1.0; 320], 4), [0..80, 80..160, 160..240, 240..320]);
+        assert_eq!(shares(&[9.0, 1.0, 1.0, 1.0], 2), [0..1, 1..4]);
+        assert_eq!(shares(&[1.0, 1.0, 1.0, 9.0], 2), [0..3, 3..4]);
+        assert_eq!(shares(&[1.0, 1.0, 9.0], 3), [0..1, 1..2, 2..3]);
+        assert_eq!(shares(&[1.0; 5], 1), [0..5]);
+    }
+}
