@@ -1,9 +1,11 @@
-"""Every shipped family, verified from its file alone: families.py DELTAG [--hidden] [FAMILY …].
+"""Every shipped family, or families in files, verified from the file alone: families.py DELTAG [--hidden] [FAMILY …].
 
 Shares no code with the generator. Cells are triangles and squares in the plane; turns, mirrors and neighbours come from
 where their middles come to lie. Checked are distance, distance histogram, rules, false positives by fair coins and the
-fingerprint, against the file; and what `deltag verify-family` says of the distance and of that in a mirror. With --hidden
-it is told what distance is left where a corner, or the cells along an edge, are hidden. Needs numpy.
+fingerprint, against the file, those that it had before it grew too; and what `deltag verify-family` says of the distance and
+of that in a mirror. With --hidden, and of every family that claims one, the distance is computed that is left where a corner,
+the cells along an edge, or a triangle of four cells are hidden, wherever they lie; it must be what `deltag info` says, and
+what the file claims at least. Needs numpy.
 """
 
 import hashlib
@@ -72,14 +74,19 @@ def left_of(turned, hidden):
 
 
 def with_hidden_cells(turned, places):
-    """Distances left where the four cells of a corner, and where all cells along an edge are hidden."""
+    """Distances left where the four cells of a corner, where all cells along an edge, and where a triangle of four is hidden."""
     height = places.imag
     rows = math.isqrt(len(places))
     # A corner of four is the uppermost two rows of cells; along the lower edge lie those that have a side or a corner on it.
+    # All turns of all words are there, so that one corner and one edge stand for the three.
     corner = height > np.sort(height)[-4] - 1e-6
     edge = height < height.min() + math.sqrt(3) / 6 + 1e-6
     assert (corner.sum(), edge.sum()) == (4, 2 * rows - 1)
-    return left_of(turned, corner), left_of(turned, edge)
+    # A triangle of four is a cell with three neighbours, and these.
+    beside = abs(abs(places[:, None] - places[None]) - 1 / math.sqrt(3)) < 1e-6
+    tiles = [row | (np.arange(len(places)) == cell) for cell, row in enumerate(beside) if row.sum() == 3]
+    assert len(tiles) == rows * (rows - 1) // 2 + (rows - 3) * (rows - 2) // 2 and corner.tolist() in [tile.tolist() for tile in tiles]
+    return {"apex": left_of(turned, corner), "edge": left_of(turned, edge), "tile": min(left_of(turned, tile) for tile in tiles)}
 
 
 def check(path, program, hidden):
@@ -118,18 +125,28 @@ def check(path, program, hidden):
     lines = head + [f"0x{int(code):0{digits}x}" for code in codes]
     assert hashlib.sha256("".join(line + "\n" for line in lines).encode()).hexdigest()[:16] == text["fingerprint"]
 
+    for before in text.get("beginnings", []):
+        first = "".join(line + "\n" for line in lines[: len(head) + before["codes"]])
+        assert hashlib.sha256(first.encode()).hexdigest()[:16] == before["fingerprint"] and before["codes"] < len(codes)
+
     in_mirror = int(np.nonzero(distances(permuted(codes, mirror), turned))[0][0])
     told = json.loads(subprocess.run([program, "verify-family", path, "--json"], check=True, capture_output=True).stdout)[0]
     assert (told["holds"], told["distance"], told["mirror_distance"]) == (True, least, in_mirror), told
     print(f"{path.stem}: {len(codes)} codes of {bits} bits, distance {least}, in a mirror {in_mirror}, {differing.min()} of {len(beside)} pairs differ")
-    if hidden and kind != "checker":
-        corner, edge = with_hidden_cells(turned, places)
-        print(f"{path.stem}: with a corner of 4 cells hidden {corner}, with an edge of {2 * rows - 1} hidden {edge}", flush=True)
+    robust = rules.get("robust", [])
+    if (hidden or robust) and kind != "checker":
+        left = with_hidden_cells(turned, places)
+        assert all(left[rule["to"]] >= rule["distance"] for rule in robust), (left, robust)
+        info = json.loads(subprocess.run([program, "info", path, "--json"], check=True, capture_output=True).stdout)
+        assert info["distance_without"] == left, (info["distance_without"], left)
+        told = f"a corner of 4 cells hidden {left['apex']}, with an edge of {2 * rows - 1} hidden {left['edge']}, with a triangle of 4 hidden {left['tile']}"
+        print(f"{path.stem}: with {told}; claimed {robust}", flush=True)
 
 
 def main():
     program, names = sys.argv[1], [name for name in sys.argv[2:] if name != "--hidden"]
-    paths = [FOLDER / f"{name}.json" for name in names] or sorted(FOLDER.glob("*.json"))
+    named = [pathlib.Path(name) if name.endswith(".json") else FOLDER / f"{name}.json" for name in names]
+    paths = named or sorted(FOLDER.glob("*.json"))
     # Place codes are no family like others: tests/independent/dense.py.
     paths = [path for path in paths if path.stem != "dense9"]
     for path in paths:

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use deltille_core::family::{Family, PAIRS_COUNTED, certify_codes};
 use deltille_core::lattice::GridKind;
-use deltille_core::targets::{FamilyRef, Target, TargetFileError};
+use deltille_core::targets::{FamilyRef, OtherFamily, Target, TargetFileError};
 
 use crate::export::dsc::{self, DscError};
 use crate::export::staging;
@@ -104,21 +104,17 @@ pub enum TargetFamilyError {
         failure: String,
     },
     /// A family with other codes.
-    #[error("{target} was made with fingerprint {wanted} of {name}, this one is {found}")]
+    #[error("{target} {why}")]
     Other {
         /// The target's name.
         target: String,
-        /// The family's name.
-        name: String,
-        /// Fingerprint of the family that the target was made with.
-        wanted: String,
-        /// That of the family which is there.
-        found: String,
+        /// What is another.
+        why: OtherFamily,
     },
 }
 
 /// The family of a target: the one given, else by the name in the target, else by the path in its spec. Its codes must be
-/// those that the target was made with, and as far apart as the family claims: what is read by it is believed by
+/// those that the target was made with, perhaps with others after them, and as far apart as the family claims: what is read by it is believed by
 /// that. `None` of a target without tags.
 ///
 /// # Errors
@@ -162,14 +158,9 @@ fn one_family(
                 error: Box::new(error),
             })?,
     };
-    if !wanted.fingerprint.is_empty() && family.fingerprint() != wanted.fingerprint {
-        return Err(TargetFamilyError::Other {
-            target: target.name.to_string(),
-            name: wanted.name.clone(),
-            wanted: wanted.fingerprint.clone(),
-            found: family.fingerprint().to_owned(),
-        });
-    }
+    target
+        .check_family(wanted, &family)
+        .map_err(|why| TargetFamilyError::Other { target: target.name.to_string(), why })?;
     // Those that are shipped were compared when they were made.
     let is_shipped = Family::shipped(family.name()).is_ok_and(|shipped| shipped == family);
     if !is_shipped

@@ -84,7 +84,7 @@ use glam::DVec2;
 use deltille_core::artwork::CuttingError;
 use deltille_core::detect::{Detector, DetectorConfig, Ink, Tone};
 use deltille_core::family::Family;
-use deltille_core::targets::{SheetLayout, SheetPage, Target};
+use deltille_core::targets::{OtherFamily, SheetLayout, SheetPage, Target};
 use deltille_files::export::sheet_file_name;
 use deltille_files::limits::{Guard, Limits};
 use fit::AffineMap;
@@ -271,15 +271,13 @@ impl<'a> Verifier<'a> {
                 continue;
             };
             let family = family.map(|family| family.of_tiling(kind).unwrap_or(family));
-            // A .dsc file names its family without a fingerprint.
-            let same = |family: &Family| {
-                needed.fingerprint.is_empty() || family.fingerprint() == needed.fingerprint
-            };
             let given = match family {
-                Some(family) if same(family) => None,
-                Some(family) => {
-                    Some(format!("{} has fingerprint {}", family.name(), family.fingerprint()))
-                }
+                Some(family) => target.check_family(needed, family).err().map(|why| match why {
+                    OtherFamily::Codes { found, .. } => {
+                        format!("{} has fingerprint {found}", family.name())
+                    }
+                    why => format!("the target {why}"),
+                }),
                 None => Some("none is given".to_owned()),
             };
             if let Some(given) = given {

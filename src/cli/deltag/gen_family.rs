@@ -5,7 +5,7 @@ use std::process::ExitCode;
 use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant};
 
-use anyhow::{bail, ensure};
+use anyhow::{Context, bail, ensure};
 use clap::ValueEnum;
 
 use super::checkpoint::CheckpointFile;
@@ -62,6 +62,10 @@ pub(super) struct Args {
     /// nothing
     #[arg(long)]
     from_nothing: bool,
+    /// For the methods best and algebraic: no search, but what is on record as far as it satisfies the
+    /// rules, after the codes of this family, which keep their ids
+    #[arg(long, value_name = "FAMILY", conflicts_with_all = ["time", "work", "from_nothing", "seed"])]
+    extend: Option<String>,
     /// Seed of the random choices of best, algebraic and search [default: 1]
     #[arg(long, allow_negative_numbers = true, value_parser = whole(0..=u64::MAX))]
     seed: Option<u64>,
@@ -239,6 +243,9 @@ fn free_name(path: &Path) -> PathBuf {
 /// Size of a family file at most: 64 MiB, of which a little is for what is not codes.
 pub(super) const FILE_LIMIT: u64 = (64 << 20) - (64 << 10);
 
+/// Codes of 49 bits that are listed where cells may be hidden.
+const ROBUST_LIMIT: u64 = 20_000;
+
 /// Length of a code's line: four spaces, quotes, 0x, digits, comma, line feed.
 pub(super) fn bytes_per_code(dimension: Dimension) -> u64 {
     u64::from(dimension.bits().div_ceil(4)) + 10
@@ -320,6 +327,7 @@ impl Args {
         refuse("--time", self.time.is_some(), &[Algebraic, Best, Search])?;
         refuse("--work", self.work.is_some(), &[Algebraic, Best])?;
         refuse("--from-nothing", self.from_nothing, &[Algebraic, Best])?;
+        refuse("--extend", self.extend.is_some(), &[Algebraic, Best])?;
         refuse("--false-positives", self.choice.false_positives.is_some(), &[Algebraic, Best])?;
         refuse("--limit", self.limit.is_some(), &[Algebraic, Best])?;
         refuse("--rounds", self.rounds.is_some(), &[Search])?;
@@ -333,6 +341,10 @@ impl Args {
              the best family so far, and more --time finds more"
         );
         let bits = self.family.dimension.bits();
+        ensure!(
+            !(method == Lexicode && bits > 25 && self.rules.is_robust()),
+            "--robust-to: a lexicode takes it up to 25 bits, not with {bits}; use --method best"
+        );
         let limit = match method {
             Search => 25,
             Lexicode => 36,
@@ -354,10 +366,11 @@ impl Args {
         } else {
             String::new()
         };
-        let Rules { min_complexity, black_distance, white_distance } = rules;
+        let Rules { min_complexity, black_distance, white_distance, robust } = rules;
+        let robust: String = robust.iter().map(|robust| format!(", robust to {robust}")).collect();
         format!(
             "{:?} d{}h{distance}, complexity {min_complexity}, black {black_distance}, \
-             white {white_distance}{seed}",
+             white {white_distance}{robust}{seed}",
             self.method,
             dimension.bits()
         )
@@ -430,8 +443,12 @@ impl Args {
 
     fn best(&self, name: &str, rules: Rules, control: Control) -> anyhow::Result<Outcome> {
         let Parameters { dimension, distance } = self.family;
-        let limit =
-            self.limit.or((dimension.bits() > 36).then(|| FILE_LIMIT / bytes_per_code(dimension)));
+        // With hidden cells every code is compared with all that were taken before.
+        let most = match rules.robust.as_slice() {
+            [] => FILE_LIMIT / bytes_per_code(dimension),
+            _ => ROBUST_LIMIT,
+        };
+        let limit = self.limit.or((dimension.bits() > 36).then_some(most));
         let budget = match self.work {
             Some(steps) => Budget::Work(steps),
             None => Budget::Time(Duration::from_secs_f64(self.time.unwrap_or(60.0)), clock::now),
@@ -444,6 +461,17 @@ impl Args {
             let codes = best.family_of(name, start)?;
             let proof = proof_of(&certify_codes(&codes), distance);
             tell!("starts from {} of {}: {proof}", counted(codes.len(), "code"), start.family);
+        }
+        if let Some(older) = &self.extend {
+            let older = super::resolve(older).context("--extend")?;
+            let Some(start) = start else { bail!("--extend: nothing is on record to extend with") };
+            return match best.family_of(name, &start)?.extending(&older) {
+                Ok(family) => Ok(Outcome::whole(family)),
+                Err(FamilyError::Field { problem, .. }) => {
+                    bail!("--extend: {problem}; their ids could not stay")
+                }
+                Err(error) => Err(error.into()),
+            };
         }
         interrupt::keeps_results();
         match best.family(name, start, control) {

@@ -1,10 +1,10 @@
 use std::process::ExitCode;
 
-use serde_json::Value;
+use serde_json::{Value, json};
 
 use super::{confusion, false_positives, place_codes};
 use crate::cli::output::{self, Telling, say};
-use crate::family::{self, Family, TagWords, bounds::bounds};
+use crate::family::{self, Family, HiddenCells, PAIRS_COUNTED, TagWords, bounds::bounds};
 use crate::lattice::GridKind;
 use crate::targets::{BoardSpec, SolidShape, SolidSpec, TagSpec, Target, TargetSpec};
 use crate::words::counted;
@@ -28,6 +28,13 @@ fn tags_of(spec: &TargetSpec) -> anyhow::Result<usize> {
     Ok(target.panels.iter().map(|panel| panel.tags.len()).sum())
 }
 
+/// The distances that are left with cells hidden, of a family whose pairs are counted.
+fn without_hidden(family: &Family) -> Vec<(HiddenCells, u32)> {
+    let known = family.len() <= PAIRS_COUNTED;
+    let all = HiddenCells::ALL.into_iter().filter(|_| known);
+    all.filter_map(|hidden| Some((hidden, family.distance_without(hidden)?))).collect()
+}
+
 pub(super) fn run(args: Args) -> anyhow::Result<ExitCode> {
     if let [of, other] = &args.families[..] {
         let [of, other] = [super::resolve(of)?, super::resolve(other)?];
@@ -43,13 +50,17 @@ pub(super) fn run(args: Args) -> anyhow::Result<ExitCode> {
     let family = super::resolve(name)?;
     if args.telling.is_json() {
         let bounds = bounds(family.kind(), family.dimension(), family.distance());
-        let mut told = serde_json::json!({
+        let mut told = json!({
             "name": family.name(), "fingerprint": family.fingerprint(), "codes": family.len(),
             "bits": family.dimension().bits(), "distance": family.distance(),
             "corrects": family.correctable(), "rules": family.rules(),
             "construction": family.construction(), "upper_bound": bounds.linear_programming,
             "distance_histogram": family.histogram(),
         });
+        let left = without_hidden(&family);
+        let left = left.iter().map(|(cells, left)| (cells.name().to_owned(), json!(left)));
+        told["distance_without"] = left.collect::<serde_json::Map<_, _>>().into();
+        told["beginnings"] = json!(family.beginnings());
         false_positives::add_to(&mut told, &family);
         output::print_json(&told)?;
         return Ok(ExitCode::SUCCESS);
@@ -60,6 +71,21 @@ pub(super) fn run(args: Args) -> anyhow::Result<ExitCode> {
     say!("  codes           {}", family.len());
     say!("  bits            {bits} in {} rows", family.dimension().rows());
     say!("  distance        {}, corrects {} cells", family.distance(), family.correctable());
+    for (hidden, left) in without_hidden(&family) {
+        let cells = hidden.count(family.dimension());
+        let what = match hidden {
+            HiddenCells::Apex => format!("the {cells} of a corner"),
+            HiddenCells::Edge => format!("the {cells} along an edge"),
+            _ => format!("any {cells} in a triangle"),
+        };
+        let kept = rules.robust.iter().find(|rule| rule.to == hidden);
+        let kept = kept.map_or(String::new(), |rule| format!(", by rule {}", rule.distance));
+        say!("                  {left} with {what} hidden ({}{kept})", hidden.name());
+    }
+    for before in family.beginnings() {
+        let (codes, fingerprint) = (before.codes, &before.fingerprint);
+        say!("  began as        {codes} codes, fingerprint {fingerprint}");
+    }
     say!(
         "  rules           every code: {} of {} neighbouring pairs of cells differ, {} cells are white, \
          {} black, at least",

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, bail};
 
 use super::parameters::Parameters;
-use crate::family::{FamilyError, Rules};
+use crate::family::{FamilyError, Robust, Rules};
 use crate::limits;
 
 #[derive(clap::Args)]
@@ -21,7 +21,12 @@ pub(super) struct RuleArgs {
     /// Keep codes at the family's distance from the all-white tile too
     #[arg(long)]
     reject_white: bool,
-    /// TOML file with min_complexity, black_distance, white_distance; options given here win
+    /// Keep codes apart also where cells are hidden: apex, the 4 cells of any corner, edge, those along
+    /// any edge, or tile, any 4 in a triangle; in at least 3 of the others, or as in edge=5.
+    /// Repeatable
+    #[arg(long, value_name = "CELLS[=DISTANCE]")]
+    robust_to: Vec<Robust>,
+    /// TOML file with min_complexity, black_distance, white_distance, robust; options given here win
     #[arg(long, value_name = "FILE")]
     rules: Option<PathBuf>,
 }
@@ -30,6 +35,11 @@ impl RuleArgs {
     /// Whether the complexity is given.
     pub(super) fn has_complexity(&self) -> bool {
         self.min_complexity.is_some()
+    }
+
+    /// Whether codes are to be known with cells hidden.
+    pub(super) fn is_robust(&self) -> bool {
+        !self.robust_to.is_empty()
     }
 
     /// The rules asked for, checked for the bits of the family.
@@ -46,7 +56,13 @@ impl RuleArgs {
         if self.reject_white {
             rules.white_distance = distance;
         }
-        check(&rules, bits, |field| format!("--{}", field.replace('_', "-")))?;
+        if !self.robust_to.is_empty() {
+            rules.robust.clone_from(&self.robust_to);
+        }
+        check(&rules, bits, |field| match field {
+            "robust" => "--robust-to".to_owned(),
+            field => format!("--{}", field.replace('_', "-")),
+        })?;
         Ok(rules)
     }
 }
@@ -85,9 +101,19 @@ fn read(path: &Path, rules: &mut Rules) -> anyhow::Result<()> {
             }
             "black_distance" => rules.black_distance = cells()?,
             "white_distance" => rules.white_distance = cells()?,
+            "robust" => {
+                let texts = value.as_array().map(Vec::as_slice).unwrap_or_default();
+                let parsed = texts.iter().map(|text| text.as_str()?.parse().ok());
+                let robust = parsed.collect::<Option<Vec<Robust>>>().filter(|r| !r.is_empty());
+                rules.robust = robust.with_context(|| {
+                    format!(
+                        "{file}: field `{field}`: {value} is not a list such as [\"edge\", \"apex=5\"]"
+                    )
+                })?;
+            }
             _ => bail!(
-                "{file}: unknown field `{field}`: there are min_complexity, black_distance and \
-                 white_distance"
+                "{file}: unknown field `{field}`: there are min_complexity, black_distance, \
+                 white_distance and robust"
             ),
         }
     }

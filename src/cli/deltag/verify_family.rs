@@ -5,7 +5,7 @@ use serde_json::json;
 use super::place_codes;
 use crate::cli::output::{self, Telling, line, say};
 use crate::cli::run::{BAD_INPUT, FAILED, report};
-use crate::family::{self, Certificate, Family, FamilyFileError, certify};
+use crate::family::{self, Certificate, Family, FamilyFileError, Robust, certify};
 use crate::words::counted;
 
 /// Told at the end of `--help`.
@@ -77,6 +77,10 @@ fn verify(family: &Family, certificate: &Certificate) -> (bool, String) {
         "{} codes of {bits} bits; {how}; every code satisfies the rules; fingerprint {fingerprint}{unchecked}",
         family.len()
     );
+    let before = family.beginnings().iter().map(|before| {
+        format!("; the first {} are those of fingerprint {}", before.codes, before.fingerprint)
+    });
+    let what: String = std::iter::once(what).chain(before).collect();
     (true, what)
 }
 
@@ -95,6 +99,10 @@ pub(super) fn proof_of(certificate: &Certificate, claimed: u32) -> String {
         true => format!("{known}, more than the {claimed} asked for"),
         false => known,
     };
+    let hidden =
+        |found: &Robust| format!("; with any {} hidden in {}", found.to.name(), found.distance);
+    let known: String =
+        std::iter::once(known).chain(certificate.robust.iter().map(hidden)).collect();
     match certificate.mirror_distance {
         Some(cells) => format!("{known}; from one seen in a mirror in {cells}"),
         None => known,

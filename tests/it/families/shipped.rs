@@ -68,14 +68,27 @@ fn own_families_are_as_large_as_documented() {
         ("d16h5", 78),
         ("d25h7", 1208),
         ("d25h9", 83),
-        ("d36h9", 12_964),
+        ("d36h9", 20_140),
         ("d36h11", 1902),
         ("d49h12", 20_000),
     ] {
         let family = Family::shipped(name).unwrap();
         assert!(family.len() >= size, "{name} has {}", family.len());
-        assert_eq!(family.rules(), &Rules::published(family.distance()), "{name}");
+        // The rule of d36h9 is chosen by natural false positives.
+        let min_complexity = if name == "d36h9" { 19.0 / 45.0 } else { 0.5 };
+        let rules = Rules { min_complexity, ..Rules::published(family.distance()) };
+        assert_eq!(family.rules(), &rules, "{name}");
     }
+}
+
+/// d36h9 has grown: boards of its first codes keep their ids, and are read by it.
+#[test]
+fn d36h9_begins_with_what_it_was() {
+    let family = Family::shipped("d36h9").unwrap();
+    assert_eq!(family.codes_under("5eb19ef119f5821f"), Some(12_964));
+    let words = TagWords::new(family.dimension());
+    assert!(family.codes()[..12_964].iter().all(|&code| words.differing_pairs(code) >= 23));
+    assert!(family.codes()[12_964..].iter().all(|&code| words.differing_pairs(code) < 23));
 }
 
 /// Minutes of work: `cargo test --release -- --ignored`.
@@ -122,8 +135,8 @@ fn very_large_families_are_proved_by_their_structure() {
 #[test]
 fn best_families_hold_whatever_the_rules() {
     for (bits, distance, rules) in [
-        (9, 3, Rules { min_complexity: 0.0, black_distance: 3, white_distance: 0 }),
-        (16, 6, Rules { min_complexity: 0.6, black_distance: 6, white_distance: 6 }),
+        (9, 3, Rules { black_distance: 3, ..Rules::NONE }),
+        (16, 6, Rules { min_complexity: 0.6, black_distance: 6, white_distance: 6, ..Rules::NONE }),
         (36, 13, Rules::published(13)),
     ] {
         let dimension = Dimension::from_bits(bits).unwrap();

@@ -4,7 +4,7 @@ use deltille_core::detect::{Detection, Detector, DetectorConfig, InkEstimate, Wa
 use deltille_core::family::Family;
 use deltille_core::lattice::GridKind;
 use deltille_core::raster::{AnyGray, FileNotes, Gray, grey_of_colours};
-use deltille_core::targets::Target;
+use deltille_core::targets::{OtherFamily, Target};
 use deltille_files::export::{csv, detection, orpc};
 use wasm_bindgen::prelude::*;
 
@@ -91,13 +91,14 @@ impl Finder {
         let target = Target::from_json(target).raise()?;
         let family = family.map(|file| Family::from_json(&file)).transpose().raise()?;
         if let (Some(wanted), Some(given)) = (&target.family, &family)
-            && wanted.fingerprint != given.fingerprint()
+            && let Err(why) = target.check_family(wanted, given)
         {
-            let (name, other) = (&wanted.name, given.fingerprint());
-            let stated = &wanted.fingerprint;
-            return Err(JsError::new(&format!(
-                "the target has tags of another {name} than the one that is shipped: {stated}, not {other}"
-            )));
+            return Err(JsError::new(&match why {
+                OtherFamily::Codes { name, wanted, found } => format!(
+                    "the target has tags of another {name} than the one that is shipped: {wanted}, not {found}"
+                ),
+                why => format!("the target {why}"),
+            }));
         }
         let detector = Detector::for_target(&target, family.as_ref(), DetectorConfig::default());
         Ok(Self { detector, target: Some(target) })

@@ -22,6 +22,7 @@ use super::algebra::{AlgebraicConstruction, Arrangement, CycleSpace, Span, resid
 use super::bounds::bounds;
 use super::file::parse_word;
 use super::polish::{Effort, polish};
+use super::robust::with_the_most_codes;
 use super::search::Search;
 use super::shipped::shipped_names;
 use super::{Construction, Control, Family, FamilyError, Progress, Rules, Screen, TagWords};
@@ -446,6 +447,11 @@ impl Best {
         let orbits = orbits.into_iter().step_by(step.max(1)).collect();
         let arranger =
             Arranger::new(self.dimension, self.distance, &self.rules, orbits, free_centre);
+        let screen = self.screen();
+        let arranger = match screen.is_robust() {
+            true => arranger.with_sums(union.differences_lighter_than(screen.reach())),
+            false => arranger,
+        };
         if self.exchange_pays()
             && self.rules.min_complexity > 0.0
             && self.dimension.bits() <= super::polish::MAX_BITS
@@ -602,7 +608,12 @@ impl Best {
         spent: &Spent,
         control: Control,
     ) -> Result<(Vec<u64>, Construction), FamilyError> {
-        if !self.exchange || self.dimension.bits() > super::polish::MAX_BITS {
+        if !self.exchange {
+            return Ok((codes, Construction::Algebraic(construction)));
+        }
+        let halt = || is_past(end) || control.is_cancelled();
+        let (codes, construction) = with_the_most_codes(screen, construction, codes, halt)?;
+        if self.dimension.bits() > super::polish::MAX_BITS {
             return Ok((codes, Construction::Algebraic(construction)));
         }
         let rounds = spent.rounds(50) as u32;
@@ -619,9 +630,16 @@ impl Best {
         }
         let plain = AlgebraicConstruction { exchanged: Vec::new(), ..construction };
         let own = plain.codes(screen)?;
-        let exchanged = polished.into_iter().filter(|code| !own.contains(code));
-        let exchanged = exchanged.map(|word| screen.words().hex(word)).collect();
+        let exchanged = polished.iter().filter(|code| !own.contains(code));
+        let exchanged = exchanged.map(|&word| screen.words().hex(word)).collect();
         let construction = AlgebraicConstruction { exchanged, seed: self.seed, ..plain };
+        let codes = construction.codes(screen)?;
+        if codes.len() >= polished.len() {
+            return Ok((codes, Construction::Algebraic(construction)));
+        }
+        // With hidden cells, words that are taken in order can be others.
+        let listed = polished.iter().map(|&word| screen.words().hex(word)).collect();
+        let construction = AlgebraicConstruction { exchanged: listed, ..construction };
         Ok((construction.codes(screen)?, Construction::Algebraic(construction)))
     }
 

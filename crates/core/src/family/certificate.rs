@@ -1,9 +1,11 @@
 use std::collections::BTreeMap;
 
 use super::file::parse_word;
+use super::hidden::least_seen;
 use super::lexicode::Lexicode;
 use super::{
-    Confusion, Construction, Control, Family, PAIRS_COUNTED, Screen, TagWords, distance_histogram,
+    Confusion, Construction, Control, Family, PAIRS_COUNTED, Robust, Screen, TagWords,
+    distance_histogram,
 };
 use crate::lattice::TagCells;
 
@@ -16,6 +18,9 @@ pub struct Certificate {
     /// Smallest distance between a code and a word, a code in any turn, seen in a mirror; `None` where not all pairs were
     /// compared. No family claims one: a mirror shows all tags of a board alike.
     pub mirror_distance: Option<u32>,
+    /// For each kind of hidden cells that the rules name the least distance found in those that are seen, among the
+    /// codes compared.
+    pub robust: Vec<Robust>,
     /// Two codes (or one, twice) that are this close, when that is too close; else zeros.
     pub closest: [u32; 2],
     /// Whether all pairs were compared; if not, a sample was, and the structure was proved.
@@ -99,7 +104,12 @@ pub fn certify(family: &Family) -> Certificate {
             } else {
                 family.codes().get(..again.len()).unwrap_or_default()
             };
-            if again != codes {
+            // What a family had before it grew comes first, in whatever order.
+            let same = match family.beginnings() {
+                [] => again == codes,
+                _ => sorted(&again) == sorted(codes),
+            };
+            if !same {
                 certificate
                     .failures
                     .push("construction: gives other codes than the file".to_owned());
@@ -107,6 +117,12 @@ pub fn certify(family: &Family) -> Certificate {
         }
     }
     certificate
+}
+
+fn sorted(codes: &[u64]) -> Vec<u64> {
+    let mut codes = codes.to_vec();
+    codes.sort_unstable();
+    codes
 }
 
 /// Lexicodes of up to this many bits are built again whole: seconds.
@@ -168,6 +184,17 @@ pub fn certify_codes(family: &Family) -> Certificate {
             many => format!("rules: {many} codes break them, the first is code {first}"),
         });
     }
+    let seen =
+        |asked: &Robust| Robust { distance: least_seen(&cells, &compared, asked.to), ..*asked };
+    let robust: Vec<Robust> = family.rules().robust.iter().map(seen).collect();
+    for (asked, found) in family.rules().robust.iter().zip(&robust) {
+        if found.distance < asked.distance {
+            let (to, left, asked) = (asked.to.name(), found.distance, asked.distance);
+            failures.push(format!(
+                "robust: with the cells of {to} hidden {left} are left that differ, the family claims {asked}"
+            ));
+        }
+    }
     let all_compared = compared.len() == codes.len();
     if all_compared && histogram != *family.histogram() {
         failures.push("distance_histogram: differs from that of the codes".to_owned());
@@ -179,6 +206,7 @@ pub fn certify_codes(family: &Family) -> Certificate {
     Certificate {
         min_distance,
         mirror_distance,
+        robust,
         closest,
         all_compared,
         rule_breakers,

@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 
 use super::algebra::AlgebraicConstruction;
-use super::{Family, FamilyError, Rules, TagWords, false_positive_rates};
+use super::{Beginning, Family, FamilyError, Rules, TagWords, false_positive_rates};
 use crate::Name;
 use crate::lattice::{Dimension, GridKind};
 
@@ -61,6 +61,8 @@ struct FamilyFile {
     bits: u32,
     distance: u32,
     fingerprint: String,
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    beginnings: Vec<Beginning>,
     construction: Construction,
     rules: Rules,
     /// Pairs among the codes and their turns at each distance.
@@ -124,7 +126,7 @@ pub(super) fn from_json(json: &str) -> Result<Family, FamilyError> {
         );
         return Err(FamilyError::Claim { field: "fingerprint".to_owned(), problem });
     }
-    Ok(Family {
+    let family = Family {
         name: file.name,
         kind: file.kind,
         dimension,
@@ -134,8 +136,10 @@ pub(super) fn from_json(json: &str) -> Result<Family, FamilyError> {
         construction: file.construction,
         histogram: file.distance_histogram,
         fingerprint,
+        beginnings: Vec::new(),
         squares: None,
-    })
+    };
+    family.with_beginnings(file.beginnings)
 }
 
 pub(super) fn to_json(family: &Family) -> String {
@@ -148,6 +152,7 @@ pub(super) fn to_json(family: &Family) -> String {
         bits: family.dimension.bits(),
         distance: family.distance,
         fingerprint: family.fingerprint.clone(),
+        beginnings: family.beginnings.clone(),
         construction: family.construction.clone(),
         rules: family.rules.clone(),
         distance_histogram: family.histogram.clone(),
@@ -176,6 +181,12 @@ pub(super) fn check_form(
     }
     check_name(name, dimension, distance)?;
     rules.check(bits)?;
+    if kind == GridKind::Checker && !rules.robust.is_empty() {
+        return Err(FamilyError::field(
+            "rules.robust",
+            "hidden cells are those of triangular tags",
+        ));
+    }
     if codes.is_empty() {
         return Err(FamilyError::field("codes", "there is no code"));
     }

@@ -37,6 +37,8 @@ mod error;
 mod export;
 mod file;
 mod frontier;
+mod growth;
+mod hidden;
 mod import;
 mod independent;
 mod kernels;
@@ -46,6 +48,7 @@ pub mod places;
 mod polish;
 mod published_bounds;
 mod reading;
+mod robust;
 mod rules;
 pub mod search;
 mod shipped;
@@ -64,6 +67,8 @@ pub use export::{ExportFormat, export};
 pub use file::check_name;
 pub use file::{Construction, SCHEMA};
 pub use frontier::{RuleChoice, best_rule, rule_choices};
+pub use growth::Beginning;
+pub use hidden::{HiddenCells, Robust};
 pub use import::{ImportError, ImportSpec, import};
 pub use natural::{
     ACCEPTED_FALSE_POSITIVES, NaturalWords, TRIANGLES_PER_MEGAPIXEL, corrected_within,
@@ -93,6 +98,8 @@ pub struct Family {
     construction: Construction,
     histogram: BTreeMap<u32, u64>,
     fingerprint: String,
+    /// See [`Family::beginnings`].
+    beginnings: Vec<Beginning>,
     /// See [`Family::with_squares`].
     squares: Option<Box<Family>>,
 }
@@ -146,6 +153,7 @@ impl Family {
             construction,
             histogram,
             fingerprint,
+            beginnings: Vec::new(),
             squares: None,
         })
     }
@@ -194,10 +202,11 @@ impl Family {
             dimension,
             distance: 1,
             codes,
-            rules: Rules { min_complexity: 0.0, black_distance: 0, white_distance: 0 },
+            rules: Rules::NONE,
             construction: Construction::Places,
             histogram: BTreeMap::new(),
             fingerprint,
+            beginnings: Vec::new(),
             squares: None,
         }
     }

@@ -192,10 +192,11 @@ pub(super) fn cumulated<'a>(rows: impl Iterator<Item = &'a Vec<f64>>, most: u32)
 fn subsets(bits: u32, ones: u32) -> impl Iterator<Item = u64> {
     let first = (1u64 << ones) - 1;
     let next = move |&word: &u64| {
-        let low = word & word.wrapping_neg();
-        let carried = word + low;
-        let next = carried | ((word ^ carried) >> (2 + low.trailing_zeros()));
-        (ones > 0 && next >> bits == 0).then_some(next)
+        // Of no ones there is one word.
+        let shift = 2 + (ones > 0).then(|| word.trailing_zeros())?;
+        let carried = word + (word & word.wrapping_neg());
+        let next = carried | ((word ^ carried) >> shift);
+        (next >> bits == 0).then_some(next)
     };
     std::iter::successors((first >> bits == 0).then_some(first), next)
 }

@@ -70,7 +70,10 @@ pub(super) fn round(
         if halt() {
             return Vec::new();
         }
-        let mut near = nearer(pool[i], &turned, screen.distance());
+        let mut near = nearer(pool[i], &turned, screen.reach());
+        if screen.is_robust() {
+            near.retain(|&at| !screen.is_apart(pool[i] ^ turned[at as usize]));
+        }
         near.iter_mut().for_each(|j| *j /= 3);
         near.dedup();
         near.retain(|&j| j != i as u32);
@@ -96,12 +99,17 @@ fn candidates(
     let words = screen.words();
     let bits = words.dimension().bits();
     let mut conflicts = vec![0u8; 1 << bits];
+    let hidden = screen.hidden_differences();
     for &code in codes {
         if halt() {
             return None;
         }
         for word in words.turns(code) {
             count_ball(&mut conflicts, word as usize, bits, screen.distance() - 1);
+            for difference in &hidden {
+                let count = &mut conflicts[(word ^ difference) as usize];
+                *count = count.saturating_add(1);
+            }
         }
     }
     let mut own: Vec<u64> = codes.iter().map(|&code| words.canonical(code)).collect();

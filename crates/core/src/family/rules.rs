@@ -1,6 +1,8 @@
 use serde::{Deserialize, Serialize};
 
-use super::{FamilyError, TagWords};
+use super::kernels::any_nearer;
+use super::{FamilyError, Robust, TagWords};
+use crate::lattice::Dimension;
 
 /// What every single code of a family has to satisfy, besides its distance to the other codes.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -12,17 +14,21 @@ pub struct Rules {
     pub black_distance: u32,
     /// Distance from the all-white word, at least: the number of black cells.
     pub white_distance: u32,
+    /// Cells that may be hidden, and the distance to the other codes that is then left.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub robust: Vec<Robust>,
 }
 
 impl Rules {
     /// No rules: what is known of families from elsewhere.
-    pub const NONE: Self = Self { min_complexity: 0.0, black_distance: 0, white_distance: 0 };
+    pub const NONE: Self =
+        Self { min_complexity: 0.0, black_distance: 0, white_distance: 0, robust: Vec::new() };
 
     /// The rules of the published families: half of the pairs differ, and the untagged tile is as
     /// far as another code (`docs/families.md`, “What a family is”). The distance from a code to its
     /// own turns is always h.
     pub fn published(distance: u32) -> Self {
-        Self { min_complexity: 0.5, black_distance: distance, white_distance: 0 }
+        Self { min_complexity: 0.5, black_distance: distance, ..Self::NONE }
     }
 
     /// Checks that the numbers make sense for tags of `bits` cells; names the field that does not.
@@ -42,6 +48,19 @@ impl Rules {
                 return Err(FamilyError::field(field, problem));
             }
         }
+        let Ok(dimension) = Dimension::from_bits(bits) else { return Ok(()) };
+        for (i, robust) in self.robust.iter().enumerate() {
+            let seen = bits - robust.to.count(dimension);
+            if !(1..=seen).contains(&robust.distance) {
+                let problem =
+                    format!("{robust}: the distance must be between 1 and the {seen} cells seen");
+                return Err(FamilyError::field("robust", problem));
+            }
+            if self.robust[..i].iter().any(|other| other.to == robust.to) {
+                let problem = format!("{} is there twice", robust.to.name());
+                return Err(FamilyError::field("robust", problem));
+            }
+        }
         Ok(())
     }
 }
@@ -55,15 +74,24 @@ pub struct Screen {
     pub(super) min_pairs: u32,
     black_distance: u32,
     white_distance: u32,
+    /// Where cells may be hidden, and the distance that must be left.
+    robust: Vec<(Vec<u64>, u32)>,
+    reach: u32,
 }
 
 impl Screen {
-    /// The words of `words` under `rules` and a distance from their own turns of at least `distance`.
+    /// The words of `words` under `rules`, `distance` apart from each other and from their own turns.
     pub fn new(words: TagWords, distance: u32, rules: &Rules) -> Self {
         // The share is a decimal fraction from a file: 1e-9 keeps its rounding from adding a pair.
         let min_pairs = (rules.min_complexity * f64::from(words.pairs()) - 1e-9).ceil() as u32;
         let Rules { black_distance, white_distance, .. } = *rules;
-        Self { words, distance, min_pairs, black_distance, white_distance }
+        let dimension = words.dimension();
+        let reach = |robust: &Robust| robust.distance + robust.to.count(dimension);
+        // With fewer cells hidden than there is distance to spare nothing is asked for.
+        let asked: Vec<&Robust> = rules.robust.iter().filter(|r| reach(r) > distance).collect();
+        let farthest = asked.iter().map(|robust| reach(robust)).max().unwrap_or(distance);
+        let robust = asked.into_iter().map(|r| (r.to.masks(dimension), r.distance)).collect();
+        Self { words, distance, min_pairs, black_distance, white_distance, robust, reach: farthest }
     }
 
     /// The word arithmetic.
@@ -76,10 +104,56 @@ impl Screen {
         self.distance
     }
 
+    /// Whether the distance alone does not tell that two codes are far enough apart.
+    pub fn is_robust(&self) -> bool {
+        !self.robust.is_empty()
+    }
+
+    /// Words that differ in so many cells are far enough apart, wherever these are.
+    pub(super) fn reach(&self) -> u32 {
+        self.reach
+    }
+
+    /// Whether words that differ in these cells are far enough apart, with hidden cells too. A turn of both
+    /// words changes nothing, as hidden cells may lie anywhere.
+    #[inline]
+    pub fn is_apart(&self, difference: u64) -> bool {
+        let count = difference.count_ones();
+        let is_left = |(masks, distance): &(Vec<u64>, u32)| {
+            masks.iter().all(|mask| (difference & !mask).count_ones() >= *distance)
+        };
+        count >= self.distance && (count >= self.reach || self.robust.iter().all(is_left))
+    }
+
+    /// The differences of `distance` cells and more that are too near with hidden cells.
+    pub(super) fn hidden_differences(&self) -> Vec<u64> {
+        let all = self.words.dimension().mask();
+        let of_place = |mask: u64, distance: u32| {
+            let seen = (0..distance).flat_map(move |ones| scattered(all & !mask, ones));
+            seen.flat_map(move |seen| parts(mask).map(move |part| seen | part))
+        };
+        let mut found: Vec<u64> = (self.robust.iter())
+            .flat_map(|(masks, distance)| masks.iter().map(|&mask| (mask, *distance)))
+            .flat_map(|(mask, distance)| of_place(mask, distance))
+            .filter(|word| word.count_ones() >= self.distance)
+            .collect();
+        found.sort_unstable();
+        found.dedup();
+        found
+    }
+
+    /// Whether a word is far enough from all words of a list.
+    pub(super) fn is_apart_from(&self, word: u64, list: &[u64]) -> bool {
+        match self.is_robust() {
+            false => !any_nearer(word, list, self.distance),
+            true => list.iter().all(|other| self.is_apart(word ^ other)),
+        }
+    }
+
     /// Whether a word, on its own, may be a code.
     #[inline]
     pub fn admits(&self, word: u64) -> bool {
-        self.look_is_fine(word) && self.words.turn_distance(word) >= self.distance
+        self.look_is_fine(word) && self.is_apart(word ^ self.words.turn(word))
     }
 
     /// Whether a word satisfies the rules, its own turns aside.
@@ -89,5 +163,40 @@ impl Screen {
         white >= self.black_distance
             && self.words.dimension().bits() - white >= self.white_distance
             && self.words.differing_pairs(word) >= self.min_pairs
+    }
+}
+
+/// All words that are part of a mask.
+fn parts(mask: u64) -> impl Iterator<Item = u64> {
+    let next = move |&part: &u64| (part != mask).then(|| part.wrapping_sub(mask) & mask);
+    std::iter::successors(Some(0), next)
+}
+
+/// The parts of a mask with so many ones.
+fn scattered(mask: u64, ones: u32) -> impl Iterator<Item = u64> {
+    parts(mask).filter(move |part| part.count_ones() == ones)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn screen(bits: u32, distance: u32, robust: &str) -> Screen {
+        let words = TagWords::new(Dimension::from_bits(bits).unwrap());
+        let robust = vec![robust.parse().unwrap()];
+        Screen::new(words, distance, &Rules { robust, ..Rules::NONE })
+    }
+
+    #[test]
+    fn differences_with_hidden_cells_are_all_of_them() {
+        for (distance, robust) in [(5, "edge"), (5, "apex=4"), (3, "tile=5")] {
+            let screen = screen(16, distance, robust);
+            let near = |word: &u64| word.count_ones() >= distance && !screen.is_apart(*word);
+            let all: Vec<u64> = (0..1 << 16).filter(near).collect();
+            assert_eq!(screen.hidden_differences(), all, "{robust}");
+            assert!(!all.is_empty() && all.iter().all(|word| word.count_ones() < screen.reach()));
+        }
+        // What the distance gives by itself is no rule more.
+        assert!(!screen(16, 7, "apex").is_robust());
     }
 }

@@ -44,7 +44,7 @@ const TRIANGULAR: [ShippedFamily; 11] = {
         ShippedFamily::of(D, "d16h5", 16, 5, 78),
         ShippedFamily::of(D, "d25h7", 25, 7, 1208),
         ShippedFamily::of(D, "d25h9", 25, 9, 83),
-        ShippedFamily::of(D, "d36h9", 36, 9, 12_964),
+        ShippedFamily::of(D, "d36h9", 36, 9, 20_140),
         ShippedFamily::of(D, "d36h11", 36, 11, 1902),
         ShippedFamily::of(D, "d49h12", 49, 12, 20_000),
         ShippedFamily::of(D, "delTag16h5", 16, 5, 34),

@@ -135,7 +135,7 @@ impl Target {
         for kind in self.tilings() {
             if let (Some((family, ids)), Some((same, others))) =
                 (self.tags_of_tiling(kind), other.tags_of_tiling(kind))
-                && family == same
+                && family.name == same.name
                 // Place codes follow from the ids of boards.
                 && family.name != places::NAME
             {

@@ -124,6 +124,34 @@ impl FamilyRef {
     }
 }
 
+/// Why a family is not that of a target's tags.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
+pub enum OtherFamily {
+    /// It has other codes.
+    #[error("was made with fingerprint {wanted} of {name}, this one is {found}")]
+    Codes {
+        /// The family's name in the target.
+        name: String,
+        /// Fingerprint of the family that the target was made with.
+        wanted: String,
+        /// That of the family which is there.
+        found: String,
+    },
+    /// The family has grown since, and the target has a tag that it did not have then.
+    #[error("has a tag {id}, but {name} of fingerprint {wanted} had only {codes}")]
+    Id {
+        /// The family's name in the target.
+        name: String,
+        /// Fingerprint of the family that the target was made with.
+        wanted: String,
+        /// The tag.
+        id: u32,
+        /// How many codes the family had.
+        codes: usize,
+    },
+}
+
 /// How far the tiles of a panel reach beyond its corners.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
@@ -404,6 +432,31 @@ impl Target {
         let own = self.panels.iter().filter(|panel| panel.kind == kind);
         let ids = own.flat_map(|panel| &panel.tags).map(|tag| tag.id).collect();
         Some((self.family.as_ref()?.of_tiling(kind), ids))
+    }
+
+    /// Whether a family is one that the target names: it has the fingerprint, or had it before it grew, and all tags
+    /// of the target then.
+    ///
+    /// # Errors
+    /// Why it is not.
+    pub fn check_family(&self, named: &FamilyRef, family: &Family) -> Result<(), OtherFamily> {
+        // A file from elsewhere names a family without a fingerprint.
+        if named.fingerprint.is_empty() || family.fingerprint() == named.fingerprint {
+            return Ok(());
+        }
+        let (name, wanted) = (named.name.clone(), named.fingerprint.clone());
+        let Some(codes) = family.codes_under(&wanted) else {
+            return Err(OtherFamily::Codes {
+                name,
+                wanted,
+                found: family.fingerprint().to_owned(),
+            });
+        };
+        let ids = self.tags_of_tiling(family.kind()).map_or_else(Vec::new, |(_, ids)| ids);
+        match ids.into_iter().find(|&id| id as usize >= codes) {
+            Some(id) => Err(OtherFamily::Id { name, wanted, id, codes }),
+            None => Ok(()),
+        }
     }
 
     /// Whether places of its corners were measured.

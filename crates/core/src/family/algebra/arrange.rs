@@ -33,6 +33,9 @@ pub struct Arranger {
     /// Number of differing pairs that a word may lack and still count, and the fraction as which it
     /// counts.
     nearly: Option<(u32, f64)>,
+    /// Sums of two words of the code that may be too light with hidden cells, one of each orbit.
+    sums: Vec<u64>,
+    screen: Screen,
 }
 
 impl Arranger {
@@ -47,6 +50,7 @@ impl Arranger {
         free_centre: bool,
     ) -> Self {
         let space = CycleSpace::of(dimension);
+        let screen = Screen::new(TagWords::new(dimension), distance, rules);
         let slices = words
             .chunks(512)
             .map(|chunk| {
@@ -65,13 +69,34 @@ impl Arranger {
             space,
             slices,
             edges: TagCells::new(dimension).neighbours().to_vec(),
-            min_pairs: Screen::new(TagWords::new(dimension), distance, rules).min_pairs,
+            min_pairs: screen.min_pairs,
             black_distance: rules.black_distance,
             white_distance: rules.white_distance,
             words,
             free_centre: free_centre && space.centre,
             nearly: None,
+            sums: Vec::new(),
+            screen,
         }
+    }
+
+    /// Lets sums of two words of the code, in cycle coordinates, count where hidden cells leave too little of
+    /// them: of n words at least n / (1 + s) can then stand together, where s sums are too light.
+    pub(in crate::family) fn with_sums(mut self, mut sums: Vec<u64>) -> Self {
+        sums.retain(|&word| self.space.canonical(word) == word);
+        self.sums = sums;
+        self
+    }
+
+    /// The share of words that can stand together at least, with hidden cells.
+    fn share_apart(&self, arrangement: &Arrangement) -> f64 {
+        if self.sums.is_empty() {
+            return 1.0;
+        }
+        let plain = Arrangement { inverted: 0, ..arrangement.clone() };
+        let on_tag = plain.apply(self.dimension, &self.sums);
+        let light = on_tag.into_iter().filter(|&word| !self.screen.is_apart(word)).count();
+        1.0 / (1.0 + light as f64)
     }
 
     /// Lets a word that lacks up to `pairs` differing pairs count as the fraction `worth` of one,
@@ -90,10 +115,12 @@ impl Arranger {
 
     /// The objective of the annealing.
     fn worth(&self, arrangement: &Arrangement, weights: &[Slice]) -> f64 {
-        let good = f64::from(self.count(arrangement, weights, self.min_pairs));
+        let share = self.share_apart(arrangement);
+        let good = share * f64::from(self.count(arrangement, weights, self.min_pairs));
         self.nearly.map_or(good, |(pairs, worth)| {
-            let nearly = self.count(arrangement, weights, self.min_pairs - pairs);
-            good + worth * (f64::from(nearly) - good)
+            let nearly =
+                share * f64::from(self.count(arrangement, weights, self.min_pairs - pairs));
+            good + worth * (nearly - good)
         })
     }
 

@@ -9,6 +9,8 @@
 //! The search is a randomised greedy one: the union that it finds need not be the largest. The
 //! table of marks has one bit for each syndrome, which limits codes to [`MAX_SYNDROME_BITS`].
 
+use std::collections::BTreeSet;
+
 use rand::SeedableRng;
 use rand::seq::IndexedRandom;
 use rand_chacha::ChaCha8Rng;
@@ -37,6 +39,16 @@ impl CosetUnion {
         let space = self.space;
         let words = self.cosets.iter().flat_map(|&c| self.code.words().map(move |w| w ^ c));
         words.filter(|&w| space.turn(w) != w && space.canonical(w) == w).collect()
+    }
+
+    /// The sums of two words that are lighter than `weight`, each once, and not zero.
+    pub(in crate::family) fn differences_lighter_than(&self, weight: u32) -> Vec<u64> {
+        let pairs = self.cosets.iter().enumerate();
+        let shifts: BTreeSet<u64> = pairs
+            .flat_map(|(i, a)| self.cosets[..=i].iter().map(move |b| self.code.reduce(a ^ b)))
+            .collect();
+        let words = shifts.into_iter().flat_map(|shift| self.code.words().map(move |w| w ^ shift));
+        words.filter(|word| (1..weight).contains(&word.count_ones())).collect()
     }
 }
 

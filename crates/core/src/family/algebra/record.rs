@@ -14,7 +14,9 @@ use crate::lattice::Dimension;
 /// The construction of an algebraic family, as its file holds it.
 ///
 /// The codes are one word of each orbit of the union of cosets, arranged on the tag, where the
-/// rules admit it and no exchanged word is too near; and the exchanged words. Where no word of the
+/// rules admit it and no exchanged word is too near; and the exchanged words. Where cells may be
+/// hidden, words of the union may be too near to each other then: they are taken in order, each that
+/// is far enough from those before it. Where no word of the
 /// union uses the central cell, it is black, or white if only that satisfies the rules. Codes are
 /// sorted by the smallest of the three turned words.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -62,16 +64,47 @@ impl AlgebraicConstruction {
         let exchanged = self.words("exchanged", &self.exchanged, dimension)?;
         let turned: Vec<u64> = exchanged.iter().flat_map(|&w| screen.words().turns(w)).collect();
         let mut codes = arranged(screen, &union, &self.arrangement);
-        let apart = |code: &u64| {
-            turned.par_iter().all(|other| (code ^ other).count_ones() >= screen.distance())
+        let order = |codes: &mut Vec<u64>| {
+            codes.sort_by_cached_key(|&code| screen.words().canonical(code));
         };
-        if !turned.is_empty() {
-            codes.retain(apart);
+        let limit = self.limit.map_or(usize::MAX, |limit| limit as usize);
+        if screen.is_robust() && !(exchanged.is_empty() && self.is_apart(screen, &union)) {
+            order(&mut codes);
+            codes = taken_in_order(screen, exchanged.into_iter().chain(codes), limit);
+        } else if !turned.is_empty() {
+            codes.retain(|&code| screen.is_apart_from(code, &turned));
+            codes.extend(exchanged);
         }
-        codes.extend(exchanged);
-        codes.sort_by_cached_key(|&code| screen.words().canonical(code));
-        codes.truncate(self.limit.map_or(usize::MAX, |limit| limit as usize));
+        order(&mut codes);
+        codes.truncate(limit);
         Ok(codes)
+    }
+
+    /// The words of the union on the tag that the screen admits one by one, and the exchanged ones.
+    pub(in crate::family) fn words_of_the_union(
+        &self,
+        screen: &Screen,
+    ) -> Result<Vec<u64>, FamilyError> {
+        let dimension = screen.words().dimension();
+        let union = CosetUnion {
+            space: CycleSpace::of(dimension),
+            code: Span::of(self.words("basis", &self.basis, dimension)?),
+            cosets: self.words("cosets", &self.cosets, dimension)?,
+        };
+        let mut words = arranged(screen, &union, &self.arrangement);
+        words.extend(self.words("exchanged", &self.exchanged, dimension)?);
+        words.sort_by_cached_key(|&word| screen.words().canonical(word));
+        words.dedup_by_key(|word| screen.words().canonical(*word));
+        Ok(words)
+    }
+
+    /// Whether any two words of the union, arranged on the tag, are far enough apart.
+    fn is_apart(&self, screen: &Screen, union: &CosetUnion) -> bool {
+        let dimension = screen.words().dimension();
+        let zero = self.arrangement.apply(dimension, &[0])[0];
+        let near = union.differences_lighter_than(screen.reach());
+        let near = self.arrangement.apply(dimension, &near);
+        near.into_iter().all(|word| screen.is_apart(word ^ zero))
     }
 
     /// Tag number `rank` of the whole linear code, as a word of the tag whether or not it satisfies
@@ -145,6 +178,9 @@ impl AlgebraicConstruction {
             return Err("the linear code has too light a word".to_owned());
         }
         let union = CosetUnion { space, code, cosets };
+        if screen.is_robust() && !self.is_apart(screen, &union) {
+            return Err("with hidden cells words of the linear code are too near".to_owned());
+        }
         // A free centre is no part of the linear code: it can only add distance.
         let ignored = if has_free_centre(&union) { 1u64 << (space.bits() - 1) } else { 0 };
         let translation = self.arrangement.translation(space);
@@ -178,6 +214,18 @@ impl AlgebraicConstruction {
 
 /// The most dimensions; the list of words would not fit in memory beyond.
 const MOST_DIMENSIONS: u32 = 26;
+
+/// Of some words those that are far enough from all that were taken before, up to `limit`.
+fn taken_in_order(screen: &Screen, words: impl Iterator<Item = u64>, limit: usize) -> Vec<u64> {
+    let (mut taken, mut turned) = (Vec::new(), Vec::new());
+    for word in words {
+        if taken.len() < limit && screen.is_apart_from(word, &turned) {
+            taken.push(word);
+            turned.extend(screen.words().turns(word));
+        }
+    }
+    taken
+}
 
 /// The words of a union on the tag that the screen admits, one of each orbit.
 fn arranged(screen: &Screen, union: &CosetUnion, arrangement: &Arrangement) -> Vec<u64> {

@@ -103,6 +103,29 @@ impl Decoder {
         }
     }
 
+    /// The nearest code in the cells that are seen: those of `hidden` count for nothing. None where no code is within
+    /// `max_errors` of the other cells, nor where a second reading is as near.
+    ///
+    /// Every code is compared. With h cells of distance left in those that are seen
+    /// ([`Family::distance_without`]) up to ⌊(h−1)/2⌋ misread cells among them never hide which tag it is.
+    ///
+    /// ```
+    /// use deltille_core::family::{Decoder, Family, HiddenCells};
+    ///
+    /// let family = Family::shipped("d25h9")?;
+    /// let decoder = Decoder::new(&family);
+    /// // A finger covers an edge, which reads as white, and one more cell is misread.
+    /// let edge = HiddenCells::Edge.masks(family.dimension())[0];
+    /// let read = (family.code(12).unwrap() | edge) ^ 1 << 24;
+    /// let decoded = decoder.decode_erased(read, edge, 1).unwrap();
+    /// assert_eq!((decoded.id, decoded.errors), (12, 1));
+    /// # Ok::<(), deltille_core::family::FamilyError>(())
+    /// ```
+    pub fn decode_erased(&self, word: u64, hidden: u64, max_errors: u32) -> Option<Decoded> {
+        let found = self.nearest(word, hidden, max_errors)?;
+        (found.runner_up != Some(found.errors)).then_some(found)
+    }
+
     /// The word of a code that was recognised, without its errors.
     pub fn word(&self, decoded: Decoded) -> u64 {
         let code = self.codes.get(decoded.id as usize).copied().unwrap_or(0);
@@ -110,16 +133,26 @@ impl Decoder {
     }
 
     fn decode_beyond(&self, word: u64, max_errors: u32) -> Option<Decoded> {
+        self.nearest(word, 0, max_errors)
+    }
+
+    /// The nearest code in the cells that are not hidden; all are compared.
+    fn nearest(&self, word: u64, hidden: u64, max_errors: u32) -> Option<Decoded> {
         // Turning the word back by k turns is comparing it with every code turned k times.
-        let mut turned_back = [word; 4];
         let full = usize::from(self.kind.turns());
-        for turns in (1..full).rev() {
-            turned_back[turns] = self.words.turn(turned_back[(turns + 1) % full]);
-        }
+        let turned_back = |word: u64| {
+            let mut turned_back = [word; 4];
+            for turns in (1..full).rev() {
+                turned_back[turns] = self.words.turn(turned_back[(turns + 1) % full]);
+            }
+            turned_back
+        };
+        let seen = turned_back(hidden).map(|hidden| !hidden);
+        let turned_back = turned_back(word);
         let (mut best, mut second) = ((u32::MAX, 0, 0), u32::MAX);
         for (id, code) in (0..).zip(&self.codes) {
-            for (turns, back) in (0..).zip(&turned_back[..full]) {
-                let errors = (back ^ code).count_ones();
+            for (turns, (back, seen)) in (0..).zip(turned_back[..full].iter().zip(&seen)) {
+                let errors = ((back ^ code) & seen).count_ones();
                 if errors < best.0 {
                     second = best.0;
                     best = (errors, id, turns);
@@ -135,5 +168,42 @@ impl Decoder {
             errors,
             runner_up: (second <= max_errors).then_some(second),
         })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use rand::{Rng, SeedableRng};
+
+    use super::*;
+    use crate::family::HiddenCells;
+
+    /// Whatever hidden cells show, and with as many of the others misread as the distance left allows.
+    #[test]
+    fn tags_are_known_with_hidden_cells() {
+        let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(3);
+        for name in ["d16h5", "d25h7", "d25h9", "d36h9", "d49h12"] {
+            let family = Family::shipped(name).unwrap();
+            let (decoder, words) = (Decoder::new(&family), TagWords::new(family.dimension()));
+            for hidden in HiddenCells::ALL {
+                let Some(left) = family.distance_without(hidden).filter(|left| *left > 0) else {
+                    continue;
+                };
+                for mask in hidden.masks(family.dimension()) {
+                    let (id, turns) = (rng.random_range(0..family.len()), rng.random_range(0..3u8));
+                    let code = words.turns(family.codes()[id])[usize::from(turns)];
+                    let mut read = code ^ (rng.random::<u64>() & mask);
+                    let errors = (left - 1) / 2;
+                    while ((read ^ code) & !mask).count_ones() < errors {
+                        read ^= 1 << rng.random_range(0..family.dimension().bits());
+                    }
+                    let found = decoder.decode_erased(read, mask, errors).unwrap();
+                    let told = (found.id as usize, found.turns, found.errors);
+                    assert_eq!(told, (id, turns, errors), "{name}, {hidden:?}");
+                    // With all cells hidden nothing is known.
+                    assert!(decoder.decode_erased(read, family.dimension().mask(), 0).is_none());
+                }
+            }
+        }
     }
 }

@@ -17,7 +17,6 @@ use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use self::sweep::Sweep;
-use super::kernels::any_nearer;
 use super::{Construction, Control, Family, FamilyError, Rules, Screen, TagWords};
 use crate::lattice::Dimension;
 
@@ -100,6 +99,10 @@ impl Lexicode {
             && self.step % 2 == 1
             && self.candidates > FIRST_CANDIDATES
             && self.distance > LEAST_DISTANCE;
+        if sweeps && screen.is_robust() {
+            let problem = "too many words stay open for a lexicode of so many bits: use `best`";
+            return Err(FamilyError::field("robust", problem));
+        }
         let first = if sweeps { FIRST_CANDIDATES } else { self.candidates };
         let kept = self.in_turn(&screen, first, checkpoint, save, control)?;
         if !sweeps {
@@ -110,14 +113,14 @@ impl Lexicode {
     }
 
     /// Looks at the first `count` candidates one after the other.
-    fn in_turn(
+    fn in_turn<'a>(
         &self,
-        screen: &Screen,
+        screen: &'a Screen,
         count: u64,
         checkpoint: &mut Checkpoint,
         save: &dyn Fn(&Checkpoint),
         control: Control,
-    ) -> Result<Kept, FamilyError> {
+    ) -> Result<Kept<'a>, FamilyError> {
         let mut kept = Kept::of(checkpoint.codes.clone(), screen);
         let (mut from, mut chunk) = (checkpoint.candidates_done, FIRST_CHUNK);
         let mut saved = from;
@@ -142,7 +145,7 @@ impl Lexicode {
                 .collect();
             for v in left {
                 if kept.allows(v, known) {
-                    kept.push(v, screen);
+                    kept.push(v);
                 }
             }
             control.tell(to, self.candidates, kept.codes.len());
@@ -160,7 +163,7 @@ impl Lexicode {
     fn sweep(
         &self,
         screen: &Screen,
-        kept: &Kept,
+        kept: &Kept<'_>,
         checkpoint: &mut Checkpoint,
         save: &dyn Fn(&Checkpoint),
         control: Control,
@@ -186,7 +189,7 @@ impl Lexicode {
     fn take_open(
         &self,
         screen: &Screen,
-        mut kept: Kept,
+        mut kept: Kept<'_>,
         open: &[u64],
         control: Control,
     ) -> Result<Vec<u64>, FamilyError> {
@@ -212,7 +215,7 @@ impl Lexicode {
                 .collect();
             for v in left {
                 if kept.allows(v, known) {
-                    kept.push(v, screen);
+                    kept.push(v);
                 }
             }
             control.tell(self.candidates, self.candidates, kept.codes.len());
@@ -271,26 +274,26 @@ fn inverse_of_odd(x: u64) -> u64 {
 }
 
 /// Codes kept so far, with their turns side by side.
-struct Kept {
+struct Kept<'a> {
     codes: Vec<u64>,
     turned: Vec<u64>,
-    distance: u32,
+    screen: &'a Screen,
 }
 
-impl Kept {
-    fn of(codes: Vec<u64>, screen: &Screen) -> Self {
+impl<'a> Kept<'a> {
+    fn of(codes: Vec<u64>, screen: &'a Screen) -> Self {
         let turned = codes.iter().flat_map(|&code| screen.words().turns(code)).collect();
-        Self { codes, turned, distance: screen.distance() }
+        Self { codes, turned, screen }
     }
 
     /// Whether `word` is far enough from the turned codes from number `from` on.
     fn allows(&self, word: u64, from: usize) -> bool {
-        !any_nearer(word, &self.turned[from..], self.distance)
+        self.screen.is_apart_from(word, &self.turned[from..])
     }
 
-    fn push(&mut self, word: u64, screen: &Screen) {
+    fn push(&mut self, word: u64) {
         self.codes.push(word);
-        self.turned.extend(screen.words().turns(word));
+        self.turned.extend(self.screen.words().turns(word));
     }
 }
 
