@@ -191,9 +191,6 @@ flat! {
             "white" => TagsIn::White,
             _ => return Err(raised::TargetError::new_err("tags_in: give black or white")),
         };
-        let paper = self::paper(paper, orientation, margin_mm, SolidSheets::default())?;
-        let paper = PaperSpec { poster, packed, tag_ids, guide_page, ..paper };
-        let paper = with_logo(paper, logo, logo_height_mm)?;
         let spacing = spacing_of(tag_spacing)?;
         let first_id = whole("first_id", first_id, errors::target)?;
         let of_tags = |family| Tags {

@@ -179,8 +179,6 @@ macro_rules! solid {
                 allow_seams: bool,
                 tag_ids: bool,
                 guide_page: bool,
-                logo: Option<PathBuf>,
-                logo_height_mm: Option<f64>,
                 paper: Option<&str>,
                 orientation: &str,
                 margin_mm: Option<f64>,

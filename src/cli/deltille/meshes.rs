@@ -99,6 +99,7 @@ impl Meshes {
             // A texture has one size.
             texture: self.texture.or(template.texture.filter(|_| !is_sized)),
             texture_dpi: self.texture_dpi.or(template.texture_dpi.filter(|_| !is_sized)),
+            textures: self.textures.or(template.textures),
         }
     }
 
@@ -135,6 +136,9 @@ impl Meshes {
         // A template says what the parser of options would refuse.
         if self.texture.is_some() && self.texture_dpi.is_some() {
             bail!("--texture, --texture-dpi: give one of them");
+        }
+        if let Some(count) = self.textures.filter(|count| !(1..=MAX_TEXTURES).contains(count)) {
+            bail!("--textures: {count} is not between 1 and {MAX_TEXTURES}");
         }
         match (self.texture, self.texture_dpi) {
             (Some(px), _) if !SIDE_PX.contains(&px) => {

@@ -399,8 +399,13 @@ mod tests {
     #[test]
     fn solids_and_other_targets_have_a_place_for_it() {
         let solid = TargetSpec::from(SolidSpec::new(SolidShape::Icosahedron));
-        let circles =
-            CirclesSpec { circles: [7, 5], spacing_mm: 20.0, diameter_mm: 10.0, asymmetric: false };
+        let circles = CirclesSpec {
+            board_id: 0,
+            circles: [7, 5],
+            spacing_mm: 20.0,
+            diameter_mm: 10.0,
+            asymmetric: false,
+        };
         for (spec, solids) in [
             (solid.clone(), SolidSheets::Net),
             (solid.clone(), SolidSheets::SeamedNet),
