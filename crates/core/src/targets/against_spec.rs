@@ -5,8 +5,8 @@
 
 use super::json::{Problem, problem};
 use super::{
-    Corner, FamilyRef, PanelPose, TagPlacement, TagsIn, Target, TargetSpec, aprilgrid, board,
-    charuco, circles, solid, tag_sheet,
+    Corner, FamilyRef, PanelPose, TagPlacement, Target, TargetSpec, aprilgrid, board, charuco,
+    circles, solid, tag_sheet,
 };
 use crate::family::shipped_name;
 

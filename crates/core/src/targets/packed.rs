@@ -5,6 +5,7 @@
 //!   │ ▲▲▲▲▲▲▲▲▲▲▲  │ ▲▲▲▲▲▲▲▲▲▲▲  │   a label of its own, which stays with it; along the lower and the right margin
 //!   │ ▲▲▲▲▲▲▲▲▲▲▲  │ ▲▲▲▲▲▲▲▲▲▲▲  │   of the sheet the check bars and the label of all
 //!   │ board 0 · …  │ board 1 · …  │
+//!   │ note         │ note         │
 //!   └──────────────┴──────────────┘
 //! ```
 
@@ -12,7 +13,9 @@ use std::cmp::Reverse;
 
 use glam::DVec2;
 
-use super::layout::{Arrangement, Footprint, check_margin, label, label_of_one, on_page};
+use super::layout::{
+    ADVANCE_CAPS, Arrangement, Footprint, check_margin, label, label_of_one, on_page,
+};
 use super::paper::PaperSpec;
 use super::{
     BoardSpec, FamilyRef, GridKind, Label, LineKind, Panel, Placement, SheetLayout, SheetLine,
@@ -24,6 +27,8 @@ use crate::lattice::ROW_HEIGHT;
 const LABEL_CAP_MM: f64 = 2.0;
 /// Blank around that label, mm.
 const LABEL_GAP_MM: f64 = 1.5;
+/// The least capital height of a note that can be read, mm.
+const LEAST_CAP_MM: f64 = 0.9;
 /// Blank between a quiet zone and the line to cut along, mm.
 const CUT_GAP_MM: f64 = 0.5;
 /// Width of these lines, mm.
@@ -41,15 +46,20 @@ struct Cell {
     blank: f64,
     /// Its size, mm.
     size: DVec2,
+    /// Lower ends of the lines of its label above its own, from above, mm.
+    lines: Vec<f64>,
 }
 
 impl Cell {
-    fn new(spec: &BoardSpec, panel: &Panel, margin_mm: f64) -> Self {
+    fn new(spec: &BoardSpec, panel: &Panel, paper: &PaperSpec) -> Self {
         let [left, lower, right, upper] =
             if panel.inverted { panel.field_mm() } else { panel.bounds_mm() };
         let ink = [DVec2::new(left, lower), DVec2::new(right, upper)];
-        let blank = Footprint::new(spec, margin_mm).mark_blank + CUT_GAP_MM;
-        let below = blank + LABEL_CAP_MM + 2.0 * LABEL_GAP_MM;
+        let blank = Footprint::new(spec, paper.margin_mm).mark_blank + CUT_GAP_MM;
+        let count = 1 + usize::from(paper.note.is_some());
+        let step = LABEL_CAP_MM + LABEL_GAP_MM;
+        let lines = (0..count).rev().map(|line| LABEL_GAP_MM + line as f64 * step).collect();
+        let below = blank + count as f64 * step + LABEL_GAP_MM;
         let least = ink[1] - ink[0] + DVec2::new(2.0 * blank, blank + below);
         // Tiles of one board are no continuation of those of the next, for whoever looks at the whole sheet. Every second
         // row of triangles lies half an edge further.
@@ -59,7 +69,26 @@ impl Cell {
                 GridKind::Checker => DVec2::ONE,
             };
         let size = ((least / step - OUT_OF_STEP).ceil() + OUT_OF_STEP) * step;
-        Self { ink, blank, size }
+        Self { ink, blank, size, lines }
+    }
+
+    /// Room for a line of the label, mm.
+    fn line_mm(&self) -> f64 {
+        self.size.x - 2.0 * self.blank
+    }
+
+    /// Refuses a note that nobody could read.
+    fn check_note(&self, note: Option<&str>) -> Result<(), TargetError> {
+        let Some(note) = note else { return Ok(()) };
+        let most = (self.line_mm() / (LEAST_CAP_MM * ADVANCE_CAPS)).floor() as usize;
+        let count = note.chars().count();
+        if count <= most {
+            return Ok(());
+        }
+        let problem = format!(
+            "{count} characters are more than the {most} that can be read below such a board: take fewer, or larger boards"
+        );
+        Err(TargetError::invalid("PaperSpec::note", problem))
     }
 
     /// Blank below the board, with its label.
@@ -77,7 +106,9 @@ pub(super) fn sheets(
     paper: &PaperSpec,
 ) -> Result<Vec<SheetLayout>, TargetError> {
     let Some(first) = panels.first() else { return Ok(Vec::new()) };
-    let cell = Cell::new(spec, first, paper.margin_mm);
+    let cell = Cell::new(spec, first, paper);
+    let note = paper.note.as_deref().map(str::trim);
+    cell.check_note(note)?;
     let (grid @ [columns, rows], arrangement) = arrange(&cell, panels.len(), paper)?
         .ok_or_else(|| layout::does_not_fit(spec, paper, |spec| fits(spec, paper)))?;
     let pages: Vec<&[Panel]> = panels.chunks(columns * rows).collect();
@@ -87,7 +118,7 @@ pub(super) fn sheets(
         if count > 1 {
             words += &format!(" · page {} of {count}", index + 1);
         }
-        sheet(&cell, grid, &arrangement, (panels, spec, family), words)
+        sheet(&cell, grid, &arrangement, (panels, spec, family, note), words)
     });
     Ok(sheets.collect())
 }
@@ -95,7 +126,7 @@ pub(super) fn sheets(
 /// Whether a board of this kind finds room.
 pub(super) fn fits(spec: &BoardSpec, paper: &PaperSpec) -> bool {
     let panels = super::board::untied_panels(&BoardSpec { boards: 1, ..spec.clone() });
-    let cell = panels.first().map(|panel| Cell::new(spec, panel, paper.margin_mm));
+    let cell = panels.first().map(|panel| Cell::new(spec, panel, paper));
     cell.is_some_and(|cell| arrange(&cell, 1, paper).is_ok_and(|found| found.is_some()))
 }
 
@@ -139,7 +170,7 @@ fn sheet(
     cell: &Cell,
     [columns, rows]: [usize; 2],
     arrangement: &Arrangement,
-    (panels, spec, family): (&[Panel], &BoardSpec, Option<&FamilyRef>),
+    (panels, spec, family, note): (&[Panel], &BoardSpec, Option<&FamilyRef>, Option<&str>),
     words: String,
 ) -> SheetLayout {
     let size = cell.size;
@@ -156,13 +187,15 @@ fn sheet(
         let corner = at(index % columns, rows - 1 - index / columns);
         let origin_mm = corner + DVec2::new(cell.blank, cell.below()) - cell.ink[0];
         sheet.placements.push(Placement { panel: panel.id, angle_rad: 0.0, origin_mm });
-        sheet.texts.push(SheetText {
-            text: Label::Words(label_of_one(spec, panel, family)),
-            at_mm: corner + DVec2::new(cell.blank, LABEL_GAP_MM + LABEL_CAP_MM / 3.0),
+        let words = [Some(label_of_one(spec, panel, family)), note.map(str::to_owned)];
+        let lines = words.into_iter().flatten().zip(&cell.lines);
+        sheet.texts.extend(lines.map(|(words, lower_mm)| SheetText {
+            text: Label::Words(words),
+            at_mm: corner + DVec2::new(cell.blank, lower_mm + LABEL_CAP_MM / 3.0),
             angle_rad: 0.0,
             cap_height_mm: LABEL_CAP_MM,
-            max_width_mm: size.x - 2.0 * cell.blank,
-        });
+            max_width_mm: cell.line_mm(),
+        }));
     }
     sheet
 }
