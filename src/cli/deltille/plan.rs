@@ -10,7 +10,7 @@ use super::camera_file;
 use crate::cli::output::{self, Telling, say};
 use crate::cli::values::number;
 use crate::detect::{Proposal, Situation};
-use crate::family;
+use crate::family::{self, places};
 use crate::lattice::GridKind;
 use crate::targets::{BoardSpec, PaperSpec, TagSpec, TagsIn};
 use crate::words::counted;
@@ -42,8 +42,11 @@ pub struct Args {
     /// Tag family; of a checkerboard without tags where none is given [default: delTag25h7]
     #[arg(long)]
     family: Option<String>,
+    /// Propose a board of place codes, of which any few tiles are labelled
+    #[arg(long, conflicts_with_all = ["family", "checker"])]
+    dense: bool,
     /// No tags
-    #[arg(long, conflicts_with = "family")]
+    #[arg(long, conflicts_with_all = ["family", "dense"])]
     untagged: bool,
     /// The paper that it must fit, such as A3 [default: up to A0]
     #[arg(long, value_name = "SIZE")]
@@ -109,6 +112,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let named = match (&args.family, args.checker || args.untagged) {
         (Some(name), _) => Some(name.clone()),
         (None, true) => None,
+        (None, false) if args.dense => Some(places::NAME.to_owned()),
         (None, false) => Some(TagSpec::default().family),
     };
     let option = if args.checker { "--tags" } else { "--family" };
@@ -127,6 +131,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     };
     let proposal = situation.board(kind, tags.zip(family.as_ref()), &paper)?;
     let tags = match &named {
+        Some(_) if args.dense => " --dense".to_owned(),
         Some(name) => format!(" {option} {name}"),
         None if args.checker => String::new(),
         None => " --untagged".to_owned(),
@@ -136,6 +141,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let command =
         format!("deltille {command} --rows {rows} --cols {cols} --edge {edge_mm}mm{tags}{paper}");
     let to_mm = |tilt: f64| proposal.reach.labelled_to_mm(focal_px, tilt.to_radians());
+    let patches_to_mm = |tilt: f64| proposal.patches_to_mm(focal_px, tilt.to_radians());
     if args.telling.is_json() {
         output::print_json(&serde_json::json!({
             "schema": "deltille/plan/1",
@@ -146,19 +152,17 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
             "labelled_to_mm": TOLD_DEG.map(|tilt| {
                 serde_json::json!({ "tilt_deg": tilt, "distance_mm": to_mm(tilt) })
             }),
+            "patches_labelled_to_mm": args.dense.then(|| TOLD_DEG.map(|tilt| {
+                serde_json::json!({ "tilt_deg": tilt, "distance_mm": patches_to_mm(tilt) })
+            })),
         }))?;
         return Ok(ExitCode::SUCCESS);
     }
-    tell(&situation, &proposal, &command, to_mm)?;
+    tell(&situation, &proposal, &command)?;
     Ok(ExitCode::SUCCESS)
 }
 
-fn tell(
-    situation: &Situation,
-    proposal: &Proposal,
-    command: &str,
-    to_mm: impl Fn(f64) -> f64,
-) -> anyhow::Result<()> {
+fn tell(situation: &Situation, proposal: &Proposal, command: &str) -> anyhow::Result<()> {
     let Situation { focal_px, size_px: [width, height], distances_mm: [near, far], .. } =
         *situation;
     let across = 2.0 * (f64::from(width) / 2.0 / focal_px).atan().to_degrees();
@@ -173,6 +177,7 @@ fn tell(
     say!("{command}");
     let whole = match proposal.reach.tags {
         0 => "; nearer it is not labelled",
+        _ if is_dense(proposal) => "; nearer, any three by four tiles are labelled",
         _ => "; nearer, parts with a tag in them are labelled",
     };
     say!(
@@ -181,15 +186,28 @@ fn tell(
         counted(proposal.reach.tags, "tag"),
         shown(proposal.whole_from_mm)
     );
-    let to = TOLD_DEG.map(|tilt| {
-        let far = to_mm(tilt);
-        match tilt {
-            0.0 => format!("to {} facing the camera", shown(far)),
-            _ => format!("to {} tilted by {tilt:.0}°", shown(far)),
-        }
-    });
-    say!("labelled {}, where pictures are sharp", to.join(", "));
+    let told = |what: &str, to_mm: &dyn Fn(f64) -> Option<f64>| {
+        let to = TOLD_DEG.iter().filter_map(|&tilt| {
+            let far = shown(to_mm(tilt.to_radians())?);
+            Some(match tilt {
+                0.0 => format!("to {far} facing the camera"),
+                _ => format!("to {far} tilted by {tilt:.0}°"),
+            })
+        });
+        let to: Vec<String> = to.collect();
+        format!("{what} {}, where pictures are sharp", to.join(", "))
+    };
+    say!("{}", told("labelled", &|tilt| Some(proposal.reach.labelled_to_mm(focal_px, tilt))));
+    if is_dense(proposal) {
+        let patches = |tilt| proposal.patches_to_mm(focal_px, tilt);
+        say!("{}", told("three by four tiles of it", &patches));
+    }
     Ok(())
+}
+
+/// Whether it is a board of place codes.
+fn is_dense(proposal: &Proposal) -> bool {
+    proposal.spec.tags.as_ref().is_some_and(TagSpec::is_dense)
 }
 
 /// A distance as a person says it.

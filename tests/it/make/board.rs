@@ -123,6 +123,33 @@ fn boards_that_are_packed_on_a_sheet_are_proved_each() {
     }
 }
 
+/// A note stands on every label, of its sheet and of each board that is cut out, in a line of its own below the board.
+#[test]
+fn a_note_goes_with_every_board_that_is_cut_out() {
+    let folder = tempfile::tempdir().unwrap();
+    let made = "board --rows 3 --cols 4 --edge 12mm --boards 6 --pack --note Lab-3 --svg";
+    deltille(folder.path()).args(made.split(' ')).assert().success();
+    let target = read(&folder.path().join("board.json"));
+    let texts = || target.sheets.iter().flat_map(|sheet| &sheet.texts);
+    let notes: Vec<_> = texts().filter(|text| text.text.to_string() == "Lab-3").collect();
+    assert_eq!(notes.len(), 6);
+    assert!(texts().any(|text| text.text.to_string().starts_with("board · Lab-3 · ")));
+    for placed in target.sheets.iter().flat_map(|sheet| &sheet.placements) {
+        let panel = target.panels.iter().find(|panel| panel.id == placed.panel).unwrap();
+        let [left, lower, ..] = panel.bounds_mm();
+        let below = placed.page_from_panel(glam::DVec2::new(left, lower));
+        let is_its = |at: glam::DVec2| {
+            (at.x - below.x).abs() < 1.0 && (0.0..15.0).contains(&(below.y - at.y))
+        };
+        assert_eq!(notes.iter().filter(|note| is_its(note.at_mm)).count(), 1, "board {}", panel.id);
+    }
+    let long = "x".repeat(80);
+    let refused = format!("board --rows 3 --cols 4 --edge 8mm --boards 6 --pack --note {long}");
+    let said = deltille(folder.path()).args(refused.split(' ')).assert().code(2);
+    let said = String::from_utf8(said.get_output().stderr.clone()).unwrap();
+    assert!(said.starts_with("error: --note: 80 characters are more than the "), "{said}");
+}
+
 #[test]
 fn every_sample_template_makes_a_board() {
     let templates = Path::new(env!("CARGO_MANIFEST_DIR")).join("templates");

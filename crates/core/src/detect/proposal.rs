@@ -15,6 +15,10 @@ const FILLED: f64 = 0.9;
 const LEAST: [u32; 2] = [4, 5];
 const MOST: u32 = 40;
 
+/// A cell of a place code from which on patches of three by four tiles are labelled where pictures are sharp, px: by
+/// photographs of printed pages (docs/measurements.md).
+const PATCH_BIT_PX: f64 = 1.5;
+
 /// A camera, and from where it is to see a board.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Situation {
@@ -39,6 +43,16 @@ pub struct Proposal {
     /// From where on a board that faces the camera is whole in the picture, mm. Nearer, parts of a board with tags are
     /// labelled too.
     pub whole_from_mm: f64,
+}
+
+impl Proposal {
+    /// Of a board of place codes the distance up to which a patch of three by four tiles is labelled in sharp pictures of a
+    /// camera of a focal length in px, tilted by an angle, mm; no other board has such.
+    pub fn patches_to_mm(&self, focal_px: f64, tilt_rad: f64) -> Option<f64> {
+        let is_dense = self.spec.tags.as_ref().is_some_and(TagSpec::is_dense);
+        let needed_mm = self.reach.detail_mm * shortening(true, tilt_rad) / PATCH_BIT_PX;
+        is_dense.then_some(focal_px * needed_mm)
+    }
 }
 
 /// Why no board suits.

@@ -5,6 +5,7 @@
 //!   │ ▲▲▲▲▲▲▲▲▲▲▲  │ ▲▲▲▲▲▲▲▲▲▲▲  │   a label of its own, which stays with it; along the lower and the right margin
 //!   │ ▲▲▲▲▲▲▲▲▲▲▲  │ ▲▲▲▲▲▲▲▲▲▲▲  │   of the sheet the check bars and the label of all
 //!   │ board 0 · …  │ board 1 · …  │
+//!   │ note         │ note         │
 //!   └──────────────┴──────────────┘
 //! ```
 
@@ -12,7 +13,9 @@ use std::cmp::Reverse;
 
 use glam::DVec2;
 
-use super::layout::{Arrangement, Footprint, check_margin, label, label_of_one, on_page};
+use super::layout::{
+    ADVANCE_CAPS, Arrangement, Footprint, check_margin, label, label_of_one, on_page,
+};
 use super::logo::{LogoPlacement, LogoSize};
 use super::paper::PaperSpec;
 use super::{
@@ -27,6 +30,8 @@ const LABEL_CAP_MM: f64 = 2.0;
 const LABEL_GAP_MM: f64 = 1.5;
 /// Blank above and below a logo beside that label, mm.
 const LOGO_GAP_MM: f64 = 0.75;
+/// The least capital height of a note that can be read, mm.
+const LEAST_CAP_MM: f64 = 0.9;
 /// Blank between a quiet zone and the line to cut along, mm.
 const CUT_GAP_MM: f64 = 0.5;
 /// Width of these lines, mm.
@@ -44,15 +49,22 @@ struct Cell {
     blank: f64,
     /// Its size, mm.
     size: DVec2,
+    /// Lower ends of the lines of its label above its own, from above, mm.
+    lines: Vec<f64>,
+    /// Size of the logo beside them, mm.
+    logo: Option<DVec2>,
 }
 
 impl Cell {
-    fn new(spec: &BoardSpec, panel: &Panel, margin_mm: f64) -> Self {
+    fn new(spec: &BoardSpec, panel: &Panel, paper: &PaperSpec) -> Self {
         let [left, lower, right, upper] =
             if panel.inverted { panel.field_mm() } else { panel.bounds_mm() };
         let ink = [DVec2::new(left, lower), DVec2::new(right, upper)];
-        let blank = Footprint::new(spec, margin_mm).mark_blank + CUT_GAP_MM;
-        let below = blank + LABEL_CAP_MM + 2.0 * LABEL_GAP_MM;
+        let blank = Footprint::new(spec, paper.margin_mm).mark_blank + CUT_GAP_MM;
+        let count = 1 + usize::from(paper.note.is_some());
+        let step = LABEL_CAP_MM + LABEL_GAP_MM;
+        let lines = (0..count).rev().map(|line| LABEL_GAP_MM + line as f64 * step).collect();
+        let below = blank + count as f64 * step + LABEL_GAP_MM;
         let least = ink[1] - ink[0] + DVec2::new(2.0 * blank, blank + below);
         // Tiles of one board are no continuation of those of the next, for whoever looks at the whole sheet. Every second
         // row of triangles lies half an edge further.
@@ -62,7 +74,32 @@ impl Cell {
                 GridKind::Checker => DVec2::ONE,
             };
         let size = ((least / step - OUT_OF_STEP).ceil() + OUT_OF_STEP) * step;
-        Self { ink, blank, size }
+        let mut cell = Self { ink, blank, size, lines, logo: None };
+        cell.logo = LogoSize::of(paper).map(|logo| {
+            let [deep, most] = [below, cell.below()].map(|mm| mm - blank - 2.0 * LOGO_GAP_MM);
+            logo.in_strip(cell.line_mm(), deep, most)
+        });
+        cell
+    }
+
+    /// Room for a line of the label, mm.
+    fn line_mm(&self) -> f64 {
+        let logo_mm = self.logo.map_or(0.0, |size| LogoSize::taken(size.x));
+        self.size.x - 2.0 * self.blank - logo_mm
+    }
+
+    /// Refuses a note that nobody could read.
+    fn check_note(&self, note: Option<&str>) -> Result<(), TargetError> {
+        let Some(note) = note else { return Ok(()) };
+        let most = (self.line_mm() / (LEAST_CAP_MM * ADVANCE_CAPS)).floor() as usize;
+        let count = note.chars().count();
+        if count <= most {
+            return Ok(());
+        }
+        let problem = format!(
+            "{count} characters are more than the {most} that can be read below such a board: take fewer, or larger boards"
+        );
+        Err(TargetError::invalid("PaperSpec::note", problem))
     }
 
     /// Blank below the board, with its label.
@@ -80,7 +117,9 @@ pub(super) fn sheets(
     paper: &PaperSpec,
 ) -> Result<Vec<SheetLayout>, TargetError> {
     let Some(first) = panels.first() else { return Ok(Vec::new()) };
-    let cell = Cell::new(spec, first, paper.margin_mm);
+    let cell = Cell::new(spec, first, paper);
+    let note = paper.note.as_deref().map(str::trim);
+    cell.check_note(note)?;
     let (grid @ [columns, rows], arrangement) = arrange(&cell, panels.len(), paper)?
         .ok_or_else(|| layout::does_not_fit(spec, paper, |spec| fits(spec, paper)))?;
     let pages: Vec<&[Panel]> = panels.chunks(columns * rows).collect();
@@ -90,7 +129,7 @@ pub(super) fn sheets(
         if count > 1 {
             words += &format!(" · page {} of {count}", index + 1);
         }
-        sheet(&cell, grid, (&arrangement, LogoSize::of(paper)), (panels, spec, family), words)
+        sheet(&cell, grid, &arrangement, (panels, spec, family, note), words)
     });
     Ok(sheets.collect())
 }
@@ -98,7 +137,7 @@ pub(super) fn sheets(
 /// Whether a board of this kind finds room.
 pub(super) fn fits(spec: &BoardSpec, paper: &PaperSpec) -> bool {
     let panels = super::board::untied_panels(&BoardSpec { boards: 1, ..spec.clone() });
-    let cell = panels.first().map(|panel| Cell::new(spec, panel, paper.margin_mm));
+    let cell = panels.first().map(|panel| Cell::new(spec, panel, paper));
     cell.is_some_and(|cell| arrange(&cell, 1, paper).is_ok_and(|found| found.is_some()))
 }
 
@@ -141,8 +180,8 @@ fn arrange(
 fn sheet(
     cell: &Cell,
     [columns, rows]: [usize; 2],
-    (arrangement, logo): (&Arrangement, Option<LogoSize>),
-    (panels, spec, family): (&[Panel], &BoardSpec, Option<&FamilyRef>),
+    arrangement: &Arrangement,
+    (panels, spec, family, note): (&[Panel], &BoardSpec, Option<&FamilyRef>, Option<&str>),
     words: String,
 ) -> SheetLayout {
     let size = cell.size;
@@ -159,22 +198,20 @@ fn sheet(
         let corner = at(index % columns, rows - 1 - index / columns);
         let origin_mm = corner + DVec2::new(cell.blank, cell.below()) - cell.ink[0];
         sheet.placements.push(Placement { panel: panel.id, angle_rad: 0.0, origin_mm });
-        let mut length = size.x - 2.0 * cell.blank;
-        if let Some(logo) = logo {
-            let least = LABEL_CAP_MM + 2.0 * LABEL_GAP_MM;
-            let [deep, most] = [least, cell.below() - cell.blank].map(|mm| mm - 2.0 * LOGO_GAP_MM);
-            let DVec2 { x: width, y: height_mm } = logo.in_strip(length, deep, most);
-            let at_mm = corner + DVec2::new(cell.blank + length - width, LOGO_GAP_MM);
+        let words = [Some(label_of_one(spec, panel, family)), note.map(str::to_owned)];
+        if let Some(DVec2 { x: width_mm, y: height_mm }) = cell.logo {
+            let right = size.x - cell.blank - width_mm;
+            let at_mm = corner + DVec2::new(right, LOGO_GAP_MM);
             sheet.logos.push(LogoPlacement { at_mm, angle_rad: 0.0, height_mm });
-            length -= LogoSize::taken(width);
         }
-        sheet.texts.push(SheetText {
-            text: Label::Words(label_of_one(spec, panel, family)),
-            at_mm: corner + DVec2::new(cell.blank, LABEL_GAP_MM + LABEL_CAP_MM / 3.0),
+        let lines = words.into_iter().flatten().zip(&cell.lines);
+        sheet.texts.extend(lines.map(|(words, lower_mm)| SheetText {
+            text: Label::Words(words),
+            at_mm: corner + DVec2::new(cell.blank, lower_mm + LABEL_CAP_MM / 3.0),
             angle_rad: 0.0,
             cap_height_mm: LABEL_CAP_MM,
-            max_width_mm: length,
-        });
+            max_width_mm: cell.line_mm(),
+        }));
     }
     sheet
 }
