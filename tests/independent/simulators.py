@@ -1,11 +1,12 @@
 """Models for simulators, opened by what simulates: simulators.py DELTILLE FOLDER.
 
-Makes boards, one with two sides, a ChArUco board, an AprilGrid, an icosahedron, a cube, a cuboid, and a cuboctahedron of triangles and squares in FOLDER, and then
+Makes boards, one with two sides, a ChArUco board, an AprilGrid, an icosahedron, a cube, a cuboid, a cuboctahedron of triangles and squares, and a ball of 320 faces
+with four textures in FOLDER, and then
 
 - MuJoCo renders each from a ring of cameras, `deltille detect` reads the pictures, and the corners must be where MuJoCo's
   camera puts those of the description: of those on faces that are seen within 60° at least 95 %;
-- trimesh loads the OBJ, usd-core the USD; corners of the description must lie on their surfaces within 0.05 mm, and be
-  corners of the texture there, as OpenCV refines them;
+- trimesh loads the OBJ and the glTF with all their materials, usd-core the USD with the subsets of its faces; corners of the description must lie on
+  their surfaces within 0.05 mm, and be corners of the texture there, as OpenCV refines them;
 - yourdfpy loads the URDF, and the elements of the SDF are read by Python.
 
 Needs mujoco, usd-core, trimesh, yourdfpy, opencv-python-headless and pillow; MUJOCO_GL=osmesa or egl without a screen.
@@ -26,6 +27,8 @@ from PIL import Image
 from pxr import Usd, UsdGeom, UsdShade
 
 WIDTH, HEIGHT, FIELD_DEG = 1600, 1200, 40.0
+# Pictures of the ball, of whose 320 faces half are seen at a time.
+LARGE = 2600
 VIEWS = 8
 SEEN_DEG, SHARE, PLACE_MM = 60.0, 0.95, 0.05
 
@@ -48,10 +51,10 @@ def looking(eye, at):
     return np.stack([right, np.cross(back, right), back], 1)
 
 
-def rendered(folder, name, target, corners):
+def rendered(folder, name, target, corners, width, height):
     """Pictures by MuJoCo, and for each the pixels of the corners that are seen well."""
     spec = mujoco.MjSpec.from_file(str(folder / f"{name}.xml"))
-    spec.visual.global_.offwidth, spec.visual.global_.offheight = WIDTH, HEIGHT
+    spec.visual.global_.offwidth, spec.visual.global_.offheight = width, height
     spec.visual.headlight.ambient = [0.5] * 3
     spec.visual.headlight.diffuse = [0.4] * 3
     spec.visual.map.znear = 0.01
@@ -76,8 +79,8 @@ def rendered(folder, name, target, corners):
     model = spec.compile()
     data = mujoco.MjData(model)
     mujoco.mj_forward(model, data)
-    renderer = mujoco.Renderer(model, HEIGHT, WIDTH)
-    focal = HEIGHT / 2 / np.tan(np.radians(FIELD_DEG) / 2)
+    renderer = mujoco.Renderer(model, height, width)
+    focal = height / 2 / np.tan(np.radians(FIELD_DEG) / 2)
     shown = []
     for k, (eye, axes) in enumerate(cameras):
         renderer.update_scene(data, camera=f"c{k}")
@@ -86,8 +89,8 @@ def rendered(folder, name, target, corners):
         for key, (place, normal) in corners.items():
             seen = axes.T @ (place / 1e3 - eye)
             sight = (eye - place / 1e3) / np.linalg.norm(eye - place / 1e3)
-            pixel = np.array([seen[0], -seen[1]]) / -seen[2] * focal + [(WIDTH - 1) / 2, (HEIGHT - 1) / 2]
-            is_inside = (pixel > 10).all() and (pixel < [WIDTH - 11, HEIGHT - 11]).all()
+            pixel = np.array([seen[0], -seen[1]]) / -seen[2] * focal + [(width - 1) / 2, (height - 1) / 2]
+            is_inside = (pixel > 10).all() and (pixel < [width - 11, height - 11]).all()
             if is_inside and sight @ normal > np.cos(np.radians(SEEN_DEG)):
                 pixels[key] = pixel
         shown.append(pixels)
@@ -116,47 +119,61 @@ def detected(program, folder, name, shown):
     assert found >= SHARE * wanted and off.max() < np.sqrt(0.5)
 
 
-def on_surface(name, what, vertices, faces, uv, texture, corners):
-    """How far corners are from a mesh, mm, and from the corners of its texture."""
+def on_surface(name, what, vertices, faces, uv, of_texture, textures, corners):
+    """How far corners are from a mesh, mm, and from the corners of its textures, of which each face has one."""
     mesh = trimesh.Trimesh(vertices, faces, process=False)
     places = np.array([place for place, _ in corners.values()])
     nearest, apart, triangle = trimesh.proximity.closest_point_naive(mesh, places)
     weights = trimesh.triangles.points_to_barycentric(mesh.triangles[triangle], nearest)
-    size = np.array(texture.shape[::-1])
-    to_pixel = lambda uv: np.stack([uv[..., 0] * size[0], (1 - uv[..., 1]) * size[1]], -1) - 0.5
-    corners_uv = to_pixel(uv[faces[triangle]])
+    on = np.asarray(of_texture)[triangle]
+    size = np.array([texture.shape[::-1] for texture in textures])[on][:, None]
+    corners_uv = np.stack([uv[faces[triangle]][..., 0], 1 - uv[faces[triangle]][..., 1]], -1) * size - 0.5
     pixels = (weights[..., None] * corners_uv).sum(1)
     # Texels per mm, by the longest side of the triangle.
     side = np.linalg.norm(corners_uv[:, 1] - corners_uv[:, 0], axis=1)
     per_mm = side / np.linalg.norm(mesh.triangles[triangle][:, 1] - mesh.triangles[triangle][:, 0], axis=1)
-    refined = cv2.cornerSubPix(texture, pixels.astype(np.float32).reshape(-1, 1, 2), (3, 3), (-1, -1),
-                               (cv2.TERM_CRITERIA_MAX_ITER | cv2.TERM_CRITERIA_EPS, 50, 1e-4)).reshape(-1, 2)
+    refined = np.empty_like(pixels)
+    for index, texture in enumerate(textures):
+        first = pixels[on == index].astype(np.float32).reshape(-1, 1, 2)
+        refined[on == index] = cv2.cornerSubPix(texture, first, (3, 3), (-1, -1),
+                                                (cv2.TERM_CRITERIA_MAX_ITER | cv2.TERM_CRITERIA_EPS, 50, 1e-4)).reshape(-1, 2)
     off = np.linalg.norm(refined - pixels, axis=1) / per_mm
     print(f"{name}: {what}: {len(places)} corners within {apart.max():.6f} mm of the surface; those of the texture are off "
           f"by {np.median(off):.4f} mm in the median, {off.max():.4f} at most")
     assert apart.max() < PLACE_MM and np.median(off) < PLACE_MM
 
 
-def obj(folder, name):
-    vertices, uvs, faces, of_uv = [], [], [], []
-    for line in (folder / f"{name}.obj").read_text().splitlines():
-        word, *values = line.split()
-        if word == "v":
-            vertices.append([float(value) for value in values])
-        elif word == "vt":
-            uvs.append([float(value) for value in values])
-        elif word == "f":
-            faces.append([int(value.split("/")[0]) - 1 for value in values])
-            of_uv.append([int(value.split("/")[1]) - 1 for value in values])
-    assert faces == of_uv
-    loaded = trimesh.load(folder / f"{name}.obj", process=False, force="mesh")
-    assert np.allclose(np.sort(loaded.triangles.reshape(-1, 9), 0), np.sort(np.array(vertices)[faces].reshape(-1, 9), 0))
+def texture_names(name, count):
+    return [f"{name}-texture.png"] if count == 1 else [f"{name}-texture-{i + 1}.png" for i in range(count)]
+
+
+def by_material(folder, name, ending, count):
+    """The parts of a mesh as trimesh loads them, by their material, whose pictures must be those of the files."""
+    scene = trimesh.load(folder / f"{name}.{ending}", process=False, force="scene")
+    parts = {part.visual.material.name: part for part in scene.geometry.values()}
+    names = ["print"] if count == 1 else [f"print-{i + 1}" for i in range(count)]
+    assert sorted(parts) == sorted(names), list(parts)
+    parts = [parts[material] for material in names]
+    for part, file in zip(parts, texture_names(name, count)):
+        material = part.visual.material
+        picture = getattr(material, "image", None) or material.baseColorTexture
+        assert np.array_equal(np.asarray(picture.convert("L")), np.asarray(Image.open(folder / file).convert("L"))), file
+    vertices = np.concatenate([part.vertices for part in parts])
+    uv = np.concatenate([part.visual.uv for part in parts])
+    starts = np.cumsum([0, *(len(part.vertices) for part in parts)])
+    faces = np.concatenate([part.faces + start for part, start in zip(parts, starts)])
+    of_texture = np.repeat(np.arange(count), [len(part.faces) for part in parts])
     welded = trimesh.Trimesh(vertices, faces, process=True)
     assert welded.is_watertight and welded.volume > 0
-    return np.array(vertices), np.array(faces), np.array(uvs)
+    return vertices, faces, uv, of_texture
 
 
-def usd(folder, name):
+def glb(folder, name, count):
+    vertices, faces, uv, of_texture = by_material(folder, name, "glb", count)
+    return vertices * 1e3, faces, uv, of_texture
+
+
+def usd(folder, name, count):
     stage = Usd.Stage.Open(str(folder / f"{name}.usda"))
     assert UsdGeom.GetStageUpAxis(stage) == "Z"
     [mesh] = [UsdGeom.Mesh(prim) for prim in stage.Traverse() if prim.IsA(UsdGeom.Mesh)]
@@ -165,12 +182,23 @@ def usd(folder, name):
     assert set(mesh.GetFaceVertexCountsAttr().Get()) == {3}
     faces = np.array(mesh.GetFaceVertexIndicesAttr().Get()).reshape(-1, 3)
     uv = np.array(UsdGeom.PrimvarsAPI(mesh).GetPrimvar("st").Get())
-    material, _ = UsdShade.MaterialBindingAPI(mesh.GetPrim()).ComputeBoundMaterial()
-    surface, _, _ = material.ComputeSurfaceSource()
-    [texture] = surface.GetInput("diffuseColor").GetConnectedSources()[0]
-    asset = UsdShade.Shader(texture.source.GetPrim()).GetInput("file").Get()
-    assert pathlib.Path(asset.resolvedPath).name == f"{name}-texture.png"
-    return vertices, faces, uv
+    of_texture = np.zeros(len(faces), int)
+    subsets = UsdShade.MaterialBindingAPI(mesh).GetMaterialBindSubsets()
+    assert len(subsets) == (count if count > 1 else 0)
+    if subsets:
+        # Every face is in one of them.
+        valid, reason = UsdGeom.Subset.ValidateFamily(mesh, UsdGeom.Tokens.face, UsdShade.Tokens.materialBind)
+        assert valid, reason
+        assert UsdGeom.Subset.GetFamilyType(mesh, UsdShade.Tokens.materialBind) == UsdGeom.Tokens.partition
+    for index, (part, file) in enumerate(zip(subsets or [mesh], texture_names(name, count))):
+        if subsets:
+            of_texture[np.array(part.GetIndicesAttr().Get())] = index
+        material, _ = UsdShade.MaterialBindingAPI(part.GetPrim()).ComputeBoundMaterial()
+        surface, _, _ = material.ComputeSurfaceSource()
+        [texture] = surface.GetInput("diffuseColor").GetConnectedSources()[0]
+        asset = UsdShade.Shader(texture.source.GetPrim()).GetInput("file").Get()
+        assert pathlib.Path(asset.resolvedPath).name == file
+    return vertices, faces, uv, of_texture
 
 
 def cuboctahedron(edge):
@@ -196,35 +224,46 @@ def cuboctahedron(edge):
 
 def main():
     program, folder = sys.argv[1], pathlib.Path(sys.argv[2])
-    formats = ["--obj", "--sdf", "--urdf", "--mjcf", "--usd"]
+    formats = ["--gltf", "--obj", "--sdf", "--urdf", "--mjcf", "--usd"]
     folder.mkdir(parents=True, exist_ok=True)
     mesh = folder / "cuboctahedron-mesh.obj"
     mesh.write_text(cuboctahedron(120))
+    sphere = trimesh.creation.icosphere(subdivisions=2, radius=600)
+    ball = folder / "ball-mesh.obj"
+    lines = [f"v {x:.9f} {y:.9f} {z:.9f}" for x, y, z in sphere.vertices]
+    ball.write_text("\n".join(lines + [f"f {a + 1} {b + 1} {c + 1}" for a, b, c in sphere.faces]) + "\n")
     small, large = ["--texture", "2048"], ["--texture", "4096"]
     for name, command in {
         "desk": ["board", "--rows", "7", "--cols", "9", "--edge", "30mm", "--name", "desk", *small],
         "squares": ["checkerboard", "--rows", "7", "--cols", "9", "--edge", "30mm", "--name", "squares", *small],
-        "door": ["board", "--rows", "6", "--cols", "7", "--edge", "30mm", "--two-sided", "4mm", "--name", "door", *small],
+        "door": ["board", "--rows", "6", "--cols", "7", "--edge", "30mm", "--two-sided", "4mm", "--name", "door", *small, "--textures", "2"],
         "charuco": ["charuco", "--squares", "8x6", "--edge", "30mm", *small],
         "aprilgrid": ["aprilgrid", "--tags", "5x4", "--edge", "30mm", *small],
         "icosahedron": ["icosahedron", *small],
         "cube": ["cube", *large],
         "cuboid": ["cuboid", "--size", "200x150x120mm", "--tiles", "6", *large],
         "cuboctahedron": ["solid", "--mesh", mesh, "--tiles", "6", "--name", "cuboctahedron", "--texture", "8192"],
+        "ball": ["solid", "--mesh", ball, "--tiles", "6", "--family", "d25h7", "--tag-spacing", "2", "--tag-border", "0.9",
+                 "--face-margin", "0.5mm", "--name", "ball", *small, "--textures", "4"],
     }.items():
         subprocess.run([program, *command, *formats, "-o", folder, "--force"], check=True, stdout=subprocess.DEVNULL)
         target = json.loads((folder / f"{name}.json").read_text())
         corners = corners_of(target)
-        texture = np.asarray(Image.open(folder / f"{name}-texture.png").convert("L"))
-        on_surface(name, "trimesh", *obj(folder, name), texture, corners)
-        on_surface(name, "usd-core", *usd(folder, name), texture, corners)
+        count = int(command[command.index("--textures") + 1]) if "--textures" in command else 1
+        textures = [np.asarray(Image.open(folder / file).convert("L")) for file in texture_names(name, count)]
+        assert max(side for texture in textures for side in texture.shape) <= int(command[command.index("--texture") + 1])
+        loaded = by_material(folder, name, "obj", count)
+        on_surface(name, "trimesh, OBJ", *loaded, textures, corners)
+        on_surface(name, "trimesh, glTF", *glb(folder, name, count), textures, corners)
+        on_surface(name, "usd-core", *usd(folder, name, count), textures, corners)
         robot = yourdfpy.URDF.load(str(folder / f"{name}.urdf"), build_scene_graph=True, load_meshes=True)
         bounds = robot.scene.bounds
-        assert np.allclose(np.ptp(bounds, 0) * 1e3, np.ptp(obj(folder, name)[0], 0), atol=1e-3), bounds
+        assert np.allclose(np.ptp(bounds, 0) * 1e3, np.ptp(loaded[0], 0), atol=1e-3), bounds
         sdf = ElementTree.parse(folder / f"{name}.sdf").getroot()
         assert {uri.text for uri in sdf.iter("uri")} == {f"{name}.obj"}
         assert {scale.text for scale in sdf.iter("scale")} == {"0.001 0.001 0.001"}
-        detected(program, folder, name, rendered(folder, name, target, corners))
+        size = (LARGE, LARGE) if name == "ball" else (WIDTH, HEIGHT)
+        detected(program, folder, name, rendered(folder, name, target, corners, *size))
 
 
 if __name__ == "__main__":

@@ -1,12 +1,13 @@
 //! Artifacts that were never on disk: made, compared and damaged as bytes.
 
 use deltille::artwork;
+use deltille::export::artifacts::{self, Making, What};
 use deltille::export::dsc::{self, Dialect};
-use deltille::export::mesh::{Meshing, TexturedMesh};
+use deltille::export::mesh::{Meshing, Resolution, TexturedMesh};
 use deltille::export::{dxf, gltf, obj, pdf, png, sheet_file_name, stl, svg};
 use deltille::family::Family;
 use deltille::lattice::GridKind;
-use deltille::limits::Guard;
+use deltille::limits::{Guard, Limits};
 use deltille::targets::{BoardSpec, PaperSpec, SolidShape, SolidSpec, Target, TargetSpec};
 use deltille::verify::{Artifact, Verdict, Verifier, VerifyError, verify};
 
@@ -170,6 +171,35 @@ fn a_solid_is_proved_in_memory_with_the_files_that_belong_together() {
     }
     let flipped = changed(&files, "i.stl", |bytes| bytes[103] ^= 0x40);
     assert_told(&compare(&target, "i.stl", &flipped), "FAILED");
+}
+
+/// Each face must have its own of several textures, in every format.
+#[test]
+fn a_solid_with_several_textures_is_proved_in_memory() {
+    let spec = SolidSpec { tiles: 6, ..SolidSpec::new(SolidShape::Tetrahedron) };
+    let target = build("i", TargetSpec::Solid(spec), PaperSpec::default());
+    let mut making = Making::default();
+    (making.mesh.textures, making.mesh.resolution) = (3, Resolution::Side(700));
+    for (what, name) in [
+        (What::Gltf, "i.glb"),
+        (What::Obj, "i.obj"),
+        (What::Sdf, "i.sdf"),
+        (What::Mjcf, "i.xml"),
+        (What::Usd, "i.usda"),
+    ] {
+        let files = artifacts::make(&target, Some(&family()), what, making).unwrap();
+        let files: Vec<Artifact> =
+            files.into_iter().map(|(name, bytes)| Artifact::new(name, bytes)).collect();
+        let verdict = compare(&target, name, &files);
+        assert!(verdict.passed, "{verdict}");
+        // Textures are counted together: none has more than half a megapixel.
+        let family = family();
+        let verifier = Verifier::new(&target, Some(&family)).unwrap();
+        let mut limits = Limits::default();
+        limits.max_pixels = 1_000_000;
+        let error = verifier.within(limits).verify(name, &files).unwrap_err().to_string();
+        assert!(error.contains("max_pixels"), "{name}: {error}");
+    }
 }
 
 /// The words on the sheets of a net are data in its description: a print of others is told by them.

@@ -159,8 +159,10 @@ impl Walk<'_> {
             ("images", root.images.len(), textures),
             ("buffers", root.buffers.len(), 1),
         ] {
-            let instead = if stated == 1 { "one".to_owned() } else { stated.to_string() };
-            let problem = format!("{count} entries instead of {instead}");
+            let problem = match stated {
+                1 => format!("{count} entries instead of one"),
+                _ => format!("{count} instead of {stated} entries"),
+            };
             self.found.unless(count == stated, place, problem);
         }
         self.found.unless(root.scene == 0, "scene", "a default scene that is not there");
