@@ -95,7 +95,7 @@ export function make(): HTMLElement {
     const names = families.filter(({ kind }) => kind === (isSquare ? "checker" : "deltille")).map(({ name }) => name);
     const options: [string, string][] = names.map((name) => [name, name]);
     if (!isSquare) options.push([PLACES, text.places]);
-    if (!ofSolid) options.push(["", text.noTags]);
+    options.push(["", text.noTags]);
     const usualFamily = isSquare ? "" : USUAL_FAMILY;
     // What a link or a template gave stays to be seen.
     if (settings.family && !options.some(([name]) => name === settings.family)) options.push([settings.family, settings.family]);
@@ -104,7 +104,7 @@ export function make(): HTMLElement {
     const name = el("input", { type: "text", value: settings.name, input: () => changed({ name: name.value }) });
     const isOpen = form.querySelector("details")?.open ?? false;
     const isDense = settings.family === PLACES;
-    const hasTags = ofSolid || (settings.family ?? usualFamily) !== "";
+    const hasTags = (settings.family ?? usualFamily) !== "";
     const kinds = Object.entries(text.kinds).filter(([kind]) => kind !== "mesh" || settings.mesh !== null);
     const measures = ofSolid
       ? [number(text.solidEdge, "edge_mm", 1, 100_000, settings.kind === "mesh" ? text.usualEdge : text.usual), number(text.tiles, "tiles", 3, 200, text.usual)]
@@ -131,9 +131,10 @@ export function make(): HTMLElement {
             ]
           : []),
         number(text.boardId, "board_id", 0, MOST_IDS),
+        box(text.inverted, "inverted"),
         ...(ofSolid
           ? [number(text.faceMargin, "face_margin_mm", 0, 1000, text.usual), box(text.skeleton, "skeleton"), box(text.perFace, "per_face"), box(text.allowSeams, "allow_seams")]
-          : [number(text.boards, "boards", 1, 500), box(text.inverted, "inverted"), box(text.poster, "poster"), box(text.packed, "packed")]),
+          : [number(text.boards, "boards", 1, 500), box(text.poster, "poster"), box(text.packed, "packed")]),
       ),
     );
     downloads.replaceChildren(

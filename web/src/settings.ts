@@ -54,7 +54,7 @@ export const usual: Settings = {
   mesh: null,
 };
 
-const OF_BOARDS = ["rows", "cols", "tags_in", "boards", "inverted", "poster", "packed"] as const;
+const OF_BOARDS = ["rows", "cols", "tags_in", "boards", "poster", "packed"] as const;
 const OF_SOLIDS = ["tiles", "face_margin_mm", "skeleton", "per_face", "allow_seams"] as const;
 /** What some settings can be. */
 const CHOICES: Record<string, string[]> = {
@@ -142,9 +142,14 @@ const UNITS: Record<string, number> = { "": 1, mm: 1, cm: 10, m: 1000, in: 25.4 
 /** The settings of a template of `deltille board` or `deltille checkerboard`. */
 export function ofTemplate(text: string): Settings {
   const values = new Map<string, string>();
+  let table = "";
   for (const line of text.split("\n")) {
     const bare = line.replace(/^\s*#.*$/, "").trim();
     if (bare === "") continue;
+    table = /^\[(\w+)\]/.exec(bare)?.[1] ?? table;
+    // Meshes and drawings for lasers are further files of the same target.
+    if (table === "meshes" || table === "laser") continue;
+    if (table !== "") throw new Error(`[${table}]: this page makes none of it: give the template to the program`);
     const [, key = "", string, plain] = /^([\w-]+)\s*=\s*(?:"([^"]*)"|([\w.+-]+))\s*(?:#.*)?$/.exec(bare) ?? [];
     const known = KEYS.find(([name]) => name === key)?.[1];
     if (!known && !OTHERS.includes(key)) throw new Error(key === "" ? `${bare}: this is no setting` : `${key}: there is no such setting`);

@@ -154,6 +154,14 @@ test.describe("make", () => {
     for (const [button, file] of [["GLB", "icosahedron.glb"], ["STL", "icosahedron.stl"], ["DXF (net)", "icosahedron-net.dxf"], ["DXF (panels)", "icosahedron-panels.dxf"], ["PDF", "icosahedron.pdf"]] as const) {
       expect((await press(page, button)).equals(readFileSync(join(made, file))), file).toBe(true);
     }
+    // Bare faces, white on black.
+    await page.getByLabel("Target", { exact: true }).selectOption("octahedron");
+    await page.getByLabel("Family of the tags").selectOption("");
+    await page.getByText("More settings").click();
+    await page.getByLabel("White tiles on black").check();
+    await expect(page.getByText("288 corners")).toBeVisible({ timeout: 30_000 });
+    drawn("octahedron", "--untagged", "--invert", "--pdf", "-o", made);
+    expect((await press(page, "PDF")).equals(readFileSync(join(made, "octahedron.pdf")))).toBe(true);
   });
 
   test("numbers that are none are told of by the names of their fields, and nothing is made of them", async ({ page }) => {

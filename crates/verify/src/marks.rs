@@ -437,11 +437,14 @@ pub(super) fn spots(page: &Page, known: &[bool], panels: &[PlacedPanel]) -> Vec<
             if plain || known[y * width + x] {
                 continue;
             }
+            let pixel = DVec2::new(x as f64, y as f64);
+            // Most of what is black is in tiles, which are compared by themselves.
+            if grounds.iter().any(|ground| ground.has_tile_at(page, pixel)) {
+                continue;
+            }
             // Where this far from edges.
             let is_off = |most: f64, near_px: f64| {
-                let expected = |ground: &Ground| {
-                    ground.expected(page, DVec2::new(x as f64, y as f64), near_px)
-                };
+                let expected = |ground: &Ground| ground.expected(page, pixel, near_px);
                 let expected = grounds.iter().find_map(expected).unwrap_or(Some(0.0));
                 expected.is_some_and(|expected| (ink - expected).abs() > most)
             };
@@ -556,12 +559,25 @@ impl<'a> Ground<'a> {
         self.placed.panel.inverted
     }
 
+    /// Whether a pixel is on the picture where the panel may be.
+    fn is_around(&self, pixel: DVec2) -> bool {
+        let [left, upper, right, lower] = self.around_px;
+        pixel.x >= left && pixel.x <= right && pixel.y >= upper && pixel.y <= lower
+    }
+
+    /// Whether a pixel is in a tile of the panel.
+    fn has_tile_at(&self, page: &Page, pixel: DVec2) -> bool {
+        self.is_around(pixel) && {
+            let place = self.placed.panel_from_page(page.page_from_px(pixel));
+            self.tiles.contains(self.placed.panel.tile_at(place / self.placed.panel.edge_mm))
+        }
+    }
+
     /// What a pixel of the panel's area should be; `Some(None)` in and beside the tiles, which are
     /// compared by themselves, and at the edge of the field, `near_px` to either side. Between the tiles of a panel
     /// that is not inverted there may be another one.
     fn expected(&self, page: &Page, pixel: DVec2, near_px: f64) -> Option<Option<f64>> {
-        let [left, upper, right, lower] = self.around_px;
-        if pixel.x < left || pixel.x > right || pixel.y < upper || pixel.y > lower {
+        if !self.is_around(pixel) {
             return None;
         }
         let place = self.placed.panel_from_page(page.page_from_px(pixel));
