@@ -70,6 +70,11 @@ def test_solids_are_meshes_too(tmp_path, root):
     assert solid.files("obj").keys() == parts
     for format, file in {"sdf": "icosahedron.sdf", "urdf": "icosahedron.urdf", "mjcf": "icosahedron.xml"}.items():
         assert solid.files(format, texture_px=2048).keys() == parts | {file}
+    split = solid.files("mjcf", texture_px=1024, textures=4)
+    numbered = {f"icosahedron-{part}" for i in range(1, 5) for part in (f"{i}.obj", f"texture-{i}.png")}
+    assert split.keys() == numbered | {"icosahedron.xml", "icosahedron.obj", "icosahedron.mtl"}
+    solid.save(tmp_path, ["usd"], texture_px=1024, textures=4)
+    assert solid.verify(tmp_path / "icosahedron.usda")
     board = deltille.Board(5, 6, edge_mm=30.0, name="desk")
     board.save(tmp_path, ["usd"], texture_px=1024)
     assert board.verify(tmp_path / "desk.usda")

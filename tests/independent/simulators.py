@@ -6,7 +6,7 @@ with four textures in FOLDER, and then
 - MuJoCo renders each from a ring of cameras, `deltille detect` reads the pictures, and the corners must be where MuJoCo's
   camera puts those of the description: of those on faces that are seen within 60° at least 95 %;
 - trimesh loads the OBJ and the glTF with all their materials, usd-core the USD with the subsets of its faces; corners of the description must lie on
-  their surfaces within 0.05 mm, and be corners of the texture there, as OpenCV refines them;
+  their surfaces within 0.05 mm, and be corners of the texture there, as OpenCV refines them, within 0.05 mm or 0.15 px;
 - yourdfpy loads the URDF, and the elements of the SDF are read by Python.
 
 Needs mujoco, usd-core, trimesh, yourdfpy, opencv-python-headless and pillow; MUJOCO_GL=osmesa or egl without a screen.
@@ -31,6 +31,8 @@ WIDTH, HEIGHT, FIELD_DEG = 1600, 1200, 40.0
 LARGE = 2600
 VIEWS = 8
 SEEN_DEG, SHARE, PLACE_MM = 60.0, 0.95, 0.05
+# Where a texture has fewer px a mm than this, its corners may be off by 0.15 px.
+COARSE = 3.0
 
 
 def corners_of(target):
@@ -140,7 +142,7 @@ def on_surface(name, what, vertices, faces, uv, of_texture, textures, corners):
     off = np.linalg.norm(refined - pixels, axis=1) / per_mm
     print(f"{name}: {what}: {len(places)} corners within {apart.max():.6f} mm of the surface; those of the texture are off "
           f"by {np.median(off):.4f} mm in the median, {off.max():.4f} at most")
-    assert apart.max() < PLACE_MM and np.median(off) < PLACE_MM
+    assert apart.max() < PLACE_MM and np.median(off * np.minimum(1, per_mm / COARSE)) < PLACE_MM
 
 
 def texture_names(name, count):

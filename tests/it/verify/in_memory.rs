@@ -196,7 +196,7 @@ fn a_solid_with_several_textures_is_proved_in_memory() {
         let family = family();
         let verifier = Verifier::new(&target, Some(&family)).unwrap();
         let mut limits = Limits::default();
-        limits.max_pixels = 1_000_000;
+        limits.max_pixels = 500_000;
         let error = verifier.within(limits).verify(name, &files).unwrap_err().to_string();
         assert!(error.contains("max_pixels"), "{name}: {error}");
     }

@@ -270,7 +270,7 @@ impl TexturedMesh {
         let px_per_m = pictures.first().map_or(0.0, |first| f64::from(first.atlas.px_per_m));
         let (mut textures, mut textured) = (Vec::new(), Vec::new());
         for (texture, Picture { faces, atlas }) in pictures.into_iter().enumerate() {
-            let sheet = atlas.drawn(target, &panels[faces], family)?;
+            let sheet = atlas.drawn(target, panels.get(faces).unwrap_or_default(), family)?;
             let png = png::to_bytes(&sheet, &target.name, px_per_m * 0.0254)?;
             textures.push(Texture { png, size_px: atlas.size_px });
             let size_mm = atlas.size_mm();
