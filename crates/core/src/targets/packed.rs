@@ -12,7 +12,9 @@ use std::cmp::Reverse;
 
 use glam::DVec2;
 
-use super::layout::{Arrangement, Footprint, check_margin, label, label_of_one, on_page};
+use super::layout::{
+    ADVANCE_CAPS, Arrangement, Footprint, check_margin, label, label_of_one, on_page,
+};
 use super::logo::{LogoPlacement, LogoSize};
 use super::paper::PaperSpec;
 use super::{
@@ -159,17 +161,19 @@ fn sheet(
         let corner = at(index % columns, rows - 1 - index / columns);
         let origin_mm = corner + DVec2::new(cell.blank, cell.below()) - cell.ink[0];
         sheet.placements.push(Placement { panel: panel.id, angle_rad: 0.0, origin_mm });
+        let words = label_of_one(spec, panel, family);
         let mut length = size.x - 2.0 * cell.blank;
         if let Some(logo) = logo {
             let least = LABEL_CAP_MM + 2.0 * LABEL_GAP_MM;
             let [deep, most] = [least, cell.below() - cell.blank].map(|mm| mm - 2.0 * LOGO_GAP_MM);
-            let DVec2 { x: width, y: height_mm } = logo.in_strip(length, deep, most);
+            let wanted = words.chars().count() as f64 * ADVANCE_CAPS * LABEL_CAP_MM;
+            let DVec2 { x: width, y: height_mm } = logo.in_strip([length, wanted], deep, most);
             let at_mm = corner + DVec2::new(cell.blank + length - width, LOGO_GAP_MM);
             sheet.logos.push(LogoPlacement { at_mm, angle_rad: 0.0, height_mm });
             length -= LogoSize::taken(width);
         }
         sheet.texts.push(SheetText {
-            text: Label::Words(label_of_one(spec, panel, family)),
+            text: Label::Words(words),
             at_mm: corner + DVec2::new(cell.blank, LABEL_GAP_MM + LABEL_CAP_MM / 3.0),
             angle_rad: 0.0,
             cap_height_mm: LABEL_CAP_MM,
