@@ -30,6 +30,21 @@ def test_boards_take_what_the_program_takes(tmp_path):
     assert deltille.Board(4, 5, boards=3).panels == [0, 1, 2]
 
 
+def test_a_logo_is_a_file_or_a_text_and_in_the_target_file(tmp_path):
+    svg = '<svg xmlns="http://www.w3.org/2000/svg"><path d="M0 9H20L10 0Z"/></svg>'
+    (tmp_path / "logo.svg").write_text(svg)
+    board = deltille.Board(5, 6, edge_mm=20, logo=tmp_path / "logo.svg", logo_height_mm=6)
+    assert board == deltille.Board(5, 6, edge_mm=20, logo=svg, logo_height_mm=6)
+    assert json.loads(board.to_json())["sheets"][0]["logos"][0]["height_mm"] == 6
+    assert "logo" in json.loads(deltille.Icosahedron(logo=svg).to_json())
+    with pytest.raises(deltille.TargetError, match="`text` cannot be printed: convert it to paths"):
+        deltille.Board(5, 6, logo='<svg xmlns="http://www.w3.org/2000/svg"><text>x</text></svg>')
+    with pytest.raises(deltille.TargetError, match="logo_height_mm"):
+        deltille.Board(5, 6, logo=svg, logo_height_mm=90)
+    with pytest.raises(deltille.MissingFileError):
+        deltille.Board(5, 6, logo=tmp_path / "none.svg")
+
+
 def test_a_target_is_read_back(tmp_path, board):
     paths = board.save(tmp_path / "made", ["pdf", "svg", "png", "dsc"])
     assert [path.name for path in paths] == ["desk.json", "desk.pdf", "desk.svg", "desk.png", "desk.dsc"]

@@ -84,10 +84,6 @@ def cut(ink):
 
 def printed(pdf, sheet, place, width_mm, is_mirrored, folder):
     """The ink of a page where the logo lies, as it is seen."""
-    run("pdftoppm", "-r", DPI, "-gray", "-png", "-singlefile", pdf, folder / "page")
-    page = np.asarray(Image.open(folder / "page.png").convert("L")) < 128
-    if is_mirrored:
-        page = page[:, ::-1]
     scale = DPI / 25.4
     turn = place["angle_rad"]
     x, y = place["at_mm"]
@@ -96,11 +92,14 @@ def printed(pdf, sheet, place, width_mm, is_mirrored, folder):
     height = place["height_mm"]
     corners = np.array([[x, y] + a * along + b * inwards for a in (0, width_mm) for b in (0, height)])
     (left, lower), (right, upper) = corners.min(axis=0), corners.max(axis=0)
-    right_px = page.shape[1] if is_mirrored else 0
-    offset = right_px - sheet["width_mm"] * scale if is_mirrored else 0.0
-    columns = [round(offset + value * scale) for value in (left, right)]
+    if is_mirrored:
+        left, right = sheet["width_mm"] - right, sheet["width_mm"] - left
+    columns = [round(value * scale) for value in (left, right)]
     rows = [round((sheet["height_mm"] - value) * scale) for value in (upper, lower)]
-    ink = page[rows[0] : rows[1], columns[0] : columns[1]]
+    part = ["-x", columns[0], "-y", rows[0], "-W", columns[1] - columns[0], "-H", rows[1] - rows[0]]
+    run("pdftoppm", "-r", DPI, *part, "-gray", "-png", "-singlefile", pdf, folder / "logo")
+    ink = np.asarray(Image.open(folder / "logo.png").convert("L")) < 128
+    ink = ink[:, ::-1] if is_mirrored else ink
     return np.rot90(ink, -round(turn / (math.pi / 2)))
 
 

@@ -282,7 +282,9 @@ impl Arrangement {
             };
             let deep = marks.depth();
             let most = if ink[0] < ink[2] { room.max(deep) } else { deep };
-            let DVec2 { x: width, y: height_mm } = size.in_strip(strip.length, deep, most);
+            let words = label.chars().count() as f64 * ADVANCE_CAPS * LABEL_CAP_MM;
+            let room = [strip.length, words];
+            let DVec2 { x: width, y: height_mm } = size.in_strip(room, deep, most);
             let (at_mm, angle_rad) = (strip.at(strip.length - width, 0.0), strip.angle());
             strip.length -= LogoSize::taken(width);
             LogoPlacement { at_mm, angle_rad, height_mm }

@@ -13,7 +13,7 @@ use serde::{Deserialize, Serialize};
 
 use super::length::format_mm;
 use super::{PaperSpec, SheetLayout, TargetError};
-use crate::quantity;
+use crate::{polygon, quantity};
 
 /// Height of a logo in the units of its outline: of one that is 12 mm high a unit is 1.2 µm.
 const UNITS: i32 = 10_000;
@@ -28,11 +28,17 @@ const MOST_RATIO: f64 = 30.0;
 /// Most of the length of a strip that a logo may take: the check bar beside it must stay long enough to be measured.
 const MOST_PART: f64 = 0.3;
 
+/// What it may take in any case of a strip that its label needs.
+const LEAST_PART: f64 = 0.15;
+
 /// Blank between a logo and what is beside it, mm.
 const BESIDE_MM: f64 = 2.0;
 
 /// Heights that may be asked for, mm: with less nothing can be told apart.
 const HEIGHT_MM: std::ops::RangeInclusive<f64> = 3.0..=200.0;
+
+/// Width below which an outline is left out, mm: some viewers draw so thin a mark as wide as a pixel, others not at all.
+const SLIVER_MM: f64 = 0.02;
 
 /// Room that is missing by no more than this is what rounding leaves, mm.
 const SLACK_MM: f64 = 1e-6;
@@ -127,7 +133,7 @@ impl Logo {
         f64::from(self.width) / f64::from(UNITS)
     }
 
-    /// Its closed outlines where it lies, in the frame of the page, mm.
+    /// Its closed outlines where it lies, in the frame of the page, mm; without those that would be less than 0.02 mm wide.
     pub fn outlines_mm(&self, place: &LogoPlacement) -> Vec<Vec<DVec2>> {
         let turn = DVec2::from_angle(place.angle_rad);
         let unit = place.height_mm / f64::from(UNITS);
@@ -135,8 +141,16 @@ impl Logo {
             let (x, y) = (f64::from(x), f64::from(UNITS - y));
             place.at_mm + turn.rotate(unit * DVec2::new(x, y))
         };
-        self.rings.iter().map(|ring| ring.iter().map(at).collect()).collect()
+        let outlines = self.rings.iter().map(|ring| ring.iter().map(at).collect());
+        outlines.filter(|outline: &Vec<DVec2>| width(outline) >= SLIVER_MM).collect()
     }
+}
+
+/// Twice the area of a closed outline over its length: the width of a long one.
+fn width(outline: &[DVec2]) -> f64 {
+    let next = outline.iter().cycle().skip(1);
+    let length: f64 = outline.iter().zip(next).map(|(a, b)| a.distance(*b)).sum();
+    2.0 * polygon::area(outline).abs() / length.max(f64::MIN_POSITIVE)
 }
 
 fn refused<T>(problem: impl Into<String>) -> Result<T, TargetError> {
@@ -224,11 +238,17 @@ impl LogoSize {
         self.width
     }
 
-    /// Width and height in a strip of some length: as high as asked for, else as the strip is `deep`, and not higher
-    /// than the `most` for which there is room.
-    pub fn in_strip(self, length: f64, deep: f64, most: f64) -> DVec2 {
-        let most = most.min(MOST_PART * length / self.width);
-        let height = self.height_mm.unwrap_or(deep).min(most);
+    /// Width and height in a strip of some length, with words that want to be so long: as high as asked for, where there
+    /// is room for the `most`; else as the strip is `deep`, or less for the sake of the words.
+    pub fn in_strip(self, [length, words]: [f64; 2], deep: f64, most: f64) -> DVec2 {
+        let widest = MOST_PART * length;
+        let height = match self.height_mm {
+            Some(asked) => asked.min(most).min(widest / self.width),
+            None => {
+                let left = (length - Self::taken(words)).clamp(LEAST_PART * length, widest);
+                deep.min(left / self.width)
+            }
+        };
         DVec2::new(self.width * height, height)
     }
 
@@ -259,8 +279,14 @@ pub(super) fn check_sheets(sheets: &[SheetLayout], paper: &PaperSpec) -> Result<
         let pages = sheet.pages.iter().map(|page| &page.marks);
         std::iter::once(sheet).chain(pages)
     });
-    let least = pages.flat_map(|page| &page.logos).map(|logo| logo.height_mm).reduce(f64::min);
-    let (Some(least), Some(logo)) = (least, &paper.logo) else { return Ok(()) };
+    let places = pages.flat_map(|page| &page.logos);
+    let smallest = places.min_by(|a, b| a.height_mm.total_cmp(&b.height_mm));
+    let (Some(place), Some(logo)) = (smallest, &paper.logo) else { return Ok(()) };
+    let least = place.height_mm;
+    if logo.outlines_mm(place).is_empty() {
+        let width = format_mm(SLIVER_MM);
+        return refused(format!("nothing of it is {width} wide: take thicker lines"));
+    }
     let fitting = format_mm((10.0 * least).floor() / 10.0);
     match paper.logo_height_mm {
         Some(asked) if least < asked - SLACK_MM => {
@@ -400,11 +426,11 @@ mod tests {
     fn solids_and_other_targets_have_a_place_for_it() {
         let solid = TargetSpec::from(SolidSpec::new(SolidShape::Icosahedron));
         let circles = CirclesSpec {
-            board_id: 0,
             circles: [7, 5],
             spacing_mm: 20.0,
             diameter_mm: 10.0,
             asymmetric: false,
+            board_id: 0,
         };
         for (spec, solids) in [
             (solid.clone(), SolidSheets::Net),
@@ -452,6 +478,23 @@ mod tests {
         };
         let error = build(&narrow.into(), &paper).unwrap_err().to_string();
         assert!(error.contains("less than 3 mm"), "{error}");
+    }
+
+    #[test]
+    fn what_is_too_thin_for_some_viewers_is_left_out() {
+        let rectangle = |x0: f64, x1: f64| {
+            [(x0, 0.0), (x1, 0.0), (x1, 1.0), (x0, 1.0)].map(DVec2::from).to_vec()
+        };
+        let logo = Logo::from_outlines(&[rectangle(0.0, 0.001), rectangle(0.5, 1.0)]).unwrap();
+        let outlines = |height_mm: f64| {
+            let place = LogoPlacement { at_mm: DVec2::ZERO, angle_rad: 0.0, height_mm };
+            logo.outlines_mm(&place).len()
+        };
+        assert_eq!([outlines(9.0), outlines(30.0)], [1, 2]);
+        let logo = Logo::from_outlines(&[rectangle(0.0, 0.001), rectangle(0.9, 0.901)]).unwrap();
+        let paper = PaperSpec { logo: Some(logo), ..PaperSpec::default() };
+        let error = build(&BoardSpec::deltille(5, 6, 20.0).into(), &paper).unwrap_err().to_string();
+        assert!(error.contains("nothing of it is 0.02 mm wide"), "{error}");
     }
 
     #[test]

@@ -74,12 +74,17 @@ impl Cell {
                 GridKind::Checker => DVec2::ONE,
             };
         let size = ((least / step - OUT_OF_STEP).ceil() + OUT_OF_STEP) * step;
-        let mut cell = Self { ink, blank, size, lines, logo: None };
-        cell.logo = LogoSize::of(paper).map(|logo| {
-            let [deep, most] = [below, cell.below()].map(|mm| mm - blank - 2.0 * LOGO_GAP_MM);
-            logo.in_strip(cell.line_mm(), deep, most)
-        });
-        cell
+        Self { ink, blank, size, lines, logo: None }
+    }
+
+    /// The same with a logo beside the label, which is to have room for these words.
+    fn with_logo(self, logo: Option<LogoSize>, words: &str) -> Self {
+        let lines = self.lines.len() as f64 * (LABEL_CAP_MM + LABEL_GAP_MM) + LABEL_GAP_MM;
+        let [deep, most] =
+            [lines, self.below() - self.blank].map(|room_mm| room_mm - 2.0 * LOGO_GAP_MM);
+        let wanted = words.chars().count() as f64 * ADVANCE_CAPS * LABEL_CAP_MM;
+        let logo = logo.map(|logo| logo.in_strip([self.line_mm(), wanted], deep, most));
+        Self { logo, ..self }
     }
 
     /// Room for a line of the label, mm.
@@ -117,7 +122,8 @@ pub(super) fn sheets(
     paper: &PaperSpec,
 ) -> Result<Vec<SheetLayout>, TargetError> {
     let Some(first) = panels.first() else { return Ok(Vec::new()) };
-    let cell = Cell::new(spec, first, paper);
+    let cell = Cell::new(spec, first, paper)
+        .with_logo(LogoSize::of(paper), &label_of_one(spec, first, family));
     let note = paper.note.as_deref().map(str::trim);
     cell.check_note(note)?;
     let (grid @ [columns, rows], arrangement) = arrange(&cell, panels.len(), paper)?
