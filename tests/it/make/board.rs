@@ -139,7 +139,7 @@ fn a_note_goes_with_every_board_that_is_cut_out() {
         let [left, lower, ..] = panel.bounds_mm();
         let below = placed.page_from_panel(glam::DVec2::new(left, lower));
         let is_its = |at: glam::DVec2| {
-            (at.x - below.x).abs() < 1.0 && (0.0..15.0).contains(&(below.y - at.y))
+            (at.x - below.x).abs() < 1.0 && (0.0..30.0).contains(&(below.y - at.y))
         };
         assert_eq!(notes.iter().filter(|note| is_its(note.at_mm)).count(), 1, "board {}", panel.id);
     }

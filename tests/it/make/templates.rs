@@ -87,7 +87,7 @@ fn every_option_of_a_board_is_in_its_template() {
     let boards = [
         "--rows 4 --cols 5 --edge 0.8in --family d36h9 --tag-spacing 2 --tag-border 1.2 --first-id 4 --tag-ids",
         "--rows 4 --cols 5 --edge 20mm --name desk --note Lab-3 --board-id 7 --invert --guide-page --orientation landscape",
-        "--rows 4 --cols 5 --paper A5 --margin 8mm --svg --png --dpi 250 --dsc --dsc-dialect original",
+        "--rows 4 --cols 5 --paper A5 --margin 8mm --svg --png --dpi 250 --dsc --dsc-dialect fork",
         "--rows 4 --cols 5 --untagged --edge 60mm --paper A4 --poster",
         "--rows 4 --cols 5 --dense --boards 4 --pack --edge 8mm --contour CutContour",
         "--rows 4 --cols 5 --two-sided 3mm --pdf --gltf",
@@ -112,14 +112,14 @@ fn every_option_of_a_solid_is_in_its_template() {
         "--edge 120mm --dense --svg --png --dpi 210 --per-face --note Lab-3 --name t --guide-page",
         "--pdf --paper A3 --orientation portrait --margin 9mm --dsc --dsc-dialect original",
         "--pdf --paper A5 --allow-seams --dxf --stl",
-        "--skeleton --panel-thickness 2mm --wall 5mm --rib 9mm --face-margin 6mm --3mf --inlay 0.3mm",
+        "--skeleton --panel-thickness 2mm --wall 5mm --rib 9mm --face-margin 12mm --3mf --inlay 0.3mm",
         "--gltf --obj --sdf --urdf --mjcf --usd --texture 1500",
         "--edge 100mm",
         "--laser dxf,svg --kerf 0.2mm",
     ];
     let cuboids = ["--size 80x60x50mm --pdf --laser dxf", "--size 8x6x5cm --edge 7cm --gltf"];
     let meshes = [
-        "--mesh prism.obj --allow-skew --square-family aprilTag25h9 --first-square-id 4 --gltf --texture-dpi 100",
+        "--mesh prism.obj --allow-skew --tiles 6 --square-family aprilTag25h9 --first-square-id 4 --gltf --texture-dpi 200",
         "--mesh prism.obj --scale 1.2 --pdf --laser svg",
     ];
     let of_all = &made_twice("tetrahedron", &solids) | &made_twice("solid", &meshes);
@@ -142,14 +142,14 @@ fn options_win_over_what_a_template_says_of_meshes_lasers_and_inks() {
     made("board --template t.toml", &saved);
     // Pages without spot colours, another size of the texture, another format of the drawing, another thickness.
     let other = "board --template t.toml --svg --texture 900 --laser svg --two-sided 4mm";
-    made(other, &["board-laser.svg", "board.glb", "board.json", "board.svg"]);
+    made(other, &["board-1.svg", "board-2.svg", "board-laser.svg", "board.glb", "board.json"]);
 
     for (text, said) in [
-        ("rows = 4\ncols = 5\ngltf = true\n", "line 3, `gltf`: unknown field `gltf`"),
-        ("rows = 4\ncols = 5\n[meshes]\nglb = true\n", "line 4, `glb`: unknown field `glb`"),
+        ("rows = 4\ncols = 5\ngltf = true\n", "line 3, `gltf`: field `gltf` is not known"),
+        ("rows = 4\ncols = 5\n[meshes]\nglb = true\n", "line 4, `glb`: field `glb` is not known"),
         (
             "rows = 4\ncols = 5\n[laser]\nformats = [\"png\"]\n",
-            "line 4, `formats`: unknown variant `png`",
+            "line 4, `formats`: `png` is not known; there are `dxf` or `svg`",
         ),
         ("rows = 4\ncols = 5\n[meshes]\ngltf = true\ntexture = 3\n", "--texture: 3 is not between"),
         (
