@@ -39,6 +39,8 @@ mod file;
 mod frontier;
 mod import;
 mod independent;
+mod invariant_bounds;
+mod joint;
 mod kernels;
 pub mod lexicode;
 mod natural;
@@ -65,6 +67,7 @@ pub use file::check_name;
 pub use file::{Construction, SCHEMA};
 pub use frontier::{RuleChoice, best_rule, rule_choices};
 pub use import::{ImportError, ImportSpec, import};
+pub use invariant_bounds::invariant_bound;
 pub use natural::{
     ACCEPTED_FALSE_POSITIVES, NaturalWords, TRIANGLES_PER_MEGAPIXEL, corrected_within,
 };
