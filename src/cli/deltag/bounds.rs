@@ -2,7 +2,9 @@ use std::process::ExitCode;
 
 use super::parameters::Parameters;
 use crate::cli::output::{self, Telling, say};
-use crate::family::{self, Construction, bounds::bounds, published_bounds, shipped_names};
+use crate::family::{
+    self, Construction, bounds::bounds, invariant_bound, published_bounds, shipped_names,
+};
 use crate::lattice::{GridKind, TagCells};
 
 #[derive(clap::Args)]
@@ -19,6 +21,8 @@ pub(super) fn run(args: Args) -> anyhow::Result<ExitCode> {
     let published = published_bounds(&TagCells::new(dimension), distance);
     let least = bounds.linear_programming.min(bounds.sphere_packing);
     let least = published.map_or(least, |published| least.min(published.most_tags));
+    let invariant = invariant_bound(dimension, distance);
+    let least = invariant.map_or(least, |invariant| least.min(invariant));
     let mut shipped = Vec::new();
     for name in shipped_names() {
         let family = family::resolve(name)?;
@@ -38,6 +42,7 @@ pub(super) fn run(args: Args) -> anyhow::Result<ExitCode> {
         output::print_json(&serde_json::json!({
             "bits": dimension.bits(), "distance": distance,
             "linear_programming": bounds.linear_programming, "sphere_packing": bounds.sphere_packing,
+            "invariant_codes": invariant,
             "published": published.map(|known| serde_json::json!({
                 "most_tags": known.most_tags, "most_words": known.most_words,
                 "known_words": known.known_words,
@@ -56,6 +61,11 @@ pub(super) fn run(args: Args) -> anyhow::Result<ExitCode> {
             known.most_tags,
             known.most_words,
             known.known_words
+        );
+    }
+    if let Some(invariant) = invariant {
+        say!(
+            "{invariant:>12}  by semidefinite programming, for codes that a turn leaves as they are"
         );
     }
     for (name, codes, by_rank) in shipped {

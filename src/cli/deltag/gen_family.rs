@@ -20,7 +20,7 @@ use crate::cli::run::FAILED;
 use crate::cli::values::{name, number, whole};
 use crate::clock;
 use crate::export::kind::Kind;
-use crate::family::best::{Best, Budget};
+use crate::family::best::{self, Best, Budget};
 use crate::family::lexicode::{self, Lexicode};
 use crate::family::search::{self, Search};
 use crate::family::{
@@ -33,9 +33,10 @@ use crate::words::counted;
 /// Told at the end of `--help`.
 pub(super) const HELP: &str = "Ctrl-C ends a search early. The methods best and algebraic write \
     the best family so far (exit code 0). The method search writes what its finished rounds found, \
-    and lexicode nothing (exit code 130); with --resume the same command goes on later and finds \
-    exactly what it would have found without a break. Where nothing was found yet, nothing is \
-    written (130). A second Ctrl-C ends the program at once.";
+    and lexicode nothing (exit code 130). With --resume the same command goes on later, and finds \
+    exactly what it would have found without a break, except by --time, of which it has what is \
+    left. Where nothing was found yet, nothing is written (130). A second Ctrl-C ends the program \
+    at once.";
 
 /// Told of `--force`.
 pub(super) const FORCE: &str = "Replace a family file also by one with fewer codes, other bits or \
@@ -81,8 +82,7 @@ pub(super) struct Args {
     rules: RuleArgs,
     #[command(flatten)]
     choice: ChoiceArgs,
-    /// For the methods lexicode and search: keep a checkpoint in this file, and go on from it if
-    /// it is there; removed at the end
+    /// Keep a checkpoint in this file, and go on from it if it is there; removed at the end
     #[arg(long, value_name = "FILE")]
     resume: Option<PathBuf>,
     /// Name of the family, also the stem of its file [default: as the bits and distance]
@@ -175,7 +175,7 @@ pub(super) fn run(args: Args) -> anyhow::Result<ExitCode> {
     let outcome = match args.method {
         Method::Lexicode => args.lexicode(&name, rules, &file, control),
         Method::Search => args.search(&name, rules, &file, control),
-        Method::Best | Method::Algebraic => args.best(&name, rules, control),
+        Method::Best | Method::Algebraic => args.best(&name, rules, &file, control),
     };
     shown.end();
     let Outcome { family, interrupted, mut exit } = outcome?;
@@ -335,11 +335,6 @@ impl Args {
             self.seed.is_none() || method != Lexicode,
             "--seed: a lexicode has no random choices; leave it out"
         );
-        ensure!(
-            self.resume.is_none() || matches!(method, Search | Lexicode),
-            "--resume: only the methods search and lexicode keep checkpoints; here Ctrl-C keeps \
-             the best family so far, and more --time finds more"
-        );
         let bits = self.family.dimension.bits();
         ensure!(
             !(method == Lexicode && bits > 25 && self.rules.is_robust()),
@@ -361,16 +356,18 @@ impl Args {
     /// All that decides what a search with checkpoints finds.
     fn identity(&self, rules: &Rules) -> String {
         let Parameters { dimension, distance } = self.family;
-        let seed = if self.method == Method::Search {
-            format!(", seed {}", self.seed())
-        } else {
-            String::new()
+        let seed = match self.method {
+            Method::Lexicode => String::new(),
+            _ => format!(", seed {}", self.seed()),
         };
+        let from = if self.from_nothing { ", from nothing" } else { "" };
+        let counted = if self.work.is_some() { ", by work" } else { "" };
+        let limit = self.limit.map(|limit| format!(", limit {limit}")).unwrap_or_default();
         let Rules { min_complexity, black_distance, white_distance, robust } = rules;
         let robust: String = robust.iter().map(|robust| format!(", robust to {robust}")).collect();
         format!(
             "{:?} d{}h{distance}, complexity {min_complexity}, black {black_distance}, \
-             white {white_distance}{robust}{seed}",
+             white {white_distance}{robust}{seed}{from}{counted}{limit}",
             self.method,
             dimension.bits()
         )
@@ -441,7 +438,13 @@ impl Args {
         }
     }
 
-    fn best(&self, name: &str, rules: Rules, control: Control) -> anyhow::Result<Outcome> {
+    fn best(
+        &self,
+        name: &str,
+        rules: Rules,
+        file: &CheckpointFile,
+        control: Control,
+    ) -> anyhow::Result<Outcome> {
         let Parameters { dimension, distance } = self.family;
         // With hidden cells every code is compared with all that were taken before.
         let most = match rules.robust.as_slice() {
@@ -456,8 +459,18 @@ impl Args {
         let best = Best::new(dimension, distance, budget).rules(rules).seed(self.seed());
         let best = best.limit(limit).exchange(self.method == Method::Best);
         let stopped = || interrupt::flag().load(Ordering::Relaxed);
+        let mut checkpoint: best::Checkpoint = file.load()?;
+        if let Some(steps) = self.work {
+            ensure!(
+                checkpoint.legs_done <= steps,
+                "--work: the checkpoint of --resume has {} steps already",
+                checkpoint.legs_done
+            );
+        }
         let start = if self.from_nothing { None } else { best.start() };
-        if let Some(start) = &start {
+        if checkpoint.construction.is_some() {
+            tell!("goes on from {} of the checkpoint", counted(checkpoint.codes.len(), "code"));
+        } else if let Some(start) = &start {
             let codes = best.family_of(name, start)?;
             let proof = proof_of(&certify_codes(&codes), distance);
             tell!("starts from {} of {}: {proof}", counted(codes.len(), "code"), start.family);
@@ -474,10 +487,10 @@ impl Args {
             };
         }
         interrupt::keeps_results();
-        match best.family(name, start, control) {
+        match best.resume(name, start, &mut checkpoint, &|c| file.save(c), control) {
             Ok(family) if stopped() => Ok(Outcome {
                 family: Some(family),
-                interrupted: Some("kept the best family so far".to_owned()),
+                interrupted: Some(format!("kept the best family so far; {}", file.advice())),
                 exit: ExitCode::SUCCESS,
             }),
             Ok(family) => Ok(Outcome::whole(family)),

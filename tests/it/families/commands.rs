@@ -164,7 +164,6 @@ fn bad_arguments_are_one_line_and_exit_code_2() {
         "gen-family d25h7 -o x.txt",
         "gen-family d25h7 -o file/x",
         "gen-family d25h7 --rounds 3",
-        "gen-family d25h7 --resume x",
         "gen-family d25h7 --method lexicode --seed 3",
         "gen-family d25h7 --method lexicode --time 3",
         "gen-family d25h7 --method lexicode --limit 3",

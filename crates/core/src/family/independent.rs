@@ -2,12 +2,16 @@
 //!
 //! Local search with plateau moves (after Andrade, Resende, Werneck, "Fast local search for the
 //! maximum independent set problem", J. Heuristics 2012): a vertex without conflict is added at
-//! once; else one with a single conflict takes the place of that one; now and then a random
-//! vertex is forced in. Deterministic for a seed and a number of steps.
+//! once; else one with a single conflict takes the place of that one, of many such the one that has been
+//! out for longest; without gain for a while, one to four vertices with few conflicts are forced in, or the
+//! search goes back to the best. Deterministic for a seed and a number of steps.
 
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
+
+use super::Screen;
+use super::kernels::nearer;
 
 /// Which vertices exclude each other; lists in one array.
 #[derive(Clone, Debug)]
@@ -26,6 +30,29 @@ impl ConflictGraph {
             Some(*sum)
         }));
         Self { starts, lists: rows.concat() }
+    }
+
+    /// Which words are too near to each other, in any turn. Where `halt` came first some
+    /// conflicts are missing.
+    pub(super) fn of_words(
+        screen: &Screen,
+        pool: &[u64],
+        halt: impl Fn() -> bool + Sync + Send,
+    ) -> Self {
+        let turned: Vec<u64> = pool.iter().flat_map(|&w| screen.words().turns(w)).collect();
+        Self::new(pool.len(), |i| {
+            if halt() {
+                return Vec::new();
+            }
+            let mut near = nearer(pool[i], &turned, screen.reach());
+            if screen.is_robust() {
+                near.retain(|&at| !screen.is_apart(pool[i] ^ turned[at as usize]));
+            }
+            near.iter_mut().for_each(|j| *j /= 3);
+            near.dedup();
+            near.retain(|&j| j != i as u32);
+            near
+        })
     }
 
     fn len(&self) -> usize {
@@ -47,47 +74,50 @@ impl ConflictGraph {
     ) -> Vec<u32> {
         /// Steps between two looks at the clock.
         const STOP_CHECK: u64 = 1 << 10;
-        /// A vertex that left stays out for this many steps, and up to as many more.
+        /// A vertex that left stays out for this many steps, and up to four more.
         const TABU: u64 = 7;
-        /// Without any improvement for this many steps something is forced in.
-        const PATIENCE: u64 = 2_000;
+        /// Vertices with one conflict that are compared before each exchange.
+        const LOOK_AT: usize = 50;
+        /// Share of the steps, and number of them at most, without gain after which something is forced in.
+        const PATIENCE: (u64, u64) = (8, 3_000);
+        /// So many vertices below the best the search goes back to it.
+        const TOO_FAR: usize = 3;
+        let patience = (steps / PATIENCE.0).clamp(1, PATIENCE.1);
         let mut random = ChaCha8Rng::seed_from_u64(seed);
         let mut state = State::new(self, initial);
         let mut best = state.chosen.items.clone();
         let mut left_at = vec![0u64; self.len()];
         let mut last_gain = 0;
         for step in 1..=steps {
-            if step % STOP_CHECK == 0 && stop() {
+            if self.len() == 0 || (step % STOP_CHECK == 0 && stop()) {
                 break;
             }
+            let rested = |v: &u32| left_at[*v as usize] <= step;
             if let Some(v) = state.free.pick(&mut random) {
                 state.add(v);
-            } else if let Some(v) = (0..8)
+            } else if step - last_gain > patience {
+                last_gain = step;
+                if state.chosen.items.len() + TOO_FAR < best.len() || random.random_ratio(1, 20) {
+                    state = State::new(self, &best);
+                }
+                for _ in 0..4 {
+                    if let Some(v) = state.loosest(&mut random) {
+                        state.force(v, |u| left_at[u as usize] = step + TABU + step % 5);
+                    }
+                    if random.random_bool(0.5) {
+                        break;
+                    }
+                }
+            } else if let Some(v) = (0..LOOK_AT.min(state.single.items.len()))
                 .filter_map(|_| state.single.pick(&mut random))
-                .filter(|&v| left_at[v as usize] <= step)
+                .filter(rested)
                 .min_by_key(|&v| left_at[v as usize])
             {
-                state.force(v, |u| left_at[u as usize] = step + TABU + step % TABU);
-            } else if self.len() > 0 {
-                let v = random.random_range(0..self.len() as u32);
-                if !state.chosen.contains(v) {
-                    state.force(v, |u| left_at[u as usize] = step + TABU + step % TABU);
-                }
+                state.force(v, |u| left_at[u as usize] = step + TABU + step % 5);
             }
             if state.chosen.items.len() > best.len() {
                 best.clone_from(&state.chosen.items);
                 last_gain = step;
-            } else if step - last_gain > PATIENCE {
-                last_gain = step;
-                // Far below the best, go back to it; else shake.
-                if state.chosen.items.len() + 3 < best.len() {
-                    state = State::new(self, &best);
-                } else if self.len() > 0 {
-                    let v = random.random_range(0..self.len() as u32);
-                    if !state.chosen.contains(v) {
-                        state.force(v, |u| left_at[u as usize] = step + TABU);
-                    }
-                }
             }
         }
         best
@@ -193,6 +223,14 @@ impl<'a> State<'a> {
         }
     }
 
+    /// Of some random vertices outside the one with the fewest conflicts.
+    fn loosest(&self, random: &mut ChaCha8Rng) -> Option<u32> {
+        (0..20)
+            .map(|_| random.random_range(0..self.graph.len() as u32))
+            .filter(|&v| !self.chosen.contains(v))
+            .min_by_key(|&v| self.conflicts[v as usize])
+    }
+
     /// Adds a vertex after removing whatever it excludes.
     fn force(&mut self, v: u32, mut left: impl FnMut(u32)) {
         let out: Vec<u32> =
@@ -214,6 +252,7 @@ mod tests {
         let n = 41;
         let graph =
             ConflictGraph::new(n, |i| [(i + 1) % n, (i + n - 1) % n].map(|j| j as u32).to_vec());
+        assert!(ConflictGraph::new(0, |_| Vec::new()).search(&[], 1, 10, || false).is_empty());
         let set = graph.search(&[3], 1, 20_000, || false);
         assert_eq!(set.len(), 20);
         assert!(set.iter().all(|&v| !graph.neighbours(v).iter().any(|u| set.contains(u))));

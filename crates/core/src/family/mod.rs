@@ -41,6 +41,8 @@ mod growth;
 mod hidden;
 mod import;
 mod independent;
+mod invariant_bounds;
+mod joint;
 mod kernels;
 pub mod lexicode;
 mod natural;
@@ -70,6 +72,7 @@ pub use frontier::{RuleChoice, best_rule, rule_choices};
 pub use growth::Beginning;
 pub use hidden::{HiddenCells, Robust};
 pub use import::{ImportError, ImportSpec, import};
+pub use invariant_bounds::invariant_bound;
 pub use natural::{
     ACCEPTED_FALSE_POSITIVES, NaturalWords, TRIANGLES_PER_MEGAPIXEL, corrected_within,
 };

@@ -9,7 +9,6 @@ use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
 use super::independent::ConflictGraph;
-use super::kernels::nearer;
 use super::{Control, Screen};
 
 /// Words are counted in a table of all of them up to this size.
@@ -65,20 +64,7 @@ pub(super) fn round(
     let mut random = ChaCha8Rng::seed_from_u64(effort.seed);
     random.set_stream(number.into());
     let Some(pool) = candidates(screen, codes, &mut random, &halt) else { return codes.to_vec() };
-    let turned: Vec<u64> = pool.iter().flat_map(|&w| screen.words().turns(w)).collect();
-    let graph = ConflictGraph::new(pool.len(), |i| {
-        if halt() {
-            return Vec::new();
-        }
-        let mut near = nearer(pool[i], &turned, screen.reach());
-        if screen.is_robust() {
-            near.retain(|&at| !screen.is_apart(pool[i] ^ turned[at as usize]));
-        }
-        near.iter_mut().for_each(|j| *j /= 3);
-        near.dedup();
-        near.retain(|&j| j != i as u32);
-        near
-    });
+    let graph = ConflictGraph::of_words(screen, &pool, &halt);
     // Without all conflicts nothing can be exchanged.
     if halt() {
         return codes.to_vec();

@@ -5,7 +5,6 @@
 
 use super::algebra::AlgebraicConstruction;
 use super::independent::ConflictGraph;
-use super::kernels::nearer;
 use super::{FamilyError, Screen};
 
 /// Words that are looked at, at most: their conflicts must fit in memory.
@@ -28,15 +27,7 @@ pub(super) fn with_the_most_codes(
     }
     let mut pool = codes.clone();
     pool.extend(words.into_iter().filter(|word| !codes.contains(word)));
-    let turned: Vec<u64> = pool.iter().flat_map(|&w| screen.words().turns(w)).collect();
-    let graph = ConflictGraph::new(pool.len(), |i| {
-        let mut near = nearer(pool[i], &turned, screen.reach());
-        near.retain(|&at| !screen.is_apart(pool[i] ^ turned[at as usize]));
-        near.iter_mut().for_each(|at| *at /= 3);
-        near.dedup();
-        near.retain(|&at| at != i as u32);
-        near
-    });
+    let graph = ConflictGraph::of_words(screen, &pool, || false);
     let first: Vec<u32> = (0..codes.len() as u32).collect();
     let found = graph.search(&first, construction.seed, STEPS, halt);
     if found.len() <= codes.len() {

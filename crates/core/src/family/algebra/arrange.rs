@@ -124,6 +124,35 @@ impl Arranger {
         })
     }
 
+    /// The objective of [`Self::anneal`] for one arrangement.
+    pub(in crate::family) fn judge(&self, arrangement: &Arrangement) -> f64 {
+        self.worth(arrangement, &self.weights(arrangement.inverted))
+    }
+
+    /// Cycles that may be inverted, and the central bit unless it is chosen for each word.
+    fn flips(&self) -> u32 {
+        self.space.cycles + u32::from(self.space.centre && !self.free_centre)
+    }
+
+    /// An arrangement that differs in one choice.
+    pub(in crate::family) fn changed(
+        &self,
+        arrangement: &Arrangement,
+        random: &mut impl Rng,
+    ) -> Arrangement {
+        let n = self.space.cycles as usize;
+        let mut next = arrangement.clone();
+        match random.random_range(0..10) {
+            0..4 => next.places.swap(random.random_range(0..n), random.random_range(0..n)),
+            4..7 => {
+                let start = &mut next.starts[random.random_range(0..n)];
+                *start = (*start + random.random_range(1..3)) % 3;
+            }
+            _ => next.inverted ^= 1 << random.random_range(0..self.flips()),
+        }
+        next
+    }
+
     /// Which words are far enough from all black and all white, as bit slices; the places of cycles
     /// do not matter for this.
     fn weights(&self, inverted: u32) -> Vec<Slice> {
@@ -186,8 +215,7 @@ impl Arranger {
     /// search early.
     pub fn anneal(&self, seed: u64, steps: u32, halt: impl Fn() -> bool) -> (f64, Arrangement) {
         let mut random = ChaCha8Rng::seed_from_u64(seed);
-        let n = self.space.cycles as usize;
-        let flips = self.space.cycles + u32::from(self.space.centre && !self.free_centre);
+        let flips = self.flips();
         let mut now = Arrangement::plain(self.space);
         now.places.shuffle(&mut random);
         now.starts.iter_mut().for_each(|s| *s = random.random_range(0..3));
@@ -203,15 +231,7 @@ impl Arranger {
                 break;
             }
             let temperature = hot * (0.3 / hot).powf(f64::from(step) / f64::from(steps));
-            let mut next = now.clone();
-            match random.random_range(0..10) {
-                0..4 => next.places.swap(random.random_range(0..n), random.random_range(0..n)),
-                4..7 => {
-                    let start = &mut next.starts[random.random_range(0..n)];
-                    *start = (*start + random.random_range(1..3)) % 3;
-                }
-                _ => next.inverted ^= 1 << random.random_range(0..flips),
-            }
+            let next = self.changed(&now, &mut random);
             let other = (next.inverted != now.inverted).then(|| self.weights(next.inverted));
             let next_score = self.worth(&next, other.as_ref().unwrap_or(&weights));
             let gain = next_score - score;

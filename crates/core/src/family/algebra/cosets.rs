@@ -6,7 +6,7 @@
 //! are unmarked: a clique in a Cayley graph (an independent set in its complement). Its vertices
 //! here are whole orbits of syndromes under the turn, so that the union is invariant.
 //!
-//! The search is a randomised greedy one: the union that it finds need not be the largest. The
+//! The search draws the first vertices at random and finds the best of what they leave: the union need not be the largest. The
 //! table of marks has one bit for each syndrome, which limits codes to [`MAX_SYNDROME_BITS`].
 
 use std::collections::BTreeSet;
@@ -15,6 +15,7 @@ use rand::SeedableRng;
 use rand::seq::IndexedRandom;
 use rand_chacha::ChaCha8Rng;
 
+use super::clique::Cliques;
 use super::{CycleSpace, LinearMap, Span};
 
 /// The most bits that a syndrome may have; the table of marked syndromes then takes 16 MiB.
@@ -139,17 +140,28 @@ impl CosetGraph {
         !self.is_marked(a ^ b) && !self.is_marked(a ^ once) && !self.is_marked(a ^ self.turn(once))
     }
 
-    /// A large union, grown greedily from one random start: vertices are added one by one, each
-    /// time the one of a few random candidates that leaves the most words possible. It grows until
-    /// no vertex fits any more or `halt` returns true. The result depends on `seed` only, unless
-    /// `halt` ended the search.
+    /// A large union, grown from one random start: vertices are added one by one, each time the one of a
+    /// few random candidates that leaves the most words possible, until so few are left that the
+    /// heaviest clique of these is found by branch and bound, or `halt` returns true. The result
+    /// depends on `seed` only, unless `halt` ended the search.
     pub fn grow(&self, seed: u64, halt: impl Fn() -> bool) -> CosetUnion {
         /// Candidates that are compared before each choice.
         const LOOK_AT: usize = 12;
+        /// So many vertices are few, and so many branches are looked at.
+        const FEW: usize = 800;
+        const NODES: u32 = 4_000;
         let mut random = ChaCha8Rng::seed_from_u64(seed);
         let mut chosen: Vec<Vertex> = Vec::new();
         let mut open = self.vertices.clone();
         while !open.is_empty() && !halt() {
+            if open.len() <= FEW {
+                let weights = open.iter().map(|v| v.weight).collect();
+                let adjacent =
+                    |i: usize, j: usize| self.adjacent(open[i].syndrome, open[j].syndrome);
+                let heaviest = Cliques::new(weights, adjacent).heaviest(NODES);
+                chosen.extend(heaviest.into_iter().map(|v| open[v]));
+                break;
+            }
             let tries = if open.len() > 50_000 { 1 } else { LOOK_AT.min(open.len()) };
             let best = (0..tries)
                 .map(|_| {

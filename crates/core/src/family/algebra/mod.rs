@@ -15,6 +15,7 @@
 //!   how many words satisfy the rules on complexity.
 
 pub mod arrange;
+mod clique;
 pub mod cosets;
 mod cycles;
 mod linear_map;

@@ -53,14 +53,7 @@ impl AlgebraicConstruction {
             let problem = "does not arrange the cycles of such a tag";
             return Err(FamilyError::field("construction.arrangement", problem));
         }
-        let union = CosetUnion {
-            space,
-            code: Span::of(self.words("basis", &self.basis, dimension)?),
-            cosets: self.words("cosets", &self.cosets, dimension)?,
-        };
-        if union.code.dimension() > MOST_DIMENSIONS {
-            return Err(FamilyError::field("construction.basis", "more than 26 dimensions"));
-        }
+        let union = self.union(dimension)?;
         let exchanged = self.words("exchanged", &self.exchanged, dimension)?;
         let turned: Vec<u64> = exchanged.iter().flat_map(|&w| screen.words().turns(w)).collect();
         let mut codes = arranged(screen, &union, &self.arrangement);
@@ -86,12 +79,7 @@ impl AlgebraicConstruction {
         screen: &Screen,
     ) -> Result<Vec<u64>, FamilyError> {
         let dimension = screen.words().dimension();
-        let union = CosetUnion {
-            space: CycleSpace::of(dimension),
-            code: Span::of(self.words("basis", &self.basis, dimension)?),
-            cosets: self.words("cosets", &self.cosets, dimension)?,
-        };
-        let mut words = arranged(screen, &union, &self.arrangement);
+        let mut words = arranged(screen, &self.union(dimension)?, &self.arrangement);
         words.extend(self.words("exchanged", &self.exchanged, dimension)?);
         words.sort_by_cached_key(|&word| screen.words().canonical(word));
         words.dedup_by_key(|word| screen.words().canonical(*word));
@@ -105,6 +93,19 @@ impl AlgebraicConstruction {
         let near = union.differences_lighter_than(screen.reach());
         let near = self.arrangement.apply(dimension, &near);
         near.into_iter().all(|word| screen.is_apart(word ^ zero))
+    }
+
+    /// The union of cosets, in cycle coordinates.
+    ///
+    /// # Errors
+    /// When a word does not parse or is too long for the dimension, or the basis has more than 26 dimensions.
+    pub(in crate::family) fn union(&self, dimension: Dimension) -> Result<CosetUnion, FamilyError> {
+        let code = Span::of(self.words("basis", &self.basis, dimension)?);
+        if code.dimension() > MOST_DIMENSIONS {
+            return Err(FamilyError::field("construction.basis", "more than 26 dimensions"));
+        }
+        let cosets = self.words("cosets", &self.cosets, dimension)?;
+        Ok(CosetUnion { space: CycleSpace::of(dimension), code, cosets })
     }
 
     /// Tag number `rank` of the whole linear code, as a word of the tag whether or not it satisfies
@@ -228,7 +229,11 @@ fn taken_in_order(screen: &Screen, words: impl Iterator<Item = u64>, limit: usiz
 }
 
 /// The words of a union on the tag that the screen admits, one of each orbit.
-fn arranged(screen: &Screen, union: &CosetUnion, arrangement: &Arrangement) -> Vec<u64> {
+pub(in crate::family) fn arranged(
+    screen: &Screen,
+    union: &CosetUnion,
+    arrangement: &Arrangement,
+) -> Vec<u64> {
     let dimension = screen.words().dimension();
     let words = arrangement.apply(dimension, &union.orbits());
     if !has_free_centre(union) {

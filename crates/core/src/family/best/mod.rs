@@ -6,9 +6,15 @@
 //! ([`AlgebraicConstruction`]) and gives the same codes again without any search. With an amount of work
 //! instead of a time the same seed gives the same codes on every machine.
 
-use std::sync::atomic::{AtomicU64, Ordering};
+mod budget;
+mod legs;
+
+use std::collections::HashSet;
 use std::time::Duration;
 
+pub use budget::Budget;
+use budget::{End, Spent, is_past};
+pub use legs::Checkpoint;
 use rand::seq::{IndexedRandom, SliceRandom};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -21,12 +27,12 @@ use super::algebra::record::has_free_centre;
 use super::algebra::{AlgebraicConstruction, Arrangement, CycleSpace, Span, residue};
 use super::bounds::bounds;
 use super::file::parse_word;
+use super::joint::{AllWords, Joint};
 use super::polish::{Effort, polish};
 use super::robust::with_the_most_codes;
 use super::search::Search;
 use super::shipped::shipped_names;
 use super::{Construction, Control, Family, FamilyError, Progress, Rules, Screen, TagWords};
-use crate::Clock;
 use crate::lattice::{Dimension, GridKind};
 
 /// What to search and for how long.
@@ -92,17 +98,6 @@ impl Best {
     }
 }
 
-/// How long a search goes on.
-#[derive(Clone, Copy, Debug)]
-#[non_exhaustive]
-pub enum Budget {
-    /// So long by a clock; how much is found depends on the machine.
-    Time(Duration, Clock),
-    /// So many steps: in each [`DRAWS`] batches of codes are drawn, the best are arranged once more, and codes are
-    /// exchanged in one round of local search. What is found depends on the seed alone.
-    Work(u32),
-}
-
 /// Batches of codes that are drawn in a step of work.
 pub const DRAWS: u64 = 4;
 
@@ -116,87 +111,6 @@ pub struct Start {
     construction: AlgebraicConstruction,
 }
 
-/// How far a search has come.
-struct Spent {
-    /// When the search began, by the clock of its budget; zero where work is counted.
-    start: Duration,
-    budget: Budget,
-    /// Share of the budget that is spent before the first share is asked for.
-    first: f64,
-    /// Steps done of a search by work, and in all.
-    done: AtomicU64,
-    total: u64,
-}
-
-impl Spent {
-    fn new(budget: Budget, first: f64) -> Self {
-        // Drawing, arranging and exchanging, and exchanging what is on record.
-        let parts = if first > 0.0 { 4 } else { 3 };
-        let total = match budget {
-            Budget::Time(..) => 1,
-            Budget::Work(steps) => parts * u64::from(steps.max(1)),
-        };
-        let start = match budget {
-            Budget::Time(_, clock) => clock(),
-            Budget::Work(_) => Duration::ZERO,
-        };
-        Self { start, budget, first, done: AtomicU64::new(0), total }
-    }
-
-    /// When a share of what follows the first share is spent; `None` where work is counted.
-    fn until(&self, share: f64) -> Option<End> {
-        match self.budget {
-            Budget::Time(time, clock) => {
-                let at = self.start + time.mul_f64(self.first + (1.0 - self.first) * share);
-                Some(End { clock, at })
-            }
-            Budget::Work(_) => None,
-        }
-    }
-
-    /// Rounds of a kind: as many as are worked, or as the time gives.
-    fn rounds(&self, most: u64) -> u64 {
-        match self.budget {
-            Budget::Time(..) => most,
-            Budget::Work(steps) => u64::from(steps.max(1)),
-        }
-    }
-
-    fn step(&self) {
-        self.done.fetch_add(1, Ordering::Relaxed);
-    }
-
-    fn thousandths(&self) -> u64 {
-        let share = match self.budget {
-            Budget::Time(time, clock) => {
-                clock().saturating_sub(self.start).as_secs_f64() / time.as_secs_f64().max(1e-3)
-            }
-            Budget::Work(_) => self.done.load(Ordering::Relaxed) as f64 / self.total as f64,
-        };
-        (1000.0 * share.min(1.0)) as u64
-    }
-}
-
-/// When something ends.
-#[derive(Clone, Copy)]
-struct End {
-    clock: Clock,
-    at: Duration,
-}
-
-impl End {
-    /// An end that leaves so much of what is left.
-    fn after(self, share: f64) -> Self {
-        let now = (self.clock)();
-        Self { at: now + self.at.saturating_sub(now).mul_f64(share), ..self }
-    }
-}
-
-/// Whether an end has come; without one it never does.
-fn is_past(end: Option<End>) -> bool {
-    end.is_some_and(|end| (end.clock)() >= end.at)
-}
-
 /// A union, how it is arranged, and how many words pass.
 #[derive(Clone, Debug)]
 struct Candidate {
@@ -204,6 +118,8 @@ struct Candidate {
     union: CosetUnion,
     arrangement: Arrangement,
     worth: f64,
+    /// What local search made of it.
+    codes: Vec<u64>,
 }
 
 /// What a random linear code is drawn by.
@@ -259,29 +175,24 @@ impl Best {
         Screen::new(TagWords::new(self.dimension), self.distance, &self.rules)
     }
 
-    /// Searches and makes a family of what was found, at least as large as what it starts from. Progress is
-    /// reported in thousandths. When it is cancelled, the search is over: the family is the best so far,
-    /// and only where nothing was found yet there is none.
-    ///
-    /// # Errors
-    /// Where the rules make no sense, or the search was cancelled before anything was found.
-    pub fn family(
+    /// Searches once with the whole budget: codes at least as many as those it starts from.
+    fn leg(
         &self,
-        name: &str,
-        start: Option<Start>,
+        screen: &Screen,
+        start: Option<&Start>,
         control: Control,
-    ) -> Result<Family, FamilyError> {
+    ) -> Result<(Vec<u64>, Construction), FamilyError> {
         /// Share of the time in which codes on record are exchanged.
-        const FOR_RECORD: f64 = 0.4;
-        self.rules.check(self.dimension.bits())?;
-        let screen = self.screen();
+        const FOR_RECORD: f64 = 0.15;
+        /// Share of what is left until which arrangements are judged by local search.
+        const JOINT: f64 = 0.85;
         // Most of the gain comes from good sources and arrangements, at 25 bits and fewer also
         // from exchanging codes, where there is time for it.
         let small = self.exchange && self.dimension.bits() <= super::polish::MAX_BITS;
         let [sources, arrangements] = match (small, self.exchange_pays()) {
             (false, _) => [0.6, 1.0],
             (true, false) => [0.6, 0.9],
-            (true, true) => [0.3, 0.5],
+            (true, true) => [0.3, 0.45],
         };
         let spent =
             Spent::new(self.budget, if small && start.is_some() { FOR_RECORD } else { 0.0 });
@@ -289,17 +200,21 @@ impl Best {
         let mut best: Option<(Vec<u64>, Construction)> = None;
         if let Some(Start { codes, construction, .. }) = start {
             control.tell(0, 1000, codes.len());
-            let found =
-                self.exchanged(&screen, construction, codes, spent.until(0.0), &spent, control)?;
-            best = Some(found);
+            let (codes, construction) = (codes.clone(), construction.clone());
+            let end = spent.until(0.0);
+            best = Some(self.exchanged(screen, construction, codes, end, &spent, control)?);
         }
         let found =
             |best: &Option<(Vec<u64>, Construction)>| best.as_ref().map_or(0, |b| b.0.len());
         let mut candidates = self.sources(&spent, sources, found(&best), control);
         self.rearrange(&mut candidates, &spent, arrangements, found(&best), control);
+        if small && self.exchange_pays() {
+            let record = start.and_then(|start| self.on_record(start));
+            self.jointly(screen, &mut candidates, record, &spent, JOINT, found(&best), control);
+        }
 
         let mut is_first = true;
-        for candidate in candidates {
+        for mut candidate in candidates {
             let end = spent.until(1.0);
             let over = match self.budget {
                 Budget::Time(..) => is_past(end),
@@ -313,20 +228,19 @@ impl Best {
             }
             is_first = false;
             let end = end.map(|end| end.after(0.7));
-            let construction = self.construction(&screen, candidate);
-            let codes = construction.codes(&screen)?;
-            let found = self.exchanged(&screen, construction, codes, end, &spent, control)?;
+            let found = std::mem::take(&mut candidate.codes);
+            let construction = self.construction(screen, candidate);
+            let (codes, construction) = with_exchanged(screen, construction, &found)?;
+            let found = self.exchanged(screen, construction, codes, end, &spent, control)?;
             if best.as_ref().is_none_or(|(codes, _)| found.0.len() > codes.len()) {
                 best = Some(found);
             }
             control.tell(spent.thousandths(), 1000, best.as_ref().map_or(0, |b| b.0.len()));
         }
-        let (codes, construction) = match best {
-            Some(found) if !found.0.is_empty() => found,
-            _ => self.search_alone(&screen, control)?,
-        };
-        let rules = self.rules.clone();
-        Family::new(name, self.dimension, self.distance, codes, rules, construction)
+        match best {
+            Some(found) if !found.0.is_empty() => Ok(found),
+            _ => self.search_alone(screen, control),
+        }
     }
 
     /// Whether there is time to gain more by exchanging codes than better sources gain: in a few
@@ -431,7 +345,7 @@ impl Best {
         }
         let arranger = self.arranger(&union, orbits);
         let (worth, arrangement) = arranger.anneal(random.random(), STEPS, halt);
-        let candidate = Some(Candidate { source, union, arrangement, worth });
+        let candidate = Some(Candidate { source, union, arrangement, worth, codes: Vec::new() });
         Draw { orbits: count, shape, candidate }
     }
 
@@ -583,6 +497,59 @@ impl Best {
         candidates.sort_by(|a, b| b.worth.total_cmp(&a.worth));
     }
 
+    /// What is on record, as a candidate.
+    fn on_record(&self, start: &Start) -> Option<Candidate> {
+        let construction = &start.construction;
+        let union = construction.union(self.dimension).ok()?;
+        let (source, arrangement) = (construction.source.clone(), construction.arrangement.clone());
+        Some(Candidate { source, union, arrangement, worth: 0.0, codes: start.codes.clone() })
+    }
+
+    /// Arranges the best candidates, and what is on record, for what local search makes of them; the best first.
+    #[expect(clippy::too_many_arguments)]
+    fn jointly(
+        &self,
+        screen: &Screen,
+        candidates: &mut Vec<Candidate>,
+        record: Option<Candidate>,
+        spent: &Spent,
+        share: f64,
+        known: usize,
+        control: Control,
+    ) {
+        /// Candidates that are worth it.
+        const KEPT: usize = 3;
+        /// Steps of the first round; each has half as many more.
+        const STEPS: u32 = 60;
+        let until = spent.until(share);
+        let over = || is_past(until) || control.is_cancelled();
+        candidates.truncate(KEPT);
+        candidates.extend(record);
+        let arrangers: Vec<Arranger> =
+            candidates.iter().map(|c| self.arranger(&c.union, c.union.orbits())).collect();
+        let all = AllWords::new(screen, &over);
+        let mut steps = STEPS;
+        for round in 0..spent.rounds(u64::MAX) {
+            candidates.par_iter_mut().zip(&arrangers).for_each(|(candidate, arranger)| {
+                let Candidate { union, arrangement, codes, .. } = candidate;
+                let joint = Joint { screen, union, arranger, all: all.as_ref() };
+                let seed = self.seed.wrapping_add(1_000_033 * (round + 1));
+                let (better, found) = joint.anneal(arrangement, seed, steps, &over);
+                if found.len() > codes.len() {
+                    (*arrangement, *codes) = (better, found);
+                }
+            });
+            let best = candidates.iter().map(|c| c.codes.len()).max().unwrap_or(0);
+            spent.step();
+            control.tell(spent.thousandths(), 1000, best.max(known));
+            if over() || candidates.is_empty() || best >= self.most() {
+                break;
+            }
+            steps = steps * 3 / 2;
+        }
+        candidates.sort_by_key(|c| std::cmp::Reverse(c.codes.len()));
+    }
+
     /// The record of a candidate.
     fn construction(&self, screen: &Screen, candidate: Candidate) -> AlgebraicConstruction {
         let words = screen.words();
@@ -628,19 +595,9 @@ impl Best {
         if polished.len() <= codes.len() {
             return Ok((codes, Construction::Algebraic(construction)));
         }
-        let plain = AlgebraicConstruction { exchanged: Vec::new(), ..construction };
-        let own = plain.codes(screen)?;
-        let exchanged = polished.iter().filter(|code| !own.contains(code));
-        let exchanged = exchanged.map(|&word| screen.words().hex(word)).collect();
-        let construction = AlgebraicConstruction { exchanged, seed: self.seed, ..plain };
-        let codes = construction.codes(screen)?;
-        if codes.len() >= polished.len() {
-            return Ok((codes, Construction::Algebraic(construction)));
-        }
-        // With hidden cells, words that are taken in order can be others.
-        let listed = polished.iter().map(|&word| screen.words().hex(word)).collect();
-        let construction = AlgebraicConstruction { exchanged: listed, ..construction };
-        Ok((construction.codes(screen)?, Construction::Algebraic(construction)))
+        let construction = AlgebraicConstruction { seed: self.seed, ..construction };
+        let (codes, construction) = with_exchanged(screen, construction, &polished)?;
+        Ok((codes, Construction::Algebraic(construction)))
     }
 
     /// Local search alone, for distances that leave no room for a linear code.
@@ -657,6 +614,32 @@ impl Best {
         let codes = search.codes(screen, control)?;
         Ok((codes, search.construction(search.rounds)))
     }
+}
+
+/// The record of a construction of which so many words were exchanged that it has these codes, or more; what it has
+/// where there are none.
+fn with_exchanged(
+    screen: &Screen,
+    construction: AlgebraicConstruction,
+    codes: &[u64],
+) -> Result<(Vec<u64>, AlgebraicConstruction), FamilyError> {
+    let words = screen.words();
+    if codes.is_empty() {
+        return Ok((construction.codes(screen)?, construction));
+    }
+    let plain = AlgebraicConstruction { exchanged: Vec::new(), ..construction };
+    let own: HashSet<u64> = plain.codes(screen)?.iter().map(|&w| words.canonical(w)).collect();
+    let exchanged = codes.iter().filter(|&&code| !own.contains(&words.canonical(code)));
+    let exchanged = exchanged.map(|&word| words.hex(word)).collect();
+    let construction = AlgebraicConstruction { exchanged, ..plain };
+    let found = construction.codes(screen)?;
+    if found.len() >= codes.len() {
+        return Ok((found, construction));
+    }
+    // With hidden cells, words that are taken in order can be others.
+    let listed = codes.iter().map(|&word| words.hex(word)).collect();
+    let construction = AlgebraicConstruction { exchanged: listed, ..construction };
+    Ok((construction.codes(screen)?, construction))
 }
 
 /// Syndromes of up to this many bits are tabulated in a search that draws many codes.
