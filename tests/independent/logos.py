@@ -41,7 +41,7 @@ LOGOS = {
 BOARDS = {
     "strip": "board --rows 6 --cols 7 --edge 20mm",
     "large": "board --rows 6 --cols 7 --edge 20mm --paper A3 --logo-height 25mm",
-    "turned": "board --rows 10 --cols 11 --edge 20mm --paper A4 --orientation portrait",
+    "turned": "board --rows 10 --cols 11 --edge 20mm --paper A4",
     "mirrored": "checkerboard --rows 5 --cols 7 --mirrored",
 }
 

@@ -117,11 +117,11 @@ fn every_kind_of_target_carries_a_logo() {
     let logo = Path::new(env!("CARGO_MANIFEST_DIR")).join("docs/gallery/logo.svg");
     std::fs::copy(logo, folder.path().join("logo.svg")).unwrap();
     for args in [
-        "board --rows 6 --cols 7 --paper A3 --logo-height 15mm --pdf --svg --png",
-        "board --rows 6 --cols 7 --edge 25mm --two-sided 3mm --mirrored --guide-page --pdf",
+        "board --rows 6 --cols 7 --edge 30mm --paper A3 --logo-height 15mm --pdf --svg --png",
+        "board --rows 6 --cols 7 --edge 25mm --two-sided 3mm --guide-page --pdf",
         "board --rows 4 --cols 5 --edge 12mm --boards 4 --pack --paper A4 --pdf",
         "board --rows 6 --cols 7 --edge 40mm --paper A4 --poster --pdf",
-        "checkerboard --rows 5 --cols 7 --tags t36h11 --svg",
+        "checkerboard --rows 5 --cols 7 --tags t36h11 --mirrored --svg",
         "charuco --squares 8x6 --edge 30mm --marker 22mm --dictionary 5x5_100 --pdf",
         "aprilgrid --tags 4x4 --edge 30mm --pdf",
         "circles --circles 9x7 --spacing 20mm --pdf",
@@ -166,13 +166,13 @@ fn a_template_keeps_the_logo_and_what_cannot_be_printed_is_refused_in_a_line() {
             "--logo text.svg",
             "--logo: text.svg: `text` with the id `name` cannot be printed: convert it to paths",
         ),
-        ("--logo nothing.svg", "`--logo`: nothing of it is black"),
+        ("--logo nothing.svg", "--logo: nothing of it is black"),
         ("--logo missing.svg", "--logo: cannot read missing.svg"),
         (
             "--logo logo.svg --logo-height 90mm",
-            "`--logo-height`: beside what else is printed there is no room",
+            "--logo-height: beside what else is printed there is no room",
         ),
-        ("--logo-height 9mm", "`--logo-height`: there is no logo: give `--logo`"),
+        ("--logo-height 9mm", "--logo-height: there is no logo: give --logo"),
         ("--logo logo.svg --gltf", "--logo: it says nothing without --pdf, --svg or --png"),
     ] {
         let said = deltille(folder.path(), &format!("{board} {args} -o refused")).code(2);

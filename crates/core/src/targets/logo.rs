@@ -463,7 +463,7 @@ mod tests {
         assert_eq!(said(logo(), None, "A4"), Ok(()));
         assert_eq!(said(logo(), Some(12.0), "A3"), Ok(()));
         let refused = |found: Result<(), String>| found.unwrap_err();
-        let error = refused(said(logo(), Some(12.0), "A4"));
+        let error = refused(said(logo(), Some(25.0), "A4"));
         let most = error.split("at most ").nth(1).and_then(|e| e.split(' ').next()).unwrap();
         let most: f64 = most.parse().unwrap();
         assert_eq!(said(logo(), Some(most), "A4"), Ok(()));

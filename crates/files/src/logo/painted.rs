@@ -210,7 +210,8 @@ fn style(stroke: &Stroke, path: &BezPath, what: &str) -> Result<kurbo::Stroke, L
     let dashes: Vec<f64> = dashes.iter().map(|&length| f64::from(length)).collect();
     let period: f64 = dashes.iter().sum();
     let length = path.perimeter(width.max(f64::MIN_POSITIVE));
-    if !(length / period * dashes.len() as f64 <= MOST_DASHES as f64) {
+    let count = length / period * dashes.len() as f64;
+    if count.is_nan() || count > MOST_DASHES as f64 {
         let what = format!("{what} has more than {MOST_DASHES} dashes");
         return refused(what, "take fewer, or convert strokes to paths");
     }

@@ -106,11 +106,11 @@ fn files_made_to_exhaust_their_reader_are_refused() {
         (nested, "elements"),
         (r##"<g id="a"><use href="#a"/></g>"##.to_owned(), ""),
         (format!(r#"<path d="{comb}"/>"#), "crossings"),
-        (format!(r#"<path stroke="red" stroke-dasharray="0.0001" d="M0 0H99V99"/>"#), "dashes"),
+        (r#"<path stroke="red" stroke-dasharray="0.0001" d="M0 0H99V99"/>"#.to_owned(), "dashes"),
         (format!(r#"<path d="{}"/>"#, "M0 0C9 0 9 9 0 9".repeat(9_000)), "corners"),
         ("<g>".repeat(depth) + &"</g>".repeat(depth), ""),
         ("x".repeat(MAX_LOGO_BYTES + 1), "bytes"),
-        (format!(r#"<path d="M0 0H1e38V1e38Z"/><path d="M0 0L1e-38 0 0 1e-38Z"/>"#), "?"),
+        (r#"<path d="M0 0H1e38V1e38Z"/><path d="M0 0L1e-38 0 0 1e-38Z"/>"#.to_owned(), "?"),
     ];
     for (body, expected) in cases {
         let start: String = body.chars().take(60).collect();
