@@ -40,7 +40,11 @@ fn options(command: &str) -> BTreeSet<String> {
         let is_option = line.len() > name.len() || said.contains(&format!(", --{name}"));
         is_option.then(|| name[..end.unwrap_or(name.len())].to_owned())
     };
-    let is_shown = |line: &&str| line.starts_with("  ") && line.trim_start().starts_with('-');
+    // What a help says of an option may go on with the name of another one, farther right.
+    let is_shown = |line: &&str| {
+        let name = line.trim_start();
+        name.starts_with('-') && (1..=6).contains(&(line.len() - name.len()))
+    };
     said.lines().filter(is_shown).filter_map(option).collect()
 }
 

@@ -16,8 +16,8 @@ const LEAST: [u32; 2] = [4, 5];
 const MOST: u32 = 40;
 
 /// A cell of a place code from which on patches of three by four tiles are labelled where pictures are sharp, px: by
-/// photographs of printed pages (docs/measurements.md).
-const PATCH_BIT_PX: f64 = 1.5;
+/// photographs of printed pages (docs/measurements.md). Tilted cells need as much height: there are none to spare.
+const PATCH_BIT_PX: f64 = 1.4;
 
 /// A camera, and from where it is to see a board.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -50,8 +50,8 @@ impl Proposal {
     /// camera of a focal length in px, tilted by an angle, mm; no other board has such.
     pub fn patches_to_mm(&self, focal_px: f64, tilt_rad: f64) -> Option<f64> {
         let is_dense = self.spec.tags.as_ref().is_some_and(TagSpec::is_dense);
-        let needed_mm = self.reach.detail_mm * shortening(true, tilt_rad) / PATCH_BIT_PX;
-        is_dense.then_some(focal_px * needed_mm)
+        let to_mm = focal_px * self.reach.detail_mm * tilt_rad.cos() / PATCH_BIT_PX;
+        is_dense.then_some(to_mm)
     }
 }
 
