@@ -295,8 +295,8 @@ mod tests {
                 let printed = of(codes.iter().map(|code| code | shown).collect(), None);
                 let sheets = artwork::draw(&target, Some(&printed)).unwrap().sheets;
                 let scene = scene_of_sheet(&target, &sheets[0], 0);
-                let middle = DVec3::new(90.0, 60.0, 0.0);
-                let pose = Pose::looking_at(DVec3::new(110.0, 10.0, 260.0), middle, DVec3::Y);
+                let middle = DVec3::new(80.0, 60.0, 0.0);
+                let pose = Pose::looking_at(DVec3::new(100.0, 20.0, 340.0), middle, DVec3::Y);
                 let light = Light::default().noise(0.01);
                 let image = scene.render(&Camera::pinhole(1280, 960, 1.0), &pose, &light);
                 let image = image.map(|v| (v.clamp(0.0, 1.0) * 255.0 + 0.5) as u8);
