@@ -184,7 +184,7 @@ impl Screen {
         let used = self.words.dimension().bits() - self.free.count_ones();
         word & self.free == 0
             && white >= self.black_distance
-            && used - white >= self.white_distance
+            && white + self.white_distance <= used
             && self.words.differing_pairs(word) >= self.min_pairs
     }
 }
