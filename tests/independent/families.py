@@ -65,15 +65,15 @@ def distances(words, others):
     return counts
 
 
-def left_of(turned, hidden):
-    """Least distance of any two words in the cells that are not hidden."""
+def left_of(words, turned, hidden):
+    """Least distance of any of some words from any other of all words, in the cells that are not hidden."""
     seen = np.uint64(sum(1 << int(bit) for bit in np.nonzero(~hidden)[0]))
-    counts = distances(turned & seen, turned & seen)
-    counts[0] -= len(turned)
+    counts = distances(words & seen, turned & seen)
+    counts[0] -= len(words)
     return int(np.nonzero(counts)[0][0])
 
 
-def with_hidden_cells(turned, places):
+def with_hidden_cells(codes, turned, places):
     """Distances left where the four cells of a corner, where all cells along an edge, and where a triangle of four is hidden."""
     height = places.imag
     rows = math.isqrt(len(places))
@@ -86,7 +86,8 @@ def with_hidden_cells(turned, places):
     beside = abs(abs(places[:, None] - places[None]) - 1 / math.sqrt(3)) < 1e-6
     tiles = [row | (np.arange(len(places)) == cell) for cell, row in enumerate(beside) if row.sum() == 3]
     assert len(tiles) == rows * (rows - 1) // 2 + (rows - 3) * (rows - 2) // 2 and corner.tolist() in [tile.tolist() for tile in tiles]
-    return {"apex": left_of(turned, corner), "edge": left_of(turned, edge), "tile": min(left_of(turned, tile) for tile in tiles)}
+    tile = min(left_of(codes, turned, tile) for tile in tiles)
+    return {"apex": left_of(turned, turned, corner), "edge": left_of(turned, turned, edge), "tile": tile}
 
 
 def check(path, program, hidden):
@@ -112,16 +113,23 @@ def check(path, program, hidden):
     histogram = {str(d): turns * int(n) // 2 for d, n in enumerate(pairs) if n}
     assert histogram == text["distance_histogram"], "distance_histogram"
 
-    beside = [(a, b) for a, b in itertools.combinations(range(bits), 2) if abs(abs(places[a] - places[b]) - edge) < 1e-6]
+    rules = text["rules"]
+    # What is free in the middle: a cell, or where a vertex is there the six around it.
+    within = 1e-6 if abs(places).min() < 1e-6 else 1 / math.sqrt(3) + 1e-6
+    free = abs(places) < within if rules.get("free") == "centre" else np.zeros(bits, bool)
+    assert not any((codes >> np.uint64(bit) & np.uint64(1)).any() for bit in np.nonzero(free)[0]), "free cells are used"
+    used = bits - int(free.sum())
+    beside = [(a, b) for a, b in itertools.combinations(range(bits), 2) if abs(abs(places[a] - places[b]) - edge) < 1e-6 and not (free[a] or free[b])]
     differing = sum((codes >> np.uint64(a) ^ codes >> np.uint64(b)) & np.uint64(1) for a, b in beside)
-    white, rules = np.bitwise_count(codes), text["rules"]
+    white = np.bitwise_count(codes)
     assert differing.min() >= rules["min_complexity"] * len(beside) - 1e-6
-    assert white.min() >= rules["black_distance"] and bits - white.max() >= rules["white_distance"]
+    assert white.min() >= rules["black_distance"] and used - white.max() >= rules["white_distance"]
 
-    rates = [turns * len(codes) * sum(math.comb(bits, i) for i in range(t + 1)) / 2**bits for t in range((distance - 1) // 2 + 1)]
+    rates = [turns * len(codes) * sum(math.comb(used, i) for i in range(t + 1)) / 2**used for t in range((distance - 1) // 2 + 1)]
     assert np.allclose(rates, text["false_positive_rate"], rtol=1e-9)
     digits = -(-bits // 4)
     head = ["deltille/family"] + (["kind checker"] if kind == "checker" else []) + [f"bits {bits}", f"distance {distance}"]
+    head += [f"free {rules['free']}"] if free.any() else []
     lines = head + [f"0x{int(code):0{digits}x}" for code in codes]
     assert hashlib.sha256("".join(line + "\n" for line in lines).encode()).hexdigest()[:16] == text["fingerprint"]
 
@@ -135,7 +143,7 @@ def check(path, program, hidden):
     print(f"{path.stem}: {len(codes)} codes of {bits} bits, distance {least}, in a mirror {in_mirror}, {differing.min()} of {len(beside)} pairs differ")
     robust = rules.get("robust", [])
     if (hidden or robust) and kind != "checker":
-        left = with_hidden_cells(turned, places)
+        left = with_hidden_cells(codes, turned, places)
         assert all(left[rule["to"]] >= rule["distance"] for rule in robust), (left, robust)
         info = json.loads(subprocess.run([program, "info", path, "--json"], check=True, capture_output=True).stdout)
         assert info["distance_without"] == left, (info["distance_without"], left)

@@ -74,7 +74,7 @@ pub(super) struct Args {
     #[arg(long, allow_negative_numbers = true, value_parser = whole(1..=1_000_000u32))]
     rounds: Option<u32>,
     /// Number of codes at most, for the methods best and algebraic [default: as many as a file of
-    /// 64 MiB holds]
+    /// 64 MiB holds, of 49 bits with --robust-to 20,000]
     #[arg(long, value_name = "CODES", allow_negative_numbers = true,
           value_parser = whole(1..=u64::MAX))]
     limit: Option<u64>,
@@ -294,6 +294,10 @@ impl Args {
             !self.rules.has_complexity(),
             "--false-positives: chooses the complexity; leave --min-complexity out"
         );
+        ensure!(
+            !self.rules.has_free_cells(),
+            "--false-positives: is about tags without free cells; leave --free out, or choose with --min-complexity"
+        );
         let distance = self.family.distance;
         let choices = frontier::choices(self.family, &rules)?;
         let Some(best) = self.choice.best(&choices, distance)? else { return Ok(rules) };
@@ -363,11 +367,12 @@ impl Args {
         let from = if self.from_nothing { ", from nothing" } else { "" };
         let counted = if self.work.is_some() { ", by work" } else { "" };
         let limit = self.limit.map(|limit| format!(", limit {limit}")).unwrap_or_default();
-        let Rules { min_complexity, black_distance, white_distance, robust } = rules;
+        let Rules { min_complexity, black_distance, white_distance, robust, free } = rules;
         let robust: String = robust.iter().map(|robust| format!(", robust to {robust}")).collect();
+        let free = free.map_or(String::new(), |free| format!(", {} free", free.name()));
         format!(
             "{:?} d{}h{distance}, complexity {min_complexity}, black {black_distance}, \
-             white {white_distance}{robust}{seed}{from}{counted}{limit}",
+             white {white_distance}{robust}{free}{seed}{from}{counted}{limit}",
             self.method,
             dimension.bits()
         )

@@ -66,11 +66,15 @@ pub(super) fn run(args: Args) -> anyhow::Result<ExitCode> {
         return Ok(ExitCode::SUCCESS);
     }
     let (bits, rules) = (family.dimension().bits(), family.rules());
-    let pairs = TagWords::new(family.dimension()).pairs();
+    let pairs = TagWords::new(family.dimension()).without(family.free_cells()).pairs();
     say!("{}, fingerprint {}", family.name(), family.fingerprint());
     say!("  codes           {}", family.len());
     say!("  bits            {bits} in {} rows", family.dimension().rows());
     say!("  distance        {}, corrects {} cells", family.distance(), family.correctable());
+    if let Some(free) = rules.free {
+        let cells = counted(family.free_cells().count_ones() as usize, "cell");
+        say!("  free            {cells}, the {}: no code uses them", free.name());
+    }
     for (hidden, left) in without_hidden(&family) {
         let cells = hidden.count(family.dimension());
         let what = match hidden {

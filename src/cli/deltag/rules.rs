@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, bail};
 
 use super::parameters::Parameters;
-use crate::family::{FamilyError, Robust, Rules};
+use crate::family::{FamilyError, FreeCells, Robust, Rules};
 use crate::limits;
 
 #[derive(clap::Args)]
@@ -26,7 +26,11 @@ pub(super) struct RuleArgs {
     /// Repeatable
     #[arg(long, value_name = "CELLS[=DISTANCE]")]
     robust_to: Vec<Robust>,
-    /// TOML file with min_complexity, black_distance, white_distance, robust; options given here win
+    /// Leave cells free that no code uses, for a hole: those of the centre, one, or of 9 and 36 bits six
+    #[arg(long, value_name = "centre")]
+    free: Option<FreeCells>,
+    /// TOML file with min_complexity, black_distance, white_distance, robust, free; options given here
+    /// win
     #[arg(long, value_name = "FILE")]
     rules: Option<PathBuf>,
 }
@@ -40,6 +44,11 @@ impl RuleArgs {
     /// Whether codes are to be known with cells hidden.
     pub(super) fn is_robust(&self) -> bool {
         !self.robust_to.is_empty()
+    }
+
+    /// Whether cells are left free.
+    pub(super) fn has_free_cells(&self) -> bool {
+        self.free.is_some()
     }
 
     /// The rules asked for, checked for the bits of the family.
@@ -56,6 +65,7 @@ impl RuleArgs {
         if self.reject_white {
             rules.white_distance = distance;
         }
+        rules.free = self.free.or(rules.free);
         if !self.robust_to.is_empty() {
             rules.robust.clone_from(&self.robust_to);
         }
@@ -101,6 +111,12 @@ fn read(path: &Path, rules: &mut Rules) -> anyhow::Result<()> {
             }
             "black_distance" => rules.black_distance = cells()?,
             "white_distance" => rules.white_distance = cells()?,
+            "free" => {
+                let free = value.as_str().and_then(|text| text.parse().ok());
+                rules.free = Some(free.with_context(|| {
+                    format!("{file}: field `{field}`: {value} is not \"centre\"")
+                })?);
+            }
             "robust" => {
                 let texts = value.as_array().map(Vec::as_slice).unwrap_or_default();
                 let parsed = texts.iter().map(|text| text.as_str()?.parse().ok());
@@ -113,7 +129,7 @@ fn read(path: &Path, rules: &mut Rules) -> anyhow::Result<()> {
             }
             _ => bail!(
                 "{file}: unknown field `{field}`: there are min_complexity, black_distance, \
-                 white_distance and robust"
+                 white_distance, robust and free"
             ),
         }
     }

@@ -782,7 +782,8 @@ fn turns_of(panel_from_grid: LatticeMap, on_grid: Tile) -> usize {
 fn is_word(reading: &Reading) -> bool {
     /// Half odds of a cell that is read right 19 times of 20.
     const SURE: f32 = 1.5;
-    let n = reading.half_odds.len();
+    // Of free cells nothing is known.
+    let n = reading.half_odds.iter().filter(|odds| odds.abs() > 0.0).count();
     let sure = |sign: f32| reading.half_odds.iter().filter(|&&odds| sign * odds > SURE).count();
     10 * (sure(1.0) + sure(-1.0)) >= 9 * n && sure(1.0).min(sure(-1.0)) * 6 >= n
 }

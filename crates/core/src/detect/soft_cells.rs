@@ -147,6 +147,12 @@ impl CellModel {
         &self.points
     }
 
+    /// The same with the bit of the cell that each is in.
+    pub fn points_by_bit(&self) -> impl Iterator<Item = (usize, &DVec2)> {
+        let of_cell = self.points.len() / self.bits;
+        self.points.iter().enumerate().map(move |(i, point)| (i / of_cell, point))
+    }
+
     /// Length of the tile's edge, bit-widths.
     pub fn width(&self) -> f64 {
         self.width

@@ -96,6 +96,8 @@ pub struct TagReader {
     clear: ClearDepth,
     /// For each bit the one whose cell takes its place in a mirror.
     mirror: Vec<u8>,
+    /// Bits of cells that no code uses, where there may be a hole.
+    free: u64,
 }
 
 /// What was read in a grid.
@@ -122,7 +124,15 @@ impl TagReader {
             TagsIn::White => ClearDepth { dark: PLAIN_DEPTH, bright: depth(margin_bits) },
         };
         let model = CellModel::new(&cells, inset_bits, margin_bits);
-        Self { kind: family.kind(), tags_in, gap_edges, model, clear, mirror: cells.mirror() }
+        Self {
+            kind: family.kind(),
+            tags_in,
+            gap_edges,
+            model,
+            clear,
+            mirror: cells.mirror(),
+            free: family.free_cells(),
+        }
     }
 
     /// Reads tiles of a grid whose corners are known: those that may carry a tag of a board that is not
@@ -200,9 +210,10 @@ impl TagReader {
         let full = SATURATED * f64::from(image.full_scale());
         let brightest = 1.0 + GLARE + GLARE_NOISE * light.noise;
         let mut samples = Vec::with_capacity(self.model.points().len());
-        for &point in self.model.points() {
+        for (bit, &point) in self.model.points_by_bit() {
             let DVec2 { x, y } = map.image_from_tile(point);
-            if !(x >= 0.0 && y >= 0.0 && x <= right && y <= lower) {
+            let is_free = self.free >> bit & 1 == 1;
+            if is_free || !(x >= 0.0 && y >= 0.0 && x <= right && y <= lower) {
                 samples.push(Sample::Erased);
                 continue;
             }
@@ -228,7 +239,13 @@ impl TagReader {
                 };
             }
         }
-        let half_odds = mixing.half_odds(&samples);
+        let mut half_odds = mixing.half_odds(&samples);
+        // What is in a hole tells nothing.
+        for (bit, odds) in half_odds.iter_mut().enumerate() {
+            if self.free >> bit & 1 == 1 {
+                *odds = 0.0;
+            }
+        }
         let length = |step: DVec2| step.x.hypot(step.y);
         Some((Reading { tile, half_odds }, length(along[0]).max(length(along[1]))))
     }
@@ -239,4 +256,58 @@ fn corner_contrast(image: ImageView, grid: &SaddleGrid, tile: Tile) -> f64 {
     let amplitudes = tile.vertices().filter_map(|v| grid.get(&v));
     let least = amplitudes.map(|p| p.amplitude).fold(f64::INFINITY, f64::min);
     2.0 * least * f64::from(image.full_scale() / crate::raster::PYRAMID_FULL_SCALE)
+}
+
+#[cfg(test)]
+mod tests {
+    use glam::DVec3;
+
+    use crate::artwork;
+    use crate::camera::{Camera, Pose};
+    use crate::detect::{Detector, DetectorConfig};
+    use crate::family::{Construction, Family, FreeCells, Rules};
+    use crate::lattice::GridKind;
+    use crate::synth::{Light, scene_of_sheet};
+    use crate::targets::{BoardSpec, PaperSpec, TagSpec, Target, TargetSpec};
+
+    /// Whatever is in the free cells, all tags of a board are read, and without an error.
+    #[test]
+    fn what_is_in_free_cells_does_not_matter() {
+        for like in ["delTag25h7", "delTag36h9"] {
+            let like = Family::shipped(like).unwrap();
+            let free = FreeCells::Centre.mask(like.dimension());
+            let codes: Vec<u64> =
+                like.codes().iter().copied().filter(|code| code & free == 0).collect();
+            let of = |codes: Vec<u64>, free| {
+                let (dimension, distance) = (like.dimension(), like.distance());
+                let source = Construction::Imported { source: "a test".to_owned() };
+                let rules = Rules { free, ..Rules::NONE };
+                Family::new("holed", dimension, distance, codes, rules, source).unwrap()
+            };
+            let family = of(codes.clone(), Some(FreeCells::Centre));
+            let tags = TagSpec { family: "holed".to_owned(), ..TagSpec::default() };
+            let spec = BoardSpec { tags: Some(tags), ..BoardSpec::deltille(8, 10, 20.0) };
+            let (spec, paper) = (TargetSpec::Board(spec), PaperSpec::default());
+            let target = Target::build("board", &spec, Some(&family), Some(&paper)).unwrap();
+            let tags = target.panels[0].tags.len();
+            for shown in [0, free, free & 0x5555_5555_5555, free & 0x0f0f_0f0f_0f0f] {
+                // As printed, or with something bright in the hole.
+                let printed = of(codes.iter().map(|code| code | shown).collect(), None);
+                let sheets = artwork::draw(&target, Some(&printed)).unwrap().sheets;
+                let scene = scene_of_sheet(&target, &sheets[0], 0);
+                let middle = DVec3::new(80.0, 60.0, 0.0);
+                let pose = Pose::looking_at(DVec3::new(100.0, 20.0, 340.0), middle, DVec3::Y);
+                let light = Light::default().noise(0.01);
+                let image = scene.render(&Camera::pinhole(1280, 960, 1.0), &pose, &light);
+                let image = image.map(|v| (v.clamp(0.0, 1.0) * 255.0 + 0.5) as u8);
+                let detector =
+                    Detector::for_target(&target, Some(&family), DetectorConfig::default());
+                let found = detector.detect(&image, "view");
+                let read: Vec<u32> =
+                    found.grids.iter().flat_map(|grid| &grid.tags).map(|tag| tag.errors).collect();
+                assert!(found.grids.iter().all(|grid| grid.kind == GridKind::Deltille));
+                assert_eq!(read, vec![0; tags], "{} shows {shown:#x}", like.name());
+            }
+        }
+    }
 }

@@ -222,11 +222,14 @@ const SAMPLE: usize = 20_000;
 fn admits(cells: &TagCells, screen: &Screen, family: &Family, code: u64) -> bool {
     let rules = family.rules();
     let bit = |i: u8| code >> i & 1;
-    let differing = cells.neighbours().iter().filter(|&&[a, b]| bit(a) != bit(b)).count() as u32;
+    let free = family.free_cells();
+    let counts = |&&[a, b]: &&[u8; 2]| (free >> a | free >> b) & 1 == 0 && bit(a) != bit(b);
+    let differing = cells.neighbours().iter().filter(counts).count() as u32;
     let white = code.count_ones();
-    differing >= screen.min_pairs
+    code & free == 0
+        && differing >= screen.min_pairs
         && white >= rules.black_distance
-        && family.dimension().bits() - white >= rules.white_distance
+        && family.used_cells() - white >= rules.white_distance
 }
 
 fn closest_pair(cells: &TagCells, codes: &[u64], distance: u32) -> [u32; 2] {

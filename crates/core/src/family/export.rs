@@ -42,8 +42,12 @@ impl ExportFormat {
 pub fn export(family: &Family, format: ExportFormat) -> String {
     let words = TagWords::new(family.dimension());
     let bits = family.dimension().bits();
+    let free = match family.free_cells() {
+        0 => String::new(),
+        free => format!(", not read {}", words.hex(free)),
+    };
     let about = format!(
-        "DelTag family {}: {} codes of {bits} bits, distance {}, fingerprint {}",
+        "DelTag family {}: {} codes of {bits} bits, distance {}, fingerprint {}{free}",
         family.name(),
         family.len(),
         family.distance(),

@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 
 use super::algebra::AlgebraicConstruction;
-use super::{Beginning, Family, FamilyError, Rules, TagWords, false_positive_rates};
+use super::{Beginning, Family, FamilyError, FreeCells, Rules, TagWords, false_positive_rates};
 use crate::Name;
 use crate::lattice::{Dimension, GridKind};
 
@@ -109,7 +109,9 @@ pub(super) fn from_json(json: &str) -> Result<Family, FamilyError> {
             FamilyError::field(format!("codes[{id}]"), problem)
         })?;
     check_form(&file.name, file.kind, dimension, file.distance, &codes, &file.rules)?;
-    let rates = false_positive_rates(file.kind, dimension, file.distance, codes.len());
+    let free = file.rules.free;
+    let used = dimension.bits() - free.map_or(0, |free| free.mask(dimension).count_ones());
+    let rates = false_positive_rates(file.kind, used, file.distance, codes.len());
     let same = |(stated, rate): (&f64, &f64)| (stated - rate).abs() <= 1e-9 * rate;
     if rates.len() != file.false_positive_rate.len()
         || !file.false_positive_rate.iter().zip(&rates).all(same)
@@ -117,7 +119,7 @@ pub(super) fn from_json(json: &str) -> Result<Family, FamilyError> {
         let problem = format!("not that of {} such codes, {rates:?}", codes.len());
         return Err(FamilyError::Claim { field: "false_positive_rate".to_owned(), problem });
     }
-    let fingerprint = fingerprint(file.kind, dimension, file.distance, &codes);
+    let fingerprint = fingerprint(file.kind, dimension, file.distance, free, &codes);
     if fingerprint != file.fingerprint {
         let problem = format!(
             "the file says {}, its codes give {fingerprint}: codes were altered, added or lost; \
@@ -181,11 +183,9 @@ pub(super) fn check_form(
     }
     check_name(name, dimension, distance)?;
     rules.check(bits)?;
-    if kind == GridKind::Checker && !rules.robust.is_empty() {
-        return Err(FamilyError::field(
-            "rules.robust",
-            "hidden cells are those of triangular tags",
-        ));
+    if kind == GridKind::Checker && !(rules.robust.is_empty() && rules.free.is_none()) {
+        let problem = "hidden and free cells are those of triangular tags";
+        return Err(FamilyError::field("rules", problem));
     }
     if codes.is_empty() {
         return Err(FamilyError::field("codes", "there is no code"));
@@ -194,6 +194,11 @@ pub(super) fn check_form(
     if let Some(id) = codes.iter().position(|&code| code > dimension.mask()) {
         let problem = format!("{} has more than {bits} bits", words.hex(codes[id]));
         return Err(FamilyError::field(format!("codes[{id}]"), problem));
+    }
+    let free = rules.free.map_or(0, |free| free.mask(dimension));
+    if let Some(id) = codes.iter().position(|&code| code & free != 0) {
+        let problem = format!("{} uses a cell that is free", words.hex(codes[id]));
+        return Err(FamilyError::Claim { field: format!("codes[{id}]"), problem });
     }
     let mut by_name: Vec<(u64, usize)> =
         (0..codes.len()).map(|id| (words.canonical(codes[id]), id)).collect();
@@ -238,12 +243,16 @@ pub(super) fn fingerprint(
     kind: GridKind,
     dimension: Dimension,
     distance: u32,
+    free: Option<FreeCells>,
     codes: &[u64],
 ) -> String {
     let words = TagWords::of(kind, dimension);
     let mut hash = Sha256::new();
     let kind = if kind == GridKind::Checker { "kind checker\n" } else { "" };
     hash.update(format!("deltille/family\n{kind}bits {}\ndistance {distance}\n", dimension.bits()));
+    if let Some(free) = free {
+        hash.update(format!("free {}\n", free.name()));
+    }
     for &code in codes {
         hash.update(words.hex(code));
         hash.update("\n");

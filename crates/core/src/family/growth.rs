@@ -41,10 +41,13 @@ impl Family {
     /// # Errors
     /// Where `older` has other tags or another distance, or codes that this family lacks.
     pub fn extending(self, older: &Family) -> Result<Self, FamilyError> {
-        let same_tags = (self.kind, self.dimension, self.distance);
-        if same_tags != (older.kind, older.dimension, older.distance) || older.is_of_places() {
+        let tags =
+            |family: &Self| (family.kind, family.dimension, family.distance, family.rules.free);
+        if tags(&self) != tags(older) || older.is_of_places() {
             let (bits, distance) = (older.dimension.bits(), older.distance);
-            let problem = format!("{} has {bits} bits and distance {distance}", older.name);
+            let free =
+                older.rules.free.map_or(String::new(), |free| format!(", {} free", free.name()));
+            let problem = format!("{} has {bits} bits and distance {distance}{free}", older.name);
             return Err(FamilyError::field("beginnings", problem));
         }
         let own: HashSet<u64> = self.codes.iter().copied().collect();
@@ -66,8 +69,13 @@ impl Family {
             let fingerprint = older.fingerprint.clone();
             beginnings.push(Beginning { codes: older.len(), fingerprint });
         }
-        let fingerprint = file::fingerprint(self.kind, self.dimension, self.distance, &codes);
+        let fingerprint = self.fingerprint_of(&codes);
         Ok(Self { codes, fingerprint, beginnings, ..self })
+    }
+
+    /// The fingerprint that codes have in such a family.
+    fn fingerprint_of(&self, codes: &[u64]) -> String {
+        file::fingerprint(self.kind, self.dimension, self.distance, self.rules.free, codes)
     }
 
     /// Checks that the first codes have the fingerprints that are stated.
@@ -83,7 +91,7 @@ impl Family {
                 );
             }
             let first = &self.codes[..before.codes];
-            let found = file::fingerprint(self.kind, self.dimension, self.distance, first);
+            let found = self.fingerprint_of(first);
             if found != before.fingerprint {
                 return claim(format!(
                     "the first {} codes have fingerprint {found}, not {}",

@@ -36,6 +36,7 @@ mod decoder;
 mod error;
 mod export;
 mod file;
+mod free;
 mod frontier;
 mod growth;
 mod hidden;
@@ -68,6 +69,7 @@ pub use error::FamilyError;
 pub use export::{ExportFormat, export};
 pub use file::check_name;
 pub use file::{Construction, SCHEMA};
+pub use free::FreeCells;
 pub use frontier::{RuleChoice, best_rule, rule_choices};
 pub use growth::Beginning;
 pub use hidden::{HiddenCells, Robust};
@@ -144,7 +146,7 @@ impl Family {
         } else {
             BTreeMap::new()
         };
-        let fingerprint = file::fingerprint(kind, dimension, distance, &codes);
+        let fingerprint = file::fingerprint(kind, dimension, distance, rules.free, &codes);
         let name = name.to_owned();
         Ok(Self {
             name,
@@ -198,7 +200,7 @@ impl Family {
         let cells = places::cells();
         let dimension = cells.dimension();
         let codes = places::first_board();
-        let fingerprint = file::fingerprint(cells.kind(), dimension, 1, &codes);
+        let fingerprint = file::fingerprint(cells.kind(), dimension, 1, None, &codes);
         Self {
             name: places::NAME.to_owned(),
             kind: cells.kind(),
@@ -250,6 +252,16 @@ impl Family {
     /// The dimension of its tags.
     pub fn dimension(&self) -> Dimension {
         self.dimension
+    }
+
+    /// The bits of cells that no code uses, and that are not read: see [`FreeCells`].
+    pub fn free_cells(&self) -> u64 {
+        self.rules.free.map_or(0, |free| free.mask(self.dimension))
+    }
+
+    /// Number of the cells that carry its codes: all but the free ones.
+    pub fn used_cells(&self) -> u32 {
+        self.dimension.bits() - self.free_cells().count_ones()
     }
 
     /// The claimed minimum distance h between any two words read off different tags or turns.
@@ -309,7 +321,7 @@ impl Family {
         if self.is_of_places() {
             return vec![1.0];
         }
-        false_positive_rates(self.kind, self.dimension, self.distance, self.codes.len())
+        false_positive_rates(self.kind, self.used_cells(), self.distance, self.codes.len())
     }
 
     /// 16 hexadecimal digits that stand for bits, distance and codes: the first half of the first
@@ -324,7 +336,8 @@ impl Family {
     /// ```
     ///
     /// one code a line in id order, lower case, ⌈b/4⌉ digits, every line ended by a line feed. That
-    /// of square tags has a second line `kind checker`.
+    /// of square tags has a second line `kind checker`, that of tags with free cells a line `free centre`
+    /// after the distance.
     pub fn fingerprint(&self) -> &str {
         &self.fingerprint
     }

@@ -18,6 +18,7 @@ use std::collections::BTreeMap;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
+use super::rules::parts;
 use super::{Family, TagWords, ball};
 use crate::lattice::{Dimension, GridKind};
 
@@ -49,6 +50,8 @@ pub struct NaturalWords {
     words: TagWords,
     /// P by differing pairs.
     chances: Vec<f64>,
+    /// Cells that may show anything.
+    free: u64,
 }
 
 impl NaturalWords {
@@ -59,12 +62,19 @@ impl NaturalWords {
         let line = TABLE.lines().find(of_bits).unwrap_or_default();
         let logs = line.split(' ').skip(1).filter_map(|log| log.parse::<f64>().ok());
         let chances = logs.map(f64::exp).collect();
-        Self { words: TagWords::new(dimension), chances }
+        Self { words: TagWords::new(dimension), chances, free: 0 }
+    }
+
+    /// The same with cells that may show anything; words have these black.
+    #[must_use]
+    pub fn with_free(self, free: u64) -> Self {
+        Self { free, ..self }
     }
 
     /// Probability that a triangle with a border shows a word.
     pub fn chance(&self, word: u64) -> f64 {
-        self.chances[self.words.differing_pairs(word) as usize]
+        let shown = parts(self.free).map(|part| self.words.differing_pairs(word | part));
+        shown.map(|pairs| self.chances[pairs as usize]).sum()
     }
 
     /// Probability that it shows a word within `errors` cells of a code in one of its turns; every such word is looked at.
@@ -75,7 +85,8 @@ impl NaturalWords {
     /// The same of the words that differ in `radius` cells.
     fn sphere(&self, code: u64, radius: u32) -> f64 {
         let bits = self.words.dimension().bits();
-        subsets(bits, radius).map(|flips| self.chance(code ^ flips)).sum()
+        let used = subsets(bits, radius).filter(|flips| flips & self.free == 0);
+        used.map(|flips| self.chance(code ^ flips)).sum()
     }
 
     /// ln Σ P(w) exp Σ l s(w), over all words w, with the half log-odds l that cells are white and s = ±1 for white and
@@ -121,6 +132,7 @@ impl NaturalWords {
         /// Words that are looked at of each radius; of more a part is drawn.
         const LOOKED_AT: f64 = 100_000.0;
         let bits = self.words.dimension().bits();
+        let used = bits - self.free.count_ones();
         let step = codes.len().div_ceil(LOOKED_AT as usize).max(1);
         let mut by_pairs = BTreeMap::<u32, Vec<f64>>::new();
         let mut random = ChaCha8Rng::seed_from_u64(u64::from(bits));
@@ -129,13 +141,14 @@ impl NaturalWords {
             let sums = by_pairs.entry(pairs).or_insert_with(|| vec![0.0; most as usize + 1]);
             for (radius, sum) in (0..).zip(sums) {
                 let all =
-                    ball(bits, radius) - radius.checked_sub(1).map_or(0.0, |less| ball(bits, less));
+                    ball(used, radius) - radius.checked_sub(1).map_or(0.0, |less| ball(used, less));
                 let share = LOOKED_AT / (codes.len() as f64 * all);
                 let chance = if share >= 1.0 {
                     self.sphere(code, radius)
                 } else {
                     let drawn = (share * all * step as f64).ceil() as u32;
-                    let of_drawn = |_| self.chance(code ^ drawn_subset(bits, radius, &mut random));
+                    let of_drawn =
+                        |_| self.chance(code ^ drawn_subset(bits, self.free, radius, &mut random));
                     (0..drawn).map(of_drawn).sum::<f64>() * all / f64::from(drawn)
                 };
                 *sum += 3.0 * step as f64 * chance;
@@ -154,8 +167,8 @@ impl Family {
         if self.kind() != GridKind::Deltille || self.is_of_places() {
             return None;
         }
-        let by_pairs =
-            NaturalWords::new(self.dimension()).by_pairs(self.codes(), self.correctable());
+        let words = NaturalWords::new(self.dimension()).with_free(self.free_cells());
+        let by_pairs = words.by_pairs(self.codes(), self.correctable());
         Some(cumulated(by_pairs.values(), self.correctable()))
     }
 
@@ -201,11 +214,11 @@ fn subsets(bits: u32, ones: u32) -> impl Iterator<Item = u64> {
     std::iter::successors((first >> bits == 0).then_some(first), next)
 }
 
-/// One of them at random.
-fn drawn_subset(bits: u32, ones: u32, random: &mut ChaCha8Rng) -> u64 {
+/// One of them at random, of cells that are not free.
+fn drawn_subset(bits: u32, free: u64, ones: u32, random: &mut ChaCha8Rng) -> u64 {
     let mut word = 0u64;
     while word.count_ones() < ones {
-        word |= 1 << random.random_range(0..bits);
+        word |= (1 << random.random_range(0..bits)) & !free;
     }
     word
 }

@@ -26,7 +26,7 @@ impl Family {
     /// What becomes of tags whose cells are wrong with a probability, where [`Self::correctable`] cells are corrected. `None`
     /// of families whose pairs are not counted, see [`Self::histogram`].
     pub fn reading(&self, rate: f64) -> Option<Reading> {
-        let (bits, most) = (self.dimension.bits(), self.correctable());
+        let (bits, most) = (self.used_cells(), self.correctable());
         let wrong = |cells: u32, count: u32| {
             let chosen = (0..count)
                 .fold(1.0, |binomial, i| binomial * f64::from(cells - i) / f64::from(i + 1));

@@ -1,7 +1,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::kernels::any_nearer;
-use super::{FamilyError, Robust, TagWords};
+use super::{FamilyError, FreeCells, Robust, TagWords};
 use crate::lattice::Dimension;
 
 /// What every single code of a family has to satisfy, besides its distance to the other codes.
@@ -17,12 +17,20 @@ pub struct Rules {
     /// Cells that may be hidden, and the distance to the other codes that is then left.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub robust: Vec<Robust>,
+    /// Cells that no code uses.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub free: Option<FreeCells>,
 }
 
 impl Rules {
     /// No rules: what is known of families from elsewhere.
-    pub const NONE: Self =
-        Self { min_complexity: 0.0, black_distance: 0, white_distance: 0, robust: Vec::new() };
+    pub const NONE: Self = Self {
+        min_complexity: 0.0,
+        black_distance: 0,
+        white_distance: 0,
+        robust: Vec::new(),
+        free: None,
+    };
 
     /// The rules of the published families: half of the pairs differ, and the untagged tile is as
     /// far as another code (`docs/families.md`, “What a family is”). The distance from a code to its
@@ -74,6 +82,8 @@ pub struct Screen {
     pub(super) min_pairs: u32,
     black_distance: u32,
     white_distance: u32,
+    /// Cells that no code uses.
+    free: u64,
     /// Where cells may be hidden, and the distance that must be left.
     robust: Vec<(Vec<u64>, u32)>,
     reach: u32,
@@ -82,6 +92,8 @@ pub struct Screen {
 impl Screen {
     /// The words of `words` under `rules`, `distance` apart from each other and from their own turns.
     pub fn new(words: TagWords, distance: u32, rules: &Rules) -> Self {
+        let free = rules.free.map_or(0, |free| free.mask(words.dimension()));
+        let words = words.without(free);
         // The share is a decimal fraction from a file: 1e-9 keeps its rounding from adding a pair.
         let min_pairs = (rules.min_complexity * f64::from(words.pairs()) - 1e-9).ceil() as u32;
         let Rules { black_distance, white_distance, .. } = *rules;
@@ -91,7 +103,16 @@ impl Screen {
         let asked: Vec<&Robust> = rules.robust.iter().filter(|r| reach(r) > distance).collect();
         let farthest = asked.iter().map(|robust| reach(robust)).max().unwrap_or(distance);
         let robust = asked.into_iter().map(|r| (r.to.masks(dimension), r.distance)).collect();
-        Self { words, distance, min_pairs, black_distance, white_distance, robust, reach: farthest }
+        Self {
+            words,
+            distance,
+            min_pairs,
+            black_distance,
+            white_distance,
+            free,
+            robust,
+            reach: farthest,
+        }
     }
 
     /// The word arithmetic.
@@ -160,14 +181,16 @@ impl Screen {
     #[inline]
     pub fn look_is_fine(&self, word: u64) -> bool {
         let white = word.count_ones();
-        white >= self.black_distance
-            && self.words.dimension().bits() - white >= self.white_distance
+        let used = self.words.dimension().bits() - self.free.count_ones();
+        word & self.free == 0
+            && white >= self.black_distance
+            && white + self.white_distance <= used
             && self.words.differing_pairs(word) >= self.min_pairs
     }
 }
 
 /// All words that are part of a mask.
-fn parts(mask: u64) -> impl Iterator<Item = u64> {
+pub(super) fn parts(mask: u64) -> impl Iterator<Item = u64> {
     let next = move |&part: &u64| (part != mask).then(|| part.wrapping_sub(mask) & mask);
     std::iter::successors(Some(0), next)
 }

@@ -65,16 +65,11 @@ fn sum_of(mut sum: [u64; 65], counts: [u64; 65]) -> [u64; 65] {
     sum
 }
 
-/// Probability that a random word is within t cells of a code or one of its turns, for
+/// Probability that a random word of b `cells` is within t cells of a code or one of its turns, for
 /// t = 0 … ⌊(h−1)/2⌋: 3·N·Σ_{i≤t} C(b,i) / 2^b, of square tags 4·N·…, exact because these balls
 /// do not overlap.
-pub fn false_positive_rates(
-    kind: GridKind,
-    dimension: Dimension,
-    distance: u32,
-    codes: usize,
-) -> Vec<f64> {
-    let b = dimension.bits();
+pub fn false_positive_rates(kind: GridKind, cells: u32, distance: u32, codes: usize) -> Vec<f64> {
+    let b = cells;
     let correctable = distance.saturating_sub(1) / 2;
     let words = f64::from(kind.turns()) * codes as f64 / 2f64.powi(b as i32);
     (0..=correctable).map(|t| words * ball(b, t)).collect()

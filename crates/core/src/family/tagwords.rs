@@ -40,6 +40,16 @@ impl TagWords {
         Self { kind, dimension, turned, neighbours, pairs: cells.neighbours().len() as u32 }
     }
 
+    /// The same where pairs with one of some cells do not count.
+    #[must_use]
+    pub fn without(mut self, free: u64) -> Self {
+        for (gap, lows) in &mut self.neighbours {
+            *lows &= !(free | free >> *gap);
+        }
+        self.pairs = self.neighbours.iter().map(|(_, lows)| lows.count_ones()).sum();
+        self
+    }
+
     /// The dimension of the tags.
     pub fn dimension(&self) -> Dimension {
         self.dimension
@@ -85,7 +95,7 @@ impl TagWords {
         self.neighbours.iter().map(|&(gap, lows)| ((word ^ word >> gap) & lows).count_ones()).sum()
     }
 
-    /// Number of pairs of edge-adjacent cells: 9, 18, 30, 45 or 63.
+    /// Number of pairs of edge-adjacent cells: 9, 18, 30, 45 or 63, where all cells count.
     pub fn pairs(&self) -> u32 {
         self.pairs
     }

@@ -139,7 +139,7 @@ pub enum OtherFamily {
         found: String,
     },
     /// The family has grown since, and the target has a tag that it did not have then.
-    #[error("has a tag {id}, but {name} of fingerprint {wanted} had only {codes}")]
+    #[error("has a tag {id}, but {name} of fingerprint {wanted} had only {codes} codes")]
     Id {
         /// The family's name in the target.
         name: String,
@@ -589,4 +589,34 @@ pub struct SheetText {
     /// The line is set smaller where it would be longer than this, mm.
     #[serde(deserialize_with = "quantity::length_mm::de")]
     pub max_width_mm: f64,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::family::{Construction, Rules};
+
+    /// A target that was made before its family grew is still one of it, as long as it has only tags of then.
+    #[test]
+    fn families_that_grew_are_those_of_older_targets() {
+        let codes = Family::shipped("delTag16h5").unwrap().codes().to_vec();
+        let dimension = crate::lattice::Dimension::from_bits(16).unwrap();
+        let of = |codes: &[u64]| {
+            let source = Construction::Imported { source: "a test".to_owned() };
+            Family::new("grown", dimension, 5, codes.to_vec(), Rules::NONE, source).unwrap()
+        };
+        let then = of(&codes[..20]);
+        let now = of(&codes).extending(&then).unwrap();
+        let tags = TagSpec { family: "grown".to_owned(), ..TagSpec::default() };
+        let spec = BoardSpec { tags: Some(tags), ..BoardSpec::deltille(8, 10, 20.0) };
+        let mut board = Target::build("old", &TargetSpec::Board(spec), Some(&then), None).unwrap();
+        let named = board.family.clone().unwrap();
+        assert_eq!(board.check_family(&named, &then), Ok(()));
+        assert_eq!(board.check_family(&named, &now), Ok(()));
+        let other = of(&codes[..21]);
+        assert!(matches!(board.check_family(&named, &other), Err(OtherFamily::Codes { .. })));
+        board.panels[0].tags[0].id = 20;
+        let why = board.check_family(&named, &now).unwrap_err();
+        assert!(matches!(why, OtherFamily::Id { id: 20, codes: 20, .. }), "{why}");
+    }
 }

@@ -10,6 +10,7 @@ use rand::seq::SliceRandom;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
+use super::cycles::cycles_in;
 use super::{Arrangement, CycleSpace};
 use crate::family::{Rules, Screen, TagWords};
 use crate::lattice::{Dimension, TagCells};
@@ -36,6 +37,9 @@ pub struct Arranger {
     /// Sums of two words of the code that may be too light with hidden cells, one of each orbit.
     sums: Vec<u64>,
     screen: Screen,
+    /// Cycles of the tag whose cells are free: there the last cycles of the code lie, which it does not use.
+    free_cycles: Vec<u8>,
+    is_centre_free: bool,
 }
 
 impl Arranger {
@@ -51,6 +55,10 @@ impl Arranger {
     ) -> Self {
         let space = CycleSpace::of(dimension);
         let screen = Screen::new(TagWords::new(dimension), distance, rules);
+        let free = rules.free.map_or(0, |free| free.mask(dimension));
+        let counts = |&[a, b]: &[u8; 2]| (free >> a | free >> b) & 1 == 0;
+        let cells = TagCells::new(dimension);
+        let edges = cells.neighbours().iter().copied().filter(counts);
         let slices = words
             .chunks(512)
             .map(|chunk| {
@@ -68,7 +76,7 @@ impl Arranger {
             dimension,
             space,
             slices,
-            edges: TagCells::new(dimension).neighbours().to_vec(),
+            edges: edges.collect(),
             min_pairs: screen.min_pairs,
             black_distance: rules.black_distance,
             white_distance: rules.white_distance,
@@ -77,6 +85,8 @@ impl Arranger {
             nearly: None,
             sums: Vec::new(),
             screen,
+            free_cycles: cycles_in(dimension, free),
+            is_centre_free: free.count_ones() % 3 == 1,
         }
     }
 
@@ -129,9 +139,15 @@ impl Arranger {
         self.worth(arrangement, &self.weights(arrangement.inverted))
     }
 
-    /// Cycles that may be inverted, and the central bit unless it is chosen for each word.
+    /// Cycles that can be arranged: the first ones, as those on free cells stay there.
+    fn movable(&self) -> usize {
+        self.space.cycles as usize - self.free_cycles.len()
+    }
+
+    /// Cycles that may be inverted, and the central bit unless it is free or chosen for each word.
     fn flips(&self) -> u32 {
-        self.space.cycles + u32::from(self.space.centre && !self.free_centre)
+        let centre = self.space.centre && !self.free_centre && !self.is_centre_free;
+        self.movable() as u32 + u32::from(centre)
     }
 
     /// An arrangement that differs in one choice.
@@ -140,7 +156,7 @@ impl Arranger {
         arrangement: &Arrangement,
         random: &mut impl Rng,
     ) -> Arrangement {
-        let n = self.space.cycles as usize;
+        let n = self.movable();
         let mut next = arrangement.clone();
         match random.random_range(0..10) {
             0..4 => next.places.swap(random.random_range(0..n), random.random_range(0..n)),
@@ -217,7 +233,9 @@ impl Arranger {
         let mut random = ChaCha8Rng::seed_from_u64(seed);
         let flips = self.flips();
         let mut now = Arrangement::plain(self.space);
+        now.places.retain(|place| !self.free_cycles.contains(place));
         now.places.shuffle(&mut random);
+        now.places.extend(&self.free_cycles);
         now.starts.iter_mut().for_each(|s| *s = random.random_range(0..3));
         now.inverted = random.random_range(0..1 << flips);
         let mut weights = self.weights(now.inverted);

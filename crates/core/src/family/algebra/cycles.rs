@@ -118,6 +118,13 @@ impl Arrangement {
     }
 }
 
+/// The cycles of the tag, by their index, whose bits are all in a mask.
+pub(super) fn cycles_in(dimension: Dimension, mask: u64) -> Vec<u8> {
+    let (cycles, _) = tag_cycles(dimension);
+    let is_in = |cycle: &[u8; 3]| cycle.iter().all(|bit| mask >> bit & 1 == 1);
+    (0..).zip(&cycles).filter(|(_, cycle)| is_in(cycle)).map(|(i, _)| i).collect()
+}
+
 /// The three-cycles of the bits of a tag, each in the order in which a turn moves the content, and
 /// the central bit that stays.
 fn tag_cycles(dimension: Dimension) -> (Vec<[u8; 3]>, Option<u8>) {

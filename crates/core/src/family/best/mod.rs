@@ -171,6 +171,14 @@ impl Best {
         Family::new(name, self.dimension, self.distance, codes, rules, construction)
     }
 
+    /// The space that codes are drawn in: without the cells that none may use, which are its last cycles.
+    fn space(&self) -> CycleSpace {
+        let whole = CycleSpace::of(self.dimension);
+        let free = self.rules.free.map_or(0, |free| free.mask(self.dimension).count_ones());
+        let centre = whole.centre && free % 3 != 1;
+        CycleSpace { cycles: whole.cycles - free / 3, centre }
+    }
+
     fn screen(&self) -> Screen {
         Screen::new(TagWords::new(self.dimension), self.distance, &self.rules)
     }
@@ -384,7 +392,7 @@ impl Best {
         promising: &[(usize, Shape)],
         random: &mut ChaCha8Rng,
     ) -> Option<(String, Span, Option<Shape>)> {
-        let space = CycleSpace::of(self.dimension);
+        let space = self.space();
         let primes: Vec<u32> = residue::PRIMES
             .into_iter()
             .filter(|&q| residue::min_distance(q) >= self.distance)
@@ -444,7 +452,7 @@ impl Best {
     ) -> CosetUnion {
         /// Random starts of the clique search; in small spaces they cost next to nothing.
         const STARTS: [u64; 2] = [40, 8];
-        let space = CycleSpace::of(self.dimension);
+        let space = self.space();
         let alone = CosetUnion { space, code: code.clone(), cosets: vec![0] };
         if space.bits() - code.dimension() > SYNDROME_BITS {
             return alone;

@@ -1,0 +1,95 @@
+//! Cells of a tag that no code uses, so that there may be a hole for a screw or a camera.
+
+use glam::DVec2;
+use serde::{Deserialize, Serialize};
+
+use crate::lattice::{Dimension, TagCells};
+
+/// Which cells are free. They are printed black, read as nothing, and count in no distance; a turn of the tag leaves
+/// them where they are.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+#[non_exhaustive]
+pub enum FreeCells {
+    /// Those in the middle: the central cell of 16, 25 and 49, and of 9 and 36 the six around the vertex that is there.
+    Centre,
+}
+
+impl FreeCells {
+    /// Its name in options and files.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Centre => "centre",
+        }
+    }
+
+    /// The bits of these cells.
+    pub fn mask(self, dimension: Dimension) -> u64 {
+        match self {
+            Self::Centre => {
+                let (cells, middle) = (TagCells::new(dimension), DVec2::splat(1.0 / 3.0));
+                let is_there = |at: DVec2| at.abs_diff_eq(middle, 1e-9);
+                let is_free = |&bit: &u32| {
+                    is_there(cells.centre(bit, 0.0))
+                        || cells.corners(bit, 0.0).into_iter().any(is_there)
+                };
+                (0..dimension.bits()).filter(is_free).fold(0, |mask, bit| mask | 1 << bit)
+            }
+        }
+    }
+}
+
+impl std::str::FromStr for FreeCells {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        match text {
+            "centre" => Ok(Self::Centre),
+            _ => Err("only the cells of the `centre` can be free".to_owned()),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::family::best::{Best, Budget};
+    use crate::family::{Control, Decoder, Family, NaturalWords, Rules, certify};
+
+    #[test]
+    fn free_cells_are_in_the_middle_and_stay_there() {
+        for dimension in Dimension::all() {
+            let (cells, mask) = (TagCells::new(dimension), FreeCells::Centre.mask(dimension));
+            assert_eq!(mask.count_ones(), if dimension.bits() % 3 == 0 { 6 } else { 1 });
+            assert_eq!(cells.rotate(mask), mask);
+        }
+    }
+
+    /// Codes leave the free cells alone, and are known whatever these show; rates are those of all words.
+    #[test]
+    fn families_with_free_cells_are_read_without_them() {
+        let dimension = Dimension::from_bits(16).unwrap();
+        let rules = Rules { free: Some(FreeCells::Centre), ..Rules::published(5) };
+        let best = Best::new(dimension, 5, Budget::Work(1)).rules(rules);
+        let family = best.family("holed", best.start(), Control::default()).unwrap();
+        let (free, certificate) = (family.free_cells(), certify(&family));
+        assert!(certificate.holds(), "{:?}", certificate.failures);
+        assert!(family.len() >= 30 && family.codes().iter().all(|code| code & free == 0));
+        assert_eq!(Family::from_json(&family.to_json()).unwrap(), family);
+        assert_ne!(
+            Family::from_json(&family.to_json().replace("\"free\"", "\"fre\"")).ok(),
+            Some(family.clone())
+        );
+
+        let (decoder, natural) = (Decoder::new(&family), NaturalWords::new(dimension));
+        let (coins, rates) =
+            (family.false_positive_rates(), family.natural_false_positive_rates().unwrap());
+        for (errors, (coins, rate)) in (0..).zip(coins.into_iter().zip(rates)) {
+            let taken: Vec<u64> =
+                (0..1u64 << 16).filter(|&word| decoder.decode(word, errors).is_some()).collect();
+            let sum: f64 = taken.iter().map(|&word| natural.chance(word)).sum();
+            assert!((rate - sum).abs() < 1e-9 * sum, "{errors}: {rate}, {sum}");
+            assert!((coins * 65536.0 - taken.len() as f64).abs() < 1e-6);
+        }
+    }
+}
