@@ -54,6 +54,7 @@ fn made_twice(command: &str, cases: &[&str]) -> BTreeSet<String> {
     for case in cases {
         let folder = tempfile::tempdir().unwrap();
         std::fs::write(folder.path().join("prism.obj"), PRISM).unwrap();
+        std::fs::write(folder.path().join("logo.svg"), LOGO).unwrap();
         let first = format!("{command} {case} --save-template t.toml -o first --no-verify");
         deltille(folder.path(), &first).success();
         let again =
@@ -71,6 +72,9 @@ fn made_twice(command: &str, cases: &[&str]) -> BTreeSet<String> {
     }
     given
 }
+
+/// A disc.
+const LOGO: &str = "<svg xmlns='http://www.w3.org/2000/svg' viewBox='0 0 2 2'><circle cx='1' cy='1' r='1'/></svg>";
 
 /// Three rectangles between two triangles.
 const PRISM: &str = "v 0 0 0\nv 120 0 0\nv 60 103.923048454 0\nv 0 0 150\nv 120 0 150\nv 60 103.923048454 150\n\
@@ -94,7 +98,8 @@ fn every_option_of_a_board_is_in_its_template() {
         "--rows 4 --cols 5 --paper A5 --margin 8mm --svg --png --dpi 250 --dsc --dsc-dialect fork",
         "--rows 4 --cols 5 --untagged --edge 60mm --paper A4 --poster",
         "--rows 4 --cols 5 --dense --boards 4 --pack --edge 8mm --contour CutContour",
-        "--rows 4 --cols 5 --two-sided 3mm --pdf --gltf",
+        "--rows 4 --cols 5 --two-sided 3mm --pdf --gltf --textures 2",
+        "--rows 4 --cols 5 --pdf --logo logo.svg --logo-height 4mm",
         "--rows 4 --cols 5 --mirrored --white White --contour Cut --pdf --laser dxf,svg --kerf 0.2mm",
         "--rows 4 --cols 5 --gltf --obj --sdf --urdf --mjcf --usd --texture 900 --plate 5mm",
         "--rows 4 --cols 5 --3mf --inlay 0.6mm --plate 0.2in --gltf --texture-dpi 150",
@@ -119,6 +124,7 @@ fn every_option_of_a_solid_is_in_its_template() {
         "--skeleton --panel-thickness 2mm --wall 5mm --rib 9mm --face-margin 12mm --3mf --inlay 0.3mm",
         "--gltf --obj --sdf --urdf --mjcf --usd --texture 1500",
         "--edge 100mm",
+        "--edge 100mm --untagged --invert --pdf --logo logo.svg --logo-height 4mm --gltf --textures 2",
         "--laser dxf,svg --kerf 0.2mm",
     ];
     let cuboids = ["--size 80x60x50mm --pdf --laser dxf", "--size 8x6x5cm --edge 7cm --gltf"];

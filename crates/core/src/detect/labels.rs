@@ -178,7 +178,11 @@ impl Labels {
             Source::Outline(outline) => outline.len(),
             Source::Rectangle((rows, cols)) => *rows as usize * *cols as usize,
             Source::Target { panels, .. } => {
-                panels.iter().map(|panel| panel.corner_ids.len()).max().unwrap_or(0)
+                let largest = panels.iter().map(|panel| panel.corner_ids.len()).max();
+                // Faces without tags may be seen side by side as one grid.
+                let untagged = panels.iter().filter(|panel| !panel.tagged);
+                let together = untagged.map(|panel| panel.corner_ids.len()).sum();
+                largest.unwrap_or(0).max(together)
             }
             Source::Scene(targets) => {
                 targets.iter().map(|(_, labels)| labels.most_corners()).max().unwrap_or(0)
