@@ -183,7 +183,7 @@ impl Family {
     /// ndarray of :attr:`correctable` + 1, float64
     ///     Probabilities with 0, 1, … corrected cells.
     fn false_positive_rates<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
-        arrays::column(py, self.family.false_positive_rates().into_iter())
+        arrays::column(py, self.family.false_positive_rates())
     }
 
     /// How likely a triangle with a border in a natural picture is taken for a tag.
@@ -198,7 +198,7 @@ impl Family {
     ) -> PyResult<Option<Bound<'py, PyArray1<f64>>>> {
         let family = self.family.clone();
         let rates = unlocked(py, move || family.natural_false_positive_rates())?;
-        Ok(rates.map(|rates| arrays::column(py, rates.into_iter())))
+        Ok(rates.map(|rates| arrays::column(py, rates)))
     }
 
     /// How many cells whoever believes single tags may correct, so that natural false positives stay rare.

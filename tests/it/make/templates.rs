@@ -74,7 +74,8 @@ fn made_twice(command: &str, cases: &[&str]) -> BTreeSet<String> {
 }
 
 /// A disc.
-const LOGO: &str = "<svg xmlns='http://www.w3.org/2000/svg' viewBox='0 0 2 2'><circle cx='1' cy='1' r='1'/></svg>";
+const LOGO: &str =
+    "<svg xmlns='http://www.w3.org/2000/svg' viewBox='0 0 2 2'><circle cx='1' cy='1' r='1'/></svg>";
 
 /// Three rectangles between two triangles.
 const PRISM: &str = "v 0 0 0\nv 120 0 0\nv 60 103.923048454 0\nv 0 0 150\nv 120 0 150\nv 60 103.923048454 150\n\

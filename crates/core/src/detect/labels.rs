@@ -147,7 +147,7 @@ impl Labels {
                         None if are_alike(panels, grid) => {
                             Reason::new(ReasonKind::Ambiguous, [("corners", grid.len() as f64)])
                         }
-                        None => why::no_outline(grid, self.most_corners(), size),
+                        None => why::no_outline(grid, largest(panels), size),
                     };
                     return vec![(unlabelled(found), Some(why))];
                 }
@@ -178,11 +178,10 @@ impl Labels {
             Source::Outline(outline) => outline.len(),
             Source::Rectangle((rows, cols)) => *rows as usize * *cols as usize,
             Source::Target { panels, .. } => {
-                let largest = panels.iter().map(|panel| panel.corner_ids.len()).max();
                 // Faces without tags may be seen side by side as one grid.
                 let untagged = panels.iter().filter(|panel| !panel.tagged);
                 let together = untagged.map(|panel| panel.corner_ids.len()).sum();
-                largest.unwrap_or(0).max(together)
+                largest(panels).max(together)
             }
             Source::Scene(targets) => {
                 targets.iter().map(|(_, labels)| labels.most_corners()).max().unwrap_or(0)
@@ -294,6 +293,11 @@ fn on_panel(found: FoundGrid, panel: &TargetPanel, labelled: &Labelled) -> Grid 
     };
     let labels = relabelled(found, label, Some(panel.id), labelled.tags.clone());
     Grid { mirrored: labelled.mirrored, ..labels }
+}
+
+/// Corners of the largest panel.
+fn largest(panels: &[TargetPanel]) -> usize {
+    panels.iter().map(|panel| panel.corner_ids.len()).max().unwrap_or(0)
 }
 
 /// Whether a grid has all corners of several untagged panels, such as those of a solid, which nothing tells apart.

@@ -44,7 +44,7 @@ fn what_is_painted_is_black_and_white_is_paper() {
         (r##"<path fill="none" stroke="#000" stroke-width="10" d="M5 5H95V95H5Z"/>"##.to_owned(), 3_600.0),
         // Seen through a clip.
         (format!(r##"<clipPath id="a"><path d="M0 0H50V50H0ZM50 50H100V100H50Z"/></clipPath><g clip-path="url(#a)">{frame}</g>"##), 5_000.0),
-        (format!(r##"<defs><g id="a"><path d="M0 0H50V50H0Z"/></g></defs><use xlink:href="#a"/><use href="#a" x="50" y="50"/>"##), 5_000.0),
+        (r##"<defs><g id="a"><path d="M0 0H50V50H0Z"/></g></defs><use xlink:href="#a"/><use href="#a" x="50" y="50"/>"##.to_owned(), 5_000.0),
         (format!(r##"<style>.k{{fill:#fff}}</style>{frame}<rect class="k" y="50" width="50" height="50"/>"##), 7_500.0),
     ];
     for (body, expected) in cases {

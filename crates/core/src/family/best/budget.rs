@@ -11,7 +11,7 @@ use crate::Clock;
 pub enum Budget {
     /// So long by a clock; how much is found depends on the machine.
     Time(Duration, Clock),
-    /// So many steps: in each [`DRAWS`] batches of codes are drawn, the best are arranged once more, and codes are
+    /// So many steps: in each four batches of codes are drawn, the best are arranged once more, and codes are
     /// exchanged in one round of local search. What is found depends on the seed alone.
     Work(u32),
 }
