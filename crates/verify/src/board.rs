@@ -12,12 +12,17 @@ use super::fold::Seen;
 use super::tiles::PlacedPanel;
 use super::{Finding, SheetVerdict, TOLERANCE_MM, Verifier, detector_config};
 use deltille_core::detect::{Detection, Detector, GridCorner};
+use deltille_core::polygon;
+use deltille_core::raster::{Gray, ImageView, Intensity};
 use deltille_core::targets::{Corner, Panel, SheetLayout};
 use deltille_core::words::counted;
 
 /// An unlabelled corner is taken for a stated one within this many edges of it: less than half the
 /// way to the next.
 pub(super) const MATCH_EDGES: f64 = 0.25;
+
+/// How much of what is around the tiles of a panel is looked at with it alone, in edges: less than any corner lies within.
+const ALONE_EDGES: f64 = 0.05;
 
 /// Greatest share of tiles of the wrong colour that are named one by one; with more, the picture
 /// does not show the panel.
@@ -344,17 +349,53 @@ fn found_corners(detection: &Detection, placed: &PlacedPanel) -> BTreeMap<u32, D
             (corner.id == Some(id)).then(|| (id, position(corner)))
         })
         .collect();
-    if panel.tags.is_empty() && found.is_empty() {
+    let near = |detection: &Detection| -> BTreeMap<u32, DVec2> {
         let unlabelled = detection.grids.iter().filter(|grid| grid.panel.is_none());
-        for at in unlabelled.flat_map(|grid| &grid.corners).map(position) {
-            if let Some((corner, distance)) = nearest(placed, at)
-                && distance < MATCH_EDGES * panel.edge_mm
-            {
-                found.insert(corner.id, at);
-            }
-        }
+        let places = unlabelled.flat_map(|grid| &grid.corners).map(position);
+        let near = |at: DVec2| {
+            let (corner, distance) = nearest(placed, at)?;
+            (distance < MATCH_EDGES * panel.edge_mm).then_some((corner.id, at))
+        };
+        places.filter_map(near).collect()
+    };
+    if panel.tags.is_empty() && found.is_empty() {
+        found = near(detection);
+    }
+    if panel.tags.is_empty() && found.len() < panel.corners.len() {
+        let outline = outline_alone(panel);
+        let outline = outline.into_iter().map(|p| page.px_from_page(placed.page_from_panel(p)));
+        let alone = detect_alone(panel, (page.blurred(), u16::MAX), &outline.collect::<Vec<_>>());
+        let alone = near(&alone);
+        found = if alone.len() > found.len() { alone } else { found };
     }
     found
+}
+
+/// What is looked at of a panel without tags where it is looked at alone: its tiles and a little more, mm.
+pub(super) fn outline_alone(panel: &Panel) -> Vec<DVec2> {
+    panel.outline_around_mm(ALONE_EDGES * panel.edge_mm)
+}
+
+/// Corners of a panel without tags whose neighbours are left out: a grid may go on over a fold, where nothing tells
+/// faces apart. `outline_px` is convex.
+pub(super) fn detect_alone<T: Intensity>(
+    panel: &Panel,
+    (mut image, white): (Gray<T>, T),
+    outline_px: &[DVec2],
+) -> Detection
+where
+    for<'a> &'a Gray<T>: Into<ImageView<'a>>,
+{
+    let width = image.width();
+    let turn = polygon::area(outline_px).signum();
+    for (index, value) in image.pixels_mut().iter_mut().enumerate() {
+        let place = DVec2::new((index % width) as f64, (index / width) as f64);
+        let mut sides = outline_px.iter().zip(outline_px.iter().cycle().skip(1));
+        if sides.any(|(p, q)| turn * (q - p).perp_dot(place - p) < 0.0) {
+            *value = white;
+        }
+    }
+    Detector::for_grid(panel.kind, None, detector_config()).detect(&image, "panel")
 }
 
 /// The stated corner nearest to a page position, and its distance, mm.

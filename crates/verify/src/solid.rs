@@ -9,16 +9,16 @@ use glam::{DVec2, DVec3};
 use rayon::prelude::*;
 use serde::Serialize;
 
-use super::board::{BoardFinding, MATCH_EDGES, wrong_tones};
+use super::board::{BoardFinding, MATCH_EDGES, detect_alone, outline_alone, wrong_tones};
 use super::face_page::face_page;
 use super::finding::shown;
 use super::fit::AffineMap;
 use super::marks::spots;
 use super::model::{Model, View};
 use super::tiles::PlacedPanel;
-use super::{FaceVerdict, Finding, Format, Verdict, Verifier, detector_config};
+use super::{FaceVerdict, Finding, Format, Verdict, Verifier};
 use deltille_core::camera::{Camera, Pose};
-use deltille_core::detect::{Detection, Detector};
+use deltille_core::detect::Detection;
 use deltille_core::lattice::Vertex;
 use deltille_core::polygon::rectangle;
 use deltille_core::raster::Gray;
@@ -259,8 +259,13 @@ fn check_face(verifier: &Verifier, model: &Model, panel: &Panel) -> FaceVerdict 
     let (view, px_per_mm) = view(verifier, model, panel);
     let image = view.render(model);
     let detection = match panel.tags.is_empty() {
-        // A grid may have a corner of a face beside it, too, which one of a known size may not.
-        true => Detector::for_grid(panel.kind, None, detector_config()).detect(&image, "face"),
+        true => {
+            let outline = outline_alone(panel).into_iter().filter_map(|place| {
+                let seen = view.camera_from_target.apply(panel.pose.target_from_panel(place));
+                view.camera.project(seen)
+            });
+            detect_alone(panel, (image.clone(), u8::MAX), &outline.collect::<Vec<_>>())
+        }
         false => verifier.detector.detect(&image, "face"),
     };
     let mut verdict = FaceVerdict {

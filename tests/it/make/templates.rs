@@ -108,7 +108,7 @@ fn every_option_of_a_board_is_in_its_template() {
     ];
     let squares = [
         "--rows 4 --cols 5 --family aprilTag36h11 --tags-in white --tag-spacing 2 --pdf --laser dxf --kerf 0.1mm",
-        "--rows 4 --cols 5 --mirrored --white White --usd --pdf",
+        "--rows 4 --cols 5 --tags aprilTag25h9 --mirrored --white White --usd --pdf",
     ];
     let given = &made_twice("board", &boards) | &made_twice("checkerboard", &squares);
     are_all("board", &given);

@@ -181,12 +181,19 @@ impl Panel {
     /// Outline of the field, mm, counter-clockwise: the rectangle of [`Self::field_mm`], or what lies around the tiles of
     /// an inverted face.
     pub fn field_outline_mm(&self) -> Vec<DVec2> {
-        let Some(rim_mm) = self.rim_mm else { return rectangle(self.field_mm()).to_vec() };
+        match self.rim_mm {
+            Some(rim_mm) => self.outline_around_mm(rim_mm),
+            None => rectangle(self.field_mm()).to_vec(),
+        }
+    }
+
+    /// The convex outline of the drawn tiles and those that touch a corner, so far away from them, mm, counter-clockwise.
+    pub fn outline_around_mm(&self, away_mm: f64) -> Vec<DVec2> {
         // Among whole numbers, so that what is straight has no corners.
         let at = |vertex: Vertex| DVec2::new(vertex.col.into(), vertex.row.into());
         let around = hull(self.tiles().iter().flat_map(|tile| tile.vertices()).map(at).collect());
         let place = |at: DVec2| self.lattice_mm(Vertex::new(at.y as i32, at.x as i32));
-        grown(&around.into_iter().map(place).collect::<Vec<_>>(), rim_mm)
+        grown(&around.into_iter().map(place).collect::<Vec<_>>(), away_mm)
     }
 
     /// Width of the quiet zone around tiles of a given edge, mm.
