@@ -33,7 +33,7 @@ fn meet(&[a, b]: &[DVec2; 2], &[c, d]: &[DVec2; 2]) -> bool {
     if a == c || a == d || b == c || b == d {
         return false;
     }
-    let side = |from: DVec2, to: DVec2, point: DVec2| (to - from).perp_dot(point - from).signum();
+    let side = |from: DVec2, to: DVec2, point: DVec2| (to - from).perp_dot(point - from);
     side(a, b, c) * side(a, b, d) <= 0.0 && side(c, d, a) * side(c, d, b) <= 0.0
 }
 
