@@ -212,7 +212,8 @@ pub(super) fn check(
     layout: &SheetLayout,
     verdict: &mut SheetVerdict,
 ) -> (AffineMap, Seen) {
-    let detection = verifier.detector.detect(&page.blurred(), "page");
+    let blurred = page.blurred();
+    let detection = verifier.detector.detect(&blurred, "page");
     // Looked at in a mirror only if need be.
     let mut mirrored: Option<Detection> = None;
     let mut mirror = None;
@@ -248,7 +249,7 @@ pub(super) fn check(
     }
     let mut seen = Seen::new();
     for panel in &mut placed {
-        let found = check_panel(verifier, &detection, panel, verdict);
+        let found = check_panel(verifier, (&blurred, &detection), panel, verdict);
         if !found.is_empty() {
             seen.insert(panel.panel.id, found);
         }
@@ -304,12 +305,12 @@ fn another_board(verifier: &Verifier, page: &Page, verdict: &mut SheetVerdict) {
 /// the corners were found.
 fn check_panel(
     verifier: &Verifier,
-    detection: &Detection,
+    (blurred, detection): (&Gray<u16>, &Detection),
     placed: &mut PlacedPanel,
     verdict: &mut SheetVerdict,
 ) -> BTreeMap<u32, DVec2> {
     let panel = placed.panel;
-    let found = found_corners(detection, placed);
+    let found = found_corners((blurred, detection), placed);
     if found.is_empty() {
         verdict.findings.push(BoardFinding::PanelMissing { panel: panel.id }.into());
     } else {
@@ -336,7 +337,10 @@ fn check_panel(
 ///
 /// Corners of a tagged panel must be labelled by its tags. An untagged panel has nothing but its
 /// outline, which tells nothing once a corner is missing; then position decides.
-fn found_corners(detection: &Detection, placed: &PlacedPanel) -> BTreeMap<u32, DVec2> {
+fn found_corners(
+    (blurred, detection): (&Gray<u16>, &Detection),
+    placed: &PlacedPanel,
+) -> BTreeMap<u32, DVec2> {
     let (page, panel) = (placed.page, placed.panel);
     let position = |corner: &GridCorner| page.page_from_px(corner.position());
     let ids: BTreeMap<(i32, i32), u32> =
@@ -364,7 +368,7 @@ fn found_corners(detection: &Detection, placed: &PlacedPanel) -> BTreeMap<u32, D
     if panel.tags.is_empty() && found.len() < panel.corners.len() {
         let outline = outline_alone(panel);
         let outline = outline.into_iter().map(|p| page.px_from_page(placed.page_from_panel(p)));
-        let alone = detect_alone(panel, (page.blurred(), u16::MAX), &outline.collect::<Vec<_>>());
+        let alone = detect_alone(panel, (blurred.clone(), u16::MAX), &outline.collect::<Vec<_>>());
         let alone = near(&alone);
         found = if alone.len() > found.len() { alone } else { found };
     }

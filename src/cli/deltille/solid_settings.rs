@@ -408,7 +408,7 @@ impl SolidSettings {
             guide_page: self.guide_page,
             ..PaperSpec::default()
         };
-        logo::on(paper, self.logo.as_deref(), length("--logo-height", &self.logo_height)?)
+        logo::on(paper, self.logo.as_deref(), length("logo-height", &self.logo_height)?)
     }
 
     /// Whose list of corners and tags is written, if any.

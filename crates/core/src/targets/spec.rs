@@ -128,10 +128,6 @@ fn one() -> u32 {
     1
 }
 
-fn is_false(flag: &bool) -> bool {
-    !flag
-}
-
 fn is_deltille(kind: &GridKind) -> bool {
     *kind == GridKind::Deltille
 }
@@ -190,7 +186,7 @@ pub struct SolidSpec {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub square_tags: Option<TagSpec>,
     /// Whether black and white are exchanged: white tiles on a black field, which takes a part of the margin.
-    #[serde(default, skip_serializing_if = "is_false")]
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub inverted: bool,
     /// A frame that holds the faces as panels, if one is to be printed.
     #[serde(default, skip_serializing_if = "Option::is_none")]
