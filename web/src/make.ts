@@ -32,6 +32,8 @@ const papers = ["A5", "A4", "A3", "A2", "A1", "A0", "letter", "legal", "tabloid"
 
 export function make(): HTMLElement {
   let settings: Settings = read(location.hash.split("?")[1] ?? "");
+  /** The address as it was last read or written. */
+  let addressed = location.hash;
   let pages: Pages | null = null;
   let at = 0;
   let isTurning = false;
@@ -231,8 +233,11 @@ export function make(): HTMLElement {
   }
 
   const address = settled(() => {
+    // A link that was just followed is yet to be read.
+    if (!form.isConnected || location.hash !== addressed) return;
     const of = query(settings);
-    if (form.isConnected) history.replaceState(null, "", `#make${of ? `?${of}` : ""}`);
+    history.replaceState(null, "", `#make${of ? `?${of}` : ""}`);
+    addressed = location.hash;
   }, 250);
 
   /** Shows another page of the sheets. */
@@ -358,7 +363,10 @@ export function make(): HTMLElement {
     const url = new URL(location.href);
     url.hash = `make${of ? `?${of}` : ""}`;
     const isCopied = await navigator.clipboard.writeText(url.href).then(() => true, () => false);
-    if (!isCopied) history.replaceState(null, "", url);
+    if (!isCopied) {
+      history.replaceState(null, "", url);
+      addressed = location.hash;
+    }
     link.textContent = isCopied ? words.make.copied : words.make.inAddress;
     setTimeout(() => (link.textContent = words.make.link), 3000);
   }
@@ -374,7 +382,8 @@ export function make(): HTMLElement {
   });
   // A link to other settings, followed while the page is open.
   window.addEventListener("hashchange", () => {
-    const [part, of = ""] = location.hash.slice(1).split("?");
+    addressed = location.hash;
+    const [part, of = ""] = addressed.slice(1).split("?");
     if (part !== "make" || of === query(settings)) return;
     // A link to this part carries no settings: the address does again.
     if (!location.hash.includes("?")) {
