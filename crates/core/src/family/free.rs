@@ -37,6 +37,15 @@ impl FreeCells {
             }
         }
     }
+
+    /// Radius of the largest circle around the middle of the tag that has only these cells in it, widths of a bit.
+    pub fn radius_bits(self, dimension: Dimension) -> f64 {
+        match self {
+            // A triangle, or a hexagon of six.
+            Self::Centre if self.mask(dimension).count_ones() == 1 => 0.75f64.sqrt() / 3.0,
+            Self::Centre => 0.75f64.sqrt(),
+        }
+    }
 }
 
 impl std::str::FromStr for FreeCells {

@@ -219,7 +219,9 @@ fn family_of(
         wider.into_iter().chain(fewer).collect()
     };
     let needed = tag_count(faces, kind, tags);
-    check_family(kind, tags, family, needed, Setting::of(kind, has_both), instead)
+    let edges = faces.iter().filter(|face| face.board.kind() == kind).map(|face| face.tile_edge_mm);
+    let finest_mm = edges.fold(f64::INFINITY, f64::min);
+    check_family(kind, tags, finest_mm, family, needed, Setting::of(kind, has_both), instead)
 }
 
 /// The panels of a checked spec, whether or not its family has so many tags.
@@ -253,6 +255,7 @@ fn on_faces(spec: &SolidSpec, faces: &[Face]) -> Vec<Panel> {
             tag_margin_bits: None,
             gap_edges: None,
             discs_mm: None,
+            hole_mm: tags.and_then(|tags| tags.hole_mm),
             inverted: spec.inverted,
             rim_mm: spec.rim_mm(),
             outline: board.outline(),
