@@ -113,7 +113,8 @@ pub(super) fn panels(
         wider.into_iter().chain(fewer).collect()
     };
     let needed = boards * on_each(tags.spacing);
-    let family = check_family(spec.grid, tags, spec.edge_mm, family, needed, Setting::TAGS, instead)?;
+    let family =
+        check_family(spec.grid, tags, spec.edge_mm, family, needed, Setting::TAGS, instead)?;
     Ok((panels, Some(family)))
 }
 

@@ -248,7 +248,14 @@ impl Default for TagSpec {
     /// six plain tiles around each of its corners, and the border is that of published targets.
     fn default() -> Self {
         let family = "delTag25h7".to_owned();
-        Self { family, first_id: 0, spacing: 3, border_bits: 1.5, tags_in: TagsIn::Black, hole_mm: None }
+        Self {
+            family,
+            first_id: 0,
+            spacing: 3,
+            border_bits: 1.5,
+            tags_in: TagsIn::Black,
+            hole_mm: None,
+        }
     }
 }
 
