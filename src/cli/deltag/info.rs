@@ -4,7 +4,7 @@ use serde_json::{Value, json};
 
 use super::{confusion, false_positives, place_codes};
 use crate::cli::output::{self, Telling, say};
-use crate::family::{self, Family, HiddenCells, PAIRS_COUNTED, TagWords, bounds::bounds};
+use crate::family::{self, Family, HiddenCells, PAIRS_COUNTED, TagWords};
 use crate::lattice::GridKind;
 use crate::targets::{BoardSpec, SolidShape, SolidSpec, TagSpec, Target, TargetSpec};
 use crate::words::counted;
@@ -49,12 +49,11 @@ pub(super) fn run(args: Args) -> anyhow::Result<ExitCode> {
     }
     let family = super::resolve(name)?;
     if args.telling.is_json() {
-        let bounds = bounds(family.kind(), family.dimension(), family.distance());
         let mut told = json!({
             "name": family.name(), "fingerprint": family.fingerprint(), "codes": family.len(),
             "bits": family.dimension().bits(), "distance": family.distance(),
             "corrects": family.correctable(), "rules": family.rules(),
-            "construction": family.construction(), "upper_bound": bounds.linear_programming,
+            "construction": family.construction(), "upper_bound": family.bounds().linear_programming,
             "distance_histogram": family.histogram(),
         });
         let left = without_hidden(&family);
@@ -107,9 +106,13 @@ pub(super) fn run(args: Args) -> anyhow::Result<ExitCode> {
         _ => String::new(),
     };
     say!("  construction    {construction}");
+    let of_cells = match family.free_cells().count_ones() {
+        0 => String::new(),
+        free => format!(", of the {} cells in use", bits - free),
+    };
     say!(
-        "  upper bound     {} codes (linear programming)",
-        bounds(family.kind(), family.dimension(), family.distance()).linear_programming
+        "  upper bound     {} codes (linear programming{of_cells})",
+        family.bounds().linear_programming
     );
     let [rows, cols] = BOARD;
     let board = tags_of(&TargetSpec::Board(BoardSpec::new(GridKind::Deltille, rows, cols, 20.0)))?;

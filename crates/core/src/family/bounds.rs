@@ -12,6 +12,7 @@
 //! integers and checked exactly, so the bound does not rest on rounding. For odd h a parity bit
 //! gives a code of length b+1, distance h+1 and even distances only, whose bound is often lower.
 
+use super::Family;
 use super::statistics::ball;
 use crate::lattice::{Dimension, GridKind};
 
@@ -27,7 +28,19 @@ pub struct Bounds {
 
 /// Bounds for tags of a kind and a dimension at distance `distance` ≥ 1.
 pub fn bounds(kind: GridKind, dimension: Dimension, distance: u32) -> Bounds {
-    let b = dimension.bits();
+    bounds_of_cells(kind, dimension.bits(), distance)
+}
+
+impl Family {
+    /// Bounds for families of this kind and distance that use as many cells: those that are free tell nothing apart.
+    pub fn bounds(&self) -> Bounds {
+        let cells = self.dimension().bits() - self.free_cells().count_ones();
+        bounds_of_cells(self.kind(), cells, self.distance())
+    }
+}
+
+/// Bounds for tags of `b` cells.
+pub(super) fn bounds_of_cells(kind: GridKind, b: u32, distance: u32) -> Bounds {
     let turns = u64::from(kind.turns());
     let words = 2f64.powi(b as i32) / ball(b, distance.saturating_sub(1) / 2);
     let plain = delsarte(b, (distance..=b).collect());

@@ -63,6 +63,7 @@ impl std::str::FromStr for FreeCells {
 mod tests {
     use super::*;
     use crate::family::best::{Best, Budget};
+    use crate::family::bounds::bounds;
     use crate::family::{Control, Decoder, Family, NaturalWords, Rules, certify};
 
     #[test]
@@ -83,6 +84,8 @@ mod tests {
         let family = best.family("holed", best.start(), Control::default()).unwrap();
         let (free, certificate) = (family.free_cells(), certify(&family));
         assert!(certificate.holds(), "{:?}", certificate.failures);
+        let of_all = bounds(family.kind(), dimension, 5).linear_programming;
+        assert!(family.bounds().linear_programming < of_all, "a cell less tells less apart");
         assert!(family.len() >= 30 && family.codes().iter().all(|code| code & free == 0));
         assert_eq!(Family::from_json(&family.to_json()).unwrap(), family);
         assert_ne!(

@@ -454,6 +454,11 @@ impl SolidSpec {
         self.margin_mm - self.rim_mm().unwrap_or_default()
     }
 
+    /// The margin that leaves so much white along the edges, mm.
+    pub(super) fn margin_around_mm(&self, white_mm: f64) -> f64 {
+        if self.inverted { white_mm / (1.0 - RIM_PART) } else { white_mm }
+    }
+
     /// The tags of faces of a tiling.
     pub(super) fn tags_of(&self, kind: GridKind) -> Option<&TagSpec> {
         match (kind, &self.square_tags) {
