@@ -68,7 +68,7 @@ pub struct Settings {
     #[serde(skip_serializing_if = "is_false")]
     dense: bool,
     /// No tags
-    #[arg(long, help_heading = TAGS, conflicts_with_all = ["family", "tags_in", "tag_spacing", "tag_border", "first_id"])]
+    #[arg(long, help_heading = TAGS, conflicts_with_all = ["family", "tags_in", "tag_spacing", "tag_border", "hole", "first_id"])]
     #[serde(skip_serializing_if = "is_false")]
     untagged: bool,
     /// A tag in every n-th row and column, on a checkerboard where the square has the right colour,
@@ -79,6 +79,9 @@ pub struct Settings {
     /// [default: 1.5, in black squares 2, in white ones 1]
     #[arg(long, help_heading = TAGS, value_name = "BITS", allow_negative_numbers = true, value_parser = number(BORDER_BITS))]
     tag_border: Option<f64>,
+    /// A hole in the middle of each tag, for a screw or a camera, of a family made with `deltag gen-family --free centre`
+    #[arg(long, help_heading = TAGS, value_name = "DIAMETER", allow_hyphen_values = true)]
+    hole: Option<String>,
     /// Id of the first tag; the others follow [default: 0]
     #[arg(long, help_heading = TAGS, value_name = "ID", allow_negative_numbers = true, value_parser = whole(0..=u32::MAX))]
     first_id: Option<u32>,
@@ -193,7 +196,7 @@ pub(super) fn refuse_idle(options: &[(&str, bool, bool, &str)]) -> anyhow::Resul
 }
 
 /// What is said of tags and not of place codes.
-const NOT_DENSE: [&str; 3] = ["--family", "--tag-spacing", "--first-id"];
+const NOT_DENSE: [&str; 4] = ["--family", "--hole", "--tag-spacing", "--first-id"];
 
 /// Refuses what is said of tags that there are not: a template may say what the parser of options would refuse, and options
 /// what does not replace all that it says.
@@ -279,6 +282,7 @@ impl Settings {
             tags_in: self.tags_in.or(template.tags_in.filter(|_| !bare)),
             tag_spacing: self.tag_spacing.or(template.tag_spacing.filter(|_| !bare && !dense)),
             tag_border: self.tag_border.or(template.tag_border.filter(|_| !bare)),
+            hole: self.hole.or(template.hole.filter(|_| !bare && !dense)),
             first_id: self.first_id.or(template.first_id.filter(|_| !bare && !dense)),
             tag_ids: self.tag_ids || (template.tag_ids && !bare && !dense),
             board_id: self.board_id.or(template.board_id),
@@ -364,7 +368,9 @@ impl Settings {
         {
             bail!("{option}: there are no tags: name their family with --tags");
         }
+        let hole_mm = length("hole", &self.hole)?;
         let tags = tagged.then(|| TagSpec {
+            hole_mm,
             first_id: self.first_id.unwrap_or(usual.first_id),
             spacing: self.tag_spacing.unwrap_or(usual.spacing),
             border_bits: self.tag_border.unwrap_or(usual.border_bits),
@@ -414,13 +420,14 @@ impl Settings {
     }
 
     /// The options that say something of tags, and whether they are given.
-    fn of_tags(&self) -> [(&'static str, bool); 6] {
+    fn of_tags(&self) -> [(&'static str, bool); 7] {
         [
             ("--family", self.family.is_some()),
             ("--dense", self.dense),
             ("--tags-in", self.tags_in.is_some()),
             ("--tag-spacing", self.tag_spacing.is_some()),
             ("--tag-border", self.tag_border.is_some()),
+            ("--hole", self.hole.is_some()),
             ("--first-id", self.first_id.is_some()),
         ]
     }

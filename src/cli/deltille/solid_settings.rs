@@ -66,7 +66,7 @@ pub struct SolidSettings {
     pub dense: bool,
     /// No tags; faces are not told apart
     #[arg(long, help_heading = TAGS,
-          conflicts_with_all = ["family", "dense", "tag_spacing", "tag_border", "first_id", "tag_ids"])]
+          conflicts_with_all = ["family", "dense", "tag_spacing", "tag_border", "hole", "first_id", "tag_ids"])]
     #[serde(skip_serializing_if = "is_false")]
     pub untagged: bool,
     /// White tiles on black, which takes a part of the margin [default margin: 8mm]
@@ -79,6 +79,9 @@ pub struct SolidSettings {
     /// Black border of a tag, in widths of a bit [default: 1.5]
     #[arg(long, help_heading = TAGS, value_name = "BITS", allow_negative_numbers = true, value_parser = number(BORDER_BITS))]
     pub tag_border: Option<f64>,
+    /// A hole in the middle of each tag, for a screw or a camera, of a family made with `deltag gen-family --free centre`
+    #[arg(long, help_heading = TAGS, value_name = "DIAMETER", allow_hyphen_values = true)]
+    pub hole: Option<String>,
     /// Id of the first tag; the others follow, face by face [default: 0]
     #[arg(long, help_heading = TAGS, value_name = "ID", allow_negative_numbers = true, value_parser = whole(0..=u32::MAX))]
     pub first_id: Option<u32>,
@@ -205,6 +208,7 @@ impl SolidSettings {
             family: self.family.or(template.family.filter(|_| !bare && !dense)),
             tag_spacing: self.tag_spacing.or(template.tag_spacing.filter(|_| !bare && !dense)),
             tag_border: self.tag_border.or(template.tag_border.filter(|_| !bare)),
+            hole: self.hole.or(template.hole.filter(|_| !bare && !dense)),
             first_id: self.first_id.or(template.first_id.filter(|_| !bare && !dense)),
             square_family: self.square_family.or(template.square_family.filter(|_| !bare)),
             first_square_id: self.first_square_id.or(template.first_square_id.filter(|_| !bare)),
@@ -325,12 +329,13 @@ impl SolidSettings {
     }
 
     /// The options that say something of tags, and whether they are given.
-    fn of_tags(&self) -> [(&'static str, bool); 7] {
+    fn of_tags(&self) -> [(&'static str, bool); 8] {
         [
             ("--family", self.family.is_some()),
             ("--dense", self.dense),
             ("--tag-spacing", self.tag_spacing.is_some()),
             ("--tag-border", self.tag_border.is_some()),
+            ("--hole", self.hole.is_some()),
             ("--first-id", self.first_id.is_some()),
             ("--square-family", self.square_family.is_some()),
             ("--first-square-id", self.first_square_id.is_some()),
@@ -346,6 +351,7 @@ impl SolidSettings {
         let family = if self.dense { Some(places::NAME) } else { self.family.as_deref() };
         let tags = TagSpec::usual(tiling, family, TagsIn::Black);
         Ok(Some(TagSpec {
+            hole_mm: length("hole", &self.hole)?,
             first_id: self.first_id.unwrap_or(tags.first_id),
             spacing: self.tag_spacing.unwrap_or(tags.spacing),
             border_bits: self.tag_border.unwrap_or(tags.border_bits),

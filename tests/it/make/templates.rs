@@ -7,6 +7,8 @@ use std::path::Path;
 use crate::common::command::deltille;
 use crate::common::folder::names;
 
+use super::holes::holed;
+
 /// Options that say where files go, what is read and how it is told: they are of a run, not of a target.
 const OF_A_RUN: [&str; 16] = [
     "template",
@@ -55,6 +57,9 @@ fn made_twice(command: &str, cases: &[&str]) -> BTreeSet<String> {
         let folder = tempfile::tempdir().unwrap();
         std::fs::write(folder.path().join("prism.obj"), PRISM).unwrap();
         std::fs::write(folder.path().join("logo.svg"), LOGO).unwrap();
+        if case.contains("holed.json") {
+            holed(folder.path());
+        }
         let first = format!("{command} {case} --save-template t.toml -o first --no-verify");
         deltille(folder.path(), &first).success();
         let again =
@@ -105,6 +110,7 @@ fn every_option_of_a_board_is_in_its_template() {
         "--rows 4 --cols 5 --gltf --obj --sdf --urdf --mjcf --usd --texture 900 --plate 5mm",
         "--rows 4 --cols 5 --3mf --inlay 0.6mm --plate 0.2in --gltf --texture-dpi 150",
         "--rows 4 --cols 5 --laser svg",
+        "--rows 4 --cols 5 --edge 40mm --paper A3 --family families/holed.json --hole 1.6mm --laser dxf",
     ];
     let squares = [
         "--rows 4 --cols 5 --family aprilTag36h11 --tags-in white --tag-spacing 2 --pdf --laser dxf --kerf 0.1mm",
@@ -127,6 +133,7 @@ fn every_option_of_a_solid_is_in_its_template() {
         "--edge 100mm",
         "--edge 100mm --untagged --invert --pdf --logo logo.svg --logo-height 4mm --gltf --textures 2",
         "--laser dxf,svg --kerf 0.2mm",
+        "--edge 240mm --tiles 6 --family families/holed.json --hole 1.6mm --laser dxf",
     ];
     let cuboids = ["--size 80x60x50mm --pdf --laser dxf", "--size 8x6x5cm --edge 7cm --gltf"];
     let meshes = [

@@ -158,15 +158,19 @@ pub fn to_laser(
     Ok(CutDrawing { paths })
 }
 
-/// The smallest length on a board, mm: the edge of a cell of its tags, of a tile, or the diameter of a disc.
+/// The smallest length on a board, mm: the edge of a cell of its tags, of a tile, the diameter of a disc or hole, or twice the
+/// black around a hole where that is narrowest.
 fn finest_mm(panel: &Panel, family: Option<&Family>) -> f64 {
+    let family = family.filter(|_| panel.border_bits.is_some());
     let family = family.and_then(|family| family.of_tiling(panel.kind));
-    let cell = panel
-        .border_bits
-        .and(family)
-        .map(|family| panel.edge_mm / family.cells().width(panel.tag_inset_bits()));
+    let bit_mm = |family: &Family| panel.edge_mm / family.cells().width(panel.tag_inset_bits());
     let gap = panel.gap_edges.map(|gap| gap * panel.edge_mm);
-    [cell, gap, panel.discs_mm, panel.hole_mm].into_iter().flatten().fold(panel.edge_mm, f64::min)
+    let ring = panel.hole_mm.zip(family).and_then(|(hole_mm, family)| {
+        let free = family.rules().free?.radius_bits(family.dimension());
+        Some(2.0 * free * bit_mm(family) - hole_mm)
+    });
+    let lengths = [family.map(bit_mm), gap, panel.discs_mm, panel.hole_mm, ring];
+    lengths.into_iter().flatten().fold(panel.edge_mm, f64::min)
 }
 
 /// The outlines of what is black on a board, in its frame, mm. Where black meets black in a corner only, they keep apart;
