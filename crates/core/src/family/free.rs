@@ -61,10 +61,12 @@ impl std::str::FromStr for FreeCells {
 
 #[cfg(test)]
 mod tests {
+    use std::sync::atomic::{AtomicUsize, Ordering};
+
     use super::*;
     use crate::family::best::{Best, Budget};
     use crate::family::bounds::bounds;
-    use crate::family::{Control, Decoder, Family, NaturalWords, Rules, certify};
+    use crate::family::{Control, Decoder, Family, NaturalWords, Progress, Rules, certify};
 
     #[test]
     fn free_cells_are_in_the_middle_and_stay_there() {
@@ -81,7 +83,13 @@ mod tests {
         let dimension = Dimension::from_bits(16).unwrap();
         let rules = Rules { free: Some(FreeCells::Centre), ..Rules::published(5) };
         let best = Best::new(dimension, 5, Budget::Work(1)).rules(rules);
-        let family = best.family("holed", best.start(), Control::default()).unwrap();
+        let told = AtomicUsize::new(0);
+        let report = |progress: Progress| {
+            told.fetch_max(progress.codes, Ordering::Relaxed);
+        };
+        let control = Control::default().report(&report);
+        let family = best.family("holed", best.start(), control).unwrap();
+        assert!((1..=family.len()).contains(&told.into_inner()), "only what is found is told");
         let (free, certificate) = (family.free_cells(), certify(&family));
         assert!(certificate.holds(), "{:?}", certificate.failures);
         let of_all = bounds(family.kind(), dimension, 5).linear_programming;
