@@ -12,6 +12,7 @@
 //! integers and checked exactly, so the bound does not rest on rounding. For odd h a parity bit
 //! gives a code of length b+1, distance h+1 and even distances only, whose bound is often lower.
 
+use super::krawtchouk::{binomial, krawtchouk};
 use super::statistics::ball;
 use crate::lattice::{Dimension, GridKind};
 
@@ -31,7 +32,8 @@ pub fn bounds(kind: GridKind, dimension: Dimension, distance: u32) -> Bounds {
     let turns = u64::from(kind.turns());
     let words = 2f64.powi(b as i32) / ball(b, distance.saturating_sub(1) / 2);
     let plain = delsarte(b, (distance..=b).collect());
-    let all = 1u64 << b;
+    // Of 64 cells there is one word more than a machine word can tell.
+    let all = dimension.mask().saturating_add(1);
     let best = if distance % 2 == 1 {
         let even = (distance + 1..=b + 1).filter(|i| i % 2 == 0).collect();
         plain.min(delsarte(b + 1, even))
@@ -41,20 +43,8 @@ pub fn bounds(kind: GridKind, dimension: Dimension, distance: u32) -> Bounds {
     Bounds { linear_programming: best.min(all) / turns, sphere_packing: words as u64 / turns }
 }
 
-/// K_k(i) for length n, exactly: the coefficient of z^k in (1−z)^i (1+z)^(n−i).
-fn krawtchouk(n: u32, k: u32, i: u32) -> i128 {
-    (0..=k.min(i))
-        .filter(|&j| k - j <= n - i)
-        .map(|j| {
-            let sign = if j % 2 == 0 { 1 } else { -1 };
-            sign * binomial(i, j) * binomial(n - i, k - j)
-        })
-        .sum()
-}
-
-fn binomial(n: u32, k: u32) -> i128 {
-    (0..k).fold(1, |b, i| b * i128::from(n - i) / i128::from(i + 1))
-}
+/// Bounds beyond the number of all words of 65 bits are none.
+const MOST: f64 = 4e19;
 
 /// Largest number of words of length n whose distances are all among `distances`, or more.
 fn delsarte(n: u32, distances: Vec<u32>) -> u64 {
@@ -69,23 +59,27 @@ fn delsarte(n: u32, distances: Vec<u32>) -> u64 {
         .collect();
     let multipliers = maximise_sum(matrix);
 
-    /// Denominator of the rounded dual solution.
-    const SCALE: i128 = 1 << 60;
+    // Denominator of the rounded dual solution: as large as sums below allow, which are no larger than the bound itself.
+    let bound = 2.0 + multipliers.iter().map(|y| y.max(0.0)).sum::<f64>();
+    if !bound.is_finite() || bound > MOST {
+        return u64::MAX;
+    }
+    let scale = 1i128 << (124 - bound.log2().ceil() as u32);
     // f(x) = 1 + Σ f_k K_k(x), f_k ≥ 0; if f(i) ≤ 0 for all distances i then M ≤ f(0).
     let f: Vec<i128> = constraints
         .iter()
         .zip(&multipliers)
-        .map(|(&k, &y)| (y.max(0.0) / binomial(n, k) as f64 * SCALE as f64).round() as i128)
+        .map(|(&k, &y)| (y.max(0.0) / binomial(n, k) as f64 * scale as f64).round() as i128)
         .collect();
     let value = |i: u32| -> i128 {
-        constraints.iter().zip(&f).map(|(&k, f)| f * krawtchouk(n, k, i)).sum::<i128>() + SCALE
+        constraints.iter().zip(&f).map(|(&k, f)| f * krawtchouk(n, k, i)).sum::<i128>() + scale
     };
     // Rounding may leave f(i) a little above zero: lower the constant term by as much.
     let excess = distances.iter().map(|&i| value(i)).max().unwrap_or(0).max(0);
-    if excess >= SCALE {
+    if excess >= scale {
         return u64::MAX;
     }
-    ((value(0) - excess) / (SCALE - excess)) as u64
+    u64::try_from((value(0) - excess) / (scale - excess)).unwrap_or(u64::MAX)
 }
 
 /// Simplex method for max Σ x_j, A x ≤ 1, x ≥ 0; returns the dual solution, one value a row.
