@@ -35,6 +35,16 @@ fn without_hidden(family: &Family) -> Vec<(HiddenCells, u32)> {
     all.filter_map(|hidden| Some((hidden, family.distance_without(hidden)?))).collect()
 }
 
+/// How many codes no such family exceeds, and how that is known.
+fn upper_bound(family: &Family) -> (u64, &'static str) {
+    let (kind, dimension, distance) = (family.kind(), family.dimension(), family.distance());
+    let bounds = bounds(kind, dimension, distance);
+    match bounds.found_none(kind, dimension, distance) {
+        true => (bounds.sphere_packing, "sphere packing"),
+        false => (bounds.linear_programming, "linear programming"),
+    }
+}
+
 pub(super) fn run(args: Args) -> anyhow::Result<ExitCode> {
     if let [of, other] = &args.families[..] {
         let [of, other] = [super::resolve(of)?, super::resolve(other)?];
@@ -49,12 +59,12 @@ pub(super) fn run(args: Args) -> anyhow::Result<ExitCode> {
     }
     let family = super::resolve(name)?;
     if args.telling.is_json() {
-        let bounds = bounds(family.kind(), family.dimension(), family.distance());
+        let (bound, _) = upper_bound(&family);
         let mut told = json!({
             "name": family.name(), "fingerprint": family.fingerprint(), "codes": family.len(),
             "bits": family.dimension().bits(), "distance": family.distance(),
             "corrects": family.correctable(), "rules": family.rules(),
-            "construction": family.construction(), "upper_bound": bounds.linear_programming,
+            "construction": family.construction(), "upper_bound": bound,
             "distance_histogram": family.histogram(),
         });
         let left = without_hidden(&family);
@@ -107,10 +117,8 @@ pub(super) fn run(args: Args) -> anyhow::Result<ExitCode> {
         _ => String::new(),
     };
     say!("  construction    {construction}");
-    say!(
-        "  upper bound     {} codes (linear programming)",
-        bounds(family.kind(), family.dimension(), family.distance()).linear_programming
-    );
+    let (bound, by) = upper_bound(&family);
+    say!("  upper bound     {bound} codes ({by})");
     let [rows, cols] = BOARD;
     let board = tags_of(&TargetSpec::Board(BoardSpec::new(GridKind::Deltille, rows, cols, 20.0)))?;
     let solid = tags_of(&TargetSpec::Solid(SolidSpec::new(SolidShape::Icosahedron)))?;

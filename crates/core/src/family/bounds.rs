@@ -10,7 +10,9 @@
 //! A_i ≥ 0 and Σ_i A_i K_k(i) ≥ −C(b,k) with the Krawtchouk polynomials K_k, and
 //! M = 1 + Σ A_i. The program is solved in floating point; its dual solution is then rounded to
 //! integers and checked exactly, so the bound does not rest on rounding. For odd h a parity bit
-//! gives a code of length b+1, distance h+1 and even distances only, whose bound is often lower.
+//! gives a code of length b+1, distance h+1 and even distances only, whose bound is often lower; and
+//! for even h a cell less and a parity bit instead make even distances of any code. Where rounding
+//! leaves no solution that can be checked, as with 64 cells and small distances, there is no such bound.
 
 use super::krawtchouk::{binomial, krawtchouk};
 use super::statistics::ball;
@@ -20,27 +22,42 @@ use crate::lattice::{Dimension, GridKind};
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub struct Bounds {
-    /// A third of Delsarte's linear programming bound, as every tag takes three words; of square tags a quarter.
+    /// A third of Delsarte's linear programming bound, as every tag takes three words; of square tags a quarter. Where none was
+    /// found, that part of all words: see [`Self::found_none`].
     pub linear_programming: u64,
     /// The same part of the sphere-packing bound.
     pub sphere_packing: u64,
+}
+
+impl Bounds {
+    /// Whether linear programming found no bound for this distance, so that [`Self::linear_programming`] says nothing.
+    pub fn found_none(&self, kind: GridKind, dimension: Dimension, distance: u32) -> bool {
+        // At distance 1 all words are a code.
+        distance > 1 && self.linear_programming >= words(dimension) / u64::from(kind.turns())
+    }
+}
+
+/// All words, or one less where a machine word cannot tell so many.
+fn words(dimension: Dimension) -> u64 {
+    dimension.mask().saturating_add(1)
 }
 
 /// Bounds for tags of a kind and a dimension at distance `distance` ≥ 1.
 pub fn bounds(kind: GridKind, dimension: Dimension, distance: u32) -> Bounds {
     let b = dimension.bits();
     let turns = u64::from(kind.turns());
-    let words = 2f64.powi(b as i32) / ball(b, distance.saturating_sub(1) / 2);
+    let packed = 2f64.powi(b as i32) / ball(b, distance.saturating_sub(1) / 2);
     let plain = delsarte(b, (distance..=b).collect());
-    // Of 64 cells there is one word more than a machine word can tell.
-    let all = dimension.mask().saturating_add(1);
-    let best = if distance % 2 == 1 {
-        let even = (distance + 1..=b + 1).filter(|i| i % 2 == 0).collect();
-        plain.min(delsarte(b + 1, even))
-    } else {
-        plain
+    let even = |length: u32| {
+        delsarte(length, (distance..=length).filter(|i| i % 2 == 0).collect())
     };
-    Bounds { linear_programming: best.min(all) / turns, sphere_packing: words as u64 / turns }
+    // A cell more does no harm, and may leave a program that rounding does not spoil.
+    let best = match plain.min(even(b + distance % 2)) {
+        u64::MAX => even(b + 1),
+        best => best,
+    };
+    let best = best.min(words(dimension));
+    Bounds { linear_programming: best / turns, sphere_packing: packed as u64 / turns }
 }
 
 /// Bounds beyond the number of all words of 65 bits are none.
@@ -126,6 +143,8 @@ fn maximise_sum(mut a: Vec<Vec<f64>>) -> Vec<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::family::algebra::bch;
+    use crate::family::algebra::ranked::Ranked;
 
     #[test]
     fn bounds_are_the_published_ones() {
@@ -137,6 +156,10 @@ mod tests {
             (25, 9, 346),
             (36, 9, 251_756),
             (36, 11, 22_313),
+            (49, 12, 37_871_778),
+            (64, 12, 331_681_116_691),
+            // Those of the first-order Reed-Muller code, of which two words do not move.
+            (64, 32, 42),
         ] {
             let dimension = Dimension::from_bits(bits).unwrap();
             let found = bounds(GridKind::Deltille, dimension, distance).linear_programming;
@@ -144,6 +167,22 @@ mod tests {
             let square = bounds(GridKind::Checker, dimension, distance).linear_programming;
             let quarter = 3 * expected / 4..=(3 * expected + 2) / 4;
             assert!(quarter.contains(&square), "a square tag takes four words, not three");
+        }
+    }
+
+    /// Whatever the distance, no bound is below what is known, and where rounding left none that is said.
+    #[test]
+    fn bounds_of_64_cells_are_true_or_none() {
+        let dimension = Dimension::from_bits(64).unwrap();
+        for distance in 1..=64 {
+            let bounds = bounds(GridKind::Deltille, dimension, distance);
+            let known = bch::extended((distance - 1) / 2);
+            let known = Ranked::new(bch::space(), &known).filter(|ranked| !ranked.is_empty());
+            let known = known.map_or(0, |ranked| ranked.len());
+            let least = bounds.linear_programming.min(bounds.sphere_packing);
+            assert!(least >= known, "{distance}: {bounds:?}, {known}");
+            let is_none = bounds.found_none(GridKind::Deltille, dimension, distance);
+            assert!(!is_none || (2..9).contains(&distance), "{distance}: {bounds:?}");
         }
     }
 

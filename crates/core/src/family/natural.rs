@@ -291,6 +291,7 @@ mod tests {
             ("d36h9", Some(2)),
             ("d36h11", Some(3)),
             ("d49h12", Some(5)),
+            ("d64h12", Some(5)),
             ("delTag16h5", None),
             ("delTag25h7", Some(1)),
             ("delTag25h9", Some(1)),
