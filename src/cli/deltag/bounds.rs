@@ -56,7 +56,9 @@ pub(super) fn run(args: Args) -> anyhow::Result<ExitCode> {
     say!("no family of {} bits and distance {distance} has more tags than", dimension.bits());
     match linear {
         Some(linear) => say!("{linear:>12}  by linear programming (Delsarte)"),
-        None => say!("{:>12}  by linear programming (Delsarte): nothing that can be checked", "none"),
+        None => {
+            say!("{:>12}  by linear programming (Delsarte): nothing that can be checked", "none")
+        }
     }
     say!("{:>12}  by sphere packing", bounds.sphere_packing);
     if let Some(known) = published {

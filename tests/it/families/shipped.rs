@@ -3,8 +3,8 @@
 use deltille::clock;
 use deltille::family::algebra::AlgebraicConstruction;
 use deltille::family::{
-    Construction, Control, Decoder, Family, FreeCells, Rules, Screen, TagWords, best, certify, lexicode,
-    shipped_names,
+    Construction, Control, Decoder, Family, FreeCells, Rules, Screen, TagWords, best, certify,
+    lexicode, shipped_names,
 };
 use deltille::lattice::Dimension;
 use proptest::prelude::*;

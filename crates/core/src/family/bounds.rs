@@ -48,12 +48,10 @@ pub fn bounds(kind: GridKind, dimension: Dimension, distance: u32) -> Bounds {
     let turns = u64::from(kind.turns());
     let packed = 2f64.powi(b as i32) / ball(b, distance.saturating_sub(1) / 2);
     let plain = delsarte(b, (distance..=b).collect());
-    let even = |length: u32| {
-        delsarte(length, (distance..=length).filter(|i| i % 2 == 0).collect())
-    };
-    // A cell more does no harm, and may leave a program that rounding does not spoil.
+    let even = |length: u32| delsarte(length, (distance..=length).filter(|i| i % 2 == 0).collect());
+    // Where rounding spoils the program, one for a smaller distance bounds these codes, too.
     let best = match plain.min(even(b + distance % 2)) {
-        u64::MAX => even(b + 1),
+        u64::MAX if distance > 1 => delsarte(b, (distance - 1..=b).collect()),
         best => best,
     };
     let best = best.min(words(dimension));

@@ -26,7 +26,9 @@ impl Dimension {
     pub fn from_bits(bits: u32) -> Result<Self, DimensionError> {
         let d = bits.isqrt();
         match NonZeroU8::new(d as u8) {
-            Some(nonzero) if d * d == bits && DIMENSIONS.contains(&nonzero.get()) => Ok(Self(nonzero)),
+            Some(nonzero) if d * d == bits && DIMENSIONS.contains(&nonzero.get()) => {
+                Ok(Self(nonzero))
+            }
             _ => Err(DimensionError(bits)),
         }
     }

@@ -29,8 +29,8 @@ pub mod residue;
 mod span;
 pub mod weights;
 
-pub use cycles::{Arrangement, CycleSpace};
 pub(in crate::family) use cycles::Placing;
+pub use cycles::{Arrangement, CycleSpace};
 pub use linear_map::LinearMap;
 pub use record::AlgebraicConstruction;
 pub use span::Span;

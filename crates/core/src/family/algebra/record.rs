@@ -96,18 +96,23 @@ impl AlgebraicConstruction {
         };
         let dimension = screen.words().dimension();
         let ranked = self.ranked(dimension).ok_or_else(|| {
-            wrong("stride", "only the tags of a linear code alone, which a turn leaves as it is, have numbers")
+            wrong(
+                "stride",
+                "only the tags of a linear code alone, which a turn leaves as it is, have numbers",
+            )
         })?;
         if screen.is_robust() && !self.is_apart(screen, &self.union(dimension)?) {
             return Err(wrong("stride", "with hidden cells words of the linear code are too near"));
         }
         let count = ranked.len();
         if count == 0 || greatest_common_divisor(stride, count) != 1 {
-            let problem = format!("{stride} and the number of tags, {count}, have a divisor in common");
+            let problem =
+                format!("{stride} and the number of tags, {count}, have a divisor in common");
             return Err(wrong("stride", &problem));
         }
         let limit = self.limit.filter(|&limit| limit <= MOST_CODES);
-        let limit = limit.ok_or_else(|| wrong("limit", "with a stride there are 2^27 codes at most"))?;
+        let limit =
+            limit.ok_or_else(|| wrong("limit", "with a stride there are 2^27 codes at most"))?;
         let place = Placing::new(&self.arrangement, dimension);
         let centre = self.free_centre(dimension)?;
         let numbers = (0..count.min(limit.saturating_mul(TRIED))).scan(0u64, |next, _| {
@@ -179,7 +184,8 @@ impl AlgebraicConstruction {
 
     /// The central cell of the tag, where no word uses it; else 0.
     fn free_centre(&self, dimension: Dimension) -> Result<u64, FamilyError> {
-        let (space, code) = (CycleSpace::of(dimension), self.words("basis", &self.basis, dimension)?);
+        let (space, code) =
+            (CycleSpace::of(dimension), self.words("basis", &self.basis, dimension)?);
         let cosets = self.words("cosets", &self.cosets, dimension)?;
         let union = CosetUnion { space, code: Span::of(code), cosets };
         Ok(centre_of(&union, &self.arrangement, dimension))
@@ -234,12 +240,15 @@ impl AlgebraicConstruction {
             return Err("the linear code changes when the tag turns".to_owned());
         }
         let weights = weights(&code, space.bits());
-        let weights = weights.ok_or("the linear code and its dual have too many words to be weighed")?;
+        let weights =
+            weights.ok_or("the linear code and its dual have too many words to be weighed")?;
         if (1..screen.distance()).any(|weight| weights[weight as usize] > 0) {
             return Err("the linear code has too light a word".to_owned());
         }
         if screen.is_robust() && code.dimension() > MOST_DIMENSIONS {
-            return Err("the linear code has too many words to be looked at with hidden cells".to_owned());
+            return Err(
+                "the linear code has too many words to be looked at with hidden cells".to_owned()
+            );
         }
         let union = CosetUnion { space, code, cosets };
         if screen.is_robust() && !self.is_apart(screen, &union) {

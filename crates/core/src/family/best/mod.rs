@@ -404,8 +404,7 @@ impl Best {
         if self.dimension.bits() != bch::space().bits() {
             return None;
         }
-        let most =
-            if self.rules.robust.is_empty() { u32::MAX } else { LISTED_DIMENSIONS };
+        let most = if self.rules.robust.is_empty() { u32::MAX } else { LISTED_DIMENSIONS };
         let least = self.distance.saturating_sub(1) / 2;
         let free = self.rules.free.map_or(0, |_| bch::space().mask() ^ self.space().mask());
         let codes = (least..).map(|errors| (errors, bch::extended(errors).vanishing_on(free)));
@@ -491,9 +490,7 @@ impl Best {
         const STARTS: [u64; 2] = [40, 8];
         let space = self.space();
         let alone = CosetUnion { space, code: code.clone(), cosets: vec![0] };
-        if space.bits() - code.dimension() > SYNDROME_BITS
-            || code.dimension() > LISTED_DIMENSIONS
-        {
+        if space.bits() - code.dimension() > SYNDROME_BITS || code.dimension() > LISTED_DIMENSIONS {
             return alone;
         }
         let Some(graph) = CosetGraph::new(space, code, self.distance, halt) else { return alone };

@@ -133,7 +133,8 @@ impl PatternTable {
     /// have the same syndrome.
     fn new(cells: &[(u64, u32)], turned: &LinearMap, weight: u32) -> Option<Self> {
         // A turn leaves but a few patterns as they are.
-        let count = ball(cells.len() as u32, weight) / 3.0 + ball(cells.len() as u32 / 3, weight / 3);
+        let count =
+            ball(cells.len() as u32, weight) / 3.0 + ball(cells.len() as u32 / 3, weight / 3);
         let slots = (1.5 * count) as usize + 2;
         let slots = slots.next_power_of_two();
         let mut table = Self { slots: vec![EMPTY; slots], shift: 32 - slots.ilog2() };
