@@ -25,7 +25,8 @@ pub(super) struct Syndromes {
     ids: Vec<(u64, u32)>,
 }
 
-/// Tables of more error patterns than this would not be worth their memory, 18 bytes each or more.
+/// Tables of more error patterns than this would not be worth their memory, 18 bytes each or more; three patterns that turn
+/// into each other count as one.
 const MAX_PATTERNS: f64 = 4e6;
 
 impl Syndromes {
@@ -34,9 +35,13 @@ impl Syndromes {
     pub(super) fn cost(family: &Family) -> f64 {
         /// A look into the table costs as much as comparing so many words side by side (measured).
         const LOOK_COST: f64 = 30.0;
+        /// Words over which the work is shared that making the table is, about a comparison for each pattern: those of some
+        /// hundred pictures.
+        const WORDS: f64 = 10_000.0;
         match family.construction() {
             Construction::Algebraic(c) if c.exchanged.is_empty() => {
-                LOOK_COST * (1.0 + c.cosets.len() as f64)
+                let patterns = ball(family.dimension().bits(), family.correctable());
+                LOOK_COST * (1.0 + c.cosets.len() as f64) + patterns / WORDS
             }
             _ => f64::INFINITY,
         }
@@ -58,10 +63,10 @@ impl Syndromes {
         let turn_of = |&bit: &u32| syndromes.apply(words.turn(1 << bit));
         let turned: Vec<u32> = code.free_bits(bits).iter().map(turn_of).collect();
         let turned = LinearMap::of_columns(&turned);
-        let columns = (0..bits).filter(|&bit| ignored >> bit & 1 == 0);
-        let columns: Vec<(u64, u32)> =
-            columns.map(|bit| (1 << bit, syndromes.apply(1 << bit))).collect();
-        let patterns = PatternTable::new(&columns, &turned, correctable)?;
+        let cells = (0..bits).map(|bit| 1 << bit).filter(|bit| ignored & bit == 0);
+        let cells: Vec<(u64, [u32; 3])> =
+            cells.map(|bit| (bit, turns_of(&turned, syndromes.apply(bit)))).collect();
+        let patterns = PatternTable::new(&cells, correctable)?;
         let mut ids: Vec<(u64, u32)> =
             family.codes().iter().map(|&code| words.canonical(code & !ignored)).zip(0..).collect();
         ids.sort_unstable();
@@ -129,30 +134,28 @@ struct Slot {
 const EMPTY: Slot = Slot { syndrome: 0, pattern: [u32::MAX; 2] };
 
 impl PatternTable {
-    /// All patterns of up to `weight` errors in some cells, of which the bits and their syndromes are given; `None` when two
-    /// have the same syndrome.
-    fn new(cells: &[(u64, u32)], turned: &LinearMap, weight: u32) -> Option<Self> {
+    /// All patterns of up to `weight` errors in some cells, of each of which the bit is given with its syndromes in all turns;
+    /// `None` when two have the same syndrome.
+    fn new(cells: &[(u64, [u32; 3])], weight: u32) -> Option<Self> {
+        let count = cells.len() as u32;
         // A turn leaves but a few patterns as they are.
-        let count =
-            ball(cells.len() as u32, weight) / 3.0 + ball(cells.len() as u32 / 3, weight / 3);
-        let slots = (1.5 * count) as usize + 2;
-        let slots = slots.next_power_of_two();
+        let count = ball(count, weight) / 3.0 + ball(count / 3, weight / 3);
+        let slots = ((1.5 * count) as usize + 2).next_power_of_two();
         let mut table = Self { slots: vec![EMPTY; slots], shift: 32 - slots.ilog2() };
-        table.insert_all(cells, turned, weight, (0, 0)).then_some(table)
+        table.insert_all(cells, weight, (0, [0; 3])).then_some(table)
     }
 
     fn insert_all(
         &mut self,
-        cells: &[(u64, u32)],
-        turned: &LinearMap,
+        cells: &[(u64, [u32; 3])],
         weight: u32,
-        (pattern, syndrome): (u64, u32),
+        (pattern, syndromes): (u64, [u32; 3]),
     ) -> bool {
-        self.insert(pattern, turns_of(turned, syndrome))
+        self.insert(pattern, syndromes)
             && (weight == 0
-                || cells.iter().enumerate().all(|(i, &(bit, column))| {
-                    let next = (pattern | bit, syndrome ^ column);
-                    self.insert_all(&cells[i + 1..], turned, weight - 1, next)
+                || cells.iter().enumerate().all(|(i, (bit, columns))| {
+                    let sums = std::array::from_fn(|turn| syndromes[turn] ^ columns[turn]);
+                    self.insert_all(&cells[i + 1..], weight - 1, (pattern | bit, sums))
                 }))
     }
 
