@@ -7,6 +7,8 @@ const video = fileURLToPath(new URL("./test-results/webcam.y4m", import.meta.url
 export default defineConfig({
   testDir: "tests",
   timeout: 120_000,
+  // Beside other work a page may be slow to answer.
+  expect: { timeout: 20_000 },
   workers: 2,
   fullyParallel: true,
   // What is measured has the machine for itself.

@@ -36,6 +36,7 @@ pub struct Tags {
     pub spacing: Option<u32>,
     pub border_bits: Option<f64>,
     pub first_id: u32,
+    pub hole_mm: Option<f64>,
 }
 
 impl Tags {
@@ -50,6 +51,7 @@ impl Tags {
             spacing: self.spacing.unwrap_or(usual.spacing),
             border_bits: self.border_bits.unwrap_or(usual.border_bits),
             tags_in: self.tags_in,
+            hole_mm: self.hole_mm,
             ..usual
         };
         Ok((spec, family))
@@ -99,6 +101,9 @@ flat! {
     ///     A tag in every n-th row and column.
     /// tag_border : float, optional
     ///     Black border of a tag, in widths of a bit.
+    /// hole_mm : float, optional
+    ///     Diameter of a hole in the middle of each tag, for a screw or a camera; the family must leave the cells there free
+    ///     (``deltag gen-family --free centre``).
     /// first_id : int, optional
     ///     Id of the first tag; the others follow.
     /// boards : int, optional
@@ -123,6 +128,7 @@ flat! {
         tags: bool = true,
         tag_spacing: Option<i64> = None,
         tag_border: Option<f64> = None,
+        hole_mm: Option<f64> = None,
         first_id: i64 = 0,
         boards: i64 = 1,
         board_id: i64 = 0,
@@ -137,7 +143,7 @@ flat! {
         let spacing = spacing_of(tag_spacing)?;
         let first_id = whole("first_id", first_id, errors::target)?;
         let of_tags =
-            || Tags { family, tags_in: TagsIn::Black, spacing, border_bits: tag_border, first_id };
+            || Tags { family, tags_in: TagsIn::Black, spacing, border_bits: tag_border, first_id, hole_mm };
         let wanted = Wanted {
             grid: GridKind::Deltille,
             size: [rows, cols],
@@ -199,6 +205,7 @@ flat! {
             spacing,
             border_bits: tag_border,
             first_id,
+            hole_mm: None,
         };
         let wanted = Wanted {
             grid: GridKind::Checker,

@@ -95,6 +95,7 @@ pub const KEYWORDS: &[(&str, &str)] = &[
     ("TagSheetSpec::family", "family"),
     ("TagSheetSpec::ids", "ids"),
     ("TagSpec::border_bits", "tag_border"),
+    ("TagSpec::hole_mm", "hole_mm"),
     ("TagSpec::family", "family"),
     ("TagSpec::first_id", "first_id"),
     ("TagSpec::spacing", "tag_spacing"),

@@ -128,7 +128,7 @@ macro_rules! solid {
         ///     Family of the tags; delTag25h7 if left out, of squares aprilTag36h11.
         /// tags : bool, optional
         ///     ``False`` for bare tilings, whose faces cannot be told apart.
-        /// tag_spacing, tag_border, first_id, board_id, inverted
+        /// tag_spacing, tag_border, hole_mm, first_id, board_id, inverted
         ///     As of :class:`Board`. White tiles on black have a margin of 8 mm unless another is given.
         /// skeleton : bool, optional
         ///     Whether it has a frame that holds its faces as panels.
@@ -153,7 +153,7 @@ macro_rules! solid {
         impl $class {
             #[new]
             #[pyo3(signature = ($($given,)* *, $($keyword = $default,)* edge_mm = None, tiles = None,
-                face_margin_mm = None, family = None, tags = true, tag_spacing = None, tag_border = None, first_id = 0,
+                face_margin_mm = None, family = None, tags = true, tag_spacing = None, tag_border = None, hole_mm = None, first_id = 0,
                 board_id = 0, inverted = false, skeleton = false, panel_thickness_mm = None, wall_mm = None, rib_mm = None, per_face = false,
                 allow_seams = false, tag_ids = false, guide_page = false, paper = None, orientation = "auto",
                 margin_mm = None, note = None, logo = None, logo_height_mm = None, name = None))]
@@ -168,6 +168,7 @@ macro_rules! solid {
                 tags: bool,
                 tag_spacing: Option<i64>,
                 tag_border: Option<f64>,
+                hole_mm: Option<f64>,
                 first_id: i64,
                 board_id: i64,
                 inverted: bool,
@@ -192,6 +193,7 @@ macro_rules! solid {
                     tags_in: TagsIn::Black,
                     spacing: spacing_of(tag_spacing)?,
                     border_bits: tag_border,
+                    hole_mm,
                     first_id: whole("first_id", first_id, errors::target)?,
                 };
                 let solids = Solids {

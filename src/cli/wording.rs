@@ -88,6 +88,7 @@ const NAMED: &[Named] = &[
     named("TagSpec::border_bits", "deltille board", "--tag-border"),
     named("TagSpec::family", "deltille board", "--family"),
     named("TagSpec::first_id", "deltille board", "--first-id"),
+    named("TagSpec::hole_mm", "deltille board", "--hole"),
     named("TagSpec::spacing", "deltille board", "--tag-spacing"),
     named("TagSpec::tags_in", "deltille checkerboard", "--tags-in"),
     named("TagsIn::Black", "deltille checkerboard", "--tags-in black"),

@@ -40,6 +40,7 @@ BOARDS = {
     "charuco": "charuco --squares 7x5 --edge 30mm",
     "aprilgrid": "aprilgrid --tags 4x4 --edge 25mm",
     "circles": "circles --circles 7x5 --spacing 25mm",
+    "holes": "board --rows 5 --cols 6 --edge 30mm --family {families}/holed.json --hole 1.2mm",
 }
 SOLIDS = {
     "tetrahedron": "tetrahedron --edge 90mm --skeleton",
@@ -155,7 +156,13 @@ def check_laser(program, folder, name, command, is_solid):
             page = affinity.translate(page, *(corner(together) - corner(page)))
             beside = together.symmetric_difference(page).area
             assert beside / found < 2 * slack, (name, kerf, ending, beside)
-            cut, panel = Polygon(outlines["CUT"][0]), json.loads((folder / f"{name}.json").read_text())["panels"][0]
+            *holes, plate_loop = outlines["CUT"]
+            cut, panel = Polygon(plate_loop), json.loads((folder / f"{name}.json").read_text())["panels"][0]
+            width = panel.get("hole_mm", 0.0)
+            assert len(holes) == (len(panel["tags"]) if width else 0), (name, len(holes))
+            for hole in map(Polygon, holes):
+                assert abs(hole.area / (np.pi / 4 * (width - kerf) ** 2) - 1) < 1e-3, (name, kerf, hole.area)
+                assert hole.buffer(kerf / 2).intersection(together).area < 1e-3, (name, kerf)
             quiet = max(5.0, panel["edge_mm"] / 4) if not panel["inverted"] else 0.0
             plate = np.array(together.bounds) + np.array([-1, -1, 1, 1]) * (quiet + kerf)
             # Shrunken tips of tiles no longer reach to where tiles did.
@@ -238,6 +245,10 @@ def check_spots(program, folder):
 def main():
     program, folder = sys.argv[1], pathlib.Path(sys.argv[2])
     folder.mkdir(parents=True, exist_ok=True)
+    # A family with room for a hole in the middle of its tags.
+    search = "gen-family d16h5 --free centre --method lexicode --name holed --force -o"
+    run(pathlib.Path(program).with_name("deltag"), *search.split(), folder)
+    BOARDS["holes"] = BOARDS["holes"].format(families=folder)
     for name, command in BOARDS.items():
         check_laser(program, folder, name, command, False)
     for name, command in SOLIDS.items():

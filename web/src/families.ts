@@ -1,6 +1,6 @@
 // Families: codes of tags, damaged and decoded.
 import { el, field, select, shape } from "./dom";
-import { RATES, bar, reading, sizes } from "./family-figures";
+import { RATES, bar, falsePositives, reading, sizes } from "./family-figures";
 import { drawing as looking } from "./library";
 import { USUAL_FAMILY } from "./settings";
 import { words } from "./words";
@@ -47,6 +47,9 @@ export function families(): HTMLElement {
     const shares = await looking.call("reading", name, RATES);
     if (name !== asked) return;
     figures.replaceChildren(sizes(family.figures), reading(shares, family.figures.correctable));
+    // Of large families this takes a second or two.
+    const rates = await looking.call("falsePositives", name);
+    if (name === asked) figures.append(falsePositives(rates, family.figures.kind));
   }
 
   /** By how much a tag is turned, degrees. */

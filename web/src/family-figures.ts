@@ -1,7 +1,7 @@
 // Figures for the mathematics of families: how many codes there can be, and what becomes of tags that are seen badly.
 import { el, field, shape } from "./dom";
 import { words } from "./words";
-import type { FamilyFigures } from "./worker";
+import type { FalsePositives, FamilyFigures } from "./worker";
 
 /** Rates of wrong cells that are shown, in parts. */
 export const RATES = Array.from({ length: 81 }, (_, i) => i / 200);
@@ -25,6 +25,16 @@ export function sizes({ name, codes, distance, correctable, linear_programming, 
   const most = Math.log(Math.max(...all.map(([, count]) => count)));
   const rows = all.map(([label, count]) => el("tr", {}, el("th", { scope: "row" }, label), el("td", {}, bar(Math.log(count) / most)), el("td", {}, count.toLocaleString("en"))));
   return el("div", {}, el("h2", {}, text.heading), el("table", {}, el("tbody", {}, ...rows)), el("p", { class: "credit" }, text.why(distance, correctable)));
+}
+
+/** How often what is no tag is taken for one, for each number of corrected cells. */
+export function falsePositives({ coins, natural, accepted, recommended }: FalsePositives, kind: string): HTMLElement {
+  const text = words.families.falsePositives;
+  const rate = (value: number | undefined) => el("td", {}, value === undefined ? "" : value.toExponential(1));
+  const head = el("tr", {}, ...[text.corrected, text.coins, ...(natural ? [text.natural] : [])].map((label) => el("th", { scope: "col" }, label)));
+  const rows = coins.map((coin, count) => el("tr", {}, el("th", { scope: "row" }, text.cells(count)), rate(coin), ...(natural ? [rate(natural[count])] : [])));
+  const told = natural ? text.recommended(recommended, accepted) : text.unknown;
+  return el("div", {}, el("h2", {}, text.heading), el("table", { class: "rates" }, el("thead", {}, head), el("tbody", {}, ...rows)), el("p", { class: "credit" }, `${text.why(kind)} ${told}`));
 }
 
 /** What becomes of tags at a rate of wrong cells, which a slider gives; shares are those read and misread at each rate. */

@@ -221,6 +221,17 @@ export const words = {
         `Where ${rate} of all cells are wrong, ${percent(read)} of the tags are read, ${percent(refused)} refused and ${misread > 0 ? `one in ${Number((1 / misread).toPrecision(2)).toLocaleString("en")}` : "none"} misread.`,
       why: (correctable: number) => `Each cell is wrong by itself, and up to ${correctable} are corrected.`,
     },
+    falsePositives: {
+      heading: "What is no tag, taken for one",
+      corrected: "Cells corrected",
+      cells: (count: number) => (count === 0 ? "none" : count === 1 ? "1" : `up to ${count}`),
+      coins: "Fair coins",
+      natural: "Natural pictures",
+      why: (kind: string) => `The probability that a ${kind === "checker" ? "square" : "triangle"} with a border that is no tag is read as one: where its cells are black or white by the fall of coins, and where it is cut from photographs, in which neighbours are mostly alike.`,
+      unknown: "Of square tags the latter is not known.",
+      recommended: (most: number | null, rate: number) =>
+        most === null ? `Believe no single tag: in photographs, more than ${rate.toExponential(0)} are false.` : `Whoever believes single tags corrects ${most === 0 ? "nothing" : most === 1 ? "1 cell at most" : `${most} cells at most`}: then it is below ${rate.toExponential(0)} in photographs.`,
+    },
     cell: (index: number, on: boolean) => `Cell ${index + 1}, ${on ? "white" : "black"}`,
   },
 };

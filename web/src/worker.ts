@@ -67,6 +67,8 @@ export type FamilyFigures = {
   turns: number;
   rotation: number[];
 };
+/** How often what is no tag is taken for one, with 0, 1, … cells corrected; in natural pictures where that is known. */
+export type FalsePositives = { coins: number[]; natural: number[] | null; accepted: number; recommended: number | null };
 export type Figures = {
   rms_px: number;
   views: number;
@@ -312,6 +314,9 @@ const calls = {
   async reading(name: string, rates: number[]): Promise<[number, number][]> {
     const shares = (await codesOf(name)).reading(Float64Array.from(rates));
     return rates.map((_, i) => [shares[2 * i] ?? 0, shares[2 * i + 1] ?? 0]);
+  },
+  async falsePositives(name: string): Promise<FalsePositives> {
+    return JSON.parse((await codesOf(name)).false_positives()) as FalsePositives;
   },
 };
 

@@ -1,11 +1,12 @@
 import { type Page, expect, test } from "@playwright/test";
+import { execFileSync } from "node:child_process";
 import { mkdirSync, mkdtempSync, readFileSync, readdirSync, writeFileSync } from "node:fs";
 import { tmpdir } from "node:os";
-import { join } from "node:path";
+import { dirname, join } from "node:path";
 import { fileURLToPath } from "node:url";
 import { PNG } from "pngjs";
 import { chooseFiles, screen, strict } from "./page";
-import { content, deltille, drawn, folder, tetrahedron } from "./pictures";
+import { content, deltille, drawn, folder, program, tetrahedron } from "./pictures";
 
 const root = fileURLToPath(new URL("../..", import.meta.url));
 const scratch = () => mkdtempSync(join(tmpdir(), "page-"));
@@ -551,6 +552,16 @@ test("the mathematics of families is drawn as it is computed otherwise", async (
   const misread = Object.entries(family.distance_histogram).reduce((sum, [apart, pairs]) => sum + ((2 * pairs) / (3 * family.codes.length)) * near(Number(apart)), 0);
   const percent = (share: number) => `${(100 * share).toFixed(1)} %`;
   await expect(figures.getByText("Where 10 % of all cells are wrong")).toContainText(`${percent(near(0))} of the tags are read, ${percent(1 - near(0) - misread)} refused and one in ${Number((1 / misread).toPrecision(2)).toLocaleString("en")} misread.`);
+
+  // False positives are those that `deltag info` states.
+  const stated = JSON.parse(execFileSync(join(dirname(program), "deltag"), ["info", "d25h7", "--json"], { encoding: "utf8" })) as { false_positive_rate: number[]; natural_false_positive_rate: number[]; recommended_correction: number };
+  const rates = figures.locator(".rates tbody tr");
+  for (const [count, name] of ["none", "1", "up to 2", "up to 3"].entries()) {
+    const both = [stated.false_positive_rate[count] ?? NaN, stated.natural_false_positive_rate[count] ?? NaN];
+    await expect(rates.nth(count).locator("th, td")).toHaveText([name, ...both.map((rate) => rate.toExponential(1))], { timeout: 30_000 });
+  }
+  expect(stated.recommended_correction).toBe(0);
+  await expect(figures.getByText("Whoever believes single tags corrects nothing")).toBeVisible();
   await cells.nth(9).hover();
   await screen(page, "families-figures");
 });

@@ -10,6 +10,7 @@ use std::collections::BTreeMap;
 use glam::DVec2;
 use rayon::prelude::*;
 
+use super::tile_table::TileTable;
 use super::tiles::{Expected, PlacedPanel};
 use deltille_core::lattice::Tile;
 use deltille_core::targets::Panel;
@@ -63,12 +64,13 @@ impl PlacedPanel<'_> {
         tolerance_px: f64,
     ) -> Vec<MovedEdge> {
         let Some(lattice_from_px) = LatticeFromPx::new(self) else { return Vec::new() };
+        let table = TileTable::new(expected.iter().map(|(&tile, expected)| (tile, expected)));
         let tile_at = |px| self.panel.tile_at(lattice_from_px.apply(px));
         let is_black = |px: DVec2| {
             let at = lattice_from_px.apply(px);
             let tile = self.panel.tile_at(at);
             let uv = |tile| uv(self.panel, tile, at);
-            let here = expected.get(&tile).map(|expected| expected.is_black_at(uv(tile)));
+            let here = table.get(tile).map(|expected| expected.is_black_at(uv(tile)));
             here.unwrap_or(self.panel.inverted)
         };
         let (width, height) = (self.page.image.width(), self.page.image.height());

@@ -1,6 +1,6 @@
 //! Verification of drawings of boards and faces for a laser or a plotter, as `.dxf` or `.svg`.
 //!
-//! The kerf is measured: it follows from how much longer the first outline to cut is than the edge of that plate. Every outline must then be where
+//! The kerf is measured: it follows from how much longer the outline of the first plate is than the edge of that plate. Every outline must then be where
 //! the target with that kerf has it. Independently of that, what is engraved is given back the half of the kerf that the beam
 //! takes, and the board that comes of it is looked at by the detector like a printed page. An SVG is drawn by resvg, too,
 //! and must show nothing else than was read.
@@ -119,8 +119,9 @@ fn kerf_of(found: &CutDrawing, boards: &[LaserBoard]) -> Option<f64> {
         let next = outline.iter().cycle().skip(1);
         outline.iter().zip(next).map(|(from, to)| from.distance(*to)).sum::<f64>()
     };
-    let cut = found.paths.iter().find(|path| path.layer == CutLayer::Cut);
-    let (cut, board) = cut.zip(boards.first())?;
+    let board = boards.first()?;
+    let holes = if board.panel.hole_mm.is_some() { board.panel.tags.len() } else { 0 };
+    let cut = found.paths.iter().filter(|path| path.layer == CutLayer::Cut).nth(holes)?;
     // All edges are moved by the same length, so that corners stay and lengths grow evenly.
     let finished = length(&board.plate_mm);
     let by_a_millimetre = length(&artwork::moved_inwards(&board.plate_mm, -0.5)) - finished;

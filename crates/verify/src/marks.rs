@@ -5,7 +5,6 @@
 //! has what the description states, and no more. The length of check bars is measured
 //! independently.
 
-use std::collections::BTreeSet;
 use std::f64::consts::TAU;
 
 use glam::DVec2;
@@ -16,10 +15,10 @@ use rstar::{AABB, RTree};
 use serde::Serialize;
 
 use super::document::{MAX_INK_ERROR, Page};
+use super::tile_table::TileTable;
 use super::tiles::{EDGE_PX, PROBES, PlacedPanel};
 use super::{Finding, SheetVerdict};
 use deltille_core::artwork;
-use deltille_core::lattice::{Orientation, Tile};
 use deltille_core::polygon::{self, rectangle};
 use deltille_core::raster::{Coverage, Gray};
 use deltille_core::targets::{
@@ -428,12 +427,13 @@ fn pixels(page: &Page, [x0, y0, x1, y1]: [f64; 4], blank: f64) -> [usize; 4] {
 pub(super) fn spots(page: &Page, known: &[bool], panels: &[PlacedPanel]) -> Vec<MarkFinding> {
     let (width, height) = (page.image.width(), page.image.height());
     let grounds: Vec<Ground> = panels.iter().map(Ground::new).collect();
+    let is_inverted = grounds.iter().any(Ground::inverted);
     let mut wrong = vec![false; width * height];
     wrong.par_chunks_mut(width).enumerate().for_each(|(y, row)| {
         for (x, (wrong, &pixel)) in row.iter_mut().zip(page.image.row(y)).enumerate() {
             let ink = 1.0 - f64::from(pixel) / 255.0;
             // White is right wherever no inverted panel is; most of the sheet is done here.
-            let plain = ink <= MAX_INK_ERROR && grounds.iter().all(|ground| !ground.inverted());
+            let plain = ink <= MAX_INK_ERROR && !is_inverted;
             if plain || known[y * width + x] {
                 continue;
             }
@@ -479,52 +479,10 @@ pub(super) fn spots(page: &Page, known: &[bool], panels: &[PlacedPanel]) -> Vec<
     spots
 }
 
-/// The tiles of a panel, as a table over all places between their ends.
-struct TileMap {
-    first: [i32; 2],
-    /// Rows and columns.
-    size: [usize; 2],
-    /// Two places for each: the inverted triangle, and the other tile.
-    has: Vec<bool>,
-}
-
-impl TileMap {
-    fn new(tiles: &BTreeSet<Tile>) -> Self {
-        let ends = |of: fn(&Tile) -> i32| {
-            let values = || tiles.iter().map(of);
-            let (least, most) = (values().min().unwrap_or(0), values().max().unwrap_or(-1));
-            (least, (most - least + 1) as usize)
-        };
-        let (rows, cols) = (ends(|tile| tile.anchor.row), ends(|tile| tile.anchor.col));
-        let mut map = Self {
-            first: [rows.0, cols.0],
-            size: [rows.1, cols.1],
-            has: vec![false; 2 * rows.1 * cols.1],
-        };
-        for &tile in tiles {
-            if let Some(place) = map.place(tile) {
-                map.has[place] = true;
-            }
-        }
-        map
-    }
-
-    fn place(&self, tile: Tile) -> Option<usize> {
-        let [row, col] = [tile.anchor.row - self.first[0], tile.anchor.col - self.first[1]];
-        let (row, col) = (usize::try_from(row).ok()?, usize::try_from(col).ok()?);
-        let other = usize::from(tile.orientation != Orientation::Inverted);
-        (row < self.size[0] && col < self.size[1]).then_some(2 * (row * self.size[1] + col) + other)
-    }
-
-    fn contains(&self, tile: Tile) -> bool {
-        self.place(tile).is_some_and(|place| self.has[place])
-    }
-}
-
 /// The area of a panel on its page.
 struct Ground<'a> {
     placed: &'a PlacedPanel<'a>,
-    tiles: TileMap,
+    tiles: TileTable<()>,
     /// Directions in which tiles are looked for beside a pixel: fine enough that no tip of a tile, also a lone
     /// one, slips between two.
     probes: Vec<DVec2>,
@@ -550,9 +508,16 @@ impl<'a> Ground<'a> {
         let inwards = |from: DVec2, to: DVec2| [from, (to - from).perp().normalize_or_zero()];
         let field = outline.iter().zip(next).map(|(&from, &to)| inwards(from, to)).collect();
         let around_px = [first.x, first.y, last.x, last.y];
+        let tiles = panel.tiles();
         let angles = (0..PROBES).map(|n| f64::from(n) * TAU / f64::from(PROBES));
         let probes = angles.map(DVec2::from_angle).collect();
-        Self { placed, tiles: TileMap::new(&panel.tiles()), probes, field, around_px }
+        Self {
+            placed,
+            tiles: TileTable::new(tiles.iter().map(|&tile| (tile, ()))),
+            probes,
+            field,
+            around_px,
+        }
     }
 
     fn inverted(&self) -> bool {
@@ -569,7 +534,7 @@ impl<'a> Ground<'a> {
     fn has_tile_at(&self, page: &Page, pixel: DVec2) -> bool {
         self.is_around(pixel) && {
             let place = self.placed.panel_from_page(page.page_from_px(pixel));
-            self.tiles.contains(self.placed.panel.tile_at(place / self.placed.panel.edge_mm))
+            self.tiles.get(self.placed.panel.tile_at(place / self.placed.panel.edge_mm)).is_some()
         }
     }
 
@@ -588,8 +553,9 @@ impl<'a> Ground<'a> {
         }
         let edge_mm = self.placed.panel.edge_mm;
         let near = near_px / page.px_per_mm;
-        let reaches =
-            |off: DVec2| self.tiles.contains(self.placed.panel.tile_at((place + off) / edge_mm));
+        let reaches = |off: DVec2| {
+            self.tiles.get(self.placed.panel.tile_at((place + off) / edge_mm)).is_some()
+        };
         let in_tile =
             reaches(DVec2::ZERO) || self.probes.iter().any(|&probe| reaches(near * probe));
         let undecided = in_tile || (self.inverted() && inside < near_px);

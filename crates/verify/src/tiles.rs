@@ -203,6 +203,7 @@ impl Expected<'_> {
         match tag.looks.region(p) {
             Region::Margin => self.black,
             Region::Border => !self.inverted,
+            Region::Hole => self.inverted,
             Region::Cell(bit) => (tag.word >> bit & 1 == 0) != self.inverted,
         }
     }
@@ -221,6 +222,8 @@ pub(super) struct TagLooks {
     margin: f64,
     inset: f64,
     width: f64,
+    /// Radius of the hole in the middle of a triangle, edges.
+    hole: Option<f64>,
     /// Bit of each cell, in rows of `columns` places, two to a column: inverted, upright.
     bits: Vec<Option<u32>>,
     columns: usize,
@@ -232,6 +235,7 @@ enum Region {
     Margin,
     Border,
     Cell(u32),
+    Hole,
 }
 
 impl TagLooks {
@@ -248,11 +252,18 @@ impl TagLooks {
             bits[2 * place + usize::from(cell.upright)] = Some(bit);
         }
         let width = cells.width(inset);
-        Self { cells, margin, inset, width, bits, columns }
+        let hole = panel.hole_mm.map(|diameter| diameter / 2.0 / panel.edge_mm);
+        Self { cells, margin, inset, width, hole, bits, columns }
     }
 
     /// The region at tile coordinates.
     fn region(&self, p: DVec2) -> Region {
+        // The edges that the coordinates are along meet at 60°.
+        let from_middle = p - 1.0 / 3.0;
+        let squared = from_middle.length_squared() + from_middle.x * from_middle.y;
+        if self.hole.is_some_and(|radius| squared < radius * radius) {
+            return Region::Hole;
+        }
         if let Some(bit) = self.bit(p) {
             return Region::Cell(bit);
         }

@@ -18,7 +18,7 @@ pub(super) struct Args {
 pub(super) fn run(args: Args) -> anyhow::Result<ExitCode> {
     let Parameters { dimension, distance } = args.family;
     let bounds = bounds(GridKind::Deltille, dimension, distance);
-    let found_none = bounds.found_none(GridKind::Deltille, dimension, distance);
+    let found_none = bounds.found_none();
     let linear = (!found_none).then_some(bounds.linear_programming);
     let published = published_bounds(&TagCells::new(dimension), distance);
     let least = bounds.linear_programming.min(bounds.sphere_packing);

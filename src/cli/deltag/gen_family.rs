@@ -20,7 +20,7 @@ use crate::cli::run::FAILED;
 use crate::cli::values::{name, number, whole};
 use crate::clock;
 use crate::export::kind::Kind;
-use crate::family::best::{self, Best, Budget};
+use crate::family::best::{self, Best, Budget, Start};
 use crate::family::lexicode::{self, Lexicode};
 use crate::family::search::{self, Search};
 use crate::family::{
@@ -226,6 +226,23 @@ pub(super) fn run(args: Args) -> anyhow::Result<ExitCode> {
         );
     }
     Ok(exit)
+}
+
+/// The codes on record after those of an older family.
+fn extended_by(
+    name: &str,
+    best: &Best,
+    start: Option<&Start>,
+    older: &str,
+) -> anyhow::Result<Family> {
+    let older = super::resolve(older).context("--extend")?;
+    let Some(start) = start else { bail!("--extend: nothing is on record to extend with") };
+    match best.family_of(name, start)?.extending(&older) {
+        Err(FamilyError::Field { problem, .. }) => {
+            bail!("--extend: {problem}; their ids could not stay")
+        }
+        extended => Ok(extended?),
+    }
 }
 
 /// The family that a file holds, if it holds one.
@@ -473,6 +490,9 @@ impl Args {
             );
         }
         let start = if self.from_nothing { None } else { best.start() };
+        let extended = self.extend.as_deref();
+        let extended = extended.map(|older| extended_by(name, &best, start.as_ref(), older));
+        let extended = extended.transpose()?;
         if checkpoint.construction.is_some() {
             tell!("goes on from {} of the checkpoint", counted(checkpoint.codes.len(), "code"));
         } else if let Some(start) = &start {
@@ -480,16 +500,8 @@ impl Args {
             let proof = proof_of(&certify_codes(&codes), distance);
             tell!("starts from {} of {}: {proof}", counted(codes.len(), "code"), start.family);
         }
-        if let Some(older) = &self.extend {
-            let older = super::resolve(older).context("--extend")?;
-            let Some(start) = start else { bail!("--extend: nothing is on record to extend with") };
-            return match best.family_of(name, &start)?.extending(&older) {
-                Ok(family) => Ok(Outcome::whole(family)),
-                Err(FamilyError::Field { problem, .. }) => {
-                    bail!("--extend: {problem}; their ids could not stay")
-                }
-                Err(error) => Err(error.into()),
-            };
+        if let Some(family) = extended {
+            return Ok(Outcome::whole(family));
         }
         interrupt::keeps_results();
         match best.resume(name, start, &mut checkpoint, &|c| file.save(c), control) {

@@ -4,7 +4,7 @@ use serde_json::{Value, json};
 
 use super::{confusion, false_positives, place_codes};
 use crate::cli::output::{self, Telling, say};
-use crate::family::{self, Family, HiddenCells, PAIRS_COUNTED, TagWords, bounds::bounds};
+use crate::family::{self, Family, HiddenCells, PAIRS_COUNTED, TagWords};
 use crate::lattice::GridKind;
 use crate::targets::{BoardSpec, SolidShape, SolidSpec, TagSpec, Target, TargetSpec};
 use crate::words::counted;
@@ -37,9 +37,8 @@ fn without_hidden(family: &Family) -> Vec<(HiddenCells, u32)> {
 
 /// How many codes no such family exceeds, and how that is known.
 fn upper_bound(family: &Family) -> (u64, &'static str) {
-    let (kind, dimension, distance) = (family.kind(), family.dimension(), family.distance());
-    let bounds = bounds(kind, dimension, distance);
-    match bounds.found_none(kind, dimension, distance) {
+    let bounds = family.bounds();
+    match bounds.found_none() {
         true => (bounds.sphere_packing, "sphere packing"),
         false => (bounds.linear_programming, "linear programming"),
     }
@@ -117,8 +116,12 @@ pub(super) fn run(args: Args) -> anyhow::Result<ExitCode> {
         _ => String::new(),
     };
     say!("  construction    {construction}");
+    let of_cells = match family.free_cells().count_ones() {
+        0 => String::new(),
+        free => format!(", of the {} cells in use", bits - free),
+    };
     let (bound, by) = upper_bound(&family);
-    say!("  upper bound     {bound} codes ({by})");
+    say!("  upper bound     {bound} codes ({by}{of_cells})");
     let [rows, cols] = BOARD;
     let board = tags_of(&TargetSpec::Board(BoardSpec::new(GridKind::Deltille, rows, cols, 20.0)))?;
     let solid = tags_of(&TargetSpec::Solid(SolidSpec::new(SolidShape::Icosahedron)))?;

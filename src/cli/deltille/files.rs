@@ -137,7 +137,10 @@ pub fn write_all(
     check_places(folder, files, overwrite)?;
     let names: Vec<&str> = files.iter().map(|file| file.name.as_str()).collect();
     let replaced = files.iter().filter_map(|file| file.replaced(folder, &staged, &names));
-    let replaced: Vec<String> = replaced.collect();
+    let mut replaced: Vec<String> = replaced.collect();
+    if replaced.is_empty() {
+        replaced.extend(textures_replaced(folder, &staged, &names));
+    }
     staging.commit().with_context(context)?;
     interrupt::stands("the files are whole, but were not all compared");
     replaced.iter().for_each(|line| tell!("{line}"));
@@ -160,13 +163,7 @@ impl File {
             && path.is_file()
             && !same_content(&path, &staged.join(&self.name));
         let stem = self.name.strip_suffix(".json").filter(|_| is_other)?;
-        let entries = fs::read_dir(folder).into_iter().flatten().flatten();
-        let mut left: Vec<String> = entries
-            .map(|entry| entry.file_name().to_string_lossy().into_owned())
-            .filter(|name| !written.contains(&name.as_str()) && is_of_target(name, stem))
-            .filter(|name| fs::read(folder.join(name)).is_ok_and(|text| Kind::of(&text).is_own()))
-            .collect();
-        left.sort();
+        let left = own_left(folder, written, |name| is_of_target(name, stem));
         let line = format!("{}: takes the place of a target that differs", path.display());
         Some(match left.len() {
             0 => line,
@@ -176,6 +173,55 @@ impl File {
             ),
         })
     }
+}
+
+/// What is to be said where textures are written that are others than before, or fewer: textures and parts of the mesh that
+/// no mesh shows any more, and meshes that show what is no longer there.
+fn textures_replaced(folder: &Path, staged: &Path, written: &[&str]) -> Option<String> {
+    let stem = written.iter().find_map(|name| name.strip_suffix(".json"))?;
+    let is_texture = |name: &str| {
+        name.strip_prefix(stem).is_some_and(|rest| rest.starts_with("-texture"))
+            && is_of_target(name, stem)
+    };
+    let mut textures = written.iter().filter(|name| is_texture(name)).peekable();
+    textures.peek()?;
+    let is_other = |name: &&str| {
+        let path = folder.join(name);
+        path.is_file() && !same_content(&path, &staged.join(name))
+    };
+    let spare = own_left(folder, written, is_texture);
+    if spare.is_empty() && !textures.any(is_other) {
+        return None;
+    }
+    let is_mesh = |name: &str| {
+        let extension = name.rsplit_once('.').map(|(_, extension)| extension);
+        extension.is_some_and(|extension| TEXTURED.contains(&extension)) && is_of_target(name, stem)
+    };
+    let left = own_left(folder, written, |name| is_texture(name) || is_mesh(name));
+    (!left.is_empty()).then(|| {
+        format!(
+            "{}: of other textures than those written now: remove them, or write them anew",
+            left.iter()
+                .map(|name| folder.join(name).display().to_string())
+                .collect::<Vec<_>>()
+                .join(", ")
+        )
+    })
+}
+
+/// Extensions of files that show the textures beside them, or go with one that does.
+const TEXTURED: [&str; 6] = ["obj", "mtl", "sdf", "urdf", "xml", "usda"];
+
+/// Files in a folder that this program wrote earlier, of some names, in order.
+fn own_left(folder: &Path, written: &[&str], is_meant: impl Fn(&str) -> bool) -> Vec<String> {
+    let entries = fs::read_dir(folder).into_iter().flatten().flatten();
+    let mut left: Vec<String> = entries
+        .map(|entry| entry.file_name().to_string_lossy().into_owned())
+        .filter(|name| !written.contains(&name.as_str()) && is_meant(name))
+        .filter(|name| fs::read(folder.join(name)).is_ok_and(|text| Kind::of(&text).is_own()))
+        .collect();
+    left.sort();
+    left
 }
 
 /// Whether a name is that of a file that is written for the target of that stem.
@@ -194,8 +240,8 @@ fn is_of_target(name: &str, stem: &str) -> bool {
         }
     };
     is_part
-        && ["pdf", "svg", "png", "dsc", "glb", "obj", "mtl", "stl", "dxf", "3mf"]
-            .contains(&extension)
+        && (TEXTURED.contains(&extension)
+            || ["pdf", "svg", "png", "dsc", "glb", "stl", "dxf", "3mf"].contains(&extension))
 }
 
 #[cfg(test)]
@@ -210,6 +256,7 @@ mod tests {
             "a-texture.png",
             "a-texture-2.png",
             "a-2.obj",
+            "a.usda",
             "a-net.dxf",
             "a-laser.svg",
             "a.dsc",

@@ -68,7 +68,7 @@ pub struct Settings {
     #[serde(skip_serializing_if = "is_false")]
     dense: bool,
     /// No tags
-    #[arg(long, help_heading = TAGS, conflicts_with_all = ["family", "tags_in", "tag_spacing", "tag_border", "first_id"])]
+    #[arg(long, help_heading = TAGS, conflicts_with_all = ["family", "tags_in", "tag_spacing", "tag_border", "hole", "first_id"])]
     #[serde(skip_serializing_if = "is_false")]
     untagged: bool,
     /// A tag in every n-th row and column, on a checkerboard where the square has the right colour,
@@ -79,6 +79,9 @@ pub struct Settings {
     /// [default: 1.5, in black squares 2, in white ones 1]
     #[arg(long, help_heading = TAGS, value_name = "BITS", allow_negative_numbers = true, value_parser = number(BORDER_BITS))]
     tag_border: Option<f64>,
+    /// A hole in the middle of each tag, for a screw or a camera, of a family made with `deltag gen-family --free centre`
+    #[arg(long, help_heading = TAGS, value_name = "DIAMETER", allow_hyphen_values = true)]
+    hole: Option<String>,
     /// Id of the first tag; the others follow [default: 0]
     #[arg(long, help_heading = TAGS, value_name = "ID", allow_negative_numbers = true, value_parser = whole(0..=u32::MAX))]
     first_id: Option<u32>,
@@ -192,6 +195,26 @@ pub(super) fn refuse_idle(options: &[(&str, bool, bool, &str)]) -> anyhow::Resul
     }
 }
 
+/// What is said of tags and not of place codes.
+const NOT_DENSE: [&str; 4] = ["--family", "--hole", "--tag-spacing", "--first-id"];
+
+/// Refuses what is said of tags that there are not: a template may say what the parser of options would refuse, and options
+/// what does not replace all that it says.
+pub(super) fn check_tags(
+    untagged: bool,
+    dense: bool,
+    of_tags: &[(&str, bool)],
+) -> anyhow::Result<()> {
+    let mut given = of_tags.iter().filter(|(_, given)| *given).map(|(option, _)| option);
+    if untagged && let Some(option) = given.next() {
+        bail!("--untagged: there are no tags: leave it or {option} out");
+    }
+    if dense && let Some(option) = given.find(|option| NOT_DENSE.contains(option)) {
+        bail!("--dense: there are place codes and no other tags: leave it or {option} out");
+    }
+    Ok(())
+}
+
 /// Whether a setting is left out of a template.
 pub(super) fn is_false(value: &bool) -> bool {
     !value
@@ -241,30 +264,27 @@ impl Settings {
 
     /// These settings, and those of a template where these say nothing.
     pub fn or(self, template: Self) -> Self {
-        let tagged = self.family.is_some()
-            || self.dense
-            || self.tags_in.is_some()
-            || self.tag_spacing.is_some()
-            || self.tag_border.is_some()
-            || self.first_id.is_some();
+        let (bare, dense) = (self.untagged, self.dense);
+        let tagged = self.of_tags().into_iter().any(|(_, given)| given);
         let formats = self.pdf || self.svg || self.png;
         let two_sided = self.two_sided.is_some();
         let png = self.png || (template.png && !formats);
         let dsc = self.dsc || template.dsc;
+        // Which tags there are, is said as a whole: what an option says of it replaces what else a template says.
         Self {
             command: None,
             rows: self.rows.or(template.rows),
             cols: self.cols.or(template.cols),
             edge: self.edge.or(template.edge),
-            // Which tags there are, is said as a whole.
-            dense: self.dense || (template.dense && self.family.is_none() && !self.untagged),
-            family: self.family.or(template.family.filter(|_| !self.dense)),
-            tags_in: self.tags_in.or(template.tags_in),
-            untagged: self.untagged || (template.untagged && !tagged),
-            tag_spacing: self.tag_spacing.or(template.tag_spacing.filter(|_| !self.dense)),
-            tag_border: self.tag_border.or(template.tag_border),
-            first_id: self.first_id.or(template.first_id.filter(|_| !self.dense)),
-            tag_ids: self.tag_ids || (template.tag_ids && !self.untagged && !self.dense),
+            untagged: bare || (template.untagged && !tagged),
+            dense: dense || (template.dense && !bare && self.family.is_none()),
+            family: self.family.or(template.family.filter(|_| !bare && !dense)),
+            tags_in: self.tags_in.or(template.tags_in.filter(|_| !bare)),
+            tag_spacing: self.tag_spacing.or(template.tag_spacing.filter(|_| !bare && !dense)),
+            tag_border: self.tag_border.or(template.tag_border.filter(|_| !bare)),
+            hole: self.hole.or(template.hole.filter(|_| !bare && !dense)),
+            first_id: self.first_id.or(template.first_id.filter(|_| !bare && !dense)),
+            tag_ids: self.tag_ids || (template.tag_ids && !bare && !dense),
             board_id: self.board_id.or(template.board_id),
             boards: self.boards.or(template.boards),
             invert: self.invert || template.invert,
@@ -337,27 +357,20 @@ impl Settings {
         if grid == GridKind::Checker && self.dense {
             bail!("--dense: place codes are for triangles: take `deltille board`");
         }
-        if self.dense && (self.family.is_some() || self.untagged) {
-            bail!(
-                "--dense: a board of place codes has no other tags: leave --family and --untagged out"
-            );
-        }
+        let of_tags = self.of_tags();
+        check_tags(self.untagged, self.dense, &of_tags)?;
         let family = if self.dense { Some(places::NAME) } else { self.family.as_deref() };
         let usual = TagSpec::usual(grid, family, self.tags_in.unwrap_or_default());
         let tagged = !self.untagged && (grid == GridKind::Deltille || self.family.is_some());
-        let of_tags = [
-            ("--tags-in", self.tags_in.is_some()),
-            ("--tag-spacing", self.tag_spacing.is_some()),
-            ("--tag-border", self.tag_border.is_some()),
-            ("--first-id", self.first_id.is_some()),
-        ];
         if grid == GridKind::Checker
             && self.family.is_none()
             && let Some((option, _)) = of_tags.iter().find(|(_, given)| *given)
         {
             bail!("{option}: there are no tags: name their family with --tags");
         }
+        let hole_mm = length("hole", &self.hole)?;
         let tags = tagged.then(|| TagSpec {
+            hole_mm,
             first_id: self.first_id.unwrap_or(usual.first_id),
             spacing: self.tag_spacing.unwrap_or(usual.spacing),
             border_bits: self.tag_border.unwrap_or(usual.border_bits),
@@ -404,6 +417,19 @@ impl Settings {
             dsc: self.dsc.then_some(dialect),
             dpi,
         })
+    }
+
+    /// The options that say something of tags, and whether they are given.
+    fn of_tags(&self) -> [(&'static str, bool); 7] {
+        [
+            ("--family", self.family.is_some()),
+            ("--dense", self.dense),
+            ("--tags-in", self.tags_in.is_some()),
+            ("--tag-spacing", self.tag_spacing.is_some()),
+            ("--tag-border", self.tag_border.is_some()),
+            ("--hole", self.hole.is_some()),
+            ("--first-id", self.first_id.is_some()),
+        ]
     }
 
     /// The same with the edge that was chosen, so that a template gives the same board again.

@@ -9,7 +9,9 @@ use serde::{Deserialize, Serialize};
 
 use super::finishing::Laser;
 use super::meshes::Meshes;
-use super::settings::{DPI, PAPER, PRINT, TAGS, is_false, is_usual, length, refuse_idle};
+use super::settings::{
+    DPI, PAPER, PRINT, TAGS, check_tags, is_false, is_usual, length, refuse_idle,
+};
 use super::{logo, template};
 use crate::cli::values::{number, whole};
 use crate::export::dsc::Dialect;
@@ -64,7 +66,7 @@ pub struct SolidSettings {
     pub dense: bool,
     /// No tags; faces are not told apart
     #[arg(long, help_heading = TAGS,
-          conflicts_with_all = ["family", "dense", "tag_spacing", "tag_border", "first_id", "tag_ids"])]
+          conflicts_with_all = ["family", "dense", "tag_spacing", "tag_border", "hole", "first_id", "tag_ids"])]
     #[serde(skip_serializing_if = "is_false")]
     pub untagged: bool,
     /// White tiles on black, which takes a part of the margin [default margin: 8mm]
@@ -77,6 +79,9 @@ pub struct SolidSettings {
     /// Black border of a tag, in widths of a bit [default: 1.5]
     #[arg(long, help_heading = TAGS, value_name = "BITS", allow_negative_numbers = true, value_parser = number(BORDER_BITS))]
     pub tag_border: Option<f64>,
+    /// A hole in the middle of each tag, for a screw or a camera, of a family made with `deltag gen-family --free centre`
+    #[arg(long, help_heading = TAGS, value_name = "DIAMETER", allow_hyphen_values = true)]
+    pub hole: Option<String>,
     /// Id of the first tag; the others follow, face by face [default: 0]
     #[arg(long, help_heading = TAGS, value_name = "ID", allow_negative_numbers = true, value_parser = whole(0..=u32::MAX))]
     pub first_id: Option<u32>,
@@ -193,28 +198,21 @@ impl SolidSettings {
     pub fn or(self, template: Self) -> Self {
         let formats = self.printed();
         let png = self.png || (template.png && !formats);
-        let says_tags = self.family.is_some()
-            || self.tag_spacing.is_some()
-            || self.tag_border.is_some()
-            || self.first_id.is_some();
-        let is_dense = self.dense || (template.dense && self.family.is_none() && !self.untagged);
-        let untagged = self.untagged || (template.untagged && !self.dense && !says_tags);
+        let (bare, dense) = (self.untagged, self.dense);
+        let tagged = self.of_tags().into_iter().any(|(_, given)| given);
+        // Which tags there are, is said as a whole: what an option says of it replaces what else a template says.
         Self {
             command: None,
-            // Which tags there are, is said as a whole.
-            dense: is_dense,
-            untagged,
-            tag_ids: self.tag_ids || (template.tag_ids && !is_dense && !untagged),
-            family: self.family.or(template.family.filter(|_| !is_dense && !untagged)),
-            tag_spacing: self
-                .tag_spacing
-                .or(template.tag_spacing.filter(|_| !is_dense && !untagged)),
-            first_id: self.first_id.or(template.first_id.filter(|_| !is_dense && !untagged)),
-            tag_border: self.tag_border.or(template.tag_border.filter(|_| !untagged)),
-            square_family: self.square_family.or(template.square_family.filter(|_| !untagged)),
-            first_square_id: self
-                .first_square_id
-                .or(template.first_square_id.filter(|_| !untagged)),
+            untagged: bare || (template.untagged && !tagged),
+            dense: dense || (template.dense && !bare && self.family.is_none()),
+            family: self.family.or(template.family.filter(|_| !bare && !dense)),
+            tag_spacing: self.tag_spacing.or(template.tag_spacing.filter(|_| !bare && !dense)),
+            tag_border: self.tag_border.or(template.tag_border.filter(|_| !bare)),
+            hole: self.hole.or(template.hole.filter(|_| !bare && !dense)),
+            first_id: self.first_id.or(template.first_id.filter(|_| !bare && !dense)),
+            square_family: self.square_family.or(template.square_family.filter(|_| !bare)),
+            first_square_id: self.first_square_id.or(template.first_square_id.filter(|_| !bare)),
+            tag_ids: self.tag_ids || (template.tag_ids && !bare && !dense),
             invert: self.invert || template.invert,
             // A mesh has one size.
             scale: self.scale.or(template.scale.filter(|_| self.edge.is_none())),
@@ -330,27 +328,30 @@ impl SolidSettings {
         Ok(spec)
     }
 
+    /// The options that say something of tags, and whether they are given.
+    fn of_tags(&self) -> [(&'static str, bool); 8] {
+        [
+            ("--family", self.family.is_some()),
+            ("--dense", self.dense),
+            ("--tag-spacing", self.tag_spacing.is_some()),
+            ("--tag-border", self.tag_border.is_some()),
+            ("--hole", self.hole.is_some()),
+            ("--first-id", self.first_id.is_some()),
+            ("--square-family", self.square_family.is_some()),
+            ("--first-square-id", self.first_square_id.is_some()),
+        ]
+    }
+
     /// The tags of all faces, or of those of a tiling where there are two.
     fn tags(&self, tiling: GridKind) -> anyhow::Result<Option<TagSpec>> {
-        let of_tags = [
-            ("family", self.family.is_some()),
-            ("dense", self.dense),
-            ("tag-spacing", self.tag_spacing.is_some()),
-            ("tag-border", self.tag_border.is_some()),
-            ("first-id", self.first_id.is_some()),
-            ("square-family", self.square_family.is_some()),
-            ("first-square-id", self.first_square_id.is_some()),
-            ("tag-ids", self.tag_ids),
-        ];
+        check_tags(self.untagged, self.dense, &self.of_tags())?;
         if self.untagged {
-            return match of_tags.iter().find(|(_, is_given)| *is_given) {
-                Some((option, _)) => bail!("--untagged: there are no tags: leave --{option} out"),
-                None => Ok(None),
-            };
+            return Ok(None);
         }
         let family = if self.dense { Some(places::NAME) } else { self.family.as_deref() };
         let tags = TagSpec::usual(tiling, family, TagsIn::Black);
         Ok(Some(TagSpec {
+            hole_mm: length("hole", &self.hole)?,
             first_id: self.first_id.unwrap_or(tags.first_id),
             spacing: self.tag_spacing.unwrap_or(tags.spacing),
             border_bits: self.tag_border.unwrap_or(tags.border_bits),

@@ -22,10 +22,13 @@ pub fn read<T: DeserializeOwned>(
     let settings: T = toml::from_str(&text).map_err(|error| {
         let before = error.span().map_or("", |span| &text[..span.start]);
         let line = before.matches('\n').count();
-        let field = text.lines().nth(line).and_then(|line| line.split_once('='));
-        let field = field.map_or("", |(field, _)| field.trim());
+        let field = text.lines().nth(line).and_then(|line| line.split('=').next());
+        // A line may be the name of a table, or blank.
+        let field =
+            field.unwrap_or_default().trim_matches(|c: char| c.is_whitespace() || "[]".contains(c));
+        let field = if field.is_empty() { String::new() } else { format!(", `{field}`") };
         let message = in_words(error.message().replace('\n', " "));
-        anyhow!("--template: {} line {}, `{field}`: {message}", path.display(), line + 1)
+        anyhow!("--template: {} line {}{field}: {message}", path.display(), line + 1)
     })?;
     match made_for(&settings).filter(|made_for| *made_for != command) {
         Some(made_for) => {

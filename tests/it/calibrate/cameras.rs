@@ -72,7 +72,10 @@ proptest! {
             prop_assert!(at.is_some(), "{camera:?}");
             let at = at.unwrap();
             prop_assert_eq!(Some(at.pixel), camera.project(point));
-            // Central differences: an error of h² in the formula, of 1e-13/h in the digits.
+            // Central differences: an error of h² in the formula, of 1e-13/h in the digits. Curves of degree 2 have another
+            // curvature beyond a knot, which is an error of h where the two points lie on either side of it.
+            let is_quadratic = matches!(&camera.lens, Lens::Spline(spline) if spline.grid().degree == 2);
+            let limit = if is_quadratic { 1e-2 } else { 1e-4 };
             let differences = |high: Option<DVec2>, low: Option<DVec2>, h: f64| {
                 ((high.unwrap() - low.unwrap()) / (2.0 * h)).to_array()
             };
@@ -83,7 +86,7 @@ proptest! {
                     differences(camera.project(point + step), camera.project(point - step), h);
                 for (by, expected) in at.by_point.iter().zip(expected) {
                     let off = (by[axis] - expected).abs() * distance;
-                    prop_assert!(off < 1e-4, "{:?} axis {axis}: {off}", camera.lens);
+                    prop_assert!(off < limit, "{:?} axis {axis}: {off}", camera.lens);
                 }
             }
             let values = camera.parameters();

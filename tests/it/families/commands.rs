@@ -158,6 +158,7 @@ fn bad_arguments_are_one_line_and_exit_code_2() {
         "frontier d36h9 --false-positives 1e-12",
         "info d16h5 d25h7",
         "info d16h5 d16h5 d16h5",
+        "gen-family d25h7 --extend d16h5",
         "gen-family d25h7 --rules nowhere.toml",
         "gen-family d25h7 --name a/b",
         "gen-family d25h7 --name ''",

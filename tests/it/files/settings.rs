@@ -22,6 +22,7 @@ fn messages_of_the_library_name_options_of_the_command_that_runs() {
         "board --rows 9 --cols 9 --dsc --family d25h9",
         "checkerboard --rows 9 --cols 9 --tags t36h11 --first-id 999",
         "checkerboard --rows 9 --cols 9 --tags t36h11 --tags-in white --dsc",
+        "board --rows 9 --cols 9 --logo ''",
         "icosahedron --edge 20mm",
         "icosahedron --skeleton --wall 99mm",
         "icosahedron --texture-dpi 9",

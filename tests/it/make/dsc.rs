@@ -31,6 +31,7 @@ fn face(side: i32, pose: PanelPose) -> Target {
         tag_margin_bits: None,
         gap_edges: None,
         discs_mm: None,
+        hole_mm: None,
         rim_mm: None,
         tags_in: TagsIn::Black,
         inverted: false,

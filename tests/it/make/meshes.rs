@@ -62,6 +62,19 @@ fn faces_are_shared_among_textures() {
     page.run(at, "deltille verify four.json four.xml");
     page.run(at, "deltille verify four.json four.usda");
     page.is("several-textures");
+
+    // Textures that no mesh shows any more are named; one that is missing is told once, whatever meshes show it.
+    let again = "tetrahedron --edge 100mm --tiles 6 --name each --obj --textures 3 --no-verify";
+    let said = deltille(at, again).success();
+    let said = String::from_utf8(said.get_output().stderr.clone()).unwrap();
+    assert!(said.contains("each-texture-4.png, ") && said.contains("each.xml: of other textures"));
+    let said = deltille(at, again).success();
+    let said = String::from_utf8(said.get_output().stderr.clone()).unwrap();
+    assert!(said.contains("each-texture-4.png, "), "{said}");
+    std::fs::remove_file(at.join("four-texture-1.png")).unwrap();
+    let said = deltille(at, "verify four.json").code(2);
+    let said = String::from_utf8(said.get_output().stderr.clone()).unwrap();
+    assert!(said.contains("four-texture-1.png") && said.lines().count() == 1, "{said}");
 }
 
 #[test]

@@ -3,6 +3,7 @@ mod checkerboard_targets;
 mod dsc;
 mod export;
 mod finishing;
+mod holes;
 mod meshes;
 mod net;
 mod other_detectors;

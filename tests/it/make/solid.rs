@@ -647,7 +647,9 @@ fn what_cannot_be_made_is_refused_in_one_line_and_leaves_nothing() {
         "icosahedron --pdf --paper 50x60mm",
         "icosahedron --pdf --per-face --edge 3m",
         "icosahedron --pdf --per-face --paper A5",
+        "icosahedron --untagged --texture 64",
         "icosahedron --skeleton --rib 1mm",
+        "tetrahedron --invert --skeleton --face-margin 6mm --laser svg",
         "icosahedron --skeleton --panel-thickness 12mm --face-margin 5mm",
         "tetrahedron --skeleton --edge 60mm --tiles 6 --face-margin 6mm --wall 6mm",
         "icosahedron --wall 4mm",
@@ -681,5 +683,10 @@ fn solids_are_untagged_and_inverted() {
             assert_eq!(target.family.is_none(), how.contains("untagged"));
             assert!(target.panels.iter().all(|panel| panel.inverted == how.contains("invert")));
         }
+    }
+    // On panels of a skeleton the black lies whole, with the margin that is usual and with the least.
+    for margin in ["", "--face-margin 8.7mm"] {
+        let skeleton = "--skeleton --per-face --pdf --laser dxf,svg --name s --force";
+        deltille(path, &format!("tetrahedron --invert {margin} {skeleton}")).success();
     }
 }

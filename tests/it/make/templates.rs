@@ -7,6 +7,8 @@ use std::path::Path;
 use crate::common::command::deltille;
 use crate::common::folder::names;
 
+use super::holes::holed;
+
 /// Options that say where files go, what is read and how it is told: they are of a run, not of a target.
 const OF_A_RUN: [&str; 16] = [
     "template",
@@ -55,6 +57,9 @@ fn made_twice(command: &str, cases: &[&str]) -> BTreeSet<String> {
         let folder = tempfile::tempdir().unwrap();
         std::fs::write(folder.path().join("prism.obj"), PRISM).unwrap();
         std::fs::write(folder.path().join("logo.svg"), LOGO).unwrap();
+        if case.contains("holed.json") {
+            holed(folder.path());
+        }
         let first = format!("{command} {case} --save-template t.toml -o first --no-verify");
         deltille(folder.path(), &first).success();
         let again =
@@ -105,6 +110,7 @@ fn every_option_of_a_board_is_in_its_template() {
         "--rows 4 --cols 5 --gltf --obj --sdf --urdf --mjcf --usd --texture 900 --plate 5mm",
         "--rows 4 --cols 5 --3mf --inlay 0.6mm --plate 0.2in --gltf --texture-dpi 150",
         "--rows 4 --cols 5 --laser svg",
+        "--rows 4 --cols 5 --edge 40mm --paper A3 --family families/holed.json --hole 1.6mm --laser dxf",
     ];
     let squares = [
         "--rows 4 --cols 5 --family aprilTag36h11 --tags-in white --tag-spacing 2 --pdf --laser dxf --kerf 0.1mm",
@@ -127,6 +133,7 @@ fn every_option_of_a_solid_is_in_its_template() {
         "--edge 100mm",
         "--edge 100mm --untagged --invert --pdf --logo logo.svg --logo-height 4mm --gltf --textures 2",
         "--laser dxf,svg --kerf 0.2mm",
+        "--edge 240mm --tiles 6 --family families/holed.json --hole 1.6mm --laser dxf",
     ];
     let cuboids = ["--size 80x60x50mm --pdf --laser dxf", "--size 8x6x5cm --edge 7cm --gltf"];
     let meshes = [
@@ -171,10 +178,69 @@ fn options_win_over_what_a_template_says_of_meshes_lasers_and_inks() {
         ("rows = 4\ncols = 5\n[laser]\nkerf = \"1mm\"\n", "--kerf: it says nothing without"),
         ("rows = 4\ncols = 5\nplate = \"3mm\"\n", "--plate: it says nothing without"),
         ("rows = 4\ncols = 5\n[finishing]\nwhite = \"Black\"\n", "--white: `Black`"),
+        ("rows = 4\n[plate]\nmm = 3\n", "line 2, `plate`: an object"),
+        (
+            "rows = 4\ncols = 5\nuntagged = true\nfamily = \"d25h7\"\n",
+            "--untagged: there are no tags: leave it or --family out",
+        ),
+        (
+            "rows = 4\ncols = 5\nuntagged = true\ntag-spacing = 4\n",
+            "--untagged: there are no tags: leave it or --tag-spacing out",
+        ),
     ] {
         std::fs::write(folder.path().join("own.toml"), text).unwrap();
         let error = deltille(folder.path(), "board --template own.toml").code(2);
         let error = String::from_utf8(error.get_output().stderr.clone()).unwrap();
         assert!(error.contains(said) && error.lines().count() == 1, "{error}");
     }
+}
+
+/// Which tags there are is said as a whole: options replace what a template says of it, and what they do not replace must
+/// go with them.
+#[test]
+fn tags_that_are_given_replace_those_of_a_template() {
+    let folder = tempfile::tempdir().unwrap();
+    let (tagged, bare, dense) =
+        ("family = \"d36h9\"\ntag-spacing = 2\n", "untagged = true\n", "dense = true\n");
+    for (command, board) in
+        [("board", "rows = 5\ncols = 6\n"), ("tetrahedron", "tiles = 8\nstl = true\n")]
+    {
+        for (template, option, result) in [
+            (tagged, "", Ok("d36h9 ids")),
+            (tagged, "--untagged", Ok("")),
+            (tagged, "--dense", Ok("dense9")),
+            (tagged, "--family d25h7", Ok("d25h7 ids")),
+            (bare, "", Ok("")),
+            (bare, "--family d25h7", Ok("d25h7 ids")),
+            (bare, "--first-id 3", Ok("delTag25h7 ids 3")),
+            (bare, "--dense", Ok("dense9")),
+            (dense, "--untagged", Ok("")),
+            (dense, "--family d25h7", Ok("d25h7 ids")),
+            (
+                dense,
+                "--tag-spacing 4",
+                Err(
+                    "--dense: there are place codes and no other tags: leave it or --tag-spacing out",
+                ),
+            ),
+        ] {
+            std::fs::write(folder.path().join("t.toml"), format!("{board}{template}")).unwrap();
+            let args = format!("{command} --template t.toml {option} -o made --force --no-verify");
+            let run = deltille(folder.path(), &args);
+            let output = run.get_output().clone();
+            let [said, refused] =
+                [output.stdout, output.stderr].map(|text| String::from_utf8(text).unwrap());
+            match result {
+                Ok("") => {
+                    assert!(!said.contains("ids") && !said.contains("dense9"), "{args}: {said}")
+                }
+                Ok(tags) => assert!(said.contains(tags), "{args}: {said} {refused}"),
+                Err(problem) => assert_eq!(refused, format!("error: {problem}\n")),
+            }
+        }
+    }
+    std::fs::write(folder.path().join("f.toml"), "[finishing]\nmirrored = true\n").unwrap();
+    let error = deltille(folder.path(), "cube --template f.toml").code(2);
+    let error = String::from_utf8(error.get_output().stderr.clone()).unwrap();
+    assert!(error.contains("line 1, `finishing`: field `finishing` is not known"), "{error}");
 }

@@ -1,7 +1,8 @@
 //! Codes of tags, looked at and damaged.
 
-use deltille_core::family::bounds::bounds;
-use deltille_core::family::{Decoder, Family, shipped_families};
+use deltille_core::family::{
+    ACCEPTED_FALSE_POSITIVES, Decoder, Family, corrected_within, shipped_families,
+};
 use wasm_bindgen::prelude::*;
 
 use crate::errors::Raise;
@@ -42,12 +43,11 @@ impl Codes {
     /// exceeds, how often a tag turns into itself, and the cell whose content each cell then receives.
     pub fn figures(&self) -> String {
         let family = &self.family;
-        let bounds = bounds(family.kind(), family.dimension(), family.distance());
+        let bounds = family.bounds();
         serde_json::json!({
             "name": family.name(), "bits": family.dimension().bits(), "codes": family.len(),
             "distance": family.distance(), "correctable": family.correctable(),
             "kind": family.kind(), "histogram": family.histogram(),
-            "false_positives": family.false_positive_rates(),
             "linear_programming": bounds.linear_programming, "sphere_packing": bounds.sphere_packing,
             "turns": family.kind().turns(), "rotation": family.cells().rotation(),
         })
@@ -79,6 +79,20 @@ impl Codes {
     pub fn reading(&self, rates: &[f64]) -> Vec<f64> {
         let shares = rates.iter().filter_map(|&rate| self.family.reading(rate));
         shares.flat_map(|shares| [shares.read, shares.misread]).collect()
+    }
+
+    /// How often a triangle or square with a border that is no tag is taken for one, as JSON, for each number of corrected
+    /// cells: where its cells are fair coins, and in natural pictures where that is known; the rate that is accepted of single
+    /// tags, and how many cells may be corrected by it. Takes a second or two for large families.
+    pub fn false_positives(&self) -> String {
+        let natural = self.family.natural_false_positive_rates();
+        let recommended =
+            natural.as_deref().map(|all| corrected_within(all, ACCEPTED_FALSE_POSITIVES));
+        serde_json::json!({
+            "coins": self.family.false_positive_rates(), "natural": natural,
+            "accepted": ACCEPTED_FALSE_POSITIVES, "recommended": recommended.flatten(),
+        })
+        .to_string()
     }
 
     /// The tag that a word is nearest to, with its turns and the number of cells that were wrong; nothing where none is

@@ -138,6 +138,9 @@ pub(super) fn draw_panel(
         let path = drawn.entry(tile).or_default();
         tag_outlines(&cells, word, panel.tag_inset_bits())
             .for_each(|outline| path.extend(in_tile(panel, tile, outline)));
+        if let Some(diameter) = panel.hole_mm {
+            path.extend(disc(panel.tag_middle_mm(tag), diameter));
+        }
     }
     let paths = drawn.into_iter().map(|(tile, path)| (tile, page_from_panel * path));
     if panel.inverted {

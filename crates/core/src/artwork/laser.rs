@@ -151,20 +151,26 @@ pub fn to_laser(
         let dark = dark_outlines(target, board.panel, family, kerf_mm == 0.0)?;
         let dark = dark.iter().map(|outline| moved_inwards(outline, half));
         paths.extend(dark.map(|outline| board.path(CutLayer::Engrave, &outline)));
-        paths.push(board.path(CutLayer::Cut, &moved_inwards(&board.plate_mm, -half)));
+        // Holes first: what is cut out may move.
+        let cut = holes(board.panel).chain([board.plate_mm.clone()]);
+        paths.extend(cut.map(|outline| board.path(CutLayer::Cut, &moved_inwards(&outline, -half))));
     }
     Ok(CutDrawing { paths })
 }
 
-/// The smallest length on a board, mm: the edge of a cell of its tags, of a tile, or the diameter of a disc.
+/// The smallest length on a board, mm: the edge of a cell of its tags, of a tile, the diameter of a disc or hole, or twice the
+/// black around a hole where that is narrowest.
 fn finest_mm(panel: &Panel, family: Option<&Family>) -> f64 {
+    let family = family.filter(|_| panel.border_bits.is_some());
     let family = family.and_then(|family| family.of_tiling(panel.kind));
-    let cell = panel
-        .border_bits
-        .and(family)
-        .map(|family| panel.edge_mm / family.cells().width(panel.tag_inset_bits()));
+    let bit_mm = |family: &Family| panel.edge_mm / family.cells().width(panel.tag_inset_bits());
     let gap = panel.gap_edges.map(|gap| gap * panel.edge_mm);
-    [cell, gap, panel.discs_mm].into_iter().flatten().fold(panel.edge_mm, f64::min)
+    let ring = panel.hole_mm.zip(family).and_then(|(hole_mm, family)| {
+        let free = family.rules().free?.radius_bits(family.dimension());
+        Some(2.0 * free * bit_mm(family) - hole_mm)
+    });
+    let lengths = [family.map(bit_mm), gap, panel.discs_mm, panel.hole_mm, ring];
+    lengths.into_iter().flatten().fold(panel.edge_mm, f64::min)
 }
 
 /// The outlines of what is black on a board, in its frame, mm. Where black meets black in a corner only, they keep apart;
@@ -176,11 +182,7 @@ fn dark_outlines(
     simple: bool,
 ) -> Result<Vec<Vec<DVec2>>, ArtworkError> {
     if let Some(diameter) = panel.discs_mm {
-        let angles = || (0..DISC_SIDES).map(|n| TAU * f64::from(n) / f64::from(DISC_SIDES));
-        let disc = |middle: DVec2| {
-            angles().map(|angle| middle + diameter / 2.0 * DVec2::from_angle(angle)).collect()
-        };
-        return Ok(panel.corners.iter().map(|corner| disc(corner.panel_mm)).collect());
+        return Ok(panel.corners.iter().map(|corner| disc(corner.panel_mm, diameter)).collect());
     }
     // Dark tiles of an inverted board are white on print.
     let inside = !panel.inverted;
@@ -195,7 +197,29 @@ fn dark_outlines(
     for tag in &panel.tags {
         dark.extend(tag_outlines(target, panel, tag, family, simple)?);
     }
+    dark.extend(holes(panel).map(|mut hole| {
+        if panel.inverted {
+            hole.reverse();
+        }
+        hole
+    }));
     Ok(dark)
+}
+
+/// The holes of the tags of a panel, clockwise in its frame, mm.
+fn holes(panel: &Panel) -> impl Iterator<Item = Vec<DVec2>> {
+    let of_tag = move |(tag, diameter): (&TagPlacement, f64)| {
+        let mut outline = disc(panel.tag_middle_mm(tag), diameter);
+        outline.reverse();
+        outline
+    };
+    panel.tags.iter().filter_map(|tag| Some((tag, panel.hole_mm?))).map(of_tag)
+}
+
+/// The outline of a disc, counter-clockwise, mm.
+fn disc(middle: DVec2, diameter: f64) -> Vec<DVec2> {
+    let angles = (0..DISC_SIDES).map(|n| TAU * f64::from(n) / f64::from(DISC_SIDES));
+    angles.map(|angle| middle + diameter / 2.0 * DVec2::from_angle(angle)).collect()
 }
 
 /// The outlines of the black of a tag, in the frame of its board, mm.

@@ -249,7 +249,7 @@ impl Sighting<'_> {
     fn tag_spec(&self, spacing: u32, first_id: u32) -> TagSpec {
         let (family, border_bits, tags_in) =
             (self.family.name().to_owned(), self.border_bits, self.tags_in);
-        TagSpec { family, first_id, spacing, border_bits, tags_in }
+        TagSpec { family, first_id, spacing, border_bits, tags_in, hole_mm: None }
     }
 
     /// The smallest board that has these tags in these places, and these corners.

@@ -14,6 +14,7 @@
 //! for even h a cell less and a parity bit instead make even distances of any code. Where rounding
 //! leaves no solution that can be checked, as with 64 cells and small distances, there is no such bound.
 
+use super::Family;
 use super::krawtchouk::{binomial, krawtchouk};
 use super::statistics::ball;
 use crate::lattice::{Dimension, GridKind};
@@ -27,24 +28,31 @@ pub struct Bounds {
     pub linear_programming: u64,
     /// The same part of the sphere-packing bound.
     pub sphere_packing: u64,
+    found_none: bool,
 }
 
 impl Bounds {
     /// Whether linear programming found no bound for this distance, so that [`Self::linear_programming`] says nothing.
-    pub fn found_none(&self, kind: GridKind, dimension: Dimension, distance: u32) -> bool {
-        // At distance 1 all words are a code.
-        distance > 1 && self.linear_programming >= words(dimension) / u64::from(kind.turns())
+    pub fn found_none(&self) -> bool {
+        self.found_none
     }
-}
-
-/// All words, or one less where a machine word cannot tell so many.
-fn words(dimension: Dimension) -> u64 {
-    dimension.mask().saturating_add(1)
 }
 
 /// Bounds for tags of a kind and a dimension at distance `distance` ≥ 1.
 pub fn bounds(kind: GridKind, dimension: Dimension, distance: u32) -> Bounds {
-    let b = dimension.bits();
+    bounds_of_cells(kind, dimension.bits(), distance)
+}
+
+impl Family {
+    /// Bounds for families of this kind and distance that use as many cells: those that are free tell nothing apart.
+    pub fn bounds(&self) -> Bounds {
+        let cells = self.dimension().bits() - self.free_cells().count_ones();
+        bounds_of_cells(self.kind(), cells, self.distance())
+    }
+}
+
+/// Bounds for tags of `b` cells.
+pub(super) fn bounds_of_cells(kind: GridKind, b: u32, distance: u32) -> Bounds {
     let turns = u64::from(kind.turns());
     let packed = 2f64.powi(b as i32) / ball(b, distance.saturating_sub(1) / 2);
     let plain = delsarte(b, (distance..=b).collect());
@@ -54,8 +62,13 @@ pub fn bounds(kind: GridKind, dimension: Dimension, distance: u32) -> Bounds {
         u64::MAX if distance > 1 => delsarte(b, (distance - 1..=b).collect()),
         best => best,
     };
-    let best = best.min(words(dimension));
-    Bounds { linear_programming: best / turns, sphere_packing: packed as u64 / turns }
+    // All words, or one less where a machine word cannot tell so many; at distance 1 they are a code.
+    let all = 1u64.checked_shl(b).unwrap_or(u64::MAX);
+    Bounds {
+        linear_programming: best.min(all) / turns,
+        sphere_packing: packed as u64 / turns,
+        found_none: distance > 1 && best >= all,
+    }
 }
 
 /// Bounds beyond the number of all words of 65 bits are none.
@@ -179,7 +192,7 @@ mod tests {
             let known = known.map_or(0, |ranked| ranked.len());
             let least = bounds.linear_programming.min(bounds.sphere_packing);
             assert!(least >= known, "{distance}: {bounds:?}, {known}");
-            let is_none = bounds.found_none(GridKind::Deltille, dimension, distance);
+            let is_none = bounds.found_none();
             assert!(!is_none || (2..9).contains(&distance), "{distance}: {bounds:?}");
         }
     }

@@ -37,6 +37,15 @@ impl FreeCells {
             }
         }
     }
+
+    /// Radius of the largest circle around the middle of the tag that has only these cells in it, widths of a bit.
+    pub fn radius_bits(self, dimension: Dimension) -> f64 {
+        match self {
+            // A triangle, or a hexagon of six.
+            Self::Centre if self.mask(dimension).count_ones() == 1 => 0.75f64.sqrt() / 3.0,
+            Self::Centre => 0.75f64.sqrt(),
+        }
+    }
 }
 
 impl std::str::FromStr for FreeCells {
@@ -52,9 +61,12 @@ impl std::str::FromStr for FreeCells {
 
 #[cfg(test)]
 mod tests {
+    use std::sync::atomic::{AtomicUsize, Ordering};
+
     use super::*;
     use crate::family::best::{Best, Budget};
-    use crate::family::{Control, Decoder, Family, NaturalWords, Rules, certify};
+    use crate::family::bounds::bounds;
+    use crate::family::{Control, Decoder, Family, NaturalWords, Progress, Rules, certify};
 
     #[test]
     fn free_cells_are_in_the_middle_and_stay_there() {
@@ -71,9 +83,17 @@ mod tests {
         let dimension = Dimension::from_bits(16).unwrap();
         let rules = Rules { free: Some(FreeCells::Centre), ..Rules::published(5) };
         let best = Best::new(dimension, 5, Budget::Work(1)).rules(rules);
-        let family = best.family("holed", best.start(), Control::default()).unwrap();
+        let told = AtomicUsize::new(0);
+        let report = |progress: Progress| {
+            told.fetch_max(progress.codes, Ordering::Relaxed);
+        };
+        let control = Control::default().report(&report);
+        let family = best.family("holed", best.start(), control).unwrap();
+        assert!((1..=family.len()).contains(&told.into_inner()), "only what is found is told");
         let (free, certificate) = (family.free_cells(), certify(&family));
         assert!(certificate.holds(), "{:?}", certificate.failures);
+        let of_all = bounds(family.kind(), dimension, 5).linear_programming;
+        assert!(family.bounds().linear_programming < of_all, "a cell less tells less apart");
         assert!(family.len() >= 30 && family.codes().iter().all(|code| code & free == 0));
         assert_eq!(Family::from_json(&family.to_json()).unwrap(), family);
         assert_ne!(

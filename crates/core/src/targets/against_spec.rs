@@ -68,6 +68,7 @@ pub(super) fn check(target: &Target) -> Result<(), Problem> {
             ("tags_in", panel.tags_in == made.tags_in),
             ("gap_edges", near(panel.gap_edges, made.gap_edges)),
             ("discs_mm", near(panel.discs_mm, made.discs_mm)),
+            ("hole_mm", near(panel.hole_mm, made.hole_mm)),
             ("tag_margin_bits", near(panel.tag_margin_bits, made.tag_margin_bits)),
             ("inverted", panel.inverted == made.inverted),
             ("rim_mm", near(panel.rim_mm, made.rim_mm)),

@@ -125,6 +125,7 @@ impl AprilGridSpec {
             tag_margin_bits: None,
             gap_edges: Some(self.gap),
             discs_mm: None,
+            hole_mm: None,
             rim_mm: None,
             inverted: false,
             outline: Outline::Touching,

@@ -113,7 +113,8 @@ pub(super) fn panels(
         wider.into_iter().chain(fewer).collect()
     };
     let needed = boards * on_each(tags.spacing);
-    let family = check_family(spec.grid, tags, family, needed, Setting::TAGS, instead)?;
+    let family =
+        check_family(spec.grid, tags, spec.edge_mm, family, needed, Setting::TAGS, instead)?;
     Ok((panels, Some(family)))
 }
 
@@ -132,6 +133,7 @@ pub(super) fn untied_panels(spec: &BoardSpec) -> Vec<Panel> {
         tag_margin_bits: None,
         gap_edges: None,
         discs_mm: None,
+        hole_mm: spec.tags.as_ref().and_then(|tags| tags.hole_mm),
         rim_mm: None,
         inverted: spec.inverted,
         outline: match spec.grid {

@@ -61,6 +61,7 @@ pub(super) fn check_ids(
 pub(super) fn check_family(
     kind: GridKind,
     tags: &TagSpec,
+    edge_mm: f64,
     family: Option<&Family>,
     needed: u64,
     setting: Setting,
@@ -71,6 +72,9 @@ pub(super) fn check_family(
         return Err(TargetError::Family { wanted: tags.family.clone(), given });
     };
     let family = family.of_tiling(kind).unwrap_or(family);
+    if let Some(hole_mm) = tags.hole_mm {
+        check_hole(tags, family, edge_mm, hole_mm)?;
+    }
     if family.kind() != kind {
         let problem = match kind {
             GridKind::Deltille => {
@@ -102,6 +106,36 @@ pub(super) fn check_family(
         }
         proposals.join(", or ")
     })
+}
+
+/// Part of the free cells that a hole may take: around it there is a ring of black, so that its edge is seen, and a drill may
+/// be a little off.
+const HOLE_PART: f64 = 0.9;
+
+/// Checks that a hole lies in the free cells of the tags.
+fn check_hole(
+    tags: &TagSpec,
+    family: &Family,
+    edge_mm: f64,
+    hole_mm: f64,
+) -> Result<(), TargetError> {
+    let refused = |problem: String| Err(TargetError::invalid("TagSpec::hole_mm", problem));
+    let Some(free) = family.rules().free else {
+        return refused(format!(
+            "the codes of {} use the cells in the middle: make a family without them by `deltag gen-family --free centre`",
+            family.name()
+        ));
+    };
+    let bit_mm = edge_mm / family.cells().width(tags.border_bits);
+    let most = 2.0 * HOLE_PART * bit_mm * free.radius_bits(family.dimension());
+    if hole_mm > most {
+        let most = (most * 100.0).floor() / 100.0;
+        return refused(format!(
+            "the cells that {} leaves free have room for a hole of {most} mm",
+            family.name()
+        ));
+    }
+    Ok(())
 }
 
 /// The closest spacing above that of `tags` with which `count` tags are enough, as a proposal.

@@ -158,6 +158,7 @@ impl CharucoSpec {
             tag_margin_bits: Some((edge_mm - self.marker_mm) / 2.0 / bit_mm),
             gap_edges: None,
             discs_mm: None,
+            hole_mm: None,
             rim_mm: None,
             inverted: false,
             outline: Outline::Touching,

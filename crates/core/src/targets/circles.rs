@@ -106,6 +106,7 @@ impl CirclesSpec {
             tag_margin_bits: None,
             gap_edges: None,
             discs_mm: Some(self.diameter_mm),
+            hole_mm: None,
             rim_mm: None,
             inverted: false,
             outline: Outline::Touching,

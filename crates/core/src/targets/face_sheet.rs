@@ -66,7 +66,7 @@ pub(super) fn sheets(
 ) -> Result<Vec<SheetLayout>, TargetError> {
     let solid = spec.polyhedron();
     let (edges, sides) = (solid.edges(), Sides::new(&solid));
-    let margin_mm = spec.margin_mm - spec.panel_inset_mm()?;
+    let margin_mm = spec.white_margin_mm() - spec.panel_inset_mm()?;
     let numbered = spec.panel_faces()?.into_iter().zip(panels).enumerate();
     numbered
         .map(|(index, (face, panel))| {

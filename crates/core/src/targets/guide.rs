@@ -456,20 +456,26 @@ fn steps(target: &Target, paper: &PaperSpec) -> Vec<String> {
         TargetSpec::Solid(spec) => steps.extend(steps_of_solid(spec, paper)),
         _ => steps.extend(steps_of_board(target)),
     }
-    if matches!(target.spec, TargetSpec::Circles(_)) {
-        steps.push(format!(
+    match &target.spec {
+        TargetSpec::Circles(_) => steps.push(format!(
             "Keep {name}.json: target_mm says where every circle is, in the order in which OpenCV's findCirclesGrid finds them."
-        ));
-        return steps;
+        )),
+        TargetSpec::Solid(SolidSpec { tags: None, .. }) => steps.push(format!(
+            "Keep {name}.json: target_mm says where every corner is. Without tags faces look alike: this finds their corners as \
+             grids, and which face a grid is must be told by other means before a camera can be made of it:\n\
+             deltille detect photos --target {name}.json -o corners"
+        )),
+        _ => {
+            steps.push(format!(
+                "Keep {name}.json: it says where every corner is. To find corners in photographs:\n\
+                 deltille detect photos --target {name}.json -o corners"
+            ));
+            steps.push(format!(
+                "Ten photographs or more, near, tilted and to the rims, make a camera:\n\
+                 deltille calibrate corners --target {name}.json --model auto --report camera.html"
+            ));
+        }
     }
-    steps.push(format!(
-        "Keep {name}.json: it says where every corner is. To find corners in photographs:\n\
-         deltille detect photos --target {name}.json -o corners"
-    ));
-    steps.push(format!(
-        "Ten photographs or more, near, tilted and to the rims, make a camera:\n\
-         deltille calibrate corners --target {name}.json --model auto --report camera.html"
-    ));
     steps
 }
 
@@ -536,11 +542,13 @@ fn steps_of_solid(spec: &SolidSpec, paper: &PaperSpec) -> Vec<String> {
         "Compare with the pictures: numbers run as printed, arrows show the upper end of each face."
             .to_owned(),
     );
-    steps.push(
-        "By hand faces come to lie within some tenths of a millimetre. With several cameras or many views, deltille rig \
-         --refine-target measures where they are."
-            .to_owned(),
-    );
+    let by_hand = "By hand faces come to lie within some tenths of a millimetre.";
+    steps.push(match spec.tags {
+        Some(_) => format!(
+            "{by_hand} With several cameras or many views, deltille rig --refine-target measures where they are."
+        ),
+        None => by_hand.to_owned(),
+    });
     steps
 }
 
@@ -593,12 +601,20 @@ mod tests {
     fn everything_lies_on_the_page_and_says_what_to_do() {
         let board = guide(BoardSpec::deltille(10, 11, 20.0));
         let solid = guide(SolidSpec::new(SolidShape::Cube));
-        for (sheet, words) in [(&board, "bubbles"), (&solid, "Score dashed")] {
+        let bare = guide(SolidSpec { tags: None, ..SolidSpec::new(SolidShape::Cube) });
+        for (sheet, words) in
+            [(&board, "bubbles"), (&solid, "Score dashed"), (&bare, "faces look alike")]
+        {
             assert_eq!((sheet.width_mm, sheet.height_mm), (210.0, 297.0));
             let on_page =
                 |p: DVec2| p.cmpge(DVec2::splat(5.0)).all() && p.x <= 205.0 && p.y <= 292.0;
             assert!(sheet.lines.iter().all(|line| on_page(line.from_mm) && on_page(line.to_mm)));
-            assert!(sheet.texts.iter().any(|text| text.text.to_string().contains(words)));
+            let says = |words| sheet.texts.iter().any(|t| t.text.to_string().contains(words));
+            assert!(says(words));
+            // What cannot label bare faces is not proposed for them.
+            let is_bare = std::ptr::eq(sheet, &bare);
+            assert_eq!(says("deltille calibrate"), !is_bare);
+            assert!(!(is_bare && says("deltille rig")));
         }
     }
 }

@@ -224,6 +224,13 @@ pub struct Panel {
         deserialize_with = "quantity::edge_mm::de"
     )]
     pub discs_mm: Option<f64>,
+    /// Diameter of the hole in the middle of each tag, mm.
+    #[serde(
+        default,
+        skip_serializing_if = "Option::is_none",
+        deserialize_with = "quantity::edge_mm::de"
+    )]
+    pub hole_mm: Option<f64>,
     /// Whether the colours are exchanged: white upright tiles, or squares, on a black field.
     pub inverted: bool,
     /// Width of the black around the tiles, mm, where that follows their outline: on an inverted face of a solid.

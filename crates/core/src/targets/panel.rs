@@ -88,10 +88,14 @@ impl Panel {
 
     /// The middle of a tag in the target frame, mm.
     pub fn tag_centre_mm(&self, tag: &TagPlacement) -> DVec3 {
+        self.pose.target_from_panel(self.tag_middle_mm(tag))
+    }
+
+    /// The same in the panel frame, mm.
+    pub(crate) fn tag_middle_mm(&self, tag: &TagPlacement) -> DVec2 {
         let vertices = self.tag_tile(tag).vertices();
         let count = vertices.clone().count() as f64;
-        let sum: DVec2 = vertices.map(|vertex| self.lattice_mm(vertex)).sum();
-        self.pose.target_from_panel(sum / count)
+        vertices.map(|vertex| self.lattice_mm(vertex)).sum::<DVec2>() / count
     }
 
     /// The tile of a tag.

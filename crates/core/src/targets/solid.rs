@@ -91,7 +91,7 @@ impl SolidSpec {
     }
 
     /// A margin with room for numbers and glue: that of [`Self::new`], or more where the panels of
-    /// the skeleton need it, in whole millimetres.
+    /// the skeleton need it for their white, in whole millimetres.
     ///
     /// # Errors
     /// Where seats, ledges and windows find no room.
@@ -99,23 +99,24 @@ impl SolidSpec {
         let usual = self.usual_margin_mm();
         let Some(skeleton) = &self.skeleton else { return Ok(usual) };
         let inset_mm = Skeleton::new(&self.polyhedron(), skeleton)?.panel_inset_mm;
-        Ok(usual.max((inset_mm + LEAST_PANEL_MARGIN_MM).ceil()))
+        Ok(usual.max(self.margin_around_mm(inset_mm + LEAST_PANEL_MARGIN_MM).ceil()))
     }
 
     /// Distance of the edges of panels from those of their faces, mm: 0 without a skeleton. Refused
-    /// where it is more than the margin.
+    /// where tiles, or the black around white ones, would lie on the ribs.
     ///
     /// # Errors
-    /// Where it is more than the margin.
+    /// Where it is more than the white of the margin.
     pub fn panel_inset_mm(&self) -> Result<f64, TargetError> {
         let Some(skeleton) = &self.skeleton else { return Ok(0.0) };
         let inset_mm = Skeleton::new(&self.polyhedron(), skeleton)?.panel_inset_mm;
-        if inset_mm > self.margin_mm {
+        if inset_mm > self.white_margin_mm() {
+            let what = if self.inverted { "the black around tiles" } else { "tiles" };
             let problem = format!(
-                "tiles {} from the edges would lie on the ribs: take at least {:.1} mm, or thinner \
+                "{what} {} from the edges would lie on the ribs: take at least {:.1} mm, or thinner \
                  panels",
                 format_mm(self.margin_mm),
-                (inset_mm * 10.0).ceil() / 10.0
+                (self.margin_around_mm(inset_mm) * 10.0).ceil() / 10.0
             );
             return Err(TargetError::invalid("SolidSpec::margin_mm", problem));
         }
@@ -219,7 +220,9 @@ fn family_of(
         wider.into_iter().chain(fewer).collect()
     };
     let needed = tag_count(faces, kind, tags);
-    check_family(kind, tags, family, needed, Setting::of(kind, has_both), instead)
+    let edges = faces.iter().filter(|face| face.board.kind() == kind).map(|face| face.tile_edge_mm);
+    let finest_mm = edges.fold(f64::INFINITY, f64::min);
+    check_family(kind, tags, finest_mm, family, needed, Setting::of(kind, has_both), instead)
 }
 
 /// The panels of a checked spec, whether or not its family has so many tags.
@@ -253,6 +256,7 @@ fn on_faces(spec: &SolidSpec, faces: &[Face]) -> Vec<Panel> {
             tag_margin_bits: None,
             gap_edges: None,
             discs_mm: None,
+            hole_mm: tags.and_then(|tags| tags.hole_mm),
             inverted: spec.inverted,
             rim_mm: spec.rim_mm(),
             outline: board.outline(),

@@ -9,10 +9,14 @@ use super::{
 };
 use crate::family::places;
 use crate::lattice::Vertex;
+use crate::quantity;
 
 /// Most rows or columns of a board: more than the largest paper holds at the finest edge that
 /// anybody prints, and few enough that no number overflows.
 pub const MOST_ROWS: u32 = 500;
+
+/// Smallest hole in a tag, mm: for a thin pin.
+const LEAST_HOLE_MM: f64 = 0.5;
 
 /// Range of rows and of columns: two rows of two corners have a tile between them.
 pub const SIDES: std::ops::RangeInclusive<u32> = 2..=MOST_ROWS;
@@ -148,6 +152,14 @@ pub struct TagSpec {
     /// Which squares of a checkerboard carry the tags.
     #[serde(default, skip_serializing_if = "TagsIn::is_black")]
     pub tags_in: TagsIn,
+    /// Diameter of a hole in the middle of each tag, mm, for a screw or a camera: bare paper on print, a cut for a laser. The
+    /// family leaves the cells there free.
+    #[serde(
+        default,
+        skip_serializing_if = "Option::is_none",
+        deserialize_with = "quantity::edge_mm::de"
+    )]
+    pub hole_mm: Option<f64>,
 }
 
 /// Single tags on sheets: a panel of one tile without corners for each, whose id is the tag's.
@@ -236,7 +248,14 @@ impl Default for TagSpec {
     /// six plain tiles around each of its corners, and the border is that of published targets.
     fn default() -> Self {
         let family = "delTag25h7".to_owned();
-        Self { family, first_id: 0, spacing: 3, border_bits: 1.5, tags_in: TagsIn::Black }
+        Self {
+            family,
+            first_id: 0,
+            spacing: 3,
+            border_bits: 1.5,
+            tags_in: TagsIn::Black,
+            hole_mm: None,
+        }
     }
 }
 
@@ -433,6 +452,11 @@ impl SolidSpec {
     /// Width of the white along the edges of a face, mm.
     pub(super) fn white_margin_mm(&self) -> f64 {
         self.margin_mm - self.rim_mm().unwrap_or_default()
+    }
+
+    /// The margin that leaves so much white along the edges, mm.
+    pub(super) fn margin_around_mm(&self, white_mm: f64) -> f64 {
+        if self.inverted { white_mm / (1.0 - RIM_PART) } else { white_mm }
     }
 
     /// The tags of faces of a tiling.
@@ -775,6 +799,15 @@ impl TagSpec {
             let problem = format!("{} is not between 0.6 and 10 bit-widths", self.border_bits);
             return Err(TargetError::invalid("TagSpec::border_bits", problem));
         }
-        Ok(())
+        let refused = |problem: &str| Err(TargetError::invalid("TagSpec::hole_mm", problem));
+        match self.hole_mm {
+            Some(_) if grid == GridKind::Checker => {
+                refused("square tags have no free cells: make a deltille board or solid")
+            }
+            Some(mm) if !(mm >= LEAST_HOLE_MM) => {
+                refused(&format!("{mm} is less than {LEAST_HOLE_MM} mm"))
+            }
+            _ => Ok(()),
+        }
     }
 }

@@ -131,6 +131,7 @@ fn panel(spec: &TagSheetSpec, id: u32) -> Panel {
         tag_margin_bits: None,
         gap_edges: None,
         discs_mm: None,
+        hole_mm: None,
         rim_mm: None,
         inverted: false,
         outline: Outline::Touching,

@@ -28,6 +28,9 @@ pub const INLAY_MM: f64 = 0.4;
 /// Points that are nearer than this are one, mm: the same corner, computed in two ways.
 const SAME_MM: f64 = 1e-6;
 
+/// How far a polygon may be from the curve that it stands for, mm.
+const CURVE_MM: f64 = 0.002;
+
 /// A closed body, mm.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Body {
@@ -402,20 +405,24 @@ impl Points {
     }
 }
 
-/// The closed loops of a path of straight lines.
+/// The closed loops of a path, curves as straight lines within [`CURVE_MM`] of them.
 fn loops(path: &[PathEl]) -> Vec<Vec<DVec2>> {
     let mut loops: Vec<Vec<DVec2>> = Vec::new();
-    for element in path {
-        match element {
-            PathEl::MoveTo(p) => loops.push(vec![DVec2::new(p.x, p.y)]),
-            // Tiles and cells have no curves.
-            PathEl::LineTo(p) | PathEl::QuadTo(_, p) | PathEl::CurveTo(.., p) => {
-                loops.extend(loops.is_empty().then(Vec::new));
-                if let Some(last) = loops.last_mut() {
-                    last.push(DVec2::new(p.x, p.y));
-                }
+    kurbo::flatten(path.iter().copied(), CURVE_MM, |element| match element {
+        PathEl::MoveTo(p) => loops.push(vec![DVec2::new(p.x, p.y)]),
+        PathEl::LineTo(p) => {
+            if let Some(last) = loops.last_mut() {
+                last.push(DVec2::new(p.x, p.y));
             }
-            PathEl::ClosePath => {}
+        }
+        _ => {}
+    });
+    // A curve that closes itself ends where it began.
+    for corners in &mut loops {
+        if let [first, .., last] = corners[..]
+            && first.distance(last) < SAME_MM
+        {
+            corners.pop();
         }
     }
     loops

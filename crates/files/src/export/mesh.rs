@@ -5,7 +5,7 @@ use std::io;
 use glam::{DVec2, DVec3};
 
 use super::inlay::{INLAY_MM, LEAST_INLAY_MM};
-use super::texture::{Picture, Surface, pictures};
+use super::texture::{Finest, Picture, Surface, pictures};
 use super::{GENERATOR, png};
 use deltille_core::artwork::ArtworkError;
 use deltille_core::family::Family;
@@ -29,8 +29,13 @@ pub const LEAST_TEXELS_PER_SQUARE_BIT: f64 = 12.0;
 /// Longest side of a texture, px, that graphics hardware of the last ten years accepts.
 pub const MAX_TEXTURE_PX: u32 = 16_384;
 
-/// Cells along the edge of a tile without a tag, as if it had a small one.
+/// Cells along the edge of a tile without a tag, as if it had a small one: what is said of them speaks of eighths.
 pub const UNTAGGED_CELLS: f64 = 8.0;
+
+const TAGS_TOO_FINE: &str =
+    "its tags would be unsharp in a smaller one; take fewer tiles, or a family of fewer bits";
+
+const TILES_TOO_FINE: &str = "its tiles would be unsharp in a smaller one; take fewer";
 
 /// Triangles of a plate: the front in two, and as many for each of the other five sides.
 pub const PLATE_TRIANGLES: usize = 12;
@@ -62,9 +67,11 @@ pub enum MeshError {
     },
     /// The requested resolution leaves the tags unsharp.
     #[error(
-        "the texture would have {texels:.1} texels per tag bit, at least {needed} are needed: give {least}"
+        "the texture would have {texels:.1} texels per {cell}, at least {needed} are needed: give {least}"
     )]
     Unsharp {
+        /// What must be sharp.
+        cell: &'static str,
         /// Texels per bit.
         texels: f64,
         /// How many are needed.
@@ -266,7 +273,13 @@ impl TexturedMesh {
         let cell_mm = smallest_cell_mm(target, family);
         let is_square = target.panels.iter().any(|panel| panel.kind == GridKind::Checker);
         let needed = if is_square { LEAST_TEXELS_PER_SQUARE_BIT } else { LEAST_TEXELS_PER_BIT };
-        let pictures = pictures(surface, meshing.textures, meshing.resolution, (cell_mm, needed))?;
+        let cell = match target.family {
+            Some(_) => Finest { name: "tag bit", mm: cell_mm, needed, coarser: TAGS_TOO_FINE },
+            None => {
+                Finest { name: "eighth of a tile", mm: cell_mm, needed, coarser: TILES_TOO_FINE }
+            }
+        };
+        let pictures = pictures(surface, meshing.textures, meshing.resolution, cell)?;
         let px_per_m = pictures.first().map_or(0.0, |first| f64::from(first.atlas.px_per_m));
         let (mut textures, mut textured) = (Vec::new(), Vec::new());
         for (texture, Picture { faces, atlas }) in pictures.into_iter().enumerate() {

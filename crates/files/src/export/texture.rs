@@ -53,17 +53,30 @@ pub(super) struct Picture {
     pub atlas: Atlas,
 }
 
-/// The textures of a surface, `count` of them, at the resolution that is asked for. Cells of tags have an edge of
-/// `cell_mm`, and need so many texels.
+/// The smallest thing on a surface, which must be sharp.
+#[derive(Clone, Copy)]
+pub(super) struct Finest {
+    /// What it is called.
+    pub name: &'static str,
+    /// Its edge, mm.
+    pub mm: f64,
+    /// Texels that it needs.
+    pub needed: f64,
+    /// What to do where no texture is large enough.
+    pub coarser: &'static str,
+}
+
+/// The textures of a surface, `count` of them, at the resolution that is asked for.
 ///
 /// # Errors
-/// When there are fewer faces than textures, or a texture would be too large, or too coarse for the tags.
+/// When there are fewer faces than textures, or a texture would be too large, or too coarse.
 pub(super) fn pictures(
     surface: Surface,
     count: u32,
     resolution: Resolution,
-    (cell_mm, needed): (f64, f64),
+    finest: Finest,
 ) -> Result<Vec<Picture>, MeshError> {
+    let Finest { name: cell, mm: cell_mm, needed, coarser } = finest;
     let (faces, asked) = (surface.len(), count);
     let most = MAX_TEXTURES.min(faces as u32).max(1);
     if !(1..=most).contains(&asked) {
@@ -98,16 +111,21 @@ pub(super) fn pictures(
     Err(match resolution {
         Resolution::Usual => {
             let or_more = or_more(MAX_TEXTURE_PX, sharp);
-            too_large(&set.at(per_m(needed)), format!("{TOO_MANY_CELLS}{or_more}"))
+            too_large(&set.at(per_m(needed)), format!("{coarser}{or_more}"))
         }
         Resolution::Side(asked) if is_unsharp => {
             let least = (f64::from(side) * SPARE * needed / texels).ceil();
             let or_more = or_more(asked.min(MAX_TEXTURE_PX), sharp);
-            MeshError::Unsharp { texels, needed, least: format!("{least:.0} px or more{or_more}") }
+            MeshError::Unsharp {
+                cell,
+                texels,
+                needed,
+                least: format!("{least:.0} px or more{or_more}"),
+            }
         }
         Resolution::Dpi(_) if is_unsharp => {
             let least = (1e3 * needed / cell_mm * 0.0254).ceil();
-            MeshError::Unsharp { texels, needed, least: format!("{least:.0} dpi or more") }
+            MeshError::Unsharp { cell, texels, needed, least: format!("{least:.0} dpi or more") }
         }
         _ => {
             let or_more = or_more(MAX_TEXTURE_PX, pictures[0].atlas.px_per_m);
@@ -118,9 +136,6 @@ pub(super) fn pictures(
 
 /// Some for spaces between faces.
 const SPARE: f64 = 1.02;
-
-const TOO_MANY_CELLS: &str =
-    "its tags would be unsharp in a smaller one; take fewer tiles, or a family of fewer bits";
 
 fn too_large(pictures: &[Picture], instead: String) -> MeshError {
     let sizes = pictures.iter().map(|picture| picture.atlas.size_px);

@@ -142,6 +142,9 @@ impl fmt::Display for Exceeded {
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum ReadError {
+    /// The path is empty.
+    #[error("no file is named: name one, or leave it out")]
+    Nameless,
     /// The file cannot be opened or read.
     #[error("cannot read {}: {source}", path.display())]
     Io {
@@ -299,6 +302,9 @@ pub fn read_short_text(path: &Path, most: usize) -> Result<String, ReadError> {
 /// # Errors
 /// When the metadata cannot be read, or the path is not a regular file.
 pub fn check_file(path: &Path) -> Result<(), ReadError> {
+    if path.as_os_str().is_empty() {
+        return Err(ReadError::Nameless);
+    }
     let io = |source| ReadError::Io { path: path.to_owned(), source };
     let metadata = path.metadata().map_err(io)?;
     if metadata.is_file() {

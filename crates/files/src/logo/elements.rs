@@ -45,6 +45,11 @@ pub(super) fn named(element: &str, id: &str) -> String {
     if id.is_empty() { format!("`{element}`") } else { format!("`{element}` with the id `{id}`") }
 }
 
+/// An element whose name is not known any more: whatever it is, its reader makes paths and groups of it.
+pub(super) fn unnamed(id: &str) -> String {
+    if id.is_empty() { "something in it".to_owned() } else { format!("what has the id `{id}`") }
+}
+
 /// How many elements an element becomes.
 fn count<'a>(
     node: Node<'a, 'a>,

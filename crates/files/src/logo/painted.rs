@@ -8,7 +8,7 @@ use usvg::{ClipPath, Color, Fill, Group, Node, Paint, PaintOrder, Path, Stroke, 
 use super::LogoError;
 use super::area::{Area, Tone};
 use super::crossings;
-use super::elements::named;
+use super::elements::{named, unnamed};
 
 /// How far straight lines may be from the curves that they replace, in heights of what is black: 1.2 µm of 12 mm.
 const FLATNESS: f64 = 1e-4;
@@ -92,7 +92,7 @@ impl Found {
         drawing_from_parent: Affine,
         clips: &[usize],
     ) -> Result<(), LogoError> {
-        let what = || named("g", group.id());
+        let what = || unnamed(group.id());
         if !group.filters().is_empty() {
             return refused(format!("{} has a filter", what()), "leave the filter out");
         }
@@ -136,7 +136,7 @@ impl Found {
         clips: &[usize],
     ) -> Result<(), LogoError> {
         let data = bez_path(path);
-        let what = named("path", path.id());
+        let what = unnamed(path.id());
         let outline =
             |rule, stroke| Outline { path: data.clone(), rule, stroke, drawing_from_path };
         let fill = path.fill().map(|fill| {

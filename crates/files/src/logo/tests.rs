@@ -68,15 +68,19 @@ fn what_cannot_be_printed_is_named() {
         ),
         (
             format!(r##"{gradient}{frame}fill="url(#g)"/>"##),
-            "`path` with the id `leaf` is painted with a gradient",
+            "what has the id `leaf` is painted with a gradient",
         ),
         (format!(r#"{frame}fill-opacity="0.5"/>"#), "shines through"),
+        (
+            r#"<rect width="9" height="9" opacity="0.5"/>"#.to_owned(),
+            "something in it shines through: paint it opaque",
+        ),
         (format!(r#"<g opacity="0.5">{frame}/></g>"#), "shines through"),
         (
             format!(
                 r##"<filter id="f"><feGaussianBlur stdDeviation="2"/></filter><g id="h" filter="url(#f)">{frame}/></g>"##
             ),
-            "`g` with the id `h` has a filter",
+            "what has the id `h` has a filter",
         ),
         (String::new(), "nothing of it is black"),
         (format!(r#"{frame}fill="white"/>"#), "nothing of it is black"),

@@ -123,6 +123,11 @@ impl Arranger {
         self.count(arrangement, &weights, self.min_pairs)
     }
 
+    /// Codes that an arrangement has for sure: with hidden cells some of the words that satisfy the rules stand apart.
+    pub(in crate::family) fn sure(&self, arrangement: &Arrangement) -> usize {
+        (self.share_apart(arrangement) * f64::from(self.score(arrangement))) as usize
+    }
+
     /// The objective of the annealing.
     fn worth(&self, arrangement: &Arrangement, weights: &[Slice]) -> f64 {
         let share = self.share_apart(arrangement);

@@ -82,7 +82,9 @@ impl Best {
             let (known, before) = (checkpoint.codes.len(), self.done(checkpoint));
             let report = |progress: Progress| {
                 let done = before + share * progress.done as f64 / progress.total as f64;
-                control.tell((1000.0 * done.min(1.0)) as u64, 1000, progress.codes.max(known));
+                let codes =
+                    progress.codes.max(known).min(self.limit.map_or(usize::MAX, |n| n as usize));
+                control.tell((1000.0 * done.min(1.0)) as u64, 1000, codes);
             };
             let since = budget.now();
             let found = leg.leg(&screen, begin.as_ref(), control.report(&report));

@@ -26,7 +26,7 @@ use super::algebra::quasicyclic::{Symmetry, random_code};
 use super::algebra::ranked::Ranked;
 use super::algebra::record::{has_free_centre, stride_of};
 use super::algebra::{AlgebraicConstruction, Arrangement, CycleSpace, Span, bch, residue};
-use super::bounds::bounds;
+use super::bounds::bounds_of_cells;
 use super::file::parse_word;
 use super::joint::{AllWords, Joint};
 use super::polish::{Effort, polish};
@@ -122,15 +122,38 @@ pub struct Start {
     construction: AlgebraicConstruction,
 }
 
-/// A union, how it is arranged, and how many words pass.
+/// A union and how it is arranged.
 #[derive(Clone, Debug)]
 struct Candidate {
     source: String,
     union: CosetUnion,
     arrangement: Arrangement,
+    /// Codes that are expected of it, those counted in part that local search may repair.
     worth: f64,
+    /// Codes that it has as it is, at least.
+    sure: usize,
     /// What local search made of it.
     codes: Vec<u64>,
+}
+
+/// The candidate that has the most codes as it is, of all that there were: what is told of a search is also written.
+struct Surest {
+    /// Codes that are known without it.
+    known: usize,
+    candidate: Option<Candidate>,
+}
+
+impl Surest {
+    fn codes(&self) -> usize {
+        self.candidate.as_ref().map_or(0, |candidate| candidate.sure).max(self.known)
+    }
+
+    fn keep(&mut self, candidates: &[Candidate]) {
+        let best = candidates.iter().max_by_key(|candidate| candidate.sure);
+        if let Some(best) = best.filter(|best| best.sure > self.codes()) {
+            self.candidate = Some(best.clone());
+        }
+    }
 }
 
 /// What a random linear code is drawn by.
@@ -224,13 +247,13 @@ impl Best {
             let end = spent.until(0.0);
             best = Some(self.exchanged(screen, construction, codes, end, &spent, control)?);
         }
-        let found =
-            |best: &Option<(Vec<u64>, Construction)>| best.as_ref().map_or(0, |b| b.0.len());
-        let mut candidates = self.sources(&spent, sources, found(&best), control);
-        self.rearrange(&mut candidates, &spent, arrangements, found(&best), control);
+        let known = best.as_ref().map_or(0, |b| b.0.len());
+        let mut surest = Surest { known, candidate: None };
+        let mut candidates = self.sources(&spent, sources, &mut surest, control);
+        self.rearrange(&mut candidates, &spent, arrangements, &mut surest, control);
         if small && self.exchange_pays() {
             let record = start.and_then(|start| self.on_record(start));
-            self.jointly(screen, &mut candidates, record, &spent, JOINT, found(&best), control);
+            self.jointly(screen, &mut candidates, record, &spent, JOINT, &mut surest, control);
         }
 
         let mut is_first = true;
@@ -257,6 +280,16 @@ impl Best {
             }
             control.tell(spent.thousandths(), 1000, best.as_ref().map_or(0, |b| b.0.len()));
         }
+        // What was judged to be worth more may have ended with less.
+        let least = best.as_ref().map_or(0, |b| b.0.len());
+        if let Some(mut surest) = surest.candidate.filter(|surest| surest.sure > least) {
+            let codes = std::mem::take(&mut surest.codes);
+            let construction = self.construction(screen, surest);
+            let (codes, construction) = with_exchanged(screen, construction, &codes)?;
+            if codes.len() > least {
+                best = Some((codes, Construction::Algebraic(construction)));
+            }
+        }
         match best {
             Some(found) if !found.0.is_empty() => Ok(found),
             _ => self.search_alone(screen, control),
@@ -276,14 +309,20 @@ impl Best {
 
     /// No family is larger; once there are so many codes, the search is over.
     fn most(&self) -> usize {
-        let bounds = bounds(GridKind::Deltille, self.dimension, self.distance);
+        let cells = self.space().bits();
+        let bounds = bounds_of_cells(GridKind::Deltille, cells, self.distance);
         let least = bounds.linear_programming.min(bounds.sphere_packing);
         usize::try_from(least).unwrap_or(usize::MAX)
     }
 
-    /// Draws unions of cosets until a share of the time is over; the most promising first. So many codes are
-    /// `known` already.
-    fn sources(&self, spent: &Spent, share: f64, known: usize, control: Control) -> Vec<Candidate> {
+    /// Draws unions of cosets until a share of the time is over; the most promising first.
+    fn sources(
+        &self,
+        spent: &Spent,
+        share: f64,
+        surest: &mut Surest,
+        control: Control,
+    ) -> Vec<Candidate> {
         /// Draws between two looks at the clock.
         const BATCH: u64 = 16;
         /// Candidates kept for a thorough arrangement.
@@ -323,6 +362,7 @@ impl Best {
                     kept.push(candidate);
                 }
             }
+            surest.keep(&kept);
             kept.sort_by(|a, b| b.worth.total_cmp(&a.worth));
             kept.truncate(KEPT);
             promising.sort_by_key(|&(best, shape)| (std::cmp::Reverse(best), shape));
@@ -330,9 +370,8 @@ impl Best {
             if draw.is_multiple_of(BATCH * DRAWS) {
                 spent.step();
             }
-            let best = kept.first().map_or(0, |c| c.worth as usize);
-            control.tell(spent.thousandths(), 1000, best.max(known));
-            if halt() || best >= enough || draw >= steps * BATCH * DRAWS {
+            control.tell(spent.thousandths(), 1000, surest.codes());
+            if halt() || surest.codes() >= enough || draw >= steps * BATCH * DRAWS {
                 return kept;
             }
         }
@@ -365,7 +404,8 @@ impl Best {
         }
         let arranger = self.arranger(&union, orbits);
         let (worth, arrangement) = arranger.anneal(random.random(), STEPS, halt);
-        let candidate = Some(Candidate { source, union, arrangement, worth, codes: Vec::new() });
+        let (sure, codes) = (arranger.sure(&arrangement), Vec::new());
+        let candidate = Some(Candidate { source, union, arrangement, worth, sure, codes });
         Draw { orbits: count, shape, candidate }
     }
 
@@ -511,7 +551,7 @@ impl Best {
         candidates: &mut [Candidate],
         spent: &Spent,
         share: f64,
-        known: usize,
+        surest: &mut Surest,
         control: Control,
     ) {
         let until = spent.until(share);
@@ -526,14 +566,15 @@ impl Best {
                     let seed = self.seed.wrapping_add(1_000_003 * (round + 1));
                     let (worth, arrangement) = arranger.anneal(seed, steps, over);
                     if worth > candidate.worth {
+                        candidate.sure = arranger.sure(&arrangement);
                         (candidate.worth, candidate.arrangement) = (worth, arrangement);
                     }
                 }
             });
-            let best = candidates.iter().map(|c| c.worth as usize).max().unwrap_or(0);
+            surest.keep(candidates);
             spent.step();
-            control.tell(spent.thousandths(), 1000, best.max(known));
-            if over() || candidates.is_empty() || best >= enough {
+            control.tell(spent.thousandths(), 1000, surest.codes());
+            if over() || candidates.is_empty() || surest.codes() >= enough {
                 break;
             }
             steps = (steps * 3 / 2).min(200_000);
@@ -546,7 +587,8 @@ impl Best {
         let construction = &start.construction;
         let union = construction.union(self.dimension).ok()?;
         let (source, arrangement) = (construction.source.clone(), construction.arrangement.clone());
-        Some(Candidate { source, union, arrangement, worth: 0.0, codes: start.codes.clone() })
+        let (codes, sure) = (start.codes.clone(), start.codes.len());
+        Some(Candidate { source, union, arrangement, worth: 0.0, sure, codes })
     }
 
     /// Arranges the best candidates, and what is on record, for what local search makes of them; the best first.
@@ -558,7 +600,7 @@ impl Best {
         record: Option<Candidate>,
         spent: &Spent,
         share: f64,
-        known: usize,
+        surest: &mut Surest,
         control: Control,
     ) {
         /// Candidates that are worth it.
@@ -575,18 +617,19 @@ impl Best {
         let mut steps = STEPS;
         for round in 0..spent.rounds(u64::MAX) {
             candidates.par_iter_mut().zip(&arrangers).for_each(|(candidate, arranger)| {
-                let Candidate { union, arrangement, codes, .. } = candidate;
+                let Candidate { union, arrangement, sure, codes, .. } = candidate;
                 let joint = Joint { screen, union, arranger, all: all.as_ref() };
                 let seed = self.seed.wrapping_add(1_000_033 * (round + 1));
                 let (better, found) = joint.anneal(arrangement, seed, steps, &over);
                 if found.len() > codes.len() {
+                    *sure = found.len();
                     (*arrangement, *codes) = (better, found);
                 }
             });
-            let best = candidates.iter().map(|c| c.codes.len()).max().unwrap_or(0);
+            surest.keep(candidates);
             spent.step();
-            control.tell(spent.thousandths(), 1000, best.max(known));
-            if over() || candidates.is_empty() || best >= self.most() {
+            control.tell(spent.thousandths(), 1000, surest.codes());
+            if over() || candidates.is_empty() || surest.codes() >= self.most() {
                 break;
             }
             steps = steps * 3 / 2;

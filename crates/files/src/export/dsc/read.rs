@@ -230,6 +230,7 @@ impl<'a> Block<'a> {
             tag_margin_bits: None,
             gap_edges: None,
             discs_mm: None,
+            hole_mm: None,
             rim_mm: None,
             inverted: false,
             outline: Outline::Touching,

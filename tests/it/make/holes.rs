@@ -1,0 +1,130 @@
+//! Boards and solids with a hole in the middle of each tag, where no code uses the cells.
+
+use assert_cmd::Command;
+use deltille::artwork::{CutLayer, CutPath, draw, to_laser};
+use deltille::export::svg;
+use deltille::family::Family;
+use deltille::lattice::Vertex;
+use deltille::targets::{BoardSpec, PaperSpec, TagSpec, Target, TargetSpec};
+use deltille::verify::{Artifact, verify};
+
+use crate::common::command::deltille;
+use crate::common::folder::names;
+
+/// A family of 16 bits whose central cell is free, `families/holed.json` in a folder.
+pub fn holed(folder: &std::path::Path) -> Family {
+    let search = "gen-family d16h5 --free centre --method lexicode --name holed";
+    let mut deltag = Command::cargo_bin("deltag").unwrap();
+    deltag.current_dir(folder).args(search.split(' ')).assert().success();
+    let text = std::fs::read_to_string(folder.join("families/holed.json")).unwrap();
+    Family::from_json(&text).unwrap()
+}
+
+#[test]
+fn every_format_with_holes_is_proved() {
+    let folder = tempfile::tempdir().unwrap();
+    holed(folder.path());
+    for (command, file_count) in [
+        (
+            "board --rows 4 --cols 5 --edge 40mm --paper A3 --pdf --svg --png --laser dxf,svg --kerf 0.1mm --gltf --3mf",
+            7,
+        ),
+        (
+            "board --rows 4 --cols 5 --edge 40mm --paper A3 --name black --invert --pdf --laser dxf --3mf --mirrored --no-verify",
+            0,
+        ),
+        ("tetrahedron --edge 300mm --tiles 8 --paper 1200x1400mm --pdf --gltf --laser svg", 3),
+        (
+            "tetrahedron --edge 300mm --tiles 8 --name black-faces --invert --paper 1200x1400mm --pdf --3mf",
+            2,
+        ),
+    ] {
+        let made = deltille(
+            folder.path(),
+            &format!("{command} --family families/holed.json --hole 1.8mm"),
+        );
+        let said = made.success().get_output().stdout.clone();
+        let said = String::from_utf8(said).unwrap();
+        assert_eq!(said.matches(": verified, ").count(), file_count, "{said}");
+    }
+}
+
+/// A board, its family, and the page.
+fn board(hole_mm: Option<f64>) -> (Target, Family) {
+    let folder = tempfile::tempdir().unwrap();
+    let family = holed(folder.path());
+    let tags = TagSpec { family: "holed".to_owned(), hole_mm, ..TagSpec::default() };
+    let spec = BoardSpec { tags: Some(tags), ..BoardSpec::deltille(4, 5, 30.0) };
+    let spec = TargetSpec::Board(spec);
+    (Target::build("desk", &spec, Some(&family), Some(&PaperSpec::default())).unwrap(), family)
+}
+
+#[test]
+fn holes_of_another_size_and_none_are_found() {
+    let (stated, family) = board(Some(1.5));
+    for (hole_mm, passes) in
+        [(Some(1.5), true), (Some(1.6), false), (Some(1.0), false), (None, false)]
+    {
+        let (printed, _) = board(hole_mm);
+        let page = svg::to_string(&draw(&printed, Some(&family)).unwrap(), 0);
+        let file = [Artifact::new("desk.svg", page.into_bytes())];
+        let proof = verify(&stated, Some(&family), "desk.svg", &file).unwrap();
+        assert_eq!(proof.passed, passes, "{hole_mm:?}: {proof}");
+    }
+}
+
+/// The area on the left of a path, mm².
+fn area(path: &CutPath) -> f64 {
+    let next = path.points_mm.iter().cycle().skip(1);
+    path.points_mm.iter().zip(next).map(|(from, to)| from.perp_dot(*to) / 2.0).sum()
+}
+
+#[test]
+fn a_laser_cuts_the_holes_first() {
+    let (target, family) = board(Some(1.5));
+    let panel = &target.panels[0];
+    let drawing = to_laser(&target, Some(&family), 0.2).unwrap();
+    let cut: Vec<_> = drawing.paths.iter().filter(|path| path.layer == CutLayer::Cut).collect();
+    let (plate, holes) = cut.split_last().unwrap();
+    assert_eq!(holes.len(), panel.tags.len());
+    assert!(area(plate) > 1e4);
+    // The beam takes away 0.1 mm beside its path, so that the holes are as wide as stated.
+    for hole in holes {
+        let area = -area(hole);
+        assert!((area / (0.65f64.powi(2) * std::f64::consts::PI) - 1.0).abs() < 1e-3, "{area}");
+    }
+    let middle =
+        |hole: &CutPath| hole.points_mm.iter().sum::<glam::DVec2>() / hole.points_mm.len() as f64;
+    let [first, second] =
+        [0, 1].map(|n| panel.lattice_mm(Vertex::new(panel.tags[n].row, panel.tags[n].col)));
+    let apart = middle(holes[1]) - middle(holes[0]);
+    assert!(apart.distance(second - first) < 1e-9, "{apart}");
+}
+
+#[test]
+fn what_has_no_room_for_a_hole_is_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    holed(folder.path());
+    for (arguments, problem) in [
+        (
+            "board --rows 4 --cols 5 --hole 2mm",
+            "--hole: the codes of delTag25h7 use the cells in the middle",
+        ),
+        (
+            "board --rows 4 --cols 5 --edge 40mm --family families/holed.json --hole 5mm",
+            "have room for a hole of 2.44 mm",
+        ),
+        (
+            "board --rows 4 --cols 5 --edge 40mm --family families/holed.json --hole 0.1mm",
+            "--hole: 0.1 is less than 0.5 mm",
+        ),
+        ("board --rows 4 --cols 5 --untagged --hole 2mm", "--hole"),
+        ("board --rows 4 --cols 5 --dense --hole 2mm", "--hole"),
+        ("cube --hole 2mm", "--hole: square tags have no free cells"),
+    ] {
+        let refused = deltille(folder.path(), arguments).code(2);
+        let said = String::from_utf8(refused.get_output().stderr.clone()).unwrap();
+        assert!(said.contains(problem), "{arguments}: {said}");
+    }
+    assert_eq!(names(folder.path()), ["families"]);
+}
