@@ -11,7 +11,7 @@ use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
 fn decode(criterion: &mut Criterion) {
-    for name in ["delTag25h7", "d25h7", "d36h9", "d36h11", "d49h12"] {
+    for name in ["delTag25h7", "d25h7", "d36h9", "d36h11", "d49h12", "d64h12"] {
         let family = Family::shipped(name).expect("a shipped family");
         let words = TagWords::new(family.dimension());
         let mut random = ChaCha8Rng::seed_from_u64(1);

@@ -22,7 +22,7 @@ import numpy as np
 import tags
 
 FOLDER = pathlib.Path(__file__).parent
-FAMILIES = ["d16h5", "delTag16h5", "d25h7", "delTag25h7", "d25h9", "d36h9", "delTag36h9", "d36h11", "delTag36h11", "d49h12"]
+FAMILIES = ["d16h5", "delTag16h5", "d25h7", "delTag25h7", "d25h9", "d36h9", "delTag36h9", "d36h11", "delTag36h11", "d49h12", "d64h12"]
 # Of these only the first codes in order are listed, which have a black corner: they are predicted too low.
 LISTED_IN_PART = ["d49h12"]
 # Words with a number of differing pairs that were seen less often are extrapolated, from so many numbers before.
@@ -147,7 +147,7 @@ def observed(near, radius, rate):
 
 def fit(words_of):
     lines = []
-    for rows in range(3, 8):
+    for rows in range(3, 9):
         words = np.concatenate([words_of[f"{name}/{rows}"] for name in pictures(words_of)])
         lines.append(f"{rows**2} " + " ".join(f"{chance:.2f}" for chance in log_chances(rows, words)) + "\n")
     (FOLDER / "words.txt").write_text("".join(lines))

@@ -139,7 +139,7 @@ def main():
     tries, seed = (int(text) for text in (sys.argv[3:] + ["2400000", "1"][len(sys.argv) - 3:]))
     kept = {}
     for index, (name, image) in enumerate(pictures(wheels).items()):
-        for rows in range(3, 8):
+        for rows in range(3, 9):
             rng = np.random.default_rng([seed, index, rows])
             kept[f"{name}/{rows}"], tried = words(image, rng, rows, tries)
         found = kept[f"{name}/5"]

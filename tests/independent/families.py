@@ -5,7 +5,8 @@ where their middles come to lie. Checked are distance, distance histogram, rules
 fingerprint, against the file, those that it had before it grew too; and what `deltag verify-family` says of the distance and
 of that in a mirror. With --hidden, and of every family that claims one, the distance is computed that is left where a corner,
 the cells along an edge, or a triangle of four cells are hidden, wherever they lie; it must be what `deltag info` says, and
-what the file claims at least. Needs numpy.
+what the file claims at least. Of a family that lists a part of a linear code by a stride the whole code is proved: that a
+turn leaves it as it is, its distance by the weights of its dual, and how many tags it has. Needs numpy.
 """
 
 import hashlib
@@ -90,6 +91,65 @@ def with_hidden_cells(codes, turned, places):
     return {"apex": left_of(turned, turned, corner), "edge": left_of(turned, turned, edge), "tile": tile}
 
 
+def reduced(words):
+    """A basis whose leading bits are in no other word of it."""
+    basis = {}
+    for word in words:
+        for lead, row in basis.items():
+            word ^= row * (word >> lead & 1)
+        if word:
+            lead = word.bit_length() - 1
+            basis = {other: row ^ word * (row >> lead & 1) for other, row in basis.items()} | {lead: word}
+    return basis
+
+
+def linear_code(construction, bits, turn):
+    """Basis of the linear code on the tag, and the word that is added to its words."""
+    # A turn moves what is in a cell to the one that has it as its source.
+    circles = [(bit, turn[turn[bit]], turn[bit]) for bit in range(bits) if bit == min(bit, turn[bit], turn[turn[bit]]) != turn[bit]]
+    arrangement, centre = construction["arrangement"], [bit for bit in range(bits) if turn[bit] == bit]
+    cells = [int(circles[place][(j + start) % 3]) for place, start in zip(arrangement["places"], arrangement["starts"]) for j in range(3)] + centre
+    assert sorted(cells) == list(range(bits))
+    on_tag = lambda word: sum((word >> i & 1) << cell for i, cell in enumerate(cells))
+    inverted = sum((0b111 if 3 * c < bits - len(centre) else 1) << 3 * c for c in range(bits // 3 + 1) if arrangement["inverted"] >> c & 1)
+    assert [int(word, 16) for word in construction["cosets"]] == [0] and not construction["exchanged"]
+    return reduced(on_tag(int(word, 16)) for word in construction["basis"]), on_tag(inverted)
+
+
+def sums(words):
+    found = np.zeros(1, np.uint64)
+    for word in words:
+        found = np.concatenate([found, found ^ np.uint64(word)])
+    return found
+
+
+def prove(name, text, codes, turn, program):
+    """The linear code that a family lists a part of."""
+    bits, distance = text["bits"], text["distance"]
+    basis, added = linear_code(text["construction"], bits, turn)
+    rows = np.array(list(basis.values()), np.uint64)
+    assert len(reduced([*basis.values(), *map(int, permuted(rows, turn))])) == len(basis), "a turn changes the linear code"
+    # Words that meet all of the code in an even number of cells: a free bit, and the leading ones of the rows that have it.
+    dual = [1 << bit | sum(1 << lead for lead, row in basis.items() if row >> bit & 1) for bit in range(bits) if bit not in basis]
+    assert not any((np.bitwise_count(rows & np.uint64(word)) & 1).any() for word in dual)
+    assert not any((np.bitwise_count((codes ^ np.uint64(added)) & np.uint64(word)) & 1).any() for word in dual), "a code is not of the linear code"
+    listed, weights = sums(dual[:20]), [0] * (bits + 1)
+    for high in sums(dual[20:]):
+        for weight, count in enumerate(np.bincount(np.bitwise_count(listed ^ high), minlength=bits + 1)):
+            weights[weight] += int(count)
+    krawtchouk = lambda i, j: sum((-1) ** k * math.comb(j, k) * math.comb(bits - j, i - k) for k in range(i + 1))
+    of_code = [sum(count * krawtchouk(i, j) for j, count in enumerate(weights)) >> len(dual) for i in range(bits + 1)]
+    assert of_code[0] == 1 and sum(of_code) == 2 ** len(basis) and min(of_code) == 0
+    least = next(weight for weight in range(1, bits + 1) if of_code[weight])
+    assert least >= distance, (least, distance)
+    # A word and its turn sum to 0 where the turn leaves it: as many words as the sums leave.
+    fixed = 2 ** (len(basis) - len(reduced(map(int, rows ^ permuted(rows, turn)))))
+    tags = (2 ** len(basis) - fixed) // 3
+    told = json.loads(subprocess.run([program, "bounds", f"d{bits}h{distance}", "--json"], check=True, capture_output=True).stdout)
+    assert tags in [shipped["by_rank_before_rules"] for shipped in told["shipped"]], (tags, told)
+    print(f"{name}: part of a linear code of {len(basis)} dimensions, distance {least}, {of_code[least]} words of that weight, {tags} tags")
+
+
 def check(path, program, hidden):
     text = json.loads(path.read_text())
     kind, bits, distance = text.get("kind", "deltille"), text["bits"], text["distance"]
@@ -140,6 +200,8 @@ def check(path, program, hidden):
     in_mirror = int(np.nonzero(distances(permuted(codes, mirror), turned))[0][0])
     told = json.loads(subprocess.run([program, "verify-family", path, "--json"], check=True, capture_output=True).stdout)[0]
     assert (told["holds"], told["distance"], told["mirror_distance"]) == (True, least, in_mirror), told
+    if "stride" in text["construction"]:
+        prove(path.stem, text, codes, turn, program)
     print(f"{path.stem}: {len(codes)} codes of {bits} bits, distance {least}, in a mirror {in_mirror}, {differing.min()} of {len(beside)} pairs differ")
     robust = rules.get("robust", [])
     if (hidden or robust) and kind != "checker":

@@ -18,6 +18,8 @@ pub(super) struct Args {
 pub(super) fn run(args: Args) -> anyhow::Result<ExitCode> {
     let Parameters { dimension, distance } = args.family;
     let bounds = bounds(GridKind::Deltille, dimension, distance);
+    let found_none = bounds.found_none();
+    let linear = (!found_none).then_some(bounds.linear_programming);
     let published = published_bounds(&TagCells::new(dimension), distance);
     let least = bounds.linear_programming.min(bounds.sphere_packing);
     let least = published.map_or(least, |published| least.min(published.most_tags));
@@ -41,7 +43,7 @@ pub(super) fn run(args: Args) -> anyhow::Result<ExitCode> {
         });
         output::print_json(&serde_json::json!({
             "bits": dimension.bits(), "distance": distance,
-            "linear_programming": bounds.linear_programming, "sphere_packing": bounds.sphere_packing,
+            "linear_programming": linear, "sphere_packing": bounds.sphere_packing,
             "invariant_codes": invariant,
             "published": published.map(|known| serde_json::json!({
                 "most_tags": known.most_tags, "most_words": known.most_words,
@@ -52,7 +54,12 @@ pub(super) fn run(args: Args) -> anyhow::Result<ExitCode> {
         return Ok(ExitCode::SUCCESS);
     }
     say!("no family of {} bits and distance {distance} has more tags than", dimension.bits());
-    say!("{:>12}  by linear programming (Delsarte)", bounds.linear_programming);
+    match linear {
+        Some(linear) => say!("{linear:>12}  by linear programming (Delsarte)"),
+        None => {
+            say!("{:>12}  by linear programming (Delsarte): nothing that can be checked", "none")
+        }
+    }
     say!("{:>12}  by sphere packing", bounds.sphere_packing);
     if let Some(known) = published {
         say!(

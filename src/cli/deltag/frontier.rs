@@ -35,7 +35,7 @@ pub(super) struct ChoiceArgs {
     pub(super) false_positives: Option<f64>,
     /// Cells that are corrected in a single tag [default: half of what the distance allows]
     #[arg(long, value_name = "CELLS", requires = "false_positives", allow_negative_numbers = true,
-          value_parser = crate::cli::values::whole(0..=24u32))]
+          value_parser = crate::cli::values::whole(0..=31u32))]
     pub(super) corrects: Option<u32>,
 }
 

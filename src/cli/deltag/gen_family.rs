@@ -44,7 +44,7 @@ pub(super) const FORCE: &str = "Replace a family file also by one with fewer cod
 
 #[derive(clap::Args)]
 pub(super) struct Args {
-    /// Bits and distance, d<bits>h<distance> with 9, 16, 25, 36 or 49 bits, such as d25h7
+    /// Bits and distance, d<bits>h<distance> with 9, 16, 25, 36, 49 or 64 bits, such as d25h7
     family: Parameters,
     /// How to search
     #[arg(long, value_enum, default_value_t = Method::Best)]
@@ -74,7 +74,7 @@ pub(super) struct Args {
     #[arg(long, allow_negative_numbers = true, value_parser = whole(1..=1_000_000u32))]
     rounds: Option<u32>,
     /// Number of codes at most, for the methods best and algebraic [default: as many as a file of
-    /// 64 MiB holds, of 49 bits with --robust-to 20,000]
+    /// 64 MiB holds, of 49 and 64 bits with --robust-to 20,000]
     #[arg(long, value_name = "CODES", allow_negative_numbers = true,
           value_parser = whole(1..=u64::MAX))]
     limit: Option<u64>,
@@ -260,7 +260,7 @@ fn free_name(path: &Path) -> PathBuf {
 /// Size of a family file at most: 64 MiB, of which a little is for what is not codes.
 pub(super) const FILE_LIMIT: u64 = (64 << 20) - (64 << 10);
 
-/// Codes of 49 bits that are listed where cells may be hidden.
+/// Codes of 49 and 64 bits that are listed where cells may be hidden.
 const ROBUST_LIMIT: u64 = 20_000;
 
 /// Length of a code's line: four spaces, quotes, 0x, digits, comma, line feed.

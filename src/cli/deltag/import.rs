@@ -28,7 +28,7 @@ pub(super) struct Args {
     /// Shape of the tags; a table of AprilTag 3 says it
     #[arg(long, value_enum)]
     shape: Option<Shape>,
-    /// Cells of a tag: 9, 16, 25, 36 or 49; a table that has nbits or BITS says it
+    /// Cells of a tag: 9, 16, 25, 36, 49 or 64; a table that has nbits or BITS says it
     #[arg(long, allow_negative_numbers = true, value_parser = whole(1..=64u32))]
     bits: Option<u32>,
     /// Cells in which any two tags differ, to be less than they do [default: what they do]

@@ -35,6 +35,15 @@ fn without_hidden(family: &Family) -> Vec<(HiddenCells, u32)> {
     all.filter_map(|hidden| Some((hidden, family.distance_without(hidden)?))).collect()
 }
 
+/// How many codes no such family exceeds, and how that is known.
+fn upper_bound(family: &Family) -> (u64, &'static str) {
+    let bounds = family.bounds();
+    match bounds.found_none() {
+        true => (bounds.sphere_packing, "sphere packing"),
+        false => (bounds.linear_programming, "linear programming"),
+    }
+}
+
 pub(super) fn run(args: Args) -> anyhow::Result<ExitCode> {
     if let [of, other] = &args.families[..] {
         let [of, other] = [super::resolve(of)?, super::resolve(other)?];
@@ -49,11 +58,12 @@ pub(super) fn run(args: Args) -> anyhow::Result<ExitCode> {
     }
     let family = super::resolve(name)?;
     if args.telling.is_json() {
+        let (bound, _) = upper_bound(&family);
         let mut told = json!({
             "name": family.name(), "fingerprint": family.fingerprint(), "codes": family.len(),
             "bits": family.dimension().bits(), "distance": family.distance(),
             "corrects": family.correctable(), "rules": family.rules(),
-            "construction": family.construction(), "upper_bound": family.bounds().linear_programming,
+            "construction": family.construction(), "upper_bound": bound,
             "distance_histogram": family.histogram(),
         });
         let left = without_hidden(&family);
@@ -110,10 +120,8 @@ pub(super) fn run(args: Args) -> anyhow::Result<ExitCode> {
         0 => String::new(),
         free => format!(", of the {} cells in use", bits - free),
     };
-    say!(
-        "  upper bound     {} codes (linear programming{of_cells})",
-        family.bounds().linear_programming
-    );
+    let (bound, by) = upper_bound(&family);
+    say!("  upper bound     {bound} codes ({by}{of_cells})");
     let [rows, cols] = BOARD;
     let board = tags_of(&TargetSpec::Board(BoardSpec::new(GridKind::Deltille, rows, cols, 20.0)))?;
     let solid = tags_of(&TargetSpec::Solid(SolidSpec::new(SolidShape::Icosahedron)))?;

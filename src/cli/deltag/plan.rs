@@ -24,7 +24,7 @@ pub(super) struct Args {
     tags_per_face: u32,
     /// Misread cells that must be corrected in a tag, at least
     #[arg(long, value_name = "CELLS", default_value_t = 0, allow_negative_numbers = true,
-          value_parser = whole(0..=24u32))]
+          value_parser = whole(0..=31u32))]
     corrects: u32,
     #[command(flatten)]
     telling: Telling,
@@ -42,7 +42,7 @@ pub(super) fn run(args: Args) -> anyhow::Result<ExitCode> {
     let Some(best) = smallest_shipped(GridKind::Deltille, needed, args.corrects) else {
         let (name, len) = (largest.name(), largest.len());
         let listed = FILE_LIMIT / bytes_per_code(largest.dimension());
-        let instead = if largest.dimension().bits() == 49 && needed <= listed / 2 {
+        let instead = if largest.dimension().bits() >= 49 && needed <= listed / 2 {
             format!("`deltag gen-family {name}` makes a file with more, or lower")
         } else {
             "lower".to_owned()

@@ -16,7 +16,7 @@ pub(super) struct RuleArgs {
     min_complexity: Option<f64>,
     /// White cells that every code must have [default: the distance]
     #[arg(long, value_name = "CELLS", allow_negative_numbers = true,
-          value_parser = crate::cli::values::whole(0..=49u32))]
+          value_parser = crate::cli::values::whole(0..=64u32))]
     black_distance: Option<u32>,
     /// Keep codes at the family's distance from the all-white tile too
     #[arg(long)]

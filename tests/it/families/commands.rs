@@ -193,6 +193,9 @@ fn bad_arguments_are_one_line_and_exit_code_2() {
         "by-rank d49h12 --rank -1",
         "by-rank d49h12 --rank 1 --count 5592320",
         "by-rank d49h12 --rank 1 --count 0",
+        "by-rank d64h12 --rank 22906490880",
+        "gen-family d64h12 --method search",
+        "gen-family d81h12",
         "by-rank delTag16h5 --rank 1",
         "bounds d025h07",
         "bounds d8h2",
@@ -307,12 +310,12 @@ fn exports_list_every_code() {
     }
 }
 
-/// A folder with exports of 49-bit codes, under a name that is no identifier.
+/// A folder with exports of 64-bit codes, which fill a machine word, under a name that is no identifier.
 fn exports() -> tempfile::TempDir {
     let folder = tempfile::tempdir().unwrap();
-    let shipped = Path::new(env!("CARGO_MANIFEST_DIR")).join("families/d49h12.json");
+    let shipped = Path::new(env!("CARGO_MANIFEST_DIR")).join("families/d64h12.json");
     let text = std::fs::read_to_string(shipped).unwrap();
-    let named = text.replace("\"name\": \"d49h12\"", "\"name\": \"4-tags\"");
+    let named = text.replace("\"name\": \"d64h12\"", "\"name\": \"4-tags\"");
     std::fs::write(folder.path().join("family.json"), named).unwrap();
     for (format, file) in [
         ("c", "tags.h"),
@@ -340,7 +343,7 @@ fn assert_runs(folder: &Path, program: impl AsRef<std::ffi::OsStr>, args: &[&str
 fn exports_compile_in_c() {
     let folder = exports();
     let text = "#include \"tags.h\"\n#include \"tags.h\"\nint main(void) { return \
-                family_4_tags_codes[FAMILY_4_TAGS_SIZE - 1] >> FAMILY_4_TAGS_BITS ? 1 : 0; }\n";
+                (family_4_tags_codes[FAMILY_4_TAGS_SIZE - 1] >> (FAMILY_4_TAGS_BITS - 1)) >> 1 ? 1 : 0; }\n";
     for name in ["main.c", "main.cpp"] {
         std::fs::write(folder.path().join(name), text).unwrap();
     }
@@ -352,7 +355,7 @@ fn exports_compile_in_c() {
 #[test]
 fn exports_compile_in_rust() {
     let folder = exports();
-    let text = "mod tags;\nfn main() { assert!(tags::CODES.iter().all(|c| c >> tags::BITS == 0)); \
+    let text = "mod tags;\nfn main() { assert!(tags::CODES.iter().any(|c| c >> (tags::BITS - 1) == 1)); \
                 assert_eq!(tags::DISTANCE, 12); }\n";
     std::fs::write(folder.path().join("main.rs"), text).unwrap();
     let args = ["--edition", "2021", "-Dwarnings", "-o", "main-rs", "main.rs"];
@@ -362,7 +365,7 @@ fn exports_compile_in_rust() {
 #[test]
 #[cfg_attr(not(has_python), ignore = "no python3 on the path")]
 fn exports_are_read_by_python() {
-    let text = "import tags, json\nassert len(tags.CODES) == 20000 and tags.BITS == 49\n\
+    let text = "import tags, json\nassert len(tags.CODES) == 10000 and tags.BITS == 64\n\
                 listed = json.load(open('tags.json'))['codes']\n\
                 assert [int(c, 16) for c in listed] == list(tags.CODES)\n";
     assert_runs(exports().path(), "python3", &["-c", text]);
@@ -374,7 +377,7 @@ fn exports_are_read_by_opencv() {
     let text = "import cv2\nf = cv2.FileStorage('tags.yml', cv2.FILE_STORAGE_READ)\n\
                 assert f.getNode('name').string() == '4-tags'\n\
                 assert [f.getNode(n).real() for n in ('bits', 'distance', 'size')] == \
-                [49, 12, 20000]\n\
+                [64, 12, 10000]\n\
                 import tags\ncodes = f.getNode('codes')\n\
                 assert [int(codes.at(i).string(), 16) for i in range(codes.size())] == \
                 list(tags.CODES)\n";

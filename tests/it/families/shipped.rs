@@ -1,9 +1,10 @@
 //! Every shipped family: what it claims holds, and it decodes what was misread.
 
 use deltille::clock;
+use deltille::family::algebra::AlgebraicConstruction;
 use deltille::family::{
-    Construction, Control, Decoder, Family, Rules, Screen, TagWords, best, certify, lexicode,
-    shipped_names,
+    Construction, Control, Decoder, Family, FreeCells, Rules, Screen, TagWords, best, certify,
+    lexicode, shipped_names,
 };
 use deltille::lattice::Dimension;
 use proptest::prelude::*;
@@ -71,6 +72,7 @@ fn own_families_are_as_large_as_documented() {
         ("d36h9", 20_140),
         ("d36h11", 1902),
         ("d49h12", 20_000),
+        ("d64h12", 10_000),
     ] {
         let family = Family::shipped(name).unwrap();
         assert!(family.len() >= size, "{name} has {}", family.len());
@@ -132,6 +134,83 @@ fn very_large_families_are_proved_by_their_structure() {
     );
 }
 
+/// Of a code with more words than anybody lists, too: the dual code is weighed, and the codes are those that its numbers give.
+#[test]
+fn families_of_64_bits_are_proved_by_the_dual_code() {
+    let shipped = Family::shipped("d64h12").unwrap();
+    let Construction::Algebraic(construction) = shipped.construction().clone() else {
+        panic!("d64h12 is algebraic")
+    };
+    let dimension = shipped.dimension();
+    let words = TagWords::new(dimension);
+    let screen = Screen::new(words.clone(), shipped.distance(), shipped.rules());
+    // The listed codes are the first of those that the rules admit.
+    let (_, count) = construction.by_rank(dimension, 0).unwrap();
+    assert_eq!(count, 22_906_490_880);
+    let stride = construction.stride.unwrap();
+    let numbers = std::iter::successors(Some(0), |n| Some((n + stride) % count));
+    let tags = numbers.map(|n| construction.by_rank(dimension, n).unwrap().0.unwrap());
+    let first: Vec<u64> = tags.filter(|&tag| screen.admits(tag)).take(50).collect();
+    assert_eq!(shipped.codes()[..50], first);
+    assert_eq!(construction.by_rank(dimension, count), Some((None, count)));
+
+    let large = AlgebraicConstruction { limit: Some(120_000), ..construction.clone() };
+    let codes = large.codes(&screen).unwrap();
+    assert_eq!(codes[..shipped.len()], *shipped.codes());
+    let family = |codes, construction: &AlgebraicConstruction| {
+        let construction = Construction::Algebraic(construction.clone());
+        let rules = shipped.rules().clone();
+        Family::new("large", dimension, 12, codes, rules, construction).unwrap()
+    };
+    let certificate = certify(&family(codes.clone(), &large));
+    assert_eq!(certificate.failures, [""; 0]);
+    assert!(!certificate.all_compared && certificate.min_distance >= 12);
+    // One cell more in the basis is a code with light words.
+    let mut basis = large.basis.clone();
+    basis[0] = "0x8000000000000001".to_owned();
+    let wrong = AlgebraicConstruction { basis, ..large.clone() };
+    assert!(wrong.prove(&screen, &codes).is_err());
+    let mut wrong = codes;
+    wrong[77_777] ^= 1 << 63;
+    let failures = certify(&family(wrong, &large)).failures;
+    assert!(failures.iter().any(|f| f.starts_with("distance: code 77777")), "{failures:?}");
+
+    // What a stride cannot be.
+    for (stride, limit) in [(2, Some(9)), (0, Some(9)), (stride, None), (stride, Some(1 << 40))] {
+        let wrong = AlgebraicConstruction { stride: Some(stride), limit, ..construction.clone() };
+        assert!(wrong.codes(&screen).is_err(), "{stride}, {limit:?}");
+    }
+}
+
+/// Searches of 64 bits, from what ships and from nothing, with free and with hidden cells.
+#[test]
+fn best_families_of_64_bits_hold() {
+    let dimension = Dimension::from_bits(64).unwrap();
+    for (distance, free, robust) in [
+        (12, None, None),
+        (16, Some(FreeCells::Centre), None),
+        (6, None, None),
+        (12, None, Some("apex=10")),
+    ] {
+        let robust: Vec<_> = robust.map(|text| text.parse().unwrap()).into_iter().collect();
+        let rules = Rules { free, robust, ..Rules::published(distance) };
+        let budget = best::Budget::Time(std::time::Duration::from_millis(100), clock::now);
+        let search = best::Best::new(dimension, distance, budget).rules(rules).limit(Some(500));
+        let start = search.start().filter(|_| distance == 12);
+        let family = search.family("test", start, Control::default()).unwrap();
+        let certificate = certify(&family);
+        assert_eq!(certificate.failures, [""; 0], "{distance}");
+        assert_eq!(family.len(), 500);
+        assert_eq!(Family::from_json(&family.to_json()).unwrap(), family);
+        let decoder = Decoder::new(&family);
+        let words = TagWords::new(dimension);
+        let misread = (0..family.correctable()).fold(0, |bits, i| bits | 1u64 << (63 - 9 * i));
+        let read = words.turn(family.codes()[77]) ^ (misread & !family.free_cells());
+        let found = decoder.decode(read, family.correctable()).unwrap();
+        assert_eq!((found.id, found.turns), (77, 1));
+    }
+}
+
 #[test]
 fn best_families_hold_whatever_the_rules() {
     for (bits, distance, rules) in [
@@ -188,7 +267,7 @@ proptest! {
     #[test]
     fn up_to_t_errors_are_corrected(
         pick: prop::sample::Index, id: prop::sample::Index, turns in 0..3u8,
-        flips in prop::collection::btree_set(0..49u32, 0..6),
+        flips in prop::collection::btree_set(0..64u32, 0..6),
     ) {
         // Decoders are built once; all shipped families take their turn.
         static DECODERS: std::sync::OnceLock<Vec<(Family, Decoder)>> = std::sync::OnceLock::new();
@@ -218,13 +297,13 @@ proptest! {
 
     #[test]
     fn both_ways_of_decoding_agree(
-        pick in 0..4usize, word: u64, id: prop::sample::Index, turns in 0..3usize,
-        flips in prop::collection::vec(0..49u32, 0..7),
+        pick in 0..5usize, word: u64, id: prop::sample::Index, turns in 0..3usize,
+        flips in prop::collection::vec(0..64u32, 0..7),
     ) {
         static PAIRS: std::sync::OnceLock<Vec<(Family, Decoder, Decoder)>> =
             std::sync::OnceLock::new();
         let pairs = PAIRS.get_or_init(|| {
-            ["d25h9", "d36h9", "d36h11", "d49h12"]
+            ["d25h9", "d36h9", "d36h11", "d49h12", "d64h12"]
                 .map(|name| Family::shipped(name).unwrap())
                 .map(|f| (f.clone(), Decoder::by_blocks(&f), Decoder::by_syndromes(&f).unwrap()))
                 .into()

@@ -204,7 +204,7 @@ mod tests {
         /// The loops enclose exactly the white cells, each runs through a vertex once.
         #[test]
         fn loops_are_simple_and_enclose_the_white_cells(
-            bits in 3u32..8, seed: u64, square: bool,
+            bits in 3u32..9, seed: u64, square: bool,
         ) {
             let kind = if square { GridKind::Checker } else { GridKind::Deltille };
             let cells = TagCells::of(kind, Dimension::from_bits(bits * bits).unwrap());

@@ -10,9 +10,12 @@
 //! A_i ≥ 0 and Σ_i A_i K_k(i) ≥ −C(b,k) with the Krawtchouk polynomials K_k, and
 //! M = 1 + Σ A_i. The program is solved in floating point; its dual solution is then rounded to
 //! integers and checked exactly, so the bound does not rest on rounding. For odd h a parity bit
-//! gives a code of length b+1, distance h+1 and even distances only, whose bound is often lower.
+//! gives a code of length b+1, distance h+1 and even distances only, whose bound is often lower; and
+//! for even h a cell less and a parity bit instead make even distances of any code. Where rounding
+//! leaves no solution that can be checked, as with 64 cells and small distances, there is no such bound.
 
 use super::Family;
+use super::krawtchouk::{binomial, krawtchouk};
 use super::statistics::ball;
 use crate::lattice::{Dimension, GridKind};
 
@@ -20,10 +23,19 @@ use crate::lattice::{Dimension, GridKind};
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub struct Bounds {
-    /// A third of Delsarte's linear programming bound, as every tag takes three words; of square tags a quarter.
+    /// A third of Delsarte's linear programming bound, as every tag takes three words; of square tags a quarter. Where none was
+    /// found, that part of all words: see [`Self::found_none`].
     pub linear_programming: u64,
     /// The same part of the sphere-packing bound.
     pub sphere_packing: u64,
+    found_none: bool,
+}
+
+impl Bounds {
+    /// Whether linear programming found no bound for this distance, so that [`Self::linear_programming`] says nothing.
+    pub fn found_none(&self) -> bool {
+        self.found_none
+    }
 }
 
 /// Bounds for tags of a kind and a dimension at distance `distance` ≥ 1.
@@ -42,32 +54,25 @@ impl Family {
 /// Bounds for tags of `b` cells.
 pub(super) fn bounds_of_cells(kind: GridKind, b: u32, distance: u32) -> Bounds {
     let turns = u64::from(kind.turns());
-    let words = 2f64.powi(b as i32) / ball(b, distance.saturating_sub(1) / 2);
+    let packed = 2f64.powi(b as i32) / ball(b, distance.saturating_sub(1) / 2);
     let plain = delsarte(b, (distance..=b).collect());
-    let all = 1u64 << b;
-    let best = if distance % 2 == 1 {
-        let even = (distance + 1..=b + 1).filter(|i| i % 2 == 0).collect();
-        plain.min(delsarte(b + 1, even))
-    } else {
-        plain
+    let even = |length: u32| delsarte(length, (distance..=length).filter(|i| i % 2 == 0).collect());
+    // Where rounding spoils the program, one for a smaller distance bounds these codes, too.
+    let best = match plain.min(even(b + distance % 2)) {
+        u64::MAX if distance > 1 => delsarte(b, (distance - 1..=b).collect()),
+        best => best,
     };
-    Bounds { linear_programming: best.min(all) / turns, sphere_packing: words as u64 / turns }
+    // All words, or one less where a machine word cannot tell so many; at distance 1 they are a code.
+    let all = 1u64.checked_shl(b).unwrap_or(u64::MAX);
+    Bounds {
+        linear_programming: best.min(all) / turns,
+        sphere_packing: packed as u64 / turns,
+        found_none: distance > 1 && best >= all,
+    }
 }
 
-/// K_k(i) for length n, exactly: the coefficient of z^k in (1−z)^i (1+z)^(n−i).
-fn krawtchouk(n: u32, k: u32, i: u32) -> i128 {
-    (0..=k.min(i))
-        .filter(|&j| k - j <= n - i)
-        .map(|j| {
-            let sign = if j % 2 == 0 { 1 } else { -1 };
-            sign * binomial(i, j) * binomial(n - i, k - j)
-        })
-        .sum()
-}
-
-fn binomial(n: u32, k: u32) -> i128 {
-    (0..k).fold(1, |b, i| b * i128::from(n - i) / i128::from(i + 1))
-}
+/// Bounds beyond the number of all words of 65 bits are none.
+const MOST: f64 = 4e19;
 
 /// Largest number of words of length n whose distances are all among `distances`, or more.
 fn delsarte(n: u32, distances: Vec<u32>) -> u64 {
@@ -82,23 +87,27 @@ fn delsarte(n: u32, distances: Vec<u32>) -> u64 {
         .collect();
     let multipliers = maximise_sum(matrix);
 
-    /// Denominator of the rounded dual solution.
-    const SCALE: i128 = 1 << 60;
+    // Denominator of the rounded dual solution: as large as sums below allow, which are no larger than the bound itself.
+    let bound = 2.0 + multipliers.iter().map(|y| y.max(0.0)).sum::<f64>();
+    if !bound.is_finite() || bound > MOST {
+        return u64::MAX;
+    }
+    let scale = 1i128 << (124 - bound.log2().ceil() as u32);
     // f(x) = 1 + Σ f_k K_k(x), f_k ≥ 0; if f(i) ≤ 0 for all distances i then M ≤ f(0).
     let f: Vec<i128> = constraints
         .iter()
         .zip(&multipliers)
-        .map(|(&k, &y)| (y.max(0.0) / binomial(n, k) as f64 * SCALE as f64).round() as i128)
+        .map(|(&k, &y)| (y.max(0.0) / binomial(n, k) as f64 * scale as f64).round() as i128)
         .collect();
     let value = |i: u32| -> i128 {
-        constraints.iter().zip(&f).map(|(&k, f)| f * krawtchouk(n, k, i)).sum::<i128>() + SCALE
+        constraints.iter().zip(&f).map(|(&k, f)| f * krawtchouk(n, k, i)).sum::<i128>() + scale
     };
     // Rounding may leave f(i) a little above zero: lower the constant term by as much.
     let excess = distances.iter().map(|&i| value(i)).max().unwrap_or(0).max(0);
-    if excess >= SCALE {
+    if excess >= scale {
         return u64::MAX;
     }
-    ((value(0) - excess) / (SCALE - excess)) as u64
+    u64::try_from((value(0) - excess) / (scale - excess)).unwrap_or(u64::MAX)
 }
 
 /// Simplex method for max Σ x_j, A x ≤ 1, x ≥ 0; returns the dual solution, one value a row.
@@ -145,6 +154,8 @@ fn maximise_sum(mut a: Vec<Vec<f64>>) -> Vec<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::family::algebra::bch;
+    use crate::family::algebra::ranked::Ranked;
 
     #[test]
     fn bounds_are_the_published_ones() {
@@ -156,6 +167,10 @@ mod tests {
             (25, 9, 346),
             (36, 9, 251_756),
             (36, 11, 22_313),
+            (49, 12, 37_871_778),
+            (64, 12, 331_681_116_691),
+            // Those of the first-order Reed-Muller code, of which two words do not move.
+            (64, 32, 42),
         ] {
             let dimension = Dimension::from_bits(bits).unwrap();
             let found = bounds(GridKind::Deltille, dimension, distance).linear_programming;
@@ -163,6 +178,22 @@ mod tests {
             let square = bounds(GridKind::Checker, dimension, distance).linear_programming;
             let quarter = 3 * expected / 4..=(3 * expected + 2) / 4;
             assert!(quarter.contains(&square), "a square tag takes four words, not three");
+        }
+    }
+
+    /// Whatever the distance, no bound is below what is known, and where rounding left none that is said.
+    #[test]
+    fn bounds_of_64_cells_are_true_or_none() {
+        let dimension = Dimension::from_bits(64).unwrap();
+        for distance in 1..=64 {
+            let bounds = bounds(GridKind::Deltille, dimension, distance);
+            let known = bch::extended((distance - 1) / 2);
+            let known = Ranked::new(bch::space(), &known).filter(|ranked| !ranked.is_empty());
+            let known = known.map_or(0, |ranked| ranked.len());
+            let least = bounds.linear_programming.min(bounds.sphere_packing);
+            assert!(least >= known, "{distance}: {bounds:?}, {known}");
+            let is_none = bounds.found_none();
+            assert!(!is_none || (2..9).contains(&distance), "{distance}: {bounds:?}");
         }
     }
 

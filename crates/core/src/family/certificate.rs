@@ -67,7 +67,7 @@ pub fn certify(family: &Family) -> Certificate {
             Some(start) => {
                 let bits = family.dimension().bits();
                 // Later candidates come round to the first again.
-                let all = (*candidates).min(family.dimension().mask() + 1);
+                let all = (*candidates).min(family.dimension().mask().saturating_add(1));
                 let candidates = if bits <= REBUILT_BITS { all } else { all.min(PREFIX) };
                 if candidates < all {
                     certificate.unchecked =

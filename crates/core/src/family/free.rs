@@ -11,7 +11,7 @@ use crate::lattice::{Dimension, TagCells};
 #[serde(rename_all = "lowercase")]
 #[non_exhaustive]
 pub enum FreeCells {
-    /// Those in the middle: the central cell of 16, 25 and 49, and of 9 and 36 the six around the vertex that is there.
+    /// Those in the middle: the central cell of 16, 25, 49 and 64, and of 9 and 36 the six around the vertex that is there.
     Centre,
 }
 

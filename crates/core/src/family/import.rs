@@ -97,6 +97,11 @@ pub fn import(text: &str, spec: &ImportSpec) -> Result<Family, ImportError> {
         .map_err(|error| FamilyError::field("bits", error.to_string()))?;
     let squares = (!places.is_empty()).then_some(GridKind::Checker);
     let kind = spec.kind.or(squares).ok_or(ImportError::Kind)?;
+    if let Some(id) = codes.iter().position(Option::is_none) {
+        let problem = format!("it has more than {bits} bits");
+        return Err(FamilyError::field(format!("codes[{id}]"), problem).into());
+    }
+    let codes: Vec<u64> = codes.into_iter().flatten().collect();
     let codes = match places.as_slice() {
         [] => codes,
         places => in_rows(&codes, places, dimension)?,
@@ -147,16 +152,16 @@ fn tokens(text: &str) -> Vec<&str> {
     tokens
 }
 
-/// The codes of a table; what is wider than any code is the widest.
-fn codes(text: &str, tokens: &[&str]) -> Vec<u64> {
+/// The codes of a table; nothing for what is wider than any code.
+fn codes(text: &str, tokens: &[&str]) -> Vec<Option<u64>> {
     let is_hex = |c: char| c.is_ascii_hexdigit();
-    let number = |digits: &str| u64::from_str_radix(digits, 16).unwrap_or(u64::MAX);
+    let number = |digits: &str| u64::from_str_radix(digits, 16).ok();
     let word = |token: &&str| {
         let digits = token.strip_prefix("0x").or_else(|| token.strip_prefix("0X"))?;
         let end = digits.find(|c| !is_hex(c)).unwrap_or(digits.len());
         (end > 0).then(|| number(&digits[..end]))
     };
-    let words: Vec<u64> = tokens.iter().filter_map(word).collect();
+    let words: Vec<Option<u64>> = tokens.iter().filter_map(word).collect();
     if !words.is_empty() {
         return words;
     }
@@ -181,7 +186,7 @@ fn places(tokens: &[&str]) -> Vec<[u32; 2]> {
         let (Ok(index), Ok(value)) = (index.parse::<usize>(), value.parse::<u32>()) else {
             continue;
         };
-        // No tag has as many bits as a word.
+        // No tag has more bits than a word.
         if index < 64 {
             places.resize(places.len().max(index + 1), [None; 2]);
             places[index][usize::from(*name == "bit_y")] = Some(value);
@@ -283,7 +288,10 @@ mod tests {
         assert!(said("0x231b", spec(squares, Some(17))).contains("17"));
         assert!(said("0x1231b", spec(squares, Some(16))).contains("more than 16 bits"));
         let wide = format!("0x{}", "f".repeat(17));
-        assert!(said(&wide, spec(squares, Some(16))).contains("more than 16 bits"));
+        for bits in [16, 64] {
+            let told = said(&wide, spec(squares, Some(bits)));
+            assert!(told.contains(&format!("more than {bits} bits")), "{told}");
+        }
         assert!(said("0x231b 0x231b", spec(squares, Some(16))).contains("again"));
         let claims = ImportSpec { distance: Some(9), ..spec(squares, Some(16)) };
         assert!(said("0x231b 0x2ea5", claims).contains("`ImportSpec::distance`"));

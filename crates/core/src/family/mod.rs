@@ -21,7 +21,7 @@
 //! Families of square tags, the AprilTags of checkerboards, are read, decoded, drawn and certified like the
 //! others, with their four turns by 90°; they are not searched here.
 //!
-//! Limits: codes have 9, 16, 25, 36 or 49 bits ([`crate::lattice::Dimension`]). Loading a family
+//! Limits: codes have 9, 16, 25, 36, 49 or 64 bits ([`crate::lattice::Dimension`]). Loading a family
 //! checks its form and fingerprint; the distance between its codes is proved by [`certify`], which
 //! costs the square of their number.
 
@@ -45,6 +45,7 @@ mod independent;
 mod invariant_bounds;
 mod joint;
 mod kernels;
+mod krawtchouk;
 pub mod lexicode;
 mod natural;
 pub mod places;

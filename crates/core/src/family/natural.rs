@@ -203,15 +203,16 @@ pub(super) fn cumulated<'a>(rows: impl Iterator<Item = &'a Vec<f64>>, most: u32)
 
 /// All words of `bits` bits of which `ones` are set, each next one greater (Gosper).
 fn subsets(bits: u32, ones: u32) -> impl Iterator<Item = u64> {
+    let all = u64::MAX >> (u64::BITS - bits);
     let first = (1u64 << ones) - 1;
     let next = move |&word: &u64| {
         // Of no ones there is one word.
-        let shift = 2 + (ones > 0).then(|| word.trailing_zeros())?;
-        let carried = word + (word & word.wrapping_neg());
-        let next = carried | ((word ^ carried) >> shift);
-        (next >> bits == 0).then_some(next)
+        let zeros = (ones > 0).then(|| word.trailing_zeros())?;
+        let carried = word.checked_add(word & word.wrapping_neg())?;
+        let next = carried | ((word ^ carried) >> 2 >> zeros);
+        (next <= all).then_some(next)
     };
-    std::iter::successors((first >> bits == 0).then_some(first), next)
+    std::iter::successors((first <= all).then_some(first), next)
 }
 
 /// One of them at random, of cells that are not free.
@@ -290,6 +291,7 @@ mod tests {
             ("d36h9", Some(2)),
             ("d36h11", Some(3)),
             ("d49h12", Some(5)),
+            ("d64h12", Some(5)),
             ("delTag16h5", None),
             ("delTag25h7", Some(1)),
             ("delTag25h9", Some(1)),

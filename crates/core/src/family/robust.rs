@@ -21,8 +21,11 @@ pub(super) fn with_the_most_codes(
     codes: Vec<u64>,
     halt: impl Fn() -> bool + Sync,
 ) -> Result<(Vec<u64>, AlgebraicConstruction), FamilyError> {
+    if !screen.is_robust() || construction.stride.is_some() {
+        return Ok((codes, construction));
+    }
     let words = construction.words_of_the_union(screen)?;
-    if !screen.is_robust() || words.len() == codes.len() || words.len() > MOST_WORDS {
+    if words.len() == codes.len() || words.len() > MOST_WORDS {
         return Ok((codes, construction));
     }
     let mut pool = codes.clone();

@@ -38,7 +38,7 @@ impl ShippedFamily {
 }
 
 /// Families of triangular tags.
-const TRIANGULAR: [ShippedFamily; 11] = {
+const TRIANGULAR: [ShippedFamily; 12] = {
     use GridKind::Deltille as D;
     [
         ShippedFamily::of(D, "d16h5", 16, 5, 78),
@@ -47,6 +47,7 @@ const TRIANGULAR: [ShippedFamily; 11] = {
         ShippedFamily::of(D, "d36h9", 36, 9, 20_140),
         ShippedFamily::of(D, "d36h11", 36, 11, 1902),
         ShippedFamily::of(D, "d49h12", 49, 12, 20_000),
+        ShippedFamily::of(D, "d64h12", 64, 12, 10_000),
         ShippedFamily::of(D, "delTag16h5", 16, 5, 34),
         ShippedFamily::of(D, "delTag25h7", 25, 7, 343),
         ShippedFamily::of(D, "delTag25h9", 25, 9, 47),
@@ -101,6 +102,7 @@ pub(super) fn json(name: &str) -> Option<&'static str> {
         "d36h9" => include_str!("../../families/d36h9.json"),
         "d36h11" => include_str!("../../families/d36h11.json"),
         "d49h12" => include_str!("../../families/d49h12.json"),
+        "d64h12" => include_str!("../../families/d64h12.json"),
         "delTag16h5" => include_str!("../../families/delTag16h5.json"),
         "delTag25h7" => include_str!("../../families/delTag25h7.json"),
         "delTag25h9" => include_str!("../../families/delTag25h9.json"),

@@ -95,7 +95,7 @@ impl TagWords {
         self.neighbours.iter().map(|&(gap, lows)| ((word ^ word >> gap) & lows).count_ones()).sum()
     }
 
-    /// Number of pairs of edge-adjacent cells: 9, 18, 30, 45 or 63, where all cells count.
+    /// Number of pairs of edge-adjacent cells: 9, 18, 30, 45, 63 or 84, where all cells count.
     pub fn pairs(&self) -> u32 {
         self.pairs
     }
@@ -120,7 +120,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn tables_agree_with_the_lattice(rows in 3..=7u32, word: u64) {
+        fn tables_agree_with_the_lattice(rows in 3..=8u32, word: u64) {
             let dimension = Dimension::from_bits(rows * rows).unwrap();
             let (cells, words) = (TagCells::new(dimension), TagWords::new(dimension));
             let word = word & dimension.mask();
@@ -131,7 +131,7 @@ mod tests {
         }
 
         #[test]
-        fn distance_does_not_see_turns(rows in 3..=7u32, a: u64, b: u64) {
+        fn distance_does_not_see_turns(rows in 3..=8u32, a: u64, b: u64) {
             let words = TagWords::new(Dimension::from_bits(rows * rows).unwrap());
             let (a, b) = (a & words.dimension().mask(), b & words.dimension().mask());
             prop_assert_eq!(words.distance(a, b), words.distance(b, words.turn(a)));

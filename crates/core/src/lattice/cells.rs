@@ -1,34 +1,41 @@
 use std::num::NonZeroU8;
+use std::ops::RangeInclusive;
 
 use glam::DVec2;
 
 use super::GridKind;
 
-/// Tag dimension d: a tag has d rows of cells and d² bits. From 3 (9 bits) to 7 (49 bits).
+/// Tag dimension d: a tag has d rows of cells and d² bits. From 3 (9 bits) to 8 (64 bits,
+/// which a word of the machine just holds).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct Dimension(NonZeroU8);
 
+/// The rows that there may be.
+const DIMENSIONS: RangeInclusive<u8> = 3..=8;
+
 /// A number of bits that no tag has.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("a tag has 9, 16, 25, 36 or 49 bits, not {0}")]
+#[error("a tag has 9, 16, 25, 36, 49 or 64 bits, not {0}")]
 pub struct DimensionError(pub u32);
 
 impl Dimension {
-    /// The dimension of a tag with `bits` = 9, 16, 25, 36 or 49 bits.
+    /// The dimension of a tag with `bits` = 9, 16, 25, 36, 49 or 64 bits.
     ///
     /// # Errors
     /// Where no tag has so many bits.
     pub fn from_bits(bits: u32) -> Result<Self, DimensionError> {
         let d = bits.isqrt();
         match NonZeroU8::new(d as u8) {
-            Some(nonzero) if d * d == bits && (3..=7).contains(&d) => Ok(Self(nonzero)),
+            Some(nonzero) if d * d == bits && DIMENSIONS.contains(&nonzero.get()) => {
+                Ok(Self(nonzero))
+            }
             _ => Err(DimensionError(bits)),
         }
     }
 
     /// All dimensions, smallest first.
     pub fn all() -> impl Iterator<Item = Dimension> {
-        (3..=7u8).filter_map(NonZeroU8::new).map(Dimension)
+        DIMENSIONS.filter_map(NonZeroU8::new).map(Dimension)
     }
 
     /// Rows of cells, d.
@@ -43,7 +50,7 @@ impl Dimension {
 
     /// A word with all bits of the tag set.
     pub fn mask(self) -> u64 {
-        (1 << self.bits()) - 1
+        u64::MAX >> (u64::BITS - self.bits())
     }
 }
 
@@ -271,6 +278,7 @@ mod tests {
     fn bits_run_from_the_apex_to_the_bottom_right() {
         for tag in all() {
             let d = tag.dimension().rows();
+            assert_eq!(tag.dimension().mask().count_ones(), d * d);
             let last = tag.cells().len() - 1;
             assert_eq!(tag.cells()[last], Cell { row: d - 1, col: 0, upright: true });
             assert_eq!(tag.cells()[0], Cell { row: 0, col: d - 1, upright: true });
@@ -319,7 +327,7 @@ mod tests {
     #[test]
     fn adjacency_counts_match_the_published_rule() {
         let counts: Vec<usize> = all().map(|tag| tag.neighbours().len()).collect();
-        assert_eq!(counts, [9, 18, 30, 45, 63]);
+        assert_eq!(counts, [9, 18, 30, 45, 63, 84]);
     }
 
     #[test]
@@ -336,6 +344,6 @@ mod tests {
     #[test]
     fn other_bit_counts_are_refused() {
         assert_eq!(Dimension::from_bits(24).unwrap_err(), DimensionError(24));
-        assert!(Dimension::from_bits(4).is_err() && Dimension::from_bits(64).is_err());
+        assert!(Dimension::from_bits(4).is_err() && Dimension::from_bits(81).is_err());
     }
 }

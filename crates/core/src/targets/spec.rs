@@ -804,7 +804,7 @@ impl TagSpec {
             Some(_) if grid == GridKind::Checker => {
                 refused("square tags have no free cells: make a deltille board or solid")
             }
-            Some(mm) if !(mm >= LEAST_HOLE_MM) => {
+            Some(mm) if mm.is_nan() || mm < LEAST_HOLE_MM => {
                 refused(&format!("{mm} is less than {LEAST_HOLE_MM} mm"))
             }
             _ => Ok(()),

@@ -274,7 +274,8 @@ impl Arranger {
 /// slice.
 ///
 /// Counting starts at 64 − `min_pairs` and adds one for each differing pair, so that it overflows
-/// into bit 6 exactly when there are enough. Eight pairs at a time go through seven full adders.
+/// into bit 6 exactly when there are enough; with the 84 pairs of 64 cells it does so from 128 into
+/// bit 7. Eight pairs at a time go through seven full adders.
 fn enough(
     edges: &[(u8, u8, u64)],
     slices: &[Slice],
@@ -282,8 +283,9 @@ fn enough(
     centre_value: u64,
     min_pairs: u32,
 ) -> Slice {
-    let start = 64 - min_pairs;
-    let mut count: [Slice; 7] =
+    let last = if edges.len() < 64 { 6 } else { 7 };
+    let start = (1 << last) - min_pairs;
+    let mut count: [Slice; 8] =
         std::array::from_fn(|bit| [u64::from(start >> bit & 1).wrapping_neg(); 8]);
     let value = |bit: u8| {
         if Some(bit) == centre { [centre_value; 8] } else { slices[usize::from(bit)] }
@@ -299,13 +301,13 @@ fn enough(
         let fours_a = add(&mut count[1], &twos_a, &twos_b);
         let fours_b = add(&mut count[1], &twos_c, &twos_d);
         let mut carry = add(&mut count[2], &fours_a, &fours_b);
-        for digit in &mut count[3..] {
+        for digit in &mut count[3..=last] {
             let sum: Slice = std::array::from_fn(|i| digit[i] ^ carry[i]);
             carry = std::array::from_fn(|i| digit[i] & carry[i]);
             *digit = sum;
         }
     }
-    count[6]
+    count[last]
 }
 
 /// Adds two slices to a binary digit (a full adder) and returns the carries.
@@ -326,7 +328,7 @@ mod tests {
 
     #[test]
     fn bit_slices_count_what_the_screen_admits() {
-        for (rows, distance) in [(4, 5), (5, 7), (6, 9), (7, 12)] {
+        for (rows, distance) in [(4, 5), (5, 7), (6, 9), (7, 12), (8, 12)] {
             let dimension = Dimension::from_bits(rows * rows).unwrap();
             let mut random = ChaCha8Rng::seed_from_u64(7);
             let words: Vec<u64> =

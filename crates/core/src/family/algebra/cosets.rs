@@ -16,6 +16,7 @@ use rand::seq::IndexedRandom;
 use rand_chacha::ChaCha8Rng;
 
 use super::clique::Cliques;
+use super::ranked::Ranked;
 use super::{CycleSpace, LinearMap, Span};
 
 /// The most bits that a syndrome may have; the table of marked syndromes then takes 16 MiB.
@@ -40,6 +41,24 @@ impl CosetUnion {
         let space = self.space;
         let words = self.cosets.iter().flat_map(|&c| self.code.words().map(move |w| w ^ c));
         words.filter(|&w| space.turn(w) != w && space.canonical(w) == w).collect()
+    }
+
+    /// The number of orbits of three words, and some of them, spread over all: no more than `most`. Of a linear code of more
+    /// than 24 dimensions no list is made.
+    pub(in crate::family) fn some_orbits(&self, most: usize) -> (usize, Vec<u64>) {
+        const LISTED_DIMENSIONS: u32 = 24;
+        if self.cosets == [0]
+            && self.code.dimension() > LISTED_DIMENSIONS
+            && let Some(ranked) = Ranked::new(self.space, &self.code)
+        {
+            let step = ranked.len().div_ceil(most as u64).max(1) | 1;
+            let numbers = (0..ranked.len()).step_by(usize::try_from(step).unwrap_or(usize::MAX));
+            let some = numbers.filter_map(|number| ranked.word(number)).collect();
+            return (usize::try_from(ranked.len()).unwrap_or(usize::MAX), some);
+        }
+        let orbits = self.orbits();
+        let (count, step) = (orbits.len(), orbits.len().div_ceil(most));
+        (count, orbits.into_iter().step_by(step.max(1)).collect())
     }
 
     /// The sums of two words that are lighter than `weight`, each once, and not zero.

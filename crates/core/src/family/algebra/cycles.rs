@@ -25,6 +25,12 @@ impl CycleSpace {
         3 * self.cycles + u32::from(self.centre)
     }
 
+    /// A word with all bits set.
+    pub fn mask(self) -> u64 {
+        // There is one bit at least.
+        u64::MAX >> (u64::BITS - self.bits())
+    }
+
     /// Every third bit: the first of each cycle.
     fn firsts(self) -> u64 {
         0x9249_2492_4924_9249 & ((1 << (3 * self.cycles)) - 1)
@@ -106,6 +112,12 @@ impl Arrangement {
 
     /// Maps words from cycle coordinates to words of the tag.
     pub fn apply(&self, dimension: Dimension, words: &[u64]) -> Vec<u64> {
+        /// Fewer words are moved bit by bit sooner than tables are made.
+        const MANY: usize = 256;
+        if words.len() >= MANY {
+            let placing = Placing::new(self, dimension);
+            return words.iter().map(|&word| placing.on_tag(word)).collect();
+        }
         let map = self.bit_map(dimension);
         let translation = self.translation(CycleSpace::of(dimension));
         words
@@ -115,6 +127,35 @@ impl Arrangement {
                 (0..).zip(&map).fold(0, |tag, (i, &to)| tag | ((word >> i & 1) << to))
             })
             .collect()
+    }
+}
+
+/// An arrangement made ready for many words.
+#[derive(Clone, Debug)]
+pub(in crate::family) struct Placing {
+    translation: u64,
+    /// tables[i][x]: the word of the tag of the word with byte i = x and all else 0.
+    tables: Vec<[u64; 256]>,
+}
+
+impl Placing {
+    pub(in crate::family) fn new(arrangement: &Arrangement, dimension: Dimension) -> Self {
+        let map = arrangement.bit_map(dimension);
+        let table = |places: &[u8]| {
+            std::array::from_fn(|x| {
+                let places = (0..).zip(places);
+                places.fold(0, |tag, (i, &to)| tag | ((x as u64 >> i & 1) << to))
+            })
+        };
+        let tables = map.chunks(8).map(table).collect();
+        Self { translation: arrangement.translation(CycleSpace::of(dimension)), tables }
+    }
+
+    /// The word of the tag of a word in cycle coordinates.
+    #[inline]
+    pub(in crate::family) fn on_tag(&self, word: u64) -> u64 {
+        let bytes = (word ^ self.translation).to_le_bytes();
+        self.tables.iter().zip(bytes).fold(0, |tag, (table, byte)| tag | table[usize::from(byte)])
     }
 }
 
@@ -154,7 +195,7 @@ mod tests {
         /// Turning in cycle coordinates is turning on the tag, under every arrangement.
         #[test]
         fn arrangements_commute_with_turns(
-            rows in 3..=7u32, word: u64, seed: u64, inverted: u32,
+            rows in 3..=8u32, word: u64, seed: u64, inverted: u32,
         ) {
             let dimension = Dimension::from_bits(rows * rows).unwrap();
             let space = CycleSpace::of(dimension);
@@ -169,6 +210,7 @@ mod tests {
             let [direct, turned] =
                 arrangement.apply(dimension, &[word, space.turn(word)])[..] else { unreachable!() };
             prop_assert_eq!(TagCells::new(dimension).rotate(direct), turned);
+            prop_assert_eq!(Placing::new(&arrangement, dimension).on_tag(word), direct);
         }
     }
 }

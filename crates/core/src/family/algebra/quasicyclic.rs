@@ -62,7 +62,7 @@ impl Symmetry {
     /// have no small invariant subspaces.
     fn small_module(self, space: CycleSpace, most: u32, random: &mut impl Rng) -> Vec<u64> {
         const MULTIPLICATIONS: u32 = 100;
-        let all = (1u64 << space.bits()) - 1;
+        let all = space.mask();
         let mut word = 0;
         for _ in 0..MULTIPLICATIONS {
             if word == 0 {

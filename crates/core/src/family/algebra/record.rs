@@ -6,7 +6,8 @@ use serde::{Deserialize, Serialize};
 
 use super::cosets::CosetUnion;
 use super::ranked::Ranked;
-use super::{Arrangement, CycleSpace, Span};
+use super::weights::weights;
+use super::{Arrangement, CycleSpace, Placing, Span};
 use crate::family::file::parse_word;
 use crate::family::{FamilyError, Screen};
 use crate::lattice::Dimension;
@@ -19,6 +20,10 @@ use crate::lattice::Dimension;
 /// is far enough from those before it. Where no word of the
 /// union uses the central cell, it is black, or white if only that satisfies the rules. Codes are
 /// sorted by the smallest of the three turned words.
+///
+/// A linear code may have far more words than anybody lists. With a [`stride`](Self::stride) codes are those of the
+/// tags number 0, stride, 2·stride, … ([`Self::by_rank`]), in this order, that the rules admit. So they are spread over
+/// the whole code, where the first ones in order would all begin with black cells.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct AlgebraicConstruction {
@@ -35,6 +40,10 @@ pub struct AlgebraicConstruction {
     /// Number of codes that are listed, the first in order; absent for all of them.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub limit: Option<u64>,
+    /// Which tags of a linear code are listed: each next one is number so many later, modulo the number of them, with which it
+    /// has no divisor in common. There is a `limit` then, and of each code that it allows 64 numbers are tried at most.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub stride: Option<u64>,
     /// Seed of the search that found the construction.
     pub seed: u64,
 }
@@ -52,6 +61,9 @@ impl AlgebraicConstruction {
         if !self.arrangement.fits(space) {
             let problem = "does not arrange the cycles of such a tag";
             return Err(FamilyError::field("construction.arrangement", problem));
+        }
+        if let Some(stride) = self.stride {
+            return self.strided(screen, stride);
         }
         let union = self.union(dimension)?;
         let exchanged = self.words("exchanged", &self.exchanged, dimension)?;
@@ -71,6 +83,46 @@ impl AlgebraicConstruction {
         order(&mut codes);
         codes.truncate(limit);
         Ok(codes)
+    }
+
+    /// The codes of a construction with a stride.
+    fn strided(&self, screen: &Screen, stride: u64) -> Result<Vec<u64>, FamilyError> {
+        /// Codes at most: of 64 bits a gigabyte of memory, and two of a file.
+        const MOST_CODES: u64 = 1 << 27;
+        /// Numbers that are tried for each code.
+        const TRIED: u64 = 64;
+        let wrong = |field, problem: &str| {
+            FamilyError::field(format!("construction.{field}"), problem.to_owned())
+        };
+        let dimension = screen.words().dimension();
+        let ranked = self.ranked(dimension).ok_or_else(|| {
+            wrong(
+                "stride",
+                "only the tags of a linear code alone, which a turn leaves as it is, have numbers",
+            )
+        })?;
+        if screen.is_robust() && !self.is_apart(screen, &self.union(dimension)?) {
+            return Err(wrong("stride", "with hidden cells words of the linear code are too near"));
+        }
+        let count = ranked.len();
+        if count == 0 || greatest_common_divisor(stride, count) != 1 {
+            let problem =
+                format!("{stride} and the number of tags, {count}, have a divisor in common");
+            return Err(wrong("stride", &problem));
+        }
+        let limit = self.limit.filter(|&limit| limit <= MOST_CODES);
+        let limit =
+            limit.ok_or_else(|| wrong("limit", "with a stride there are 2^27 codes at most"))?;
+        let place = Placing::new(&self.arrangement, dimension);
+        let centre = self.free_centre(dimension)?;
+        let numbers = (0..count.min(limit.saturating_mul(TRIED))).scan(0u64, |next, _| {
+            let number = *next;
+            *next = ((u128::from(number) + u128::from(stride)) % u128::from(count)) as u64;
+            Some(number)
+        });
+        let words = numbers.filter_map(|number| ranked.word(number));
+        let codes = words.filter_map(|word| choice(screen, place.on_tag(word), centre));
+        Ok(codes.take(limit as usize).collect())
     }
 
     /// The words of the union on the tag that the screen admits one by one, and the exchanged ones.
@@ -113,6 +165,13 @@ impl AlgebraicConstruction {
     /// construction is more than a linear code, or its record is not consistent. A central cell
     /// that the code does not use is black, unless the arrangement inverts it.
     pub fn by_rank(&self, dimension: Dimension, rank: u64) -> Option<(Option<u64>, u64)> {
+        let ranked = self.ranked(dimension)?;
+        let word = ranked.word(rank).map(|w| self.arrangement.apply(dimension, &[w])[0]);
+        Some((word, ranked.len()))
+    }
+
+    /// The numbers of the tags of a linear code alone; `None` of more than that, and where the record is not consistent.
+    fn ranked(&self, dimension: Dimension) -> Option<Ranked> {
         let space = CycleSpace::of(dimension);
         let words = |field, list| self.words(field, list, dimension).ok();
         let linear = self.exchanged.is_empty() && words("cosets", &self.cosets)? == [0];
@@ -120,9 +179,16 @@ impl AlgebraicConstruction {
         if !linear || !self.arrangement.fits(space) {
             return None;
         }
-        let ranked = Ranked::new(space, &code)?;
-        let word = ranked.word(rank).map(|w| self.arrangement.apply(dimension, &[w])[0]);
-        Some((word, ranked.len()))
+        Ranked::new(space, &code)
+    }
+
+    /// The central cell of the tag, where no word uses it; else 0.
+    fn free_centre(&self, dimension: Dimension) -> Result<u64, FamilyError> {
+        let (space, code) =
+            (CycleSpace::of(dimension), self.words("basis", &self.basis, dimension)?);
+        let cosets = self.words("cosets", &self.cosets, dimension)?;
+        let union = CosetUnion { space, code: Span::of(code), cosets };
+        Ok(centre_of(&union, &self.arrangement, dimension))
     }
 
     /// The linear code and one word of each of its cosets as words of the tag, and a mask of the
@@ -139,8 +205,7 @@ impl AlgebraicConstruction {
         let code = Span::of(self.words("basis", &self.basis, dimension).ok()?);
         let cosets = self.words("cosets", &self.cosets, dimension).ok()?;
         let union = CosetUnion { space, code, cosets };
-        let centre = self.arrangement.bit_map(dimension).get(3 * space.cycles as usize).copied();
-        let ignored = centre.filter(|_| has_free_centre(&union)).map_or(0, |bit| 1 << bit);
+        let ignored = centre_of(&union, &self.arrangement, dimension);
         let on_tag = |words: &[u64]| self.arrangement.apply(dimension, words);
         let zero = on_tag(&[0])[0];
         let code = Span::of(on_tag(union.code.rows()).into_iter().map(|row| row ^ zero));
@@ -153,7 +218,7 @@ impl AlgebraicConstruction {
     /// square.
     ///
     /// The basis has to span a code that is invariant under the turn and whose lightest non-zero
-    /// word weighs the distance or more (all words are checked), and each of `codes`, mapped back
+    /// word weighs the distance or more (all words are weighed, or all of the dual code), and each of `codes`, mapped back
     /// to cycle coordinates, has to lie in it. Then the sum of any two words is a word of the
     /// linear code, and their distance is its weight.
     ///
@@ -165,7 +230,7 @@ impl AlgebraicConstruction {
         let words = |field, list| self.words(field, list, dimension).map_err(|e| e.to_string());
         let code = Span::of(words("basis", &self.basis)?);
         let cosets = words("cosets", &self.cosets)?;
-        if !self.arrangement.fits(space) || code.dimension() > MOST_DIMENSIONS {
+        if !self.arrangement.fits(space) {
             return Err("the construction does not fit such tags".to_owned());
         }
         if !self.exchanged.is_empty() || cosets != [0] {
@@ -174,9 +239,16 @@ impl AlgebraicConstruction {
         if !code.rows().iter().all(|&row| code.contains(space.turn(row))) {
             return Err("the linear code changes when the tag turns".to_owned());
         }
-        let light = |word: &u64| (1..screen.distance()).contains(&word.count_ones());
-        if code.words().any(|word| light(&word)) {
+        let weights = weights(&code, space.bits());
+        let weights =
+            weights.ok_or("the linear code and its dual have too many words to be weighed")?;
+        if (1..screen.distance()).any(|weight| weights[weight as usize] > 0) {
             return Err("the linear code has too light a word".to_owned());
+        }
+        if screen.is_robust() && code.dimension() > MOST_DIMENSIONS {
+            return Err(
+                "the linear code has too many words to be looked at with hidden cells".to_owned()
+            );
         }
         let union = CosetUnion { space, code, cosets };
         if screen.is_robust() && !self.is_apart(screen, &union) {
@@ -239,10 +311,35 @@ pub(in crate::family) fn arranged(
     if !has_free_centre(union) {
         return words.into_iter().filter(|&w| screen.admits(w)).collect();
     }
-    let centre = 1u64 << arrangement.bit_map(dimension)[3 * union.space.cycles as usize];
-    let choose =
-        |word: u64| [word & !centre, word | centre].into_iter().find(|&w| screen.admits(w));
-    words.into_par_iter().filter_map(choose).collect()
+    let centre = centre_of(union, arrangement, dimension);
+    words.into_par_iter().filter_map(|word| choice(screen, word, centre)).collect()
+}
+
+/// A word as a code, if it may be one: where the central cell is free, black, or white if only that satisfies the rules.
+fn choice(screen: &Screen, word: u64, free_centre: u64) -> Option<u64> {
+    match free_centre {
+        0 => screen.admits(word).then_some(word),
+        centre => [word & !centre, word | centre].into_iter().find(|&word| screen.admits(word)),
+    }
+}
+
+/// The central cell of the tag, where no word of a union uses it; else 0.
+fn centre_of(union: &CosetUnion, arrangement: &Arrangement, dimension: Dimension) -> u64 {
+    match has_free_centre(union) {
+        true => 1 << arrangement.bit_map(dimension)[3 * union.space.cycles as usize],
+        false => 0,
+    }
+}
+
+fn greatest_common_divisor(a: u64, b: u64) -> u64 {
+    if b == 0 { a } else { greatest_common_divisor(b, a % b) }
+}
+
+/// A stride for so many tags that spreads any number of them evenly: about a golden section of them.
+pub(in crate::family) fn stride_of(tags: u64) -> u64 {
+    let golden = (tags as f64 * 0.618_033_988_749_895) as u64;
+    let coprime = |stride: &u64| greatest_common_divisor(*stride, tags) == 1;
+    (golden.max(1)..).find(coprime).unwrap_or(1)
 }
 
 /// Whether the space has a central bit that no word of the union uses.

@@ -93,6 +93,15 @@ impl Span {
         Self::of(kept)
     }
 
+    /// The dual code: the words of `length` bits that meet every word of the code in an even number of bits.
+    pub fn dual(&self, length: u32) -> Self {
+        // A free bit, and of the leading ones those whose rows have it.
+        Self::of(self.free_bits(length).into_iter().map(|bit| {
+            let rows = self.rows.iter().filter(|&row| row >> bit & 1 == 1);
+            rows.fold(1 << bit, |word, row| word | 1 << row.ilog2())
+        }))
+    }
+
     /// The bits of a word of `length` bits that lead no row, ascending; their values identify a
     /// coset.
     pub fn free_bits(&self, length: u32) -> Vec<u32> {
@@ -130,6 +139,9 @@ mod tests {
             let short = span.vanishing_on(u64::from(mask));
             let expected = all.iter().filter(|&&w| w & u64::from(mask) == 0).count();
             prop_assert_eq!(1 << short.dimension(), expected);
+            let dual = span.dual(16);
+            prop_assert_eq!(dual.dimension(), 16 - span.dimension());
+            prop_assert!(dual.words().all(|w| words.iter().all(|&v| (w & u64::from(v)).count_ones() % 2 == 0)));
             prop_assert!(short.words().all(|w| span.contains(w) && w & u64::from(mask) == 0));
         }
     }

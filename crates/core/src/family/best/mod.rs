@@ -23,8 +23,9 @@ use rayon::prelude::*;
 use super::algebra::arrange::Arranger;
 use super::algebra::cosets::{CosetGraph, CosetUnion, MAX_SYNDROME_BITS};
 use super::algebra::quasicyclic::{Symmetry, random_code};
-use super::algebra::record::has_free_centre;
-use super::algebra::{AlgebraicConstruction, Arrangement, CycleSpace, Span, residue};
+use super::algebra::ranked::Ranked;
+use super::algebra::record::{has_free_centre, stride_of};
+use super::algebra::{AlgebraicConstruction, Arrangement, CycleSpace, Span, bch, residue};
 use super::bounds::bounds_of_cells;
 use super::file::parse_word;
 use super::joint::{AllWords, Joint};
@@ -98,6 +99,16 @@ impl Best {
     }
 }
 
+/// Words by which an arrangement is judged, at most: of very many a part tells which is good.
+const JUDGED_WORDS: usize = 30_000;
+
+/// Codes of which no more words than of so many dimensions are listed and put in order; of larger ones those are listed
+/// that a stride meets.
+const LISTED_DIMENSIONS: u32 = 24;
+
+/// Codes of a construction with a stride, where nothing else is said.
+const STRIDED_CODES: u64 = 1 << 20;
+
 /// Batches of codes that are drawn in a step of work.
 pub const DRAWS: u64 = 4;
 
@@ -169,7 +180,8 @@ impl Best {
             let family = Family::shipped(name).ok()?;
             let Construction::Algebraic(construction) = family.construction() else { return None };
             let fits = family.dimension() == self.dimension && family.distance() >= self.distance;
-            let construction = AlgebraicConstruction { limit: self.limit, ..construction.clone() };
+            let limit = self.limit.or(construction.stride.and(construction.limit));
+            let construction = AlgebraicConstruction { limit, ..construction.clone() };
             // Exchanged words are listed whatever the rules.
             let admitted = |word: &String| parse_word(word).is_some_and(|w| screen.admits(w));
             let all_admitted = construction.exchanged.iter().all(admitted);
@@ -299,7 +311,8 @@ impl Best {
     fn most(&self) -> usize {
         let cells = self.space().bits();
         let bounds = bounds_of_cells(GridKind::Deltille, cells, self.distance);
-        bounds.linear_programming.min(bounds.sphere_packing) as usize
+        let least = bounds.linear_programming.min(bounds.sphere_packing);
+        usize::try_from(least).unwrap_or(usize::MAX)
     }
 
     /// Draws unions of cosets until a share of the time is over; the most promising first.
@@ -384,8 +397,7 @@ impl Best {
             return Draw { orbits: 0, shape: None, candidate: None };
         };
         let union = self.with_cosets(code, &mut random, halt);
-        let orbits = union.orbits();
-        let count = orbits.len();
+        let (count, orbits) = union.some_orbits(JUDGED_WORDS);
         let share = WORTH_A_TRY[usize::from(most_orbits > MANY_ORBITS)];
         if count == 0 || (count as f64) < share * most_orbits as f64 {
             return Draw { orbits: count, shape, candidate: None };
@@ -397,16 +409,16 @@ impl Best {
         Draw { orbits: count, shape, candidate }
     }
 
+    fn arranger_of(&self, union: &CosetUnion) -> Arranger {
+        self.arranger(union, union.some_orbits(JUDGED_WORDS).1)
+    }
+
+    /// What arranges a union, judged by some of its orbits.
     fn arranger(&self, union: &CosetUnion, orbits: Vec<u64>) -> Arranger {
         /// A changed cell makes up to three pairs differ, and about this share of such words can
         /// be had without conflict.
         const REPAIR: (u32, f64) = (3, 0.45);
-        /// Words by which an arrangement is judged, at most.
-        const JUDGED_WORDS: usize = 30_000;
         let free_centre = has_free_centre(union);
-        // Of very many words a part tells which arrangement is good.
-        let step = orbits.len().div_ceil(JUDGED_WORDS);
-        let orbits = orbits.into_iter().step_by(step.max(1)).collect();
         let arranger =
             Arranger::new(self.dimension, self.distance, &self.rules, orbits, free_centre);
         let screen = self.screen();
@@ -425,7 +437,28 @@ impl Best {
         }
     }
 
-    /// A linear code: a shortened quadratic-residue code or a random quasi-cyclic one, by turns.
+    /// The extended BCH code of most dimensions that has the distance and cells in the middle for no code where these are
+    /// free; with hidden cells, whose light words have to be listed, of no more than can be. `None` of other tags, and where
+    /// no word of it is moved by a turn.
+    fn bch_code(&self) -> Option<(String, Span)> {
+        if self.dimension.bits() != bch::space().bits() {
+            return None;
+        }
+        let most = if self.rules.robust.is_empty() { u32::MAX } else { LISTED_DIMENSIONS };
+        let least = self.distance.saturating_sub(1) / 2;
+        let free = self.rules.free.map_or(0, |_| bch::space().mask() ^ self.space().mask());
+        let codes = (least..).map(|errors| (errors, bch::extended(errors).vanishing_on(free)));
+        let (errors, code) = codes.into_iter().find(|(_, code)| code.dimension() <= most)?;
+        let is_moved = code.rows().iter().any(|&row| bch::space().turn(row) != row);
+        let source = format!(
+            "extended BCH code of length 64, distance {}{}",
+            2 * errors + 2,
+            if free == 0 { "" } else { ", shortened by the position 0" }
+        );
+        is_moved.then_some((source, code))
+    }
+
+    /// A linear code: an extended BCH code, a shortened quadratic-residue code or a random quasi-cyclic one, by turns.
     fn linear_code(
         &self,
         draw: u64,
@@ -438,6 +471,9 @@ impl Best {
             .filter(|&q| residue::min_distance(q) >= self.distance)
             .filter(|&q| residue::space(q).cycles >= space.cycles)
             .collect();
+        if let Some((source, code)) = self.bch_code() {
+            return Some((source, code, None));
+        }
         // A random code of 49 bits takes long to check and is far smaller.
         let only_residue = self.dimension.bits() > 36;
         if (draw.is_multiple_of(4) || only_residue) && !primes.is_empty() {
@@ -494,7 +530,7 @@ impl Best {
         const STARTS: [u64; 2] = [40, 8];
         let space = self.space();
         let alone = CosetUnion { space, code: code.clone(), cosets: vec![0] };
-        if space.bits() - code.dimension() > SYNDROME_BITS {
+        if space.bits() - code.dimension() > SYNDROME_BITS || code.dimension() > LISTED_DIMENSIONS {
             return alone;
         }
         let Some(graph) = CosetGraph::new(space, code, self.distance, halt) else { return alone };
@@ -521,7 +557,7 @@ impl Best {
         let until = spent.until(share);
         let over = || is_past(until) || control.is_cancelled();
         let arrangers: Vec<Arranger> =
-            candidates.iter().map(|c| self.arranger(&c.union, c.union.orbits())).collect();
+            candidates.iter().map(|c| self.arranger_of(&c.union)).collect();
         let enough = self.most();
         let mut steps = 4_000;
         for round in 0..spent.rounds(u64::MAX) {
@@ -576,7 +612,7 @@ impl Best {
         candidates.truncate(KEPT);
         candidates.extend(record);
         let arrangers: Vec<Arranger> =
-            candidates.iter().map(|c| self.arranger(&c.union, c.union.orbits())).collect();
+            candidates.iter().map(|c| self.arranger_of(&c.union)).collect();
         let all = AllWords::new(screen, &over);
         let mut steps = STEPS;
         for round in 0..spent.rounds(u64::MAX) {
@@ -605,13 +641,18 @@ impl Best {
     fn construction(&self, screen: &Screen, candidate: Candidate) -> AlgebraicConstruction {
         let words = screen.words();
         let hex = |list: &[u64]| list.iter().map(|&w| words.hex(w)).collect();
+        let CosetUnion { space, code, cosets } = &candidate.union;
+        let is_large = code.dimension() > LISTED_DIMENSIONS;
+        let ranked = is_large.then(|| Ranked::new(*space, code)).flatten();
+        let stride = ranked.map(|ranked| stride_of(ranked.len()));
         AlgebraicConstruction {
             source: candidate.source,
-            basis: hex(candidate.union.code.rows()),
-            cosets: hex(&candidate.union.cosets),
+            basis: hex(code.rows()),
+            cosets: hex(cosets),
             arrangement: candidate.arrangement,
             exchanged: Vec::new(),
-            limit: self.limit,
+            limit: self.limit.or(stride.map(|_| STRIDED_CODES)),
+            stride,
             seed: self.seed,
         }
     }

@@ -120,7 +120,10 @@ impl Block {
     #[inline]
     fn tail(&self, bits: u32, word: u64) -> u32 {
         let end = self.shift + self.width;
-        ((word >> end) | (word & ((1 << self.shift) - 1)) << (bits - end)) as u32
+        // The last block of 64 bits leaves nothing above, and its end is no shift.
+        let above = word >> (end - 1) >> 1;
+        let below = word & ((1 << self.shift) - 1);
+        (above | below << (bits - end)) as u32
     }
 
     /// The first word of a bucket that `confirm` takes, of those whose tails are near enough.

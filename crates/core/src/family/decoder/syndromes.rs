@@ -7,12 +7,17 @@ use crate::family::{Construction, Family, TagWords, ball};
 /// The syndrome of a word is that of its errors plus that of its coset, so one look into a table
 /// of all error patterns per coset gives the word of the union that was meant; whether the family
 /// lists it is looked up by its smallest turn. Time does not depend on the number of codes.
+///
+/// The code is the same when a tag turns, so a turn of errors is a linear map of their syndrome. The table holds one
+/// of three turned patterns, that with the smallest syndrome, and is a third as large.
 #[derive(Clone, Debug)]
 pub(super) struct Syndromes {
     words: TagWords,
     /// The central cell, where no word of the union uses it; else none.
     ignored: u64,
     syndromes: LinearMap,
+    /// The syndrome of a turned word, from that of the word.
+    turned: LinearMap,
     /// Syndromes of the cosets.
     cosets: Vec<u32>,
     patterns: PatternTable,
@@ -20,7 +25,8 @@ pub(super) struct Syndromes {
     ids: Vec<(u64, u32)>,
 }
 
-/// Tables of more error patterns than this would not be worth their memory, 24 bytes each.
+/// Tables of more error patterns than this would not be worth their memory, 18 bytes each or more; three patterns that turn
+/// into each other count as one.
 const MAX_PATTERNS: f64 = 4e6;
 
 impl Syndromes {
@@ -29,9 +35,13 @@ impl Syndromes {
     pub(super) fn cost(family: &Family) -> f64 {
         /// A look into the table costs as much as comparing so many words side by side (measured).
         const LOOK_COST: f64 = 30.0;
+        /// Words over which the work is shared that making the table is, about a comparison for each pattern: those of some
+        /// hundred pictures.
+        const WORDS: f64 = 10_000.0;
         match family.construction() {
             Construction::Algebraic(c) if c.exchanged.is_empty() => {
-                LOOK_COST * (1.0 + c.cosets.len() as f64)
+                let patterns = ball(family.dimension().bits(), family.correctable());
+                LOOK_COST * (1.0 + c.cosets.len() as f64) + patterns / WORDS
             }
             _ => f64::INFINITY,
         }
@@ -43,20 +53,27 @@ impl Syndromes {
         let (code, cosets, ignored) = construction.on_the_tag(family.dimension())?;
         let bits = family.dimension().bits();
         let correctable = family.correctable();
-        if ball(bits, correctable) > MAX_PATTERNS {
+        let words = TagWords::new(family.dimension());
+        let is_invariant = code.rows().iter().all(|&row| code.contains(words.turn(row)));
+        if ball(bits, correctable) > 3.0 * MAX_PATTERNS || !is_invariant {
             return None;
         }
         let syndromes = code.syndromes(bits)?;
-        let cells: Vec<u32> = (0..bits).filter(|&bit| ignored >> bit & 1 == 0).collect();
-        let patterns = PatternTable::new(&cells, &syndromes, correctable)?;
-        let words = TagWords::new(family.dimension());
+        // Free bits are words with the syndromes 1, 2, 4, …
+        let turn_of = |&bit: &u32| syndromes.apply(words.turn(1 << bit));
+        let turned: Vec<u32> = code.free_bits(bits).iter().map(turn_of).collect();
+        let turned = LinearMap::of_columns(&turned);
+        let cells = (0..bits).map(|bit| 1 << bit).filter(|bit| ignored & bit == 0);
+        let cells: Vec<(u64, [u32; 3])> =
+            cells.map(|bit| (bit, turns_of(&turned, syndromes.apply(bit)))).collect();
+        let patterns = PatternTable::new(&cells, correctable)?;
         let mut ids: Vec<(u64, u32)> =
             family.codes().iter().map(|&code| words.canonical(code & !ignored)).zip(0..).collect();
         ids.sort_unstable();
         let cosets: Vec<u32> = cosets.iter().map(|&word| syndromes.apply(word)).collect();
         let belongs = |&code: &u64| cosets.contains(&syndromes.apply(code & !ignored));
         let all_belong = family.codes().iter().all(belongs);
-        all_belong.then_some(Self { words, ignored, syndromes, cosets, patterns, ids })
+        all_belong.then_some(Self { words, ignored, syndromes, turned, cosets, patterns, ids })
     }
 
     /// The code within `max_errors`, at most ⌊(h−1)/2⌋.
@@ -64,7 +81,7 @@ impl Syndromes {
         let read = word & !self.ignored;
         let syndrome = self.syndromes.apply(read);
         self.cosets.iter().find_map(|coset| {
-            let meant = read ^ self.patterns.get(syndrome ^ coset)?;
+            let meant = read ^ self.errors(syndrome ^ coset)?;
             let canonical = self.words.canonical(meant);
             let at = self.ids.binary_search_by_key(&canonical, |&(word, _)| word).ok()?;
             let id = self.ids[at].1;
@@ -77,7 +94,30 @@ impl Syndromes {
     }
 }
 
-/// Error patterns by their syndromes: a hash table with open addressing.
+impl Syndromes {
+    /// The pattern of errors that has a syndrome.
+    #[inline]
+    fn errors(&self, syndrome: u32) -> Option<u64> {
+        let turns = turns_of(&self.turned, syndrome);
+        let least = turns[0].min(turns[1]).min(turns[2]);
+        let pattern = self.patterns.get(least)?;
+        // Turned twice more it is turned back once, and the other way round.
+        Some(match turns.iter().position(|&syndrome| syndrome == least) {
+            Some(1) => self.words.turn(self.words.turn(pattern)),
+            Some(2) => self.words.turn(pattern),
+            _ => pattern,
+        })
+    }
+}
+
+/// The syndromes of a word after no turn, one and two.
+#[inline]
+fn turns_of(turned: &LinearMap, syndrome: u32) -> [u32; 3] {
+    let once = turned.apply(syndrome.into());
+    [syndrome, once, turned.apply(once.into())]
+}
+
+/// Error patterns by their syndromes, one of each three that turn into each other: a hash table with open addressing.
 #[derive(Clone, Debug)]
 struct PatternTable {
     slots: Vec<Slot>,
@@ -94,29 +134,36 @@ struct Slot {
 const EMPTY: Slot = Slot { syndrome: 0, pattern: [u32::MAX; 2] };
 
 impl PatternTable {
-    /// All patterns of up to `weight` errors in some cells; `None` when two have the same syndrome.
-    fn new(cells: &[u32], syndromes: &LinearMap, weight: u32) -> Option<Self> {
-        let count = ball(cells.len() as u32, weight) as usize;
-        let slots = (2 * count).next_power_of_two().max(2);
+    /// All patterns of up to `weight` errors in some cells, of each of which the bit is given with its syndromes in all turns;
+    /// `None` when two have the same syndrome.
+    fn new(cells: &[(u64, [u32; 3])], weight: u32) -> Option<Self> {
+        let count = cells.len() as u32;
+        // A turn leaves but a few patterns as they are.
+        let count = ball(count, weight) / 3.0 + ball(count / 3, weight / 3);
+        let slots = ((1.5 * count) as usize + 2).next_power_of_two();
         let mut table = Self { slots: vec![EMPTY; slots], shift: 32 - slots.ilog2() };
-        table.insert_all(cells, syndromes, weight, 0).then_some(table)
+        table.insert_all(cells, weight, (0, [0; 3])).then_some(table)
     }
 
     fn insert_all(
         &mut self,
-        cells: &[u32],
-        syndromes: &LinearMap,
+        cells: &[(u64, [u32; 3])],
         weight: u32,
-        pattern: u64,
+        (pattern, syndromes): (u64, [u32; 3]),
     ) -> bool {
-        self.insert(pattern, syndromes.apply(pattern))
+        self.insert(pattern, syndromes)
             && (weight == 0
-                || cells.iter().enumerate().all(|(i, cell)| {
-                    self.insert_all(&cells[i + 1..], syndromes, weight - 1, pattern | 1 << cell)
+                || cells.iter().enumerate().all(|(i, (bit, columns))| {
+                    let sums = std::array::from_fn(|turn| syndromes[turn] ^ columns[turn]);
+                    self.insert_all(&cells[i + 1..], weight - 1, (pattern | bit, sums))
                 }))
     }
 
-    fn insert(&mut self, pattern: u64, syndrome: u32) -> bool {
+    /// Takes a pattern whose syndrome is the smallest of its turns; false where another has it.
+    fn insert(&mut self, pattern: u64, [syndrome, once, twice]: [u32; 3]) -> bool {
+        if once < syndrome || twice < syndrome {
+            return true;
+        }
         let (at, found) = self.find(syndrome);
         self.slots[at] = Slot { syndrome, pattern: [pattern as u32, (pattern >> 32) as u32] };
         found.is_none()

@@ -64,7 +64,7 @@ impl Lexicode {
             rules: Rules::published(distance),
             start,
             step: STEP,
-            candidates: dimension.mask() + 1,
+            candidates: dimension.mask().saturating_add(1),
         }
     }
 

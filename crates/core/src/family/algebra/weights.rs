@@ -1,0 +1,78 @@
+//! How many words of a linear code have each weight: a proof of its distance.
+//!
+//! Of a code of few dimensions all words are weighed. Of one of many all words of its dual are, the words that meet each of its
+//! words in an even number of bits; how many of these have weight j, B_j, tells how many of the code have weight i
+//! (MacWilliams & Sloane, chapter 5):
+//!
+//! ```text
+//!     A_i = Σ B_j K_i(j) / Σ B_j        with the Krawtchouk polynomials K_i of the length
+//! ```
+
+use rayon::prelude::*;
+
+use super::Span;
+use crate::family::kernels::count_distances;
+use crate::family::krawtchouk::krawtchouk;
+
+/// The most dimensions of a code, or of its dual, that are weighed: a second or two.
+const MOST_DIMENSIONS: u32 = 30;
+
+/// Number of words of each weight, 0 to `length`; `None` where neither the code nor its dual is small enough.
+pub fn weights(code: &Span, length: u32) -> Option<Vec<u128>> {
+    let other = length - code.dimension();
+    if code.dimension().min(other) > MOST_DIMENSIONS {
+        return None;
+    }
+    if code.dimension() <= other {
+        return Some(counted(code).into_iter().take(length as usize + 1).map(u128::from).collect());
+    }
+    let of_dual = counted(&code.dual(length));
+    let weight = |i: u32| {
+        let sum: i128 =
+            (0..=length).map(|j| i128::from(of_dual[j as usize]) * krawtchouk(length, i, j)).sum();
+        (sum >> other) as u128
+    };
+    Some((0..=length).map(weight).collect())
+}
+
+/// Weighs all words.
+fn counted(code: &Span) -> [u64; 65] {
+    /// Rows whose sums are listed; each of the others' sums is compared with the list.
+    const LISTED: usize = 12;
+    let (listed, others) = code.rows().split_at(code.rows().len().min(LISTED));
+    let (listed, others) = (Span::of(listed.iter().copied()), others.to_vec());
+    let list: Vec<u64> = listed.words().collect();
+    let sum = |which: u64| {
+        let chosen = (0..).zip(&others).filter(|&(i, _)| which >> i & 1 == 1);
+        chosen.fold(0, |sum, (_, row)| sum ^ row)
+    };
+    (0..1u64 << others.len())
+        .into_par_iter()
+        .fold(
+            || [0; 65],
+            |mut counts, which| {
+                count_distances(sum(which), &list, &mut counts);
+                counts
+            },
+        )
+        .reduce(|| [0; 65], |a, b| std::array::from_fn(|i| a[i] + b[i]))
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+
+    proptest! {
+        /// By the words or by those of the dual, and whether or not any are listed.
+        #[test]
+        fn weights_are_those_of_all_words(words: [u64; 17], length in 9u32..=20, few in 1usize..17) {
+            let mask = (1 << length) - 1;
+            let code = Span::of(words[..few].iter().map(|word| word & mask));
+            let mut expected = vec![0; length as usize + 1];
+            code.words().for_each(|word| expected[word.count_ones() as usize] += 1);
+            prop_assert_eq!(weights(&code, length).unwrap(), expected);
+        }
+    }
+}
