@@ -79,7 +79,7 @@ pub struct Settings {
     /// [default: 1.5, in black squares 2, in white ones 1]
     #[arg(long, help_heading = TAGS, value_name = "BITS", allow_negative_numbers = true, value_parser = number(BORDER_BITS))]
     tag_border: Option<f64>,
-    /// A hole in the middle of each tag, for a screw or a camera, of a family made with `deltag gen-family --free centre`
+    /// A hole in the middle of each triangular tag, for a screw or a camera, of a family made with `deltag gen-family --free centre`
     #[arg(long, help_heading = TAGS, value_name = "DIAMETER", allow_hyphen_values = true)]
     hole: Option<String>,
     /// Id of the first tag; the others follow [default: 0]

@@ -79,7 +79,7 @@ pub struct SolidSettings {
     /// Black border of a tag, in widths of a bit [default: 1.5]
     #[arg(long, help_heading = TAGS, value_name = "BITS", allow_negative_numbers = true, value_parser = number(BORDER_BITS))]
     pub tag_border: Option<f64>,
-    /// A hole in the middle of each tag, for a screw or a camera, of a family made with `deltag gen-family --free centre`
+    /// A hole in the middle of each triangular tag, for a screw or a camera, of a family made with `deltag gen-family --free centre`
     #[arg(long, help_heading = TAGS, value_name = "DIAMETER", allow_hyphen_values = true)]
     pub hole: Option<String>,
     /// Id of the first tag; the others follow, face by face [default: 0]
