@@ -141,7 +141,26 @@ pub fn family(target: &Target, given: Option<&str>) -> Result<Option<Family>, Ta
     Ok(Some(family.with_squares(squares)))
 }
 
-/// A family of a target: the one given, else by its name, else by its path in the spec.
+/// The family by its name, or the one at the path if that is it, and it is not the one of this name.
+fn named_family(
+    target: &Target,
+    wanted: &FamilyRef,
+    path: Option<&str>,
+) -> Result<Family, FamilyFileError> {
+    let is_it = |family: &Family| target.check_family(wanted, family).is_ok();
+    let of_name = family_file::resolve(&wanted.name);
+    if of_name.as_ref().is_ok_and(is_it) {
+        return of_name;
+    }
+    match path.map(family_file::resolve) {
+        Some(Ok(family)) if of_name.is_err() || is_it(&family) => Ok(family),
+        Some(Err(error)) if of_name.is_err() => Err(error),
+        _ => of_name,
+    }
+}
+
+/// A family of a target: the one given, else by its name, else by its path in the spec. One's own family may have the
+/// name of one that ships.
 fn one_family(
     target: &Target,
     wanted: &FamilyRef,
@@ -150,13 +169,11 @@ fn one_family(
 ) -> Result<Family, TargetFamilyError> {
     let family = match given {
         Some(given) => given,
-        None => family_file::resolve(&wanted.name)
-            .or_else(|error| path.map_or(Err(error), family_file::resolve))
-            .map_err(|error| TargetFamilyError::Named {
-                target: target.name.to_string(),
-                name: wanted.name.clone(),
-                error: Box::new(error),
-            })?,
+        None => named_family(target, wanted, path).map_err(|error| TargetFamilyError::Named {
+            target: target.name.to_string(),
+            name: wanted.name.clone(),
+            error: Box::new(error),
+        })?,
     };
     target
         .check_family(wanted, &family)

@@ -511,10 +511,12 @@ impl Args {
                 exit: ExitCode::SUCCESS,
             }),
             Ok(family) => Ok(Outcome::whole(family)),
-            Err(FamilyError::Cancelled) => {
+            Err(FamilyError::Cancelled) if stopped() => {
                 let message = "nothing was found yet, and nothing was written".to_owned();
                 Ok(Outcome::interrupted(None, message))
             }
+            // The time was over before there was a code.
+            Err(FamilyError::Cancelled) => Err(self.none_found()),
             // The name and the rules were checked before: it is the codes that are missing.
             Err(FamilyError::Field { field, .. }) if field == "codes" => Err(self.none_found()),
             Err(error) => Err(error.into()),

@@ -398,6 +398,8 @@ fn tables_of_other_programs_become_families() {
     std::fs::write(at.join("mine.py"), format!("BITS = 16\ncodes = [\n{}]\n", list(""))).unwrap();
     std::fs::write(at.join("words.txt"), "231b\n2ea5\n346a\n").unwrap();
     std::fs::write(at.join("prose.txt"), "no table\n").unwrap();
+    // White and black alone look alike in all turns.
+    std::fs::write(at.join("blank.txt"), "231b\n0000\n").unwrap();
     let mut page = Page::default();
     for args in [
         "mine.h --shape square --bits 16 --name t16h5",
@@ -422,6 +424,8 @@ fn tables_of_other_programs_become_families() {
         "mine.h --shape square --bits 9",
         "mine.h --shape square --bits 16 --distance 7",
         "nowhere.h",
+        "blank.txt --shape triangle --bits 16",
+        "mine.json",
     ] {
         page.refused(at, &format!("deltag import {args}"));
     }

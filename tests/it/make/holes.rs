@@ -120,6 +120,10 @@ fn what_has_no_room_for_a_hole_is_refused() {
         ),
         ("board --rows 4 --cols 5 --untagged --hole 2mm", "--hole"),
         ("board --rows 4 --cols 5 --dense --hole 2mm", "--hole"),
+        (
+            "board --rows 4 --cols 5 --edge 40mm --family families/holed.json --hole 2mm --two-sided 3mm",
+            "--two-sided: a hole through a tag of one side would be in a tile of the other",
+        ),
         ("cube --hole 2mm", "--hole: square tags have no free cells"),
     ] {
         let refused = deltille(folder.path(), arguments).code(2);
@@ -127,4 +131,38 @@ fn what_has_no_room_for_a_hole_is_refused() {
         assert!(said.contains(problem), "{arguments}: {said}");
     }
     assert_eq!(names(folder.path()), ["families"]);
+}
+
+/// Whatever reads a description asks whether its family has room for the holes.
+#[test]
+fn a_hole_that_is_written_into_a_description_by_hand_is_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    deltille(folder.path(), "board --rows 4 --cols 5 --edge 30mm --svg").success();
+    let path = folder.path().join("board.json");
+    let text = std::fs::read_to_string(&path).unwrap();
+    let mut target: serde_json::Value = serde_json::from_str(&text).unwrap();
+    target["spec"]["tags"]["hole_mm"] = 1.0.into();
+    target["panels"][0]["hole_mm"] = 1.0.into();
+    std::fs::write(&path, target.to_string()).unwrap();
+    for command in
+        ["verify board.json", "render board.json", "detect board.svg --target board.json"]
+    {
+        let refused = deltille(folder.path(), command).code(2);
+        let said = String::from_utf8(refused.get_output().stderr.clone()).unwrap();
+        assert!(
+            said.contains("has holes of 1 mm in its tags, but the codes of delTag25h7"),
+            "{said}"
+        );
+    }
+}
+
+#[test]
+fn a_family_may_have_the_name_of_one_that_ships() {
+    let folder = tempfile::tempdir().unwrap();
+    let search = "gen-family d16h5 --free centre --method lexicode -o own";
+    let mut deltag = Command::cargo_bin("deltag").unwrap();
+    deltag.current_dir(folder.path()).args(search.split(' ')).assert().success();
+    let board = "board --rows 6 --cols 7 --edge 20mm --family own/d16h5.json --hole 1mm --svg";
+    deltille(folder.path(), board).success();
+    deltille(folder.path(), "verify board.json").success();
 }

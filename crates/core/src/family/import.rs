@@ -7,7 +7,9 @@
 //! Limits: other orders of bits are not known, and AprilTags whose bits do not fill a square, such as those of
 //! tagStandard41h12, are refused.
 
-use super::{Construction, Family, FamilyError, PAIRS_COUNTED, Rules, distance_histogram};
+use super::{
+    Construction, Family, FamilyError, PAIRS_COUNTED, Rules, TagWords, distance_histogram,
+};
 use crate::lattice::{Dimension, GridKind};
 
 /// What is known of a table that is to be imported.
@@ -52,6 +54,15 @@ pub enum ImportError {
         /// How many there are.
         bits: u32,
     },
+    /// A family file, which is no table.
+    #[error("this is a family file already: it is read by `--family` as it is")]
+    FamilyFile,
+    /// A tag that looks alike in two turns.
+    #[error("codes[{id}] is its own turn: such a tag does not tell how it lies")]
+    OwnTurn {
+        /// Number of the code.
+        id: usize,
+    },
     /// Two codes are too close.
     #[error("`ImportSpec::distance`: its codes are as close as {found}, not {claimed}")]
     Distance {
@@ -82,6 +93,9 @@ pub enum ImportError {
 /// # Ok::<(), deltille_core::family::ImportError>(())
 /// ```
 pub fn import(text: &str, spec: &ImportSpec) -> Result<Family, ImportError> {
+    if text.trim_start().starts_with('{') && text.contains("\"deltille/family/") {
+        return Err(ImportError::FamilyFile);
+    }
     let text = without_comments(text);
     let tokens = tokens(&text);
     let codes = codes(&text, &tokens);
@@ -110,6 +124,14 @@ pub fn import(text: &str, spec: &ImportSpec) -> Result<Family, ImportError> {
     let fit = codes.iter().all(|&code| code <= dimension.mask());
     let histogram = distance_histogram(kind, dimension, if fit { &codes } else { &[] });
     let found = histogram.keys().next().copied().unwrap_or(bits);
+    let words = TagWords::of(kind, dimension);
+    let is_own_turn = |&code: &u64| {
+        let turns = std::iter::successors(Some(words.turn(code)), |&word| Some(words.turn(word)));
+        turns.take(usize::from(kind.turns()) - 1).any(|turned| turned == code)
+    };
+    if fit && let Some(id) = codes.iter().position(is_own_turn) {
+        return Err(ImportError::OwnTurn { id });
+    }
     if let Some(claimed) = spec.distance.filter(|&claimed| fit && claimed > found && found > 0) {
         return Err(ImportError::Distance { found, claimed });
     }

@@ -72,8 +72,10 @@ pub(super) fn check_family(
         return Err(TargetError::Family { wanted: tags.family.clone(), given });
     };
     let family = family.of_tiling(kind).unwrap_or(family);
-    if let Some(hole_mm) = tags.hole_mm {
-        check_hole(tags, family, edge_mm, hole_mm)?;
+    if let Some(hole_mm) = tags.hole_mm
+        && let Some(problem) = no_room_for_hole(family, edge_mm, tags.border_bits, hole_mm)
+    {
+        return Err(TargetError::invalid("TagSpec::hole_mm", problem));
     }
     if family.kind() != kind {
         let problem = match kind {
@@ -112,30 +114,25 @@ pub(super) fn check_family(
 /// be a little off.
 const HOLE_PART: f64 = 0.9;
 
-/// Checks that a hole lies in the free cells of the tags.
-fn check_hole(
-    tags: &TagSpec,
+/// Why there is no room for a hole in tags of a family on tiles of a size.
+pub(super) fn no_room_for_hole(
     family: &Family,
     edge_mm: f64,
+    border_bits: f64,
     hole_mm: f64,
-) -> Result<(), TargetError> {
-    let refused = |problem: String| Err(TargetError::invalid("TagSpec::hole_mm", problem));
+) -> Option<String> {
+    let name = family.name();
     let Some(free) = family.rules().free else {
-        return refused(format!(
-            "the codes of {} use the cells in the middle: make a family without them by `deltag gen-family --free centre`",
-            family.name()
+        return Some(format!(
+            "the codes of {name} use the cells in the middle: make a family without them by `deltag gen-family --free centre`"
         ));
     };
-    let bit_mm = edge_mm / family.cells().width(tags.border_bits);
+    let bit_mm = edge_mm / family.cells().width(border_bits);
     let most = 2.0 * HOLE_PART * bit_mm * free.radius_bits(family.dimension());
-    if hole_mm > most {
+    (hole_mm > most).then(|| {
         let most = (most * 100.0).floor() / 100.0;
-        return refused(format!(
-            "the cells that {} leaves free have room for a hole of {most} mm",
-            family.name()
-        ));
-    }
-    Ok(())
+        format!("the cells that {name} leaves free have room for a hole of at most {most} mm: larger tiles have more")
+    })
 }
 
 /// The closest spacing above that of `tags` with which `count` tags are enough, as a proposal.

@@ -125,7 +125,7 @@ impl FamilyRef {
 }
 
 /// Why a family is not that of a target's tags.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum OtherFamily {
     /// It has other codes.
@@ -149,6 +149,14 @@ pub enum OtherFamily {
         id: u32,
         /// How many codes the family had.
         codes: usize,
+    },
+    /// The target has holes where the family needs the cells.
+    #[error("has holes of {hole_mm} mm in its tags, but {problem}")]
+    Hole {
+        /// Their diameter, mm.
+        hole_mm: f64,
+        /// Why they cannot be there.
+        problem: String,
     },
 }
 
@@ -447,6 +455,17 @@ impl Target {
     /// # Errors
     /// Why it is not.
     pub fn check_family(&self, named: &FamilyRef, family: &Family) -> Result<(), OtherFamily> {
+        let of_family = self.panels.iter().filter(|panel| panel.kind == family.kind());
+        for panel in of_family {
+            let (Some(hole_mm), Some(border)) = (panel.hole_mm, panel.border_bits) else {
+                continue;
+            };
+            if let Some(problem) =
+                capacity::no_room_for_hole(family, panel.edge_mm, border, hole_mm)
+            {
+                return Err(OtherFamily::Hole { hole_mm, problem });
+            }
+        }
         // A file from elsewhere names a family without a fingerprint.
         if named.fingerprint.is_empty() || family.fingerprint() == named.fingerprint {
             return Ok(());

@@ -697,6 +697,11 @@ impl BoardSpec {
             Some(_) if self.tags.is_none() => {
                 refused("untagged sides cannot be told apart: give them tags".to_owned())
             }
+            Some(_) if self.tags.as_ref().is_some_and(|tags| tags.hole_mm.is_some()) => refused(
+                "a hole through a tag of one side would be in a tile of the other: leave out `TagSpec::hole_mm`, or \
+                 make one side"
+                    .to_owned(),
+            ),
             Some(_) => Ok(()),
         }
     }
@@ -805,7 +810,7 @@ impl TagSpec {
                 refused("square tags have no free cells: make a deltille board or solid")
             }
             Some(mm) if mm.is_nan() || mm < LEAST_HOLE_MM => {
-                refused(&format!("{mm} is less than {LEAST_HOLE_MM} mm"))
+                refused(&format!("{mm} mm is less than {LEAST_HOLE_MM} mm"))
             }
             _ => Ok(()),
         }
