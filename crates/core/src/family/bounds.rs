@@ -46,8 +46,7 @@ pub fn bounds(kind: GridKind, dimension: Dimension, distance: u32) -> Bounds {
 impl Family {
     /// Bounds for families of this kind and distance that use as many cells: those that are free tell nothing apart.
     pub fn bounds(&self) -> Bounds {
-        let cells = self.dimension().bits() - self.free_cells().count_ones();
-        bounds_of_cells(self.kind(), cells, self.distance())
+        bounds_of_cells(self.kind(), self.used_cells(), self.distance())
     }
 }
 

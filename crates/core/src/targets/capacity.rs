@@ -72,11 +72,6 @@ pub(super) fn check_family(
         return Err(TargetError::Family { wanted: tags.family.clone(), given });
     };
     let family = family.of_tiling(kind).unwrap_or(family);
-    if let Some(hole_mm) = tags.hole_mm
-        && let Some(problem) = no_room_for_hole(family, edge_mm, tags.border_bits, hole_mm)
-    {
-        return Err(TargetError::invalid("TagSpec::hole_mm", problem));
-    }
     if family.kind() != kind {
         let problem = match kind {
             GridKind::Deltille => {
@@ -89,6 +84,11 @@ pub(super) fn check_family(
             }
         };
         return Err(TargetError::invalid(setting.family, format!("{} {problem}", family.name())));
+    }
+    if let Some(hole_mm) = tags.hole_mm
+        && let Some(problem) = no_room_for_hole(family, edge_mm, tags.border_bits, hole_mm)
+    {
+        return Err(TargetError::invalid("TagSpec::hole_mm", problem));
     }
     check_ids(setting, (tags.first_id, needed), family, || {
         let (there, first) = (family.len() as u64, u64::from(tags.first_id));
