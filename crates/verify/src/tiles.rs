@@ -258,11 +258,13 @@ impl TagLooks {
 
     /// The region at tile coordinates.
     fn region(&self, p: DVec2) -> Region {
-        // The edges that the coordinates are along meet at 60°.
-        let from_middle = p - 1.0 / 3.0;
-        let squared = from_middle.length_squared() + from_middle.x * from_middle.y;
-        if self.hole.is_some_and(|radius| squared < radius * radius) {
-            return Region::Hole;
+        if let Some(radius) = self.hole {
+            // The edges that the coordinates are along meet at 60°.
+            let from_middle = p - 1.0 / 3.0;
+            let squared = from_middle.length_squared() + from_middle.x * from_middle.y;
+            if squared < radius * radius {
+                return Region::Hole;
+            }
         }
         if let Some(bit) = self.bit(p) {
             return Region::Cell(bit);
