@@ -113,6 +113,8 @@ def detect_many(
 def load_detections(
     path: Union[str, os.PathLike[str]],
     target: Union[Target, Sequence[Target], None] = None,
+    *,
+    assume_target: bool = False,
 ) -> list[Result]:
     """Detections of many pictures from files.
 
@@ -123,6 +125,8 @@ def load_detections(
         :mod:`deltille.ray` writes them too; or one of the two tables, beside which the other lies.
     target : Target or sequence of Target, optional
         What was looked for, from which :attr:`Detection.object_points` come.
+    assume_target : bool, optional
+        Whether the target is taken even where the files name another one.
 
     Returns
     -------
@@ -138,10 +142,10 @@ def load_detections(
     place = Path(path)
     texts = sorted(place.glob("*.json")) if place.is_dir() else []
     if texts:
-        return [Detection.load(text, target=target) for text in texts]
+        return [Detection.load(text, target=target, assume_target=assume_target) for text in texts]
     if place.suffix == ".json":
-        return [Detection.load(place, target=target)]
-    rows = sorted(_tables([place], target), key=lambda row: row[0])
+        return [Detection.load(place, target=target, assume_target=assume_target)]
+    rows = sorted(_tables([place], target, assume_target), key=lambda row: row[0])
     if not rows and place.is_dir():
         raise FileError(f"{place}: no .json or .parquet file in this folder")
     return [found if found is not None else Failure(image, ImageError(why)) for image, found, why in rows]

@@ -87,6 +87,7 @@ PICTURES = pa.schema(
         ("exif_orientation", pa.int32()),
         ("damage", pa.string()),
         ("error", pa.string()),
+        ("targets", pa.string()),
     ],
     metadata={"deltille.schema": "deltille/pictures/1"},
 )
@@ -443,6 +444,8 @@ class _Rows:
             "exif_orientation": found.exif_orientation,
             "damage": found.damage,
         }
+        if found.target_identities:
+            picture["targets"] = json.dumps(found.target_identities)
         if reasons:
             picture["why"] = reasons[0]["kind"]
             picture["why_text"] = "; ".join(str(reason) for reason in found.reasons)

@@ -62,6 +62,17 @@ CameraModel: TypeAlias = Literal[
     "kannala-brandt",
 ]
 
+class _Identity(TypedDict):
+    name: str
+    fingerprint: str
+    labels: str
+    panels: int
+    corners: int
+    edge_mm: tuple[float, float]
+
+class TargetIdentity(_Identity, total=False):
+    plan: str
+
 class Candidate(TypedDict):
     model: str
     parameters: int

@@ -55,6 +55,8 @@ use crate::solving::{How, ModelChoice, OneCamera, Seen, named, solve};
 ///     For which the uncertainty of projections is told.
 /// names : sequence of str, optional
 ///     Names of the views.
+/// assume_target : bool, optional
+///     Whether the target is taken even where the detections name another one.
 ///
 /// Returns
 /// -------
@@ -67,7 +69,8 @@ use crate::solving::{How, ModelChoice, OneCamera, Seen, named, solve};
 #[pyfunction]
 #[pyo3(signature = (detections, target = None, model = "radtan", *, camera = None, grid = None, rows = None,
     cols = None, edge_mm = None, hold_out = None, loss = "huber", weights = "covariance", board_shape = false,
-    measure_target = false, shape = None, print_scale = None, distances_mm = None, names = None))]
+    measure_target = false, shape = None, print_scale = None, distances_mm = None, names = None,
+    assume_target = false))]
 #[expect(clippy::too_many_arguments, reason = "keywords")]
 pub fn calibrate(
     py: Python<'_>,
@@ -88,22 +91,23 @@ pub fn calibrate(
     print_scale: Option<&Bound<'_, PyAny>>,
     distances_mm: Option<Vec<f64>>,
     names: Option<Vec<String>>,
+    assume_target: bool,
 ) -> PyResult<Py<Calibration>> {
     let mut how = How::of(loss, weights, hold_out, distances_mm, print_scale)?;
     (how.board_shape, how.measure_target) = (board_shape, measure_target);
+    let target = target.or_else(|| of_detections(&detections.all, grid.is_some()));
+    let seen = Seen::of(target, grid, sides(rows, cols)?, edge_mm)?;
     if let Some(path) = shape {
         let text = Limits::default().read_text(&path).raise_of_file(&path, errors::file)?;
-        let sheet = read_sheet(&text);
+        let sheet = read_sheet(&text, seen.targets());
         let wrong = |error| {
             raised::FileError::new_err(format!("{}: {}", path.display(), errors::told(&error)))
         };
         how.sheet = sheet.map_err(wrong)?;
     }
-    let target = target.or_else(|| of_detections(&detections.all, grid.is_some()));
-    let seen = Seen::of(target, grid, sides(rows, cols)?, edge_mm)?;
     let model = ModelChoice::of(model)?;
     let names = detections.names(names);
-    let detections = named(py, &detections.all, names)?;
+    let detections = named(py, &detections.all, names, assume_target)?;
     let known = camera.map(|camera| camera.0.clone());
     let one = OneCamera { name: "camera".to_owned(), detections, known };
     let solved = solve(py, seen, vec![one], false, model, how)?;
@@ -131,7 +135,7 @@ pub fn of_detections(detections: &[PyRef<'_, Detection>], is_grid: bool) -> Opti
 ///     Cameras that are known and kept.
 /// refine_target : bool, optional
 ///     Whether it is found, too, where the panels are on the target.
-/// hold_out, loss, weights, board_shape, measure_target, print_scale, distances_mm
+/// hold_out, loss, weights, board_shape, measure_target, print_scale, distances_mm, assume_target
 ///     As of :func:`calibrate`.
 ///
 /// Returns
@@ -145,7 +149,7 @@ pub fn of_detections(detections: &[PyRef<'_, Detection>], is_grid: bool) -> Opti
 #[pyfunction]
 #[pyo3(signature = (cameras, target = None, model = "radtan", *, known = None, refine_target = false,
     hold_out = None, loss = "huber", weights = "covariance", board_shape = false, measure_target = false,
-    print_scale = None, distances_mm = None))]
+    print_scale = None, distances_mm = None, assume_target = false))]
 #[expect(clippy::too_many_arguments, reason = "keywords")]
 pub fn rig(
     py: Python<'_>,
@@ -161,6 +165,7 @@ pub fn rig(
     measure_target: bool,
     print_scale: Option<&Bound<'_, PyAny>>,
     distances_mm: Option<Vec<f64>>,
+    assume_target: bool,
 ) -> PyResult<Rig> {
     let wrong = |what: String| Err(raised::CalibrationError::new_err(what));
     let mut how = How::of(loss, weights, hold_out, distances_mm, print_scale)?;
@@ -181,7 +186,7 @@ pub fn rig(
         let detections: Results<'_> = detections.extract()?;
         target = target.or_else(|| of_detections(&detections.all, false));
         let known = known.remove(&name).map(|camera| camera.0.clone());
-        let detections = named(py, &detections.all, None)?;
+        let detections = named(py, &detections.all, None, assume_target)?;
         let is_same = |one: &deltille::detect::Detection, other: &deltille::detect::Detection| {
             !one.grids.is_empty() && one.grids == other.grids
         };

@@ -4,6 +4,7 @@ use std::path::PathBuf;
 use std::sync::Arc;
 
 use deltille::calibrate::{self as solver, Estimate, Reference};
+use deltille::camera::CameraFile;
 use deltille::export::calibration::Residuals;
 use deltille::export::camera::{colmap, colmap_rig, kalibr};
 use deltille::export::saved;
@@ -123,19 +124,19 @@ macro_rules! whole {
             /// path : path-like
             ///     An ``.html`` file.
             /// title : str, optional
-            /// force : bool, optional
+            /// overwrite : bool, optional
             ///     Whether a file of another kind is replaced.
             ///
             /// Returns
             /// -------
             /// pathlib.Path
-            #[pyo3(signature = (path, *, title = None, force = false))]
+            #[pyo3(signature = (path, *, title = None, overwrite = false))]
             fn report(
                 $self: $kind,
                 py: Python<'_>,
                 path: PathBuf,
                 title: Option<&str>,
-                force: bool,
+                overwrite: bool,
             ) -> PyResult<PathBuf> {
                 let solved = $solved.clone();
                 if !solved.is_whole() {
@@ -151,7 +152,7 @@ macro_rules! whole {
                     (page.print, page.models) = (solved.print, &solved.models);
                     page.html()
                 })?;
-                save_text(path, errors::told_in_lines(&page), force)
+                save_text(path, errors::told_in_lines(&page), overwrite)
             }
         }
     };
@@ -191,23 +192,28 @@ impl Calibration {
     ///     poses of the views too.
     /// residuals : bool, optional
     ///     Whether every corner is listed in the ``.json``.
-    /// force : bool, optional
+    /// overwrite : bool, optional
     ///     Whether a file of another kind is replaced.
     ///
     /// Returns
     /// -------
     /// pathlib.Path
-    #[pyo3(signature = (path, format = "json", *, residuals = false, force = false))]
+    #[pyo3(signature = (path, format = "json", *, residuals = false, overwrite = false))]
     fn save(
         slf: PyRef<'_, Self>,
         path: PathBuf,
         format: &str,
         residuals: bool,
-        force: bool,
+        overwrite: bool,
     ) -> PyResult<PathBuf> {
         let own = slf.as_super();
         let text = match format {
             "json" => text_of(&own.solved, residuals)?,
+            "own" => {
+                let camera = own.estimate().camera.clone();
+                let calibrated_with = own.solved.estimate.calibrated_with.clone();
+                CameraFile { camera, calibrated_with }.to_yaml()
+            }
             _ => {
                 let stem = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
                 let camera = own.estimate();
@@ -215,7 +221,7 @@ impl Calibration {
                 own.camera().text(format, &stem, &views.collect::<Vec<_>>())?
             }
         };
-        save_text(path, text, force)
+        save_text(path, text, overwrite)
     }
 
     /// The target with its corners where they were measured; ``None`` where they were not.
@@ -351,14 +357,20 @@ impl Rig {
     ///     ``"json"``, which :meth:`load` reads back, ``"kalibr"``, ``"colmap"`` or ``"colmap-rig"``.
     /// residuals : bool, optional
     ///     Whether every corner is listed in the ``.json``.
-    /// force : bool, optional
+    /// overwrite : bool, optional
     ///     Whether a file of another kind is replaced.
     ///
     /// Returns
     /// -------
     /// pathlib.Path
-    #[pyo3(signature = (path, format = "json", *, residuals = false, force = false))]
-    fn save(&self, path: PathBuf, format: &str, residuals: bool, force: bool) -> PyResult<PathBuf> {
+    #[pyo3(signature = (path, format = "json", *, residuals = false, overwrite = false))]
+    fn save(
+        &self,
+        path: PathBuf,
+        format: &str,
+        residuals: bool,
+        overwrite: bool,
+    ) -> PyResult<PathBuf> {
         let estimate = &self.solved.estimate;
         let cameras = || estimate.cameras.iter();
         let text = match format {
@@ -378,7 +390,7 @@ impl Rig {
                 return Err(raised::CameraError::new_err(what));
             }
         };
-        save_text(path, text, force)
+        save_text(path, text, overwrite)
     }
 
     fn __repr__(&self) -> String {

@@ -130,7 +130,7 @@ impl Camera {
     /// format : str, optional
     ///     ``"own"``, which :meth:`load` reads back for every model, ``"opencv"``, ``"ros"``, ``"kalibr"``,
     ///     ``"colmap"``, ``"nerfstudio"`` or ``"mrcal"``.
-    /// force : bool, optional
+    /// overwrite : bool, optional
     ///     Whether a file of another kind is replaced.
     ///
     /// Returns
@@ -141,10 +141,10 @@ impl Camera {
     /// ------
     /// CameraError
     ///     Where the format has no such lens.
-    #[pyo3(signature = (path, format = "own", *, force = false))]
-    fn save(&self, path: PathBuf, format: &str, force: bool) -> PyResult<PathBuf> {
+    #[pyo3(signature = (path, format = "own", *, overwrite = false))]
+    fn save(&self, path: PathBuf, format: &str, overwrite: bool) -> PyResult<PathBuf> {
         let stem = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
-        save_text(path, self.text(format, &stem, &[])?, force)
+        save_text(path, self.text(format, &stem, &[])?, overwrite)
     }
 
     /// Width of the image, px.
@@ -326,13 +326,13 @@ impl Camera {
 }
 
 /// Writes a file of text whole or not at all.
-pub fn save_text(path: PathBuf, text: String, force: bool) -> PyResult<PathBuf> {
+pub fn save_text(path: PathBuf, text: String, overwrite: bool) -> PyResult<PathBuf> {
     let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty());
     let folder = folder.unwrap_or(std::path::Path::new(".")).to_owned();
     let Some(name) = path.file_name() else {
         return Err(raised::FileError::new_err(format!("{} is not a file name", path.display())));
     };
     let files = [(name.to_string_lossy().into_owned(), text.into_bytes())];
-    write_set(&folder, &files, force).raise_of_file(&path, errors::file)?;
+    write_set(&folder, &files, overwrite).raise_of_file(&path, errors::file)?;
     Ok(path)
 }

@@ -408,19 +408,23 @@ impl Located {
 ///     The target; that of the detection if left out.
 /// print_scale : float or (float, float), optional
 ///     Measured over stated length of the check bars, across and up the sheet.
+/// assume_target : bool, optional
+///     Whether the target is taken even where the detection names another one.
 ///
 /// Returns
 /// -------
 /// Located
 ///     Where there is no pose, :attr:`Located.why` says why.
 #[pyfunction]
-#[pyo3(name = "pose", signature = (detection, camera, target = None, *, print_scale = None))]
+#[pyo3(name = "pose", signature = (detection, camera, target = None, *, print_scale = None,
+    assume_target = false))]
 pub fn pose_of(
     py: Python<'_>,
     detection: PyRef<'_, Detection>,
     camera: PyRef<'_, Camera>,
     target: Option<Targets>,
     print_scale: Option<&Bound<'_, PyAny>>,
+    assume_target: bool,
 ) -> PyResult<Located> {
     let targets = target.map_or_else(|| detection.targets.clone(), |targets| targets.0);
     let wrong = |what: &str| Err(raised::CalibrationError::new_err(what.to_owned()));
@@ -431,7 +435,15 @@ pub fn pose_of(
         };
     };
     let print_scale = print_scale.map(print_scale_of).transpose()?;
-    let (detection, camera, target) = (detection.clone(), camera.clone(), target.clone());
+    let mut detection = detection.clone();
+    let reference = Reference::Target(&target.target);
+    if assume_target {
+        Arc::make_mut(&mut detection.found).forget_targets();
+    }
+    for grid in &detection.found.grids {
+        reference.check_labels(&detection.found, grid).raise(errors::calibration)?;
+    }
+    let (camera, target) = (camera.clone(), target.clone());
     Asked { detection, camera, target, print_scale }.located(py)
 }
 

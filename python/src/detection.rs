@@ -128,11 +128,24 @@ impl Detection {
         found.map(|found| &*found.target)
     }
 
+    /// A detection with its targets, which are taken even where it names others if they are assumed.
+    fn of(
+        mut found: detect::Detection,
+        targets: Vec<Target>,
+        assume_target: bool,
+    ) -> PyResult<Self> {
+        if assume_target {
+            found.forget_targets();
+        }
+        Self { found: Arc::new(found), targets }.checked()
+    }
+
     /// The same, where its labels are those of its targets: of others they would be places that were never seen.
     fn checked(self) -> PyResult<Self> {
         let labelled = self.found.grids.iter().filter(|grid| grid.panel.is_some());
         for (grid, target) in labelled.filter_map(|grid| Some((grid, self.target_of(grid)?))) {
-            Reference::Target(target).check_labels(grid).raise(errors::detection)?;
+            let reference = Reference::Target(target);
+            reference.check_labels(&self.found, grid).raise(errors::detection)?;
         }
         Ok(self)
     }
@@ -281,27 +294,29 @@ impl Detection {
     /// path : path-like
     /// target : Target or sequence of Target, optional
     ///     What was looked for, from which :attr:`object_points` come.
+    /// assume_target : bool, optional
+    ///     Whether the target is taken even where the file names another one.
     ///
     /// Returns
     /// -------
     /// Detection
     #[staticmethod]
-    #[pyo3(signature = (path, *, target = None))]
-    fn load(path: PathBuf, target: Option<Targets>) -> PyResult<Self> {
+    #[pyo3(signature = (path, *, target = None, assume_target = false))]
+    fn load(path: PathBuf, target: Option<Targets>, assume_target: bool) -> PyResult<Self> {
         let text = Limits::default().read_text(&path).raise_of_file(&path, errors::file)?;
         let wrong = |error: PyErr| {
             let what = format!("{}: {}", path.display(), error);
             raised::FileError::new_err(what.replace("DetectionError: ", ""))
         };
-        Self::from_json(&text, target).map_err(wrong)
+        Self::from_json(&text, target, assume_target).map_err(wrong)
     }
 
     /// The detection of a text, as :meth:`load` reads it from files.
     #[staticmethod]
-    #[pyo3(signature = (text, *, target = None))]
-    fn from_json(text: &str, target: Option<Targets>) -> PyResult<Self> {
-        let found = Arc::new(detection::read(text).raise(errors::detection)?);
-        Self { found, targets: target.map(|targets| targets.0).unwrap_or_default() }.checked()
+    #[pyo3(signature = (text, *, target = None, assume_target = false))]
+    fn from_json(text: &str, target: Option<Targets>, assume_target: bool) -> PyResult<Self> {
+        let found = detection::read(text).raise(errors::detection)?;
+        Self::of(found, target.map(|targets| targets.0).unwrap_or_default(), assume_target)
     }
 
     /// The text that ``deltille detect`` writes.
@@ -316,14 +331,14 @@ impl Detection {
     /// path : path-like
     /// format : str, optional
     ///     ``"json"``, which :meth:`load` reads back, ``"csv"`` or ``"orpc"``.
-    /// force : bool, optional
+    /// overwrite : bool, optional
     ///     Whether a file of another kind is replaced.
     ///
     /// Returns
     /// -------
     /// pathlib.Path
-    #[pyo3(signature = (path, format = "json", *, force = false))]
-    fn save(&self, path: PathBuf, format: &str, force: bool) -> PyResult<PathBuf> {
+    #[pyo3(signature = (path, format = "json", *, overwrite = false))]
+    fn save(&self, path: PathBuf, format: &str, overwrite: bool) -> PyResult<PathBuf> {
         let target = self.targets.first().map(|target| &*target.target);
         let text = match format {
             "json" => detection::write(&self.found),
@@ -334,7 +349,7 @@ impl Detection {
                 return Err(raised::DetectionError::new_err(what));
             }
         };
-        save_text(path, text, force)
+        save_text(path, text, overwrite)
     }
 
     /// Name of the picture.
@@ -414,6 +429,13 @@ impl Detection {
         self.found.ink.map(|ink| record(py, &ink)).transpose()
     }
 
+    /// The targets that were looked for, by which results of different targets are told apart: ``name``, ``fingerprint``,
+    /// ``labels``, ``panels``, ``corners`` and ``edge_mm`` of each; empty where they are not known.
+    #[getter]
+    fn target_identities<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        record(py, &self.found.targets)
+    }
+
     /// How EXIF says that the pixels are to be turned for a viewer, 2 to 8; ``None`` if not at all.
     #[getter]
     fn exif_orientation(&self) -> Option<u8> {
@@ -490,7 +512,11 @@ type Row = (String, Option<Detection>, Option<String>);
 
 /// Detections from tables: Parquet files, or the folders that hold them.
 #[pyfunction]
-pub fn _tables(paths: Vec<PathBuf>, targets: Option<Targets>) -> PyResult<Vec<Row>> {
+pub fn _tables(
+    paths: Vec<PathBuf>,
+    targets: Option<Targets>,
+    assume_target: bool,
+) -> PyResult<Vec<Row>> {
     let mut files = Vec::new();
     let first = paths.first().cloned().unwrap_or_default();
     for path in paths {
@@ -505,8 +531,8 @@ pub fn _tables(paths: Vec<PathBuf>, targets: Option<Targets>) -> PyResult<Vec<Ro
     let targets = targets.map(|targets| targets.0).unwrap_or_default();
     let row = |picture: Picture| match picture.found {
         Ok(found) => {
-            let found = Detection { found: Arc::new(found), targets: targets.clone() };
-            Ok((picture.image, Some(found.checked()?), None))
+            let found = Detection::of(found, targets.clone(), assume_target)?;
+            Ok((picture.image, Some(found), None))
         }
         Err(why) => Ok((picture.image, None, Some(why))),
     };

@@ -103,15 +103,15 @@ impl Family {
     /// Parameters
     /// ----------
     /// path : path-like
-    /// force : bool, optional
+    /// overwrite : bool, optional
     ///     Whether a file of another kind is replaced.
     ///
     /// Returns
     /// -------
     /// pathlib.Path
-    #[pyo3(signature = (path, *, force = false))]
-    fn save(&self, path: PathBuf, force: bool) -> PyResult<PathBuf> {
-        crate::camera::save_text(path, self.to_json(), force)
+    #[pyo3(signature = (path, *, overwrite = false))]
+    fn save(&self, path: PathBuf, overwrite: bool) -> PyResult<PathBuf> {
+        crate::camera::save_text(path, self.to_json(), overwrite)
     }
 
     /// Its name.

@@ -140,6 +140,8 @@ impl NextView {
 ///     Distances at which the board can be held and is in focus.
 /// avoid : sequence of NextView, optional
 ///     Views that cannot be taken.
+/// assume_target : bool, optional
+///     As of :func:`calibrate`.
 ///
 /// Returns
 /// -------
@@ -151,7 +153,7 @@ impl NextView {
 ///     Where the size of the pictures is not known, or detections do not belong to the target.
 #[pyfunction]
 #[pyo3(signature = (detections, target = None, model = "radtan", *, size_px = None, camera = None,
-    nearest_mm = None, farthest_mm = None, avoid = None))]
+    nearest_mm = None, farthest_mm = None, avoid = None, assume_target = false))]
 #[expect(clippy::too_many_arguments, reason = "keywords")]
 pub fn next_view(
     py: Python<'_>,
@@ -163,6 +165,7 @@ pub fn next_view(
     nearest_mm: Option<f64>,
     farthest_mm: Option<f64>,
     avoid: Option<Vec<PyRef<'_, NextView>>>,
+    assume_target: bool,
 ) -> PyResult<NextView> {
     let wrong = |what: &str| raised::CalibrationError::new_err(what.to_owned());
     let target = target.or_else(|| of_detections(&detections.all, false));
@@ -197,7 +200,7 @@ pub fn next_view(
     let avoided: Vec<deltille::calibrate::NextView> =
         avoid.unwrap_or_default().iter().map(|view| view.next.clone()).collect();
     let guide = guide.within_mm(nearest, farthest).avoiding(&avoided);
-    let detections = named(py, &detections.all, None)?;
+    let detections = named(py, &detections.all, None, assume_target)?;
     let reference = Reference::Target(target);
     let shown = views(&detections, &reference).raise(errors::calibration)?.views;
     let Guided { next, .. } = unlocked(py, || guide.after(&reference, &shown))?;

@@ -182,6 +182,7 @@ pub fn named(
     py: Python<'_>,
     detections: &[PyRef<'_, Detection>],
     names: Option<Vec<String>>,
+    assume_target: bool,
 ) -> PyResult<Named> {
     if names.as_ref().is_some_and(|names| names.len() != detections.len()) {
         let what = "names: give as many as there are detections";
@@ -203,7 +204,11 @@ pub fn named(
             PyErr::warn(py, &py.get_type::<PyUserWarning>(), what, 2)?;
             continue;
         }
-        all.push((name, (**found).clone()));
+        let mut found = (**found).clone();
+        if assume_target {
+            found.forget_targets();
+        }
+        all.push((name, found));
     }
     Ok(all)
 }

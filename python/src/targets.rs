@@ -104,6 +104,13 @@ impl Target {
         &self.target.name
     }
 
+    /// What tells this target from others, whatever it is called and printed on: ``name``, ``fingerprint``, ``labels``,
+    /// ``panels``, ``corners`` and ``edge_mm``; of a measured or refined target also ``plan``, the fingerprint of its print.
+    #[getter]
+    fn identity<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        crate::detection::record(py, &self.target.identity())
+    }
+
     /// Places of all corners in the target's frame, N × 3, float64, mm: where they were measured, else as planned.
     #[getter]
     fn corners<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray2<f64>> {
@@ -279,7 +286,7 @@ impl Target {
     ///     Of those of :meth:`files`; PDF if left out. The ``.json`` is always written.
     /// dpi, texture_dpi, texture_px, textures, plate_mm, inlay_mm, kerf_mm
     ///     As of :meth:`files`.
-    /// force : bool, optional
+    /// overwrite : bool, optional
     ///     Whether files of another kind are replaced.
     ///
     /// Returns
@@ -287,7 +294,7 @@ impl Target {
     /// list of pathlib.Path
     ///     The files, the description first.
     #[pyo3(signature = (folder, formats = None, *, dpi = 300.0, texture_dpi = None, texture_px = None, textures = None,
-        plate_mm = None, inlay_mm = None, kerf_mm = None, force = false))]
+        plate_mm = None, inlay_mm = None, kerf_mm = None, overwrite = false))]
     #[expect(clippy::too_many_arguments, reason = "keywords")]
     fn save(
         &self,
@@ -301,7 +308,7 @@ impl Target {
         plate_mm: Option<f64>,
         inlay_mm: Option<f64>,
         kerf_mm: Option<f64>,
-        force: bool,
+        overwrite: bool,
     ) -> PyResult<Vec<PathBuf>> {
         let given =
             Keywords { dpi, texture_dpi, texture_px, textures, plate_mm, inlay_mm, kerf_mm };
@@ -317,7 +324,7 @@ impl Target {
                     }
                 }
             }
-            write_set(&folder, &files, force).raise_of_file(&folder, errors::file)
+            write_set(&folder, &files, overwrite).raise_of_file(&folder, errors::file)
         })?
     }
 

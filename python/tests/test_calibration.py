@@ -223,3 +223,31 @@ def test_labels_of_another_target_are_refused(detections):
     other = deltille.Board(9, 8, edge_mm=20)
     with pytest.raises(deltille.DetectionError, match="the target does not belong to this detection"):
         deltille.Detection.from_json(detections[0].to_json(), target=other)
+
+
+def test_a_board_of_another_size_is_refused(tmp_path, board, camera, detections, calibration):
+    larger = deltille.Board(7, 8, edge_mm=25, name="desk")
+    own, other = board.identity, larger.identity
+    assert own["labels"] == other["labels"] and own["fingerprint"] != other["fingerprint"]
+    assert [found["fingerprint"] for found in detections[0].target_identities] == [own["fingerprint"]]
+    for found in detections[:3]:
+        found.save(tmp_path / f"{found.image}.json")
+    calibration.save(tmp_path / "camera" / "camera.json")
+    sizes = r"edges of 20 mm\).*edges of 25 mm\)"
+    for call in (
+        lambda **keywords: deltille.calibrate(detections, larger, **keywords),
+        lambda **keywords: deltille.rig({"a": detections}, larger, refine_target=True, **keywords),
+        lambda **keywords: deltille.next_view(detections, larger, **keywords),
+        lambda **keywords: deltille.pose(detections[0], camera, larger, **keywords),
+        lambda **keywords: deltille.load_detections(tmp_path, larger, **keywords),
+        lambda **keywords: deltille.Detection.load(tmp_path / "0.png.json", target=larger, **keywords),
+    ):
+        with pytest.raises(deltille.Error, match=sizes + ".*assume_target=True"):
+            call()
+        call(assume_target=True)
+    with pytest.raises(deltille.Error, match=sizes):
+        deltille.Calibration.load(tmp_path / "camera" / "camera.json", target=larger)
+    wrong = deltille.calibrate(detections, larger, assume_target=True)
+    with pytest.raises(deltille.CalibrationError, match=sizes + ".*assume_target=True"):
+        deltille.compare(calibration, wrong)
+    assert deltille.compare(calibration, wrong, assume_target=True).rms_px < 1e-3

@@ -60,7 +60,17 @@ def test_a_target_is_read_back(tmp_path, board):
     (tmp_path / "made/desk.pdf").write_bytes(b"something else")
     with pytest.raises(deltille.FileError, match="would be lost"):
         board.save(tmp_path / "made")
-    board.save(tmp_path / "made", force=True)
+    board.save(tmp_path / "made", overwrite=True)
+
+
+def test_the_description_of_another_board_is_kept(tmp_path, board):
+    board.save(tmp_path)
+    larger = deltille.Board(7, 8, edge_mm=25, name="desk")
+    with pytest.raises(deltille.FileError, match=r"edges of 20 mm\), whose prints need it: .* or `overwrite` it"):
+        larger.save(tmp_path)
+    assert deltille.Target.load(tmp_path / "desk.json") == board
+    larger.save(tmp_path, overwrite=True)
+    assert deltille.Target.load(tmp_path / "desk.json") == larger
 
 
 def test_what_is_printed_is_proved_in_memory(board):

@@ -26,6 +26,7 @@ pub mod camera;
 mod clock;
 pub mod detect;
 pub mod family;
+mod identity;
 pub mod json;
 pub mod lattice;
 pub mod name;

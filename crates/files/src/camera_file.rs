@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use deltille_core::camera::{Camera, CameraFileError};
+use deltille_core::camera::{Camera, CameraFile, CameraFileError};
 use deltille_core::json;
 
 use crate::export::staging;
@@ -36,11 +36,19 @@ pub enum CameraReadError {
     },
 }
 
+/// Reads the camera of a camera file, see [`read_with_targets`].
+///
+/// # Errors
+/// The same.
+pub fn read(path: &Path) -> Result<Camera, CameraReadError> {
+    read_with_targets(path).map(|file| file.camera)
+}
+
 /// Reads a camera file: one of ours, of ROS or OpenCV. What killed runs have left in its folder is put in order before.
 ///
 /// # Errors
 /// Where the file cannot be read, or holds no camera.
-pub fn read(path: &Path) -> Result<Camera, CameraReadError> {
+pub fn read_with_targets(path: &Path) -> Result<CameraFile, CameraReadError> {
     let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty());
     staging::settle(folder.unwrap_or(Path::new("."))).map_err(CameraReadError::Settle)?;
     let text = Limits::default().read_text(path)?;
@@ -51,5 +59,5 @@ pub fn read(path: &Path) -> Result<Camera, CameraReadError> {
         return Err(ReadError::TooLong { path: path.to_owned(), most: MAX_SETTINGS_BYTES }.into());
     }
     let yaml = |error| CameraReadError::Yaml { path: path.to_owned(), error };
-    Camera::from_yaml(&text).map_err(yaml)
+    CameraFile::from_yaml(&text).map_err(yaml)
 }

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use deltille_core::family::{Family, PAIRS_COUNTED, certify_codes};
 use deltille_core::lattice::GridKind;
-use deltille_core::targets::{FamilyRef, OtherFamily, Target, TargetFileError};
+use deltille_core::targets::{FamilyRef, OtherFamily, Target, TargetFileError, TargetIdentity};
 
 use crate::export::dsc::{self, DscError};
 use crate::export::staging;
@@ -70,6 +70,14 @@ pub fn read(path: &Path, limits: &Limits) -> Result<Target, TargetReadError> {
         return target.map_err(|error| TargetReadError::Dsc { path: path_of(), error });
     }
     Target::from_json(&text).map_err(|error| TargetReadError::Json { path: path_of(), error })
+}
+
+/// The board that a description at a path describes, where a new text of the file would not describe its prints: they would
+/// be of no use any more. `None` where there is no such description, or the new text is not one of a target.
+pub fn lost_board(path: &Path, new: &[u8]) -> Option<TargetIdentity> {
+    let new = Target::from_json(std::str::from_utf8(new).ok()?).ok()?;
+    let there = Target::from_json(&Limits::default().read_text(path).ok()?).ok()?;
+    (!new.has_prints_of(&there)).then(|| there.identity())
 }
 
 /// Why the family of a target cannot be had.

@@ -63,7 +63,9 @@ pub fn detection(file: File) -> bool {
 }
 
 pub fn sheet(file: File) -> bool {
-    let Some(Ok(sheet)) = file.text().map(calibration::read_sheet) else { return false };
+    let Some(Ok(sheet)) = file.text().map(|text| calibration::read_sheet(text, &[])) else {
+        return false;
+    };
     assert_finite(sheet.print_scale.into_iter().flatten());
     true
 }

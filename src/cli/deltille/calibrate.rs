@@ -15,13 +15,14 @@ use super::camera_file;
 use super::files::{File, check_places, same_file, sample_of, text_file, write_all};
 use super::page::check_images;
 use super::sightings::{Sightings, SightingsArgs};
-use crate::calibrate::{Calibration, CameraEstimate, Estimate, Intrinsics, Source};
-use crate::camera::{Camera, Lens, PROJECTION_PARAMETERS, Pose, SplineGrid};
+use crate::calibrate::{Calibration, CameraEstimate, Estimate, Intrinsics, Reference, Source};
+use crate::camera::{Camera, CameraFile, Lens, PROJECTION_PARAMETERS, Pose, SplineGrid};
 use crate::cli::output::{self, Overwrite, tell};
 use crate::cli::run::{FAILED, report};
 use crate::cli::wording::in_options;
 use crate::export::calibration;
 use crate::export::camera::{FormatError, colmap, kalibr, mrcal, nerfstudio, opencv, ros};
+use crate::targets::TargetIdentity;
 use crate::words::{counted, places, shown};
 
 /// Correlations from here on are told: such parameters are hardly told apart.
@@ -90,10 +91,10 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
             path.display()
         );
     }
-    let intrinsics = args.intrinsics()?;
+    let (intrinsics, known_with) = args.intrinsics()?;
     let folder = output::folder_of(&path);
     let sample = sample(&intrinsics);
-    let (planned, refused) = args.files(&stem, &sample, &[], &sample_of(calibration::SCHEMA));
+    let (planned, refused) = args.files(&stem, &sample, &[], &[], &sample_of(calibration::SCHEMA));
     if let (true, Some(refused)) = (planned.is_empty(), refused.into_iter().next()) {
         return Err(refused).context("--format");
     }
@@ -104,13 +105,22 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let Sightings { views, panels, target, empty, left_out, print } =
         args.sightings.read(measure)?;
     ensure!(!views.is_empty(), "no board of this kind in {}", counted(empty.len(), "picture"));
+    if let (Some(known), Some(target), false) =
+        (&args.fixed_intrinsics, &target, args.sightings.assumes_target())
+    {
+        camera_file::check_targets(known, &known_with, std::slice::from_ref(target))?;
+    }
     for picture in &empty {
         tell!("{}: no board, left out", picture.display());
     }
     if let Some(folder) = &args.images {
         check_images(folder, &views)?;
     }
-    let mut calibration = Calibration::new(panels).camera(&stem, views, intrinsics);
+    let calibration = match &target {
+        Some(target) => Calibration::of(&Reference::Target(target), panels),
+        None => Calibration::new(panels),
+    };
+    let mut calibration = calibration.camera(&stem, views, intrinsics);
     let tried = match args.model {
         Some(model) => model.choose(&mut calibration, 0)?,
         None => Vec::new(),
@@ -135,7 +145,11 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         let json = calibration::write(estimate, diagnoses, *print, args.solve.residuals());
         let json = json.unwrap_or_default();
         let views = views.collect::<Vec<_>>();
-        (files, refused) = args.files(&stem, &camera.camera, &views, &in_options(&json));
+        let of_camera = match camera.model {
+            Some(_) => &estimate.calibrated_with,
+            None => &known_with,
+        };
+        (files, refused) = args.files(&stem, &camera.camera, of_camera, &views, &in_options(&json));
     }
     files.extend(solved.measured(&stem, target.as_ref()));
     let mut written = write_all(folder, &files, args.overwrite)?;
@@ -159,13 +173,14 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
 }
 
 impl Args {
-    /// What is known of the camera.
-    fn intrinsics(&self) -> anyhow::Result<Intrinsics> {
-        let known = self.fixed_intrinsics.as_deref();
-        let known = known.map(|path| camera_file::read("--fixed-intrinsics", path)).transpose()?;
+    /// What is known of the camera, and the targets that it was calibrated with.
+    fn intrinsics(&self) -> anyhow::Result<(Intrinsics, Vec<TargetIdentity>)> {
+        if let Some(path) = &self.fixed_intrinsics {
+            let known = camera_file::read_with_targets("--fixed-intrinsics", path)?;
+            return Ok((Intrinsics::Known(known.camera), known.calibrated_with));
+        }
         let sought = self.model.map(|model| Intrinsics::Unknown(model.richest()));
-        let known = known.map(Intrinsics::Known).or(sought);
-        known.context("give --model, or --fixed-intrinsics")
+        Ok((sought.context("give --model, or --fixed-intrinsics")?, Vec::new()))
     }
 
     /// The files of a camera in all formats asked for, and why there are not all; `json` is the text that tells all.
@@ -173,12 +188,13 @@ impl Args {
         &self,
         stem: &str,
         camera: &Camera,
+        calibrated_with: &[TargetIdentity],
         views: &[(&str, Pose)],
         json: &str,
     ) -> (Vec<File>, Vec<FormatError>) {
         let (mut files, mut refused) = (Vec::new(), Vec::new());
         for format in &self.format {
-            match format.texts(stem, camera, views, json) {
+            match format.texts(stem, camera, calibrated_with, views, json) {
                 Ok(texts) => {
                     files.extend(texts.into_iter().map(|(name, text)| text_file(name, text)))
                 }
@@ -195,13 +211,16 @@ impl Format {
         self,
         stem: &str,
         camera: &Camera,
+        calibrated_with: &[TargetIdentity],
         views: &[(&str, Pose)],
         json: &str,
     ) -> Result<Vec<(String, String)>, FormatError> {
         let named = |end: &str, text: String| (format!("{stem}{end}"), text);
         Ok(match self {
             Self::Own => {
-                vec![named(".yaml", camera.to_yaml()), named(".json", json.to_owned())]
+                let (camera, calibrated_with) = (camera.clone(), calibrated_with.to_vec());
+                let yaml = CameraFile { camera, calibrated_with }.to_yaml();
+                vec![named(".yaml", yaml), named(".json", json.to_owned())]
             }
             Self::Opencv => vec![named("-opencv.yaml", opencv(camera)?)],
             Self::Ros => vec![named("-ros.yaml", ros(camera, stem)?)],

@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
-use anyhow::{Context, ensure};
+use anyhow::{Context, anyhow, ensure};
 use glam::DVec2;
 
 use super::calibrating::distance;
@@ -17,6 +17,7 @@ use crate::cli::run::FAILED;
 use crate::export::{comparison, saved};
 use crate::limits::Limits;
 use crate::report::comparison_svg;
+use crate::targets::{TargetIdentity, check_same_board};
 use crate::words::{counted, shown};
 
 /// Arguments of `deltille compare`.
@@ -41,6 +42,9 @@ pub struct Args {
     /// Write the comparison, and a picture of the same name of each camera
     #[arg(short, long, value_name = "FILE.json")]
     output: Option<PathBuf>,
+    /// Compare even where both were calibrated with the same tags at different sizes
+    #[arg(long)]
+    assume_target: bool,
     #[command(flatten)]
     overwrite: Overwrite,
 }
@@ -67,7 +71,13 @@ fn tolerance(text: &str) -> Result<f64, String> {
 pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let path = args.output.as_deref().map(|path| output::file(path, "comparison", "json"));
     let path = path.transpose()?;
-    let (first, second) = (read("FIRST", &args.first)?, read("SECOND", &args.second)?);
+    let (first, first_with) = read("FIRST", &args.first)?;
+    let (second, second_with) = read("SECOND", &args.second)?;
+    if !args.assume_target {
+        let [one, other] = [&args.first, &args.second].map(|path| path.display().to_string());
+        check_same_board([&one, &other], [&first_with, &second_with])
+            .map_err(|problem| anyhow!(problem))?;
+    }
     let pairs = pairs(&first, &second)?;
     if let Some(path) = &path {
         let json = sample_of(comparison::SCHEMA);
@@ -114,16 +124,20 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     Ok(if has_changed { ExitCode::from(FAILED) } else { ExitCode::SUCCESS })
 }
 
-/// The cameras of a calibration or rig, or the one of a camera file.
-fn read(option: &'static str, path: &Path) -> anyhow::Result<Vec<CameraEstimate>> {
+/// The cameras of a calibration or rig, or the one of a camera file, and the targets that they were calibrated with.
+fn read(
+    option: &'static str,
+    path: &Path,
+) -> anyhow::Result<(Vec<CameraEstimate>, Vec<TargetIdentity>)> {
     let is_json = path.extension().is_some_and(|end| end.eq_ignore_ascii_case("json"));
     if !is_json {
-        let camera = camera_file::read(option, path)?;
-        return Ok(vec![CameraEstimate::given("", camera)]);
+        let file = camera_file::read_with_targets(option, path)?;
+        return Ok((vec![CameraEstimate::given("", file.camera)], file.calibrated_with));
     }
     let text = Limits::default().read_text(path).context(option)?;
-    let cameras = saved::read_cameras(&text);
-    cameras.with_context(|| format!("{option}: {}", path.display()))
+    let found = saved::read_without_target(&text);
+    let found = found.with_context(|| format!("{option}: {}", path.display()))?;
+    Ok((found.cameras, found.calibrated_with))
 }
 
 /// The same cameras of both.

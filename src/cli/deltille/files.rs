@@ -4,7 +4,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::rc::Rc;
 
-use anyhow::{Context, anyhow, ensure};
+use anyhow::{Context, anyhow, bail, ensure};
 
 use crate::artwork::Artwork;
 use crate::cli::interrupt;
@@ -13,6 +13,7 @@ use crate::cli::run::{Interrupted, message};
 use crate::export::kind::Kind;
 use crate::export::staging::{Staging, same_content};
 use crate::export::{ExportError, atomic, pdf, png, sheet_file_name, svg};
+use crate::target_file::lost_board;
 use crate::targets;
 
 /// Writes one file to a path.
@@ -135,6 +136,9 @@ pub fn write_all(
     check_interrupt()?;
     // Drawing takes a while, and what is there may have changed.
     check_places(folder, files, overwrite)?;
+    for file in files.iter().filter(|_| !overwrite.is_forced()) {
+        file.check_board(folder, &staged)?;
+    }
     let names: Vec<&str> = files.iter().map(|file| file.name.as_str()).collect();
     let replaced = files.iter().filter_map(|file| file.replaced(folder, &staged, &names));
     let mut replaced: Vec<String> = replaced.collect();
@@ -155,8 +159,24 @@ fn check_interrupt() -> anyhow::Result<()> {
 }
 
 impl File {
-    /// What is to be said where this is a description that takes the place of another target's: files
-    /// of that one may be left beside it.
+    /// Refuses to replace the description of another board, without which its prints are of no use.
+    fn check_board(&self, folder: &Path, staged: &Path) -> anyhow::Result<()> {
+        if self.kind != Kind::of_schema(targets::SCHEMA) {
+            return Ok(());
+        }
+        let path = folder.join(&self.name);
+        let new = fs::read(staged.join(&self.name)).unwrap_or_default();
+        match lost_board(&path, &new) {
+            Some(board) => bail!(
+                "{} describes another board, {board}, whose prints need it: keep both by another --name or -o, or \
+                 replace it with --force",
+                path.display()
+            ),
+            None => Ok(()),
+        }
+    }
+
+    /// A warning where this description replaces one that differs: files of the earlier target may remain beside it.
     fn replaced(&self, folder: &Path, staged: &Path, written: &[&str]) -> Option<String> {
         let path = folder.join(&self.name);
         let is_other = self.kind == Kind::of_schema(targets::SCHEMA)
@@ -164,11 +184,11 @@ impl File {
             && !same_content(&path, &staged.join(&self.name));
         let stem = self.name.strip_suffix(".json").filter(|_| is_other)?;
         let left = own_left(folder, written, |name| is_of_target(name, stem));
-        let line = format!("{}: takes the place of a target that differs", path.display());
+        let line = format!("{}: replaced a description that differed", path.display());
         Some(match left.len() {
             0 => line,
             _ => format!(
-                "{line}; still of that one beside it: {}: remove them, or write them anew",
+                "{line}; files of the earlier one remain beside it: {}: remove them, or write them again",
                 left.join(", ")
             ),
         })

@@ -76,6 +76,9 @@ pub struct Args {
     /// photograph
     #[arg(long, value_name = "FILE")]
     picture: Option<PathBuf>,
+    /// Use --target even where the camera was calibrated with the same tags at another size
+    #[arg(long)]
+    assume_target: bool,
     #[command(flatten)]
     sheet: SheetArgs,
     /// Family file, where the target names a family that is not shipped
@@ -109,12 +112,14 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         "--target: {} are boards that lie about: give the file of one of them",
         counted(target.panels.len(), "panel")
     );
-    let sheet = args.sheet.read(&limits)?;
+    let sheet = args.sheet.read(&limits, std::slice::from_ref(&target))?;
     let panels = sightings::panels(&reference, &sheet)?;
     let detector = Detector::for_targets(&[(&target, family.as_ref())], DetectorConfig::default());
     let detector = detector.context("--target")?;
-    let near =
-        args.camera.as_deref().map(|path| camera_file::read("--camera", path)).transpose()?;
+    let near = args.camera.as_deref().map(|path| {
+        camera_file::read_for("--camera", path, std::slice::from_ref(&target), args.assume_target)
+    });
+    let near = near.transpose()?;
     let (intrinsics, size) = args.intrinsics(near)?;
     if let (Some(nearest), Some(farthest)) = (args.nearest, args.farthest) {
         ensure!(nearest < farthest, "--nearest: must be less than --farthest");

@@ -35,6 +35,9 @@ pub struct Args {
     /// The camera, as `deltille calibrate`, ROS or OpenCV write it
     #[arg(long, value_name = "FILE")]
     camera: PathBuf,
+    /// Use --target even where the camera was calibrated with the same tags at another size
+    #[arg(long)]
+    assume_target: bool,
     #[command(flatten)]
     sheet: SheetArgs,
     /// Family file, where the target names a family that is not shipped
@@ -57,14 +60,14 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let limits = args.limits.limits();
     let targets = target_file::read_all(&args.target, &limits).context("--target")?;
     let families = target_file::families(&targets, args.family.as_deref())?;
-    let sheet = args.sheet.read(&limits)?;
+    let sheet = args.sheet.read(&limits, &targets)?;
     if let [_, _, ..] = targets.as_slice() {
         // Refuses what is known of one sheet alone.
         sightings::panels(&Reference::Scene(&targets), &sheet)?;
     }
     let each = targets.iter().zip(families.iter().map(Option::as_ref)).collect::<Vec<_>>();
     let detector = Detector::for_targets(&each, DetectorConfig::default()).context("--target")?;
-    let camera = camera_file::read("--camera", &args.camera)?;
+    let camera = camera_file::read_for("--camera", &args.camera, &targets, args.assume_target)?;
     let finder = Finder { detector, camera, targets, sheet, limits };
     let path =
         args.output.as_ref().map(|path| output::file(path, "poses", "ndjson")).transpose()?;

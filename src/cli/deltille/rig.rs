@@ -18,7 +18,7 @@ use super::{camera_file, sightings, target_file};
 use crate::calibrate::{
     Calibration, CameraViews, Estimate, Excluded, Intrinsics, Reference, TargetMap,
 };
-use crate::camera::{Camera, Pose};
+use crate::camera::{Camera, CameraFile, Pose};
 use crate::cli::output::{Overwrite, check_folder, fixed, say, tell};
 use crate::cli::run::{FAILED, report};
 use crate::cli::wording::in_options;
@@ -47,6 +47,9 @@ pub struct Args {
     /// A camera that is known already and kept, with its file
     #[arg(long, value_name = "NAME=FILE", value_parser = named)]
     known: Vec<(String, PathBuf)>,
+    /// Use --target even where the detections, or the camera, name another target
+    #[arg(long)]
+    assume_target: bool,
     #[command(flatten)]
     sheet: SheetArgs,
     /// Find where the target's panels are on it, and write that as <target>-refined.json
@@ -105,16 +108,17 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         [only] => Reference::Target(only),
         several => Reference::Scene(several),
     };
-    let sheet = args.sheet.read(&limits)?;
+    let sheet = args.sheet.read(&limits, &targets)?;
     let panels = sightings::panels(&reference, &sheet)?;
-    let cameras = args.camera.iter().map(|(name, _)| args.intrinsics(name));
+    let cameras = args.camera.iter().map(|(name, _)| args.intrinsics(name, &targets));
     let cameras = cameras.collect::<anyhow::Result<Vec<Intrinsics>>>()?;
     args.check_files(&cameras, &targets)?;
     let page = args.solve.page("rig", args.overwrite)?;
     let mut calibration = Calibration::of(&reference, panels).refine_panels(args.refine_target);
     let (mut left_out, mut ink, mut seen) = (Vec::new(), Vec::new(), Vec::new());
     for ((name, folder), intrinsics) in args.camera.iter().zip(cameras) {
-        let read = sightings::read(std::slice::from_ref(folder), &reference, &limits);
+        let read =
+            sightings::read(std::slice::from_ref(folder), &reference, &limits, args.assume_target);
         let sightings::Read { mut views, left_out: out, ink: of_camera, detections, .. } =
             read.with_context(|| format!("--camera {name}"))?;
         check_own(name, &detections, &seen)?;
@@ -179,8 +183,9 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
 
 impl Args {
     /// What is known of a camera.
-    fn intrinsics(&self, name: &str) -> anyhow::Result<Intrinsics> {
-        let known = of_name(&self.known, name).map(|path| camera_file::read("--known", path));
+    fn intrinsics(&self, name: &str, targets: &[Target]) -> anyhow::Result<Intrinsics> {
+        let known = of_name(&self.known, name)
+            .map(|path| camera_file::read_for("--known", path, targets, self.assume_target));
         let known = known.transpose()?.map(Intrinsics::Known);
         Ok(known.unwrap_or(Intrinsics::Unknown(self.model.richest())))
     }
@@ -208,7 +213,12 @@ impl Args {
         let mut refused = Vec::new();
         let mut files = vec![text_file("rig.json".to_owned(), json.to_owned())];
         for (name, camera, _) in cameras {
-            files.push(text_file(format!("{name}.yaml"), camera.to_yaml()));
+            let camera = (*camera).clone();
+            // A camera that was given was calibrated elsewhere.
+            let is_known = of_name(&self.known, name).is_some();
+            let calibrated_with = if is_known { Vec::new() } else { found.calibrated_with.clone() };
+            let yaml = CameraFile { camera, calibrated_with }.to_yaml();
+            files.push(text_file(format!("{name}.yaml"), yaml));
         }
         for format in &self.format {
             match format.files(cameras, found) {

@@ -43,6 +43,9 @@ pub struct SightingsArgs {
     /// Length of a tile's edge of the untagged board, such as 20mm
     #[arg(long, requires = "grid", value_name = "LENGTH", allow_hyphen_values = true)]
     edge: Option<String>,
+    /// Use the target that is given even where the detections name another one
+    #[arg(long)]
+    assume_target: bool,
     #[command(flatten)]
     sheet: SheetArgs,
     #[command(flatten)]
@@ -106,6 +109,11 @@ impl SightingsArgs {
         Ok(Some(edge_mm::RANGE.check(mm).context("--edge")?))
     }
 
+    /// Whether the target is taken as it is given, whatever detections and cameras name.
+    pub fn assumes_target(&self) -> bool {
+        self.assume_target
+    }
+
     /// Reads everything. Where the target is to be measured, it takes views whose labels are sure.
     pub fn read(&self, measure_target: bool) -> anyhow::Result<Sightings> {
         let limits = self.limits.limits();
@@ -126,7 +134,7 @@ impl SightingsArgs {
             ),
         };
         let Read { mut views, empty, mut left_out, ink, .. } =
-            read(&self.detections, &reference, &limits)?;
+            read(&self.detections, &reference, &limits, self.assume_target)?;
         let board = match reference {
             Reference::Grid(grid) if measure_target => {
                 let made = grid.target("board").context(
@@ -139,7 +147,7 @@ impl SightingsArgs {
         if measure_target {
             left_out.extend(take_sure(&mut views, &reference)?);
         }
-        let sheet = self.sheet.read(&limits)?;
+        let sheet = self.sheet.read(&limits, target.as_slice())?;
         put_on(&sheet, target.as_ref(), &mut views)?;
         let panels = panels(&reference, &sheet)?;
         let print = Print { scale: sheet.print_scale, ink };
@@ -150,13 +158,13 @@ impl SightingsArgs {
 
 impl SheetArgs {
     /// The sheet, where nothing is known as it was planned.
-    pub fn read(&self, limits: &Limits) -> anyhow::Result<Sheet> {
+    pub fn read(&self, limits: &Limits, targets: &[Target]) -> anyhow::Result<Sheet> {
         let Some(path) = &self.shape else {
             return Ok(Sheet { print_scale: self.print_scale, shape: None });
         };
         let show = || format!("--shape: {}", path.display());
         let text = limits.read_text(path).context("--shape")?;
-        calibration::read_sheet(&text).with_context(show)
+        calibration::read_sheet(&text, targets).with_context(show)
     }
 }
 
@@ -229,8 +237,13 @@ pub struct Read {
 }
 
 /// The views that detections show, files or folders of them. What does not belong to the target is
-/// told on standard error, too.
-pub fn read(paths: &[PathBuf], reference: &Reference, limits: &Limits) -> anyhow::Result<Read> {
+/// told on standard error, too. Where the target is assumed, it does not matter which one the detections name.
+pub fn read(
+    paths: &[PathBuf],
+    reference: &Reference,
+    limits: &Limits,
+    is_assumed: bool,
+) -> anyhow::Result<Read> {
     let (mut files, mut detections, mut foreign) = (Vec::new(), Vec::new(), Vec::new());
     let Places { texts, tables } = places(paths)?;
     for Place { path, is_named } in texts {
@@ -275,6 +288,11 @@ pub fn read(paths: &[PathBuf], reference: &Reference, limits: &Limits) -> anyhow
             first.display()
         );
     }
+    if is_assumed {
+        detections.iter_mut().for_each(|(_, found)| found.forget_targets());
+    } else {
+        note_unnamed(&detections, reference);
+    }
     let Shown { views, empty, left_out, .. } = views(&detections, reference)?;
     for (index, out) in &left_out {
         tell!("warning: left out: {}: {}", files[*index].display(), out.reason);
@@ -283,6 +301,25 @@ pub fn read(paths: &[PathBuf], reference: &Reference, limits: &Limits) -> anyhow
     let left_out = left_out.into_iter().map(|(_, out)| out).collect();
     let ink = ink_of(&detections, reference);
     Ok(Read { views, empty, left_out, ink, detections })
+}
+
+/// Notes once that detections do not say which target they are of.
+fn note_unnamed(detections: &[(String, Detection)], reference: &Reference) {
+    let Some(target) = reference.targets().first() else { return };
+    let shows = |found: &&(String, Detection)| !found.1.grids.is_empty();
+    let all = detections.iter().filter(shows).count();
+    let unnamed =
+        detections.iter().filter(shows).filter(|(_, found)| found.targets.is_empty()).count();
+    if unnamed > 0 {
+        let target = target.identity();
+        tell!(
+            "note: {unnamed} of {} not name the target that they were made with; assumed to be {target}",
+            match all {
+                1 => "1 detection does".to_owned(),
+                _ => format!("{all} detections do"),
+            }
+        );
+    }
 }
 
 /// What detections say together of the ink; pictures that do not allow for it are told on standard error.

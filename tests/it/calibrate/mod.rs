@@ -4,6 +4,7 @@ mod commands;
 mod gross_errors;
 mod guide;
 mod models;
+mod other_target;
 mod page;
 mod rig;
 mod scenes;

@@ -112,7 +112,10 @@ fn another_board_of_the_same_name_says_what_is_left_of_the_first() {
     // The same again, fewer files: nothing is left over, and nothing is touched.
     page.run(at, "deltille board --rows 4 --cols 4 --pdf --no-verify");
     assert_eq!(["board.json", "board.pdf", "board.svg"].map(time), written);
+    // The prints of the first need its description.
     page.run(at, "deltille board --rows 5 --cols 4 --pdf --no-verify");
+    assert_eq!(["board.json", "board.pdf", "board.svg"].map(time), written);
+    page.run(at, "deltille board --rows 5 --cols 4 --pdf --no-verify --force");
     page.is("board-again");
 }
 

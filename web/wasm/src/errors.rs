@@ -6,8 +6,11 @@ use wasm_bindgen::JsError;
 
 /// A message on one line.
 pub fn told(message: &impl Display) -> String {
-    named(&message.to_string().replace('\n', " "))
+    named(&message.to_string().replace('\n', " ").replace(ASSUME_TARGET, ""))
 }
+
+/// What the page has no setting for.
+const ASSUME_TARGET: &str = ", or set `Detection::forget_targets` to assume this one";
 
 /// A text in which settings have the names of the page: what the library calls `BoardSpec::rows` is `rows`.
 pub fn named(text: &str) -> String {

@@ -3,7 +3,7 @@
 use deltille_core::calibrate::{
     self, Calibration, Held, Holding, Intrinsics, Model, NextView, Reference, View, Words, views,
 };
-use deltille_core::camera::Pose;
+use deltille_core::camera::{CameraFile, Pose};
 use deltille_core::detect::{Detection, InkEstimate};
 use deltille_core::targets::Target;
 use deltille_files::export::calibration::{Print, Residuals};
@@ -71,7 +71,11 @@ impl Solved {
             json: calibration::write(&estimate, &diagnoses, print, Residuals::LeftOut)
                 .map(|json| named(&json))
                 .unwrap_or_default(),
-            yaml: found.camera.to_yaml(),
+            yaml: CameraFile {
+                camera: found.camera.clone(),
+                calibrated_with: estimate.calibrated_with.clone(),
+            }
+            .to_yaml(),
             opencv: camera::opencv(&found.camera).ok(),
             ros: camera::ros(&found.camera, "camera").ok(),
             page: named(&page.html()),

@@ -15,7 +15,7 @@ use super::stop::Stop;
 use super::view::{Reference, Sighting, View};
 use super::weights::Weights;
 use crate::camera::{Camera, Pose};
-use crate::targets::{PanelPose, Target};
+use crate::targets::{PanelPose, Target, TargetIdentity};
 
 /// Cameras that are fixed to each other, their views of one rigid target or of several that are fixed to each
 /// other, and what of these is known.
@@ -40,6 +40,8 @@ pub struct Calibration {
     /// Those of all targets, one after the other.
     pub(super) panels: Vec<PanelPlace>,
     pub(super) targets: Vec<TargetPanels>,
+    /// Identities of the targets, where those are described.
+    pub(super) identities: Vec<TargetIdentity>,
     pub(super) cameras: Vec<CameraViews>,
     pub(super) loss: Loss,
     pub(super) weights: Weights,
@@ -184,6 +186,7 @@ impl Calibration {
         Self {
             panels,
             targets: of_targets,
+            identities: Vec::new(),
             cameras: Vec::new(),
             loss: Loss::default(),
             weights: Weights::default(),
@@ -202,14 +205,16 @@ impl Calibration {
     /// A calibration of what was photographed, with panels at these places: one target, or several with their panels one
     /// target after the other.
     pub fn of(reference: &Reference, panels: Vec<PanelPlace>) -> Self {
-        let ([_, _, ..], targets) = (reference.targets(), reference.targets()) else {
-            return Self::new(panels);
-        };
+        let targets = reference.targets();
         let mut panels = panels.into_iter();
         let of_target = |target: &Target| {
             (target.name.to_string(), panels.by_ref().take(target.panels.len()).collect())
         };
-        Self::of_targets(targets.iter().map(of_target).collect::<Vec<_>>())
+        let calibration = match targets {
+            [] | [_] => Self::new(panels),
+            several => Self::of_targets(several.iter().map(of_target).collect::<Vec<_>>()),
+        };
+        Self { identities: targets.iter().map(Target::identity).collect(), ..calibration }
     }
 
     /// Adds a camera: of an unknown lens of a [`Model`], or a known [`Camera`] that is kept.
@@ -311,9 +316,10 @@ impl Calibration {
     /// The same with other cameras.
     pub(super) fn of_cameras(&self, cameras: Vec<CameraViews>) -> Self {
         let (panels, targets) = (self.panels.clone(), self.targets.clone());
+        let identities = self.identities.clone();
         let (distances_mm, order) = (self.distances_mm.clone(), self.order.clone());
         let (delays, stop) = (self.delays.clone(), self.stop.clone());
-        Self { panels, targets, cameras, distances_mm, order, delays, stop, ..*self }
+        Self { panels, targets, identities, cameras, distances_mm, order, delays, stop, ..*self }
     }
 
     /// One of its cameras by itself, with panels at these places. What it saw of each target is a view of its own.
@@ -328,6 +334,7 @@ impl Calibration {
         Self {
             panels,
             targets: vec![all],
+            identities: self.identities.clone(),
             cameras: vec![camera],
             refine_panels: false,
             hold_out: None,
@@ -428,6 +435,7 @@ impl Calibration {
         Self {
             panels,
             targets: targets.collect(),
+            identities: self.identities.clone(),
             cameras: cameras.collect(),
             stop: self.stop.clone(),
             refine_panels: false,

@@ -26,7 +26,7 @@ use super::target_map::{CornerOffset, TargetMap};
 use super::uncertainty::{ObservedCovariance, ProjectionUncertainty};
 use crate::camera::{Camera, PROJECTION_PARAMETERS, Pose};
 use crate::statistics::median;
-use crate::targets::{Name, PanelPose, Target};
+use crate::targets::{Name, PanelPose, Target, TargetIdentity};
 
 /// The result of a calibration: cameras, their poses and those of the target, with uncertainties.
 ///
@@ -41,6 +41,8 @@ pub struct Estimate {
     pub frames: Vec<FrameEstimate>,
     /// The targets, in the order given; the scene is that of the first one that was seen.
     pub targets: Vec<TargetEstimate>,
+    /// Identities of the targets that the cameras were calibrated with; empty where they are not known.
+    pub calibrated_with: Vec<TargetIdentity>,
     /// The panels of all targets; those that were found have a covariance.
     pub panels: Vec<PanelPlace>,
     /// The shape of the board's sheet, where it was to be found.
@@ -260,7 +262,8 @@ impl Estimate {
         let poses =
             poses.map(|panel| PanelPose::from_pose(&panel.target_from_panel, panel.covariance));
         let name = Name::like(&format!("{}-refined", target.name.trim_end_matches("-refined")));
-        Target { name, ..target.with_poses(&poses.collect::<Vec<_>>()) }
+        let plan = Some(target.printed());
+        Target { name, plan, ..target.with_poses(&poses.collect::<Vec<_>>()) }
     }
 
     /// How many unknowns were found beside the poses of the frames.

@@ -4,7 +4,9 @@ use glam::DVec3;
 
 use crate::detect::Grid;
 use crate::lattice::GridKind;
-use crate::targets::{BoardSpec, Target, TargetError, TargetSpec, board_vertices};
+use crate::targets::{BoardSpec, Target, TargetError, TargetIdentity, TargetSpec, board_vertices};
+
+use super::view::ASSUME_TARGET;
 
 /// An untagged board that no file describes. Its labels may differ between views by a motion of the
 /// lattice, which the pose of the view takes up.
@@ -33,6 +35,17 @@ impl UntaggedGrid {
     /// Where a corner is, mm.
     pub(super) fn place(&self, row: i32, col: i32) -> DVec3 {
         self.edge_mm * self.kind.position(row.into(), col.into()).extend(0.0)
+    }
+
+    /// Refuses a grid that was detected as a target with tiles of another size.
+    pub(super) fn check_target(&self, seen: Option<&TargetIdentity>) -> Result<(), String> {
+        match seen {
+            Some(seen) if seen.edge_mm != [self.edge_mm; 2] => Err(format!(
+                "it was detected as {seen}, and `UntaggedGrid::edge_mm` is {}: {ASSUME_TARGET}",
+                self.edge_mm
+            )),
+            _ => Ok(()),
+        }
     }
 
     /// Whether a detected grid can be this board; what speaks against it.

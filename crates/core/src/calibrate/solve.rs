@@ -68,7 +68,8 @@ impl Calibration {
             },
         })?;
         let held_out = test.map(|test| test.given(&estimate).adjusted()).transpose()?;
-        Ok(Estimate { held_out: held_out.map(Box::new), ..estimate })
+        let (held_out, calibrated_with) = (held_out.map(Box::new), self.identities.clone());
+        Ok(Estimate { held_out, calibrated_with, ..estimate })
     }
 
     /// Refuses views of panels whose places are not given.

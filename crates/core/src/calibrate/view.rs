@@ -13,7 +13,7 @@ use super::shape::Shape;
 use super::target_map::TargetMap;
 use crate::camera::Pose;
 use crate::detect::{Detection, Grid};
-use crate::targets::{Panel, Target};
+use crate::targets::{Panel, Target, TargetIdentity};
 
 /// Corners that a panel needs in a view, so that a few wrong ones show.
 pub(super) const LEAST_CORNERS: usize = 6;
@@ -36,6 +36,10 @@ const OTHER_TARGET: &str = "; the target does not belong to this detection";
 /// What is wrong with detections of one target where there are several.
 const OF_ONE_TARGET: &str =
     "it does not say which target its corners belong to: detect again with all targets at once";
+
+/// What to do about detections of another target.
+pub(super) const ASSUME_TARGET: &str = "give the description that it was detected with, or set \
+                                        `Detection::forget_targets` to assume this one";
 
 /// Why labels of a grid without panel are not on the target.
 const CUT_OFF: &str = "its rows and columns are not those of the target: without tags they are known \
@@ -191,8 +195,12 @@ impl Reference<'_> {
         }
     }
 
-    /// What a detection shows of the panels, or the panel that is wrong in it and why.
-    fn sightings(&self, detection: &Detection) -> Result<Vec<Sighting>, (Option<u32>, String)> {
+    /// What a detection shows of the panels, or the panel that is wrong in it and why; `identities` are those of the targets.
+    fn sightings(
+        &self,
+        detection: &Detection,
+        identities: &[TargetIdentity],
+    ) -> Result<Vec<Sighting>, (Option<u32>, String)> {
         match self {
             Self::Grid(board) => {
                 let of_kind = detection.grids.iter().filter(|grid| grid.kind == board.kind);
@@ -202,14 +210,21 @@ impl Reference<'_> {
                         None => Ok(Vec::new()),
                     };
                 };
-                board.check(grid).map_err(|problem| (None, problem))?;
+                let check = board.check_target(detection.target_of(grid));
+                check.and_then(|()| board.check(grid)).map_err(|problem| (None, problem))?;
                 let at = |row, col| board.place(row, col);
                 Ok(vec![Sighting { panel: PanelRef::ONLY, observations: observations(grid, at) }])
             }
             Self::Target(_) | Self::Scene(_) => {
                 let grids = detection.grids.iter();
                 let found = grids.filter_map(|grid| {
-                    self.on_targets(grid).map_err(|problem| (grid.panel, problem)).transpose()
+                    let seen = detection.target_of(grid);
+                    let index = self.target_of(grid, seen, identities);
+                    let on_it = |index: Option<usize>| match index {
+                        Some(index) => self.on_target(index, grid),
+                        None => Ok(None),
+                    };
+                    index.and_then(on_it).map_err(|problem| (grid.panel, problem)).transpose()
                 });
                 found.collect()
             }
@@ -218,31 +233,53 @@ impl Reference<'_> {
 }
 
 impl Reference<'_> {
-    /// Compares the labels of a grid with what is on the target: panel, corners and tags.
+    /// Compares the labels of a grid of a detection with what is on the target: its identity, panel, corners and tags.
     ///
     /// # Errors
     /// A sentence that says what is not on it.
-    pub fn check_labels(&self, grid: &Grid) -> Result<(), String> {
-        self.on_targets(grid).map(drop)
+    pub fn check_labels(&self, detection: &Detection, grid: &Grid) -> Result<(), String> {
+        let identities: Vec<TargetIdentity> = self.targets().iter().map(Target::identity).collect();
+        match self.target_of(grid, detection.target_of(grid), &identities)? {
+            Some(index) => self.on_target(index, grid).map(drop),
+            None => Ok(()),
+        }
     }
 
-    /// The corners of a grid on the panel of its target; `None` where it is none of theirs, or was not labelled.
-    fn on_targets(&self, grid: &Grid) -> Result<Option<Sighting>, String> {
+    /// Index of the target that a grid belongs to: by the identity of the target that it was labelled with, where the
+    /// detection has that, else by its name. `None` where it is none of these targets.
+    fn target_of(
+        &self,
+        grid: &Grid,
+        seen: Option<&TargetIdentity>,
+        identities: &[TargetIdentity],
+    ) -> Result<Option<usize>, String> {
         let targets = self.targets();
-        let mut first = 0;
-        for target in targets {
-            let is_it = match &grid.target {
-                Some(name) => is_named(target, name),
-                None if targets.len() == 1 => true,
-                None if grid.panel.is_none() => return Ok(None),
-                None => return Err(OF_ONE_TARGET.to_owned()),
+        let Some(seen) = seen else {
+            return match &grid.target {
+                Some(name) => Ok(targets.iter().position(|target| is_named(target, name))),
+                None if targets.len() == 1 => Ok(Some(0)),
+                None if grid.panel.is_none() => Ok(None),
+                None => Err(OF_ONE_TARGET.to_owned()),
             };
-            if is_it {
-                return on_target(target, first, grid);
-            }
-            first += target.panels.len();
+        };
+        if let Some(index) = identities.iter().position(|own| own.is_same_print(seen)) {
+            return Ok(Some(index));
         }
-        Ok(None)
+        // Other targets in the same image are of no concern, unless they may be mistaken for these.
+        let confusable = identities.iter().find(|own| own.is_confusable(seen));
+        match confusable.or_else(|| identities.first().filter(|_| grid.target.is_none())) {
+            Some(own) => Err(format!(
+                "it was detected as {seen}, and the target given is {own}: {ASSUME_TARGET}"
+            )),
+            None => Ok(None),
+        }
+    }
+
+    /// The corners of a grid on the panel of a target; `None` where the grid was not labelled.
+    fn on_target(&self, index: usize, grid: &Grid) -> Result<Option<Sighting>, String> {
+        let targets = self.targets();
+        let first = targets[..index].iter().map(|target| target.panels.len()).sum();
+        on_target(&targets[index], first, grid)
     }
 }
 
@@ -308,6 +345,8 @@ pub fn views(
     let mut wrong = 0;
     let mut copies = 0;
     let mut seen = HashMap::new();
+    let identities: Vec<TargetIdentity> =
+        reference.targets().iter().map(Target::identity).collect();
     for (index, (name, detection)) in detections.iter().enumerate() {
         let size_px = [detection.width, detection.height];
         if let Some((first, other)) = detections.first()
@@ -333,7 +372,7 @@ pub fn views(
             copies += 1;
             continue;
         }
-        match sightings(detection, reference) {
+        match sightings(detection, reference, &identities) {
             Err((panel, problem)) => {
                 left_out.push((index, excluded(panel, Reason::Foreign(problem.clone()))));
                 wrong += 1;
@@ -388,8 +427,9 @@ fn copied<'a>(
 fn sightings(
     detection: &Detection,
     reference: &Reference,
+    identities: &[TargetIdentity],
 ) -> Result<Vec<Sighting>, (Option<u32>, String)> {
-    let mut sightings = reference.sightings(detection)?;
+    let mut sightings = reference.sightings(detection, identities)?;
     sightings.retain(|sighting| sighting.observations.len() >= LEAST_CORNERS);
     match (is_mirrored(&sightings), sightings.as_slice()) {
         (true, [only]) => Err((reference.panel_id(only.panel), Reason::Mirrored.to_string())),

@@ -34,6 +34,7 @@
 use glam::DVec2;
 use serde::{Deserialize, Serialize};
 
+use crate::identity::TargetIdentity;
 use crate::quantity;
 use crate::reading::in_words;
 
@@ -83,6 +84,17 @@ struct Own {
     spline: Option<SplineGrid>,
     #[serde(default)]
     distortion: Vec<f64>,
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    calibrated_with: Vec<TargetIdentity>,
+}
+
+/// The content of the project's own camera file.
+#[derive(Clone, Debug, PartialEq)]
+pub struct CameraFile {
+    /// The camera.
+    pub camera: Camera,
+    /// Identities of the targets that it was calibrated with; empty where they are not known.
+    pub calibrated_with: Vec<TargetIdentity>,
 }
 
 #[derive(Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
@@ -176,16 +188,32 @@ impl Model {
 }
 
 impl Camera {
+    /// Reads the camera of a camera file, see [`CameraFile::from_yaml`].
+    ///
+    /// # Errors
+    /// The same.
+    pub fn from_yaml(text: &str) -> Result<Camera, CameraFileError> {
+        CameraFile::from_yaml(text).map(|file| file.camera)
+    }
+
+    /// The text of the project's own camera file, with every digit, without the targets that it was calibrated with.
+    pub fn to_yaml(&self) -> String {
+        CameraFile { camera: self.clone(), calibrated_with: Vec::new() }.to_yaml()
+    }
+}
+
+impl CameraFile {
     /// Reads the text of a camera file.
     ///
     /// # Errors
     /// Where it is no YAML, a field is missing or out of its range, or the model is none of those here.
-    pub fn from_yaml(text: &str) -> Result<Camera, CameraFileError> {
+    pub fn from_yaml(text: &str) -> Result<Self, CameraFileError> {
         check_size(text).map_err(CameraFileError::Yaml)?;
         // OpenCV writes a version directive and a tag that no other reader of YAML knows.
         let foreign = text.contains("camera_matrix");
         let own = if foreign { from_foreign(text)? } else { parse(text)? };
-        let Own { width, height, focal_px, centre_px, model, spline, mut distortion } = own;
+        let Own { width, height, focal_px, centre_px, model, spline, mut distortion, .. } = own;
+        let calibrated_with = own.calibrated_with;
         let key = |key, problem: String| CameraFileError::Key { key, problem };
         let numbers = [
             ("width", vec![f64::from(width)], quantity::side_px::RANGE),
@@ -224,23 +252,33 @@ impl Camera {
             in_range.map_err(|what| key("distortion", format!("{name}: {what}")))?;
         }
         let lens = lens.with_parameters(&distortion);
-        Ok(Camera { width, height, focal_px, centre_px, lens })
+        let camera = Camera { width, height, focal_px, centre_px, lens };
+        Ok(Self { camera, calibrated_with })
     }
 
-    /// The text of the project's own camera file, with every digit.
+    /// The text of the file, with every digit.
     pub fn to_yaml(&self) -> String {
-        let model = Model::of(&self.lens);
-        let mut distortion = self.lens.parameters();
+        let Camera { width, height, focal_px, centre_px, lens } = &self.camera;
+        let model = Model::of(lens);
+        let mut distortion = lens.parameters();
         let least = if model == Model::Fisheye { LEAST_TERMS } else { 0 };
         while model.ends_early() && distortion.len() > least && distortion.last() == Some(&0.0) {
             distortion.pop();
         }
-        let Camera { width, height, focal_px, centre_px, .. } = *self;
-        let spline = match &self.lens {
+        let spline = match lens {
             Lens::Spline(lens) => Some(lens.grid()),
             _ => None,
         };
-        let own = Own { width, height, focal_px, centre_px, model, spline, distortion };
+        let own = Own {
+            width: *width,
+            height: *height,
+            focal_px: *focal_px,
+            centre_px: *centre_px,
+            model,
+            spline,
+            distortion,
+            calibrated_with: self.calibrated_with.clone(),
+        };
         let yaml = serde_yaml_ng::to_string(&own).expect("plain data has a YAML form");
         format!("# deltille {}, camera\n{yaml}", env!("CARGO_PKG_VERSION"))
     }
@@ -296,6 +334,7 @@ fn from_foreign(text: &str) -> Result<Own, CameraFileError> {
         model,
         spline: None,
         distortion: coefficients.data,
+        calibrated_with: Vec::new(),
     })
 }
 

@@ -26,7 +26,7 @@ pub use brown_conrady::BrownConrady;
 pub use double_sphere::DoubleSphere;
 pub use extended_unified::ExtendedUnified;
 #[cfg(feature = "yaml")]
-pub use file::CameraFileError;
+pub use file::{CameraFile, CameraFileError};
 pub use kannala_brandt::KannalaBrandt;
 pub use lens::{Imaged, Lens, MAX_LENS_PARAMETERS, Ray};
 pub use pose::Pose;

@@ -10,6 +10,7 @@ use crate::lattice::GridKind;
 use crate::quantity;
 use crate::raster::{FileNotes, Pyramid};
 use crate::statistics::median;
+use crate::targets::TargetIdentity;
 
 /// What was found in one image.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -24,6 +25,9 @@ pub struct Detection {
     /// What the image's file says beside its pixels.
     #[serde(default, skip_serializing_if = "FileNotes::is_empty")]
     pub file: FileNotes,
+    /// The targets that were looked for; empty where the corners are of no known target, or of an unknown one.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub targets: Vec<TargetIdentity>,
     /// The grids that were found: labelled ones by the id of their panel, then the others, largest first.
     pub grids: Vec<Grid>,
     /// What was found of the camera's tone curve, where it was looked for.
@@ -42,6 +46,20 @@ impl Detection {
     /// What was found in an image of a width and height, px, by whatever found it.
     pub fn new(image: impl Into<String>, [width, height]: [u32; 2], grids: Vec<Grid>) -> Self {
         Self { image: image.into(), width, height, grids, ..Self::default() }
+    }
+
+    /// Removes the identities of the targets, so that the detection is accepted with any target whose labels it has.
+    pub fn forget_targets(&mut self) {
+        self.targets.clear();
+    }
+
+    /// Identity of the target that a grid belongs to; `None` where the detection does not name it.
+    pub fn target_of(&self, grid: &Grid) -> Option<&TargetIdentity> {
+        match (&grid.target, self.targets.as_slice()) {
+            (None, [only]) => Some(only),
+            (None, _) => None,
+            (Some(name), all) => all.iter().find(|target| *target.name == **name),
+        }
     }
 }
 

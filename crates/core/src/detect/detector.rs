@@ -26,7 +26,7 @@ use crate::Clock;
 use crate::family::{Family, FamilyError};
 use crate::lattice::GridKind;
 use crate::raster::{FileNotes, Gray, ImageView, PYRAMID_FULL_SCALE, Pyramid};
-use crate::targets::{Target, least_untagged_corners};
+use crate::targets::{Target, TargetIdentity, least_untagged_corners};
 
 /// Most levels of the pyramid that every image has: the coarsest sees four times the blur that the finest can.
 const PYRAMID_LEVELS: usize = 3;
@@ -159,6 +159,8 @@ pub struct Detector {
     /// Where tiles show something else than their colour.
     tag_areas: TagAreas,
     labels: Labels,
+    /// The targets that are looked for.
+    targets: Vec<TargetIdentity>,
     /// Edge of the tiles, mm, where all panels have the same.
     edge_mm: Option<f64>,
     /// What is known of the ink from other pictures.
@@ -218,7 +220,8 @@ impl Detector {
         let tag_areas = TagAreas::default();
         let finder = Finder::of(kind);
         let (edge_mm, ink, clock, other) = (None, None, None, None);
-        Self { finder, refiner, tag_areas, labels, edge_mm, ink, clock, other }
+        let targets = Vec::new();
+        Self { finder, refiner, tag_areas, labels, targets, edge_mm, ink, clock, other }
     }
 
     /// A detector of a target; `family` is the family that the target names.
@@ -236,7 +239,7 @@ impl Detector {
         let first = of_tilings.next();
         let other = of_tilings.next().map(Box::new);
         let first = first.unwrap_or_else(|| Self::of_one_tiling(target, family, config));
-        Self { other, ..first }
+        Self { other, targets: vec![target.identity()], ..first }
     }
 
     fn of_one_tiling(target: &Target, family: Option<&Family>, config: DetectorConfig) -> Self {
@@ -301,7 +304,8 @@ impl Detector {
         };
         let mut of_kinds = [GridKind::Deltille, GridKind::Checker].into_iter().filter_map(of_kind);
         let first = of_kinds.next().ok_or(SceneError::Empty)?;
-        Ok(Self { other: of_kinds.next().map(Box::new), ..first })
+        let targets = all.iter().map(|target| target.identity()).collect();
+        Ok(Self { other: of_kinds.next().map(Box::new), targets, ..first })
     }
 
     fn with(
@@ -312,8 +316,8 @@ impl Detector {
         config: DetectorConfig,
     ) -> Self {
         let (finder, refiner) = (Finder::of(kind), refiner(kind, config, edge_mm));
-        let (ink, clock, other) = (None, None, None);
-        Self { finder, refiner, tag_areas, labels, edge_mm, ink, clock, other }
+        let (targets, ink, clock, other) = (Vec::new(), None, None, None);
+        Self { finder, refiner, tag_areas, labels, targets, edge_mm, ink, clock, other }
     }
 
     /// The same detector with a clock, by which it notes how long each stage took, see [`Detection::timing_ms`].
@@ -365,10 +369,11 @@ impl Detector {
             Finder::Deltille(finder) => self.detect_with(finder, image, name),
             Finder::Checker(finder) => self.detect_with(finder, image, name),
         };
-        match &self.other {
+        let found = match &self.other {
             Some(other) => both(found, other.detect_view(image, name)),
             None => found,
-        }
+        };
+        Detection { targets: self.targets.clone(), ..found }
     }
 
     fn detect_with<const N: usize>(
@@ -407,6 +412,7 @@ impl Detector {
             width: image.width() as u32,
             height: image.height() as u32,
             file: FileNotes::default(),
+            targets: Vec::new(),
             grids: grids.into_iter().map(|(grid, _)| grid).collect(),
             tone: optics.tone,
             ink: self.ink.or_else(|| {

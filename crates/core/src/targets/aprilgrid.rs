@@ -12,12 +12,13 @@ use serde::{Deserialize, Serialize};
 
 use super::build::needed;
 use super::capacity::{Setting, check_ids};
+use super::layout::imprint;
 use super::length::format_mm;
 use super::single_panel::{SinglePanel, sheet};
 use super::spec::BORDER_BITS;
 use super::{
-    Corner, FamilyRef, GridKind, Outline, Panel, PanelPose, PaperSpec, SheetLayout, TagPlacement,
-    TagsIn, TargetError, tag_range,
+    Corner, FamilyRef, Fingerprint, GridKind, Outline, Panel, PanelPose, PaperSpec, SheetLayout,
+    TagPlacement, TagsIn, TargetError, identity, tag_range,
 };
 use crate::family::Family;
 use crate::lattice::Vertex;
@@ -174,7 +175,7 @@ pub(super) fn parts(
     let ids = (spec.first_id, spec.count().into());
     let family =
         check_ids(Setting::TAGS, ids, family, || "make fewer `AprilGridSpec::tags`".to_owned())?;
-    let label = label(name, spec, &family);
+    let label = label(name, spec, &family, identity::fingerprint(&panels, Some(&family)));
     let single = SinglePanel {
         of_size: &|tag_mm| AprilGridSpec { tag_mm, ..spec.clone() }.panel(),
         size_mm: spec.tag_mm,
@@ -186,7 +187,7 @@ pub(super) fn parts(
 }
 
 /// All that is needed to make it again.
-fn label(name: &str, spec: &AprilGridSpec, family: &FamilyRef) -> String {
+fn label(name: &str, spec: &AprilGridSpec, family: &FamilyRef, target: Fingerprint) -> String {
     let [columns, rows] = spec.tags;
     let last = spec.first_id + spec.count() - 1;
     let parts = [
@@ -197,7 +198,7 @@ fn label(name: &str, spec: &AprilGridSpec, family: &FamilyRef) -> String {
         tag_range(&family.name, spec.first_id, last),
         format!("border {} bits", spec.border_bits),
         format!("board {}", spec.board_id),
-        format!("deltille {}", env!("CARGO_PKG_VERSION")),
+        imprint(target),
     ];
     parts.join(" · ")
 }

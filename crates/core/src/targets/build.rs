@@ -5,8 +5,8 @@ use super::paper::{PaperSpec, SolidSheets};
 use super::poster::Poster;
 use super::{
     BoardSpec, FamilyRef, Finish, LineKind, Name, Panel, Placement, SheetLayout, SheetLine, Target,
-    TargetError, TargetSpec, aprilgrid, board, charuco, circles, face_sheet, guide, logo, net,
-    packed, solid, tag_ids, tag_sheet,
+    TargetError, TargetSpec, aprilgrid, board, charuco, circles, face_sheet, guide, identity, logo,
+    net, packed, solid, tag_ids, tag_sheet,
 };
 use crate::family::{Family, FamilyError, places};
 use crate::polygon::rectangle;
@@ -104,7 +104,7 @@ impl Target {
         layout.map_or(Ok(()), |paper| logo::check_sheets(&sheets, paper))?;
         let logo = layout.and_then(|paper| paper.logo.clone());
         let (spec, finish) = (spec.clone(), Finish::default());
-        let mut target = Target { name, spec, family, panels, sheets, finish, logo };
+        let mut target = Target { name, spec, family, panels, sheets, finish, logo, plan: None };
         if layout.is_some_and(|paper| paper.tag_ids) {
             tag_ids::add(&mut target)?;
         }
@@ -205,7 +205,9 @@ fn board_parts(
         let sheets = packed::sheets(name, board, &panels, family.as_ref(), paper)?;
         return Ok((panels, family, sheets));
     }
-    let words = |panel: &Panel| label(name, board, std::slice::from_ref(panel), family.as_ref());
+    let target = identity::fingerprint(&panels, family.as_ref());
+    let words =
+        |panel: &Panel| label(name, board, std::slice::from_ref(panel), family.as_ref(), target);
     let sheets = match arrangement {
         None => Vec::new(),
         Some((Ok(arrangement), _)) => {

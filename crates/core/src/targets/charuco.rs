@@ -16,11 +16,12 @@ use serde::{Deserialize, Serialize};
 
 use super::build::needed;
 use super::capacity::{Setting, check_ids};
+use super::layout::imprint;
 use super::length::format_mm;
 use super::single_panel::{SinglePanel, sheet};
 use super::{
-    Corner, FamilyRef, GridKind, Outline, Panel, PanelPose, PaperSpec, SheetLayout, TagPlacement,
-    TagsIn, TargetError, tag_range,
+    Corner, FamilyRef, Fingerprint, GridKind, Outline, Panel, PanelPose, PaperSpec, SheetLayout,
+    TagPlacement, TagsIn, TargetError, identity, tag_range,
 };
 use crate::family::{Family, dictionary, dictionary_names};
 use crate::lattice::{Dimension, TagCells, Vertex};
@@ -196,7 +197,8 @@ pub(super) fn parts(
         "take a larger `CharucoSpec::dictionary`, or fewer `CharucoSpec::squares`".to_owned()
     })?;
     let panel = spec.panel(dimension);
-    let label = label(name, spec, &family);
+    let target = identity::fingerprint(std::slice::from_ref(&panel), Some(&family));
+    let label = label(name, spec, &family, target);
     let single = SinglePanel {
         of_size: &|square_mm| {
             let marker_mm = spec.marker_mm * square_mm / spec.square_mm;
@@ -211,7 +213,7 @@ pub(super) fn parts(
 }
 
 /// All that is needed to make it again.
-fn label(name: &str, spec: &CharucoSpec, family: &FamilyRef) -> String {
+fn label(name: &str, spec: &CharucoSpec, family: &FamilyRef, target: Fingerprint) -> String {
     let [columns, rows] = spec.squares;
     let last = spec.first_id + spec.markers() - 1;
     let mut parts = vec![
@@ -225,7 +227,7 @@ fn label(name: &str, spec: &CharucoSpec, family: &FamilyRef) -> String {
         parts.push("legacy pattern".to_owned());
     }
     parts.push(format!("board {}", spec.board_id));
-    parts.push(format!("deltille {}", env!("CARGO_PKG_VERSION")));
+    parts.push(imprint(target));
     parts.join(" · ")
 }
 

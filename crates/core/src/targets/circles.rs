@@ -13,10 +13,12 @@
 use glam::{DMat3, DVec3};
 use serde::{Deserialize, Serialize};
 
+use super::layout::imprint;
 use super::length::format_mm;
 use super::single_panel::{SinglePanel, sheet};
 use super::{
-    Corner, GridKind, Outline, Panel, PanelPose, PaperSpec, SheetLayout, TagsIn, TargetError,
+    Corner, Fingerprint, GridKind, Outline, Panel, PanelPose, PaperSpec, SheetLayout, TagsIn,
+    TargetError, identity,
 };
 use crate::quantity;
 
@@ -143,12 +145,14 @@ pub(super) fn parts(
         setting: "CirclesSpec::spacing_mm",
         fewer: "fewer `CirclesSpec::circles`",
     };
-    let sheets = paper.map(|paper| sheet(&single, paper, label(name, spec))).transpose()?;
+    let sheets = paper
+        .map(|paper| sheet(&single, paper, label(name, spec, identity::fingerprint(&panels, None))))
+        .transpose()?;
     Ok((panels, sheets.into_iter().collect()))
 }
 
 /// All that is needed to make it again.
-fn label(name: &str, spec: &CirclesSpec) -> String {
+fn label(name: &str, spec: &CirclesSpec, target: Fingerprint) -> String {
     let [columns, rows] = spec.circles;
     let kind = if spec.asymmetric { "asymmetric circles" } else { "circles" };
     let parts = [
@@ -157,7 +161,7 @@ fn label(name: &str, spec: &CirclesSpec) -> String {
         format!("spacing {}", format_mm(spec.spacing_mm)),
         format!("diameter {}", format_mm(spec.diameter_mm)),
         format!("board {}", spec.board_id),
-        format!("deltille {}", env!("CARGO_PKG_VERSION")),
+        imprint(target),
     ];
     parts.join(" · ")
 }

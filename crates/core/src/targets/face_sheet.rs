@@ -19,14 +19,14 @@
 use glam::DVec2;
 
 use super::angles::turn_of;
-use super::layout::{ADVANCE_CAPS, Arrangement, Footprint, fit, tag_range};
+use super::layout::{ADVANCE_CAPS, Arrangement, Footprint, fit, imprint, tag_range};
 use super::length::format_mm;
 use super::net::Sides;
 use super::paper::PaperSpec;
 use super::polyhedron::sides;
 use super::{
-    Face, FamilyRef, Label, LineKind, Panel, Placement, Polyhedron, SheetLayout, SheetLine,
-    SheetText, SolidSpec, TargetError,
+    Face, FamilyRef, Fingerprint, Label, LineKind, Panel, Placement, Polyhedron, SheetLayout,
+    SheetLine, SheetText, SolidSpec, TargetError, identity,
 };
 
 /// White beyond the edges of a face, mm: what cutting and gluing by hand are off, and some more.
@@ -67,12 +67,13 @@ pub(super) fn sheets(
     let solid = spec.polyhedron();
     let (edges, sides) = (solid.edges(), Sides::new(&solid));
     let margin_mm = spec.white_margin_mm() - spec.panel_inset_mm()?;
+    let target = identity::fingerprint(panels, family);
     let numbered = spec.panel_faces()?.into_iter().zip(panels).enumerate();
     numbered
         .map(|(index, (face, panel))| {
             let ink = bounds(&face);
             let arrangement = arrange(spec, ink, paper)?;
-            let words = label(name, spec, index, panel, family);
+            let words = label(name, spec, index, panel, family, target);
             let mut sheet = arrangement.sheet(panel.id, ink, words);
             let numbers = edge_numbers(&solid, &edges, index);
             let edge_words = sides.of(index).zip(numbers).map(|(side, edge)| {
@@ -256,6 +257,7 @@ fn label(
     index: usize,
     panel: &Panel,
     family: Option<&FamilyRef>,
+    target: Fingerprint,
 ) -> String {
     let mut parts = vec![
         name.to_owned(),
@@ -266,9 +268,8 @@ fn label(
     if let (Some(family), [first, .., last] | [first @ last]) = (family, panel.tags.as_slice()) {
         let family = family.of_tiling(panel.kind);
         parts.push(tag_range(&family.name, first.id, last.id));
-        parts.push(format!("fingerprint {}", family.fingerprint));
     }
     parts.push(format!("board {}", panel.id));
-    parts.push(format!("deltille {}", env!("CARGO_PKG_VERSION")));
+    parts.push(imprint(target));
     parts.join(" · ")
 }

@@ -6,7 +6,8 @@ use glam::DVec2;
 use serde::{Deserialize, Serialize};
 
 use super::{
-    FamilyRef, Finish, GridKind, Logo, Name, Panel, SheetLayout, Target, TargetSpec, against_spec,
+    FamilyRef, Fingerprint, Finish, GridKind, Logo, Name, Panel, SheetLayout, Target,
+    TargetIdentity, TargetSpec, against_spec,
 };
 use crate::json::{self, ReadError};
 use crate::lattice::Vertex;
@@ -74,6 +75,11 @@ pub enum TargetFileError {
 struct TargetFile {
     schema: String,
     name: Name,
+    /// Absent in files of earlier versions.
+    #[serde(default)]
+    fingerprint: Option<Fingerprint>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    plan: Option<TargetIdentity>,
     spec: TargetSpec,
     family: Option<FamilyRef>,
     panels: Vec<Panel>,
@@ -103,10 +109,22 @@ impl Target {
         if head.schema != SCHEMA {
             return Err(TargetFileError::Schema { found: head.schema });
         }
-        let TargetFile { schema: _, name, spec, family, panels, sheets, finish, logo } =
-            json::read(text)?;
-        let target = Target { name, spec, family, panels, sheets, finish, logo };
-        check(&target).map_err(|(field, problem)| TargetFileError::Field { field, problem })?;
+        let TargetFile {
+            schema: _,
+            name,
+            fingerprint,
+            plan,
+            spec,
+            family,
+            panels,
+            sheets,
+            finish,
+            logo,
+        } = json::read(text)?;
+        let target = Target { name, spec, family, panels, sheets, finish, logo, plan };
+        check(&target)
+            .and_then(|()| check_identity(&target, fingerprint))
+            .map_err(|(field, problem)| TargetFileError::Field { field, problem })?;
         Ok(target)
     }
 
@@ -120,9 +138,21 @@ impl Target {
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
     pub fn to_json(&self) -> String {
-        let Target { name, spec, family, panels, sheets, finish, logo } = self.clone();
+        let fingerprint = Some(self.identity().fingerprint);
+        let Target { name, spec, family, panels, sheets, finish, logo, plan } = self.clone();
         let schema = SCHEMA.to_owned();
-        let file = TargetFile { schema, name, spec, family, panels, sheets, finish, logo };
+        let file = TargetFile {
+            schema,
+            name,
+            fingerprint,
+            plan,
+            spec,
+            family,
+            panels,
+            sheets,
+            finish,
+            logo,
+        };
         json::to_text(&file, 4)
     }
 }
@@ -223,6 +253,27 @@ pub fn check(target: &Target) -> Result<(), Problem> {
         }
     }
     Ok(())
+}
+
+/// Checks that the corners and tags are those of the stated fingerprint, and that a plan has the same labels.
+fn check_identity(target: &Target, stated: Option<Fingerprint>) -> Result<(), Problem> {
+    let found = target.identity();
+    if let Some(stated) = stated
+        && stated != found.fingerprint
+    {
+        let what = format!(
+            "it is {stated}, but the corners and tags have {}: the file was edited; remove the field to make it the \
+             description of another target",
+            found.fingerprint
+        );
+        return problem("fingerprint", what);
+    }
+    match &target.plan {
+        Some(plan) if plan.labels != found.labels => {
+            problem("plan.labels", "the corners or tags are not those of the plan")
+        }
+        _ => Ok(()),
+    }
 }
 
 /// Checks the size of a sheet, that its lines lie on it, and that there is a logo where it has one.

@@ -19,8 +19,8 @@ use super::length::format_mm;
 use super::logo::{LogoPlacement, LogoSize};
 use super::paper::{Orientation, PaperSize, PaperSpec};
 use super::{
-    BoardSpec, CheckBar, FamilyRef, GridKind, Label, LineKind, Panel, Placement, SheetLayout,
-    SheetLine, SheetText, TagsIn, TargetError, board,
+    BoardSpec, CheckBar, FamilyRef, Fingerprint, GridKind, Label, LineKind, Panel, Placement,
+    SheetLayout, SheetLine, SheetText, TagsIn, TargetError, board,
 };
 use crate::family::places;
 use crate::polygon::rectangle;
@@ -459,19 +459,24 @@ fn bar_words(length_mm: f64) -> String {
     fitting.unwrap_or_else(|| format!("{length_mm} mm"))
 }
 
+/// How the label of a sheet ends: which target it is part of, and what made it.
+pub(super) fn imprint(target: Fingerprint) -> String {
+    format!("target {} · deltille {}", target.short(), env!("CARGO_PKG_VERSION"))
+}
+
 /// The label of a sheet of boards: all that is needed to make them again.
 pub(super) fn label(
     name: &str,
     spec: &BoardSpec,
     panels: &[Panel],
     family: Option<&FamilyRef>,
+    target: Fingerprint,
 ) -> String {
     let mut parts = size_in_words(name, spec);
     let mut tags = panels.iter().flat_map(|panel| &panel.tags);
     if let (Some(family), Some(first)) = (family, tags.next()) {
         let last = tags.next_back().unwrap_or(first);
         parts.push(tag_range(&family.name, first.id, last.id));
-        parts.push(format!("fingerprint {}", family.fingerprint));
         if panels[0].tags_in == TagsIn::White {
             parts.push("tags in white squares".to_owned());
         }
@@ -485,7 +490,7 @@ pub(super) fn label(
         [only] => Some(format!("board {}", only.id)),
         [first, .., last] => Some(format!("boards {}–{}", first.id, last.id)),
     });
-    parts.push(format!("deltille {}", env!("CARGO_PKG_VERSION")));
+    parts.push(imprint(target));
     parts.join(" · ")
 }
 

@@ -21,6 +21,7 @@ mod face;
 mod face_sheet;
 mod finish;
 mod guide;
+mod identity;
 pub mod json;
 mod label;
 mod layout;
@@ -45,6 +46,7 @@ use serde::{Deserialize, Serialize};
 
 pub use crate::Name;
 use crate::family::Family;
+pub use crate::identity::{Fingerprint, TargetIdentity, check_result_of, check_same_board};
 use crate::lattice::GridKind;
 use crate::quantity;
 pub use aprilgrid::AprilGridSpec;
@@ -92,6 +94,8 @@ pub struct Target {
     pub finish: Finish,
     /// The logo on them.
     pub logo: Option<Logo>,
+    /// Identity of the target as printed, where this one has measured corners or refined panels.
+    pub plan: Option<TargetIdentity>,
 }
 
 /// Names a family so that a changed code table cannot go unnoticed.

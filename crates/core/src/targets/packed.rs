@@ -20,7 +20,7 @@ use super::logo::{LogoPlacement, LogoSize};
 use super::paper::PaperSpec;
 use super::{
     BoardSpec, FamilyRef, GridKind, Label, LineKind, Panel, Placement, SheetLayout, SheetLine,
-    SheetText, TargetError, layout,
+    SheetText, TargetError, identity, layout,
 };
 use crate::lattice::ROW_HEIGHT;
 
@@ -128,10 +128,11 @@ pub(super) fn sheets(
     cell.check_note(note)?;
     let (grid @ [columns, rows], arrangement) = arrange(&cell, panels.len(), paper)?
         .ok_or_else(|| layout::does_not_fit(spec, paper, |spec| fits(spec, paper)))?;
+    let target = identity::fingerprint(panels, family);
     let pages: Vec<&[Panel]> = panels.chunks(columns * rows).collect();
     let count = pages.len();
     let sheets = pages.into_iter().enumerate().map(|(index, panels)| {
-        let mut words = label(name, spec, panels, family);
+        let mut words = label(name, spec, panels, family, target);
         if count > 1 {
             words += &format!(" · page {} of {count}", index + 1);
         }

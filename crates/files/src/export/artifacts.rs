@@ -24,9 +24,12 @@ use super::{
     threemf,
 };
 use crate::limits::{Limits, ReadError};
+use crate::target_file;
 use deltille_core::artwork::{self, ArtworkError, CuttingError};
 use deltille_core::family::Family;
-use deltille_core::targets::{Skeleton, SolidSpec, Target, TargetError, TargetSpec};
+use deltille_core::targets::{
+    Skeleton, SolidSpec, Target, TargetError, TargetIdentity, TargetSpec,
+};
 
 /// Resolution of PNG pages, dots per inch, where none is asked for.
 pub const DEFAULT_DPI: f64 = 300.0;
@@ -328,29 +331,40 @@ pub enum SetError {
         source: ReadError,
     },
     /// Something else is there.
-    #[error("{} holds {found}, which would be lost: choose another place to write to, or `force` it", path.display())]
+    #[error("{} holds {found}, which would be lost: choose another place to write to, or `overwrite` it", path.display())]
     Taken {
         /// The file.
         path: PathBuf,
         /// What is there.
         found: String,
     },
+    /// The description of another board is there.
+    #[error(
+        "{} describes another board, {board}, whose prints need it: choose another name or folder to keep both, or `overwrite` it",
+        path.display()
+    )]
+    Board {
+        /// The description.
+        path: PathBuf,
+        /// The board.
+        board: TargetIdentity,
+    },
 }
 
 /// Writes files into a folder, all or none, see [`super::staging`], and returns where they are. A file that is there
-/// already is replaced where it is of the same kind, or with `force`.
+/// already is replaced where it is of the same kind, or with `overwrite`; the description of another board only with that.
 ///
 /// # Errors
 /// Where something else is there, or nothing can be written.
 pub fn write_set(
     folder: &Path,
     files: &[(String, Vec<u8>)],
-    force: bool,
+    overwrite: bool,
 ) -> Result<Vec<PathBuf>, SetError> {
     let at = |source: io::Error| SetError::Folder { folder: folder.to_owned(), source };
     for (name, bytes) in files {
         let path = folder.join(name);
-        if force || !path.is_file() {
+        if overwrite || !path.is_file() {
             continue;
         }
         let there = Limits::default().read(&path);
@@ -358,6 +372,9 @@ pub fn write_set(
         let found = Kind::of(&there);
         if !there.is_empty() && found != Kind::of(bytes) {
             return Err(SetError::Taken { path, found: found.to_string() });
+        }
+        if let Some(board) = target_file::lost_board(&path, bytes) {
+            return Err(SetError::Board { path, board });
         }
     }
     let staging = Staging::new(folder).map_err(at)?;

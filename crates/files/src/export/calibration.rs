@@ -16,6 +16,7 @@ use deltille_core::camera::SplineGrid;
 use deltille_core::detect::InkEstimate;
 use deltille_core::json::{self, ReadError};
 use deltille_core::quantity;
+use deltille_core::targets::{Target, TargetIdentity, check_result_of};
 
 /// What a calibration found out about the printed sheet.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -62,6 +63,9 @@ pub enum SheetError {
         /// What is wrong.
         problem: String,
     },
+    /// The calibration was made with another target.
+    #[error("{0}")]
+    OtherTarget(String),
     /// The calibration did not estimate a shape.
     #[error("no `board_shape` in it: make it by a calibration with `Calibration::board_shape`")]
     Flat,
@@ -69,6 +73,8 @@ pub enum SheetError {
 
 #[derive(Deserialize)]
 struct SheetOfFile {
+    #[serde(default)]
+    calibrated_with: Vec<TargetIdentity>,
     #[serde(default, deserialize_with = "quantity::print_scale::de")]
     print_scale: Option<[f64; 2]>,
     board_shape: Option<StoredShape>,
@@ -92,11 +98,12 @@ impl StoredShape {
     }
 }
 
-/// Reads the sheet from a calibration or rig file that has a shape.
+/// Reads the sheet from a calibration or rig file that has a shape; `targets` are those whose sheet it should be, none if it may be
+/// that of any.
 ///
 /// # Errors
-/// When the file is not a calibration, a field is not valid, or no shape was estimated.
-pub fn read_sheet(text: &str) -> Result<Sheet, SheetError> {
+/// When the file is not a calibration, a field is not valid, it was made with another target, or no shape was estimated.
+pub fn read_sheet(text: &str, targets: &[Target]) -> Result<Sheet, SheetError> {
     let schema = json::schema(text.as_bytes()).ok().flatten();
     if !schema.is_some_and(|schema| [SCHEMA, super::rig::SCHEMA].contains(&schema.as_str())) {
         return Err(SheetError::Foreign);
@@ -105,6 +112,8 @@ pub fn read_sheet(text: &str) -> Result<Sheet, SheetError> {
         ReadError::Json(_) => SheetError::Foreign,
         ReadError::Field { field, problem } => SheetError::Field { field, problem },
     })?;
+    let given: Vec<TargetIdentity> = targets.iter().map(Target::identity).collect();
+    check_result_of(&file.calibrated_with, &given).map_err(SheetError::OtherTarget)?;
     let shape = file.board_shape.ok_or(SheetError::Flat)?.shape();
     Ok(Sheet { print_scale: file.print_scale, shape: Some(shape) })
 }
@@ -133,6 +142,8 @@ struct CalibrationFile<'a> {
     coverage: CoverageRecord,
     sigma: f64,
     common_px: Option<f64>,
+    #[serde(skip_serializing_if = "<[TargetIdentity]>::is_empty")]
+    calibrated_with: &'a [TargetIdentity],
     #[serde(skip_serializing_if = "Option::is_none")]
     print_scale: Option<[f64; 2]>,
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -186,6 +197,7 @@ pub fn write(
         coverage: coverage(camera),
         sigma: found.sigma,
         common_px: found.common_px,
+        calibrated_with: &found.calibrated_with,
         print_scale: print.scale,
         ink: print.ink,
         board_shape: found.shape.map(shape),

@@ -3,7 +3,7 @@
 //!
 //! Columns: `grid` (counted from 0 in the image), `kind`, `panel` (`target:panel` when there are
 //! several targets), `row`, `col`, `id`, `x`, `y` (px, pixel centres at integers, y down),
-//! `cov_xx`, `cov_xy`, `cov_yy` (px²). A cell is empty where the value is not known.
+//! `cov_xx`, `cov_xy`, `cov_yy` (px²), `target` (fingerprint of the target that it belongs to). A cell is empty where the value is not known.
 
 use std::fmt::Write;
 
@@ -13,7 +13,7 @@ use deltille_core::detect::Detection;
 use deltille_core::lattice::GridKind;
 
 /// The header line.
-pub const HEADER: &str = "grid,kind,panel,row,col,id,x,y,cov_xx,cov_xy,cov_yy";
+pub const HEADER: &str = "grid,kind,panel,row,col,id,x,y,cov_xx,cov_xy,cov_yy,target";
 
 /// The text of the CSV file of one image.
 ///
@@ -35,6 +35,8 @@ pub fn write(detection: &Detection) -> String {
             (None, Some(id)) => id.to_string(),
             (Some(target), Some(id)) => format!("{target}:{id}"),
         };
+        let target = detection.target_of(grid).filter(|_| grid.panel.is_some());
+        let target = target.map_or_else(String::new, |target| target.fingerprint.to_string());
         for corner in &grid.corners {
             let (row, col, x, y) = (corner.row, corner.col, corner.x, corner.y);
             let id = corner.id.map_or_else(String::new, |id| id.to_string());
@@ -42,7 +44,8 @@ pub fn write(detection: &Detection) -> String {
                 .cov
                 .map_or_else(|| ",,".to_owned(), |[xx, xy, yy]| format!("{xx},{xy},{yy}"));
             // Writing to a String cannot fail.
-            let _ = writeln!(text, "{index},{kind},{panel},{row},{col},{id},{x},{y},{cov}");
+            let _ =
+                writeln!(text, "{index},{kind},{panel},{row},{col},{id},{x},{y},{cov},{target}");
         }
     }
     text

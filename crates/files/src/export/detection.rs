@@ -9,6 +9,7 @@ use deltille_core::json::{self, ReadError};
 use deltille_core::quantity;
 use deltille_core::raster::FileNotes;
 use deltille_core::reading::in_words;
+use deltille_core::targets::TargetIdentity;
 
 /// Schema and version that this crate writes and reads.
 pub const SCHEMA: &str = "deltille/detection/1";
@@ -80,6 +81,8 @@ struct DetectionFile {
     height: u32,
     #[serde(default, skip_serializing_if = "FileNotes::is_empty")]
     file: FileNotes,
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    targets: Vec<TargetIdentity>,
     grids: Vec<Grid>,
     #[serde(default, skip_serializing_if = "Option::is_none")]
     tone: Option<ToneEstimate>,
@@ -116,14 +119,26 @@ pub fn write_line(detection: &Detection) -> String {
 
 impl DetectionFile {
     fn of(detection: &Detection) -> Self {
-        let Detection { image, width, height, file, grids, tone, ink, reasons, timing_ms, .. } =
-            detection.clone();
+        let Detection {
+            image,
+            width,
+            height,
+            file,
+            targets,
+            grids,
+            tone,
+            ink,
+            reasons,
+            timing_ms,
+            ..
+        } = detection.clone();
         Self {
             schema: SCHEMA.to_owned(),
             image,
             width,
             height,
             file,
+            targets,
             grids,
             tone,
             ink,
@@ -155,11 +170,22 @@ pub fn read(text: &str) -> Result<Detection, DetectionFileError> {
     if schema != SCHEMA {
         return Err(DetectionFileError::Schema { found: schema });
     }
-    let DetectionFile { image, width, height, file, grids, tone, ink, reasons, timing_ms, .. } =
-        json::read(text)?;
+    let DetectionFile {
+        image,
+        width,
+        height,
+        file,
+        targets,
+        grids,
+        tone,
+        ink,
+        reasons,
+        timing_ms,
+        ..
+    } = json::read(text)?;
     check_corners(&grids)?;
     let mut detection = Detection::new(image, [width, height], grids);
-    detection.file = file;
+    (detection.file, detection.targets) = (file, targets);
     (detection.tone, detection.ink) = (tone, ink);
     (detection.reasons, detection.timing_ms) = (reasons, timing_ms);
     Ok(detection)

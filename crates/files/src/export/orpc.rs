@@ -11,7 +11,8 @@
 //! ```
 //!
 //! `board` is the position of the board among those of the target by ascending id, `point` the
-//! index of the corner in its matrix ([`super::dsc::point_id`]). A grid that is not labelled has
+//! index of the corner in its matrix ([`super::dsc::point_id`]). After the corners, where readers have stopped that count
+//! them, a comment names the target that was looked for. A grid that is not labelled has
 //! board −1, ordered 0, and points counted in the smallest matrix that holds the grid.
 
 use std::fmt::Write;
@@ -37,6 +38,9 @@ pub fn write(detection: &Detection, target: Option<&Target>) -> String {
     lines.iter().for_each(|line| {
         let _ = writeln!(text, "{line}");
     });
+    for target in &detection.targets {
+        let _ = writeln!(text, "# target {} {target}", target.fingerprint);
+    }
     text
 }
 

@@ -14,6 +14,7 @@ use super::motion::Motion;
 use deltille_core::calibrate::{CameraEstimate, Diagnosis, Estimate, Excluded};
 use deltille_core::camera::SplineGrid;
 use deltille_core::json;
+use deltille_core::targets::TargetIdentity;
 
 /// Schema and version that this crate writes.
 pub const SCHEMA: &str = "deltille/rig/1";
@@ -27,6 +28,8 @@ struct RigFile<'a> {
     outliers: usize,
     sigma: f64,
     common_px: Option<f64>,
+    #[serde(skip_serializing_if = "<[TargetIdentity]>::is_empty")]
+    calibrated_with: &'a [TargetIdentity],
     #[serde(skip_serializing_if = "Option::is_none")]
     print_scale: Option<[f64; 2]>,
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -131,6 +134,7 @@ pub fn write(
         outliers: found.outlier_count(),
         sigma: found.sigma,
         common_px: found.common_px,
+        calibrated_with: &found.calibrated_with,
         print_scale: print.scale,
         board_shape: found.shape.map(shape),
         target_map: found.map.as_ref().map(|of_target| map(found, of_target)),

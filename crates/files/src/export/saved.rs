@@ -18,6 +18,7 @@ use deltille_core::calibrate::{
 use deltille_core::camera::{Camera, Lens, Pose, Spline, SplineGrid};
 use deltille_core::json::{self, ReadError};
 use deltille_core::quantity;
+use deltille_core::targets::{Target, TargetIdentity, check_result_of};
 
 /// Why a calibration cannot be read from a file.
 #[derive(Debug, thiserror::Error)]
@@ -34,6 +35,9 @@ pub enum SavedError {
         /// What is wrong.
         problem: String,
     },
+    /// The calibration was made with another target.
+    #[error("{0}")]
+    OtherTarget(String),
     /// A corner lies on a panel that the target does not have.
     #[error("panel {0} is not on the target")]
     Panel(u32),
@@ -42,10 +46,12 @@ pub enum SavedError {
 /// Reads the estimate of a camera or a rig; `reference` is the target that was photographed.
 ///
 /// # Errors
-/// When the file is not a calibration, a field is not valid, or the target does not have a panel of
-/// the file.
+/// When the file is not a calibration, a field is not valid, or the calibration was made with another target.
 pub fn read(text: &str, reference: &Reference) -> Result<Estimate, SavedError> {
-    estimate(text, Some(reference))
+    let found = estimate(text, Some(reference))?;
+    let given: Vec<TargetIdentity> = reference.targets().iter().map(Target::identity).collect();
+    check_result_of(&found.calibrated_with, &given).map_err(SavedError::OtherTarget)?;
+    Ok(found)
 }
 
 fn estimate(text: &str, reference: Panels) -> Result<Estimate, SavedError> {
@@ -148,6 +154,8 @@ struct Fit {
     sigma: f64,
     #[serde(deserialize_with = "quantity::deviation::de")]
     common_px: Option<f64>,
+    #[serde(default)]
+    calibrated_with: Vec<TargetIdentity>,
     board_shape: Option<SavedShape>,
     target_map: Option<SavedMap>,
     excluded: Vec<SavedExcluded>,
@@ -382,6 +390,7 @@ impl Fit {
     fn estimate(self, reference: Panels) -> Result<Estimate, SavedError> {
         let mut estimate = Estimate::default();
         (estimate.sigma, estimate.common_px) = (self.sigma, self.common_px);
+        estimate.calibrated_with = self.calibrated_with;
         estimate.shape = self.board_shape.map(SavedShape::read);
         estimate.map = self.target_map.map(|map| map.read(reference)).transpose()?;
         estimate.excluded = self.excluded.into_iter().map(SavedExcluded::read).collect();

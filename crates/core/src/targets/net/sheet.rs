@@ -12,7 +12,10 @@ use crate::lattice::{GridKind, Vertex};
 use crate::polygon;
 use crate::targets::angles::turn_of;
 use crate::targets::face_sheet::edge_numbers;
-use crate::targets::layout::{ADVANCE_CAPS, Arrangement, Footprint, fit_upright, tag_range};
+use crate::targets::identity;
+use crate::targets::layout::{
+    ADVANCE_CAPS, Arrangement, Footprint, fit_upright, imprint, tag_range,
+};
 use crate::targets::length::format_mm;
 use crate::targets::paper::{PaperSpec, SolidSheets};
 use crate::targets::poster::{MOST_PAGES, Poster};
@@ -530,12 +533,11 @@ impl<'a> Drawing<'a> {
             {
                 let family = family.of_tiling(kind);
                 parts.push(tag_range(&family.name, first.id, last.id));
-                parts.push(format!("fingerprint {}", family.fingerprint));
             }
         }
         let last = self.panels.last().map_or(0, |panel| panel.id);
         parts.push(format!("boards {}–{last}", spec.board_id));
-        parts.push(format!("deltille {}", env!("CARGO_PKG_VERSION")));
+        parts.push(imprint(identity::fingerprint(self.panels, self.family)));
         parts.join(" · ")
     }
 }

@@ -88,6 +88,7 @@ fn read_in(text: &str, name: &str, units: &[Units]) -> Result<Target, DscError> 
         sheets: Vec::new(),
         finish: Finish::default(),
         logo: None,
+        plan: None,
     };
     deltille_core::targets::json::check(&target)
         .map_err(|(field, problem)| DscError::Target(format!("{field}: {problem}")))?;

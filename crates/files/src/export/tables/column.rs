@@ -83,7 +83,7 @@ pub const CORNERS: [Column; 17] = [
 ];
 
 /// A row for each picture.
-pub const PICTURES: [Column; 24] = [
+pub const PICTURES: [Column; 25] = [
     column("image", Kind::Text),
     column("width", Kind::Signed).gaps(),
     column("height", Kind::Signed).gaps(),
@@ -108,4 +108,5 @@ pub const PICTURES: [Column; 24] = [
     column("exif_orientation", Kind::Signed).gaps().extra(),
     column("damage", Kind::Text).gaps().extra(),
     column("error", Kind::Text).gaps().extra(),
+    column("targets", Kind::Text).gaps().extra(),
 ];

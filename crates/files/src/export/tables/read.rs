@@ -23,6 +23,7 @@ use deltille_core::detect::{Detection, Grid, GridCorner, InkEstimate, Reason, To
 use deltille_core::lattice::GridKind;
 use deltille_core::quantity::{self, Range};
 use deltille_core::raster::FileNotes;
+use deltille_core::targets::TargetIdentity;
 
 /// Rows that are decoded at a time.
 const BATCH: usize = 4096;
@@ -237,6 +238,10 @@ impl Reader {
                 let exif_orientation =
                     exif_orientation.map_err(|_| row.wrong(21, "not from 2 to 8"))?;
                 found.file = FileNotes { exif_orientation, damage: owned(row.text(22)?) };
+                if let Some(json) = owned(row.text(24)?) {
+                    let targets: Result<Vec<TargetIdentity>, _> = serde_json::from_str(&json);
+                    found.targets = targets.map_err(|error| row.wrong(24, error))?;
+                }
                 if let Some(json) = owned(row.text(8)?) {
                     let reasons: Result<Vec<Reason>, _> = serde_json::from_str(&json);
                     found.reasons = reasons.map_err(|error| row.wrong(8, error))?;

@@ -163,6 +163,7 @@ fn picture_row(picture: &Picture) -> [Cell; column::PICTURES.len()] {
     let found = picture.found.as_ref().ok();
     let count = |of: fn(&Detection) -> usize| whole(found.map(|found| of(found) as u32));
     let reasons = found.map(|found| &found.reasons).filter(|reasons| !reasons.is_empty());
+    let targets = found.map(|found| &found.targets).filter(|targets| !targets.is_empty());
     let sentences = |reasons: &Vec<deltille_core::detect::Reason>| {
         text(&reasons.iter().map(ToString::to_string).collect::<Vec<_>>().join("; "))
     };
@@ -198,6 +199,7 @@ fn picture_row(picture: &Picture) -> [Cell; column::PICTURES.len()] {
         whole(file.and_then(|file| file.exif_orientation)),
         file.and_then(|file| file.damage.as_deref()).map_or(Cell::None, text),
         picture.found.as_ref().err().map_or(Cell::None, |why| text(why)),
+        targets.map_or(Cell::None, |all| to_json(serde_json::to_value(all))),
     ]
 }
 

@@ -1,0 +1,190 @@
+//! The identity of a target, by which results name it.
+
+use std::fmt;
+use std::str::FromStr;
+
+use serde::{Deserialize, Serialize};
+
+use crate::Name;
+use crate::quantity;
+use crate::words::counted;
+
+/// The fingerprint of a target: 64 bits of a SHA-256 hash, written as 16 hexadecimal digits.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+#[serde(try_from = "String", into = "String")]
+pub struct Fingerprint(u64);
+
+impl Fingerprint {
+    /// The first eight digits, as printed on sheets.
+    pub fn short(self) -> String {
+        format!("{:08x}", self.0 >> 32)
+    }
+
+    /// The one with these bits.
+    pub fn from_bits(bits: u64) -> Self {
+        Self(bits)
+    }
+}
+
+impl fmt::Display for Fingerprint {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        write!(f, "{:016x}", self.0)
+    }
+}
+
+impl FromStr for Fingerprint {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let is_hex = text.len() == 16
+            && text.bytes().all(|b| b.is_ascii_digit() || (b'a'..=b'f').contains(&b));
+        match u64::from_str_radix(text, 16) {
+            Ok(bits) if is_hex => Ok(Self(bits)),
+            _ => Err("a fingerprint has 16 hexadecimal digits".to_owned()),
+        }
+    }
+}
+
+impl TryFrom<String> for Fingerprint {
+    type Error = String;
+
+    fn try_from(text: String) -> Result<Self, String> {
+        text.parse()
+    }
+}
+
+impl From<Fingerprint> for String {
+    fn from(fingerprint: Fingerprint) -> Self {
+        fingerprint.to_string()
+    }
+}
+
+/// Names a target wherever results refer to it, so that results of different targets cannot be mixed up unnoticed.
+///
+/// Two targets with the same tags in the same tiles have the same [`labels`](Self::labels); the same
+/// [`fingerprint`](Self::fingerprint) have only those whose corners are also at the same positions. The name and the sizes are for
+/// messages.
+///
+/// ```
+/// use deltille_core::targets::{BoardSpec, Target};
+///
+/// let [small, large] = [20.0, 25.0].map(|edge_mm| BoardSpec::deltille(10, 11, edge_mm));
+/// let [small, large] = [Target::new("desk", small)?, Target::new("desk", large)?];
+/// let [small, large] = [small.identity(), large.identity()];
+/// assert_eq!(small.labels, large.labels);
+/// assert_ne!(small.fingerprint, large.fingerprint);
+/// assert_eq!(small.to_string(), "desk (110 corners, edges of 20 mm)");
+/// # Ok::<(), deltille_core::targets::TargetError>(())
+/// ```
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct TargetIdentity {
+    /// Name of the target.
+    pub name: Name,
+    /// Hash of panel ids, tilings, corners (mm, in the target frame) and tags.
+    pub fingerprint: Fingerprint,
+    /// Fingerprint of the target as it was printed, where this one has measured corners or refined panels.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub plan: Option<Fingerprint>,
+    /// Hash of panel ids, tilings, rows and columns of corners, and tags: of all that detection can tell apart.
+    pub labels: Fingerprint,
+    /// Number of panels.
+    pub panels: u32,
+    /// Number of corners.
+    pub corners: u32,
+    /// Shortest and longest edge of a tile, mm.
+    #[serde(deserialize_with = "quantity::edge_mm::de")]
+    pub edge_mm: [f64; 2],
+}
+
+impl TargetIdentity {
+    /// Fingerprint of the target as it was printed.
+    pub fn of_print(&self) -> Fingerprint {
+        self.plan.unwrap_or(self.fingerprint)
+    }
+
+    /// Whether both are the same print, whatever was measured of it.
+    pub fn is_same_print(&self, other: &Self) -> bool {
+        self.of_print() == other.of_print()
+    }
+
+    /// Whether labels cannot tell the other target from this one, although its corners were printed elsewhere.
+    pub fn is_confusable(&self, other: &Self) -> bool {
+        self.labels == other.labels && !self.is_same_print(other)
+    }
+}
+
+/// Refuses to use results of two targets together where their labels are the same and their corners are not: one of the
+/// descriptions is then not that of the board.
+///
+/// # Errors
+/// Which results were made with which target; `first` and `second` say what they are, such as `the camera`.
+pub fn check_same_board(
+    [first, second]: [&str; 2],
+    [of_first, of_second]: [&[TargetIdentity]; 2],
+) -> Result<(), String> {
+    let mut pairs = of_first.iter().flat_map(|one| of_second.iter().map(move |other| (one, other)));
+    match pairs.find(|(one, other)| one.is_confusable(other)) {
+        Some((one, other)) => Err(format!(
+            "{first} is of {one}, {second} of {other}, which has the same labels at another size: only one can be the board that \
+             was photographed; give its description, or set `Detection::forget_targets` to assume this one"
+        )),
+        None => Ok(()),
+    }
+}
+
+/// Refuses a result of other targets than those given. A result that names no target may be of any.
+///
+/// # Errors
+/// Which target the result is of, and which one is given.
+pub fn check_result_of(
+    of_result: &[TargetIdentity],
+    given: &[TargetIdentity],
+) -> Result<(), String> {
+    let is_given = |one: &TargetIdentity| given.iter().any(|other| one.is_same_print(other));
+    match (of_result.first(), given.first()) {
+        (Some(one), Some(other)) if !of_result.iter().any(is_given) => Err(format!(
+            "it was calibrated with {one}, and the target given is {other}: give the description of that target"
+        )),
+        _ => Ok(()),
+    }
+}
+
+/// The name and the size, such as `desk (110 corners, edges of 20 mm)`.
+impl fmt::Display for TargetIdentity {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        write!(f, "{} (", self.name)?;
+        if self.panels > 1 {
+            write!(f, "{}, ", counted(self.panels as usize, "panel"))?;
+        }
+        let [least, most] = self.edge_mm.map(short);
+        let corners = counted(self.corners as usize, "corner");
+        match least == most {
+            true => write!(f, "{corners}, edges of {least} mm)"),
+            false => write!(f, "{corners}, edges of {least} to {most} mm)"),
+        }
+    }
+}
+
+/// A length to a ten-thousandth of a millimetre, as precise as a fingerprint, without trailing zeros.
+fn short(mm: f64) -> String {
+    let text = format!("{mm:.4}");
+    text.trim_end_matches('0').trim_end_matches('.').to_owned()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn fingerprints_are_sixteen_lowercase_digits() {
+        let fingerprint = Fingerprint::from_bits(0x0123_4567_89ab_cdef);
+        assert_eq!(fingerprint.to_string().parse(), Ok(fingerprint));
+        assert_eq!(fingerprint.short(), "01234567");
+        for wrong in
+            ["", "0123456789abcde", "0123456789ABCDEF", "+123456789abcdef", "0123456789abcdeg"]
+        {
+            assert!(wrong.parse::<Fingerprint>().is_err(), "{wrong}");
+        }
+    }
+}

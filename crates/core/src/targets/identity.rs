@@ -1,0 +1,141 @@
+//! What makes a target the one it is: its corners in space and its tags, whatever it is called and printed on.
+
+use sha2::{Digest, Sha256};
+
+use super::{FamilyRef, GridKind, Panel, Target};
+use crate::identity::{Fingerprint, TargetIdentity};
+
+/// Corners closer than this, mm, count as the same point: a hundredth of what printers resolve, and a thousand times what
+/// any file format of a target rounds off.
+const QUANTUM_MM: f64 = 1e-4;
+
+/// Position of the rounding boundary between two multiples of [`QUANTUM_MM`], in quanta. Lengths that people choose have few
+/// decimals, and so have their halves and quarters: none of them lies near this fraction, so that the last digit of a
+/// coordinate cannot change the fingerprint.
+const BOUNDARY: f64 = 0.382;
+
+impl Target {
+    /// Identity of this target. Measured corners and refined panels are at other positions than planned, so that a measured
+    /// target has another fingerprint than its plan, which its identity names.
+    pub fn identity(&self) -> TargetIdentity {
+        let panels = &self.panels;
+        let edges = panels.iter().map(|panel| panel.edge_mm);
+        let least = edges.clone().fold(f64::INFINITY, f64::min);
+        TargetIdentity {
+            name: self.name.clone(),
+            fingerprint: fingerprint(panels, self.family.as_ref()),
+            plan: self.plan.as_ref().map(TargetIdentity::of_print),
+            labels: hash(panels, self.family.as_ref(), false),
+            panels: panels.len() as u32,
+            corners: panels.iter().map(|panel| panel.corners.len() as u32).sum(),
+            edge_mm: [least, edges.fold(0.0, f64::max)],
+        }
+    }
+
+    /// Whether its description serves for prints of the other target too: both have the same panels and tags, or were measured
+    /// of the same print.
+    pub fn has_prints_of(&self, other: &Self) -> bool {
+        let are_both_measured = self.plan.is_some() && other.plan.is_some();
+        (self.panels == other.panels && self.family == other.family)
+            || (are_both_measured && self.identity().is_same_print(&other.identity()))
+    }
+
+    /// Identity of the target as it was printed: of the one from which this target was measured or refined, or its own.
+    pub(crate) fn printed(&self) -> TargetIdentity {
+        self.plan.clone().unwrap_or_else(|| self.identity())
+    }
+}
+
+/// Fingerprint of the target with these panels.
+pub(super) fn fingerprint(panels: &[Panel], family: Option<&FamilyRef>) -> Fingerprint {
+    hash(panels, family, true)
+}
+
+fn hash(panels: &[Panel], family: Option<&FamilyRef>, with_positions: bool) -> Fingerprint {
+    let mut hash = Sha256::new();
+    hash.update(if with_positions { "deltille/target\n" } else { "deltille/labels\n" });
+    for panel in panels {
+        let kind = match panel.kind {
+            GridKind::Deltille => "deltille",
+            GridKind::Checker => "checker",
+        };
+        hash.update(format!("panel {} {kind}\n", panel.id));
+        for corner in &panel.corners {
+            hash.update(format!("corner {} {}", corner.row, corner.col));
+            if with_positions {
+                let [x, y, z] = panel.place_mm(corner).to_array().map(quanta);
+                hash.update(format!(" {x} {y} {z}"));
+            }
+            hash.update("\n");
+        }
+        // By its name: a family may grow, which leaves its earlier codes as they are.
+        if let (Some(family), false) = (family, panel.tags.is_empty()) {
+            hash.update(format!("family {}\n", family.of_tiling(panel.kind).name));
+        }
+        for tag in &panel.tags {
+            hash.update(format!("tag {} {} {}\n", tag.row, tag.col, tag.id));
+        }
+    }
+    let bytes = hash.finalize();
+    Fingerprint::from_bits(u64::from_be_bytes(bytes[..8].try_into().expect("a hash has 32 bytes")))
+}
+
+/// A coordinate as a whole number of [`QUANTUM_MM`].
+fn quanta(mm: f64) -> i64 {
+    (mm / QUANTUM_MM + BOUNDARY).floor() as i64
+}
+
+#[cfg(test)]
+mod tests {
+    use glam::DVec3;
+
+    use super::*;
+    use crate::targets::{BoardSpec, MeasuredPlace, PaperSpec, TargetSpec};
+
+    fn board(name: &str, edit: impl Fn(&mut BoardSpec)) -> Target {
+        let mut spec = BoardSpec::deltille(5, 6, 20.0);
+        edit(&mut spec);
+        Target::new(name, spec).unwrap()
+    }
+
+    #[test]
+    fn a_fingerprint_depends_on_corners_and_tags_alone() {
+        let desk = board("desk", |_| {}).identity();
+        let on_paper = {
+            let paper = PaperSpec { note: Some("lab 3".to_owned()), ..PaperSpec::default() };
+            let spec = TargetSpec::Board(BoardSpec::deltille(5, 6, 20.0));
+            let family = crate::family::Family::shipped("delTag25h7").unwrap();
+            Target::build("wall", &spec, Some(&family), Some(&paper)).unwrap()
+        };
+        assert_eq!(desk.fingerprint, on_paper.identity().fingerprint);
+        let read = Target::from_json(&on_paper.to_json()).unwrap();
+        assert_eq!(read.identity(), on_paper.identity());
+
+        let others = [
+            board("desk", |spec| spec.edge_mm = 20.001),
+            board("desk", |spec| spec.rows = 6),
+            board("desk", |spec| spec.board_id = 1),
+            board("desk", |spec| spec.tags.as_mut().unwrap().first_id = 1),
+            board("desk", |spec| spec.tags = None),
+        ];
+        for other in &others {
+            assert_ne!(desk.fingerprint, other.identity().fingerprint);
+        }
+        let confusable = others.iter().filter(|other| desk.is_confusable(&other.identity()));
+        assert_eq!(confusable.count(), 1, "only the size cannot be told from labels");
+    }
+
+    #[test]
+    fn a_measured_target_names_its_plan() {
+        let plan = board("desk", |_| {});
+        let mut measured = Target { plan: Some(plan.identity()), ..plan.clone() };
+        let place =
+            MeasuredPlace { offset_mm: DVec3::new(0.01, 0.0, 0.0), covariance_mm2: [0.0; 6] };
+        measured.panels[0].corners[3].measured = Some(place);
+        let read = Target::from_json(&measured.to_json()).unwrap();
+        assert_eq!(read.plan, Some(plan.identity()));
+        assert!(read.identity().is_same_print(&plan.identity()));
+        assert_ne!(read.identity().fingerprint, plan.identity().fingerprint);
+        assert_eq!(read.identity().labels, plan.identity().labels);
+    }
+}
