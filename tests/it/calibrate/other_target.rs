@@ -11,7 +11,7 @@ use deltille::targets::Target;
 
 const SMALL: &str = "--target small/desk.json";
 const LARGE: &str = "--target large/desk.json";
-const BOTH_SIZES: [&str; 2] = ["edges of 20 mm", "edges of 25 mm"];
+const BOTH_SIZES: [&str; 2] = ["20 mm", "25 mm"];
 
 /// Two boards of the same tags, of 20 and 25 mm, and what a camera sees of the smaller one.
 fn scene() -> tempfile::TempDir {
@@ -103,8 +103,8 @@ fn the_same_board_is_accepted_by_any_name_and_format() {
     let renamed =
         fs::read_to_string(at.join("small/desk.json")).unwrap().replacen("\"desk\"", "\"wall\"", 1);
     fs::write(at.join("wall.json"), renamed).unwrap();
-    for target in ["wall.json", "small/desk.dsc"] {
-        let command = format!("calibrate seen --target {target} --model radtan -o {target}-camera");
+    for (target, output) in [("wall.json", "of-name"), ("small/desk.dsc", "of-format")] {
+        let command = format!("calibrate seen --target {target} --model radtan -o {output}");
         let output = deltille(at, &command).success().get_output().clone();
         assert!(!String::from_utf8_lossy(&output.stderr).contains("note:"), "{target}");
     }
