@@ -153,15 +153,14 @@ pub fn check_result_of(
 /// The name and the size, such as `desk (110 corners, edges of 20 mm)`.
 impl fmt::Display for TargetIdentity {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
-        write!(f, "{} (", self.name)?;
+        write!(f, "{} ({}", self.name, counted(self.corners as usize, "corner"))?;
         if self.panels > 1 {
-            write!(f, "{}, ", counted(self.panels as usize, "panel"))?;
+            write!(f, " on {}", counted(self.panels as usize, "panel"))?;
         }
         let [least, most] = self.edge_mm.map(short);
-        let corners = counted(self.corners as usize, "corner");
         match least == most {
-            true => write!(f, "{corners}, edges of {least} mm)"),
-            false => write!(f, "{corners}, edges of {least} to {most} mm)"),
+            true => write!(f, ", edges of {least} mm)"),
+            false => write!(f, ", edges of {least} to {most} mm)"),
         }
     }
 }

@@ -133,6 +133,7 @@ impl SightingsArgs {
                 "give --target FILE, or --grid deltille or checker with --edge for untagged boards"
             ),
         };
+        let sheet = self.sheet.read(&limits, target.as_slice())?;
         let Read { mut views, empty, mut left_out, ink, .. } =
             read(&self.detections, &reference, &limits, self.assume_target)?;
         let board = match reference {
@@ -147,7 +148,6 @@ impl SightingsArgs {
         if measure_target {
             left_out.extend(take_sure(&mut views, &reference)?);
         }
-        let sheet = self.sheet.read(&limits, target.as_slice())?;
         put_on(&sheet, target.as_ref(), &mut views)?;
         let panels = panels(&reference, &sheet)?;
         let print = Print { scale: sheet.print_scale, ink };

@@ -40,6 +40,8 @@ fn a_rendered_sheet_is_found_with_every_label_in_every_format() {
         assert_eq!(detection::write(&found), json);
         let target = Target::from_json(&std::fs::read_to_string(path("board.json")).unwrap());
         let target = target.unwrap();
+        let identity = target.identity();
+        assert_eq!(found.targets, [identity.clone()]);
         assert_eq!((found.grids.len(), found.grids[0].panel), (1, Some(0)));
         assert_eq!(found.grids[0].corners.len(), 42);
         for (i, corner) in found.grids[0].corners.iter().enumerate() {
@@ -54,7 +56,8 @@ fn a_rendered_sheet_is_found_with_every_label_in_every_format() {
         assert_eq!(lines[3..5], ["num_corners: 42", "encoding: ascii"]);
         // Matrix of 9 columns: rows 0 and 1 start in column 2, rows 2 and 3 in column 1.
         assert!(lines[5].starts_with("0,2,1,") && lines[12].starts_with("0,11,1,"));
-        assert!(lines[19].starts_with("0,19,1,") && lines.len() == 47);
+        assert!(lines[19].starts_with("0,19,1,") && lines.len() == 48);
+        assert_eq!(lines[47], format!("# target {} {}", identity.fingerprint, identity));
 
         let csv = std::fs::read_to_string(path("out/board.csv")).unwrap();
         assert_eq!(csv.lines().count(), 43);

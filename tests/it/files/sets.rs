@@ -155,7 +155,10 @@ impl Boards {
 
     fn start(&self, which: usize) -> Child {
         let mut command = Command::new(DELTILLE);
-        command.args(BOARDS[which].split_whitespace()).current_dir(self.folder.path());
+        command
+            .args(BOARDS[which].split_whitespace())
+            .arg("--force")
+            .current_dir(self.folder.path());
         command.stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap()
     }
 

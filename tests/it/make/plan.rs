@@ -30,7 +30,7 @@ fn boards_are_proposed_and_made() {
         let output = page.run(at, &format!("deltille plan {arguments}"));
         let said = String::from_utf8(output.stdout).unwrap();
         let command = said.lines().find_map(|line| line.strip_prefix("deltille ")).unwrap();
-        deltille(at, &format!("{command} --no-verify")).success();
+        deltille(at, &format!("{command} --no-verify --force")).success();
     }
     for arguments in [
         "--size 640x480 --fov 20 --distance 1m..300m",
