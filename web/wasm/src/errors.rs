@@ -2,11 +2,12 @@
 
 use std::fmt::Display;
 
+use deltille::words::with_short_quotes;
 use wasm_bindgen::JsError;
 
 /// A message on one line.
 pub fn told(message: &impl Display) -> String {
-    named(&message.to_string().replace('\n', " "))
+    named(&with_short_quotes(&message.to_string().replace('\n', " ")))
 }
 
 /// A text in which settings have the names of the page: what the library calls `BoardSpec::rows` is `rows`.
