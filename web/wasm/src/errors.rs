@@ -2,7 +2,7 @@
 
 use std::fmt::Display;
 
-use deltille::words::with_short_quotes;
+use deltille_core::words::with_short_quotes;
 use wasm_bindgen::JsError;
 
 /// A message on one line.

@@ -254,3 +254,48 @@ fn values<'a>(line: &'a str, words: [&str; 3]) -> Option<[&'a str; 3]> {
     let (second, third) = rest.split_once(words[2])?;
     Some([first, second, third])
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use deltille_core::lattice::GridKind;
+    use deltille_core::targets::{BoardSpec, Target, TargetSpec};
+    use deltille_files::export::inlay::InlaidBodies;
+    use deltille_files::export::mesh::Meshing;
+    use deltille_files::export::threemf::{INLAY, to_bytes};
+
+    #[test]
+    fn the_build_item_stands_at_the_origin_and_lines_are_xml() {
+        let spec = BoardSpec { tags: None, ..BoardSpec::new(GridKind::Deltille, 4, 5, 20.0) };
+        let target = Target::build("b", &TargetSpec::Board(spec), None, None).unwrap();
+        let file = to_bytes(&InlaidBodies::new(&target, None, Meshing::default()).unwrap());
+        let words = Words::of(&target);
+        let stated = frame(&words.title, &words.subject, INLAY);
+        let parts = parts(&file, &Limits::default(), &mut Findings::default()).unwrap();
+        let good = text(&parts[2].1).unwrap();
+        let holds = |text: &str| {
+            let mut found = Findings::default();
+            let bodies = model(text, &stated, &Limits::default(), &mut found);
+            bodies.is_ok_and(|bodies| bodies.len() == 2) && !found.refuse()
+        };
+        assert!(holds(good));
+        let (before, after) = good.split_once(TURN).unwrap();
+        let (place, end) = after.split_once("\"/>").unwrap();
+        let [x, y, z] = place.split(' ').collect::<Vec<_>>()[..] else { panic!("{place}") };
+        let z: f64 = z.parse().unwrap();
+        for place in [
+            format!("{x} {y} {}", z - 3.0),
+            format!("{x} {y} {}", z + 3.0),
+            format!("-1 {y} {z}"),
+            format!("{x} 0 {z}"),
+            format!("{x} {y}"),
+            format!("{x} {y} {z} 0"),
+        ] {
+            assert!(!holds(&format!("{before}{TURN}{place}\"/>{end}")), "{place}");
+        }
+        // White space that XML does not know.
+        for space in ['\u{c}', '\u{b}', '\u{a0}', '\u{2003}'] {
+            assert!(!holds(&good.replacen("<vertex", &format!("{space}<vertex"), 1)));
+        }
+    }
+}

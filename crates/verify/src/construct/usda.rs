@@ -138,3 +138,34 @@ pub(crate) fn list(line: &str) -> Option<(&'static str, Vec<f64>)> {
 
 /// Digits of an index that fits into 32 bits with its sign.
 const MOST_DIGITS_OF_INDEX: usize = 9;
+
+#[cfg(test)]
+mod tests {
+    use super::list;
+
+    #[test]
+    fn lists_hold_tuples_of_their_type() {
+        let values = |line: &str| list(line).map(|(_, values)| values);
+        let good = "        point3f[] points = [(0.1, -2, 3), (4, 5, 6)]";
+        assert_eq!(values(good), Some(vec![0.1, -2.0, 3.0, 4.0, 5.0, 6.0]));
+        assert_eq!(values("int[] indices = [0, 12]"), Some(vec![0.0, 12.0]));
+        assert_eq!(values("int[] indices = []"), Some(Vec::new()));
+        for line in [
+            "point3f[] points = [(0.1, -2, 3, 4, 5, 6)]",
+            "point3f[] points = [(0.1, -2), (3, 4, 5, 6)]",
+            "point3f[] points = [0.1, -2, 3, (4, 5, 6)]",
+            "point3f[] points = [((0.1, -2, 3), (4, 5, 6))]",
+            "point3f[] points = [(0.1, -2, 3) (4, 5, 6)]",
+            "point3f[] points = [(0.1, -2, 3), (4, 5, 6), ]",
+            "point3f[] points = [(0.1, -2, 3),, (4, 5, 6)]",
+            "point3f[] points = [(0.1, -2, 3), (4, 5, 6]",
+            "texCoord2f[] primvars:st = [(0, 0, 0)]",
+            "int[] indices = [(0), 1]",
+            "int[] indices = [0, 1,]",
+            "int[] indices = [0, -1]",
+            "int[] indices = [0, 4294967296]",
+        ] {
+            assert_eq!(values(line), None, "{line}");
+        }
+    }
+}
