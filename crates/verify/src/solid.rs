@@ -14,7 +14,7 @@ use super::face_page::{face_page, front};
 use super::finding::shown;
 use super::fit::AffineMap;
 use super::marks::named;
-use super::model::{Model, View};
+use super::model::{Model, Triangle, View};
 use super::texels::{self, Texels};
 use super::tiles::{Pattern, PlacedPanel, TagLooks, expected};
 use super::{FaceVerdict, Finding, Format, Verdict, Verifier};
@@ -64,6 +64,9 @@ const NORMAL_SLACK: f64 = 1e-4;
 
 /// A mesh this much larger or smaller, relative, is not looked at any further.
 const MAX_SCALE_ERROR: f64 = 0.05;
+
+/// Relative tolerance of the resolution of textures: vertices and texture coordinates are rounded.
+const TEXEL_SLACK: f64 = 1e-2;
 
 /// White around a face in its picture, px.
 const AROUND_PX: f64 = 8.0;
@@ -399,17 +402,28 @@ impl Verifier<'_> {
     }
 }
 
-/// What is wrong with a mesh beside its faces: triangles of a solid that lie on none of them, or ink in a texture that no
-/// triangle shows.
+/// What is wrong with a mesh beside its faces: triangles of a solid that lie on none of them, or in another order, textures
+/// of different resolutions, or ink in a texture that no triangle shows.
 fn not_on_faces(verifier: &Verifier, model: &Model) -> Option<Finding> {
     let body = |problem: String| Some(MeshFinding::Body { problem }.into());
-    if let TargetSpec::Solid(_) = verifier.target.spec {
-        let on_face = |panel: &Panel| front(model, panel, &verifier.face_outline_mm(panel)).len();
-        let on_faces: usize = verifier.target.panels.iter().map(on_face).sum();
-        let all = model.triangles.len();
-        if on_faces != all {
-            return body(format!("{on_faces} of {all} triangles lie on the faces"));
-        }
+    let panels = match &verifier.target.spec {
+        TargetSpec::Solid(_) => verifier.target.panels.as_slice(),
+        _ => sides(verifier.target),
+    };
+    let on_face = |panel: &Panel| front(model, panel, &verifier.face_outline_mm(panel));
+    let fronts: Vec<&Triangle> =
+        panels.iter().flat_map(on_face).map(|front| front.triangle).collect();
+    let (on_faces, all) = (fronts.len(), model.triangles.len());
+    if on_faces != all && matches!(verifier.target.spec, TargetSpec::Solid(_)) {
+        return body(format!("{on_faces} of {all} triangles lie on the faces"));
+    }
+    if !fronts.iter().zip(&model.triangles).all(|(front, next)| std::ptr::eq(*front, next)) {
+        return body("triangles in another order than that of the faces".to_owned());
+    }
+    let texels = || fronts.iter().map(|triangle| model.texel_mm(triangle));
+    let (finest, coarsest) = (texels().fold(f64::INFINITY, f64::min), texels().fold(0.0, f64::max));
+    if coarsest > (1.0 + TEXEL_SLACK) * finest {
+        return body(format!("textures of {finest:.4} to {coarsest:.4} mm for a pixel"));
     }
     let [texture, column, row] = texels::hidden(model)?;
     body(format!(

@@ -70,6 +70,12 @@ struct Filled {
 impl Filled {
     fn new(path: &Path, fill: impl FnOnce(&mut dyn Write) -> io::Result<()>) -> io::Result<Self> {
         check_place(path)?;
+        if path.is_dir() {
+            return Err(io::Error::new(
+                io::ErrorKind::IsADirectory,
+                "there is a folder of that name",
+            ));
+        }
         let (file, unfinished) = temporary_file(folder_of(path))?;
         let mut writer = BufWriter::new(file);
         fill(&mut writer)?;
