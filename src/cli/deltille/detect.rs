@@ -119,6 +119,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     for image in images.named() {
         args.check_results(&named.claim(image)?)?;
     }
+    let new_folder = args.folder().filter(|folder| !folder.exists());
     if let Some(folder) = args.folder() {
         output::check_folder(folder).context("-o")?;
         fs::create_dir_all(folder)
@@ -207,6 +208,10 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
             Some(again) => again.finish(&earlier)?,
             None => tables.finish(&earlier)?,
         }
+    }
+    if let Some(folder) = new_folder {
+        // This removes only an empty folder.
+        let _ = fs::remove_dir(folder);
     }
     if interrupt::is_raised() {
         return Err(Interrupted(report.standing()).into());

@@ -49,7 +49,7 @@ impl Mesh {
 
     fn passes(&self, name: &str, files: &[(String, Vec<u8>)]) -> bool {
         let files: Vec<Artifact> =
-            files.iter().map(|(name, bytes)| Artifact::of(name.clone(), bytes.clone())).collect();
+            files.iter().map(|(name, bytes)| Artifact::new(name.clone(), bytes.clone())).collect();
         let verifier = Verifier::new(&self.target, Some(&self.family)).unwrap();
         verifier.verify(name, &files).unwrap().passed
     }

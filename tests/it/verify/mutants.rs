@@ -72,7 +72,7 @@ fn what_breaks_a_grammar_is_refused() {
                 let files: Vec<Artifact> = (made.iter())
                     .map(|(name, good)| {
                         let content = if name == file { &bytes } else { good };
-                        Artifact::of(name.clone(), content.clone())
+                        Artifact::new(name.clone(), content.clone())
                     })
                     .collect();
                 verifier.verify(&named, &files).is_ok_and(|verdict| verdict.passed)
