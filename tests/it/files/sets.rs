@@ -158,7 +158,7 @@ fn results_of_an_image_appear_together() {
     // The second file cannot be written.
     std::fs::create_dir_all(at.join("out/b.overlay.png")).unwrap();
     let (code, said) =
-        run(DELTILLE, at, "detect a.png b.png --target a.json --overlay --ink 0um -o out");
+        run(DELTILLE, at, "detect a.png b.png --target a.json --overlay --ink none -o out");
     assert_eq!(code, Some(1), "{said}");
     assert!(said.contains("1 of 2 images failed"), "{said}");
     assert_eq!(names(&at.join("out")), ["a.json", "a.overlay.png", "b.overlay.png"]);

@@ -69,6 +69,17 @@ struct Filled {
 
 impl Filled {
     fn new(path: &Path, fill: impl FnOnce(&mut dyn Write) -> io::Result<()>) -> io::Result<Self> {
+        Self::filled(path, fill).map_err(|error| match error.to_string().contains(PREFIX) {
+            // The temporary name means nothing to the user.
+            true => io::Error::new(error.kind(), io::Error::from(error.kind()).to_string()),
+            false => error,
+        })
+    }
+
+    fn filled(
+        path: &Path,
+        fill: impl FnOnce(&mut dyn Write) -> io::Result<()>,
+    ) -> io::Result<Self> {
         check_place(path)?;
         if path.is_dir() {
             return Err(io::Error::new(
@@ -113,10 +124,7 @@ fn temporary_file(folder: &Path) -> io::Result<(tempfile::NamedTempFile, Unfinis
         builder.permissions(std::fs::Permissions::from_mode(0o666));
     }
     Unfinished::begin(|| {
-        let file = builder.tempfile_in(folder).map_err(|error| {
-            // The temporary name means nothing to the user.
-            io::Error::new(error.kind(), std::io::Error::from(error.kind()).to_string())
-        })?;
+        let file = builder.tempfile_in(folder)?;
         // Where files cannot be locked, nothing that is left over is ever removed.
         let _ = file.as_file().lock();
         let path = file.path().to_owned();
