@@ -14,7 +14,7 @@ use rand_chacha::ChaCha8Rng;
 /// Mutants of each file.
 const MUTANTS: usize = 40;
 
-/// Characters that the grammars are made of.
+/// Characters that the grammars are made of. A DXF has none of them but in its comment.
 const STRUCTURE: &[u8] = b"()[]{}<>\"',=/:#";
 
 /// The bytes with one character of their grammar deleted, doubled, moved or exchanged for another.
@@ -54,7 +54,6 @@ fn what_breaks_a_grammar_is_refused() {
         What::Urdf,
         What::Mjcf,
         What::Usd,
-        What::LaserDxf,
         What::LaserSvg,
     ];
     let mut random = ChaCha8Rng::seed_from_u64(14);
