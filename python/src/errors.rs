@@ -7,6 +7,7 @@ use std::io;
 use std::path::Path;
 
 use deltille::limits;
+use deltille::words::with_short_quotes;
 use pyo3::exceptions::PyKeyboardInterrupt;
 use pyo3::prelude::*;
 
@@ -117,7 +118,7 @@ pub const KEYWORDS: &[(&str, &str)] = &[
 
 /// A message of the library on one line, with its settings as keywords.
 pub fn told(message: &impl Display) -> String {
-    let text = message.to_string().replace('\n', " ");
+    let text = with_short_quotes(&message.to_string().replace('\n', " ")).into_owned();
     let (mut told, mut rest) = (String::with_capacity(text.len()), text.as_str());
     while let Some((before, after)) = rest.split_once('`') {
         told += before;

@@ -127,7 +127,15 @@ impl Overwrite {
     /// Refuses to write a file of some kind over one of another kind: it only has the same name, and
     /// may be all that its owner has of a mesh, a target or a calibration.
     pub fn check(self, path: &Path, kind: &Kind) -> anyhow::Result<()> {
-        if self.force || !path.is_file() {
+        if self.force {
+            return Ok(());
+        }
+        ensure!(
+            !path.is_symlink(),
+            "cannot write {}: it is a symbolic link; name what it leads to, or --force replaces the link",
+            path.display()
+        );
+        if !path.is_file() {
             return Ok(());
         }
         let (there, is_empty) = match Limits::default().read(path) {
@@ -171,7 +179,10 @@ pub fn settle(folder: &Path) -> anyhow::Result<()> {
 pub fn write(path: &Path, content: &[u8], overwrite: Overwrite) -> anyhow::Result<()> {
     overwrite.check(path, &Kind::of(content))?;
     settle(folder_of(path))?;
-    if path.is_file() && std::fs::read(path).is_ok_and(|there| there == content) {
+    if path.is_file()
+        && !path.is_symlink()
+        && std::fs::read(path).is_ok_and(|there| there == content)
+    {
         return Ok(());
     }
     make_folder_of(path)?;

@@ -10,6 +10,7 @@ use clap::error::{ContextKind, ContextValue, ErrorKind};
 
 use crate::cli::output::tell;
 use crate::cli::{interrupt, wording};
+use crate::words::{cut, shown, with_short_quotes};
 
 /// Exit code for bad input of every kind.
 pub const BAD_INPUT: u8 = 2;
@@ -84,7 +85,7 @@ pub fn message(error: &anyhow::Error) -> String {
             text = format!("{text}: {cause}");
         }
     }
-    shortened(&text.replace('\n', " "))
+    shortened(&with_short_quotes(&shown(&text.replace('\n', " "))))
 }
 
 /// A line without its middle where that is longer than anybody reads: messages name what they found
@@ -115,7 +116,12 @@ fn one_line(error: &clap::Error, arguments: &[OsString]) -> String {
         let commands = commands.join(", ");
         return format!("a command is missing, one of {commands} (--help tells what they do)");
     }
-    let text = error.to_string();
+    let mut text = error.to_string();
+    for (_, value) in error.context() {
+        if let ContextValue::String(value) = value {
+            text = text.replace(value, &cut(value));
+        }
+    }
     let mut paragraphs = text
         .split("\n\n")
         .map(|paragraph| paragraph.split_whitespace().collect::<Vec<_>>().join(" "));

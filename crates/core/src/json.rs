@@ -6,6 +6,7 @@ use serde::{Deserialize, Serialize};
 use serde_json::ser::{CompactFormatter, Formatter, PrettyFormatter};
 
 use crate::reading::in_words;
+use crate::words::cut;
 
 /// Serialises plain data, indented down to `depth` levels; what lies deeper stays on one line.
 pub fn to_text<T: Serialize>(value: &T, depth: usize) -> String {
@@ -50,8 +51,8 @@ pub fn read<T: serde::de::DeserializeOwned>(json: &str) -> Result<T, ReadError> 
     Ok(value)
 }
 
-/// The schema that a JSON text names, such as `deltille/target/1`; `None` where it names none, an
-/// error where it is no JSON object.
+/// The schema that a JSON text names, such as `deltille/target/1`, in short where it is that of nobody; `None` where it names
+/// none, an error where it is no JSON object.
 ///
 /// # Errors
 /// Where it is no JSON object.
@@ -61,7 +62,7 @@ pub fn schema(text: &[u8]) -> serde_json::Result<Option<String>> {
         schema: Option<String>,
     }
     check_object(text)?;
-    serde_json::from_slice::<Head>(text).map(|head| head.schema)
+    serde_json::from_slice::<Head>(text).map(|head| head.schema.map(|schema| cut(&schema).into()))
 }
 
 /// Refuses a list, whose values would be taken for the fields in their order.

@@ -2,6 +2,8 @@
 
 use std::fmt::Display;
 
+use crate::words::{cut, with_short_quotes};
+
 /// What the message of a reader says, without the names of Rust's types.
 ///
 /// ```
@@ -22,6 +24,7 @@ pub fn in_words(message: impl Display) -> String {
     let (before, said) = message.split_at(at);
     let known = KNOWN.iter().find_map(|(start, told)| told(said.strip_prefix(start)?));
     let said = known.unwrap_or_else(|| said.to_owned());
+    let (before, said) = (with_short_quotes(before), with_short_quotes(&said));
     match line {
         Some(line) => format!("{before}{said} (line {line})"),
         None => format!("{before}{said}"),
@@ -68,13 +71,22 @@ fn starts_at(message: &str, start: &str) -> Option<usize> {
 }
 
 fn unknown(what: &str, rest: &str) -> Option<String> {
-    let (name, known) = rest.split_once(", ").unwrap_or((rest, ""));
-    let known = known.strip_prefix("expected ").unwrap_or_default();
+    // The name is the file's, and may hold anything.
+    let (name, known) = rest.rsplit_once(", expected ").unwrap_or((rest, ""));
+    let name = cut_name(name.strip_suffix(", there are no fields").unwrap_or(name));
     let known = known.strip_prefix("one of ").unwrap_or(known);
     Some(match known {
         "" => format!("{what}{name} is not known"),
         known => format!("{what}{name} is not known; there are {known}"),
     })
+}
+
+/// A name between backquotes, in short.
+fn cut_name(name: &str) -> String {
+    match name.strip_prefix('`').and_then(|name| name.strip_suffix('`')) {
+        Some(name) => format!("`{}`", cut(name)),
+        None => cut(name).into_owned(),
+    }
 }
 
 fn in_place_of(rest: &str) -> Option<String> {
@@ -92,8 +104,11 @@ fn found(what: &str) -> String {
         "map" => "an object".to_owned(),
         "unit value" | "null" | "Option value" => "nothing".to_owned(),
         _ => match what.strip_prefix("string ") {
-            Some(text) => format!("the text {text}"),
-            None => what.to_owned(),
+            Some(text) => {
+                let inside = text.strip_prefix('"').and_then(|text| text.strip_suffix('"'));
+                format!("the text \"{}\"", cut(inside.unwrap_or(text)))
+            }
+            None => cut(what).into_owned(),
         },
     }
 }
@@ -167,6 +182,22 @@ mod tests {
         ] {
             let said = in_words(serde_json::from_str::<File>(text).unwrap_err());
             assert!(said.starts_with(told), "{text}: {said}");
+        }
+    }
+
+    #[test]
+    fn what_a_file_has_is_repeated_in_short() {
+        // Quotation marks and commas in it change nothing.
+        for word in ["x", "`, `", "\\\"a\\\", ", ", expected one of `"] {
+            let long = word.repeat(3000);
+            for text in [
+                format!("{{\"{long}\": 1}}"),
+                format!("{{\"kind\": \"{long}\"}}"),
+                format!("{{\"count\": \"{long}\"}}"),
+            ] {
+                let said = in_words(serde_json::from_str::<File>(&text).unwrap_err());
+                assert!(said.chars().count() < 250, "{said}");
+            }
         }
     }
 }

@@ -13,20 +13,59 @@ pub fn counted(count: usize, thing: &str) -> String {
     format!("{count} {thing}{}", if count == 1 { "" } else { "s" })
 }
 
-/// What is quoted of a text: all of it, or the beginning of one that may be a whole file.
+/// Most characters of a text of others that a message repeats.
+pub const MOST_QUOTED: usize = 80;
+
+/// A text of others in a message: all of it, or the beginning of one that may be a whole file, in
+/// at most [`MOST_QUOTED`] characters.
+///
+/// ```
+/// use deltille_core::words::cut;
+///
+/// assert_eq!(cut("id,A,B"), "id,A,B");
+/// assert_eq!(cut(&"x".repeat(5000)).chars().count(), 80);
+/// ```
+pub fn cut(text: &str) -> Cow<'_, str> {
+    if text.char_indices().nth(MOST_QUOTED).is_none() {
+        return Cow::Borrowed(text);
+    }
+    Cow::Owned(text.chars().take(MOST_QUOTED - 1).chain(['…']).collect())
+}
+
+/// A [`cut`] text between backquotes.
 ///
 /// ```
 /// use deltille_core::words::quoted;
 ///
 /// assert_eq!(quoted("id,A,B"), "`id,A,B`");
-/// assert!(quoted(&"x".repeat(5000)).len() < 80);
 /// ```
 pub fn quoted(text: &str) -> String {
-    const MOST_CHARACTERS: usize = 60;
-    match text.char_indices().nth(MOST_CHARACTERS) {
-        Some((end, _)) => format!("`{} …`", &text[..end]),
-        None => format!("`{text}`"),
+    format!("`{}`", cut(text))
+}
+
+/// A message in which everything between backquotes, or between quotation marks, is [`cut`].
+///
+/// ```
+/// use deltille_core::words::with_short_quotes;
+///
+/// assert_eq!(with_short_quotes("`a` and \"b\""), "`a` and \"b\"");
+/// let message = format!("family `{}` is not known", "x".repeat(5000));
+/// assert_eq!(with_short_quotes(&message).chars().count(), 80 + "family `` is not known".len());
+/// ```
+pub fn with_short_quotes(message: &str) -> Cow<'_, str> {
+    if message.char_indices().nth(MOST_QUOTED).is_none() {
+        return Cow::Borrowed(message);
     }
+    let (mut short, mut rest) = (String::new(), message);
+    while let Some(open) = rest.find(['`', '"']) {
+        let mark = &rest[open..=open];
+        let Some((inside, after)) = rest[open + 1..].split_once(mark) else { break };
+        short += &rest[..=open];
+        short += &cut(inside);
+        short += mark;
+        rest = after;
+    }
+    Cow::Owned(short + rest)
 }
 
 /// How many places two digits of a standard deviation need, and so the value that it belongs to.

@@ -10,10 +10,8 @@ use std::collections::BTreeMap;
 use glam::DVec2;
 use rayon::prelude::*;
 
-use super::tile_table::TileTable;
-use super::tiles::{Expected, PlacedPanel};
+use super::tiles::{Expected, Pattern, PlacedPanel};
 use deltille_core::lattice::Tile;
-use deltille_core::targets::Panel;
 
 /// Side of the squares over which ink is added up, px: shorter than the side of a cell that is drawn for a check.
 const SQUARE: usize = 8;
@@ -64,15 +62,9 @@ impl PlacedPanel<'_> {
         tolerance_px: f64,
     ) -> Vec<MovedEdge> {
         let Some(lattice_from_px) = LatticeFromPx::new(self) else { return Vec::new() };
-        let table = TileTable::new(expected.iter().map(|(&tile, expected)| (tile, expected)));
+        let pattern = Pattern::new(self.panel, expected);
         let tile_at = |px| self.panel.tile_at(lattice_from_px.apply(px));
-        let is_black = |px: DVec2| {
-            let at = lattice_from_px.apply(px);
-            let tile = self.panel.tile_at(at);
-            let uv = |tile| uv(self.panel, tile, at);
-            let here = table.get(tile).map(|expected| expected.is_black_at(uv(tile)));
-            here.unwrap_or(self.panel.inverted)
-        };
+        let is_black = |px: DVec2| pattern.is_black_at(lattice_from_px.apply(px));
         let (width, height) = (self.page.image.width(), self.page.image.height());
         let corners = expected.keys().flat_map(|tile| tile.vertices());
         let corners = corners.map(|vertex| self.px_of(vertex));
@@ -163,11 +155,4 @@ fn covered([x, y]: [usize; 2], is_black: &impl Fn(DVec2) -> bool) -> f64 {
     let middle = DVec2::new(x as f64, y as f64);
     let black = samples.filter(|&(i, j)| is_black(middle + DVec2::new(sample(i), sample(j))));
     black.count() as f64 / (SAMPLES * SAMPLES) as f64
-}
-
-/// Tile coordinates of a position in the panel, in edges.
-fn uv(panel: &Panel, tile: Tile, at: DVec2) -> DVec2 {
-    let [a, b, c] = tile.frame().map(|vertex| panel.position(vertex));
-    let (ab, ac, p) = (b - a, c - a, at - a);
-    DVec2::new(p.perp_dot(ac), ab.perp_dot(p)) / ab.perp_dot(ac)
 }

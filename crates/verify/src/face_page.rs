@@ -4,26 +4,54 @@
 use glam::{DVec2, DVec3};
 
 use super::document::Page;
-use super::model::Model;
+use super::model::{Model, Triangle};
+use deltille_core::polygon;
 use deltille_core::raster::Gray;
 use deltille_core::targets::{Panel, Placement};
 
-/// Greatest distance of the triangles of a face from the plane of its panel, mm.
+/// Greatest distance of the triangles of a face from the plane of its panel, and of their corners from its outline, mm.
 const IN_PLANE_MM: f64 = 0.25;
 
 /// Samples of the texture per pixel of the page along each axis.
 const SAMPLES: usize = 2;
 
+/// A triangle on the front of a face.
+pub(super) struct Front<'a> {
+    pub triangle: &'a Triangle,
+    /// Its corners in the panel frame, mm: those of the face, where they are near to them.
+    pub flat: [DVec2; 3],
+}
+
+/// The triangles of a mesh that lie on a face with this outline, counter-clockwise in the frame of its panel, mm, and are
+/// seen from its front.
+pub(super) fn front<'a>(model: &'a Model, panel: &Panel, outline: &[DVec2]) -> Vec<Front<'a>> {
+    let sides = || outline.iter().zip(outline.iter().cycle().skip(1));
+    let is_in = |p: DVec2| {
+        sides()
+            .all(|(&from, &to)| (to - from).normalize_or_zero().perp_dot(p - from) >= -IN_PLANE_MM)
+    };
+    let front = model.triangles.iter().filter_map(|triangle| {
+        let flat = triangle.vertices_mm.map(|v| panel.pose.panel_from_target(v));
+        let is_level = flat.iter().all(|p| p.z.abs() <= IN_PLANE_MM);
+        let flat = flat.map(DVec3::truncate);
+        let is_front = polygon::area(&flat) > 0.0 && flat.iter().all(|&p| is_in(p));
+        let corner = |p: DVec2| {
+            let corner = outline.iter().find(|corner| corner.distance(p) <= IN_PLANE_MM);
+            corner.copied().unwrap_or(p)
+        };
+        (is_level && is_front).then(|| Front { triangle, flat: flat.map(corner) })
+    });
+    front.collect()
+}
+
 /// The texture of a loaded mesh on the face of a panel, seen from its front, as a page, and the
-/// placement of the panel on that page; white where the mesh has no triangle in the face.
+/// placement of the panel on that page; white where no triangle is in the face.
 ///
-/// `outline` is that of the face, counter-clockwise in the panel frame, mm: triangles in its plane
-/// outside it belong to another face. `area_mm` is the left, lower, right and upper end of the page
-/// in the panel frame, and `px_per_mm` its resolution.
+/// `area_mm` is the left, lower, right and upper end of the page in the panel frame, and `px_per_mm` its resolution.
 pub(super) fn face_page(
     model: &Model,
     panel: &Panel,
-    outline: &[DVec2],
+    front: &[Front],
     area_mm: [f64; 4],
     px_per_mm: f64,
 ) -> (Page, Placement) {
@@ -35,25 +63,11 @@ pub(super) fn face_page(
     let mut shades = vec![u8::MAX; width * height];
     // Side of the largest pixel of the texture, px of the page: it smears edges by as much.
     let mut texel_px = 0.0f64;
-    for triangle in &model.triangles {
-        let flat = triangle.vertices_mm.map(|v| panel.pose.panel_from_target(v));
-        let middle = flat.iter().sum::<DVec3>().truncate() / 3.0;
-        let inside = |i: usize| {
-            let (from, to) = (outline[i], outline[(i + 1) % outline.len()]);
-            (to - from).perp_dot(middle - from) > 0.0
-        };
-        if flat.iter().any(|p| p.z.abs() > IN_PLANE_MM) || !(0..outline.len()).all(inside) {
-            continue;
-        }
+    for Front { triangle, flat } in front {
         // In samples of the page, whose centres are integers; y runs down there and up on the panel.
         let [a, b, c] =
             flat.map(|p| DVec2::new(p.x - left, upper - p.y) * scale - DVec2::splat(0.5));
         let area = (b - a).perp_dot(c - a);
-        // Faces are counter-clockwise from the front, so with y down the front is clockwise, and its
-        // signed area in these coordinates negative.
-        if area >= 0.0 {
-            continue;
-        }
         let (texture, size) = model.texture(triangle);
         texel_px = texel_px.max(model.texel_mm(triangle) * px_per_mm);
         let low = a.min(b).min(c).ceil().max(DVec2::ZERO);

@@ -16,8 +16,8 @@ use super::document::MAX_PIXELS;
 use super::inlay::FacePicture;
 use super::reader::Reader;
 use super::{
-    CutVerdict, Document, DocumentError, Finding, Format, PRINT_PX_PER_MM, SheetVerdict, Verdict,
-    Verifier, VerifyError, file_name,
+    CutVerdict, Document, DocumentError, Finding, Format, PRINT_PX_PER_MM, PageFinding,
+    SheetVerdict, Verdict, Verifier, VerifyError, file_name,
 };
 use deltille_core::artwork::{self, CutDrawing, CutLayer, CuttingError, LaserBoard};
 use deltille_core::raster::Coverage;
@@ -149,9 +149,13 @@ fn drawn_otherwise(
 ) -> Result<Vec<Finding>, DocumentError> {
     let document = Document::read_by(reader, path)?;
     let size = document.size_mm(0);
+    let [left, lower, right, upper] = found.bounds_mm().unwrap_or_default();
+    let stated = DVec2::new(right - left, upper - lower) + 2.0 * laser_svg::AROUND_MM;
+    if (size - stated).abs().max_element() > document.size_tolerance_mm() {
+        return Ok(vec![PageFinding::PageSize { found_mm: size, stated_mm: stated }.into()]);
+    }
     let finest = (MAX_PIXELS / size.element_product()).sqrt();
     let page = document.render(0, PRINT_PX_PER_MM.min(finest))?;
-    let [left, lower, right, upper] = found.bounds_mm().unwrap_or_default();
     // The drawing is in the middle of the picture.
     let origin = (size - DVec2::new(right - left, upper - lower)) / 2.0 - DVec2::new(left, lower);
     let mut cover = Coverage::new(page.image.width(), page.image.height());

@@ -73,6 +73,7 @@ mod reader;
 mod scene;
 mod solid;
 mod stated;
+mod texels;
 mod tile_table;
 mod tiles;
 mod verdict;

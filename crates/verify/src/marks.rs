@@ -452,6 +452,12 @@ pub(super) fn spots(page: &Page, known: &[bool], panels: &[PlacedPanel]) -> Vec<
                 || page.smear_px > 0.0 && is_off(MAX_INK_ERROR, EDGE_PX + page.smear_px);
         }
     });
+    named(page, wrong)
+}
+
+/// Names each connected spot of wrong pixels of a page.
+pub(super) fn named(page: &Page, mut wrong: Vec<bool>) -> Vec<MarkFinding> {
+    let (width, height) = (page.image.width(), page.image.height());
     let mut spots = Vec::new();
     for start in 0..wrong.len() {
         if spots.len() == MOST_SPOTS {

@@ -10,12 +10,13 @@ use rayon::prelude::*;
 use serde::Serialize;
 
 use super::board::{BoardFinding, MATCH_EDGES, detect_alone, outline_alone, wrong_tones};
-use super::face_page::face_page;
+use super::face_page::{face_page, front};
 use super::finding::shown;
 use super::fit::AffineMap;
-use super::marks::spots;
-use super::model::{Model, View};
-use super::tiles::PlacedPanel;
+use super::marks::named;
+use super::model::{Model, Triangle, View};
+use super::texels::{self, Texels};
+use super::tiles::{Pattern, PlacedPanel, TagLooks, expected};
 use super::{FaceVerdict, Finding, Format, Verdict, Verifier};
 use deltille_core::camera::{Camera, Pose};
 use deltille_core::detect::Detection;
@@ -63,6 +64,12 @@ const NORMAL_SLACK: f64 = 1e-4;
 
 /// A mesh this much larger or smaller, relative, is not looked at any further.
 const MAX_SCALE_ERROR: f64 = 0.05;
+
+/// Relative tolerance of the resolution of textures: vertices and texture coordinates are rounded.
+const TEXEL_SLACK: f64 = 1e-2;
+
+/// White around a face in its picture, px.
+const AROUND_PX: f64 = 8.0;
 
 /// A mesh with so many times the stated triangles is not looked at any further either.
 const MOST_TRIANGLES: usize = 2;
@@ -158,6 +165,14 @@ pub(super) fn verify(verifier: &Verifier, path: &Path, model: Model, format: For
             return Verdict::new(path, format, findings);
         }
     }
+    let is_beyond = |uv: &DVec2| uv.cmplt(DVec2::ZERO).any() || uv.cmpgt(DVec2::ONE).any();
+    if model.triangles.iter().flat_map(|triangle| &triangle.uv).any(is_beyond)
+        || texels::are_shared(&model)
+    {
+        let problem = "triangles that share a part of a texture, or lie beyond it".to_owned();
+        findings.push(MeshFinding::Body { problem }.into());
+        return Verdict::new(path, format, findings);
+    }
     let wrong = model.triangles.iter().filter(|triangle| {
         let normal = triangle.winding().normalize_or_zero();
         triangle.normals.iter().any(|n| n.distance(normal) > NORMAL_SLACK)
@@ -178,7 +193,8 @@ pub(super) fn verify(verifier: &Verifier, path: &Path, model: Model, format: For
         faces = panels.map(check).collect();
     }
     if findings.is_empty() && faces.iter().all(|face| face.findings.is_empty()) {
-        findings.extend(wrong_surface(verifier, &model));
+        let surface = wrong_surface(verifier, &model);
+        findings.extend(surface.or_else(|| not_on_faces(verifier, &model)));
     }
     let mut verdict = Verdict::new(path, format, findings);
     verdict.passed &= faces.iter().all(|face| face.findings.is_empty());
@@ -331,47 +347,89 @@ fn check_print(
     verdict: &mut FaceVerdict,
 ) {
     let outline = verifier.face_outline_mm(panel);
-    let low = outline.iter().copied().reduce(DVec2::min).unwrap_or_default();
-    let high = outline.iter().copied().reduce(DVec2::max).unwrap_or_default();
+    let front = front(model, panel, &outline);
+    // Texels just beside the face are on the page, too.
+    let around_mm = DVec2::splat(AROUND_PX / px_per_mm);
+    let low = outline.iter().copied().reduce(DVec2::min).unwrap_or_default() - around_mm;
+    let high = outline.iter().copied().reduce(DVec2::max).unwrap_or_default() + around_mm;
     let area_mm = [low.x, low.y, high.x, high.y];
-    let (mut page, placement) = face_page(model, panel, &outline, area_mm, px_per_mm);
+    let (mut page, placement) = face_page(model, panel, &front, area_mm, px_per_mm);
     page.texel_px = page.texel_px.min(MOST_TEXEL_PX);
-    let found_from_stated = AffineMap::IDENTITY;
-    let placed = PlacedPanel::new(&page, panel, &placement, found_from_stated);
+    let placed = PlacedPanel::new(&page, panel, &placement, AffineMap::IDENTITY);
     if let Some(finding) = wrong_tones(&placed) {
         verdict.findings.push(finding);
         return;
     }
     let report = placed.check_tiles(verifier.family);
     verdict.tags_exact = report.tags_exact;
-    let known = vec![false; page.image.pixels().len()];
-    let marks = spots(&page, &known, &[placed]);
-    let on_panel = |place: DVec2| place + DVec2::new(area_mm[0], area_mm[1]);
+    let on_panel = |place: DVec2| place + low;
+    let are_right = report.findings.is_empty();
     let of_tiles = report.findings.into_iter().map(|finding| finding.moved(on_panel).into());
     verdict.findings.extend(of_tiles);
-    verdict.findings.extend(marks.into_iter().map(|spot| spot.moved(on_panel).into()));
+    let family = verifier.family.and_then(|family| family.of_tiling(panel.kind));
+    let looks = family.map(|family| TagLooks::new(family, panel));
+    let expected = expected(panel, family, looks.as_ref());
+    let texels = Texels {
+        model,
+        panel,
+        pattern: &Pattern::new(panel, &expected),
+        field: panel.field_outline_mm(),
+        fills_face: panel.rim_mm.is_none(),
+    };
+    match texels.wrong(&front, &page, low, are_right) {
+        Ok(wrong) => {
+            let spots = named(&page, wrong).into_iter();
+            verdict.findings.extend(spots.map(|spot| spot.moved(on_panel).into()));
+        }
+        Err(problem) => {
+            verdict.findings.push(MeshFinding::Body { problem: problem.to_owned() }.into());
+        }
+    }
 }
 
 impl Verifier<'_> {
-    /// The outline of a panel's face in the panel frame, mm.
+    /// The outline of a panel's face, or of the side of a plate, counter-clockwise in the panel frame, mm.
     fn face_outline_mm(&self, panel: &Panel) -> Vec<DVec2> {
-        let of_panel = || {
-            // Large enough for all that is printed.
-            let [left, lower, right, upper] = panel.bounds_mm();
-            let (width, height) = (right - left, upper - lower);
-            let corner = DVec2::new(left, lower);
-            let beyond = [DVec2::new(2.0 * width, 0.0), DVec2::new(0.0, 2.0 * height)];
-            vec![corner, corner + beyond[0], corner + beyond[1]]
-        };
-        let TargetSpec::Solid(spec) = &self.target.spec else { return of_panel() };
+        let of_plate = || rectangle(panel.field_mm()).to_vec();
+        let TargetSpec::Solid(spec) = &self.target.spec else { return of_plate() };
         let solid = spec.polyhedron();
         let index = self.target.panels.iter().position(|p| p.id == panel.id);
         let Some(index) = index.filter(|&index| index < solid.faces.len()) else {
-            return of_panel();
+            return of_plate();
         };
         let corners = solid.corners_mm(index).into_iter();
         corners.map(|v| panel.pose.panel_from_target(v).truncate()).collect()
     }
+}
+
+/// What is wrong with a mesh beside its faces: triangles of a solid that lie on none of them, or in another order, textures
+/// of different resolutions, or ink in a texture that no triangle shows.
+fn not_on_faces(verifier: &Verifier, model: &Model) -> Option<Finding> {
+    let body = |problem: String| Some(MeshFinding::Body { problem }.into());
+    let panels = match &verifier.target.spec {
+        TargetSpec::Solid(_) => verifier.target.panels.as_slice(),
+        _ => sides(verifier.target),
+    };
+    let on_face = |panel: &Panel| front(model, panel, &verifier.face_outline_mm(panel));
+    let fronts: Vec<&Triangle> =
+        panels.iter().flat_map(on_face).map(|front| front.triangle).collect();
+    let (on_faces, all) = (fronts.len(), model.triangles.len());
+    if on_faces != all && matches!(verifier.target.spec, TargetSpec::Solid(_)) {
+        return body(format!("{on_faces} of {all} triangles lie on the faces"));
+    }
+    if !fronts.iter().zip(&model.triangles).all(|(front, next)| std::ptr::eq(*front, next)) {
+        return body("triangles in another order than that of the faces".to_owned());
+    }
+    let texels = || fronts.iter().map(|triangle| model.texel_mm(triangle));
+    let (finest, coarsest) = (texels().fold(f64::INFINITY, f64::min), texels().fold(0.0, f64::max));
+    if coarsest > (1.0 + TEXEL_SLACK) * finest {
+        return body(format!("textures of {finest:.4} to {coarsest:.4} mm for a pixel"));
+    }
+    let [texture, column, row] = texels::hidden(model)?;
+    body(format!(
+        "ink at column {column}, row {row} of texture {}, which no face shows",
+        texture + 1
+    ))
 }
 
 /// A corner that is seen in the picture of a face.

@@ -13,6 +13,7 @@ use serde::Serialize;
 use super::document::{MAX_INK_ERROR, Page};
 use super::fit::AffineMap;
 use super::marks;
+use super::tile_table::TileTable;
 use deltille_core::family::{Decoder, Family};
 use deltille_core::lattice::{Cell, GridKind, TagCells, Tile, Vertex};
 use deltille_core::statistics::median;
@@ -206,6 +207,55 @@ impl Expected<'_> {
             Region::Hole => self.inverted,
             Region::Cell(bit) => (tag.word >> bit & 1 == 0) != self.inverted,
         }
+    }
+}
+
+/// The expected appearance of all tiles of a panel; `family` is that of its tiling.
+pub(super) fn expected<'a>(
+    panel: &Panel,
+    family: Option<&Family>,
+    looks: Option<&'a TagLooks>,
+) -> BTreeMap<Tile, Expected<'a>> {
+    let tags: BTreeMap<Tile, TagPlacement> =
+        panel.tags.iter().map(|tag| (panel.tag_tile(tag), *tag)).collect();
+    let expected = panel.tiles().into_iter().map(|tile| {
+        let tag = tags.get(&tile).and_then(|&placement| {
+            let word = family?.code(placement.id)?;
+            Some(ExpectedTag { placement, word, looks: looks? })
+        });
+        let inverted = panel.inverted;
+        (tile, Expected { black: tile.is_dark() != inverted, inverted, tag })
+    });
+    expected.collect()
+}
+
+/// The colours of a panel at any point.
+pub(super) struct Pattern<'a> {
+    panel: &'a Panel,
+    table: TileTable<&'a Expected<'a>>,
+}
+
+impl<'a> Pattern<'a> {
+    pub fn new(panel: &'a Panel, expected: &'a BTreeMap<Tile, Expected<'a>>) -> Self {
+        let table = TileTable::new(expected.iter().map(|(&tile, expected)| (tile, expected)));
+        Self { panel, table }
+    }
+
+    /// Whether a point of the panel, in edges, lies in a tile.
+    pub fn has_tile_at(&self, at: DVec2) -> bool {
+        self.table.get(self.panel.tile_at(at)).is_some()
+    }
+
+    /// Whether the panel is black at a point, in edges. Outside the tiles that is the colour of its field.
+    pub fn is_black_at(&self, at: DVec2) -> bool {
+        let tile = self.panel.tile_at(at);
+        let Some(expected) = self.table.get(tile) else { return self.panel.inverted };
+        if expected.tag.is_none() {
+            return expected.black;
+        }
+        let [a, b, c] = tile.frame().map(|vertex| self.panel.position(vertex));
+        let (ab, ac, p) = (b - a, c - a, at - a);
+        expected.is_black_at(DVec2::new(p.perp_dot(ac), ab.perp_dot(p)) / ab.perp_dot(ac))
     }
 }
 
@@ -403,20 +453,10 @@ impl<'a> PlacedPanel<'a> {
     pub fn check_tiles(&self, family: Option<&Family>) -> TileReport {
         let family = family.and_then(|family| family.of_tiling(self.panel.kind));
         let looks = family.map(|family| TagLooks::new(family, self.panel));
-        let tags: BTreeMap<Tile, TagPlacement> =
-            self.panel.tags.iter().map(|tag| (self.panel.tag_tile(tag), *tag)).collect();
         // Needed only where something is wrong.
         let decoder = OnceCell::new();
         let mut report = TileReport::default();
-        let expected = self.panel.tiles().into_iter().map(|tile| {
-            let tag = tags.get(&tile).and_then(|&placement| {
-                let word = family?.code(placement.id)?;
-                Some(ExpectedTag { placement, word, looks: looks.as_ref()? })
-            });
-            let inverted = self.panel.inverted;
-            (tile, Expected { black: tile.is_dark() != inverted, inverted, tag })
-        });
-        let expected: BTreeMap<Tile, Expected> = expected.collect();
+        let expected = expected(self.panel, family, looks.as_ref());
         for (&tile, expected) in &expected {
             let tally = self.compare(tile, expected);
             report.tiles += 1;

@@ -119,6 +119,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     for image in images.named() {
         args.check_results(&named.claim(image)?)?;
     }
+    let new_folder = args.folder().filter(|folder| !folder.exists());
     if let Some(folder) = args.folder() {
         output::check_folder(folder).context("-o")?;
         fs::create_dir_all(folder)
@@ -196,7 +197,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let mut again = None;
     if !args.stream && args.finder.ink_is_open() && !interrupt::is_raised() {
         let unseen = unseen.into_inner().expect("no thread panics here");
-        again = see_again(&args, &targets, detector, &seen, unseen, &threads)?;
+        again = see_again(&args, &targets, detector, &seen, unseen, &threads, &report)?;
     }
     if let Some(tables) = tables {
         let is_left = interrupt::is_raised();
@@ -207,6 +208,10 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
             Some(again) => again.finish(&earlier)?,
             None => tables.finish(&earlier)?,
         }
+    }
+    if let Some(folder) = new_folder {
+        // This removes only an empty folder.
+        let _ = fs::remove_dir(folder);
     }
     if interrupt::is_raised() {
         return Err(Interrupted(report.standing()).into());
@@ -223,6 +228,7 @@ fn see_again(
     seen: &[Seen],
     unseen: Vec<(usize, Option<Picture>)>,
     threads: &rayon::ThreadPool,
+    report: &Report,
 ) -> anyhow::Result<Option<Tables>> {
     let found: Vec<Option<InkEstimate>> = seen.iter().map(|seen| seen.ink).collect();
     let known: Vec<InkEstimate> = found.iter().copied().flatten().collect();
@@ -241,7 +247,7 @@ fn see_again(
             }
             let Seen { index, image, stem, .. } = &seen[index];
             let again = one_image(args, targets, &detector, image, stem);
-            again.as_ref().err().iter().for_each(|error| bar.suspend(|| run::report(error)));
+            again.as_ref().err().iter().for_each(|error| bar.suspend(|| report.fail_again(error)));
             if let Some(tables) = &tables {
                 tables.add(
                     *index,
@@ -335,6 +341,12 @@ impl Report {
                 }
             }
         }
+    }
+
+    /// Counts an image that was seen, and cannot be seen or written once more.
+    fn fail_again(&self, error: &anyhow::Error) {
+        run::report(error);
+        self.state.lock().expect("no thread panics here").failed += 1;
     }
 
     fn done(&self) -> usize {
@@ -441,16 +453,15 @@ fn one_image(
     let mut found = detector.detect(&image, &name_of(path));
     found.file = notes;
     if let Some(folder) = args.folder() {
-        let save = |extension: &str, content: &[u8]| {
-            let path = folder.join(format!("{stem}.{extension}"));
-            atomic::write(&path, |out| out.write_all(content))
+        let path = |extension: &str| folder.join(format!("{stem}.{extension}"));
+        let text = |format: Format| {
+            (path(format.extension()), format.text(&found, targets.first()).into_bytes())
         };
-        for format in args.each() {
-            save(format.extension(), format.text(&found, targets.first()).as_bytes())?;
-        }
+        let mut files: Vec<(PathBuf, Vec<u8>)> = args.each().map(text).collect();
         if args.overlay {
-            save("overlay.png", &overlay::png(&image, &found)?)?;
+            files.push((path("overlay.png"), overlay::png(&image, &found)?));
         }
+        atomic::write_together(&files)?;
     }
     let line = if args.stream { detection::write_line(&found) } else { summary(path, &found) };
     let is_there = match targets.is_empty() {

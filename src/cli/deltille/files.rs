@@ -107,7 +107,7 @@ pub fn check_places(folder: &Path, files: &[File], overwrite: Overwrite) -> anyh
     files.iter().try_for_each(|file| {
         let path = folder.join(&file.name);
         let show = || format!("cannot write {}", path.display());
-        let path = atomic::place(&path).with_context(show)?;
+        atomic::check_place(&path).with_context(show)?;
         ensure!(!path.is_dir(), "{}: there is a folder of that name", show());
         overwrite.check(&path, &file.kind)
     })
@@ -120,35 +120,61 @@ pub fn write_all(
     files: &[File],
     overwrite: Overwrite,
 ) -> anyhow::Result<Vec<PathBuf>> {
-    let context = || format!("-o: cannot write to {}", folder.display());
-    check_places(folder, files, overwrite)?;
-    interrupt::stands("nothing was written");
-    let staging = Staging::new(folder).with_context(context)?;
-    let staged = staging.files();
-    for file in files {
+    Staged::new(folder, files, overwrite)?.commit()
+}
+
+/// Files that are written under temporary names, to appear together once all else is done; without that, they leave
+/// nothing behind.
+pub struct Staged<'a> {
+    folder: &'a Path,
+    files: &'a [File],
+    overwrite: Overwrite,
+    staging: Staging,
+}
+
+impl<'a> Staged<'a> {
+    /// Writes the files under temporary names.
+    pub fn new(folder: &'a Path, files: &'a [File], overwrite: Overwrite) -> anyhow::Result<Self> {
+        check_places(folder, files, overwrite)?;
+        interrupt::stands("nothing was written");
+        let staging = Staging::new(folder).with_context(|| cannot_write_to(folder))?;
+        let staged = staging.files();
+        for file in files {
+            check_interrupt()?;
+            (file.write)(&staged.join(&file.name)).map_err(|error| {
+                // The name of the temporary folder means nothing to the user.
+                let staged = staged.display().to_string();
+                anyhow!(message(&error).replace(&staged, &folder.display().to_string()))
+            })?;
+        }
         check_interrupt()?;
-        (file.write)(&staged.join(&file.name)).map_err(|error| {
-            // The name of the temporary folder means nothing to the user.
-            let staged = staged.display().to_string();
-            anyhow!(message(&error).replace(&staged, &folder.display().to_string()))
-        })?;
+        Ok(Self { folder, files, overwrite, staging })
     }
-    check_interrupt()?;
-    // Drawing takes a while, and what is there may have changed.
-    check_places(folder, files, overwrite)?;
-    for file in files.iter().filter(|_| !overwrite.is_forced()) {
-        file.check_board(folder, &staged)?;
+
+    /// Moves all files to their places.
+    pub fn commit(self) -> anyhow::Result<Vec<PathBuf>> {
+        let Self { folder, files, overwrite, staging } = self;
+        // Drawing takes a while, and what is there may have changed.
+        check_places(folder, files, overwrite)?;
+        let staged = staging.files();
+        for file in files.iter().filter(|_| !overwrite.is_forced()) {
+            file.check_board(folder, &staged)?;
+        }
+        let names: Vec<&str> = files.iter().map(|file| file.name.as_str()).collect();
+        let replaced = files.iter().filter_map(|file| file.replaced(folder, &staged, &names));
+        let mut replaced: Vec<String> = replaced.collect();
+        if replaced.is_empty() {
+            replaced.extend(textures_replaced(folder, &staged, &names));
+        }
+        staging.commit().with_context(|| cannot_write_to(folder))?;
+        interrupt::stands("the files are whole, but were not all compared");
+        replaced.iter().for_each(|line| tell!("{line}"));
+        Ok(files.iter().map(|file| folder.join(&file.name)).collect())
     }
-    let names: Vec<&str> = files.iter().map(|file| file.name.as_str()).collect();
-    let replaced = files.iter().filter_map(|file| file.replaced(folder, &staged, &names));
-    let mut replaced: Vec<String> = replaced.collect();
-    if replaced.is_empty() {
-        replaced.extend(textures_replaced(folder, &staged, &names));
-    }
-    staging.commit().with_context(context)?;
-    interrupt::stands("the files are whole, but were not all compared");
-    replaced.iter().for_each(|line| tell!("{line}"));
-    Ok(files.iter().map(|file| folder.join(&file.name)).collect())
+}
+
+fn cannot_write_to(folder: &Path) -> String {
+    format!("-o: cannot write to {}", folder.display())
 }
 
 fn check_interrupt() -> anyhow::Result<()> {

@@ -11,6 +11,7 @@ use crate::export::GENERATOR;
 use crate::export::kind::Kind;
 use crate::limits;
 use crate::reading::in_words;
+use crate::words::quoted;
 
 /// The settings in a file that was made for a command.
 pub fn read<T: DeserializeOwned>(
@@ -26,13 +27,14 @@ pub fn read<T: DeserializeOwned>(
         // A line may be the name of a table, or blank.
         let field =
             field.unwrap_or_default().trim_matches(|c: char| c.is_whitespace() || "[]".contains(c));
-        let field = if field.is_empty() { String::new() } else { format!(", `{field}`") };
+        let field = if field.is_empty() { String::new() } else { format!(", {}", quoted(field)) };
         let message = in_words(error.message().replace('\n', " "));
         anyhow!("--template: {} line {}{field}: {message}", path.display(), line + 1)
     })?;
     match made_for(&settings).filter(|made_for| *made_for != command) {
         Some(made_for) => {
-            bail!("--template: {} was made for `{made_for}`, not `{command}`", path.display())
+            let made_for = quoted(made_for);
+            bail!("--template: {} was made for {made_for}, not `{command}`", path.display())
         }
         None => Ok(settings),
     }

@@ -10,7 +10,7 @@ use anyhow::{Context, anyhow, bail, ensure};
 
 use super::calibrating::distance;
 use super::camera_file;
-use super::files::{File, bytes_file, check_places, same_file, sample_of, text_file, write_all};
+use super::files::{File, Staged, bytes_file, check_places, same_file, sample_of, text_file};
 use super::images::{self, Images, Stems};
 use super::in_flight;
 use super::limits::ImageLimits;
@@ -167,13 +167,10 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let map = args.view.map(&made);
     let mut files = args.view.files(&stem, made.view(), &map)?;
     files.insert(0, text_file(format!("{stem}.json"), undistortion::write(&made, &map)));
-    let written = write_all(&args.view.output, &files, args.view.overwrite)?;
-    let view = made.view();
-    say!("{}", told(view, &map));
-    for path in &written {
-        say!("wrote {}", path.display());
-    }
-    pictures.write(&images, &map)
+    let staged = Staged::new(&args.view.output, &files, args.view.overwrite)?;
+    say!("{}", told(made.view(), &map));
+    let made = pictures.write(&images, &map)?;
+    made.end(staged)
 }
 
 /// A view in a line.
@@ -221,8 +218,9 @@ impl Pictures<'_> {
         })
     }
 
-    /// Writes all; a picture that cannot be read is told, and the others go on.
-    fn write(&self, images: &Images, map: &PixelMap) -> anyhow::Result<ExitCode> {
+    /// Writes all; a picture that cannot be read is reported, and the others go on.
+    fn write(&self, images: &Images, map: &PixelMap) -> anyhow::Result<Made> {
+        let is_new = !self.folder.exists();
         if images.count() != Some(0) {
             fs::create_dir_all(self.folder)
                 .with_context(|| format!("-o: cannot write to {}", self.folder.display()))?;
@@ -248,17 +246,13 @@ impl Pictures<'_> {
         bar.finish_and_clear();
         let done = done.into_inner().expect("no thread panics here");
         let failed = failed.into_inner().expect("no thread panics here").len();
-        if interrupt::is_raised() {
-            return Err(Interrupted(format!("{done} pictures are written")).into());
-        }
         if done > 0 {
             say!("wrote {} to {}", counted(done, "picture"), self.folder.display());
+        } else if is_new {
+            // This removes only an empty folder.
+            let _ = fs::remove_dir(self.folder);
         }
-        Ok(match (done, failed) {
-            (_, 0) => ExitCode::SUCCESS,
-            (0, _) => ExitCode::from(BAD_INPUT),
-            _ => ExitCode::from(FAILED),
-        })
+        Ok(Made { done, failed })
     }
 
     fn write_one(&self, image: &Path, map: &PixelMap) -> anyhow::Result<()> {
@@ -282,6 +276,35 @@ impl Pictures<'_> {
         self.args.overwrite.check(&place, &Kind::own_png())?;
         let png = signed_png(png.into_inner());
         Ok(atomic::write(&place, |out| out.write_all(&png))?)
+    }
+}
+
+/// How many pictures were made, and how many were not.
+#[derive(Clone, Copy)]
+struct Made {
+    done: usize,
+    failed: usize,
+}
+
+impl Made {
+    /// Writes the files beside the pictures, unless there should be pictures and none could be made.
+    fn end(self, staged: Staged) -> anyhow::Result<ExitCode> {
+        let Self { done, failed } = self;
+        let is_left = interrupt::is_raised();
+        if done == 0 && (failed > 0 || is_left) {
+            drop(staged);
+            return match is_left {
+                true => Err(Interrupted("nothing was written".to_owned()).into()),
+                false => Ok(ExitCode::from(BAD_INPUT)),
+            };
+        }
+        for path in staged.commit()? {
+            say!("wrote {}", path.display());
+        }
+        if is_left {
+            return Err(Interrupted(format!("{done} pictures are written")).into());
+        }
+        Ok(if failed > 0 { ExitCode::from(FAILED) } else { ExitCode::SUCCESS })
     }
 }
 
@@ -327,18 +350,13 @@ pub fn run_pair(args: PairArgs) -> anyhow::Result<ExitCode> {
         false => (baseline.y, "column"),
     };
     say!("baseline {mm:.3} mm; a point is in the same {what} of both pictures");
-    let written = write_all(&args.view.output, &files, args.view.overwrite)?;
-    for path in &written {
-        say!("wrote {}", path.display());
+    let staged = Staged::new(&args.view.output, &files, args.view.overwrite)?;
+    let mut made = Made { done: 0, failed: 0 };
+    for (index, images) in images.iter().enumerate() {
+        let Made { done, failed } = of_camera(index).write(images, &maps[index])?;
+        made = Made { done: made.done + done, failed: made.failed + failed };
     }
-    for (index, images) in images.iter().enumerate().filter(|(_, images)| images.count() != Some(0))
-    {
-        let code = of_camera(index).write(images, &maps[index])?;
-        if code != ExitCode::SUCCESS {
-            return Ok(code);
-        }
-    }
-    Ok(ExitCode::SUCCESS)
+    made.end(staged)
 }
 
 /// The cameras of a rig's file.

@@ -119,17 +119,89 @@ fn another_board_of_the_same_name_says_what_is_left_of_the_first() {
     page.is("board-again");
 }
 
-/// What a link leads to is written, and verified as what the link's name says.
+/// A link stays as it is, or with `--force` becomes a file; what it leads to is never written.
 #[cfg(unix)]
 #[test]
-fn files_behind_links_of_any_name_are_verified() {
+fn nothing_is_written_through_a_link() {
     let folder = tempfile::tempdir().unwrap();
-    std::fs::write(folder.path().join("out.bin"), "x").unwrap();
-    std::os::unix::fs::symlink("out.bin", folder.path().join("board.pdf")).unwrap();
-    deltille(folder.path(), "board --rows 5 --cols 6 --pdf --force").success();
-    deltille(folder.path(), "verify board.json board.pdf").success();
-    assert!(std::fs::read(folder.path().join("out.bin")).unwrap().starts_with(b"%PDF"));
-    assert!(folder.path().join("board.pdf").is_symlink());
+    let at = folder.path();
+    deltille(at, "board --rows 4 --cols 4 --png --dpi 200 --name t --no-verify").success();
+    std::fs::create_dir(at.join("out")).unwrap();
+    let commands = [
+        ("board --rows 5 --cols 6 --pdf -o out", "board.pdf"),
+        ("detect t.png --target t.json --overlay -o out", "t.overlay.png"),
+        ("refine --kind deltille --seeds seeds.csv t.png -o out/corners.csv", "corners.csv"),
+        ("verify t.json t.png --report out/verdict.json", "verdict.json"),
+        ("board --rows 5 --cols 6 --pdf --save-template out/t.toml -o out", "t.toml"),
+    ];
+    std::fs::write(at.join("seeds.csv"), "x,y\n20,20\n").unwrap();
+    let mut page = Page::default();
+    for (args, name) in commands {
+        let (link, outside) = (at.join("out").join(name), at.join("outside"));
+        std::fs::write(&outside, "").unwrap();
+        std::os::unix::fs::symlink("../outside", &link).unwrap();
+        page.refused(at, &format!("deltille {args}"));
+        assert!(link.is_symlink());
+        deltille(at, &format!("{args} --force")).success();
+        assert!(!link.is_symlink() && link.is_file(), "{args}");
+        assert_eq!(std::fs::read(&outside).unwrap(), b"", "{args}");
+        std::fs::remove_dir_all(at.join("out")).unwrap();
+        std::fs::create_dir(at.join("out")).unwrap();
+    }
+    page.is("links");
+}
+
+/// Of an image all results are written or none, and the count of failures is that of what is missing.
+#[test]
+fn results_of_an_image_appear_together() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    deltille(at, "board --rows 4 --cols 4 --png --dpi 200 --name a --no-verify").success();
+    std::fs::copy(at.join("a.png"), at.join("b.png")).unwrap();
+    // The second file cannot be written.
+    std::fs::create_dir_all(at.join("out/b.overlay.png")).unwrap();
+    let (code, said) =
+        run(DELTILLE, at, "detect a.png b.png --target a.json --overlay --ink none -o out");
+    assert_eq!(code, Some(1), "{said}");
+    assert!(said.contains("1 of 2 images failed"), "{said}");
+    assert_eq!(names(&at.join("out")), ["a.json", "a.overlay.png", "b.overlay.png"]);
+}
+
+/// What is repeated of a file is short.
+#[test]
+fn errors_quote_little_of_a_hostile_file() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    let long = "\u{1b}[31mx".repeat(1000);
+    let escaped = long.replace('\u{1b}', "\\u001b");
+    let files = [
+        ("key.toml", format!("\"{escaped}\" = 1\n")),
+        ("value.toml", format!("command = \"{escaped}\"\n")),
+        ("number.toml", format!("rows = \"{escaped}\"\n")),
+        ("key.json", format!("{{\"schema\": \"deltille/target/1\", \"{escaped}\": 1}}")),
+        ("schema.json", format!("{{\"schema\": \"{escaped}\"}}")),
+        ("name.json", format!("{{\"schema\": \"deltille/target/1\", \"name\": \"{escaped}\"}}")),
+        ("model.yaml", format!("width: 9\nheight: 9\nmodel: \"{escaped}\"\n")),
+        ("key.yaml", format!("\"{escaped}\": 9\n")),
+        ("family.dsc", format!("0,4,4,20\n{long},2\n")),
+        ("word.dsc", format!("{long}\n")),
+    ];
+    for (name, text) in files {
+        std::fs::write(at.join(name), text).unwrap();
+        let command = match name.rsplit_once('.').unwrap().1 {
+            "toml" => format!("board --template {name}"),
+            "yaml" => format!("undistort --camera {name}"),
+            _ => format!("render {name} --camera none.yaml --eye 0,0,300"),
+        };
+        let (code, said) = run(DELTILLE, at, &command);
+        assert_eq!(code, Some(2), "{name}: {said}");
+        assert!(said.lines().count() == 1 && said.chars().count() < 700, "{name}: {said}");
+    }
+    for option in ["--rows", "--edge", "--paper", "--family", "--name"] {
+        let (code, said) = run(DELTILLE, at, &format!("board {option} {}", "x".repeat(9000)));
+        assert_eq!(code, Some(2), "{option}: {said}");
+        assert!(said.lines().count() == 1 && said.chars().count() < 1500, "{option}: {said}");
+    }
 }
 
 /// Two boards that differ, by the content of all their files.

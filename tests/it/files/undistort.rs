@@ -65,3 +65,19 @@ fn what_cannot_be_shown_is_refused_in_a_line() {
     let left: Vec<_> = fs::read_dir(folder.path()).unwrap().collect();
     assert_eq!(left.len(), 2);
 }
+
+/// Files of the view are written with the pictures, or not at all where none could be made.
+#[test]
+fn a_damaged_photograph_leaves_nothing() {
+    let folder = folder();
+    fs::write(folder.path().join("cut.png"), b"\x89PNG\r\n\x1a\n").unwrap();
+    deltille(folder.path(), "undistort --camera camera.yaml cut.png -o new").code(2);
+    assert!(!folder.path().join("new").exists());
+    deltille(folder.path(), "undistort --camera camera.yaml cut.png").code(2);
+    assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 3);
+    deltille(folder.path(), "undistort --camera camera.yaml cut.png photo.png -o new").code(1);
+    let new = folder.path().join("new");
+    assert!(
+        new.join("camera-undistorted.yaml").exists() && !new.join("cut-undistorted.png").exists()
+    );
+}

@@ -1,4 +1,6 @@
 mod broken_sheets;
 mod commands;
 mod damaged;
+mod faces;
 mod in_memory;
+mod mutants;

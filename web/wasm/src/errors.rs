@@ -2,11 +2,13 @@
 
 use std::fmt::Display;
 
+use deltille_core::words::with_short_quotes;
 use wasm_bindgen::JsError;
 
 /// A message on one line.
 pub fn told(message: &impl Display) -> String {
-    named(&message.to_string().replace('\n', " ").replace(ASSUME_TARGET, ""))
+    let text = message.to_string().replace('\n', " ").replace(ASSUME_TARGET, "");
+    named(&with_short_quotes(&text))
 }
 
 /// What the page has no setting for.

@@ -31,7 +31,7 @@ pub struct WriteError {
 
 /// Writes a file through `fill`: to a temporary name in the same folder, renamed to `path` once all
 /// content is on the disk. After an error nothing is left behind, and an earlier file is unchanged.
-/// A symbolic link is followed; a device or a pipe is refused.
+/// A symbolic link is replaced, and what it leads to is unchanged; a device or a pipe is refused.
 ///
 /// # Errors
 /// When `fill` fails, or the file cannot be written.
@@ -39,18 +39,78 @@ pub fn write(
     path: &Path,
     fill: impl FnOnce(&mut dyn Write) -> io::Result<()>,
 ) -> Result<(), WriteError> {
-    fill_and_rename(path, fill).map_err(|source| WriteError { path: path.to_owned(), source })
+    let failed = |source| WriteError { path: path.to_owned(), source };
+    Filled::new(path, fill).and_then(Filled::rename).map_err(failed)
 }
 
-fn fill_and_rename(
-    path: &Path,
-    fill: impl FnOnce(&mut dyn Write) -> io::Result<()>,
-) -> io::Result<()> {
-    let path = &place(path)?;
-    let folder = match path.parent() {
+/// Writes several files, as [`write`] does, after all of them are on the disk under temporary names: where one cannot be
+/// written, none is.
+///
+/// # Errors
+/// When a file cannot be written.
+pub fn write_together(files: &[(PathBuf, Vec<u8>)]) -> Result<(), WriteError> {
+    let failed = |path: &Path, source| WriteError { path: path.to_owned(), source };
+    let fill = |(path, content): &(PathBuf, Vec<u8>)| {
+        Filled::new(path, |out| out.write_all(content)).map_err(|source| failed(path, source))
+    };
+    let filled: Vec<Filled> = files.iter().map(fill).collect::<Result<_, _>>()?;
+    filled
+        .into_iter()
+        .zip(files)
+        .try_for_each(|(filled, (path, _))| filled.rename().map_err(|source| failed(path, source)))
+}
+
+/// A file that is written whole, under a temporary name.
+struct Filled {
+    file: tempfile::NamedTempFile,
+    path: PathBuf,
+    _unfinished: Unfinished,
+}
+
+impl Filled {
+    fn new(path: &Path, fill: impl FnOnce(&mut dyn Write) -> io::Result<()>) -> io::Result<Self> {
+        Self::filled(path, fill).map_err(|error| match error.to_string().contains(PREFIX) {
+            // The temporary name means nothing to the user.
+            true => io::Error::new(error.kind(), io::Error::from(error.kind()).to_string()),
+            false => error,
+        })
+    }
+
+    fn filled(
+        path: &Path,
+        fill: impl FnOnce(&mut dyn Write) -> io::Result<()>,
+    ) -> io::Result<Self> {
+        check_place(path)?;
+        if path.is_dir() {
+            return Err(io::Error::new(
+                io::ErrorKind::IsADirectory,
+                "there is a folder of that name",
+            ));
+        }
+        let (file, unfinished) = temporary_file(folder_of(path))?;
+        let mut writer = BufWriter::new(file);
+        fill(&mut writer)?;
+        let file = writer.into_inner().map_err(io::IntoInnerError::into_error)?;
+        file.as_file().sync_all()?;
+        Ok(Self { file, path: path.to_owned(), _unfinished: unfinished })
+    }
+
+    fn rename(self) -> io::Result<()> {
+        self.file.persist(&self.path).map_err(|error| error.error)?;
+        sync_folder(folder_of(&self.path));
+        Ok(())
+    }
+}
+
+fn folder_of(path: &Path) -> &Path {
+    match path.parent() {
         Some(parent) if !parent.as_os_str().is_empty() => parent,
         _ => Path::new("."),
-    };
+    }
+}
+
+/// A temporary file in a folder, locked.
+fn temporary_file(folder: &Path) -> io::Result<(tempfile::NamedTempFile, Unfinished)> {
     if !folder.is_dir() {
         let message = format!("{} is not a folder", folder.display());
         return Err(io::Error::new(io::ErrorKind::NotFound, message));
@@ -63,24 +123,13 @@ fn fill_and_rename(
         use std::os::unix::fs::PermissionsExt;
         builder.permissions(std::fs::Permissions::from_mode(0o666));
     }
-    let made = Unfinished::begin(|| {
-        let file = builder.tempfile_in(folder).map_err(|error| {
-            // The temporary name means nothing to the user.
-            io::Error::new(error.kind(), std::io::Error::from(error.kind()).to_string())
-        })?;
+    Unfinished::begin(|| {
+        let file = builder.tempfile_in(folder)?;
         // Where files cannot be locked, nothing that is left over is ever removed.
         let _ = file.as_file().lock();
         let path = file.path().to_owned();
         Ok((file, path))
-    });
-    let (file, _unfinished) = made?;
-    let mut writer = BufWriter::new(file);
-    fill(&mut writer)?;
-    let file = writer.into_inner().map_err(io::IntoInnerError::into_error)?;
-    file.as_file().sync_all()?;
-    file.persist(path).map_err(|error| error.error)?;
-    sync_folder(folder);
-    Ok(())
+    })
 }
 
 /// A temporary file or folder, registered while it is written so that [`abandon`] can remove it.
@@ -168,24 +217,16 @@ pub(super) fn sync_folder(folder: &Path) {
     let _ = File::open(folder).and_then(|folder| folder.sync_all());
 }
 
-/// The path of the file that a write to `path` replaces: the destination of symbolic links, else
-/// `path`.
+/// Checks what a write to `path` would replace: a file, or a symbolic link, itself. Folders are left to the system.
 ///
 /// # Errors
-/// When a symbolic link has no destination, or the path is a device or a pipe.
-pub fn place(path: &Path) -> io::Result<PathBuf> {
-    match path.symlink_metadata() {
-        Err(_) => Ok(path.to_owned()),
-        Ok(link) if link.is_symlink() => {
-            let to = path.canonicalize().map_err(|error| {
-                io::Error::new(error.kind(), "it is a symbolic link to nothing")
-            })?;
-            place(&to)
-        }
-        Ok(there) if there.is_file() || there.is_dir() => Ok(path.to_owned()),
-        Ok(_) => {
+/// When the path is a device or a pipe, or leads to one.
+pub fn check_place(path: &Path) -> io::Result<()> {
+    match path.metadata() {
+        Ok(there) if !there.is_file() && !there.is_dir() => {
             Err(io::Error::new(io::ErrorKind::InvalidInput, "it is a device or a pipe, no file"))
         }
+        _ => Ok(()),
     }
 }
 
@@ -195,19 +236,39 @@ mod tests {
 
     #[cfg(unix)]
     #[test]
-    fn links_stay_links_and_pipes_pipes() {
+    fn links_are_replaced_themselves_and_pipes_stay() {
         let folder = tempfile::tempdir().unwrap();
         let path = |name: &str| folder.path().join(name);
         std::fs::write(path("real"), "old").unwrap();
         std::os::unix::fs::symlink("real", path("link")).unwrap();
         std::os::unix::fs::symlink("nowhere", path("dangling")).unwrap();
         std::os::unix::net::UnixListener::bind(path("socket")).unwrap();
+        std::os::unix::fs::symlink("socket", path("to-socket")).unwrap();
         let new = |name: &str| write(&path(name), |out| out.write_all(b"new"));
-        new("link").unwrap();
-        assert_eq!(std::fs::read(path("real")).unwrap(), b"new");
-        assert!(path("link").is_symlink());
-        assert!(new("dangling").unwrap_err().to_string().contains("link to nothing"));
-        assert!(new("socket").unwrap_err().to_string().contains("no file"));
+        for link in ["link", "dangling"] {
+            new(link).unwrap();
+            assert!(!path(link).is_symlink());
+            assert_eq!(std::fs::read(path(link)).unwrap(), b"new");
+        }
+        assert_eq!(std::fs::read(path("real")).unwrap(), b"old");
+        assert!(!path("nowhere").exists());
+        for pipe in ["socket", "to-socket"] {
+            assert!(new(pipe).unwrap_err().to_string().contains("no file"));
+        }
+    }
+
+    #[test]
+    fn of_several_files_all_are_written_or_none() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = |name: &str| folder.path().join(name);
+        let files =
+            |second: &str| [path("a"), path(second)].map(|path| (path, b"new".to_vec())).to_vec();
+        std::fs::write(path("a"), "old").unwrap();
+        write_together(&files("none/b")).unwrap_err();
+        assert_eq!(std::fs::read(path("a")).unwrap(), b"old");
+        assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 1);
+        write_together(&files("b")).unwrap();
+        assert_eq!(["a", "b"].map(|name| std::fs::read(path(name)).unwrap()), [b"new", b"new"]);
     }
 
     #[test]

@@ -16,6 +16,7 @@ use std::path::Path;
 
 use super::dsc;
 use deltille_core::json;
+use deltille_core::words::cut;
 
 /// Number of first lines of a text in which its comment is looked for.
 const HEAD_LINES: usize = 3;
@@ -198,7 +199,7 @@ impl Kind {
 impl fmt::Display for Kind {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
         let (Is::Schema(words) | Is::Words(words)) = &self.0;
-        f.write_str(words)
+        f.write_str(&cut(words))
     }
 }
 

@@ -12,7 +12,7 @@ use super::svg::{HEAD, data, number};
 use deltille_core::artwork::{CutDrawing, CutLayer, CutPath};
 
 /// Blank around the drawing, mm.
-const AROUND_MM: f64 = 1.0;
+pub const AROUND_MM: f64 = 1.0;
 
 /// Width of the lines to cut along, mm: what laser programs take for a hairline.
 const HAIRLINE_MM: f64 = 0.01;

@@ -85,7 +85,8 @@ impl Staging {
         let _moving = atomic::moving();
         for entry in fs::read_dir(&files)? {
             let staged = entry?;
-            if same_content(&staged.path(), &self.folder.join(staged.file_name())) {
+            let place = self.folder.join(staged.file_name());
+            if !place.is_symlink() && same_content(&staged.path(), &place) {
                 fs::remove_file(staged.path())?;
             }
         }
@@ -150,21 +151,14 @@ fn finish(temporary: &Path, folder: &Path) -> io::Result<()> {
         Err(error) if error.kind() == io::ErrorKind::NotFound => Vec::new(),
         entries => entries?.map(|entry| Ok(entry?.file_name())).collect::<io::Result<_>>()?,
     };
-    let place = |name: &OsString| atomic::place(&folder.join(name));
-    let places = names.iter().map(place).collect::<io::Result<Vec<_>>>()?;
+    let places: Vec<PathBuf> = names.iter().map(|name| folder.join(name)).collect();
+    places.iter().try_for_each(|place| atomic::check_place(place))?;
     // Freeing a replaced file takes a file system a hundred times as long as a rename; holding it
     // open defers that until after the last rename.
     let open = |place: &PathBuf| File::open(place).ok().filter(|_| cfg!(unix));
     let _replaced: Vec<File> = places.iter().filter_map(open).collect();
     for (name, place) in names.iter().zip(&places) {
-        let staged = files.join(name);
-        if fs::rename(&staged, place).is_err() {
-            // A link may lead to another file system.
-            let mut content = File::open(&staged)?;
-            atomic::write(place, |out| io::copy(&mut content, out).map(|_| ()))
-                .map_err(|error| error.source)?;
-            fs::remove_file(&staged)?;
-        }
+        fs::rename(files.join(name), place)?;
     }
     atomic::sync_folder(folder);
     atomic::remove(temporary);

@@ -9,7 +9,7 @@ use serde_json::Value;
 use super::{Findings, Words, decimal, is_creator, is_plain_file_name, mtl, png, start, text};
 use crate::reader::Reader;
 use crate::{Artifact, DocumentError};
-use deltille_files::export::obj::{part_name, texture_name};
+use deltille_files::export::obj::{material_name, part_name, texture_name};
 use deltille_files::export::texture::MAX_TEXTURES;
 
 /// Inspects an OBJ, its material library and its textures; returns the findings, and these files as
@@ -37,11 +37,19 @@ pub(super) fn check(
     let written = reader.read_text(&path.with_file_name(&library))?;
     let (materials, of_library) = mtl::check(&written);
     found.add_of(&library, of_library);
+    let library_name = library.clone();
     parts.push(Artifact::new(library, written));
     let few = materials.len() <= MAX_TEXTURES as usize;
     found.unless(few, "the file", format!("more than {MAX_TEXTURES} materials"));
     let known = materials.iter().map(|material| &material.name).eq(used.iter());
     found.unless(known, "the file", "materials other than those of its library");
+    let usual = (0..materials.len()).map(|texture| material_name(texture, materials.len()));
+    let named = materials.iter().map(|material| material.name.clone()).eq(usual);
+    found.unless(
+        named,
+        &library_name,
+        "materials of other names than are written, or in another order",
+    );
     for texture in materials.into_iter().filter_map(|material| material.texture) {
         if found.refuse() {
             break;

@@ -159,9 +159,11 @@ fn model(
     let mut bodies: Vec<Body> = Vec::new();
     let mut rest = String::new();
     let mut section = "";
+    let mut place = None;
     let mut nodes = 0;
     for line in text.lines() {
-        let trimmed = line.trim_start();
+        // No other white space is XML's in all its versions.
+        let trimmed = line.trim_start_matches(' ');
         nodes += 1;
         if nodes > limits.max_nodes {
             return Err(limits.exceeded(Kind::Nodes).to_string());
@@ -178,12 +180,23 @@ fn model(
                 if section == "<vertices>" {
                     bodies.push(Body::default());
                 }
-                rest += &placed(line);
+                let (line, numbers) = placed(line);
+                place = place.or(numbers);
+                rest += &line;
                 rest.push('\n');
             }
         }
     }
     same_lines(&rest, stated, str::to_owned, found);
+    if found.refuse() {
+        return Ok(Vec::new());
+    }
+    let is_there = place.is_some_and(|place| is_at_origin(&bodies, place));
+    found.unless(
+        is_there,
+        "the build item",
+        "a position other than with its least coordinates at 0",
+    );
     if found.refuse() {
         return Ok(Vec::new());
     }
@@ -195,16 +208,30 @@ fn model(
     }
 }
 
-/// A line, without its numbers if it is the one that puts the object onto the printer.
-fn placed(line: &str) -> String {
-    let Some((before, rest)) = line.split_once(TURN) else { return line.to_owned() };
-    let numbers = rest.trim_end_matches("\"/>").split(' ').map(decimal);
-    let are_numbers = numbers.filter(Option::is_some).count() == 3 && rest.split(' ').count() == 3;
-    match are_numbers && rest.ends_with("\"/>") {
-        true => format!("{before}{TURN}\"/>"),
-        false => line.to_owned(),
+/// A line without its numbers, and these, if it is the one that puts the object onto the printer.
+fn placed(line: &str) -> (String, Option<DVec3>) {
+    let numbers = || {
+        let (before, rest) = line.split_once(TURN)?;
+        let numbers: Vec<f64> =
+            rest.strip_suffix("\"/>")?.split(' ').map(decimal).collect::<Option<_>>()?;
+        let place = <[f64; 3]>::try_from(numbers).ok()?;
+        Some((format!("{before}{TURN}\"/>"), DVec3::from(place)))
+    };
+    match numbers() {
+        Some((line, place)) => (line, Some(place)),
+        None => (line.to_owned(), None),
     }
 }
+
+/// Whether the object is put where its least coordinate along each axis is 0.
+fn is_at_origin(bodies: &[Body], place: DVec3) -> bool {
+    let vertices = bodies.iter().flat_map(|body| &body.vertices_mm);
+    let least = vertices.copied().reduce(DVec3::min).unwrap_or_default();
+    (least + place).abs().max_element() <= ROUNDED_MM
+}
+
+/// Coordinates are written with nine decimals.
+const ROUNDED_MM: f64 = 1e-8;
 
 fn vertex(line: &str) -> Option<DVec3> {
     let [x, y, z] = values(line, ["<vertex x=\"", "\" y=\"", "\" z=\""])?.map(decimal);
@@ -226,4 +253,49 @@ fn values<'a>(line: &'a str, words: [&str; 3]) -> Option<[&'a str; 3]> {
     let (first, rest) = rest.split_once(words[1])?;
     let (second, third) = rest.split_once(words[2])?;
     Some([first, second, third])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use deltille_core::lattice::GridKind;
+    use deltille_core::targets::{BoardSpec, Target, TargetSpec};
+    use deltille_files::export::inlay::InlaidBodies;
+    use deltille_files::export::mesh::Meshing;
+    use deltille_files::export::threemf::{INLAY, to_bytes};
+
+    #[test]
+    fn the_build_item_stands_at_the_origin_and_lines_are_xml() {
+        let spec = BoardSpec { tags: None, ..BoardSpec::new(GridKind::Deltille, 4, 5, 20.0) };
+        let target = Target::build("b", &TargetSpec::Board(spec), None, None).unwrap();
+        let file = to_bytes(&InlaidBodies::new(&target, None, Meshing::default()).unwrap());
+        let words = Words::of(&target);
+        let stated = frame(&words.title, &words.subject, INLAY);
+        let parts = parts(&file, &Limits::default(), &mut Findings::default()).unwrap();
+        let good = text(&parts[2].1).unwrap();
+        let holds = |text: &str| {
+            let mut found = Findings::default();
+            let bodies = model(text, &stated, &Limits::default(), &mut found);
+            bodies.is_ok_and(|bodies| bodies.len() == 2) && !found.refuse()
+        };
+        assert!(holds(good));
+        let (before, after) = good.split_once(TURN).unwrap();
+        let (place, end) = after.split_once("\"/>").unwrap();
+        let [x, y, z] = place.split(' ').collect::<Vec<_>>()[..] else { panic!("{place}") };
+        let z: f64 = z.parse().unwrap();
+        for place in [
+            format!("{x} {y} {}", z - 3.0),
+            format!("{x} {y} {}", z + 3.0),
+            format!("-1 {y} {z}"),
+            format!("{x} 0 {z}"),
+            format!("{x} {y}"),
+            format!("{x} {y} {z} 0"),
+        ] {
+            assert!(!holds(&format!("{before}{TURN}{place}\"/>{end}")), "{place}");
+        }
+        // White space that XML does not know.
+        for space in ['\u{c}', '\u{b}', '\u{a0}', '\u{2003}'] {
+            assert!(!holds(&good.replacen("<vertex", &format!("{space}<vertex"), 1)));
+        }
+    }
 }

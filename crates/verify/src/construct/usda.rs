@@ -94,20 +94,78 @@ fn brackets(line: &str) -> [usize; 2] {
     [from, to.max(from)]
 }
 
-/// The list that a line has: its name and its numbers.
+/// The list that a line has: its name and its numbers, each tuple of which has as many as the type of the list says.
 pub(crate) fn list(line: &str) -> Option<(&'static str, Vec<f64>)> {
     let trimmed = line.trim_start();
     let mut names = USD_LISTS.into_iter().chain([USD_SUBSET]);
     let name = names.find(|name| trimmed.starts_with(&format!("{name} = [")))?;
     let [from, to] = brackets(line);
     let inside = line[from..to].strip_prefix('[')?.strip_suffix(']')?;
-    let number = |word: &str| match name.starts_with("int[]") {
-        true => decimal(word).filter(|_| !word.contains(['.', '-'])),
-        false => decimal(word.trim_matches(['(', ')'])),
+    let size = if name.starts_with("int[]") {
+        1
+    } else if name.starts_with("texCoord2f[]") {
+        2
+    } else {
+        3
     };
-    let numbers: Option<Vec<f64>> = match inside.is_empty() {
-        true => Some(Vec::new()),
-        false => inside.split(',').map(|word| number(word.trim())).collect(),
+    let whole = |word: &str| {
+        let digits = word.bytes().all(|byte| byte.is_ascii_digit());
+        (digits && word.len() <= MOST_DIGITS_OF_INDEX).then(|| decimal(word)).flatten()
     };
-    Some((name, numbers?))
+    let entry = |entry: &str| -> Option<Vec<f64>> {
+        if size == 1 {
+            return Some(vec![whole(entry)?]);
+        }
+        let words = entry.strip_prefix('(')?.strip_suffix(')')?.split(", ");
+        words.map(decimal).collect::<Option<Vec<f64>>>().filter(|words| words.len() == size)
+    };
+    let mut numbers = Vec::new();
+    let mut rest = inside;
+    while !rest.is_empty() {
+        let end = match size {
+            1 => rest.find(',').unwrap_or(rest.len()),
+            _ => rest.find(')')? + 1,
+        };
+        numbers.extend(entry(&rest[..end])?);
+        rest = match &rest[end..] {
+            "" => "",
+            // Something follows.
+            next => next.strip_prefix(", ").filter(|next| !next.is_empty())?,
+        };
+    }
+    Some((name, numbers))
+}
+
+/// Digits of an index that fits into 32 bits with its sign.
+const MOST_DIGITS_OF_INDEX: usize = 9;
+
+#[cfg(test)]
+mod tests {
+    use super::list;
+
+    #[test]
+    fn lists_hold_tuples_of_their_type() {
+        let values = |line: &str| list(line).map(|(_, values)| values);
+        let good = "        point3f[] points = [(0.1, -2, 3), (4, 5, 6)]";
+        assert_eq!(values(good), Some(vec![0.1, -2.0, 3.0, 4.0, 5.0, 6.0]));
+        assert_eq!(values("int[] indices = [0, 12]"), Some(vec![0.0, 12.0]));
+        assert_eq!(values("int[] indices = []"), Some(Vec::new()));
+        for line in [
+            "point3f[] points = [(0.1, -2, 3, 4, 5, 6)]",
+            "point3f[] points = [(0.1, -2), (3, 4, 5, 6)]",
+            "point3f[] points = [0.1, -2, 3, (4, 5, 6)]",
+            "point3f[] points = [((0.1, -2, 3), (4, 5, 6))]",
+            "point3f[] points = [(0.1, -2, 3) (4, 5, 6)]",
+            "point3f[] points = [(0.1, -2, 3), (4, 5, 6), ]",
+            "point3f[] points = [(0.1, -2, 3),, (4, 5, 6)]",
+            "point3f[] points = [(0.1, -2, 3), (4, 5, 6]",
+            "texCoord2f[] primvars:st = [(0, 0, 0)]",
+            "int[] indices = [(0), 1]",
+            "int[] indices = [0, 1,]",
+            "int[] indices = [0, -1]",
+            "int[] indices = [0, 4294967296]",
+        ] {
+            assert_eq!(values(line), None, "{line}");
+        }
+    }
 }

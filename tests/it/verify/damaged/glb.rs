@@ -89,7 +89,7 @@ fn float(view: usize, index: usize, value: f32) -> Damage {
 }
 
 /// Changes the texture.
-fn texture(damage: Damage) -> Damage {
+pub fn texture(damage: Damage) -> Damage {
     Box::new(move |bytes| {
         let mut parts = Parts::of(bytes);
         let mut root: Value = serde_json::from_slice(&parts.json).unwrap();

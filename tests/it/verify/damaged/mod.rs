@@ -5,11 +5,11 @@
 //! viewers would show otherwise. A table for each format has a line for each cause.
 
 mod edit;
-mod glb;
+pub mod glb;
 mod lists;
 mod obj;
 mod pdf;
-mod png;
+pub mod png;
 mod split;
 mod stl;
 mod svg;
@@ -39,7 +39,7 @@ use crate::common::verdict::findings;
 const LEAST: usize = 440;
 
 /// One way of damaging a file.
-struct Case {
+pub struct Case {
     /// What is done to it.
     name: &'static str,
     /// The file that is damaged.
@@ -48,7 +48,7 @@ struct Case {
 }
 
 /// Makes a damaged file of a good one.
-type Damage = Box<dyn Fn(&[u8]) -> Vec<u8>>;
+pub type Damage = Box<dyn Fn(&[u8]) -> Vec<u8>>;
 
 /// A line of a table: what is done, and how.
 type Row = (&'static str, Damage);
