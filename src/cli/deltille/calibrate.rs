@@ -22,6 +22,7 @@ use crate::cli::run::{FAILED, report};
 use crate::cli::wording::in_options;
 use crate::export::calibration;
 use crate::export::camera::{FormatError, colmap, kalibr, mrcal, nerfstudio, opencv, ros};
+use crate::targets::Target;
 use crate::words::{counted, places, shown};
 
 /// Correlations from here on are told: such parameters are hardly told apart.
@@ -110,7 +111,9 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     if let Some(folder) = &args.images {
         check_images(folder, &views)?;
     }
-    let mut calibration = Calibration::new(panels).camera(&stem, views, intrinsics);
+    let accuracy_mm = target.as_ref().and_then(Target::measured_sd_mm);
+    let calibration = Calibration::new(panels).board_accuracy_mm(accuracy_mm);
+    let mut calibration = calibration.camera(&stem, views, intrinsics);
     let tried = match args.model {
         Some(model) => model.choose(&mut calibration, 0)?,
         None => Vec::new(),

@@ -46,6 +46,8 @@ pub struct Calibration {
     pub(super) refine_panels: bool,
     pub(super) board_shape: bool,
     pub(super) measure_target: bool,
+    /// Standard deviation of a corner of the board from its plan, mm; that of a print where it is not known.
+    pub(super) board_accuracy_mm: Option<f64>,
     pub(super) hold_out: Option<usize>,
     pub(super) distances_mm: Vec<f64>,
     /// Which of the model's starts is taken; the best where none is said.
@@ -190,6 +192,7 @@ impl Calibration {
             refine_panels: false,
             board_shape: false,
             measure_target: false,
+            board_accuracy_mm: None,
             hold_out: None,
             distances_mm: Vec::new(),
             start: None,
@@ -202,14 +205,18 @@ impl Calibration {
     /// A calibration of what was photographed, with panels at these places: one target, or several with their panels one
     /// target after the other.
     pub fn of(reference: &Reference, panels: Vec<PanelPlace>) -> Self {
+        let accuracy_mm = reference.targets().iter().map(Target::measured_sd_mm);
+        // Of several targets the least accurate one.
+        let accuracy_mm = accuracy_mm.reduce(|one, other| Some(one?.max(other?))).flatten();
         let ([_, _, ..], targets) = (reference.targets(), reference.targets()) else {
-            return Self::new(panels);
+            return Self::new(panels).board_accuracy_mm(accuracy_mm);
         };
         let mut panels = panels.into_iter();
         let of_target = |target: &Target| {
             (target.name.to_string(), panels.by_ref().take(target.panels.len()).collect())
         };
-        Self::of_targets(targets.iter().map(of_target).collect::<Vec<_>>())
+        let targets: Vec<_> = targets.iter().map(of_target).collect();
+        Self::of_targets(targets).board_accuracy_mm(accuracy_mm)
     }
 
     /// Adds a camera: of an unknown lens of a [`Model`], or a known [`Camera`] that is kept.
@@ -260,6 +267,15 @@ impl Calibration {
     #[must_use]
     pub fn measure_target(self, measure_target: bool) -> Self {
         Self { measure_target, ..self }
+    }
+
+    /// With the standard deviation of a coordinate of the board's corners from where its file has them, mm: what
+    /// such errors do to a camera is in its observed covariance. Zero where the board is exact; unless said
+    /// otherwise 0.1 mm, the error of office printers, and not more than half a percent of an edge. Where
+    /// [`measure_target`](Self::measure_target) finds the corners it does not matter.
+    #[must_use]
+    pub fn board_accuracy_mm(self, board_accuracy_mm: Option<f64>) -> Self {
+        Self { board_accuracy_mm, ..self }
     }
 
     /// Keeps every n-th frame (the n-th, the 2n-th, …) out of the calibration; only the poses in these are

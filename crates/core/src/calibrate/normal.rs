@@ -107,8 +107,8 @@ pub(super) struct Step {
 /// of each corner's offset.
 pub(super) struct Covariances {
     pub shared: DMatrix<f64>,
-    /// Of the shared unknowns with all that are kept.
-    pub across: DMatrix<f64>,
+    /// Of all that are kept.
+    pub kept: DMatrix<f64>,
     /// A square root of that of the shared unknowns.
     pub root: Root,
     pub frames: Vec<Matrix6<f64>>,
@@ -366,9 +366,8 @@ impl Normal {
             (None, Some(first)) => (parts.iter().map(fixed).collect(), blocks(&kept, first)),
             (None, None) => (parts.iter().map(fixed).collect(), Vec::new()),
         };
-        let across = kept.rows(0, self.shared).into_owned();
-        let shared = across.columns(0, self.shared).into_owned();
-        Some(Covariances { shared, across, root, frames, corners, loose, tied })
+        let shared = kept.view((0, 0), (self.shared, self.shared)).into_owned();
+        Some(Covariances { shared, kept, root, frames, corners, loose, tied })
     }
 
     /// The covariance of what is kept for residuals of variance 1; `None` where something is open.
@@ -381,20 +380,34 @@ impl Normal {
         Some(DMatrix::from_fn(n, n, |i, j| inverse[(i, j)] * scale[i] * scale[j]))
     }
 
-    /// Adds the pull of a corner in one block to that of all that are kept.
-    pub(super) fn pull_of_corner(
+    /// The solution of the equations for a right side of shared unknowns and corners' offsets, in this
+    /// order, which is zero for the poses of frames. `None` where a corner is open by itself.
+    pub(super) fn solve_without_frames(
         &self,
         layout: &Layout,
-        corner: &OfCorner,
-        pull: &mut DVector<f64>,
-    ) {
-        if let Some(first) = layout.corners {
-            let mut own = pull.fixed_rows_mut::<3>(first + 3 * corner.index);
-            own += corner.right;
-        } else if let Some(part) = self.parts.get(corner.index) {
-            let Some(whole) = part.c.clone().cholesky() else { return };
-            *pull -= &part.b * whole.solve(&corner.right);
+        found: &Covariances,
+        right: &DVector<f64>,
+    ) -> Option<DVector<f64>> {
+        if layout.corners.is_some() {
+            return Some(&found.kept * right);
         }
+        let mut of_kept = DVector::zeros(layout.count);
+        of_kept.rows_mut(0, self.shared).copy_from(&right.rows(0, self.shared));
+        let mut of_parts = Vec::with_capacity(self.parts.len());
+        for (index, part) in self.parts.iter().enumerate() {
+            let whole = part.c.clone().cholesky()?;
+            let own = right.rows(self.shared + 3 * index, 3).into_owned();
+            of_kept -= &part.b * whole.solve(&own);
+            of_parts.push((whole, own));
+        }
+        let kept = &found.kept * of_kept;
+        let mut solution = DVector::zeros(right.len());
+        solution.rows_mut(0, self.shared).copy_from(&kept.rows(0, self.shared));
+        for (index, (part, (whole, own))) in self.parts.iter().zip(of_parts).enumerate() {
+            let own = whole.solve(&(own - part.b.tr_mul(&kept)));
+            solution.rows_mut(self.shared + 3 * index, 3).copy_from(&own);
+        }
+        Some(solution)
     }
 
     /// The inverse of the reduced equations; the root is that of what all frames share, which alone may be open.
@@ -592,6 +605,97 @@ pub(super) struct Local {
     pub right: Vec<f64>,
     /// The corners, where they are unknown.
     pub corners: Vec<OfCorner>,
+}
+
+/// The normal equations of one frame for the shared unknowns and offsets of corners that it touches, its
+/// pose eliminated.
+pub(super) struct OfFrame {
+    /// Indices among the shared unknowns, followed by the offsets of all corners.
+    touched: Vec<usize>,
+    matrix: DMatrix<f64>,
+    right: DVector<f64>,
+}
+
+impl OfFrame {
+    /// From the blocks of the frame; `shared` is the number of shared unknowns. `None` where the pose is
+    /// open. The pose is at its optimum, so that nothing is left of its right side.
+    pub fn of(locals: &[Local], shared: usize) -> Option<Self> {
+        let of_local = |local: &Local| {
+            let corners = local.corners.iter();
+            let corners = corners.flat_map(|corner| (0..3).map(|k| shared + 3 * corner.index + k));
+            local.columns.iter().copied().chain(corners).collect::<Vec<usize>>()
+        };
+        let all: BTreeSet<usize> = locals.iter().flat_map(of_local).collect();
+        let touched: Vec<usize> = all.into_iter().collect();
+        let place = |unknown: usize| touched.partition_point(|&of| of < unknown);
+        let n = touched.len();
+        let (mut matrix, mut right) = (DMatrix::<f64>::zeros(n, n), DVector::<f64>::zeros(n));
+        let (mut across, mut pose) = (DMatrix::<f64>::zeros(n, 6), Matrix6::<f64>::zeros());
+        for local in locals {
+            let places: Vec<usize> = local.columns.iter().map(|&column| place(column)).collect();
+            let of_shared = places.len();
+            for (i, &row) in places.iter().enumerate() {
+                right[row] += local.right[i];
+                for (&column, value) in places.iter().zip(local.row(i)) {
+                    matrix[(row.max(column), row.min(column))] += value;
+                }
+            }
+            for i in 0..6 {
+                let (with_shared, with_pose) = local.row(of_shared + i).split_at(of_shared);
+                places.iter().zip(with_shared).for_each(|(&row, v)| across[(row, i)] += v);
+                for (j, value) in with_pose.iter().enumerate() {
+                    pose[(i, j)] += value;
+                    if j < i {
+                        pose[(j, i)] += value;
+                    }
+                }
+            }
+            for corner in &local.corners {
+                let first = place(shared + 3 * corner.index);
+                let (with_shared, with_pose) = corner.cross.split_at(of_shared);
+                for k in 0..3 {
+                    right[first + k] += corner.right[k];
+                    places
+                        .iter()
+                        .zip(with_shared)
+                        .for_each(|(&c, v)| matrix[(first + k, c)] += v[k]);
+                    with_pose.iter().enumerate().for_each(|(i, v)| across[(first + k, i)] += v[k]);
+                    (0..=k).for_each(|l| matrix[(first + k, first + l)] += corner.own[(k, l)]);
+                }
+            }
+        }
+        matrix.fill_upper_triangle_with_lower_triangle();
+        let through = pose.cholesky()?.solve(&across.transpose());
+        Some(Self { touched, matrix: matrix - across * through, right })
+    }
+
+    /// Adds what is between the shared unknowns (rows) and the offsets of all corners (columns).
+    pub fn add_across(&self, across: &mut DMatrix<f64>) {
+        let shared = across.nrows();
+        let of_shared = self.touched.partition_point(|&unknown| unknown < shared);
+        for (j, &corner) in self.touched.iter().enumerate().skip(of_shared) {
+            for (i, &unknown) in self.touched[..of_shared].iter().enumerate() {
+                across[(unknown, corner - shared)] += self.matrix[(i, j)];
+            }
+        }
+    }
+
+    /// The right side among those of all n unknowns.
+    pub fn right(&self, n: usize) -> DVector<f64> {
+        self.spread(&self.right, n)
+    }
+
+    /// The product of the matrix with a vector of all unknowns.
+    pub fn times(&self, vector: &DVector<f64>) -> DVector<f64> {
+        let own = DVector::from_fn(self.touched.len(), |i, _| vector[self.touched[i]]);
+        self.spread(&(&self.matrix * own), vector.len())
+    }
+
+    fn spread(&self, own: &DVector<f64>, n: usize) -> DVector<f64> {
+        let mut all = DVector::zeros(n);
+        self.touched.iter().zip(own.iter()).for_each(|(&unknown, value)| all[unknown] = *value);
+        all
+    }
 }
 
 /// What a corner in a block says of its own offset.
