@@ -49,7 +49,7 @@ pub struct SolveArgs {
     /// Standard deviation of a coordinate of the board's corners from the description, such as 0.05mm, or 0 of
     /// an exact board; it is in the observed deviations [default: what a measured target says of itself, else
     /// 0.1 mm, at most 0.5 % of an edge]
-    #[arg(long, value_name = "LENGTH", value_parser = accuracy, conflicts_with = "measure_target")]
+    #[arg(long, value_name = "LENGTH", value_parser = accuracy)]
     board_accuracy: Option<f64>,
     /// Distance of points for which the uncertainty of projections is told beside that at infinity, such as 2m;
     /// several may be given, separated by commas [default: the median distance of the corners]

@@ -48,12 +48,14 @@ pub(super) struct Observed {
 }
 
 impl Observed {
-    /// The same with what errors of the board add to it.
-    pub fn with(self, of_board: Option<DMatrix<f64>>) -> Self {
-        let covariance = match &of_board {
-            Some(of_board) => self.covariance + of_board,
-            None => self.covariance,
-        };
+    /// The same with what errors of the board add to it, and what is `drawn` to the plan of one that is measured.
+    pub fn with(self, of_board: Option<DMatrix<f64>>, drawn: Option<&DMatrix<f64>>) -> Self {
+        let mut covariance = self.covariance;
+        covariance = of_board.iter().fold(covariance, |sum, of_board| sum + of_board);
+        if let Some(drawn) = drawn {
+            let shared = drawn.rows(0, covariance.nrows());
+            covariance += shared * shared.transpose();
+        }
         Self { covariance, of_board, ..self }
     }
 }
@@ -71,7 +73,7 @@ pub(super) fn observed(
         return None;
     }
     let pull = |frame: usize| match &minimum.problem.map {
-        Some(map) => without_frame(minimum, whitening, loss, found, map, frame),
+        Some(map) => with_leverage(minimum, whitening, loss, found, map, frame),
         None => pull_of(minimum, whitening, loss, found, frame),
     };
     let columns = (0..frames).into_par_iter().map(pull).collect::<Option<Vec<_>>>()?;
@@ -188,14 +190,17 @@ fn pull_of(
     pull.iter().all(|v| v.is_finite()).then_some(pull)
 }
 
-/// By how much the shared unknowns change when a frame is left out, in units of the effect of noise: the
-/// jackknife (Efron 1982), linearised. Corner offsets adapt to each frame, so what it leaves by itself
-/// says little.
+/// The same where corners are unknowns too: their offsets adapt to each frame, and a frame's leverage on lens and
+/// offsets together is large in few directions. With H all normal equations, Hᵥ those of the frame over the shared
+/// unknowns and the offsets, and M = H^−½ Hᵥ H^−½,
 ///
 /// ```text
-///     (H − Hᵥ) δ = gᵥ        over the shared unknowns and the offsets of corners
+///     y = f(M) H^−½ gᵥ,    f(p) = 1 / (1 − p)        the jackknife (CR3), linearised
 /// ```
-fn without_frame(
+///
+/// by Lanczos' method. CR2, whose root of that is right for noise, is too small here: model errors, which the offsets
+/// of a few frames take up, differ from frame to frame.
+fn with_leverage(
     minimum: &Minimum,
     whitening: &Whitening,
     loss: Loss,
@@ -209,41 +214,56 @@ fn without_frame(
         .filter(|(block, _)| block.frame == frame)
         .map(|(block, weights)| Local::of(problem, layout, block, weights, loss, whitening.sigma));
     let locals = locals.collect::<Option<Vec<Local>>>()?;
-    let own = OfFrame::of(&locals, layout.shared)?;
-    let n = layout.shared + 3 * map.len();
+    let own = OfFrame::of(locals, layout.shared)?;
     let solve = |right: &DVector<f64>| normal.solve_without_frames(layout, found, right);
-    // Conjugate gradients with H as the preconditioner: few directions depend much on one frame.
-    let mut right = own.right(n);
-    let enough = LEFT * LEFT * right.norm_squared();
-    let (mut change, mut step) = (DVector::zeros(n), solve(&right)?);
-    // H · step
-    let mut along = right.clone();
-    let mut power = right.dot(&step);
-    for _ in 0..MOST_ROUNDS {
-        if power <= 0.0 || right.norm_squared() <= enough {
-            break;
+    // Right sides that are orthonormal by H⁻¹, and what H⁻¹ makes of them.
+    let mut basis: Vec<DVector<f64>> = Vec::new();
+    let mut solutions: Vec<DVector<f64>> = Vec::new();
+    let mut next = own.right(layout.shared + 3 * map.len());
+    let mut solution = solve(&next)?;
+    let mut size = next.dot(&solution).max(0.0).sqrt();
+    let (whole, mut left) = (size, 1.0);
+    let (mut along, mut beside) = (Vec::new(), Vec::new());
+    while basis.len() < MOST_DIRECTIONS && left > LEFT && size > 0.0 {
+        basis.push(next / size);
+        solutions.push(solution / size);
+        let last = &solutions[solutions.len() - 1];
+        next = own.times(last);
+        along.push(next.dot(last));
+        for (vector, solution) in basis.iter().zip(&solutions) {
+            let part = next.dot(solution);
+            next.axpy(-part, vector, 1.0);
         }
-        let through = &along - own.times(&step);
-        let by = power / step.dot(&through);
-        change.axpy(by, &step, 1.0);
-        right.axpy(-by, &through, 1.0);
-        let next = solve(&right)?;
-        let now = right.dot(&next);
-        step = next + &step * (now / power);
-        along = &right + &along * (now / power);
-        power = now;
+        solution = solve(&next)?;
+        size = next.dot(&solution).max(0.0).sqrt();
+        beside.push(size);
+        left *= size;
+    }
+    let n = basis.len();
+    let tridiagonal = DMatrix::from_fn(n, n, |i, j| match i.abs_diff(j) {
+        0 => along[i],
+        1 => beside[i.min(j)],
+        _ => 0.0,
+    });
+    let eigen = tridiagonal.symmetric_eigen();
+    let grown = eigen.eigenvalues.map(|part| (1.0 - part.clamp(0.0, MOST_OF_ONE)).recip());
+    let first = eigen.eigenvectors.row(0).transpose();
+    let parts = &eigen.eigenvectors * grown.component_mul(&first) * whole;
+    let mut change = DVector::zeros(layout.shared);
+    for (solution, part) in solutions.iter().zip(parts.iter()) {
+        change.axpy(*part, &solution.rows(0, layout.shared), 1.0);
     }
     let frames = problem.frames.len() as f64;
     // (F − 1)/F is the jackknife's; the caller multiplies by F/(F − 1).
-    let change = &found.root.inverse * change.rows(0, layout.shared) * ((frames - 1.0) / frames);
+    let change = &found.root.inverse * change * ((frames - 1.0) / frames);
     change.iter().all(|v| v.is_finite()).then_some(change)
 }
 
-/// What of the right side may be left of a solution.
+/// What is left beyond the directions found so far does not count below this part of the whole.
 const LEFT: f64 = 1e-4;
 
-/// Rounds at most; a frame that the others hardly replace takes more.
-const MOST_ROUNDS: usize = 100;
+/// Directions at most in which a frame's leverage is resolved: those with much of it are found first.
+const MOST_DIRECTIONS: usize = 40;
 
 /// The same for a frame that touches only some of the unknowns.
 fn by_some(own: &DMatrix<f64>, pull: &DVector<f64>, found: &Covariances) -> Option<DVector<f64>> {

@@ -47,13 +47,9 @@ pub(super) fn board_errors(
         return None;
     }
     let map = CornerMap::flat(problem);
-    let printed = || PRINTED_MM.min(PRINTED_EDGES * map.edge_mm());
-    let accuracy_mm = accuracy_mm.unwrap_or_else(printed);
-    if accuracy_mm <= 0.0 {
-        return None;
-    }
+    let accuracy_mm = accuracy(&map, accuracy_mm)?;
     let mut problem = problem.clone();
-    let sheets = sheets(&map);
+    let sheets = sheets(&map, &SHEET);
     let mut across = DMatrix::zeros(layout.shared, 3 * map.len());
     problem.map = Some(map);
     let of_frame = |frame: usize| {
@@ -62,7 +58,7 @@ pub(super) fn board_errors(
         let locals = blocks.map(|(block, weights)| {
             Local::of(&problem, layout, block, weights, loss, whitening.sigma)
         });
-        OfFrame::of(&locals.collect::<Option<Vec<Local>>>()?, layout.shared)
+        OfFrame::of(locals.collect::<Option<Vec<Local>>>()?, layout.shared)
     };
     let frames: Vec<usize> = (0..problem.frames.len()).collect();
     for some in frames.chunks(FRAMES_AT_A_TIME) {
@@ -77,23 +73,60 @@ pub(super) fn board_errors(
     Some(covariance * accuracy_mm.powi(2))
 }
 
+/// Standard deviation of a corner's coordinate, mm; `None` of an exact board.
+fn accuracy(map: &CornerMap, given_mm: Option<f64>) -> Option<f64> {
+    let printed = || PRINTED_MM.min(PRINTED_EDGES * map.edge_mm());
+    Some(given_mm.unwrap_or_else(printed)).filter(|mm| *mm > 0.0)
+}
+
+/// How the shared unknowns and the offsets of corners, in this order, are off where the corners are found too: a column
+/// for each way in which a sheet differs from its plan, one standard deviation of it.
+///
+/// The prior of the offsets is white, and draws a sheet that is distorted as a whole towards its plan where views
+/// do not determine it: with P the part of the prior in the normal equations H, by H⁻¹ P b. Of many views that is
+/// nothing, of four it is most of what is wrong.
+pub(super) fn drawn_to_plan(
+    minimum: &Minimum,
+    whitening: &Whitening,
+    found: &Covariances,
+    accuracy_mm: Option<f64>,
+) -> Option<DMatrix<f64>> {
+    let Minimum { problem, normal, layout, .. } = minimum;
+    let map = problem.map.as_ref()?;
+    let accuracy_mm = accuracy(map, accuracy_mm)?;
+    // A scale is not measured: distances take it up.
+    let sheets = sheets(map, &SHEET[1..]);
+    let off = sheets.column_iter().map(|sheet| {
+        let mut right = DVector::zeros(layout.shared + sheet.len());
+        for (i, offset) in sheet.iter().enumerate() {
+            let weight = (whitening.sigma / map.prior_mm[i % 3]).powi(2);
+            right[layout.shared + i] = accuracy_mm * weight * offset;
+        }
+        normal.solve_without_frames(layout, found, &right)
+    });
+    let off = off.collect::<Option<Vec<_>>>()?;
+    (!off.is_empty()).then(|| DMatrix::from_columns(&off))
+}
+
+/// Displacements of a sheet as a whole, over the position from its middle: scaled, stretched, sheared, and bent.
+const SHEET: [fn(DVec3) -> DVec3; 6] = [
+    |at| DVec3::new(at.x, at.y, 0.0),
+    |at| DVec3::new(at.x, -at.y, 0.0),
+    |at| DVec3::new(at.y, at.x, 0.0),
+    |at| DVec3::new(0.0, 0.0, at.x * at.x),
+    |at| DVec3::new(0.0, 0.0, at.x * at.y),
+    |at| DVec3::new(0.0, 0.0, at.y * at.y),
+];
+
 /// Offsets of all corners, a column for each way in which the sheet of a panel differs from its plan. Those in the
 /// plane have together a mean square of 1 a coordinate, those out of it likewise.
-fn sheets(map: &CornerMap) -> DMatrix<f64> {
+fn sheets(map: &CornerMap, fields: &[fn(DVec3) -> DVec3]) -> DMatrix<f64> {
     let mut columns = Vec::new();
     let mut first = 0;
     // Corners are ordered by panel.
     for of_panel in map.corners.chunk_by(|a, b| a.panel == b.panel) {
         let count = of_panel.len() as f64;
         let middle = of_panel.iter().map(|corner| corner.panel_mm).sum::<DVec3>() / count;
-        let fields: [fn(DVec3) -> DVec3; 6] = [
-            |at| DVec3::new(at.x, -at.y, 0.0),
-            |at| DVec3::new(at.y, at.x, 0.0),
-            |at| DVec3::new(at.x, at.y, 0.0),
-            |at| DVec3::new(0.0, 0.0, at.x * at.x),
-            |at| DVec3::new(0.0, 0.0, at.x * at.y),
-            |at| DVec3::new(0.0, 0.0, at.y * at.y),
-        ];
         for field in fields {
             let moved = of_panel.iter().map(|corner| field(corner.panel_mm - middle));
             let mut moved: Vec<DVec3> = moved.collect();

@@ -5,7 +5,7 @@ use glam::DVec2;
 use nalgebra::{DMatrix, Matrix3};
 
 use super::agreement::{Observed, observed};
-use super::board_errors::board_errors;
+use super::board_errors::{board_errors, drawn_to_plan};
 use super::calibration::{Calibration, CameraViews, PanelPlace};
 use super::corner_map::CornerMap;
 use super::coverage::Coverage;
@@ -391,9 +391,10 @@ impl Estimate {
         }
         let variance = variance(minimum, whitening, loss);
         let covariance = &found.shared * variance;
+        let drawn = drawn_to_plan(minimum, whitening, &found, *board_accuracy_mm);
         let observed = observed(minimum, whitening, loss, &found).map(|observed| {
             let of_board = board_errors(minimum, whitening, loss, &found, *board_accuracy_mm);
-            observed.with(of_board)
+            observed.with(of_board, drawn.as_ref())
         });
         let mut views = views(cameras, frames, settled);
         let cameras = cameras.iter().enumerate().map(|(index, camera)| {
@@ -438,7 +439,7 @@ impl Estimate {
             targets: targets.collect(),
             panels: panels.collect(),
             shape: board_shape(minimum, &covariance, f_ratio),
-            map: target_map(settled, &found.corners, variance, loss),
+            map: target_map(settled, &found.corners, variance, loss, drawn.as_ref()),
             rms_px: rms_px(cameras.iter().flat_map(CameraEstimate::corners)),
             common_px: whitening.common_px,
             sigma: variance.sqrt(),
@@ -616,24 +617,33 @@ fn target_map(
     covariances: &[Matrix3<f64>],
     variance: f64,
     loss: Loss,
+    drawn: Option<&DMatrix<f64>>,
 ) -> Option<TargetMap> {
-    let problem = &settled.minimum.problem;
+    let Minimum { problem, layout, .. } = &settled.minimum;
     let map = problem.map.as_ref()?;
     let covariances = map.without_gauge(covariances, settled.whitening.sigma, problem);
     let weights = weights(map, settled, loss);
     let few = weights.iter().filter(|of| of.1 > 0 && rests_on_few(of)).count();
     let corners = map.corners.iter().zip(&map.offsets_mm).zip(covariances).zip(map.views(problem));
-    let measured = corners.zip(&weights).filter(|(_, of)| !rests_on_few(of));
-    let corners = measured.map(|((((corner, &offset_mm), covariance), views), _)| CornerOffset {
-        panel: corner.panel,
-        row: corner.row,
-        col: corner.col,
-        panel_mm: corner.panel_mm,
-        offset_mm,
-        covariance_mm2: std::array::from_fn(|i| {
-            std::array::from_fn(|j| variance * covariance[(i, j)])
-        }),
-        views,
+    let all = corners.zip(&weights).enumerate();
+    let measured = all.filter(|(_, (_, of))| !rests_on_few(of));
+    let corners = measured.map(|(index, ((((corner, &offset_mm), covariance), views), _))| {
+        let drawn = drawn.map_or(Matrix3::zeros(), |drawn| {
+            let own = drawn.rows(layout.shared + 3 * index, 3);
+            let square = own * own.transpose();
+            Matrix3::from_fn(|i, j| square[(i, j)])
+        });
+        CornerOffset {
+            panel: corner.panel,
+            row: corner.row,
+            col: corner.col,
+            panel_mm: corner.panel_mm,
+            offset_mm,
+            covariance_mm2: std::array::from_fn(|i| {
+                std::array::from_fn(|j| variance * covariance[(i, j)] + drawn[(i, j)])
+            }),
+            views,
+        }
     });
     let expected_mm = [map.prior_mm.x, map.prior_mm.z];
     let mut map = TargetMap::new(corners.collect(), expected_mm);

@@ -11,10 +11,10 @@
 //! through them, nor a corner with another corner but through frames: of the two the one that has more
 //! unknowns is eliminated, and the other is kept.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 
 use glam::{DMat3, DVec2, DVec3};
-use nalgebra::{DMatrix, DVector, Matrix3, Matrix6, SMatrix, Vector3, Vector6};
+use nalgebra::{Cholesky, DMatrix, DVector, Matrix3, Matrix6, SMatrix, U6, Vector3, Vector6};
 use rayon::prelude::*;
 
 use super::corner_map::CornerMap;
@@ -607,94 +607,115 @@ pub(super) struct Local {
     pub corners: Vec<OfCorner>,
 }
 
-/// The normal equations of one frame for the shared unknowns and offsets of corners that it touches, its
-/// pose eliminated.
+/// The normal equations of one frame for the shared unknowns followed by the offsets of all corners, its pose
+/// eliminated.
 pub(super) struct OfFrame {
-    /// Indices among the shared unknowns, followed by the offsets of all corners.
-    touched: Vec<usize>,
-    matrix: DMatrix<f64>,
-    right: DVector<f64>,
+    locals: Vec<Local>,
+    /// Number of shared unknowns.
+    shared: usize,
+    /// Those of the pose.
+    pose: Cholesky<f64, U6>,
 }
 
 impl OfFrame {
-    /// From the blocks of the frame; `shared` is the number of shared unknowns. `None` where the pose is
-    /// open. The pose is at its optimum, so that nothing is left of its right side.
-    pub fn of(locals: &[Local], shared: usize) -> Option<Self> {
-        let of_local = |local: &Local| {
-            let corners = local.corners.iter();
-            let corners = corners.flat_map(|corner| (0..3).map(|k| shared + 3 * corner.index + k));
-            local.columns.iter().copied().chain(corners).collect::<Vec<usize>>()
-        };
-        let all: BTreeSet<usize> = locals.iter().flat_map(of_local).collect();
-        let touched: Vec<usize> = all.into_iter().collect();
-        let place = |unknown: usize| touched.partition_point(|&of| of < unknown);
-        let n = touched.len();
-        let (mut matrix, mut right) = (DMatrix::<f64>::zeros(n, n), DVector::<f64>::zeros(n));
-        let (mut across, mut pose) = (DMatrix::<f64>::zeros(n, 6), Matrix6::<f64>::zeros());
-        for local in locals {
-            let places: Vec<usize> = local.columns.iter().map(|&column| place(column)).collect();
-            let of_shared = places.len();
-            for (i, &row) in places.iter().enumerate() {
-                right[row] += local.right[i];
-                for (&column, value) in places.iter().zip(local.row(i)) {
-                    matrix[(row.max(column), row.min(column))] += value;
-                }
-            }
+    /// From the blocks of the frame. `None` where the pose is open.
+    pub fn of(locals: Vec<Local>, shared: usize) -> Option<Self> {
+        let mut pose = Matrix6::<f64>::zeros();
+        for local in &locals {
             for i in 0..6 {
-                let (with_shared, with_pose) = local.row(of_shared + i).split_at(of_shared);
-                places.iter().zip(with_shared).for_each(|(&row, v)| across[(row, i)] += v);
-                for (j, value) in with_pose.iter().enumerate() {
-                    pose[(i, j)] += value;
-                    if j < i {
-                        pose[(j, i)] += value;
-                    }
-                }
+                let own = local.row(local.columns.len() + i)[local.columns.len()..].iter();
+                own.enumerate().for_each(|(j, value)| pose[(i, j)] += value);
+            }
+        }
+        pose.fill_upper_triangle_with_lower_triangle();
+        Some(Self { locals, shared, pose: pose.cholesky()? })
+    }
+
+    /// The right side of n unknowns. The pose is at its optimum, so that nothing is left of its own.
+    pub fn right(&self, n: usize) -> DVector<f64> {
+        let mut right = DVector::zeros(n);
+        for local in &self.locals {
+            local.columns.iter().zip(&local.right).for_each(|(&row, value)| right[row] += value);
+            for corner in &local.corners {
+                let mut own = right.fixed_rows_mut::<3>(self.shared + 3 * corner.index);
+                own += corner.right;
+            }
+        }
+        right
+    }
+
+    /// Calls `each` for every unknown that the frame touches, with what is between it and the pose; for some more
+    /// than once, with what is to be summed.
+    fn with_pose(&self, mut each: impl FnMut(usize, Vector6<f64>)) {
+        for local in &self.locals {
+            let of_shared = local.columns.len();
+            for (i, &column) in local.columns.iter().enumerate() {
+                each(column, Vector6::from_fn(|pose, _| local.row(of_shared + pose)[i]));
             }
             for corner in &local.corners {
-                let first = place(shared + 3 * corner.index);
-                let (with_shared, with_pose) = corner.cross.split_at(of_shared);
                 for k in 0..3 {
-                    right[first + k] += corner.right[k];
-                    places
-                        .iter()
-                        .zip(with_shared)
-                        .for_each(|(&c, v)| matrix[(first + k, c)] += v[k]);
-                    with_pose.iter().enumerate().for_each(|(i, v)| across[(first + k, i)] += v[k]);
-                    (0..=k).for_each(|l| matrix[(first + k, first + l)] += corner.own[(k, l)]);
+                    let across = Vector6::from_fn(|pose, _| corner.cross[of_shared + pose][k]);
+                    each(self.shared + 3 * corner.index + k, across);
                 }
             }
         }
-        matrix.fill_upper_triangle_with_lower_triangle();
-        let through = pose.cholesky()?.solve(&across.transpose());
-        Some(Self { touched, matrix: matrix - across * through, right })
-    }
-
-    /// Adds what is between the shared unknowns (rows) and the offsets of all corners (columns).
-    pub fn add_across(&self, across: &mut DMatrix<f64>) {
-        let shared = across.nrows();
-        let of_shared = self.touched.partition_point(|&unknown| unknown < shared);
-        for (j, &corner) in self.touched.iter().enumerate().skip(of_shared) {
-            for (i, &unknown) in self.touched[..of_shared].iter().enumerate() {
-                across[(unknown, corner - shared)] += self.matrix[(i, j)];
-            }
-        }
-    }
-
-    /// The right side among those of all n unknowns.
-    pub fn right(&self, n: usize) -> DVector<f64> {
-        self.spread(&self.right, n)
     }
 
     /// The product of the matrix with a vector of all unknowns.
     pub fn times(&self, vector: &DVector<f64>) -> DVector<f64> {
-        let own = DVector::from_fn(self.touched.len(), |i, _| vector[self.touched[i]]);
-        self.spread(&(&self.matrix * own), vector.len())
+        let mut product = DVector::zeros(vector.len());
+        for local in &self.locals {
+            for (i, &row) in local.columns.iter().enumerate() {
+                for (&column, value) in local.columns.iter().zip(local.row(i)) {
+                    product[row] += value * vector[column];
+                    if column != row {
+                        product[column] += value * vector[row];
+                    }
+                }
+            }
+            for corner in &local.corners {
+                let first = self.shared + 3 * corner.index;
+                let own = corner.own * vector.fixed_rows::<3>(first);
+                (0..3).for_each(|k| product[first + k] += own[k]);
+                for (&column, values) in local.columns.iter().zip(&corner.cross) {
+                    for (k, value) in values.iter().enumerate() {
+                        product[first + k] += value * vector[column];
+                        product[column] += value * vector[first + k];
+                    }
+                }
+            }
+        }
+        let mut pose = Vector6::zeros();
+        self.with_pose(|unknown, across| pose += across * vector[unknown]);
+        let pose = self.pose.solve(&pose);
+        self.with_pose(|unknown, across| product[unknown] -= across.dot(&pose));
+        product
     }
 
-    fn spread(&self, own: &DVector<f64>, n: usize) -> DVector<f64> {
-        let mut all = DVector::zeros(n);
-        self.touched.iter().zip(own.iter()).for_each(|(&unknown, value)| all[unknown] = *value);
-        all
+    /// Adds what is between the shared unknowns (rows) and the offsets of all corners (columns).
+    pub fn add_across(&self, across: &mut DMatrix<f64>) {
+        for local in &self.locals {
+            for corner in &local.corners {
+                for (&row, values) in local.columns.iter().zip(&corner.cross) {
+                    for (k, value) in values.iter().enumerate() {
+                        across[(row, 3 * corner.index + k)] += value;
+                    }
+                }
+            }
+        }
+        let mut of_shared: BTreeMap<usize, Vector6<f64>> = BTreeMap::new();
+        self.with_pose(|unknown, with_pose| {
+            if unknown < self.shared {
+                *of_shared.entry(unknown).or_default() += with_pose;
+            }
+        });
+        let of_shared: Vec<_> =
+            of_shared.iter().map(|(&row, of)| (row, self.pose.solve(of))).collect();
+        self.with_pose(|unknown, with_pose| {
+            if let Some(column) = unknown.checked_sub(self.shared) {
+                of_shared.iter().for_each(|(row, of)| across[(*row, column)] -= of.dot(&with_pose));
+            }
+        });
     }
 }
 
