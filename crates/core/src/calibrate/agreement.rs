@@ -198,8 +198,8 @@ fn pull_of(
 ///     y = f(M) H^−½ gᵥ,    f(p) = 1 / (1 − p)        the jackknife (CR3), linearised
 /// ```
 ///
-/// by Lanczos' method. CR2, whose root of that is right for noise, is too small here: model errors, which the offsets
-/// of a few frames take up, differ from frame to frame.
+/// by Lanczos' method. It is the more cautious choice: on halves of robot-hand, with the exponent 3/4 in place of 1,
+/// differences found over expected were 0.94 to 1.09, with 1 they were 0.77 to 0.88. CR2 (1/2) was not tried there.
 fn with_leverage(
     minimum: &Minimum,
     whitening: &Whitening,
