@@ -46,6 +46,11 @@ pub struct SolveArgs {
     /// Find the place of every corner of the target, too, and write it as a measured target
     #[arg(long, conflicts_with_all = ["shape", "board_shape"])]
     measure_target: bool,
+    /// Standard deviation of a coordinate of the board's corners from the description, such as 0.05mm, or 0 of
+    /// an exact board; it is in the observed deviations [default: what a measured target says of itself, else
+    /// 0.1 mm, at most 0.5 % of an edge]
+    #[arg(long, value_name = "LENGTH", value_parser = accuracy)]
+    board_accuracy: Option<f64>,
     /// Distance of points for which the uncertainty of projections is told beside that at infinity, such as 2m;
     /// several may be given, separated by commas [default: the median distance of the corners]
     #[arg(long, value_name = "LENGTH", value_delimiter = ',', value_parser = distance)]
@@ -206,6 +211,10 @@ impl SolveArgs {
             Weighting::Equal => Weights::Equal,
             Weighting::Covariance => Weights::Covariance,
         };
+        let calibration = match self.board_accuracy {
+            Some(mm) => calibration.board_accuracy_mm(Some(mm)),
+            None => calibration,
+        };
         let calibration = calibration
             .loss(loss)
             .weights(weights)
@@ -299,6 +308,21 @@ pub fn left_out(refused: &[FormatError]) -> Option<ExitCode> {
     (!refused.is_empty()).then(|| ExitCode::from(FAILED))
 }
 
+/// How far corners of a board are off, mm.
+fn accuracy(text: &str) -> Result<f64, String> {
+    if text.trim() == "0" {
+        return Ok(0.0);
+    }
+    let mm = parse_length_mm(text).map_err(|error| error.to_string())?;
+    match (0.0..=MOST_OFF_MM).contains(&mm) {
+        true => Ok(mm),
+        false => Err(format!("{text}: not between 0 and {MOST_OFF_MM} mm")),
+    }
+}
+
+/// Largest standard deviation of a board's corners, mm: no board that is off by more is of use.
+const MOST_OFF_MM: f64 = 10.0;
+
 /// How far a point is, mm.
 pub fn distance(text: &str) -> Result<f64, String> {
     let mm = parse_length_mm(text).map_err(|error| error.to_string())?;
@@ -343,9 +367,16 @@ fn mapped(map: &TargetMap, views: usize) -> String {
             format!("; a corner is in {}, take {LEAST_TO_MEASURE} or more", counted(views, "view"))
         }
     };
+    let left = match map.few {
+        0 => String::new(),
+        few => format!(
+            "; {} not measured, as most of the observations are outliers or fewer than two count",
+            counted(few, "corner")
+        ),
+    };
     format!(
         "target: corners are {plane:.3} mm beside their places and {out:.3} mm above or below (rms a \
-         coordinate), {} of {} by more than chance makes{few}",
+         coordinate), {} of {} by more than chance makes{few}{left}",
         map.significant().count(),
         map.corners().len()
     )

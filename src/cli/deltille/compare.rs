@@ -227,7 +227,11 @@ fn verdict(chance: Option<f64>, is_significant: Option<bool>, changed: &str) -> 
         (Some(chance), Some(true)) => {
             format!("more than chance makes (p = {chance:.1e}): {changed}")
         }
-        (Some(chance), _) => format!("no more than chance makes (p = {chance:.2})"),
+        (Some(chance), _) => {
+            // Rounded to zero it would contradict the verdict.
+            let digits = if chance < 0.01 { 3 } else { 2 };
+            format!("no more than chance makes (p = {chance:.digits$})")
+        }
         (None, _) => "how sure that is, is not known".to_owned(),
     }
 }

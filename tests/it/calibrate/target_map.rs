@@ -168,6 +168,40 @@ fn offsets_are_within_their_deviations() {
     assert!(counts[0] as f64 >= 0.985 * counts[1] as f64, "{counts:?}");
 }
 
+/// Four views leave a bent sheet's shape open: what is drawn to the plan is in the deviations.
+#[test]
+fn deviations_of_four_views_hold() {
+    let (mut of_camera, mut of_corners) = (0.0, 0.0);
+    for seed in 0..8 {
+        let offsets = Sheet { random_mm: 0.03, bent_mm: 0.1 }.offsets(1, 50 + seed);
+        let views = views(&[Pose::IDENTITY], &offsets, &Pose::IDENTITY, 4, 5000 + seed);
+        let found = of(views).measure_target(true).solve().unwrap();
+        let (value, truth) = (found.cameras[0].camera.focal_px, camera().focal_px);
+        let sd = found.cameras[0].observed_sd()[0].expect("four views show it");
+        of_camera += ((value.x - truth.x) / sd).powi(2) / 8.0;
+        let map = found.map.as_ref().unwrap();
+        let truth = without_gauge(&offsets.concat(), map, &[Pose::IDENTITY], false);
+        of_corners += compared(map, &truth).1 / 8.0;
+    }
+    assert!(of_camera.sqrt() < 1.5, "{}", of_camera.sqrt());
+    assert!(of_corners.sqrt() < 1.5, "{}", of_corners.sqrt());
+}
+
+/// A corner that most views have elsewhere, each in another place, is not measured.
+#[test]
+fn a_corner_that_rests_on_outliers_is_not_measured() {
+    let offsets = Sheet { random_mm: 0.05, bent_mm: 0.0 }.offsets(1, 3);
+    let mut views = views(&[Pose::IDENTITY], &offsets, &Pose::IDENTITY, 12, 7000);
+    for (index, view) in views.iter_mut().enumerate().take(8) {
+        let (sin, cos) = (2.4 * index as f64).sin_cos();
+        view.sightings[0].observations[40].pixel += (1.0 + index as f64) * DVec2::new(sin, cos);
+    }
+    let found = of(views).measure_target(true).solve().unwrap();
+    let map = found.map.unwrap();
+    assert_eq!((map.few, map.corners().len()), (1, (SIDE * SIDE - 1) as usize));
+    assert_eq!(map.offset_mm(PanelRef::ONLY, 40 / SIDE, 40 % SIDE), DVec3::ZERO);
+}
+
 /// How many of so many boards as planned show an offset.
 fn alarms(boards: u64) -> usize {
     let is_alarm = |seed: &u64| {

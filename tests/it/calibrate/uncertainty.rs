@@ -36,6 +36,8 @@ fn pairs(
         found += both.rms_px.powi(2);
         expected += both.expected_px.unwrap().powi(2);
         significant += usize::from(both.is_significant().unwrap());
+        // The two numbers and the probability do not contradict each other.
+        assert!(both.rms_px > both.expected_px.unwrap() || both.chance.unwrap() > 0.2);
     }
     ((found / expected).sqrt(), significant)
 }
@@ -124,6 +126,37 @@ fn what_noise_does_not_explain_is_observed() {
     let ratio = f64::sqrt(found / expected);
     assert!((0.6..1.7).contains(&ratio), "{ratio}");
     assert!(from_noise / 12.0 < 0.6, "{from_noise}");
+}
+
+/// A board that is stretched, sheared and bent alike in every view moves the camera, and no scatter between views
+/// shows that.
+#[test]
+fn errors_of_the_board_are_in_the_observed_deviations() {
+    use rand::{Rng, SeedableRng};
+    let truth = camera(Model::Radtan);
+    let (mut with, mut without) = (0.0, 0.0);
+    for seed in 0..8 {
+        let mut random = rand_chacha::ChaCha8Rng::seed_from_u64(seed);
+        let [a, b, c, d, e]: [f64; 5] = std::array::from_fn(|_| random.random_range(-0.1..0.1));
+        let (mut views, _) = simulated(&truth, VIEWS, TILT_RAD, 100 + seed);
+        let sightings = views.iter_mut().flat_map(|view| &mut view.sightings);
+        for seen in sightings.flat_map(|sighting| &mut sighting.observations) {
+            let [u, v] = [seen.panel_mm.x / 100.0 - 1.0, seen.panel_mm.y / 70.0 - 1.0];
+            let bent = c * u * u + d * u * v + e * v * v;
+            seen.panel_mm += DVec3::new(a * u + b * v, b * u - a * v, bent);
+        }
+        let off = |accuracy_mm: Option<f64>| {
+            let found = of(&views, Model::Radtan).board_accuracy_mm(accuracy_mm).solve().unwrap();
+            let camera = &found.cameras[0];
+            let off = camera.camera.focal_px - truth.focal_px;
+            let sd = camera.observed_sd();
+            (off.x / sd[0].unwrap()).powi(2) + (off.y / sd[1].unwrap()).powi(2)
+        };
+        with += off(None) / 16.0;
+        without += off(Some(0.0)) / 16.0;
+    }
+    assert!(with.sqrt() < 1.3, "{}", with.sqrt());
+    assert!(without.sqrt() > 1.5, "{}", without.sqrt());
 }
 
 /// Of many calibrations from the same places, each moved so that it explains the corners best where they really were,

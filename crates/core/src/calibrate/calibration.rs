@@ -48,6 +48,8 @@ pub struct Calibration {
     pub(super) refine_panels: bool,
     pub(super) board_shape: bool,
     pub(super) measure_target: bool,
+    /// Standard deviation of a corner of the board from its plan, mm; that of a print where it is not known.
+    pub(super) board_accuracy_mm: Option<f64>,
     pub(super) hold_out: Option<usize>,
     pub(super) distances_mm: Vec<f64>,
     /// Which of the model's starts is taken; the best where none is said.
@@ -193,6 +195,7 @@ impl Calibration {
             refine_panels: false,
             board_shape: false,
             measure_target: false,
+            board_accuracy_mm: None,
             hold_out: None,
             distances_mm: Vec::new(),
             start: None,
@@ -206,6 +209,9 @@ impl Calibration {
     /// target after the other.
     pub fn of(reference: &Reference, panels: Vec<PanelPlace>) -> Self {
         let targets = reference.targets();
+        // Of several targets the least accurate one.
+        let accuracy_mm = targets.iter().map(Target::measured_sd_mm);
+        let accuracy_mm = accuracy_mm.reduce(|one, other| Some(one?.max(other?))).flatten();
         let mut panels = panels.into_iter();
         let of_target = |target: &Target| {
             (target.name.to_string(), panels.by_ref().take(target.panels.len()).collect())
@@ -214,7 +220,8 @@ impl Calibration {
             [] | [_] => Self::new(panels),
             several => Self::of_targets(several.iter().map(of_target).collect::<Vec<_>>()),
         };
-        Self { identities: targets.iter().map(Target::identity).collect(), ..calibration }
+        let identities = targets.iter().map(Target::identity).collect();
+        Self { identities, ..calibration.board_accuracy_mm(accuracy_mm) }
     }
 
     /// Adds a camera: of an unknown lens of a [`Model`], or a known [`Camera`] that is kept.
@@ -265,6 +272,15 @@ impl Calibration {
     #[must_use]
     pub fn measure_target(self, measure_target: bool) -> Self {
         Self { measure_target, ..self }
+    }
+
+    /// With the standard deviation of a coordinate of the board's corners from where its file has them, mm: what
+    /// such errors do to a camera is in its observed covariance. Zero where the board is exact; unless said
+    /// otherwise 0.1 mm, the error of office printers, and not more than half a percent of an edge. Where
+    /// [`measure_target`](Self::measure_target) finds the corners it does not matter.
+    #[must_use]
+    pub fn board_accuracy_mm(self, board_accuracy_mm: Option<f64>) -> Self {
+        Self { board_accuracy_mm, ..self }
     }
 
     /// Keeps every n-th frame (the n-th, the 2n-th, …) out of the calibration; only the poses in these are

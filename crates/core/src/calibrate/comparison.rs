@@ -2,14 +2,18 @@
 //!
 //! What a pixel of the one shows is projected by the other, after the motion that makes them differ least: a
 //! principal point that is off and a camera that is turned are one and the same to every user of a picture. What
-//! is left is compared with what the covariances of both allow for, in the basis in which these are independent,
+//! is left is compared with what the covariances of both allow for,
 //!
 //! ```text
 //!     d = (I − P) (J_B δθ_B − J_A δθ_A)        P: what the motion explains
-//!     Σᵢ (eᵢ · d)² / (λᵢ + ε²)                  λᵢ, eᵢ: variances and directions of d
+//!     |d|² / Σᵢ (λᵢ + ε²)                       λᵢ: variances of d in independent directions
 //! ```
 //!
-//! d over all places of the region, and ε what no calibration is better known than.
+//! d over all places of the region, and ε what no calibration is better known than. So what is tested is the
+//! ratio of the two numbers that are reported. How covariances of few frames divide between directions is
+//! known too roughly for a test of each.
+//!
+//! Both calibrations are taken to be of one board: what its errors do to both alike is no difference.
 
 use std::collections::BTreeMap;
 
@@ -18,7 +22,9 @@ use nalgebra::{DMatrix, DVector};
 
 use super::coverage::Coverage;
 use super::estimate::CameraEstimate;
-use super::uncertainty::{INFINITY_MM, Source, by_motion, by_parameters, seen_at};
+use super::uncertainty::{
+    INFINITY_MM, ObservedCovariance, Source, by_motion, by_parameters, seen_at,
+};
 use crate::camera::Pose;
 use crate::statistics::{chi_squared_chance, f_chance};
 
@@ -35,10 +41,6 @@ const SAME_PX: f64 = 1e-9;
 
 /// No calibration is known better than this, px: neither lens nor sensor is what its model says.
 const LEAST_SD_PX: f64 = 1e-3;
-
-/// How uncertain a calibration is, is itself known to about this part of the whole: directions in which
-/// differences are expected to be much smaller do not decide.
-const KNOWN_TO: f64 = 0.1;
 
 /// Chance makes two calibrations of a camera that has not changed differ this seldom.
 const SELDOM: f64 = 1e-3;
@@ -416,25 +418,17 @@ impl Known {
         }
         known.motions = -pseudo_inverse(&matrix)? * right;
         // The differences over all places are G x with x of variance 1.
-        let (mut gram, mut along) = (DMatrix::zeros(count, count), DVector::zeros(count));
+        let (mut gram, mut square) = (DMatrix::zeros(count, count), 0.0);
         for (of_motion, changes, by) in &rows {
             let changes = changes + of_motion * &known.motions;
             gram += changes.tr_mul(&changes);
-            along += changes.tr_mul(&DVector::from_column_slice(&by.to_array()));
+            square += by.length_squared();
         }
         let coordinates = 2.0 * rows.len() as f64;
         known.expected_px = (gram.trace() / coordinates).sqrt();
-        let eigen = gram.symmetric_eigen();
-        let floor = coordinates * (KNOWN_TO * known.expected_px).max(LEAST_SD_PX).powi(2);
-        let largest = eigen.eigenvalues.max();
-        let modes = eigen.eigenvalues.iter().zip(eigen.eigenvectors.column_iter());
-        let modes = modes.filter(|(variance, _)| **variance > SINGULAR * largest);
-        let modes = modes.map(|(&variance, mode)| {
-            let share = variance / (variance + floor);
-            (mode.dot(&along).powi(2) / variance / (variance + floor), share)
-        });
+        let mean = gram.trace() + coordinates * LEAST_SD_PX.powi(2);
         let freedom = [first, second].map(CameraEstimate::observed_freedom);
-        known.chance = chance_of(&modes.collect::<Vec<_>>(), freedom);
+        known.chance = chance_of(square, mean, gram.norm_squared(), freedom);
         Some(known)
     }
 
@@ -481,12 +475,11 @@ impl Known {
     }
 }
 
-/// How often chance makes a sum as large, of squares that are expected to be as large as given: by the χ² of the same
-/// mean and variance (Satterthwaite 1946); where covariances are known as from so many squares only, by the F distribution.
-fn chance_of(squares: &[(f64, f64)], known: [Option<f64>; 2]) -> f64 {
-    let sum = |of: fn(&(f64, f64)) -> f64| squares.iter().map(of).sum::<f64>();
-    let (found, mean, spread) = (sum(|of| of.0), sum(|of| of.1), sum(|of| of.1 * of.1));
-    if squares.is_empty() || spread == 0.0 {
+/// The probability of a sum of squares as large as `found` or larger, of which `mean` is expected and whose
+/// variances have squares that sum up to `spread`: by the χ² of the same mean and variance (Satterthwaite
+/// 1946); where covariances are known as from so many squares only, by the F distribution.
+fn chance_of(found: f64, mean: f64, spread: f64, known: [Option<f64>; 2]) -> f64 {
+    if mean <= 0.0 || spread <= 0.0 {
         return 1.0;
     }
     let freedom = (mean * mean / spread).round().max(1.0);
@@ -502,10 +495,12 @@ impl CameraEstimate {
     }
 }
 
-/// A square root of the covariance of a camera's parameters: that which is observed, else that from noise.
+/// A square root of the covariance of a camera's parameters: that which is observed, without errors of the board,
+/// else that from noise.
 fn half_of(camera: &CameraEstimate) -> Option<DMatrix<f64>> {
-    let observed = camera.covariance_from(Source::Observed);
-    let covariance = observed.or_else(|| camera.covariance_from(Source::Noise))?;
+    let observed = camera.projection.as_ref().and_then(|known| known.observed.as_ref());
+    let observed = observed.map(ObservedCovariance::without_board);
+    let covariance = observed.or_else(|| camera.covariance_from(Source::Noise).cloned())?;
     let n = covariance.nrows();
     let sd = DVector::from_fn(n, |i, _| covariance[(i, i)].sqrt());
     let scaled = DMatrix::from_fn(n, n, |i, j| covariance[(i, j)] / sd[i] / sd[j]);

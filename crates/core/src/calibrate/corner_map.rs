@@ -33,6 +33,8 @@ pub(super) struct CornerMap {
     pub offsets_mm: Vec<DVec3>,
     /// The prior standard deviation of an offset along x, y and z of the panel, mm.
     pub prior_mm: DVec3,
+    /// The number of offsets that the views determine, γ; zero before that is known.
+    pub determined: f64,
 }
 
 /// A corner whose place is unknown.
@@ -65,12 +67,17 @@ impl CornerMap {
         let index = labels.enumerate().map(|(at, label)| (label, at)).collect();
         let offsets_mm = vec![DVec3::ZERO; corners.len()];
         let prior_mm = DVec3::splat(FIRST_PRIOR * nearest_mm(&corners));
-        Self { index, corners, offsets_mm, prior_mm }
+        Self { index, corners, offsets_mm, prior_mm, determined: 0.0 }
     }
 
-    /// The same map with another prior, mm.
-    pub fn expecting(self, prior_mm: DVec3) -> Self {
-        Self { prior_mm, ..self }
+    /// The same map with another prior, mm, and the number of offsets that the views determine.
+    pub fn expecting(self, (prior_mm, determined): (DVec3, f64)) -> Self {
+        Self { prior_mm, determined, ..self }
+    }
+
+    /// The distance of neighbours in a row, mm.
+    pub fn edge_mm(&self) -> f64 {
+        nearest_mm(&self.corners)
     }
 
     /// Number of corners.
@@ -98,9 +105,9 @@ impl CornerMap {
         index.map_or(DVec3::ZERO, |&index| self.offsets_mm[index])
     }
 
-    /// The prior that maximises the marginal likelihood of the offsets, mm; `covariances` and
-    /// `sigma` are as in [`Self::without_gauge`].
-    pub fn fitted_prior(&self, covariances: &[Matrix3<f64>], sigma: f64) -> DVec3 {
+    /// The prior that maximises the marginal likelihood of the offsets, mm, and the number γ of offsets that
+    /// the views determine; `covariances` and `sigma` are as in [`Self::without_gauge`].
+    pub fn fitted_prior(&self, covariances: &[Matrix3<f64>], sigma: f64) -> (DVec3, f64) {
         let of_axes = |axes: &[usize]| {
             let (mut squares, mut determined) = (0.0, 0.0);
             for (offset, covariance) in self.offsets_mm.iter().zip(covariances) {
@@ -109,10 +116,10 @@ impl CornerMap {
                     determined += 1.0 - covariance[(k, k)] * (sigma / self.prior_mm[k]).powi(2);
                 }
             }
-            (squares / determined.max(1.0)).sqrt().max(LEAST_PRIOR_MM)
+            ((squares / determined.max(1.0)).sqrt().max(LEAST_PRIOR_MM), determined)
         };
-        let [plane, out] = [of_axes(&[0, 1]), of_axes(&[2])];
-        DVec3::new(plane, plane, out)
+        let [(plane, in_plane), (out, out_of_plane)] = [of_axes(&[0, 1]), of_axes(&[2])];
+        (DVec3::new(plane, plane, out), in_plane + out_of_plane)
     }
 
     /// The covariances of the offsets less the share of the directions that poses and distances

@@ -5,20 +5,22 @@ use glam::DVec2;
 use nalgebra::{DMatrix, Matrix3};
 
 use super::agreement::{Observed, observed};
+use super::board_errors::{board_errors, drawn_to_plan};
 use super::calibration::{Calibration, CameraViews, PanelPlace};
+use super::corner_map::CornerMap;
 use super::coverage::Coverage;
 use super::error::CalibrationError;
 use super::excluded::Excluded;
 use super::finding::Finding;
 use super::lack_of_fit::{LackOfFit, lack_of_fit};
 use super::lens_end::LensEnd;
+use super::loss::Loss;
 use super::minimise::Minimum;
 use super::model::Model;
 use super::next_view::KnownSoFar;
 use super::normal::Covariances;
 use super::panel::PanelRef;
-use super::problem::Problem;
-use super::reweighting::{Settled, variance};
+use super::reweighting::{Settled, deviations, variance};
 use super::roughness::Roughness;
 use super::shape::{BoardShape, COUNT as SHAPE_COEFFICIENTS, Shape};
 use super::start::Frame;
@@ -368,7 +370,7 @@ impl Estimate {
         settled: &Settled,
         f_ratio: f64,
     ) -> Result<Self, CalibrationError> {
-        let Calibration { cameras, loss, distances_mm, .. } = calibration;
+        let Calibration { cameras, loss, distances_mm, board_accuracy_mm, .. } = calibration;
         let loss = *loss;
         let Settled { minimum, whitening, .. } = settled;
         let Minimum { problem, normal, layout, steps } = minimum;
@@ -392,7 +394,11 @@ impl Estimate {
         }
         let variance = variance(minimum, whitening, loss);
         let covariance = &found.shared * variance;
-        let observed = observed(minimum, whitening, loss, &found);
+        let drawn = drawn_to_plan(minimum, whitening, &found, *board_accuracy_mm);
+        let observed = observed(minimum, whitening, loss, &found).map(|observed| {
+            let of_board = board_errors(minimum, whitening, loss, &found, *board_accuracy_mm);
+            observed.with(of_board, drawn.as_ref())
+        });
         let mut views = views(cameras, frames, settled);
         let cameras = cameras.iter().enumerate().map(|(index, camera)| {
             let views = std::mem::take(&mut views[index]);
@@ -436,7 +442,7 @@ impl Estimate {
             targets: targets.collect(),
             panels: panels.collect(),
             shape: board_shape(minimum, &covariance, f_ratio),
-            map: target_map(problem, &found.corners, variance, whitening.sigma),
+            map: target_map(settled, &found.corners, variance, loss, drawn.as_ref()),
             rms_px: rms_px(cameras.iter().flat_map(CameraEstimate::corners)),
             common_px: whitening.common_px,
             sigma: variance.sqrt(),
@@ -537,10 +543,15 @@ fn projection(
     if columns.is_empty() {
         return None;
     }
-    let observed = observed.map(|Observed { covariance, freedom }| {
+    let observed = observed.map(|Observed { covariance, of_board, freedom }| {
         let n = columns.len();
-        let own = DMatrix::from_fn(n, n, |i, j| covariance[(columns[i].1, columns[j].1)]);
-        ObservedCovariance { covariance: own, freedom: *freedom }
+        let own =
+            |of: &DMatrix<f64>| DMatrix::from_fn(n, n, |i, j| of[(columns[i].1, columns[j].1)]);
+        ObservedCovariance {
+            covariance: own(covariance),
+            of_board: of_board.as_ref().map(own),
+            freedom: *freedom,
+        }
     });
     let (whitening, free) = (&settled.whitening, camera.free());
     ProjectionUncertainty::of(problem, whitening, index, &free, distances_mm, observed)
@@ -570,30 +581,77 @@ fn known(settled: &Settled, found: &Covariances, variance: f64) -> Option<KnownS
     Some(KnownSoFar { information: information / variance, corner_variance_px2 })
 }
 
+/// Least sum of the weights of a corner's observations for its position to be measured: a view has two
+/// coordinates, a position three.
+const LEAST_VIEWS: f64 = 2.0;
+
+/// Least mean weight of them: a majority.
+const LEAST_WEIGHT: f64 = 0.5;
+
+/// Whether a position rests on observations that count.
+fn rests_on_few(&(weight, count): &(f64, usize)) -> bool {
+    weight < LEAST_VIEWS || weight < LEAST_WEIGHT * count as f64
+}
+
+/// For each corner the weights of its observations, summed, and their number. Outliers weigh nothing; views in
+/// which the whole panel takes no part are left out.
+fn weights(map: &CornerMap, settled: &Settled, loss: Loss) -> Vec<(f64, usize)> {
+    let Settled { minimum, whitening, problem, outliers } = settled;
+    let mut weights = vec![(0.0, 0); map.len()];
+    let off = deviations(problem, whitening);
+    let blocks = problem.blocks.iter().zip(&minimum.problem.blocks).zip(off).zip(outliers);
+    for (((block, part), off), outliers) in blocks {
+        if part.observations.is_empty() {
+            continue;
+        }
+        for ((seen, off), outlier) in block.observations.iter().zip(off).zip(outliers) {
+            let (weight, count) = &mut weights[map.index(block.panel, seen)];
+            *count += 1;
+            if !outlier {
+                *weight += loss.influence(off * off, whitening.sigma).weight;
+            }
+        }
+    }
+    weights
+}
+
 fn target_map(
-    problem: &Problem,
+    settled: &Settled,
     covariances: &[Matrix3<f64>],
     variance: f64,
-    sigma: f64,
+    loss: Loss,
+    drawn: Option<&DMatrix<f64>>,
 ) -> Option<TargetMap> {
+    let Minimum { problem, layout, .. } = &settled.minimum;
     let map = problem.map.as_ref()?;
-    let covariances = map.without_gauge(covariances, sigma, problem);
+    let covariances = map.without_gauge(covariances, settled.whitening.sigma, problem);
+    let weights = weights(map, settled, loss);
+    let few = weights.iter().filter(|of| of.1 > 0 && rests_on_few(of)).count();
     let corners = map.corners.iter().zip(&map.offsets_mm).zip(covariances).zip(map.views(problem));
-    // Of a corner whose observations are all wrong nothing was found.
-    let seen = corners.filter(|(_, views)| *views > 0);
-    let corners = seen.map(|(((corner, &offset_mm), covariance), views)| CornerOffset {
-        panel: corner.panel,
-        row: corner.row,
-        col: corner.col,
-        panel_mm: corner.panel_mm,
-        offset_mm,
-        covariance_mm2: std::array::from_fn(|i| {
-            std::array::from_fn(|j| variance * covariance[(i, j)])
-        }),
-        views,
+    let all = corners.zip(&weights).enumerate();
+    let measured = all.filter(|(_, (_, of))| !rests_on_few(of));
+    let corners = measured.map(|(index, ((((corner, &offset_mm), covariance), views), _))| {
+        let drawn = drawn.map_or(Matrix3::zeros(), |drawn| {
+            let own = drawn.rows(layout.shared + 3 * index, 3);
+            let square = own * own.transpose();
+            Matrix3::from_fn(|i, j| square[(i, j)])
+        });
+        CornerOffset {
+            panel: corner.panel,
+            row: corner.row,
+            col: corner.col,
+            panel_mm: corner.panel_mm,
+            offset_mm,
+            covariance_mm2: std::array::from_fn(|i| {
+                std::array::from_fn(|j| variance * covariance[(i, j)] + drawn[(i, j)])
+            }),
+            views,
+        }
     });
     let expected_mm = [map.prior_mm.x, map.prior_mm.z];
-    Some(TargetMap::new(corners.collect(), expected_mm))
+    let mut map = TargetMap::new(corners.collect(), expected_mm);
+    map.few = few;
+    Some(map)
 }
 
 fn board_shape(minimum: &Minimum, covariance: &DMatrix<f64>, f_ratio: f64) -> Option<BoardShape> {

@@ -23,6 +23,7 @@
 
 mod agreement;
 mod automatic;
+mod board_errors;
 mod calibration;
 mod comparison;
 mod consensus;

@@ -11,10 +11,10 @@
 //! through them, nor a corner with another corner but through frames: of the two the one that has more
 //! unknowns is eliminated, and the other is kept.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 
 use glam::{DMat3, DVec2, DVec3};
-use nalgebra::{DMatrix, DVector, Matrix3, Matrix6, SMatrix, Vector3, Vector6};
+use nalgebra::{Cholesky, DMatrix, DVector, Matrix3, Matrix6, SMatrix, U6, Vector3, Vector6};
 use rayon::prelude::*;
 
 use super::corner_map::CornerMap;
@@ -107,8 +107,8 @@ pub(super) struct Step {
 /// of each corner's offset.
 pub(super) struct Covariances {
     pub shared: DMatrix<f64>,
-    /// Of the shared unknowns with all that are kept.
-    pub across: DMatrix<f64>,
+    /// Of all that are kept.
+    pub kept: DMatrix<f64>,
     /// A square root of that of the shared unknowns.
     pub root: Root,
     pub frames: Vec<Matrix6<f64>>,
@@ -366,9 +366,8 @@ impl Normal {
             (None, Some(first)) => (parts.iter().map(fixed).collect(), blocks(&kept, first)),
             (None, None) => (parts.iter().map(fixed).collect(), Vec::new()),
         };
-        let across = kept.rows(0, self.shared).into_owned();
-        let shared = across.columns(0, self.shared).into_owned();
-        Some(Covariances { shared, across, root, frames, corners, loose, tied })
+        let shared = kept.view((0, 0), (self.shared, self.shared)).into_owned();
+        Some(Covariances { shared, kept, root, frames, corners, loose, tied })
     }
 
     /// The covariance of what is kept for residuals of variance 1; `None` where something is open.
@@ -381,20 +380,34 @@ impl Normal {
         Some(DMatrix::from_fn(n, n, |i, j| inverse[(i, j)] * scale[i] * scale[j]))
     }
 
-    /// Adds the pull of a corner in one block to that of all that are kept.
-    pub(super) fn pull_of_corner(
+    /// The solution of the equations for a right side of shared unknowns and corners' offsets, in this
+    /// order, which is zero for the poses of frames. `None` where a corner is open by itself.
+    pub(super) fn solve_without_frames(
         &self,
         layout: &Layout,
-        corner: &OfCorner,
-        pull: &mut DVector<f64>,
-    ) {
-        if let Some(first) = layout.corners {
-            let mut own = pull.fixed_rows_mut::<3>(first + 3 * corner.index);
-            own += corner.right;
-        } else if let Some(part) = self.parts.get(corner.index) {
-            let Some(whole) = part.c.clone().cholesky() else { return };
-            *pull -= &part.b * whole.solve(&corner.right);
+        found: &Covariances,
+        right: &DVector<f64>,
+    ) -> Option<DVector<f64>> {
+        if layout.corners.is_some() {
+            return Some(&found.kept * right);
         }
+        let mut of_kept = DVector::zeros(layout.count);
+        of_kept.rows_mut(0, self.shared).copy_from(&right.rows(0, self.shared));
+        let mut of_parts = Vec::with_capacity(self.parts.len());
+        for (index, part) in self.parts.iter().enumerate() {
+            let whole = part.c.clone().cholesky()?;
+            let own = right.rows(self.shared + 3 * index, 3).into_owned();
+            of_kept -= &part.b * whole.solve(&own);
+            of_parts.push((whole, own));
+        }
+        let kept = &found.kept * of_kept;
+        let mut solution = DVector::zeros(right.len());
+        solution.rows_mut(0, self.shared).copy_from(&kept.rows(0, self.shared));
+        for (index, (part, (whole, own))) in self.parts.iter().zip(of_parts).enumerate() {
+            let own = whole.solve(&(own - part.b.tr_mul(&kept)));
+            solution.rows_mut(self.shared + 3 * index, 3).copy_from(&own);
+        }
+        Some(solution)
     }
 
     /// The inverse of the reduced equations; the root is that of what all frames share, which alone may be open.
@@ -592,6 +605,118 @@ pub(super) struct Local {
     pub right: Vec<f64>,
     /// The corners, where they are unknown.
     pub corners: Vec<OfCorner>,
+}
+
+/// The normal equations of one frame for the shared unknowns followed by the offsets of all corners, its pose
+/// eliminated.
+pub(super) struct OfFrame {
+    locals: Vec<Local>,
+    /// Number of shared unknowns.
+    shared: usize,
+    /// Those of the pose.
+    pose: Cholesky<f64, U6>,
+}
+
+impl OfFrame {
+    /// From the blocks of the frame. `None` where the pose is open.
+    pub fn of(locals: Vec<Local>, shared: usize) -> Option<Self> {
+        let mut pose = Matrix6::<f64>::zeros();
+        for local in &locals {
+            for i in 0..6 {
+                let own = local.row(local.columns.len() + i)[local.columns.len()..].iter();
+                own.enumerate().for_each(|(j, value)| pose[(i, j)] += value);
+            }
+        }
+        pose.fill_upper_triangle_with_lower_triangle();
+        Some(Self { locals, shared, pose: pose.cholesky()? })
+    }
+
+    /// The right side of n unknowns. The pose is at its optimum, so that nothing is left of its own.
+    pub fn right(&self, n: usize) -> DVector<f64> {
+        let mut right = DVector::zeros(n);
+        for local in &self.locals {
+            local.columns.iter().zip(&local.right).for_each(|(&row, value)| right[row] += value);
+            for corner in &local.corners {
+                let mut own = right.fixed_rows_mut::<3>(self.shared + 3 * corner.index);
+                own += corner.right;
+            }
+        }
+        right
+    }
+
+    /// Calls `each` for every unknown that the frame touches, with what is between it and the pose; for some more
+    /// than once, with what is to be summed.
+    fn with_pose(&self, mut each: impl FnMut(usize, Vector6<f64>)) {
+        for local in &self.locals {
+            let of_shared = local.columns.len();
+            for (i, &column) in local.columns.iter().enumerate() {
+                each(column, Vector6::from_fn(|pose, _| local.row(of_shared + pose)[i]));
+            }
+            for corner in &local.corners {
+                for k in 0..3 {
+                    let across = Vector6::from_fn(|pose, _| corner.cross[of_shared + pose][k]);
+                    each(self.shared + 3 * corner.index + k, across);
+                }
+            }
+        }
+    }
+
+    /// The product of the matrix with a vector of all unknowns.
+    pub fn times(&self, vector: &DVector<f64>) -> DVector<f64> {
+        let mut product = DVector::zeros(vector.len());
+        for local in &self.locals {
+            for (i, &row) in local.columns.iter().enumerate() {
+                for (&column, value) in local.columns.iter().zip(local.row(i)) {
+                    product[row] += value * vector[column];
+                    if column != row {
+                        product[column] += value * vector[row];
+                    }
+                }
+            }
+            for corner in &local.corners {
+                let first = self.shared + 3 * corner.index;
+                let own = corner.own * vector.fixed_rows::<3>(first);
+                (0..3).for_each(|k| product[first + k] += own[k]);
+                for (&column, values) in local.columns.iter().zip(&corner.cross) {
+                    for (k, value) in values.iter().enumerate() {
+                        product[first + k] += value * vector[column];
+                        product[column] += value * vector[first + k];
+                    }
+                }
+            }
+        }
+        let mut pose = Vector6::zeros();
+        self.with_pose(|unknown, across| pose += across * vector[unknown]);
+        let pose = self.pose.solve(&pose);
+        self.with_pose(|unknown, across| product[unknown] -= across.dot(&pose));
+        product
+    }
+
+    /// Adds what is between the shared unknowns (rows) and the offsets of all corners (columns).
+    pub fn add_across(&self, across: &mut DMatrix<f64>) {
+        for local in &self.locals {
+            for corner in &local.corners {
+                for (&row, values) in local.columns.iter().zip(&corner.cross) {
+                    for (k, value) in values.iter().enumerate() {
+                        across[(row, 3 * corner.index + k)] += value;
+                    }
+                }
+            }
+        }
+        let mut of_shared: BTreeMap<usize, Vector6<f64>> = BTreeMap::new();
+        self.with_pose(|unknown, with_pose| {
+            if unknown < self.shared {
+                *of_shared.entry(unknown).or_default() += with_pose;
+            }
+        });
+        let of_shared: Vec<_> =
+            of_shared.iter().map(|(&row, of)| (row, self.pose.solve(of))).collect();
+        self.with_pose(|unknown, with_pose| {
+            if let Some(column) = unknown.checked_sub(self.shared) {
+                of_shared.iter().for_each(|(row, of)| across[(*row, column)] -= of.dot(&with_pose));
+            }
+        });
+    }
 }
 
 /// What a corner in a block says of its own offset.

@@ -259,13 +259,13 @@ impl Calibration {
             let Minimum { problem, normal, layout, .. } = &settled.minimum;
             let Some(map) = &problem.map else { break };
             let found = normal.covariances(layout).ok_or(CalibrationError::NoStart)?;
-            let prior_mm = map.fitted_prior(&found.corners, settled.whitening.sigma);
-            let change = (prior_mm - map.prior_mm).abs() / map.prior_mm;
+            let fitted = map.fitted_prior(&found.corners, settled.whitening.sigma);
+            let change = (fitted.0 - map.prior_mm).abs() / map.prior_mm;
             if change.max_element() < SAME_PRIOR {
                 break;
             }
             let mut problem = settled.problem.clone();
-            problem.map = Some(map.clone().expecting(prior_mm));
+            problem.map = Some(map.clone().expecting(fitted));
             settled = settle(Kept { problem, ..gross.kept() }, self.weights, self.loss)?;
         }
         Ok(settled)

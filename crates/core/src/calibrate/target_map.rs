@@ -18,6 +18,9 @@ pub struct TargetMap {
     /// The deviation of the offsets that was found, in the plane of the panels and out of it, mm: corners that
     /// few views show are drawn to zero accordingly.
     pub expected_mm: [f64; 2],
+    /// The number of corners that were seen and are not in the map, as their positions would rest on outliers:
+    /// fewer than two observations count, or less than half of them.
+    pub few: usize,
 }
 
 /// A corner that is not quite where its plan has it.
@@ -50,10 +53,10 @@ impl TargetMap {
     /// A map of these corners; `expected_mm` as in [`Self::expected_mm`].
     pub fn new(mut corners: Vec<CornerOffset>, expected_mm: [f64; 2]) -> Self {
         corners.sort_by_key(CornerOffset::label);
-        Self { corners, expected_mm }
+        Self { corners, expected_mm, few: 0 }
     }
 
-    /// Every corner that was seen, by panel, row and column.
+    /// Every corner that was measured, by panel, row and column.
     pub fn corners(&self) -> &[CornerOffset] {
         &self.corners
     }
@@ -88,7 +91,7 @@ impl TargetMap {
             let panel = PanelRef::new(corner.panel.index() - panels.start, corner.panel.id());
             CornerOffset { panel, ..*corner }
         });
-        Self { corners: own.collect(), expected_mm: self.expected_mm }
+        Self { corners: own.collect(), expected_mm: self.expected_mm, few: self.few }
     }
 
     /// The corner with a label.

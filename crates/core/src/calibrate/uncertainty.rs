@@ -40,8 +40,21 @@ pub struct ProjectionUncertainty {
 pub struct ObservedCovariance {
     /// The covariance, in the order of the parameters that were found.
     pub covariance: DMatrix<f64>,
+    /// The part of it that comes from errors of the board, which are the same in every frame, and in every
+    /// calibration with that board; `None` where the board is exact or its corners were found too.
+    pub of_board: Option<DMatrix<f64>>,
     /// How well it is known: a variance of it as from so many independent squares.
     pub freedom: f64,
+}
+
+impl ObservedCovariance {
+    /// The covariance without the part that comes from errors of the board.
+    pub fn without_board(&self) -> DMatrix<f64> {
+        match &self.of_board {
+            Some(of_board) => &self.covariance - of_board,
+            None => self.covariance.clone(),
+        }
+    }
 }
 
 /// Where a deviation comes from.
@@ -49,7 +62,8 @@ pub struct ObservedCovariance {
 pub enum Source {
     /// The noise of the corners, if camera and target are what they are taken for.
     Noise,
-    /// How far the frames agree with each other, whatever the cause.
+    /// How far the frames agree with each other, whatever the cause, and what errors of the board do to all of
+    /// them alike.
     Observed,
 }
 

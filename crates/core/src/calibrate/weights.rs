@@ -62,7 +62,7 @@ impl Whitening {
     /// Every corner alike.
     fn equal(problem: &Problem, residuals: &[Vec<DVec2>]) -> Self {
         let mut whitening = Self { blocks: alike(problem), common_px: None, sigma: 1.0 };
-        whitening.sigma = whitening.median_sigma(residuals);
+        whitening.sigma = whitening.median_sigma(problem, residuals);
         whitening
     }
 
@@ -76,7 +76,7 @@ impl Whitening {
         let with = |common: f64| {
             let blocks = triangles(&covariances, common);
             let mut whitening = Self { blocks, common_px: Some(common), sigma: 1.0 };
-            whitening.sigma = whitening.median_sigma(residuals);
+            whitening.sigma = whitening.median_sigma(problem, residuals);
             whitening
         };
         let alone = with(0.0);
@@ -102,12 +102,23 @@ impl Whitening {
         Self { blocks, ..*self }
     }
 
-    fn median_sigma(&self, residuals: &[Vec<DVec2>]) -> f64 {
+    fn median_sigma(&self, problem: &Problem, residuals: &[Vec<DVec2>]) -> f64 {
         let whitened = self.blocks.iter().flatten().zip(residuals.iter().flatten());
         let squares = whitened.map(|(&w, &r)| Self::apply(w, r).length_squared());
-        (median(squares.collect()).unwrap_or(0.0) / MEDIAN_OF_CHI_SQUARED_2).sqrt().max(LEAST_SIGMA)
+        let square = median(squares.collect()).unwrap_or(0.0) / MEDIAN_OF_CHI_SQUARED_2;
+        (square / left_free(problem)).sqrt().max(LEAST_SIGMA)
     }
 }
+
+/// The part of the residuals' squares that unknowns leave. Where corners are unknown too, few views leave little.
+fn left_free(problem: &Problem) -> f64 {
+    let Some(map) = &problem.map else { return 1.0 };
+    let unknowns = map.determined + 6.0 * problem.frames.len() as f64;
+    (1.0 - unknowns / (2.0 * problem.count().max(1) as f64)).max(LEAST_FREE)
+}
+
+/// Least part of the squares that is taken to be left: two views of a corner leave a quarter.
+const LEAST_FREE: f64 = 0.25;
 
 /// The covariances of all corners, `None` where no corner has one. A corner without one among
 /// others that have one was the hardest to refine: it gets the largest variance of all.

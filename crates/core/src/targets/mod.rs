@@ -494,6 +494,19 @@ impl Target {
         self.panels.iter().flat_map(|panel| &panel.corners).any(|corner| corner.measured.is_some())
     }
 
+    /// How well the measured places of its corners are known: standard deviation of a coordinate, root mean
+    /// square over the corners that were measured, mm. `None` where none was.
+    pub fn measured_sd_mm(&self) -> Option<f64> {
+        let corners = self.panels.iter().flat_map(|panel| &panel.corners);
+        let places = corners.filter_map(|corner| corner.measured);
+        let variances =
+            places.map(|MeasuredPlace { covariance_mm2: [xx, _, _, yy, _, zz], .. }| {
+                (xx + yy + zz) / 3.0
+            });
+        let (sum, count) = variances.fold((0.0, 0), |(sum, count), v| (sum + v, count + 1));
+        (count > 0).then(|| (sum / f64::from(count)).sqrt())
+    }
+
     /// On how many pages all its sheets are printed.
     pub fn page_count(&self) -> usize {
         self.sheets.iter().map(SheetLayout::page_count).sum()

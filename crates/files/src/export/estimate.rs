@@ -42,6 +42,9 @@ pub(super) struct ProjectionRecord {
     /// Degrees of freedom of the observed covariance.
     #[serde(skip_serializing_if = "Option::is_none")]
     observed_freedom: Option<f64>,
+    /// The part of the observed covariance that errors of the board make, the lower triangle.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    board_covariance: Option<Vec<Vec<f64>>>,
     distances_mm: Vec<f64>,
     maps: Vec<UncertaintyRecord>,
 }
@@ -159,6 +162,10 @@ pub(super) fn parameters(camera: &CameraEstimate) -> Vec<ParameterRecord<'_>> {
         .collect()
 }
 
+fn lower_triangle(matrix: &DMatrix<f64>) -> Vec<Vec<f64>> {
+    (0..matrix.nrows()).map(|i| (0..=i).map(|j| matrix[(i, j)]).collect()).collect()
+}
+
 pub(super) fn projection(camera: &CameraEstimate) -> Option<ProjectionRecord> {
     let known = camera.projection.as_ref()?;
     let (rows, columns) = known.alignment.shape();
@@ -181,6 +188,11 @@ pub(super) fn projection(camera: &CameraEstimate) -> Option<ProjectionRecord> {
             .as_ref()
             .map(|of| correlations_of(&of.covariance, spline(camera).is_some())),
         observed_freedom: known.observed.as_ref().map(|of| of.freedom),
+        board_covariance: known
+            .observed
+            .as_ref()
+            .and_then(|of| of.of_board.as_ref())
+            .map(lower_triangle),
         distances_mm: known.distances_mm.clone(),
         maps: maps.collect(),
     })

@@ -201,6 +201,8 @@ struct SavedProjection {
     observed_correlations: Option<Vec<Vec<f64>>>,
     #[serde(default, deserialize_with = "quantity::deviation::de")]
     observed_freedom: Option<f64>,
+    #[serde(default, deserialize_with = "quantity::figure::de")]
+    board_covariance: Option<Vec<Vec<f64>>>,
     #[serde(deserialize_with = "quantity::length_mm::de")]
     distances_mm: Vec<f64>,
 }
@@ -470,7 +472,7 @@ impl SavedCamera {
             .ok_or_else(|| field("parameters", "they are those of no lens here"))?;
         let values: Vec<f64> = self.parameters.iter().map(|p| p.value).collect();
         let sds: Vec<f64> = self.parameters.iter().filter_map(|p| p.sd).collect();
-        let covariance = covariance(&self.correlations, &sds)
+        let covariance = covariance_of(&self.correlations, &sds)
             .ok_or_else(|| field("correlations", "there is not one for each pair of parameters"))?;
         let observed: Vec<f64> = self.parameters.iter().filter_map(|p| p.observed_sd).collect();
         let projection = self.projection.map(|known| known.read(sds.len(), &observed));
@@ -502,7 +504,7 @@ impl SavedCamera {
 
 /// The covariance matrix from correlations and standard deviations; `None` where there is not one
 /// correlation for each pair.
-fn covariance(rows: &[Vec<f64>], sds: &[f64]) -> Option<DMatrix<f64>> {
+fn covariance_of(rows: &[Vec<f64>], sds: &[f64]) -> Option<DMatrix<f64>> {
     let n = sds.len();
     // For a spline only the lower triangle is stored.
     let has_all = |(i, row): (usize, &Vec<f64>)| row.len() == n || row.len() == i + 1;
@@ -514,16 +516,21 @@ fn covariance(rows: &[Vec<f64>], sds: &[f64]) -> Option<DMatrix<f64>> {
 impl SavedProjection {
     /// `found` is the number of estimated parameters, `sds` are their observed standard deviations.
     fn read(self, found: usize, sds: &[f64]) -> Result<ProjectionUncertainty, &'static str> {
-        let Self { alignment, observed_correlations, observed_freedom, distances_mm } = self;
+        let Self { alignment, observed_correlations, observed_freedom, .. } = self;
+        let (board, distances_mm) = (self.board_covariance, self.distances_mm);
         if alignment.len() != 6 || alignment.iter().any(|row| row.len() != found) {
             return Err("`alignment` has not six rows with a number for each parameter");
         }
         let alignment = DMatrix::from_fn(6, found, |i, j| alignment[i][j]);
         let observed = observed_correlations.zip(observed_freedom).map(|(rows, freedom)| {
-            let covariance = covariance(&rows, sds).filter(|_| sds.len() == found);
+            let covariance = covariance_of(&rows, sds).filter(|_| sds.len() == found);
             let covariance = covariance
                 .ok_or("`observed_correlations` are not one for each pair of parameters")?;
-            Ok(ObservedCovariance { covariance, freedom })
+            let of_board = board.map(|rows| {
+                covariance_of(&rows, &vec![1.0; found])
+                    .ok_or("`board_covariance` has not a number for each pair of parameters")
+            });
+            Ok(ObservedCovariance { covariance, of_board: of_board.transpose()?, freedom })
         });
         Ok(ProjectionUncertainty::new(alignment, distances_mm, observed.transpose()?))
     }

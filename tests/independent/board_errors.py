@@ -1,0 +1,153 @@
+"""Standard deviations of a camera whose board is not quite what its description says, in simulation.
+
+    python board_errors.py path/to/deltille FOLDER [--kind sheet|corners|both|none] [--size 0.05] [--views 20]
+                           [--seeds 1-40] [--noise 0.1] [--measure] [--accuracy 0.05mm]
+
+A checkerboard of 10 × 11 corners, 20 mm apart, is in every view distorted alike: `sheet` is stretched, sheared and bent
+at random, `corners` displaces each corner by itself, with `--size` mm rms a coordinate; `both` has both. Prints how
+far fx, fy, cx, cy are from the truth in their deviations from noise and in the observed ones, rms over seeds, and with
+--measure the same of the positions of corners. Needs numpy.
+"""
+
+import argparse
+import json
+import pathlib
+import shutil
+import subprocess
+import sys
+from concurrent.futures import ThreadPoolExecutor
+
+import numpy as np
+
+ROWS, COLS, EDGE_MM = 10, 11, 20.0
+WIDTH, HEIGHT = 1600, 1200
+TRUTH = {"fx": 1000.0, "fy": 1001.0, "cx": 805.0, "cy": 596.0}
+K1, K2, P1, P2 = -0.2, 0.06, 1e-4, -2e-4
+MARGIN_PX = 10.0
+
+
+def rotation(turn):
+    """The matrix of a rotation vector (Rodrigues)."""
+    angle = np.linalg.norm(turn)
+    x, y, z = turn / angle
+    k = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
+    return np.eye(3) + np.sin(angle) * k + (1 - np.cos(angle)) * k @ k
+
+
+def project(points):
+    x, y = (points[:, :2] / points[:, 2:]).T
+    r2 = x * x + y * y
+    radial = 1 + r2 * (K1 + r2 * K2)
+    u = x * radial + 2 * P1 * x * y + P2 * (r2 + 2 * x * x)
+    v = y * radial + P1 * (r2 + 2 * y * y) + 2 * P2 * x * y
+    return np.stack([TRUTH["fx"] * u + TRUTH["cx"], TRUTH["fy"] * v + TRUTH["cy"]], 1)
+
+
+def errors(random, board, kind, size):
+    """Offsets of all corners, mm."""
+    offsets = np.zeros_like(board)
+    x, y = (board - board.mean(0))[:, :2].T
+    if kind in ("sheet", "both"):
+        plane = [np.stack([x, -y], 1), np.stack([y, x], 1)]
+        out = [x * x, x * y, y * y]
+        for modes, part in ((plane, np.s_[:, :2]), (out, np.s_[:, 2])):
+            field = sum(c * m / np.std(m) for c, m in zip(random.normal(size=len(modes)), modes))
+            offsets[part] += size * field / np.sqrt(np.mean((field - field.mean(0)) ** 2))
+    if kind in ("corners", "both"):
+        offsets += random.normal(0, size, board.shape)
+    return offsets
+
+
+def view(random, board, noise):
+    """The corners of a view that shows all of the board."""
+    while True:
+        turn = random.uniform([-0.7, -0.7, -0.5], [0.7, 0.7, 0.5]) + 1e-9
+        place = random.uniform([-180, -130, 280], [180, 130, 600])
+        # Rows run upwards on the board and downwards in the image, and its face is towards the camera.
+        middle = np.array([(COLS - 1) / 2, (ROWS - 1) / 2, 0]) * EDGE_MM
+        pixels = project((board - middle) * [1, -1, -1] @ rotation(turn).T + place)
+        if (pixels > MARGIN_PX).all() and (pixels < [WIDTH - MARGIN_PX, HEIGHT - MARGIN_PX]).all():
+            return pixels + random.normal(0, noise, pixels.shape)
+
+
+def simulate(args, seed):
+    folder = args.folder / f"{seed}"
+    shutil.rmtree(folder, ignore_errors=True)
+    (folder / "corners").mkdir(parents=True)
+    random = np.random.default_rng(seed)
+    rows, cols = (axis.ravel() for axis in np.mgrid[:ROWS, :COLS])
+    plan = np.stack([cols, rows, 0 * rows], 1) * EDGE_MM
+    offsets = errors(random, plan, args.kind, args.size)
+    cov = [args.noise**2, 0.0, args.noise**2]
+    for index in range(args.views):
+        pixels = view(random, plan + offsets, args.noise).tolist()
+        corners = [
+            {"row": int(row), "col": int(col), "id": None, "x": x, "y": y, "cov": cov}
+            for row, col, (x, y) in zip(rows, cols, pixels)
+        ]
+        grid = {"kind": "checker", "panel": None, "corners": corners, "tags": []}
+        found = {"schema": "deltille/detection/1", "image": f"{index}.png", "width": WIDTH, "height": HEIGHT}
+        (folder / "corners" / f"{index:03}.json").write_text(json.dumps(found | {"grids": [grid]}))
+    command = [args.deltille, "calibrate", folder / "corners", "--grid", "checker", "--rows", ROWS, "--cols", COLS]
+    command += ["--edge", "20mm", "--model", "radtan", "-o", folder / "camera.yaml"]
+    command += ["--measure-target"] * args.measure
+    command += ["--board-accuracy", args.accuracy] if args.accuracy else []
+    done = subprocess.run([str(part) for part in command], capture_output=True, text=True)
+    if done.returncode not in (0, 1):
+        sys.exit(done.stderr)
+    found = {p["name"]: p for p in json.loads((folder / "camera.json").read_text())["parameters"]}
+    off = [
+        [(found[name]["value"] - value) / found[name].get(sd, np.nan) for name, value in TRUTH.items()]
+        for sd in ("sd", "observed_sd")
+    ]
+    mapped = of_map(folder / "camera-measured.json", plan, offsets) if args.measure else np.nan
+    shutil.rmtree(folder)
+    return np.array(off), mapped
+
+
+def of_map(path, plan, offsets):
+    """Mean square of how far measured corners are off, in deviations of a coordinate."""
+    x, y = (plan - plan.mean(0))[:, :2].T
+    one, zero = np.ones_like(x), np.zeros_like(x)
+    # Moves, rotations and a scale are not measured.
+    plane = [np.r_[one, zero], np.r_[zero, one], np.r_[-y, x], np.r_[x, y]]
+    truth = offsets.copy()
+    left = lambda modes, values: values - np.stack(modes, 1) @ np.linalg.lstsq(np.stack(modes, 1), values, rcond=None)[0]
+    truth[:, :2] = left(plane, offsets[:, :2].T.ravel()).reshape(2, -1).T
+    truth[:, 2] = left([one, x, y], offsets[:, 2])
+    squares = []
+    for corner in json.loads(path.read_text())["panels"][0]["corners"]:
+        if "measured" not in corner:
+            continue
+        place = corner["measured"]
+        xx, xy, xz, yy, yz, zz = place["covariance_mm2"]
+        covariance = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+        off = np.array(place["offset_mm"]) - truth[corner["row"] * COLS + corner["col"]]
+        squares.append(off @ np.linalg.solve(covariance, off) / 3)
+    return np.mean(squares)
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("deltille")
+    parser.add_argument("folder", type=pathlib.Path)
+    parser.add_argument("--kind", choices=["sheet", "corners", "both", "none"], default="both")
+    parser.add_argument("--size", type=float, default=0.05)
+    parser.add_argument("--views", type=int, default=20)
+    parser.add_argument("--seeds", default="1-40")
+    parser.add_argument("--noise", type=float, default=0.1)
+    parser.add_argument("--measure", action="store_true")
+    parser.add_argument("--accuracy")
+    args = parser.parse_args()
+    low, high = map(int, args.seeds.split("-"))
+    with ThreadPoolExecutor(2) as pool:
+        off, mapped = zip(*pool.map(lambda seed: simulate(args, seed), range(low, high + 1)))
+    noise, observed = np.sqrt(np.mean(np.square(off), 0))
+    told = lambda values: ", ".join(f"{name} {value:.2f}" for name, value in zip(TRUTH, values))
+    print(f"{args.kind} {args.size} mm, {args.views} views, {len(off)} seeds, {'measured' if args.measure else 'plain'}")
+    print(f"  of noise: {told(noise)}; observed: {told(observed)}", end="")
+    print(f"; corners {np.sqrt(np.mean(mapped)):.2f}" if args.measure else "", flush=True)
+
+
+if __name__ == "__main__":
+    main()
