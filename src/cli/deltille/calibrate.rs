@@ -101,7 +101,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     check_places(folder, &planned, args.overwrite)?;
     let page = args.solve.page(&stem, args.overwrite)?;
     let measure = args.solve.measures_target();
-    let Sightings { views, panels, target, empty, left_out, print } =
+    let Sightings { views, panels, target, empty, left_out, print, symmetries } =
         args.sightings.read(measure)?;
     ensure!(!views.is_empty(), "no board of this kind in {}", counted(empty.len(), "picture"));
     for picture in &empty {
@@ -110,7 +110,8 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     if let Some(folder) = &args.images {
         check_images(folder, &views)?;
     }
-    let mut calibration = Calibration::new(panels).camera(&stem, views, intrinsics);
+    let calibration = Calibration::new(panels).label_symmetries(symmetries);
+    let mut calibration = calibration.camera(&stem, views, intrinsics);
     let tried = match args.model {
         Some(model) => model.choose(&mut calibration, 0)?,
         None => Vec::new(),

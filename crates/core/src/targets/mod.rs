@@ -37,6 +37,7 @@ mod single_panel;
 mod skeleton;
 mod solid;
 mod spec;
+mod symmetry;
 mod tag_ids;
 mod tag_sheet;
 
@@ -74,6 +75,7 @@ pub use spec::{BORDER_BITS, FACE_TILES, MOST_ROWS, SIDES, least_untagged_corners
 pub use spec::{
     BoardSpec, ListFormat, ListedSpec, SolidShape, SolidSpec, TagSheetSpec, TagSpec, TargetSpec,
 };
+pub(crate) use symmetry::symmetries;
 
 /// A target: its panels, and the sheets they are printed on.
 #[derive(Clone, Debug, PartialEq)]
