@@ -99,7 +99,7 @@ fn px(text: &str) -> Result<f64, String> {
 pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let limits = args.limits.limits();
     let target = match (&args.target, args.grid.read_target()?) {
-        (Some(path), _) => target_file::read(path, &limits).context("--target")?,
+        (Some(path), _) => target_file::read_placed(path, &limits).context("--target")?,
         (None, Some((_, target))) => target,
         (None, None) => bail!("give --target FILE, or --grid for an untagged board"),
     };

@@ -59,7 +59,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let limits = args.limits.limits();
     let targets = match args.grid.read_target()? {
         Some((_, target)) => vec![target],
-        None => target_file::read_all(&args.target, &limits).context("--target")?,
+        None => target_file::read_all_placed(&args.target, &limits).context("--target")?,
     };
     let families = target_file::families(&targets, args.family.as_deref())?;
     let sheet = args.sheet.read(&limits)?;

@@ -104,7 +104,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let limits = args.limits.limits();
     let (targets, grid) = match args.grid.read_target()? {
         Some((grid, target)) => (vec![target], Some(grid)),
-        None => (target_file::read_all(&args.target, &limits).context("--target")?, None),
+        None => (target_file::read_all_placed(&args.target, &limits).context("--target")?, None),
     };
     let reference = match (grid, targets.as_slice()) {
         (Some(grid), _) => Reference::Grid(grid),

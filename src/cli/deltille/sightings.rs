@@ -136,7 +136,7 @@ impl SightingsArgs {
     /// Reads everything. Where the target is to be measured, it takes views whose labels are sure.
     pub fn read(&self, measure_target: bool) -> anyhow::Result<Sightings> {
         let limits = self.limits.limits();
-        let target = self.target.as_deref().map(|path| target_file::read(path, &limits));
+        let target = self.target.as_deref().map(|path| target_file::read_placed(path, &limits));
         let target: Option<Target> = target.transpose().context("--target")?;
         let reference = match (&target, self.grid.read()?) {
             (Some(target), _) => Reference::Target(target),

@@ -64,7 +64,7 @@ mod tests {
             assert_eq!(turns(GridKind::Checker, rows, cols), expected, "{rows} × {cols}");
         }
         for (rows, cols) in [(4, 5), (4, 6), (5, 5), (7, 10)] {
-            assert_eq!(turns(GridKind::Deltille, rows, cols), [], "{rows} × {cols}");
+            assert!(turns(GridKind::Deltille, rows, cols).is_empty(), "{rows} × {cols}");
         }
         let triangle = (0..6).flat_map(|row| (0..6 - row).map(move |col| Vertex::new(row, col)));
         let of_triangle = symmetries(GridKind::Deltille, triangle);
