@@ -194,12 +194,16 @@ fn told(camera: &CameraEstimate, found: &Comparison, tolerance: f64) -> String {
             "the camera has changed, or its model or the board does not hold in both".to_owned()
         }
     };
+    let verdict_of = |found: &Comparison| Verdict::of(std::slice::from_ref(found), &[], tolerance);
     let expected = match (found.expected_px, found.why_undecided()) {
         (Some(px), _) => format!(
             "{name}from the uncertainties of both {px:.4} px are expected: {}\n",
             verdict(found.chance, found.is_significant(), &meaning)
         ),
-        (None, _) if found.rms_px <= tolerance => format!("{name}{meaning}\n"),
+        (None, _) if verdict_of(found) == Verdict::Same && tolerance > 0.0 => {
+            format!("{name}{meaning}\n")
+        }
+        (None, _) if verdict_of(found) == Verdict::Same => format!("{name}both are the same\n"),
         (None, why) => format!(
             "{name}cannot judge whether the camera has changed: {}; give the .json of `deltille calibrate` or `rig`, \
              which has uncertainties, or --tolerance\n",

@@ -1,5 +1,8 @@
 use super::comparison::{CameraMotion, Comparison};
 
+/// Differences up to this are rounding: what a pixel shows is found by iteration, to about 10⁻⁹ px.
+const ROUNDING_PX: f64 = 1e-6;
+
 /// Whether a camera or a rig has changed from one calibration to another.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
@@ -16,10 +19,11 @@ impl Verdict {
     /// The verdict on all cameras that were compared, of which differences up to a tolerance, px rms a coordinate, do not
     /// count, and on their motions.
     pub fn of(found: &[Comparison], motions: &[CameraMotion], tolerance_px: f64) -> Self {
-        let of_cameras = found.iter().map(|found| match found.rms_px <= tolerance_px {
-            true => Some(false),
-            false => found.is_significant(),
-        });
+        let of_cameras =
+            found.iter().map(|found| match found.rms_px <= tolerance_px.max(ROUNDING_PX) {
+                true => Some(false),
+                false => found.is_significant(),
+            });
         let of_motions = motions.iter().map(CameraMotion::is_significant);
         let all: Vec<Option<bool>> = of_cameras.chain(of_motions).collect();
         if all.contains(&Some(true)) {
@@ -82,6 +86,6 @@ mod tests {
         assert_eq!(of(&[&changed, &open], 0.0), Verdict::Changed);
         assert_eq!(of(&[&changed, &open], 0.2), Verdict::Same);
         // One camera file given twice.
-        assert_eq!(of(&[&comparison(0.0, None)], 0.0), Verdict::Same);
+        assert_eq!(of(&[&comparison(1e-10, None)], 0.0), Verdict::Same);
     }
 }
