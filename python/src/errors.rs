@@ -207,23 +207,23 @@ impl<T, E: Error + 'static> RaiseFile<T> for Result<T, E> {
     fn raise_of_file(self, path: &Path, class: fn(String) -> PyErr) -> PyResult<T> {
         self.map_err(|error| {
             let mut cause: Option<&(dyn Error + 'static)> = Some(&error);
-            let (mut number, mut at, mut is_folder) = (None, path, false);
+            let (mut number, mut at) = (None, path);
             while let Some(error) = cause {
                 // The file may be another one, which that of the path names.
-                match error.downcast_ref::<ReadError>() {
-                    Some(ReadError::Io { path, .. }) => at = path,
-                    Some(ReadError::NotFile { path, .. }) => {
-                        (at, is_folder) = (path, path.is_dir());
-                    }
-                    _ => {}
+                if let Some(ReadError::Io { path, .. }) = error.downcast_ref() {
+                    at = path;
                 }
                 let system = error.downcast_ref::<io::Error>();
                 number = number.or(system.and_then(io::Error::raw_os_error));
                 cause = error.source();
             }
+            let words = told(&error);
+            // A folder is refused before the system is asked, in these words.
+            let refused = limits::check_file(at).err().filter(|_| number.is_none() && at.is_dir());
+            let is_folder = refused.is_some_and(|refused| words.contains(&told(&refused)));
             match number.is_some() || is_folder {
                 true => of_system(number, at).unwrap_or_else(|wrong| wrong),
-                false => class(told(&error)),
+                false => class(words),
             }
         })
     }

@@ -84,8 +84,7 @@ def test_errors_of_files_are_those_of_the_system_and_survive_pickling(tmp_path):
     if hasattr(os, "geteuid") and os.geteuid() != 0:
         locked.chmod(0)
         cases.append((deltille.PermissionFileError, PermissionError, errno.EACCES, locked))
-    readers = [deltille.Target.load, deltille.Camera.load, deltille.Family.load, deltille.Detection.load,
-               deltille.Calibration.load, deltille.Rig.load]
+    readers = [deltille.Target.load, deltille.Camera.load, deltille.Detection.load, deltille.Calibration.load, deltille.Rig.load]
     for kind, base, number, path in cases:
         for read in readers:
             with pytest.raises(base) as raised:
@@ -98,14 +97,6 @@ def test_errors_of_files_are_those_of_the_system_and_survive_pickling(tmp_path):
     # What the system has no number for has the library's words.
     words = deltille.FileError("a.csv: names two formats")
     assert str(pickle.loads(pickle.dumps(words))) == "a.csv: names two formats" and words.errno is None
-
-
-def test_errors_of_written_files_are_those_of_the_system(tmp_path, board):
-    (tmp_path / "file").write_text("")
-    for write in [board.save, lambda path: board.files("svg") and board.save(path)]:
-        with pytest.raises(OSError) as raised:
-            write(tmp_path / "file" / "deeper.json")
-        assert isinstance(raised.value, deltille.FileError)
 
 
 def test_wrong_types_are_type_errors(board):
