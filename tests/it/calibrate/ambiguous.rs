@@ -126,7 +126,9 @@ impl Rig {
         let cameras = self.found.cameras.iter().zip(&self.truth);
         let off = cameras.map(|(camera, truth)| {
             let at = |pose: &Pose| pose.inverse().translation;
-            at(&camera.camera_from_rig).distance(at(truth))
+            // The first camera is the rig's frame.
+            let truth = truth.after(&self.truth[0].inverse());
+            at(&camera.camera_from_rig).distance(at(&truth))
         });
         off.fold(0.0, f64::max)
     }
