@@ -164,7 +164,7 @@ fn labels_that_change_from_moment_to_moment_are_brought_together() {
         let rig = Rig::of(&checkerboard(rows, cols), rolls, &boards, Model::Radtan, 7);
         assert!(rig.off_mm() < 8.0, "{rows} × {cols}: {} mm", rig.off_mm());
         assert_eq!(rig.found.frames.len(), boards.len());
-        let some = rig.said.iter().flatten().filter(|said| said.frames < said.of && said.is_sure);
+        let some = rig.said.iter().flatten().filter(|said| said.frames > 0 && said.is_sure);
         assert!(some.count() > 0, "{:?}", rig.said);
     }
 }
