@@ -3,6 +3,10 @@
 Every exception is an :class:`Error`; most are a :class:`ValueError` too, files an :class:`OSError`.
 """
 
+import errno as _errno
+import os as _os
+import sys as _sys
+
 __all__ = [
     "ArgumentError",
     "CalibrationError",
@@ -11,8 +15,10 @@ __all__ = [
     "Error",
     "FamilyError",
     "FileError",
+    "FolderError",
     "ImageError",
     "MissingFileError",
+    "PermissionFileError",
     "TargetError",
     "VerifyError",
 ]
@@ -55,11 +61,38 @@ class VerifyError(Error, ValueError):
 
 
 class FileError(Error, OSError):
-    """A file that cannot be read or written."""
+    """A file that cannot be read or written.
+
+    Where the system says why, ``errno``, ``strerror`` and ``filename`` are set as in every :class:`OSError`; else they are
+    ``None``, and the words are the library's.
+    """
 
 
 class MissingFileError(FileError, FileNotFoundError):
     """A file that is not there; ``filename`` is its name."""
+
+
+class PermissionFileError(FileError, PermissionError):
+    """A file that the user may not read or write; ``filename`` is its name."""
+
+
+class FolderError(FileError, IsADirectoryError):
+    """A folder where a file is needed; ``filename`` is its name."""
+
+
+def _of_system(number, filename):
+    """The exception for a number of the system; without one, of a folder where a file is needed."""
+    if number is None:
+        plain = OSError(_errno.EISDIR, _os.strerror(_errno.EISDIR))
+    elif _sys.platform == "win32":
+        import ctypes
+
+        plain = ctypes.WinError(number)
+    else:
+        plain = OSError(number, _os.strerror(number))
+    kinds = (MissingFileError, PermissionFileError, FolderError)
+    kind = next((kind for kind in kinds if isinstance(plain, kind.__bases__[1])), FileError)
+    return kind(plain.errno, plain.strerror, filename)
 
 
 # Where they are imported from.
@@ -74,6 +107,8 @@ for _class in (
     CameraError,
     VerifyError,
     FileError,
+    FolderError,
     MissingFileError,
+    PermissionFileError,
 ):
     _class.__module__ = "deltille"

@@ -104,6 +104,12 @@ impl Comparison {
         self.found.chance
     }
 
+    /// Why it cannot be judged whether the camera has changed, as a sentence; ``None`` where it can.
+    #[getter]
+    fn why_undecided(&self) -> Option<&'static str> {
+        self.found.why_undecided()
+    }
+
     /// Whether they differ by more than chance makes; ``None`` where uncertainties are not known.
     #[getter]
     fn is_significant(&self) -> Option<bool> {
@@ -150,7 +156,7 @@ fn told_significant(is_significant: Option<bool>) -> &'static str {
     match is_significant {
         Some(true) => ", more than chance makes",
         Some(false) => ", no more than chance makes",
-        None => "",
+        None => ", cannot be judged",
     }
 }
 
@@ -196,6 +202,12 @@ impl Motion {
     #[getter]
     fn chance(&self) -> Option<f64> {
         self.0.chance
+    }
+
+    /// Why it cannot be judged whether it has moved, as a sentence; ``None`` where it can.
+    #[getter]
+    fn why_undecided(&self) -> Option<&'static str> {
+        self.0.why_undecided()
     }
 
     /// Whether it moved by more than the deviations explain; ``None`` where these are not known.
@@ -369,7 +381,7 @@ impl Located {
     fn to_json(&self) -> String {
         let found = self.estimate.as_ref().zip(self.view());
         match found {
-            Some((estimate, view)) => pose::write_line(estimate, view, &self.target),
+            Some((estimate, view)) => pose::write_line(estimate, view, &self.asked.target.target),
             None => pose::write_none(&self.image, &self.target, self.why.as_deref().unwrap_or("")),
         }
     }

@@ -6,7 +6,7 @@ use std::fmt::Display;
 use std::io;
 use std::path::Path;
 
-use deltille::limits;
+use deltille::limits::{self, ReadError};
 use deltille::words::with_short_quotes;
 use pyo3::exceptions::PyKeyboardInterrupt;
 use pyo3::prelude::*;
@@ -24,7 +24,6 @@ pub mod raised {
     pyo3::import_exception!(deltille.errors, CameraError);
     pyo3::import_exception!(deltille.errors, VerifyError);
     pyo3::import_exception!(deltille.errors, FileError);
-    pyo3::import_exception!(deltille.errors, MissingFileError);
 }
 
 /// What messages of the library call a setting, and what it is called here.
@@ -199,7 +198,8 @@ classes! {
 /// Makes exceptions of the errors of a file.
 pub trait RaiseFile<T> {
     /// An exception of a class, with the error's words. Where the system does not give the file, it is a `FileError`
-    /// with its number and the file's name, of a missing file a `MissingFileError`.
+    /// with the system's number and words and the file's name, of a missing file a `MissingFileError`, of one that may
+    /// not be used a `PermissionFileError`, of a folder in its place a `FolderError`.
     ///
     /// # Errors
     /// Where there is an error.
@@ -210,28 +210,34 @@ impl<T, E: Error + 'static> RaiseFile<T> for Result<T, E> {
     fn raise_of_file(self, path: &Path, class: fn(String) -> PyErr) -> PyResult<T> {
         self.map_err(|error| {
             let mut cause: Option<&(dyn Error + 'static)> = Some(&error);
-            let mut system = None;
+            let (mut number, mut at) = (None, path);
             while let Some(error) = cause {
-                system = system.or(error.downcast_ref::<io::Error>());
+                // The file may be another one, which that of the path names.
+                if let Some(ReadError::Io { path, .. }) = error.downcast_ref() {
+                    at = path;
+                }
+                let system = error.downcast_ref::<io::Error>();
+                number = number.or(system.and_then(io::Error::raw_os_error));
                 cause = error.source();
             }
-            let Some((system, number)) = system.and_then(|of| Some((of, of.raw_os_error()?)))
-            else {
-                return class(told(&error));
-            };
-            let raised = match system.kind() {
-                io::ErrorKind::NotFound => raised::MissingFileError::new_err(told(&error)),
-                _ => raised::FileError::new_err(told(&error)),
-            };
-            Python::attach(|py| {
-                let value = raised.value(py);
-                // An exception that takes no attributes is one all the same.
-                let _ = value.setattr("errno", number);
-                let _ = value.setattr("filename", path.display().to_string());
-            });
-            raised
+            let words = told(&error);
+            // A folder is refused before the system is asked, in these words.
+            let refused = limits::check_file(at).err().filter(|_| number.is_none() && at.is_dir());
+            let is_folder = refused.is_some_and(|refused| words.contains(&told(&refused)));
+            match number.is_some() || is_folder {
+                true => of_system(number, at).unwrap_or_else(|wrong| wrong),
+                false => class(words),
+            }
         })
     }
+}
+
+/// The exception for a number of the system, of a folder where a file is needed for none.
+fn of_system(number: Option<i32>, path: &Path) -> PyResult<PyErr> {
+    Python::attach(|py| {
+        let make = py.import("deltille.errors")?.getattr("_of_system")?;
+        Ok(PyErr::from_value(make.call1((number, path.as_os_str()))?))
+    })
 }
 
 /// Does work without the interpreter's lock; a panic becomes an exception.

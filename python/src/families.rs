@@ -191,7 +191,8 @@ impl Family {
     /// Returns
     /// -------
     /// ndarray of :attr:`correctable` + 1, float64, or None
-    ///     Probabilities with 0, 1, … corrected cells; ``None`` of square tags and of place codes.
+    ///     Probabilities with 0, 1, … corrected cells, known within a factor of 3; ``None`` of square tags and of place
+    ///     codes.
     fn natural_false_positive_rates<'py>(
         &self,
         py: Python<'py>,

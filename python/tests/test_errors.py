@@ -1,4 +1,7 @@
+import copy
 import errno
+import os
+import pickle
 import re
 
 import numpy
@@ -69,6 +72,31 @@ def test_a_missing_file_is_told_as_the_system_tells_it(tmp_path):
     with pytest.raises(deltille.FileError) as raised:
         deltille.Target.load(tmp_path)
     assert not isinstance(raised.value, FileNotFoundError)
+
+
+def test_errors_of_files_are_those_of_the_system_and_survive_pickling(tmp_path):
+    locked = tmp_path / "locked.json"
+    locked.write_text("{}")
+    cases = [
+        (deltille.MissingFileError, FileNotFoundError, errno.ENOENT, tmp_path / "none.json"),
+        (deltille.FolderError, IsADirectoryError, errno.EISDIR, tmp_path),
+    ]
+    if hasattr(os, "geteuid") and os.geteuid() != 0:
+        locked.chmod(0)
+        cases.append((deltille.PermissionFileError, PermissionError, errno.EACCES, locked))
+    readers = [deltille.Target.load, deltille.Camera.load, deltille.Detection.load, deltille.Calibration.load, deltille.Rig.load]
+    for kind, base, number, path in cases:
+        for read in readers:
+            with pytest.raises(base) as raised:
+                read(path)
+            found = raised.value
+            for error in [found, pickle.loads(pickle.dumps(found)), copy.copy(found), copy.deepcopy(found)]:
+                assert type(error) is kind and isinstance(error, deltille.FileError)
+                assert (error.errno, error.strerror, error.filename) == (number, os.strerror(number), str(path)), read
+                assert str(error) == f"[Errno {number}] {os.strerror(number)}: {str(path)!r}"
+    # What the system has no number for has the library's words.
+    words = deltille.FileError("a.csv: names two formats")
+    assert str(pickle.loads(pickle.dumps(words))) == "a.csv: names two formats" and words.errno is None
 
 
 def test_wrong_types_are_type_errors(board):

@@ -16,6 +16,8 @@ use crate::words::{cut, shown, with_short_quotes};
 pub const BAD_INPUT: u8 = 2;
 /// Exit code when what was checked does not hold, or some of many inputs failed.
 pub const FAILED: u8 = 1;
+/// Exit code when a verdict was asked for, and what it needs is not known.
+pub const UNDECIDED: u8 = 3;
 
 /// Characters kept of either end of a long message.
 const MOST_CHARACTERS: usize = 1000;

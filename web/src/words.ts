@@ -226,7 +226,7 @@ export const words = {
       corrected: "Cells corrected",
       cells: (count: number) => (count === 0 ? "none" : count === 1 ? "1" : `up to ${count}`),
       coins: "Fair coins",
-      natural: "Natural pictures",
+      natural: "Natural pictures (within a factor of 3)",
       why: (kind: string) => `The probability that a ${kind === "checker" ? "square" : "triangle"} with a border that is no tag is read as one: where its cells are black or white by the fall of coins, and where it is cut from photographs, in which neighbours are mostly alike.`,
       unknown: "Of square tags the latter is not known.",
       recommended: (most: number | null, rate: number) =>

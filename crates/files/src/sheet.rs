@@ -133,7 +133,7 @@ impl Sheet {
 
 /// Whether panels are fixed to each other in space.
 fn is_solid(target: &Target) -> bool {
-    target.panels.len() > 1 && target.spec.is_rigid()
+    target.panels.len() > 1 && !target.is_loose()
 }
 
 /// How the panel of an id is turned on its sheet, rad; 0 where no sheet is described.

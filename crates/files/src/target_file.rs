@@ -8,6 +8,7 @@ use deltille_core::targets::{FamilyRef, OtherFamily, Target, TargetFileError, Ta
 
 use crate::export::dsc::{self, DscError};
 use crate::export::staging;
+use crate::export::tp::{self, TpError};
 use crate::family_file::{self, FamilyFileError};
 use crate::limits::{Limits, ReadError};
 
@@ -40,6 +41,14 @@ pub enum TargetReadError {
         /// What is wrong with it.
         error: DscError,
     },
+    /// The board poses beside a `.dsc` cannot be used.
+    #[error("{}: {error}", path.display())]
+    Tp {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong with it.
+        error: TpError,
+    },
     /// The file is no target.
     #[error("{}: {error}", path.display())]
     Json {
@@ -50,7 +59,8 @@ pub enum TargetReadError {
     },
 }
 
-/// Reads a target: `.dsc` by its extension, JSON otherwise. What killed runs have left in its folder is put in order
+/// Reads a target: `.dsc` by its extension, with the poses of its boards in a `.tp` of the same stem where it has none,
+/// JSON otherwise. What killed runs have left in its folder is put in order
 /// before.
 ///
 /// # Errors
@@ -67,7 +77,13 @@ pub fn read(path: &Path, limits: &Limits) -> Result<Target, TargetReadError> {
     if extension == "dsc" {
         let stem = path.file_stem().unwrap_or_default().to_string_lossy();
         let target = dsc::read(&text, &stem);
-        return target.map_err(|error| TargetReadError::Dsc { path: path_of(), error });
+        let target = target.map_err(|error| TargetReadError::Dsc { path: path_of(), error })?;
+        let poses = poses_beside(path);
+        return match target.overlapping_boards() {
+            Some(_) if poses.exists() => tp::placed(&target, &limits.read_text(&poses)?)
+                .map_err(|error| TargetReadError::Tp { path: poses, error }),
+            _ => Ok(target),
+        };
     }
     Target::from_json(&text).map_err(|error| TargetReadError::Json { path: path_of(), error })
 }
@@ -78,6 +94,24 @@ pub fn lost_board(path: &Path, new: &[u8]) -> Option<TargetIdentity> {
     let new = Target::from_json(std::str::from_utf8(new).ok()?).ok()?;
     let there = Target::from_json(&Limits::default().read_text(path).ok()?).ok()?;
     (!new.has_prints_of(&there)).then(|| there.identity())
+}
+
+/// Where the poses of the boards of a `.dsc` are looked for: in the `.tp` of the same stem beside it.
+fn poses_beside(path: &Path) -> PathBuf {
+    path.with_extension("tp")
+}
+
+/// What is missing of a target that was read from a file, as a sentence without full stop: where the boards of a `.dsc`
+/// are to each other. They are taken as boards that lie about then.
+pub fn without_poses(path: &Path, target: &Target) -> Option<String> {
+    let [one, other] = target.overlapping_boards()?;
+    Some(format!(
+        "{}: boards {one} and {other} are listed in the same place, so the poses of its {} boards on the target are \
+         missing and each board is taken by itself; if they are fixed to each other, put {} beside it",
+        path.display(),
+        target.panels.len(),
+        poses_beside(path).file_name().unwrap_or_default().display()
+    ))
 }
 
 /// Why the family of a target cannot be had.

@@ -3,7 +3,9 @@
 use serde_json::{Value, json};
 
 use crate::cli::output::say;
-use crate::family::{ACCEPTED_FALSE_POSITIVES, Family, TRIANGLES_PER_MEGAPIXEL, corrected_within};
+use crate::family::{
+    ACCEPTED_FALSE_POSITIVES, Family, NATURAL_FACTOR, TRIANGLES_PER_MEGAPIXEL, corrected_within,
+};
 use crate::words::counted;
 
 /// Adds the fields of `--json` to what is told of a family.
@@ -14,6 +16,7 @@ pub(super) fn add_to(told: &mut Value, family: &Family) {
         .map(|rates| rates.iter().map(|rate| rate * TRIANGLES_PER_MEGAPIXEL).collect::<Vec<_>>());
     told["false_positive_rate"] = json!(family.false_positive_rates());
     told["natural_false_positive_rate"] = json!(&natural);
+    told["natural_false_positive_factor"] = json!(natural.as_ref().map(|_| NATURAL_FACTOR));
     told["natural_false_positives_per_megapixel_at_most"] = json!(per_megapixel);
     told["accepted_false_positive_rate"] = json!(ACCEPTED_FALSE_POSITIVES);
     told["recommended_correction"] = json!(recommended_correction(natural.as_deref()));
@@ -33,6 +36,9 @@ pub(super) fn tell(family: &Family) -> anyhow::Result<()> {
             n => format!("up to {n} cells are"),
         };
         say!("    {rate:>10.1e}  {natural:>16}  {corrected} corrected");
+    }
+    if natural.is_some() {
+        say!("  rates in natural pictures are known within a factor of {NATURAL_FACTOR}");
     }
     say!(
         "  of a natural picture `detect` reads {TRIANGLES_PER_MEGAPIXEL} triangles in a megapixel, or fewer"

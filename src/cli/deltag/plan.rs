@@ -8,7 +8,7 @@ use super::false_positives;
 use super::gen_family::{FILE_LIMIT, bytes_per_code};
 use crate::cli::output::{self, Telling, say};
 use crate::cli::values::whole;
-use crate::family::{Family, ShippedFamily, shipped_names, smallest_shipped};
+use crate::family::{Family, NATURAL_FACTOR, ShippedFamily, shipped_names, smallest_shipped};
 use crate::lattice::GridKind;
 use crate::words::counted;
 
@@ -94,7 +94,7 @@ fn about(family: &Family) -> String {
     let [coins, natural] = [last(&coins), last(rates.as_deref().unwrap_or_default())];
     format!(
         "{}, {} codes of {} bits, distance {}; corrects {} cells, then takes for a tag a word of fair coins with \
-         probability {coins:.1e}, a bordered triangle of a natural picture with {natural:.1e}; {}",
+         probability {coins:.1e}, a bordered triangle of a natural picture with {natural:.1e} (within a factor of {NATURAL_FACTOR}); {}",
         family.name(),
         family.len(),
         family.dimension().bits(),

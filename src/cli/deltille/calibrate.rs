@@ -102,7 +102,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     check_places(folder, &planned, args.overwrite)?;
     let page = args.solve.page(&stem, args.overwrite)?;
     let measure = args.solve.measures_target();
-    let Sightings { views, panels, target, empty, left_out, print } =
+    let Sightings { views, panels, target, empty, left_out, print, symmetries } =
         args.sightings.read(measure)?;
     ensure!(!views.is_empty(), "no board of this kind in {}", counted(empty.len(), "picture"));
     if let (Some(known), Some(target), false) =
@@ -120,6 +120,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         Some(target) => Calibration::of(&Reference::Target(target), panels),
         None => Calibration::new(panels),
     };
+    let calibration = calibration.label_symmetries(symmetries);
     let mut calibration = calibration.camera(&stem, views, intrinsics);
     let tried = match args.model {
         Some(model) => model.choose(&mut calibration, 0)?,

@@ -10,10 +10,10 @@ use glam::DVec2;
 use super::calibrating::distance;
 use super::camera_file;
 use super::files::{File, check_places, sample_of, text_file, write_all};
-use crate::calibrate::{CameraEstimate, CameraMotion, Comparison, Region};
+use crate::calibrate::{CameraEstimate, CameraMotion, Comparison, Region, Verdict};
 use crate::camera::Pose;
 use crate::cli::output::{self, Overwrite};
-use crate::cli::run::FAILED;
+use crate::cli::run::{FAILED, UNDECIDED};
 use crate::export::{comparison, saved};
 use crate::limits::Limits;
 use crate::report::comparison_svg;
@@ -67,7 +67,7 @@ fn tolerance(text: &str) -> Result<f64, String> {
 }
 
 /// Compares two calibrations; exit code 1 where they differ by more than their uncertainties explain, and by more than
-/// is tolerated.
+/// is tolerated, 3 where uncertainties are missing.
 pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let path = args.output.as_deref().map(|path| output::file(path, "comparison", "json"));
     let path = path.transpose()?;
@@ -105,7 +105,10 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
             shown(&motion.from),
             motion.turn_rad.length().to_degrees(),
             motion.moved_mm.length(),
-            verdict(motion.chance, motion.is_significant(), "it has moved")
+            match motion.why_undecided() {
+                Some(why) => format!("cannot judge whether it has moved: {why}"),
+                None => verdict(motion.chance, motion.is_significant(), "it has moved"),
+            }
         );
     }
     if let Some(path) = &path {
@@ -117,11 +120,11 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         }
     }
     output::print(&text)?;
-    let is_beyond =
-        |found: &Comparison| found.is_significant() == Some(true) && found.rms_px > args.tolerance;
-    let has_changed = found.iter().any(is_beyond)
-        || motions.iter().any(|motion| motion.is_significant() == Some(true));
-    Ok(if has_changed { ExitCode::from(FAILED) } else { ExitCode::SUCCESS })
+    Ok(match Verdict::of(&found, &motions, args.tolerance) {
+        Verdict::Changed => ExitCode::from(FAILED),
+        Verdict::Undecided => ExitCode::from(UNDECIDED),
+        _ => ExitCode::SUCCESS,
+    })
 }
 
 /// The cameras of a calibration or rig, or the one of a camera file, and the targets that they were calibrated with.
@@ -205,12 +208,22 @@ fn told(camera: &CameraEstimate, found: &Comparison, tolerance: f64) -> String {
             "the camera has changed, or its model or the board does not hold in both".to_owned()
         }
     };
-    let expected = found.expected_px.map_or(String::new(), |px| {
-        format!(
+    let verdict_of = |found: &Comparison| Verdict::of(std::slice::from_ref(found), &[], tolerance);
+    let expected = match (found.expected_px, found.why_undecided()) {
+        (Some(px), _) => format!(
             "{name}from the uncertainties of both {px:.4} px are expected: {}\n",
             verdict(found.chance, found.is_significant(), &meaning)
-        )
-    });
+        ),
+        (None, _) if verdict_of(found) == Verdict::Same && tolerance > 0.0 => {
+            format!("{name}{meaning}\n")
+        }
+        (None, _) if verdict_of(found) == Verdict::Same => format!("{name}both are the same\n"),
+        (None, why) => format!(
+            "{name}cannot judge whether the camera has changed: {}; give the .json of `deltille calibrate` or `rig`, \
+             which has uncertainties, or --tolerance\n",
+            why.unwrap_or_default()
+        ),
+    };
     format!(
         "{name}differs by {:.4} px (rms a coordinate), at most {:.4} px, over {} at {far}, after it is turned by \
          {:.4}°{moved}\n{expected}",
@@ -232,6 +245,6 @@ fn verdict(chance: Option<f64>, is_significant: Option<bool>, changed: &str) -> 
             let digits = if chance < 0.01 { 3 } else { 2 };
             format!("no more than chance makes (p = {chance:.digits$})")
         }
-        (None, _) => "how sure that is, is not known".to_owned(),
+        (None, _) => String::new(),
     }
 }

@@ -49,7 +49,8 @@ pub struct Args {
     #[arg(long)]
     timing: bool,
     /// Print each result on standard output as a line of JSON as soon as it is there; files are
-    /// written only where -o names a folder
+    /// written only where -o names a folder. Ink is then estimated from each image by itself, not from all, so that
+    /// corners differ slightly from those of a run without --stream; a known --ink gives the same
     #[arg(long)]
     stream: bool,
     /// Read JPEG files of which a part is missing too, and note it in the result; without this they are errors
@@ -199,6 +200,9 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         let unseen = unseen.into_inner().expect("no thread panics here");
         again = see_again(&args, &targets, detector, &seen, unseen, &threads, &report)?;
     }
+    if args.stream && args.finder.ink_is_open() {
+        tell_ink_of_all(&seen);
+    }
     if let Some(tables) = tables {
         let is_left = interrupt::is_raised();
         // An interrupted run does not take the place of one that was not, unless it goes on with it.
@@ -217,6 +221,19 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         return Err(Interrupted(report.standing()).into());
     }
     report.end()
+}
+
+/// Says, after each image was printed with its own ink, that all together have one by which corners are others.
+fn tell_ink_of_all(seen: &[Seen]) {
+    let known: Vec<InkEstimate> = seen.iter().filter_map(|seen| seen.ink).collect();
+    let of_all = InkEstimate::of_all(&known).filter(|ink| ink.used && known.len() > 1);
+    if let Some(ink) = of_all {
+        let images = counted(ink.pictures as usize, "image");
+        tell!(
+            "note: --stream located the corners of each image with the ink of that image; without it they are located \
+             with the ink of all, {ink} ({images}), and differ"
+        );
+    }
 }
 
 /// Looks once more at all images, with what they say together of the ink: pictures that say little of it are seen

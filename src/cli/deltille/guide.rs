@@ -11,7 +11,7 @@ use super::calibrating::{ModelChoice, distance};
 use super::files::{check_places, sample_of, text_file};
 use super::images::photographs_in;
 use super::limits::ImageLimits;
-use super::sightings::{self, SheetArgs};
+use super::sightings::{self, GridArgs, SheetArgs};
 use super::{camera_file, target_file};
 use crate::calibrate::{
     Calibration, Excluded, Guide, Intrinsics, Model, NextView, PanelPlace, Reference, View, views,
@@ -43,8 +43,10 @@ pub struct Args {
     /// Folder that another program, such as a camera's, fills with photographs
     folder: PathBuf,
     /// Description of the target: the .json that was written with it, or a .dsc
-    #[arg(long, value_name = "FILE")]
-    target: PathBuf,
+    #[arg(long, required_unless_present = "grid", value_name = "FILE")]
+    target: Option<PathBuf>,
+    #[command(flatten)]
+    grid: GridArgs,
     /// What of the camera is to be found: radtan, radtan5, rational, thin-prism, kannala-brandt …, as for
     /// `deltille calibrate`
     #[arg(long, default_value = "radtan", conflicts_with = "camera")]
@@ -99,7 +101,11 @@ fn px(text: &str) -> Result<f64, String> {
 /// Proposes one view after the other until they are enough.
 pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let limits = args.limits.limits();
-    let target = target_file::read(&args.target, &limits).context("--target")?;
+    let target = match (&args.target, args.grid.read_target()?) {
+        (Some(path), _) => target_file::read_placed(path, &limits).context("--target")?,
+        (None, Some((_, target))) => target,
+        (None, None) => bail!("give --target FILE, or --grid for an untagged board"),
+    };
     let family = target_file::family(&target, args.family.as_deref())?;
     ensure!(
         args.folder.is_dir(),

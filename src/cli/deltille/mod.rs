@@ -126,6 +126,9 @@ enum Command {
     #[command(after_help = examples::RIG)]
     Rig(rig::Args),
     /// Say whether two calibrations of a camera or rig differ by more than chance
+    ///
+    /// The exit code is 0 where they do not, 1 where they do, and 3 where it cannot be judged, as the uncertainties of a
+    /// camera are not known: give the .json of a calibration.
     #[command(after_help = examples::COMPARE)]
     Compare(compare::Args),
     /// Say where a target is in photographs of a known camera

@@ -7,7 +7,7 @@ use anyhow::{Context, bail};
 
 use super::images::Images;
 use super::limits::ImageLimits;
-use super::sightings::SheetArgs;
+use super::sightings::{GridArgs, SheetArgs};
 use super::{camera_file, sightings, target_file};
 use crate::calibrate::{Calibration, Diagnosis, Estimate, Reference, Words, views};
 use crate::camera::Camera;
@@ -30,8 +30,10 @@ pub struct Args {
     images: Vec<PathBuf>,
     /// Description of the target: the .json that was written with it, or a .dsc; may be given for each of several
     /// targets
-    #[arg(long, required = true, value_name = "FILE")]
+    #[arg(long, required_unless_present = "grid", value_name = "FILE")]
     target: Vec<PathBuf>,
+    #[command(flatten)]
+    grid: GridArgs,
     /// The camera, as `deltille calibrate`, ROS or OpenCV write it
     #[arg(long, value_name = "FILE")]
     camera: PathBuf,
@@ -58,7 +60,10 @@ pub struct Args {
 /// Finds the target in each image and says where it is, a line of JSON each.
 pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let limits = args.limits.limits();
-    let targets = target_file::read_all(&args.target, &limits).context("--target")?;
+    let targets = match args.grid.read_target()? {
+        Some((_, target)) => vec![target],
+        None => target_file::read_all_placed(&args.target, &limits).context("--target")?,
+    };
     let families = target_file::families(&targets, args.family.as_deref())?;
     let sheet = args.sheet.read(&limits, &targets)?;
     if let [_, _, ..] = targets.as_slice() {
@@ -68,6 +73,11 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let each = targets.iter().zip(families.iter().map(Option::as_ref)).collect::<Vec<_>>();
     let detector = Detector::for_targets(&each, DetectorConfig::default()).context("--target")?;
     let camera = camera_file::read_for("--camera", &args.camera, &targets, args.assume_target)?;
+    for target in &targets {
+        if let Some(ambiguity) = Reference::Target(target).label_ambiguity() {
+            tell!("note: {}: {ambiguity}", target.name);
+        }
+    }
     let finder = Finder { detector, camera, targets, sheet, limits };
     let path =
         args.output.as_ref().map(|path| output::file(path, "poses", "ndjson")).transpose()?;
@@ -95,7 +105,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
                     match found {
                         Ok(found) => {
                             let views = found.cameras.iter().flat_map(|camera| &camera.views);
-                            let line = |view| pose::write_line(&found, view, &target.name) + "\n";
+                            let line = |view| pose::write_line(&found, view, target) + "\n";
                             of_image += &views.map(line).collect::<String>();
                         }
                         Err(why) => {

@@ -13,7 +13,7 @@ use super::calibrating::{
 use super::files::{File, check_places, same_file, sample_of, text_file, write_all};
 use super::limits::FileLimits;
 use super::page::check_images;
-use super::sightings::SheetArgs;
+use super::sightings::{GridArgs, SheetArgs};
 use super::{camera_file, sightings, target_file};
 use crate::calibrate::{
     Calibration, CameraViews, Estimate, Excluded, Intrinsics, Reference, TargetMap,
@@ -39,8 +39,10 @@ pub struct Args {
     camera: Vec<(String, PathBuf)>,
     /// Description of the target: the .json that was written with it; once for each of several targets that do not
     /// move against each other, of which no camera need see more than one
-    #[arg(long, required = true, value_name = "FILE")]
+    #[arg(long, required_unless_present = "grid", value_name = "FILE")]
     target: Vec<PathBuf>,
+    #[command(flatten)]
+    grid: GridArgs,
     /// What is to be found of each camera, see `deltille calibrate`
     #[arg(long, default_value = "radtan")]
     model: ModelChoice,
@@ -53,7 +55,7 @@ pub struct Args {
     #[command(flatten)]
     sheet: SheetArgs,
     /// Find where the target's panels are on it, and write that as <target>-refined.json
-    #[arg(long, conflicts_with = "print_scale")]
+    #[arg(long, conflicts_with_all = ["print_scale", "grid"])]
     refine_target: bool,
     #[command(flatten)]
     solve: SolveArgs,
@@ -103,10 +105,14 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     check_folders(&args.camera)?;
     check_folder(&args.output).context("-o")?;
     let limits = args.limits.limits();
-    let targets = target_file::read_all(&args.target, &limits).context("--target")?;
-    let reference = match targets.as_slice() {
-        [only] => Reference::Target(only),
-        several => Reference::Scene(several),
+    let (targets, grid) = match args.grid.read_target()? {
+        Some((grid, target)) => (vec![target], Some(grid)),
+        None => (target_file::read_all_placed(&args.target, &limits).context("--target")?, None),
+    };
+    let reference = match (grid, targets.as_slice()) {
+        (Some(grid), _) => Reference::Grid(grid),
+        (None, [only]) => Reference::Target(only),
+        (None, several) => Reference::Scene(several),
     };
     let sheet = args.sheet.read(&limits, &targets)?;
     let panels = sightings::panels(&reference, &sheet)?;
@@ -123,14 +129,16 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
             read.with_context(|| format!("--camera {name}"))?;
         check_own(name, &detections, &seen)?;
         seen.push((name, detections));
+        let of_camera_out = |out: Vec<Excluded>| {
+            out.into_iter().map(|out| Excluded { camera: Some(name.clone()), ..out })
+        };
+        left_out.extend(of_camera_out(sightings::take_known(&mut views, &reference)));
         if args.solve.measures_target() {
             let unsure = sightings::take_sure(&mut views, &reference)?;
-            left_out.extend(
-                unsure.into_iter().map(|out| Excluded { camera: Some(name.clone()), ..out }),
-            );
+            left_out.extend(of_camera_out(unsure));
         }
-        sightings::put_on(&sheet, targets.first(), &mut views)?;
-        left_out.extend(out.into_iter().map(|out| Excluded { camera: Some(name.clone()), ..out }));
+        sightings::put_on(&sheet, reference.targets().first(), &mut views)?;
+        left_out.extend(of_camera_out(out));
         ink.extend(of_camera);
         if let Some(folder) = of_name(&args.images, name) {
             check_images(folder, &views)?;

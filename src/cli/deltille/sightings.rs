@@ -16,7 +16,7 @@ use crate::detect::{Detection, InkEstimate};
 use crate::export::calibration::{self, Print, Sheet};
 use crate::export::detection;
 use crate::export::tables::folder;
-use crate::lattice::GridKind;
+use crate::lattice::{GridKind, LatticeMap};
 use crate::limits::{Limits, ReadError};
 use crate::quantity::{edge_mm, print_scale};
 use crate::targets::{SIDES, Target, parse_length_mm};
@@ -29,10 +29,24 @@ pub struct SightingsArgs {
     #[arg(required = true, value_name = "DETECTIONS")]
     detections: Vec<PathBuf>,
     /// Description of the target: the .json of `deltille board`, or a .dsc
-    #[arg(long, value_name = "FILE", conflicts_with = "grid")]
+    #[arg(long, value_name = "FILE")]
     target: Option<PathBuf>,
+    #[command(flatten)]
+    grid: GridArgs,
+    /// Use the target that is given even where the detections name another one
+    #[arg(long)]
+    assume_target: bool,
+    #[command(flatten)]
+    sheet: SheetArgs,
+    #[command(flatten)]
+    limits: FileLimits,
+}
+
+/// An untagged board that no file describes.
+#[derive(clap::Args)]
+pub struct GridArgs {
     /// An untagged board of this tiling instead; --edge says how large
-    #[arg(long, value_name = "KIND", requires = "edge")]
+    #[arg(long, value_name = "KIND", requires = "edge", conflicts_with = "target")]
     grid: Option<Kind>,
     /// Rows of corners of the untagged board
     #[arg(long, requires_all = ["grid", "cols"], value_parser = whole(SIDES))]
@@ -43,13 +57,6 @@ pub struct SightingsArgs {
     /// Length of a tile's edge of the untagged board, such as 20mm
     #[arg(long, requires = "grid", value_name = "LENGTH", allow_hyphen_values = true)]
     edge: Option<String>,
-    /// Use the target that is given even where the detections name another one
-    #[arg(long)]
-    assume_target: bool,
-    #[command(flatten)]
-    sheet: SheetArgs,
-    #[command(flatten)]
-    limits: FileLimits,
 }
 
 /// What is known of the sheet beforehand.
@@ -100,15 +107,35 @@ pub struct Sightings {
     pub left_out: Vec<Excluded>,
     /// What is known of the print.
     pub print: Print,
+    /// See [`Reference::label_symmetries`].
+    pub symmetries: Vec<Vec<LatticeMap>>,
+}
+
+impl GridArgs {
+    /// The board, if there is one.
+    pub fn read(&self) -> anyhow::Result<Option<UntaggedGrid>> {
+        let (Some(kind), Some(edge)) = (self.grid, &self.edge) else { return Ok(None) };
+        let kind = match kind {
+            Kind::Deltille => GridKind::Deltille,
+            Kind::Checker => GridKind::Checker,
+        };
+        let mm = parse_length_mm(edge).context("--edge")?;
+        let edge_mm = edge_mm::RANGE.check(mm).context("--edge")?;
+        let size = self.rows.zip(self.cols).map(|(rows, cols)| [rows, cols]);
+        Ok(Some(UntaggedGrid { kind, edge_mm, size }))
+    }
+
+    /// The board as a target, if there is one, where it must be known which corner is which; and the board.
+    pub fn read_target(&self) -> anyhow::Result<Option<(UntaggedGrid, Target)>> {
+        let Some(grid) = self.read()? else { return Ok(None) };
+        let made = grid
+            .target("board")
+            .context("--grid: give --rows and --cols, so that it is known which corner is which")?;
+        Ok(Some((grid, made.context("--grid")?)))
+    }
 }
 
 impl SightingsArgs {
-    fn edge_mm(&self) -> anyhow::Result<Option<f64>> {
-        let Some(text) = &self.edge else { return Ok(None) };
-        let mm = parse_length_mm(text).context("--edge")?;
-        Ok(Some(edge_mm::RANGE.check(mm).context("--edge")?))
-    }
-
     /// Whether the target is taken as it is given, whatever detections and cameras name.
     pub fn assumes_target(&self) -> bool {
         self.assume_target
@@ -117,18 +144,11 @@ impl SightingsArgs {
     /// Reads everything. Where the target is to be measured, it takes views whose labels are sure.
     pub fn read(&self, measure_target: bool) -> anyhow::Result<Sightings> {
         let limits = self.limits.limits();
-        let target = self.target.as_deref().map(|path| target_file::read(path, &limits));
+        let target = self.target.as_deref().map(|path| target_file::read_placed(path, &limits));
         let target: Option<Target> = target.transpose().context("--target")?;
-        let reference = match (&target, self.grid, self.edge_mm()?) {
-            (Some(target), ..) => Reference::Target(target),
-            (None, Some(kind), Some(edge_mm)) => {
-                let kind = match kind {
-                    Kind::Deltille => GridKind::Deltille,
-                    Kind::Checker => GridKind::Checker,
-                };
-                let size = self.rows.zip(self.cols).map(|(rows, cols)| [rows, cols]);
-                Reference::Grid(UntaggedGrid { kind, edge_mm, size })
-            }
+        let reference = match (&target, self.grid.read()?) {
+            (Some(target), _) => Reference::Target(target),
+            (None, Some(grid)) => Reference::Grid(grid),
             _ => bail!(
                 "give --target FILE, or --grid deltille or checker with --edge for untagged boards"
             ),
@@ -151,8 +171,9 @@ impl SightingsArgs {
         put_on(&sheet, target.as_ref(), &mut views)?;
         let panels = panels(&reference, &sheet)?;
         let print = Print { scale: sheet.print_scale, ink };
+        let symmetries = reference.label_symmetries();
         let target = target.or(board);
-        Ok(Sightings { panels, target, views, empty, left_out, print })
+        Ok(Sightings { panels, target, views, empty, left_out, print, symmetries })
     }
 }
 
@@ -178,19 +199,31 @@ pub fn take_sure(views: &mut Vec<View>, reference: &Reference) -> anyhow::Result
         counted(views.len(), "picture")
     );
     let unsure = views.extract_if(.., |view| !reference.is_sure_of(view));
-    let unsure = unsure.map(|view| {
-        tell!("left out: {}: {NOT_WHOLE}", view.name);
-        Excluded {
-            camera: None,
-            corners: view.corner_count(),
-            view: view.name,
-            image: view.image,
-            panel: None,
-            reason: Reason::Foreign(NOT_WHOLE.to_owned()),
-        }
-    });
-    Ok(unsure.collect())
+    Ok(unsure.map(|view| left_out(view, NOT_WHOLE)).collect())
 }
+
+/// Takes out the views of an untagged board in which it is not known which corner is which, and tells them.
+pub fn take_known(views: &mut Vec<View>, reference: &Reference) -> Vec<Excluded> {
+    let unknown = views.extract_if(.., |view| !reference.labels_are_of_board(view));
+    unknown.map(|view| left_out(view, IN_PART)).collect()
+}
+
+/// A view that takes no part, which is told.
+fn left_out(view: View, why: &str) -> Excluded {
+    tell!("left out: {}: {why}", view.name);
+    Excluded {
+        camera: None,
+        corners: view.corner_count(),
+        view: view.name,
+        image: view.image,
+        panel: None,
+        reason: Reason::Foreign(why.to_owned()),
+    }
+}
+
+/// Why a view cannot tell which corner is which.
+const IN_PART: &str = "the board is not seen from its first row and column to its last: without tags its corners are \
+                       not known then";
 
 /// Why a view cannot measure an untagged board.
 const NOT_WHOLE: &str =

@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, anyhow, bail};
 
+use crate::cli::output::tell;
 use crate::detect::check_distinct;
 use crate::family::{self, Family};
 use crate::limits::Limits;
@@ -13,6 +14,26 @@ use crate::targets::Target;
 /// Reads a target: `.dsc` by its extension, JSON otherwise.
 pub fn read(path: &Path, limits: &Limits) -> anyhow::Result<Target> {
     Ok(target_file::read(path, limits)?)
+}
+
+/// The same where poses are asked for; tells where a `.dsc` lacks those of its boards.
+pub fn read_placed(path: &Path, limits: &Limits) -> anyhow::Result<Target> {
+    let target = read(path, limits)?;
+    tell_missing(path, &target);
+    Ok(target)
+}
+
+/// The same of several files, see [`read_all`].
+pub fn read_all_placed(paths: &[PathBuf], limits: &Limits) -> anyhow::Result<Vec<Target>> {
+    let targets = read_all(paths, limits)?;
+    paths.iter().zip(&targets).for_each(|(path, target)| tell_missing(path, target));
+    Ok(targets)
+}
+
+fn tell_missing(path: &Path, target: &Target) {
+    if let Some(missing) = target_file::without_poses(path, target) {
+        tell!("warning: {missing}");
+    }
 }
 
 /// The targets of several files, which can be told apart.

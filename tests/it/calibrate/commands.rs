@@ -691,3 +691,93 @@ fn a_displaced_panel_is_named_on_the_terminal_in_the_file_and_on_the_page() {
         assert_eq!(named, is_named, "{by_mm}: {}", camera["diagnoses"]);
     }
 }
+
+/// Camera files have no uncertainties, and neither have cameras that were given: no verdict has a basis then.
+#[test]
+fn a_comparison_without_uncertainties_is_undecided() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    let (target, mut random) = (board(6, 8), ChaCha8Rng::seed_from_u64(3));
+    std::fs::write(at.join("board.json"), target.to_json()).unwrap();
+    for part in ["a", "b"] {
+        std::fs::create_dir(at.join(part)).unwrap();
+        for view in 0..8 {
+            let pose = crate::common::view::tilted(
+                &mut random,
+                target.panels[0].middle_mm(),
+                300.0,
+                0.1 + 0.08 * f64::from(view),
+            );
+            let found = detection(&target, &camera(), &pose, &mut random);
+            let text = detection::write(&found);
+            std::fs::write(at.join(format!("{part}/{view}.json")), text).unwrap();
+        }
+        done(at, &format!("calibrate {part} --target board.json --model radtan -o {part}.yaml"));
+    }
+    let code = |args: &str| {
+        let result = output(at, args);
+        (result.status.code(), String::from_utf8_lossy(&result.stdout).into_owned())
+    };
+    assert_eq!(code("compare a.json b.json").0, Some(0));
+    for (args, which) in
+        [("a.yaml b.yaml", "both"), ("a.yaml b.json", "the first"), ("a.json b.yaml", "the second")]
+    {
+        let (code, told) = code(&format!("compare {args} --region image -o said.json"));
+        assert_eq!(code, Some(3), "{told}");
+        assert!(told.contains("cannot judge whether the camera has changed"), "{told}");
+        assert!(told.contains(&format!("the uncertainties of {which} are not known")), "{told}");
+        let said = json(&at.join("said.json"));
+        assert!(said["cameras"][0]["significant"].is_null());
+        assert!(said["cameras"][0]["undecided"].as_str().unwrap().contains(which));
+    }
+    // What is tolerated needs no uncertainty, and what is the same is the same.
+    assert_eq!(code("compare a.yaml b.yaml --region image --tolerance 50").0, Some(0));
+    assert_eq!(code("compare a.yaml a.yaml").0, Some(0));
+}
+
+/// Boards of a `.dsc` that are each listed in their own plane have no poses to each other, unless a `.tp` has them.
+#[test]
+fn boards_of_a_list_without_poses_are_each_taken_by_itself() {
+    use deltille::export::dsc::{self, Dialect};
+    use deltille::limits::Limits;
+    use deltille::target_file;
+
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    let family = Family::shipped(&TagSpec::default().family).unwrap();
+    let spec = BoardSpec { boards: 3, ..BoardSpec::new(GridKind::Deltille, 5, 6, 20.0) };
+    let sheets = Target::build("cube", &TargetSpec::Board(spec), Some(&family), None).unwrap();
+    std::fs::write(at.join("cube.dsc"), dsc::write(&sheets, Dialect::Fork).unwrap()).unwrap();
+    let read = || target_file::read(&at.join("cube.dsc"), &Limits::default());
+
+    let loose = read().unwrap();
+    assert!(loose.is_loose() && loose.overlapping_boards() == Some([0, 1]));
+    let told = output(at, "calibrate none.json --target cube.dsc --model radtan");
+    let told = String::from_utf8_lossy(&told.stderr).into_owned();
+    assert!(told.contains("the poses of its 3 boards on the target are missing"), "{told}");
+    assert!(told.contains("put cube.tp beside it"), "{told}");
+
+    let poses = "#calibration date\n0\n1 0 0 0\n0 1 0 0\n0 0 1 0\n1\n 0 0 -1 617.5\n0 1 0 4\n1 0 0 12\n\
+                 2\n0 0 1 -10\n0 1 0 3\n-1 0 0 618\n7\n1 0 0 0\n0 1 0 0\n0 0 1 0\n";
+    std::fs::write(at.join("cube.tp"), poses).unwrap();
+    let cube = read().unwrap();
+    assert!(!cube.is_loose());
+    let corner = cube.panels[1].corners[7];
+    let [x, y] = corner.panel_mm.to_array();
+    assert!(corner.target_mm.distance(DVec3::new(617.5, 4.0 + y, 12.0 + x)) < 1e-9);
+
+    for (wrong, why) in [
+        (poses.replace("2\n0 0 1 -10", "3\n0 0 1 -10"), "board 2 of the .dsc has no pose"),
+        (poses.replace(" 0 0 -1 617.5", " 0 0 1 617.5"), "R of board 1 is not a rotation"),
+        (poses.replace("0 1 0 3", "0 1 0"), "four numbers"),
+        (poses.replace("\n1\n", "\n0\n"), "board 0 has two poses"),
+        (
+            poses.split("2\n0 0 1").next().unwrap().to_owned() + "2\n1 0 0 5\n0 1 0 0\n0 0 1 0\n",
+            "boards 0 and 2 in the same place",
+        ),
+    ] {
+        std::fs::write(at.join("cube.tp"), wrong).unwrap();
+        let error = read().unwrap_err().to_string();
+        assert!(error.contains("cube.tp") && error.contains(why), "{error}");
+    }
+}

@@ -1,3 +1,4 @@
+mod ambiguous;
 mod board_shape;
 mod cameras;
 mod commands;

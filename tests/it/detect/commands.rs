@@ -258,3 +258,33 @@ fn what_detect_says() {
     }
     page.is("detect");
 }
+
+/// A stream prints each picture before it has seen the others, so their ink is not that of all.
+#[test]
+#[cfg_attr(not(has_data), ignore = "no photographs: set DELTILLE_DATA to their folder")]
+fn a_stream_says_that_files_would_have_other_corners() {
+    let folder = tempfile::tempdir().unwrap();
+    let photographs = std::fs::read_dir(crate::common::data("robot-hand")).unwrap();
+    let mut paths: Vec<_> = photographs.map(|entry| entry.unwrap().path()).collect();
+    paths.retain(|path| path.extension().is_some_and(|end| end == "png"));
+    paths.sort();
+    for path in &paths[..3] {
+        std::fs::copy(path, folder.path().join(path.file_name().unwrap())).unwrap();
+    }
+    let detect = |images: &str, how: &str| {
+        let args = format!("detect --grid deltille --rows 10 --cols 11 {how} {images}");
+        let result = deltille(folder.path(), &args).success();
+        let text = |bytes: &[u8]| String::from_utf8_lossy(bytes).into_owned();
+        (text(&result.get_output().stdout), text(&result.get_output().stderr))
+    };
+    let (lines, told) = detect("*.png", "--stream");
+    assert!(
+        told.contains("note: --stream located the corners of each image with the ink"),
+        "{told}"
+    );
+    assert!(lines.lines().all(|line| line.contains("\"pictures\":1")), "{lines}");
+    let first = paths[0].file_name().unwrap().to_string_lossy();
+    assert!(!detect(&first, "--stream").1.contains("note:"));
+    assert!(!detect("*.png", "--stream --ink none").1.contains("note:"));
+    assert!(!detect("*.png", "-o corners").1.contains("note:"));
+}

@@ -15,6 +15,7 @@ use super::stop::Stop;
 use super::view::{Reference, Sighting, View};
 use super::weights::Weights;
 use crate::camera::{Camera, Pose};
+use crate::lattice::LatticeMap;
 use crate::targets::{PanelPose, Target, TargetIdentity};
 
 /// Cameras that are fixed to each other, their views of one rigid target or of several that are fixed to each
@@ -58,6 +59,8 @@ pub struct Calibration {
     pub(super) order: Vec<String>,
     /// By how many frames each camera is late, where that is known.
     pub(super) delays: Option<Vec<i32>>,
+    /// Rotations of the labels of each panel that no picture shows; may be shorter than there are panels.
+    pub(super) symmetries: Vec<Vec<LatticeMap>>,
     /// Whether the work is to end.
     pub(super) stop: Stop,
 }
@@ -201,6 +204,7 @@ impl Calibration {
             start: None,
             order: Vec::new(),
             delays: None,
+            symmetries: Vec::new(),
             stop: Stop::default(),
         }
     }
@@ -212,6 +216,7 @@ impl Calibration {
         // Of several targets the least accurate one.
         let accuracy_mm = targets.iter().map(Target::measured_sd_mm);
         let accuracy_mm = accuracy_mm.reduce(|one, other| Some(one?.max(other?))).flatten();
+        let symmetries = reference.label_symmetries();
         let mut panels = panels.into_iter();
         let of_target = |target: &Target| {
             (target.name.to_string(), panels.by_ref().take(target.panels.len()).collect())
@@ -221,7 +226,16 @@ impl Calibration {
             several => Self::of_targets(several.iter().map(of_target).collect::<Vec<_>>()),
         };
         let identities = targets.iter().map(Target::identity).collect();
-        Self { identities, ..calibration.board_accuracy_mm(accuracy_mm) }
+        Self { identities, symmetries, ..calibration.board_accuracy_mm(accuracy_mm) }
+    }
+
+    /// With the rotations of the labels of each panel that no picture shows, see
+    /// [`Reference::label_symmetries`](super::Reference::label_symmetries); unless said otherwise there are none. The
+    /// cameras of a rig must agree on the pose of the board, which decides between them, see
+    /// [`CameraEstimate::label_rotation`](super::CameraEstimate::label_rotation).
+    #[must_use]
+    pub fn label_symmetries(self, symmetries: Vec<Vec<LatticeMap>>) -> Self {
+        Self { symmetries, ..self }
     }
 
     /// Adds a camera: of an unknown lens of a [`Model`], or a known [`Camera`] that is kept.
@@ -335,7 +349,19 @@ impl Calibration {
         let identities = self.identities.clone();
         let (distances_mm, order) = (self.distances_mm.clone(), self.order.clone());
         let (delays, stop) = (self.delays.clone(), self.stop.clone());
-        Self { panels, targets, identities, cameras, distances_mm, order, delays, stop, ..*self }
+        let symmetries = self.symmetries.clone();
+        Self {
+            panels,
+            targets,
+            identities,
+            cameras,
+            distances_mm,
+            order,
+            delays,
+            symmetries,
+            stop,
+            ..*self
+        }
     }
 
     /// One of its cameras by itself, with panels at these places. What it saw of each target is a view of its own.
@@ -357,6 +383,7 @@ impl Calibration {
             distances_mm: Vec::new(),
             order: Vec::new(),
             delays: None,
+            symmetries: self.symmetries.clone(),
             stop: self.stop.clone(),
             ..*self
         }
@@ -460,6 +487,7 @@ impl Calibration {
             distances_mm: Vec::new(),
             order: self.order.clone(),
             delays: Some(estimate.cameras.iter().map(|camera| camera.delay).collect()),
+            symmetries: self.symmetries.clone(),
             ..*self
         }
     }

@@ -76,6 +76,8 @@ pub struct Comparison {
     pub expected_px: Option<f64>,
     /// How often chance makes them differ as much where the camera is the same.
     pub chance: Option<f64>,
+    /// Whether the uncertainty of the first, and of the second, is not known.
+    pub lacks_uncertainty: [bool; 2],
 }
 
 /// How the second camera differs at a pixel of the first.
@@ -122,6 +124,7 @@ impl Default for Comparison {
             rms_px: 0.0,
             expected_px: None,
             chance: None,
+            lacks_uncertainty: [false; 2],
         }
     }
 }
@@ -178,6 +181,7 @@ impl Comparison {
             chance: known.as_ref().map(|known| known.chance),
             places: differences,
             second_from_first,
+            lacks_uncertainty: [first, second].map(|of| half_of(of).is_none()),
         })
     }
 

@@ -9,6 +9,7 @@ use super::lack_of_fit::LackOfFit;
 use super::lens_end::LensEnd;
 use super::model::Model;
 use super::model_selection::{Instead, Remedy, is_explained};
+use super::start::LabelRotation;
 use crate::camera::Camera;
 
 /// Corners are found to a few hundredths of a pixel; a camera that leaves more than this does not
@@ -69,6 +70,20 @@ pub enum Diagnosis {
         /// By how many frames; negative where it was ahead of the others.
         frames: i32,
     },
+    /// The board looks the same after a rotation, and the labels of a camera of a rig were rotated so that the cameras
+    /// agree on where it is, or both labellings fit.
+    LabelsRotated {
+        /// The camera.
+        camera: usize,
+        /// By how much, in how many frames, and whether that is sure.
+        rotation: LabelRotation,
+    },
+    /// The shape of a board, or its corners, were to be found, and it looks the same after a rotation, so that views may
+    /// show it either way round.
+    LabelsOpen {
+        /// The least such rotation, degrees.
+        degrees: u32,
+    },
     /// The lens turns back or runs away within the image.
     LensEnds {
         /// The camera.
@@ -124,10 +139,19 @@ impl Calibration {
         let own = self.split().map_or_else(|_| self.clone(), |(own, _)| own);
         let alone = own.each_alone(found);
         let mut said = said(found, &alone);
+        said.extend(own.open_labels());
         if let (true, Some((other, rms_px))) = (own.is_single(), own.other_minimum(found)) {
             said.push(Diagnosis::OtherMinimum { camera: 0, other, rms_px });
         }
         said
+    }
+
+    /// Where what was to be found of the board depends on which way round it was seen.
+    fn open_labels(&self) -> Option<Diagnosis> {
+        let is_of_place = self.board_shape || self.measure_target;
+        let maps = self.symmetries.iter().flatten().filter(|_| is_of_place);
+        let degrees = maps.map(|map| map.angle_rad().to_degrees().round() as u32).min()?;
+        Some(Diagnosis::LabelsOpen { degrees })
     }
 
     /// A camera of another valley that leaves not much more, where a model has several.
@@ -196,6 +220,10 @@ fn said(found: &Estimate, alone: &[Alone]) -> Vec<Diagnosis> {
         .filter_map(|(camera, of)| Some(Diagnosis::LensEnds { camera, end: of.lens_end()? }));
     let late = cameras().filter(|(_, of)| of.delay != 0);
     let late = late.map(|(camera, of)| Diagnosis::Late { camera, frames: of.delay });
+    let rotated = cameras().filter_map(|(camera, of)| {
+        Some(Diagnosis::LabelsRotated { camera, rotation: of.label_rotation? })
+    });
+    let late = late.chain(rotated);
     let gross = found.findings.iter().cloned().map(Diagnosis::GrossErrors);
     let open = cameras().zip(alone).filter(|((_, of), _)| !of.ill_conditioned.is_empty());
     let open = open.map(|((camera, of), alone)| Diagnosis::IllConditioned {

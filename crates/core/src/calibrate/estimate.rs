@@ -23,7 +23,7 @@ use super::panel::PanelRef;
 use super::reweighting::{Settled, deviations, variance};
 use super::roughness::Roughness;
 use super::shape::{BoardShape, COUNT as SHAPE_COEFFICIENTS, Shape};
-use super::start::Frame;
+use super::start::{Frame, LabelRotation};
 use super::target_map::{CornerOffset, TargetMap};
 use super::uncertainty::{ObservedCovariance, ProjectionUncertainty};
 use crate::camera::{Camera, PROJECTION_PARAMETERS, Pose};
@@ -104,6 +104,9 @@ pub struct CameraEstimate {
     /// By how many frames its pictures are late, against those of most other cameras: a picture of it shows the moment
     /// that theirs of so many frames before show.
     pub delay: i32,
+    /// How its labels were rotated so that the cameras of a rig agree, where the board looks the same after a rotation
+    /// and the detected labels do not agree, or do not decide; `None` where neither is the case.
+    pub label_rotation: Option<LabelRotation>,
     /// The views that took part, in the order of the frames.
     pub views: Vec<ViewEstimate>,
     /// Where corners were seen, of a camera whose views do not list them, as one that was read from a file.
@@ -298,6 +301,7 @@ impl CameraEstimate {
             pose_sd: None,
             observed_pose_sd: None,
             delay: 0,
+            label_rotation: None,
             views: Vec::new(),
             coverage: None,
             rms_px: 0.0,
@@ -523,6 +527,7 @@ fn camera_estimate(
         pose_sd: layout.cameras[index].map(|first| std::array::from_fn(|i| sd(first + i))),
         observed_pose_sd: None,
         delay: 0,
+        label_rotation: None,
         rms_px: rms_px(views.iter().flat_map(|view| &view.corners)),
         views,
         coverage: None,

@@ -3,8 +3,10 @@ use std::collections::BTreeSet;
 use glam::DVec3;
 
 use crate::detect::Grid;
-use crate::lattice::GridKind;
-use crate::targets::{BoardSpec, Target, TargetError, TargetIdentity, TargetSpec, board_vertices};
+use crate::lattice::{GridKind, LatticeMap};
+use crate::targets::{
+    BoardSpec, Target, TargetError, TargetIdentity, TargetSpec, board_vertices, symmetries,
+};
 
 use super::view::ASSUME_TARGET;
 
@@ -70,6 +72,24 @@ impl UntaggedGrid {
         } else {
             format!("its rows and columns are not those of a board of {rows} × {cols} corners")
         })
+    }
+
+    /// The rotations of its labels that no picture shows, see
+    /// [`Panel::label_symmetries`](crate::targets::Panel::label_symmetries); none where its size is not known.
+    pub(super) fn label_symmetries(&self) -> Vec<LatticeMap> {
+        self.size.map_or(Vec::new(), |[rows, cols]| {
+            symmetries(self.kind, board_vertices(self.kind, rows, cols))
+        })
+    }
+
+    /// Whether labels reach to all four ends of its rows and columns.
+    pub(super) fn is_spanned_by(&self, labels: &BTreeSet<(i32, i32)>) -> bool {
+        let ends = |labels: &BTreeSet<(i32, i32)>| {
+            let rows = labels.iter().map(|(row, _)| *row);
+            let cols = labels.iter().map(|(_, col)| *col);
+            (rows.clone().min(), rows.max(), cols.clone().min(), cols.max())
+        };
+        self.size.is_some_and(|[rows, cols]| ends(labels) == ends(&self.labels(rows, cols)))
     }
 
     fn labels(&self, rows: u32, cols: u32) -> BTreeSet<(i32, i32)> {

@@ -99,7 +99,7 @@ impl Calibration {
             CameraViews { views, ..camera.clone() }
         });
         let own = self.of_cameras(cameras.collect());
-        let Start { mut problem, frames, mut excluded, delays } = Start::of(&own)?;
+        let Start { mut problem, frames, mut excluded, delays, rotations } = Start::of(&own)?;
         problem.stop = self.stop.clone();
         let gross = Gross::of(problem).ok_or(CalibrationError::NoStart)?;
         own.check_frames(&gross)?;
@@ -123,7 +123,9 @@ impl Calibration {
         let kept: Vec<&Frame> = gross.belonging().map(|frame| &frames[frame]).collect();
         let mut estimate = Estimate::new(&own, &kept, &settled, f_ratio)?;
         let of_cameras = estimate.cameras.iter_mut().zip(delays);
-        of_cameras.for_each(|(camera, delay)| camera.delay = delay);
+        for ((camera, delay), rotation) in of_cameras.zip(rotations) {
+            (camera.delay, camera.label_rotation) = (delay, rotation);
+        }
         if let ([camera], [CameraViews { intrinsics: Intrinsics::Unknown(_), .. }]) =
             (estimate.cameras.as_slice(), own.cameras.as_slice())
         {

@@ -13,6 +13,7 @@ use super::shape::Shape;
 use super::target_map::TargetMap;
 use crate::camera::Pose;
 use crate::detect::{Detection, Grid};
+use crate::lattice::LatticeMap;
 use crate::targets::{Panel, Target, TargetIdentity};
 
 /// Corners that a panel needs in a view, so that a few wrong ones show.
@@ -136,6 +137,30 @@ impl Reference<'_> {
         }
     }
 
+    /// The rotations of each panel's labels that no picture shows, see [`Panel::label_symmetries`].
+    pub fn label_symmetries(&self) -> Vec<Vec<LatticeMap>> {
+        match self {
+            Self::Grid(grid) => vec![grid.label_symmetries()],
+            Self::Target(_) | Self::Scene(_) => {
+                let panels = self.targets().iter().flat_map(|target| &target.panels);
+                panels.map(Panel::label_symmetries).collect()
+            }
+        }
+    }
+
+    /// What a half turn or another rotation that no picture shows leaves open, as a sentence without capital and full
+    /// stop; `None` where labels are known.
+    pub fn label_ambiguity(&self) -> Option<String> {
+        let maps = self.label_symmetries();
+        let of_most = maps.iter().max_by_key(|maps| maps.len()).filter(|maps| !maps.is_empty())?;
+        let degrees = 360 / (of_most.len() + 1);
+        Some(format!(
+            "a board without tags that looks the same after a rotation by {degrees}° is labelled by how it lies in the \
+             image: which of its {} sides is the lower one is not known",
+            of_most.len() + 1
+        ))
+    }
+
     /// What its file describes, or their files; none of an untagged board.
     pub fn targets(&self) -> &[Target] {
         match *self {
@@ -179,6 +204,16 @@ impl Reference<'_> {
             let is_absent = seen == 0 && self.targets().len() > 1;
             let whole: usize = target.panels.iter().map(|panel| panel.corners.len()).sum();
             is_tagged || is_absent || seen >= whole
+        })
+    }
+
+    /// Whether it is known but for a [symmetry](Self::label_symmetries) which corner of a board is which: always of
+    /// targets; of an untagged board whose rows and columns are given, where the view reaches from its first to its last.
+    pub fn labels_are_of_board(&self, view: &View) -> bool {
+        let Self::Grid(grid) = self else { return true };
+        view.sightings.iter().all(|sighting| {
+            let labels = sighting.observations.iter().map(|seen| (seen.row, seen.col));
+            grid.is_spanned_by(&labels.collect())
         })
     }
 

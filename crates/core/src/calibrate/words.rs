@@ -7,6 +7,7 @@ use super::lack_of_fit::LackOfFit;
 use super::model::Model;
 use super::model_selection::{Instead, Remedy};
 use super::panel::PanelRef;
+use super::start::LabelRotation;
 use super::target_map::LEAST_TO_MEASURE;
 use crate::camera::Camera;
 use crate::words::counted;
@@ -56,6 +57,11 @@ impl<'a> Words<'a> {
             Diagnosis::ManyLeftOut { left_out, all } => self.many_left_out(*left_out, *all),
             Diagnosis::OtherMinimum { camera, other, rms_px } => self.other_minimum(*camera, other, *rms_px),
             Diagnosis::Late { camera, frames } => self.late(*camera, *frames),
+            Diagnosis::LabelsRotated { camera, rotation } => self.labels_rotated(*camera, rotation),
+            Diagnosis::LabelsOpen { degrees } => format!(
+                "the board has no tags and looks the same after a rotation by {degrees}°: what was found of its corners or \
+                 its shape is right only if it was the same way round in all views"
+            ),
             Diagnosis::LensEnds { camera, end } => self.of_camera(*camera, end.to_string()),
             Diagnosis::GrossErrors(finding) => self.finding(finding),
             Diagnosis::Remedied { camera, remedy } => self.remedied(*camera, remedy),
@@ -95,6 +101,26 @@ impl<'a> Words<'a> {
              put to these; mend the trigger or the numbering before the rig is used",
             self.estimate.cameras[camera].name
         )
+    }
+
+    fn labels_rotated(&self, camera: usize, rotation: &LabelRotation) -> String {
+        let LabelRotation { degrees, frames, of, is_sure } = *rotation;
+        let name = &self.estimate.cameras[camera].name;
+        let board =
+            format!("a board without tags that looks the same after a rotation by {degrees}°");
+        let labels = match frames {
+            0 => "were kept as detected".to_owned(),
+            _ => format!("were rotated in {frames} of {}", counted(of, "frame")),
+        };
+        match is_sure {
+            true => format!(
+                "camera {name}: its labels of {board} {labels}: only so do the cameras agree on where the board is"
+            ),
+            false => format!(
+                "camera {name}: its labels of {board} {labels}, but rotated otherwise they fit as well: the poses \
+                 between the cameras may be wrong; tilt the board about different axes, or take one with tags"
+            ),
+        }
     }
 
     fn other_minimum(&self, camera: usize, other: &Camera, rms_px: f64) -> String {

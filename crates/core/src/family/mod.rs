@@ -77,7 +77,8 @@ pub use hidden::{HiddenCells, Robust};
 pub use import::{ImportError, ImportSpec, import};
 pub use invariant_bounds::invariant_bound;
 pub use natural::{
-    ACCEPTED_FALSE_POSITIVES, NaturalWords, TRIANGLES_PER_MEGAPIXEL, corrected_within,
+    ACCEPTED_FALSE_POSITIVES, NATURAL_FACTOR, NaturalWords, TRIANGLES_PER_MEGAPIXEL,
+    corrected_within,
 };
 pub use published_bounds::{PublishedBounds, published_bounds};
 pub use reading::Reading;

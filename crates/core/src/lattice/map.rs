@@ -31,6 +31,21 @@ impl LatticeMap {
         self.turns
     }
 
+    /// Whether dark tiles go to dark tiles.
+    pub fn keeps_colours(self) -> bool {
+        let Vertex { row, col } = self.shift;
+        let shift = match self.kind {
+            GridKind::Deltille => 0,
+            GridKind::Checker => row + col,
+        };
+        (i32::from(self.turns) + shift) % 2 == 0
+    }
+
+    /// The rotation of the plane that belongs to it, counter-clockwise, rad.
+    pub fn angle_rad(self) -> f64 {
+        std::f64::consts::TAU * f64::from(self.turns) / self.kind.steps().len() as f64
+    }
+
     /// Where `v` goes.
     pub fn apply(self, v: Vertex) -> Vertex {
         let (mut row, mut col) = (v.row, v.col);

@@ -38,6 +38,7 @@ mod single_panel;
 mod skeleton;
 mod solid;
 mod spec;
+mod symmetry;
 mod tag_ids;
 mod tag_sheet;
 
@@ -76,6 +77,7 @@ pub use spec::{BORDER_BITS, FACE_TILES, MOST_ROWS, SIDES, least_untagged_corners
 pub use spec::{
     BoardSpec, ListFormat, ListedSpec, SolidShape, SolidSpec, TagSheetSpec, TagSpec, TargetSpec,
 };
+pub(crate) use symmetry::symmetries;
 
 /// A target: its panels, and the sheets they are printed on.
 #[derive(Clone, Debug, PartialEq)]
@@ -423,9 +425,20 @@ impl Target {
         target
     }
 
-    /// Whether its panels are sheets that lie about, each for itself.
+    /// Whether its panels are sheets that lie about, each for itself; also boards of a list that has no poses of them.
     pub fn is_loose(&self) -> bool {
-        self.panels.len() > 1 && !self.spec.is_rigid()
+        self.panels.len() > 1 && (!self.spec.is_rigid() || self.overlapping_boards().is_some())
+    }
+
+    /// Ids of two boards of a list that would be in one place: each is listed in a plane of its own, and the list has no
+    /// poses of the boards.
+    pub fn overlapping_boards(&self) -> Option<[u32; 2]> {
+        let is_list = matches!(self.spec, TargetSpec::Listed(_));
+        let panels: &[Panel] = if is_list { &self.panels } else { &[] };
+        let pairs =
+            panels.iter().enumerate().flat_map(|(i, a)| panels[..i].iter().map(move |b| (b, a)));
+        let mut pairs = pairs.filter(|(a, b)| a.overlaps(b));
+        pairs.next().map(|(a, b)| [a.id, b.id])
     }
 
     /// Whether its panels have places in one scene, as far as is known: a list tells nothing of what is around several.

@@ -15,6 +15,11 @@ const QUIET_EDGES: f64 = 0.25;
 /// The least quiet zone, mm: on fine boards text stays clear of the tiles for the eye as well.
 const QUIET_MIN_MM: f64 = 5.0;
 
+/// Panels lie in one plane where their normals differ by less than 3° (the cosine of it) and their middles by less than
+/// this part of an edge: listed places have rounding errors alone.
+const SAME_WAY: f64 = 0.9986;
+const IN_PLANE_EDGES: f64 = 0.05;
+
 /// White between a white square and the border of the tag in it, bit-widths: readers of AprilTags ask
 /// for one, the corners of the square for as much clear of the tag as in a black one.
 const TAG_MARGIN_BITS: f64 = 2.0;
@@ -33,6 +38,25 @@ impl Panel {
     /// Whether it is a single tag, with no corner of the lattice around it.
     pub fn is_tag_alone(&self) -> bool {
         self.corners.is_empty() && self.tags.len() == 1
+    }
+
+    /// Whether another panel faces the same way in the same plane, and a corner of one lies on a tile between corners of
+    /// the other: one would hide the other.
+    pub(super) fn overlaps(&self, other: &Panel) -> bool {
+        let normal = |panel: &Panel| panel.pose.matrix().z_axis;
+        let apart_mm = (other.middle_mm() - self.middle_mm()).dot(normal(self)).abs();
+        let is_plane = normal(self).dot(normal(other)) > SAME_WAY
+            && apart_mm < IN_PLANE_EDGES * self.edge_mm.min(other.edge_mm);
+        is_plane && (self.is_under_corner_of(other) || other.is_under_corner_of(self))
+    }
+
+    fn is_under_corner_of(&self, other: &Panel) -> bool {
+        let vertices: BTreeSet<Vertex> =
+            self.corners.iter().map(|corner| Vertex::new(corner.row, corner.col)).collect();
+        other.corners.iter().any(|corner| {
+            let at = self.pose.panel_from_target(corner.target_mm).truncate() / self.edge_mm;
+            self.kind.tile_at(at).vertices().all(|vertex| vertices.contains(&vertex))
+        })
     }
 
     /// The mean of its corners in the target frame, mm.

@@ -30,6 +30,8 @@ struct CameraRecord<'a> {
     expected_px: Option<f64>,
     chance: Option<f64>,
     significant: Option<bool>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    undecided: Option<&'static str>,
     second_from_first: Motion,
     /// For each pixel (x, y) of the first camera the difference (dx, dy) of the second camera
     /// there, and the standard deviation of a coordinate.
@@ -56,6 +58,8 @@ struct MotionRecord<'a> {
     moved_mm: DVec3,
     chance: Option<f64>,
     significant: Option<bool>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    undecided: Option<&'static str>,
 }
 
 /// The JSON text of a comparison; `names` are those of the cameras, empty for a camera without
@@ -70,6 +74,7 @@ pub fn write(names: &[&str], found: &[Comparison], motions: &[CameraMotion]) -> 
         expected_px: found.expected_px,
         chance: found.chance,
         significant: found.is_significant(),
+        undecided: found.why_undecided(),
         second_from_first: Motion::new(&found.second_from_first, None),
         places: found.places.iter().flatten().map(place).collect(),
     });
@@ -80,6 +85,7 @@ pub fn write(names: &[&str], found: &[Comparison], motions: &[CameraMotion]) -> 
         moved_mm: motion.moved_mm,
         chance: motion.chance,
         significant: motion.is_significant(),
+        undecided: motion.why_undecided(),
     });
     let file =
         ComparisonFile { schema: SCHEMA, cameras: cameras.collect(), motions: motions.collect() };

@@ -124,13 +124,18 @@ pub(super) struct DiagnosisRecord<'a> {
     rms_px: Option<f64>,
     #[serde(skip_serializing_if = "Option::is_none")]
     rms_mm: Option<f64>,
-    /// Delay of a camera, in frames.
+    /// Delay of a camera, in frames, or frames in which labels were rotated.
     #[serde(skip_serializing_if = "Option::is_none")]
     frames: Option<i32>,
     #[serde(skip_serializing_if = "Option::is_none")]
     left_out: Option<usize>,
     #[serde(skip_serializing_if = "Option::is_none")]
     all: Option<usize>,
+    /// The least rotation after which the board looks the same, degrees, and whether only the labels taken fit.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    degrees: Option<u32>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    sure: Option<bool>,
     /// Parameters of another camera that explains the views.
     #[serde(skip_serializing_if = "BTreeMap::is_empty")]
     other: BTreeMap<String, f64>,
@@ -356,6 +361,18 @@ pub(super) fn diagnoses<'a>(
                 frames: Some(*frames),
                 ..text
             },
+            Diagnosis::LabelsRotated { camera, rotation } => DiagnosisRecord {
+                kind: "labels_rotated",
+                camera: name(*camera),
+                degrees: Some(rotation.degrees),
+                frames: Some(rotation.frames as i32),
+                all: Some(rotation.of),
+                sure: Some(rotation.is_sure),
+                ..text
+            },
+            Diagnosis::LabelsOpen { degrees } => {
+                DiagnosisRecord { kind: "labels_open", degrees: Some(*degrees), ..text }
+            }
             Diagnosis::OtherMinimum { camera, other, rms_px } => DiagnosisRecord {
                 kind: "other_minimum",
                 camera: name(*camera),

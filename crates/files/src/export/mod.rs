@@ -57,6 +57,8 @@ pub mod tables;
 pub mod texture;
 #[cfg(feature = "meshes")]
 pub mod threemf;
+/// Board poses beside a `.dsc`.
+pub mod tp;
 pub mod truth;
 pub mod undistortion;
 

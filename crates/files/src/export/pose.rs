@@ -3,7 +3,8 @@
 use serde::Serialize;
 
 use super::motion::Motion;
-use deltille_core::calibrate::{Estimate, ViewEstimate};
+use deltille_core::calibrate::{Estimate, Reference, ViewEstimate};
+use deltille_core::targets::Target;
 
 /// Schema and version that this crate writes.
 pub const SCHEMA: &str = "deltille/pose/1";
@@ -18,6 +19,8 @@ struct PoseLine<'a> {
     outliers: usize,
     rms_px: f64,
     camera_from_target: Motion,
+    #[serde(skip_serializing_if = "is_one")]
+    poses_alike: usize,
 }
 
 #[derive(Serialize)]
@@ -29,20 +32,27 @@ struct NoPoseLine<'a> {
     reason: &'a str,
 }
 
+fn is_one(count: &usize) -> bool {
+    *count == 1
+}
+
 /// The line of a picture without a pose, with the reason; without line end.
 pub fn write_none(image: &str, target: &str, reason: &str) -> String {
     let line = NoPoseLine { schema: SCHEMA, image, target, camera_from_target: None, reason };
     serde_json::to_string(&line).expect("plain data has a JSON form")
 }
 
-/// The line of a view of a single camera, with the standard deviations of its pose; without line
-/// end.
-pub fn write_line(estimate: &Estimate, view: &ViewEstimate, target: &str) -> String {
+/// The line of a view of a single camera, with the standard deviations of its pose, and in how many poses the target
+/// looks the same where it has no tags; without line end.
+pub fn write_line(estimate: &Estimate, view: &ViewEstimate, target: &Target) -> String {
+    let alike =
+        Reference::Target(target).label_symmetries().iter().map(|maps| 1 + maps.len()).max();
     let line = PoseLine {
         schema: SCHEMA,
         view: &view.name,
         image: &view.image,
-        target,
+        target: &target.name,
+        poses_alike: alike.unwrap_or(1),
         corners: view.corners.len(),
         outliers: view.outlier_count(),
         rms_px: view.rms_px,

@@ -48,7 +48,7 @@ pub(super) fn start(calibration: &Calibration) -> Result<Start, CalibrationError
     let frame =
         |view: usize| Frame { name: views[view].name.clone(), place: view, views: vec![(0, view)] };
     let frames = used.into_iter().map(frame).collect();
-    Ok(Start { problem, frames, excluded, delays: vec![0] })
+    Ok(Start { problem, frames, excluded, delays: vec![0], rotations: vec![None] })
 }
 
 /// Refuses too few views to find a camera from.

@@ -8,7 +8,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use super::super::calibration::Calibration;
 use super::linked::{ByFrame, Seen};
-use super::together::middle_of;
+use super::symmetry::{Symmetries, agreed};
 use crate::statistics::median;
 
 /// Delays that are looked for, frames.
@@ -29,7 +29,11 @@ const LONGEST_TURN: usize = 3;
 type Track<'a> = Vec<&'a [Seen]>;
 
 /// By how many frames each camera is late against most of the others.
-pub(super) fn delays(calibration: &Calibration, seen: &ByFrame) -> Vec<i32> {
+pub(super) fn delays(
+    calibration: &Calibration,
+    seen: &ByFrame,
+    symmetries: &Symmetries,
+) -> Vec<i32> {
     let order = calibration.moments();
     let at = |of_camera: &'_ BTreeMap<String, Vec<Seen>>| -> Vec<Vec<Seen>> {
         order.iter().map(|name| of_camera.get(name).cloned().unwrap_or_default()).collect()
@@ -47,7 +51,7 @@ pub(super) fn delays(calibration: &Calibration, seen: &ByFrame) -> Vec<i32> {
             open.map(move |to| (from, delay, to)).collect::<Vec<_>>()
         });
         let told = pairs.filter_map(|(from, delay, to)| {
-            let (by, moments) = delay_between(&tracks[from], &tracks[to])?;
+            let (by, moments) = delay_between(&tracks[from], &tracks[to], symmetries)?;
             Some((moments, std::cmp::Reverse(from), std::cmp::Reverse(to), delay + by))
         });
         let Some((_, _, to, delay)) = told.max() else { break };
@@ -66,15 +70,15 @@ fn usual(delays: &[i32]) -> i32 {
 }
 
 /// By how many frames a camera is later than another, and how many moments tell; `None` where too few do.
-fn delay_between(from: &Track, to: &Track) -> Option<(i32, usize)> {
-    let scatters = |how: fn(&Track, &Track, i32) -> Option<(f64, usize)>| {
+fn delay_between(from: &Track, to: &Track, symmetries: &Symmetries) -> Option<(i32, usize)> {
+    let scatters = |how: &dyn Fn(&Track, &Track, i32) -> Option<(f64, usize)>| {
         let all =
             (-MOST_DELAY..=MOST_DELAY).filter_map(|delay| Some((delay, how(from, to, delay)?)));
         all.collect::<Vec<(i32, (f64, usize))>>()
     };
-    let mut all = scatters(scatter_of_poses);
+    let mut all = scatters(&|from, to, delay| scatter_of_poses(from, to, delay, symmetries));
     if all.is_empty() {
-        all = scatters(scatter_of_turns);
+        all = scatters(&scatter_of_turns);
     }
     let &(delay, (least, moments)) = all.iter().min_by(|a, b| a.1.0.total_cmp(&b.1.0))?;
     let in_time = all.iter().find(|(delay, _)| *delay == 0);
@@ -104,16 +108,21 @@ fn moments<'a>(
 }
 
 /// How much the pose of one camera in the other scatters, mm, by the targets that both see.
-fn scatter_of_poses(from: &Track, to: &Track, delay: i32) -> Option<(f64, usize)> {
+fn scatter_of_poses(
+    from: &Track,
+    to: &Track,
+    delay: i32,
+    symmetries: &Symmetries,
+) -> Option<(f64, usize)> {
     let relative = moments(from, to, delay).filter_map(|(first, second)| {
         let mut pairs = from[first].iter().flat_map(|a| to[second].iter().map(move |b| (a, b)));
         let (a, b) = pairs.find(|(a, b)| a.target == b.target)?;
-        Some(b.camera_from_target.after(&a.camera_from_target.inverse()))
+        Some(symmetries.relative(a, b))
     });
     let relative: Vec<_> = relative.collect();
     let count = relative.len();
-    let poses: Vec<_> = super::evenly(&relative, MOST_MOMENTS).copied().collect();
-    (count >= LEAST_MOMENTS).then(|| (middle_of(&poses).1, count))
+    let moments: Vec<_> = super::evenly(&relative, MOST_MOMENTS).cloned().collect();
+    (count >= LEAST_MOMENTS).then(|| Some((agreed(&moments)?.spread_mm, count))).flatten()
 }
 
 /// By how much turns from moment to moment differ between the cameras, rad.

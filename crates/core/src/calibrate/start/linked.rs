@@ -26,6 +26,8 @@ pub(super) struct Seen {
     /// Its index among the camera's views.
     pub view: usize,
     pub corners: usize,
+    /// Which of the [`Symmetries`](super::symmetry::Symmetries) of the target its labels are rotated by.
+    pub rotated: Option<usize>,
 }
 
 /// What each camera saw, by the name of the frame.

@@ -14,6 +14,7 @@ mod first_camera;
 mod linked;
 mod motion;
 mod splined;
+mod symmetry;
 mod together;
 
 use super::calibration::Calibration;
@@ -24,6 +25,7 @@ use super::problem::Problem;
 pub(super) use alone::enough;
 pub(super) use delay::in_order;
 pub(super) use first_camera::evenly;
+pub use symmetry::LabelRotation;
 pub(super) use together::middle;
 
 /// A problem whose values are near those that are sought.
@@ -35,6 +37,8 @@ pub(super) struct Start {
     pub excluded: Vec<(usize, Excluded)>,
     /// By how many frames each camera is late.
     pub delays: Vec<i32>,
+    /// How the labels of each camera were rotated, where a symmetry of the board leaves that open.
+    pub rotations: Vec<Option<LabelRotation>>,
 }
 
 /// A moment at which pictures were taken.

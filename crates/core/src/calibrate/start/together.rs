@@ -15,6 +15,7 @@ use super::super::problem::{Block, CameraUnknowns, Problem};
 use super::super::reweighting::scale;
 use super::delay::{delays, in_time};
 use super::linked::{ByFrame, Places, Seen};
+use super::symmetry::Symmetries;
 use super::{Frame, Start};
 use crate::camera::{Camera, Pose};
 use crate::statistics::median;
@@ -34,8 +35,11 @@ pub(super) fn start(calibration: &Calibration) -> Result<Start, CalibrationError
         seen.push(by_frame(calibration, camera, &poses));
         found.extend(alone.cameras.into_iter().map(|alone| (alone.camera, alone.roughness)));
     }
-    let delays = calibration.delays.clone().unwrap_or_else(|| delays(calibration, &seen));
+    let symmetries = Symmetries::of(calibration);
+    let known = calibration.delays.clone();
+    let delays = known.unwrap_or_else(|| delays(calibration, &seen, &symmetries));
     in_time(calibration, &delays, &mut seen);
+    let rotations = symmetries.agree(calibration, &mut seen);
     let places = Places::of(calibration, &seen)?;
     let names: BTreeSet<&str> =
         seen.iter().flat_map(|of_camera| of_camera.keys().map(String::as_str)).collect();
@@ -59,11 +63,17 @@ pub(super) fn start(calibration: &Calibration) -> Result<Start, CalibrationError
             let Some((_, view)) = of_frame.views.iter().find(|(of, _)| *of == index) else {
                 continue;
             };
-            blocks.extend(camera.views[*view].sightings.iter().map(|sighting| Block {
-                camera: index,
-                frame,
-                panel: sighting.panel,
-                observations: sighting.observations.clone(),
+            let seen = seen[index].get(&of_frame.name).map_or(&[][..], Vec::as_slice);
+            blocks.extend(camera.views[*view].sightings.iter().map(|sighting| {
+                let target = calibration.target_of(sighting.panel);
+                let of_target = seen.iter().find(|s| (s.target, s.view) == (target, *view));
+                let rotated = of_target.and_then(|seen| seen.rotated);
+                Block {
+                    camera: index,
+                    frame,
+                    panel: sighting.panel,
+                    observations: symmetries.rotated(target, rotated, &sighting.observations),
+                }
             }));
         }
     }
@@ -88,7 +98,7 @@ pub(super) fn start(calibration: &Calibration) -> Result<Start, CalibrationError
     let whitening = scale(&problem);
     let first = minimise(problem, &whitening, Loss::Cauchy, Until::Rough)
         .ok_or(CalibrationError::NoStart)?;
-    Ok(Start { problem: first.problem, frames, excluded, delays })
+    Ok(Start { problem: first.problem, frames, excluded, delays, rotations })
 }
 
 /// A camera by itself: as it is known, or as its views have it.
@@ -124,6 +134,7 @@ fn by_frame(
                 camera_from_target,
                 view,
                 corners,
+                rotated: None,
             }));
         }
         if !of_view.is_empty() {
@@ -136,11 +147,6 @@ fn by_frame(
 /// The pose that lies in the middle of others: its median distance from them is the least. A turn
 /// counts by how far it moves a point as far away as the translations reach.
 pub(in crate::calibrate) fn middle(poses: &[Pose]) -> Pose {
-    middle_of(poses).0
-}
-
-/// The same with its median distance from the others, mm.
-pub(super) fn middle_of(poses: &[Pose]) -> (Pose, f64) {
     let arm = median(poses.iter().map(|pose| pose.translation.length()).collect())
         .unwrap_or(0.0)
         .max(1.0);
@@ -151,5 +157,5 @@ pub(super) fn middle_of(poses: &[Pose]) -> (Pose, f64) {
     let spread =
         |pose: &Pose| median(poses.iter().map(|other| apart(pose, other)).collect()).unwrap_or(0.0);
     let of_all = poses.iter().map(|pose| (*pose, spread(pose)));
-    of_all.min_by(|a, b| a.1.total_cmp(&b.1)).unwrap_or((Pose::IDENTITY, 0.0))
+    of_all.min_by(|a, b| a.1.total_cmp(&b.1)).map_or(Pose::IDENTITY, |(pose, _)| pose)
 }

@@ -1,0 +1,294 @@
+//! Labels of a board that looks the same after a rotation, so that each camera of a rig may call its corners otherwise.
+//!
+//! The detector labels such a board by how it lies in the image. A camera that is upside down, or a moment at which the
+//! board lies on its side in one image, gives labels that differ by one of the rotations Sₖ of the board. The pose of
+//! camera b in camera a is the same in all frames only with the right one,
+//!
+//! ```text
+//!     b_from_a = b_from_target · Sₖ⁻¹ · a_from_target⁻¹
+//! ```
+//!
+//! as any other lets it rotate with the board. In each frame the poses for different k are as far apart as the rotations
+//! are, 90° or more, so that a frame is decided as soon as the pose is known about.
+//!
+//! Limits: cameras are compared by a board that both see. What a rotation of all cameras' labels in one frame changes is
+//! the pose of the board alone, which stays as the first of them has it.
+
+use std::collections::BTreeMap;
+use std::f64::consts::FRAC_PI_4;
+
+use glam::{DQuat, DVec3};
+
+use super::super::calibration::Calibration;
+use super::super::problem::Observation;
+use super::evenly;
+use super::linked::{ByFrame, LEAST_SHARED, Seen};
+use crate::camera::Pose;
+use crate::lattice::{LatticeMap, Vertex};
+use crate::statistics::median;
+
+/// Poses of most frames that are compared: more decide no better.
+const MOST_FRAMES: usize = 60;
+
+/// Poses scatter by so many times more where labels are wrong, or labels are kept as they were detected: what a frame by
+/// itself says of a pose scatters by two or three times as much as in other frames, and wrong labels scatter as far as
+/// the board was tilted.
+const DECISIVE: f64 = 3.0;
+
+/// Rotations of a board differ by 90° or more; by half of the least they are told from one another.
+const OTHER_RAD: f64 = FRAC_PI_4;
+
+/// How the labels of a camera were rotated.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
+pub struct LabelRotation {
+    /// The least rotation after which the board looks the same, degrees.
+    pub degrees: u32,
+    /// Frames in which the labels were rotated.
+    pub frames: usize,
+    /// Frames in which the camera saw the board together with another one.
+    pub of: usize,
+    /// Whether labels that are rotated otherwise do not fit.
+    pub is_sure: bool,
+}
+
+/// The rotations after which each target looks the same.
+pub(super) struct Symmetries {
+    of_target: Vec<Vec<Symmetry>>,
+    /// Where the corners of each target are in the frame of its panel, by their labels, mm.
+    places: Vec<BTreeMap<(i32, i32), DVec3>>,
+}
+
+/// A rotation of the labels of a target, and what it does to the pose of a view.
+struct Symmetry {
+    map: LatticeMap,
+    /// From the target with its labels rotated to the target as it was labelled.
+    labelled_from_rotated: Pose,
+}
+
+impl Symmetries {
+    /// Those of the targets of one panel; of several panels tags decide.
+    pub(super) fn of(calibration: &Calibration) -> Self {
+        let mut places = vec![BTreeMap::new(); calibration.targets.len()];
+        let of_target = calibration.targets.iter().enumerate().map(|(target, of)| {
+            let maps = match of.panels.len() {
+                1 => calibration.symmetries.get(of.panels.start).map_or(&[][..], Vec::as_slice),
+                _ => &[],
+            };
+            if maps.is_empty() {
+                return Vec::new();
+            }
+            let views = calibration.cameras.iter().flat_map(|camera| &camera.views);
+            let sightings = views.flat_map(|view| &view.sightings);
+            let own = sightings.filter(|sighting| of.panels.contains(&sighting.panel.index()));
+            let seen = own.flat_map(|sighting| &sighting.observations);
+            places[target] = seen.map(|seen| ((seen.row, seen.col), seen.panel_mm)).collect();
+            let panel = calibration.panels[of.panels.start].target_from_panel;
+            maps.iter().filter_map(|&map| Symmetry::of(map, &places[target], &panel)).collect()
+        });
+        let of_target = of_target.collect();
+        Self { of_target, places }
+    }
+
+    /// The poses of a view of a target: as it was labelled, then with its labels rotated.
+    fn poses(&self, seen: &Seen) -> impl Iterator<Item = Pose> {
+        let rotated = self.of_target[seen.target].iter();
+        let rotated = rotated.map(|of| seen.camera_from_target.after(&of.labelled_from_rotated));
+        std::iter::once(seen.camera_from_target).chain(rotated)
+    }
+
+    /// Where camera b is, seen from camera a, by what both saw of one target: as it was labelled, then with the labels of
+    /// b rotated.
+    pub(super) fn relative(&self, a: &Seen, b: &Seen) -> Vec<Pose> {
+        let target_from_a = a.camera_from_target.inverse();
+        self.poses(b).map(|b_from_target| b_from_target.after(&target_from_a)).collect()
+    }
+
+    /// What was seen of a target, with its labels rotated.
+    pub(super) fn rotated(
+        &self,
+        target: usize,
+        rotation: Option<usize>,
+        observations: &[Observation],
+    ) -> Vec<Observation> {
+        let Some(rotation) = rotation else { return observations.to_vec() };
+        let Symmetry { map, .. } = self.of_target[target][rotation];
+        let relabelled = observations.iter().filter_map(|seen| {
+            let Vertex { row, col } = map.apply(Vertex::new(seen.row, seen.col));
+            // A place that no view has belongs to no corner of the board.
+            let panel_mm = *self.places[target].get(&(row, col))?;
+            Some(Observation { row, col, panel_mm, ..*seen })
+        });
+        relabelled.collect()
+    }
+
+    /// Rotates the labels of all cameras but the first so that the cameras agree, from camera to camera along those that
+    /// share the most frames. Returns what is to be said of each camera.
+    pub(super) fn agree(
+        &self,
+        calibration: &Calibration,
+        seen: &mut ByFrame,
+    ) -> Vec<Option<LabelRotation>> {
+        let mut said = vec![None; seen.len()];
+        if self.of_target.iter().all(Vec::is_empty) {
+            return said;
+        }
+        let given = |camera: usize| calibration.cameras[camera].camera_from_rig;
+        let mut placed: Vec<(usize, Pose)> = vec![(0, given(0).unwrap_or(Pose::IDENTITY))];
+        let mut open: Vec<usize> = (1..seen.len()).collect();
+        while !open.is_empty() {
+            let pairs = placed.iter().flat_map(|&(from, pose)| {
+                open.iter().map(move |&to| (from, pose, to)).collect::<Vec<_>>()
+            });
+            let pairs = pairs.map(|(from, pose, to)| (self.common(seen, from, to), from, pose, to));
+            let most = pairs.max_by_key(|(frames, from, _, to)| {
+                (frames.len(), std::cmp::Reverse(*from), std::cmp::Reverse(*to))
+            });
+            let Some((frames, from, from_rig, to)) = most else { break };
+            let known = given(from).zip(given(to)).map(|(from, to)| to.after(&from.inverse()));
+            let found = match known {
+                Some(pose) => Some(Agreed { pose, spread_mm: 0.0, is_sure: true }),
+                None if frames.len() < LEAST_SHARED => break,
+                None => agreed(&frames),
+            };
+            let Some(found) = found else { break };
+            let to_rig = found.pose.after(&from_rig);
+            let (frames, of) = self.rotate(seen, &placed, (to, to_rig));
+            let degrees = self.least_degrees(&seen[to]);
+            let is_of_note = degrees.is_some() && (frames > 0 || !found.is_sure);
+            said[to] = degrees.filter(|_| is_of_note).map(|degrees| LabelRotation {
+                degrees,
+                frames,
+                of,
+                is_sure: found.is_sure,
+            });
+            placed.push((to, to_rig));
+            open.retain(|&camera| camera != to);
+        }
+        said
+    }
+
+    /// The least rotation of the targets that a camera saw, degrees.
+    fn least_degrees(&self, seen: &BTreeMap<String, Vec<Seen>>) -> Option<u32> {
+        let targets = seen.values().flatten().map(|seen| seen.target);
+        let maps = targets.flat_map(|target| &self.of_target[target]).map(|of| of.map);
+        let degrees = maps.map(|map| map.angle_rad().to_degrees().round() as u32);
+        degrees.map(|degrees| degrees.min(360 - degrees)).min()
+    }
+
+    /// The relative poses of two cameras in the frames in which both saw one target.
+    fn common(&self, seen: &ByFrame, from: usize, to: usize) -> Vec<Vec<Pose>> {
+        let both = seen[from].iter().filter_map(|(name, a)| Some((a, seen[to].get(name)?)));
+        let relative = both.flat_map(|(a, b)| {
+            let pairs = a.iter().flat_map(|a| b.iter().map(move |b| (a, b)));
+            pairs.filter(|(a, b)| a.target == b.target).map(|(a, b)| self.relative(a, b))
+        });
+        relative.collect()
+    }
+
+    /// Rotates the labels of a camera at this pose on the rig to those of the placed ones, and counts the frames in which
+    /// that was done, and all.
+    fn rotate(
+        &self,
+        seen: &mut ByFrame,
+        placed: &[(usize, Pose)],
+        (to, to_rig): (usize, Pose),
+    ) -> (usize, usize) {
+        let (mut rotated, mut all) = (0, 0);
+        let mut own = std::mem::take(&mut seen[to]);
+        for (name, of_frame) in &mut own {
+            let (mut is_rotated, mut is_shared) = (false, false);
+            for view in of_frame {
+                // What shows the most corners has the best pose.
+                let others = placed.iter().flat_map(|(camera, from_rig)| {
+                    let of_camera = seen[*camera].get(name).into_iter().flatten();
+                    of_camera.map(move |seen| (from_rig, seen))
+                });
+                let same = others.filter(|(_, other)| other.target == view.target);
+                let Some((from_rig, other)) = same.max_by_key(|(_, other)| other.corners) else {
+                    continue;
+                };
+                is_shared = true;
+                let expected = to_rig.after(&from_rig.inverse()).after(&other.camera_from_target);
+                let arm_mm = expected.translation.length().max(1.0);
+                let poses: Vec<Pose> = self.poses(view).collect();
+                let off = |index: usize| apart_mm(&poses[index], &expected, arm_mm);
+                let nearest = (0..poses.len()).min_by(|&a, &b| off(a).total_cmp(&off(b)));
+                let nearest = nearest.filter(|&index| DECISIVE * off(index) < off(0));
+                if let Some(rotation) = nearest.and_then(|index| index.checked_sub(1)) {
+                    view.rotated = Some(rotation);
+                    view.camera_from_target = poses[rotation + 1];
+                    is_rotated = true;
+                }
+            }
+            rotated += usize::from(is_rotated);
+            all += usize::from(is_shared);
+        }
+        seen[to] = own;
+        (rotated, all)
+    }
+}
+
+impl Symmetry {
+    /// `None` where no view shows two corners of which one goes to the other.
+    fn of(
+        map: LatticeMap,
+        places: &BTreeMap<(i32, i32), DVec3>,
+        target_from_panel: &Pose,
+    ) -> Option<Self> {
+        let rotation = DQuat::from_rotation_z(map.angle_rad());
+        // The corner with the rotated label is where the corner with the detected one is.
+        let shifts = places.iter().filter_map(|(&(row, col), &at)| {
+            let Vertex { row, col } = map.apply(Vertex::new(row, col));
+            Some(*places.get(&(row, col))? - rotation * at)
+        });
+        let shifts: Vec<DVec3> = shifts.collect();
+        let translation = shifts.iter().sum::<DVec3>() / shifts.len() as f64;
+        let rotated_from_labelled = Pose { rotation, translation };
+        let labelled_from_rotated = target_from_panel
+            .after(&rotated_from_labelled.inverse())
+            .after(&target_from_panel.inverse());
+        (!shifts.is_empty()).then_some(Self { map, labelled_from_rotated })
+    }
+}
+
+/// The relative pose on which most frames agree.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Agreed {
+    pub pose: Pose,
+    /// The median distance of the frames from it, mm.
+    pub spread_mm: f64,
+    /// Whether no pose that belongs to other labels fits.
+    pub is_sure: bool,
+}
+
+/// A rotation counts by how far it moves a point at the end of an arm.
+fn apart_mm(a: &Pose, b: &Pose, arm_mm: f64) -> f64 {
+    (a.translation - b.translation).length() + arm_mm * a.rotation.angle_between(b.rotation)
+}
+
+/// The pose on which most frames agree, of each of which there are the pose as it was labelled, and those with labels
+/// rotated: that of the labels as they are, unless others agree decisively better. `None` without frames.
+pub(super) fn agreed(frames: &[Vec<Pose>]) -> Option<Agreed> {
+    let frames: Vec<&Vec<Pose>> = evenly(frames, MOST_FRAMES).collect();
+    let labelled = || frames.iter().filter_map(|poses| poses.first());
+    let arm_mm = median(labelled().map(|pose| pose.translation.length()).collect())?.max(1.0);
+    let spread_mm = |pose: &Pose, most: usize| {
+        let nearest = frames.iter().map(|poses| {
+            let poses = poses.iter().take(most);
+            poses.map(|other| apart_mm(pose, other, arm_mm)).fold(f64::INFINITY, f64::min)
+        });
+        median(nearest.collect()).unwrap_or(f64::INFINITY)
+    };
+    let least = |found: Vec<(Pose, f64)>| found.into_iter().min_by(|a, b| a.1.total_cmp(&b.1));
+    let as_labelled = least(labelled().map(|pose| (*pose, spread_mm(pose, 1))).collect())?;
+    let all = frames.iter().flat_map(|poses| poses.iter());
+    let all: Vec<(Pose, f64)> = all.map(|pose| (*pose, spread_mm(pose, usize::MAX))).collect();
+    let best = least(all.clone())?;
+    let is_better = DECISIVE * best.1 < as_labelled.1;
+    let (pose, spread_mm) = if is_better { best } else { as_labelled };
+    let fits_too = |&(other, spread): &(Pose, f64)| {
+        spread < DECISIVE * spread_mm && other.rotation.angle_between(pose.rotation) > OTHER_RAD
+    };
+    Some(Agreed { pose, spread_mm, is_sure: !all.iter().any(fits_too) })
+}

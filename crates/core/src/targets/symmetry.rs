@@ -1,0 +1,73 @@
+//! Rotations after which a panel without tags looks the same.
+
+use std::collections::BTreeSet;
+
+use super::Panel;
+use crate::lattice::{GridKind, LatticeMap, Vertex};
+
+impl Panel {
+    /// The rotations, other than none, that take the corners of a panel without tags to its corners and its dark tiles
+    /// to dark tiles: no picture tells such labels from one another.
+    ///
+    /// A checkerboard of r × c corners has the half turn where r + c is even, and a square one of an even number of
+    /// rows the quarter turns too. A deltille has 120° rotations only where its outline has them, as a triangle does;
+    /// rectangular ones have none. Of a panel with tags, or with discs, there are none.
+    ///
+    /// ```
+    /// use deltille_core::targets::{BoardSpec, Target};
+    ///
+    /// let symmetries = |rows, cols| {
+    ///     let spec = BoardSpec { tags: None, ..BoardSpec::checkerboard(rows, cols, 30.0) };
+    ///     Target::new("board", spec).map(|board| board.panels[0].label_symmetries().len())
+    /// };
+    /// assert_eq!([symmetries(4, 6)?, symmetries(4, 7)?, symmetries(6, 6)?, symmetries(5, 5)?], [1, 0, 3, 1]);
+    /// # Ok::<(), deltille_core::targets::TargetError>(())
+    /// ```
+    pub fn label_symmetries(&self) -> Vec<LatticeMap> {
+        match self.tags.is_empty() && self.discs_mm.is_none() {
+            true => symmetries(self.kind, self.corners.iter().map(|c| Vertex::new(c.row, c.col))),
+            false => Vec::new(),
+        }
+    }
+}
+
+/// The same of corners at these vertices.
+pub(crate) fn symmetries(
+    kind: GridKind,
+    vertices: impl IntoIterator<Item = Vertex>,
+) -> Vec<LatticeMap> {
+    let vertices: BTreeSet<Vertex> = vertices.into_iter().collect();
+    let of_turns = |turns: i32| {
+        let turned = LatticeMap::new(kind, turns, Vertex::new(0, 0));
+        let first = vertices.iter().map(|&v| turned.apply(v)).min()?;
+        let map = LatticeMap::new(kind, turns, *vertices.first()? - first);
+        let is_onto = vertices.iter().all(|&v| vertices.contains(&map.apply(v)));
+        (is_onto && map.keeps_colours()).then_some(map)
+    };
+    (1..kind.steps().len() as i32).filter_map(of_turns).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::targets::board_vertices;
+
+    #[test]
+    fn symmetries_of_boards() {
+        let turns = |kind, rows, cols| -> Vec<u8> {
+            let maps = symmetries(kind, board_vertices(kind, rows, cols));
+            maps.into_iter().map(LatticeMap::turns).collect()
+        };
+        for (rows, cols, expected) in
+            [(4, 6, &[2][..]), (5, 7, &[2]), (4, 7, &[]), (6, 6, &[1, 2, 3]), (7, 7, &[2])]
+        {
+            assert_eq!(turns(GridKind::Checker, rows, cols), expected, "{rows} × {cols}");
+        }
+        for (rows, cols) in [(4, 5), (4, 6), (5, 5), (7, 10)] {
+            assert!(turns(GridKind::Deltille, rows, cols).is_empty(), "{rows} × {cols}");
+        }
+        let triangle = (0..6).flat_map(|row| (0..6 - row).map(move |col| Vertex::new(row, col)));
+        let of_triangle = symmetries(GridKind::Deltille, triangle);
+        assert_eq!(of_triangle.into_iter().map(LatticeMap::turns).collect::<Vec<_>>(), [2, 4]);
+    }
+}
