@@ -4,6 +4,7 @@ mod commands;
 mod gross_errors;
 mod guide;
 mod models;
+mod one_state;
 mod page;
 mod rig;
 mod scenes;

@@ -10,8 +10,10 @@ use super::coverage::Coverage;
 use super::error::CalibrationError;
 use super::excluded::Excluded;
 use super::finding::Finding;
+use super::halves;
 use super::lack_of_fit::{LackOfFit, lack_of_fit};
 use super::lens_end::LensEnd;
+use super::loss::Loss;
 use super::minimise::Minimum;
 use super::model::Model;
 use super::next_view::KnownSoFar;
@@ -21,7 +23,8 @@ use super::problem::Problem;
 use super::reweighting::{Settled, variance};
 use super::roughness::Roughness;
 use super::shape::{BoardShape, COUNT as SHAPE_COEFFICIENTS, Shape};
-use super::start::Frame;
+use super::start::{Frame, in_order};
+use super::state_equations::StateEquations;
 use super::target_map::{CornerOffset, TargetMap};
 use super::uncertainty::{ObservedCovariance, ProjectionUncertainty};
 use crate::camera::{Camera, PROJECTION_PARAMETERS, Pose};
@@ -68,6 +71,8 @@ pub struct Estimate {
     pub steps: usize,
     /// What the corners say of the first camera and the board's shape, by which views are proposed.
     pub(super) known: Option<KnownSoFar>,
+    /// What the views of each camera say of its state.
+    pub(super) states: Vec<Option<StateEquations>>,
 }
 
 /// The estimate of one camera.
@@ -390,12 +395,19 @@ impl Estimate {
         let variance = variance(minimum, whitening, loss);
         let covariance = &found.shared * variance;
         let observed = observed(minimum, whitening, loss, &found);
+        let states = states(frames, settled, loss);
         let mut views = views(cameras, frames, settled);
         let cameras = cameras.iter().enumerate().map(|(index, camera)| {
             let views = std::mem::take(&mut views[index]);
             let mut camera = camera_estimate(index, camera, views, settled, &found, &covariance);
-            camera.projection =
-                projection(index, &camera, settled, distances_mm, observed.as_ref());
+            camera.projection = projection(
+                &camera,
+                &states[index],
+                index,
+                settled,
+                distances_mm,
+                observed.as_ref(),
+            );
             let of_pose = layout.cameras[index].zip(observed.as_ref());
             camera.observed_pose_sd = of_pose.map(|(first, observed)| {
                 std::array::from_fn(|i| observed.covariance[(first + i, first + i)].sqrt())
@@ -440,10 +452,24 @@ impl Estimate {
             lack_of_fit: lack_of_fit(problem, whitening),
             steps: *steps,
             known: known(settled, &found, variance),
+            states,
             cameras,
             ..Self::default()
         })
     }
+}
+
+/// What the views of each camera say of its state, in the natural order of their names.
+fn states(frames: &[&Frame], settled: &Settled, loss: Loss) -> Vec<Option<StateEquations>> {
+    let Settled { minimum, whitening, .. } = settled;
+    let names = in_order(frames.iter().map(|frame| frame.name.as_str()).collect());
+    let places: BTreeMap<&str, usize> =
+        names.iter().enumerate().map(|(place, name)| (name.as_str(), place)).collect();
+    let mut order: Vec<usize> = (0..frames.len()).collect();
+    order.sort_by_key(|&frame| places.get(frames[frame].name.as_str()));
+    let cameras = 0..minimum.problem.cameras.len();
+    let of = |camera| StateEquations::of(&minimum.problem, whitening, loss, camera, &order);
+    cameras.map(of).collect()
 }
 
 /// The views of every camera, with all corners that are within its reach.
@@ -523,8 +549,9 @@ fn camera_estimate(
 
 /// How a camera's projections are known, with the covariance of what all frames share as these show it.
 fn projection(
-    index: usize,
     camera: &CameraEstimate,
+    state: &Option<StateEquations>,
+    index: usize,
     settled: &Settled,
     distances_mm: &[f64],
     observed: Option<&Observed>,
@@ -537,7 +564,11 @@ fn projection(
     let observed = observed.map(|Observed { covariance, freedom }| {
         let n = columns.len();
         let own = DMatrix::from_fn(n, n, |i, j| covariance[(columns[i].1, columns[j].1)]);
-        ObservedCovariance { covariance: own, freedom: *freedom }
+        let covariance = match state {
+            Some(state) => halves::raised(state, own, &camera.covariance),
+            None => own,
+        };
+        ObservedCovariance { covariance, freedom: *freedom }
     });
     let (whitening, free) = (&settled.whitening, camera.free());
     ProjectionUncertainty::of(problem, whitening, index, &free, distances_mm, observed)
