@@ -565,7 +565,7 @@ fn projection(
         let n = columns.len();
         let own = DMatrix::from_fn(n, n, |i, j| covariance[(columns[i].1, columns[j].1)]);
         let covariance = match state {
-            Some(state) => halves::raised(state, own, &camera.covariance),
+            Some(state) => halves::raised(state, &camera.camera, own, &camera.covariance),
             None => own,
         };
         ObservedCovariance { covariance, freedom: *freedom }

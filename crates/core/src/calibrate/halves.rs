@@ -7,7 +7,9 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::state_equations::StateEquations;
+use super::one_state::significance;
+use super::state_equations::{Candidate, StateEquations};
+use crate::camera::Camera;
 use crate::statistics::f_chance;
 
 /// Probability that a covariance that is right is raised, for all parameters and both ways to split.
@@ -23,6 +25,7 @@ const LEAST_VIEWS: usize = 5;
 /// from noise.
 pub(super) fn raised(
     equations: &StateEquations,
+    camera: &Camera,
     observed: DMatrix<f64>,
     noise: &DMatrix<f64>,
 ) -> DMatrix<f64> {
@@ -31,8 +34,10 @@ pub(super) fn raised(
     if count < 2 * LEAST_VIEWS || equations.parameter_count() != n {
         return observed;
     }
+    let limit = SIGNIFICANT / (WAYS * (n + 1)) as f64;
     let ways: [&dyn Fn(usize) -> bool; WAYS] = [&|view| 2 * view < count, &|view| view % 2 == 0];
-    let differences = ways.into_iter().filter_map(|is_first| {
+    // All parameters, each half by itself.
+    let apart = ways.iter().filter_map(|is_first| {
         let first = equations.some(is_first).fit(&equations.camera())?;
         let second = equations.some(|view| !is_first(view)).fit(&equations.camera())?;
         let off: DVector<f64> = first.values() - second.values();
@@ -42,9 +47,18 @@ pub(super) fn raised(
             (observed[(i, i)] * half / noise[(i, i)]).sqrt()
         };
         let chance = |i: usize| f_chance((off[i] / of_halves(i)).powi(2), 1.0, (count - 2) as f64);
-        let least = (0..n).map(chance).fold(1.0, f64::min);
-        (least * ((WAYS * n) as f64) < SIGNIFICANT).then_some(off)
+        ((0..n).map(chance).fold(1.0, f64::min) < limit).then_some(off)
     });
-    let differences: Vec<DVector<f64>> = differences.collect();
+    // The focal lengths alone: halves that show the board differently tell more of them with one lens.
+    let focal = ways.iter().filter(|_| equations.is_focal_free()).filter_map(|is_first| {
+        let mut columns = equations.camera();
+        let weights = (0..count).map(|view| f64::from(u8::from(is_first(view)))).collect();
+        columns.push(equations.weighted(Candidate::Focal, weights));
+        let effect = equations.fit(&columns)?.effect(n, 2.0)?;
+        let focal_px = camera.focal_px.to_array();
+        let off = DVector::from_fn(n, |i, _| focal_px.get(i).map_or(0.0, |px| px * effect.value));
+        (significance(effect) < limit).then_some(off)
+    });
+    let differences: Vec<DVector<f64>> = apart.chain(focal).collect();
     differences.iter().fold(observed, |sum, off| sum + off * off.transpose() / 4.0)
 }

@@ -6,7 +6,7 @@
 //!   stretch    x and y of the board in another ratio than described
 //! ```
 //!
-//! Each is a score test on [`StateEquations`]. Deviations are those of a delete-one jackknife over views, so that
+//! Each is a score test on [`StateEquations`]. Deviations are those of the scatter between views, so that
 //! errors of the model and of the board, which differ from view to view, do not pass for a change. Stretch, shear and
 //! bend of the board are unknowns of each test: a bent board that is seen from one side first and from the other
 //! later is no change of the camera.
@@ -16,9 +16,9 @@ use super::weights::OUTLIER_SIGMA;
 use crate::camera::Camera;
 use crate::statistics::f_chance;
 
-/// Probability of each of the three diagnoses for views in which nothing is wrong; that of a change is for all
-/// positions together.
-const SIGNIFICANT: f64 = 1e-3;
+/// Probability of each of the three diagnoses for views in which nothing is wrong, 1 % for all; that of a change is
+/// for all positions together.
+const SIGNIFICANT: f64 = 0.01 / 3.0;
 
 /// Least number of views before and after a change: two and one to test them.
 const LEAST_VIEWS: usize = 3;
@@ -120,7 +120,11 @@ impl State {
                 left_px,
             })
         });
-        let shutter = shutter(equations, step.as_ref().map(|step| step.first));
+        // What one step leaves of a stretch is not told from a shutter.
+        let shutter = match stretch {
+            None => shutter(equations, step.as_ref().map(|step| step.first)),
+            Some(_) => None,
+        };
         Self { change, shutter, stretch }
     }
 }
@@ -135,7 +139,7 @@ fn base(equations: &StateEquations) -> Vec<Column> {
 }
 
 /// How often noise makes as much of an effect.
-fn significance(effect: Effect) -> f64 {
+pub(super) fn significance(effect: Effect) -> f64 {
     match effect.freedom >= 1.0 {
         true => f_chance((effect.value / effect.sd).powi(2), 1.0, effect.freedom),
         false => 1.0,
@@ -150,7 +154,7 @@ struct Step {
     fit: Fit,
 }
 
-fn after(first: usize, count: usize) -> Vec<f64> {
+pub(super) fn after(first: usize, count: usize) -> Vec<f64> {
     (0..count).map(|view| f64::from(u8::from(view >= first))).collect()
 }
 

@@ -80,7 +80,7 @@ pub(super) struct StateEquations {
     pub views: Vec<ViewEquations>,
     /// Columns of the camera.
     parameters: usize,
-    /// Whether the first of them is the focal length in x.
+    /// Whether the first two of them are the focal lengths.
     is_focal_free: bool,
     /// Whether all corners are those of one panel.
     pub is_of_one_panel: bool,
@@ -141,7 +141,7 @@ impl StateEquations {
         Some(Self {
             views,
             parameters: equations.free.len(),
-            is_focal_free: equations.free.first() == Some(&0),
+            is_focal_free: equations.free.starts_with(&[0, 1]),
             is_of_one_panel: panels.len() == 1,
         })
     }
@@ -160,6 +160,11 @@ impl StateEquations {
     /// How many unknowns the camera has.
     pub(super) fn parameter_count(&self) -> usize {
         self.parameters
+    }
+
+    /// Whether the first two of them are the focal lengths.
+    pub(super) fn is_focal_free(&self) -> bool {
+        self.is_focal_free
     }
 
     /// By which part the focal length in x changes in a fit whose first columns are those of the camera.
@@ -275,9 +280,11 @@ impl Fit {
         self.left / self.freedom.max(1.0)
     }
 
-    /// An unknown, with the larger of the deviations from noise and from the delete-one jackknife over views.
+    /// An unknown with its deviation: the mean of the variances from the delete-one jackknife over views and from
+    /// noise as much larger as views scatter more than it in all directions, and never less than that from noise.
     ///
-    /// The degrees of freedom are those of Satterthwaite's formula for what the views contribute, less `taken`.
+    /// The degrees of freedom of the jackknife are those of Satterthwaite's formula for what the views contribute,
+    /// less `taken`; the mean has twice as many, as the other variance is known from all directions together.
     pub(super) fn effect(&self, index: usize, taken: f64) -> Option<Effect> {
         let count = self.parts.len() as f64;
         let (mut without, mut shares) = (Vec::with_capacity(self.parts.len()), Vec::new());
@@ -291,13 +298,40 @@ impl Fit {
         let squares: f64 = without.iter().map(|value| (value - mean).powi(2)).sum();
         let of_views = (count - 1.0) / count * squares;
         let of_noise = self.noise_variance(index);
+        let both = (0.5 * (of_views + self.scatter() * of_noise)).max(of_noise);
         let (sum, squares) = shares.iter().fold((0.0, 0.0), |(a, b), s| (a + s, b + s * s));
-        let freedom = sum * sum / squares - taken;
-        let value = self.beta[index];
-        let sd = of_views.max(of_noise).sqrt();
+        let freedom = 2.0 * (sum * sum / squares - taken);
+        let (value, sd) = (self.beta[index], both.sqrt());
         (sd > 0.0 && sd.is_finite()).then_some(Effect { value, sd, freedom })
     }
+
+    /// How much larger the squares of what views pull at the unknowns are than noise has them: about 1 where
+    /// it is all there is.
+    fn scatter(&self) -> f64 {
+        let (mut squares, mut freedom) = (0.0, -(self.beta.len() as f64));
+        for (own, pull) in &self.parts {
+            let pull = pull - own * &self.beta;
+            let n = own.nrows();
+            let scale = DVector::from_fn(n, |i, _| match own[(i, i)] > 0.0 {
+                true => own[(i, i)].sqrt().recip(),
+                false => 0.0,
+            });
+            let eigen =
+                DMatrix::from_fn(n, n, |i, j| own[(i, j)] * scale[i] * scale[j]).symmetric_eigen();
+            let along = eigen.eigenvectors.tr_mul(&pull.component_mul(&scale));
+            let known =
+                eigen.eigenvalues.iter().zip(along.iter()).filter(|(value, _)| **value > OPEN);
+            for (value, along) in known {
+                squares += along * along / value;
+                freedom += 1.0;
+            }
+        }
+        squares / freedom.max(1.0) / self.variance()
+    }
 }
+
+/// A direction of which a view says less than this part of what it says of its coordinates is open to it.
+const OPEN: f64 = 1e-6;
 
 struct Equations<'a> {
     problem: &'a Problem,

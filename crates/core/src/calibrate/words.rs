@@ -305,15 +305,18 @@ impl<'a> Words<'a> {
 /// A camera of a model that does not fit the lens at all.
 fn does_not_fit(model: Option<Model>, rms_px: f64) -> String {
     let of = model.map_or(String::new(), |model| format!("{model}, "));
-    let fisheye = match model {
-        Some(model) if model.is_perspective() => ", or `pupil` for a fisheye",
-        _ => "",
+    let richer = model.map_or(&[] as &[Model], Model::richer).iter().copied();
+    // A lens of the other kind has a pupil that moves as often as not.
+    let fisheye = model.filter(|model| model.is_perspective()).map(|_| Model::Pupil);
+    let others: Vec<String> = richer.chain(fisheye).map(|model| model.to_string()).collect();
+    let advice = match others.as_slice() {
+        [] => "none of the richer models here does".to_owned(),
+        others => format!("try `calibrate::Model` {}", others.join(" or ")),
     };
     format!(
-        "the model does not fit the lens ({of}{rms_px:.1} px, more than {} % of the image's width): {}{fisheye}; or \
+        "the model does not fit the lens ({of}{rms_px:.1} px, more than {} % of the image's width): {advice}; or \
          labels are wrong",
-        100.0 * FOREIGN_PART,
-        other_lens(model)
+        100.0 * FOREIGN_PART
     )
 }
 
