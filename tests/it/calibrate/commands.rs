@@ -236,9 +236,9 @@ fn what_is_wrong_is_told_on_the_terminal_in_the_file_and_on_the_page() {
             "A print scale that is wrong",
             &good,
             "--model radtan --print-scale 1.2,1.1",
-            "remedy",
-            "instead",
-            "board_shape",
+            "stretched_board",
+            "kind",
+            "stretched_board",
         ),
         (
             "Not quite this camera",

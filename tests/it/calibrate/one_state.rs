@@ -31,11 +31,11 @@ fn nothing_is_named_where_camera_and_board_are_as_described_or_bent() {
     }
 }
 
-/// The observed deviation of a focal length that changed by 90 px is that of two halves: half of their difference.
+/// Of a focal length that changed by 90 px the halves of the views show tens of px, and noise half a pixel.
 #[test]
 fn an_observed_deviation_is_not_below_what_halves_of_the_views_show() {
     for run in runs(&[(Scene::Zoom, 3)]) {
         let [_, noise, observed] = run.focal;
-        assert!(noise < 2.0 && observed > 40.0, "{run:?}");
+        assert!(noise < 2.0 && observed > 20.0 * noise, "{run:?}");
     }
 }

@@ -120,10 +120,12 @@ impl State {
                 left_px,
             })
         });
-        // What one step leaves of a stretch is not told from a shutter.
-        let shutter = match stretch {
-            None => shutter(equations, step.as_ref().map(|step| step.first)),
-            Some(_) => None,
+        // What one step leaves of a stretch may pass for a shutter, and what shutters do together for a stretch.
+        let shutter = shutter(equations, step.as_ref().map(|step| step.first));
+        let (stretch, shutter) = match (stretch, shutter) {
+            (Some((stretch, true)), Some(_)) => (Some(stretch), None),
+            (Some((_, false)), Some(shutter)) => (None, Some(shutter)),
+            (stretch, shutter) => (stretch.map(|(stretch, _)| stretch), shutter),
         };
         Self { change, shutter, stretch }
     }
@@ -206,7 +208,8 @@ fn shutter(equations: &StateEquations, changed: Option<usize>) -> Option<Rolling
     Some(RollingShutter { shear_px, views, significance, left_px })
 }
 
-fn stretch(equations: &StateEquations) -> Option<BoardStretch> {
+/// The stretch, and whether the board's columns explain most of the squares.
+fn stretch(equations: &StateEquations) -> Option<(BoardStretch, bool)> {
     if !equations.is_of_one_panel || equations.count() < LEAST_VIEWS {
         return None;
     }
@@ -217,10 +220,9 @@ fn stretch(equations: &StateEquations) -> Option<BoardStretch> {
     let significance = significance(effect);
     let ratio = (1.0 + effect.value) / (1.0 - effect.value);
     let is_large = (ratio - 1.0).abs() > LEAST_STRETCH;
-    (significance < SIGNIFICANT && is_large).then(|| BoardStretch {
-        ratio,
-        sd: 2.0 * effect.sd,
-        significance,
-        left_px: equations.px() * fit.variance().sqrt(),
-    })
+    let plain = equations.fit(&equations.camera())?;
+    let is_most = fit.variance() < MOST_LEFT * plain.variance();
+    let left_px = equations.px() * fit.variance().sqrt();
+    let found = BoardStretch { ratio, sd: 2.0 * effect.sd, significance, left_px };
+    (significance < SIGNIFICANT && is_large).then_some((found, is_most))
 }
