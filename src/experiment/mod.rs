@@ -6,4 +6,5 @@ pub mod guide;
 pub mod photographs;
 pub mod plot;
 pub mod rig;
+pub mod states;
 pub mod table2;

@@ -17,7 +17,8 @@ use crate::cli::{interrupt, output, progress};
 use crate::detect::Tone;
 use crate::experiment::photographs::axes::Axis;
 use crate::experiment::photographs::{self, Kind, Subject, table};
-use crate::experiment::{corners, guide, plot, rig, table2};
+use crate::experiment::states::Scene;
+use crate::experiment::{corners, guide, plot, rig, states, table2};
 use crate::family;
 use crate::limits::Limits;
 
@@ -42,6 +43,9 @@ enum Experiment {
     /// The paper's §4.4: a rig of four cameras, calibrated with an icosahedron and with a cube whose
     /// panels are misplaced, with and without refining them: rig.csv
     Rig(RigArgs),
+    /// Views of a camera in one state, and of one that changes, with a rolling shutter, or with a board of other
+    /// proportions: how often each is diagnosed: states.csv
+    States(StatesArgs),
     /// The paper's Table 2: calibrate on the first half of a sequence of photographs, find poses
     /// on the second
     Table2(Table2Args),
@@ -94,6 +98,22 @@ struct RigArgs {
     #[arg(long, value_name = "N", default_value_t = 30,
           value_parser = whole(5..=1000u32))]
     frames: u32,
+    #[command(flatten)]
+    simulation: SimulationArgs,
+}
+
+#[derive(clap::Args)]
+struct StatesArgs {
+    /// Runs without any fault
+    #[arg(long, value_name = "N", default_value_t = 500, value_parser = whole(1..=100_000u32))]
+    clean: u32,
+    /// Runs of each scene with a fault
+    #[arg(long, value_name = "N", default_value_t = 100, value_parser = whole(1..=100_000u32))]
+    runs: u32,
+    /// Which scenes [default: all]
+    #[arg(long, value_name = "SCENE", value_delimiter = ',',
+          value_parser = Scene::ALL.map(Scene::name))]
+    scene: Vec<String>,
     #[command(flatten)]
     simulation: SimulationArgs,
 }
@@ -162,6 +182,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         Experiment::Guide(args) => run_guide(args),
         Experiment::Photographs(args) => run_photographs(args),
         Experiment::Rig(args) => run_rig(args),
+        Experiment::States(args) => run_states(args),
         Experiment::Table2(args) => {
             let images = Images::of(std::slice::from_ref(&args.folder))?;
             let rows = table2::run(images.named());
@@ -221,6 +242,25 @@ fn run_rig(args: RigArgs) -> anyhow::Result<ExitCode> {
     let path = simulation.output.join("rig.csv");
     output::write(&path, rig::csv(&outcomes).as_bytes(), simulation.overwrite)?;
     output::print(&format!("{}wrote {}\n", rig::text(&outcomes), path.display()))?;
+    Ok(ExitCode::SUCCESS)
+}
+
+fn run_states(args: StatesArgs) -> anyhow::Result<ExitCode> {
+    let StatesArgs { clean, runs, scene, simulation } = args;
+    let is_wanted = |of: &Scene| scene.is_empty() || scene.iter().any(|name| name == of.name());
+    let count = |of: Scene| if of == Scene::Clean { clean } else { runs } as usize;
+    let scenes = Scene::ALL.into_iter().filter(is_wanted).map(|of| (of, count(of)));
+    let scenes: Vec<(Scene, usize)> = scenes.collect();
+    let steps = scenes.iter().map(|(_, runs)| runs).sum();
+    let outcome = simulation.run(steps, "runs", |tick| {
+        states::run(&scenes, simulation.seed, interrupt::flag(), tick)
+    })?;
+    let Some(outcome) = outcome else {
+        return Err(Interrupted("nothing was written".to_owned()).into());
+    };
+    let path = simulation.output.join("states.csv");
+    output::write(&path, states::csv(&outcome).as_bytes(), simulation.overwrite)?;
+    output::print(&format!("{}wrote {}\n", states::text(&outcome), path.display()))?;
     Ok(ExitCode::SUCCESS)
 }
 

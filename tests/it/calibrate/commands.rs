@@ -236,9 +236,9 @@ fn what_is_wrong_is_told_on_the_terminal_in_the_file_and_on_the_page() {
             "A print scale that is wrong",
             &good,
             "--model radtan --print-scale 1.2,1.1",
-            "remedy",
-            "instead",
-            "board_shape",
+            "stretched_board",
+            "kind",
+            "stretched_board",
         ),
         (
             "Not quite this camera",
@@ -262,6 +262,29 @@ fn what_is_wrong_is_told_on_the_terminal_in_the_file_and_on_the_page() {
         assert!(said.any(|d| d["kind"] == kind && d[key] == value), "{title}: {said:?}");
     }
     page.is("calibrate-warnings");
+}
+
+/// From the eleventh picture on the focal length is 2 % longer.
+#[test]
+fn a_change_of_zoom_ends_with_an_error_that_names_the_view() {
+    let target = board(8, 9);
+    let mut seen = detections(&target, 20, 0.7);
+    let zoomed = |v: f64, centre: f64| centre + 1.02 * (v - centre);
+    for corner in seen[10..].iter_mut().flat_map(|of| &mut of.grids[0].corners) {
+        (corner.x, corner.y) = (zoomed(corner.x, 804.0), zoomed(corner.y, 606.0));
+    }
+    let folder = folder(&target, &seen);
+    let result = output(folder.path(), &format!("{CALIBRATE} --report page.html"));
+    let said = String::from_utf8(result.stderr).unwrap();
+    assert!(said.contains("from 10 on") && said.contains("lock zoom"), "{said}");
+    assert_eq!(result.status.code(), Some(1));
+    let written = json(&folder.path().join("camera.json"));
+    let change = &written["diagnoses"][0];
+    assert_eq!((&change["kind"], &change["from_view"]), (&"changed_camera".into(), &"10".into()));
+    let focal = |i: usize| change["focal_px"][i].as_f64().unwrap();
+    assert!((focal(1) / focal(0) - 1.02).abs() < 1e-3, "{change}");
+    let page = std::fs::read_to_string(folder.path().join("page.html")).unwrap();
+    assert!(page.contains("The views do not show one camera"));
 }
 
 #[test]

@@ -5,6 +5,7 @@ mod commands;
 mod gross_errors;
 mod guide;
 mod models;
+mod one_state;
 mod other_target;
 mod page;
 mod rig;

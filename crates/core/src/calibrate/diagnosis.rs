@@ -4,12 +4,14 @@ use std::collections::BTreeSet;
 
 use super::calibration::Calibration;
 use super::estimate::{CameraEstimate, Estimate};
-use super::finding::Finding;
+use super::finding::{Finding, Shared};
 use super::lack_of_fit::LackOfFit;
 use super::lens_end::LensEnd;
 use super::model::Model;
 use super::model_selection::{Instead, Remedy, is_explained};
-use super::start::LabelRotation;
+use super::one_state::{BoardStretch, CameraChange, RollingShutter, State};
+use super::shape::STRETCH;
+use super::start::{LabelRotation, in_order};
 use crate::camera::Camera;
 
 /// Corners are found to a few hundredths of a pixel; a camera that leaves more than this does not
@@ -84,6 +86,27 @@ pub enum Diagnosis {
         /// The least such rotation, degrees.
         degrees: u32,
     },
+    /// The views do not show one camera: from some view on its focal length is another one.
+    ChangedCamera {
+        /// The camera.
+        camera: usize,
+        /// What changed, and when.
+        change: CameraChange,
+    },
+    /// Rows were read one after the other while board or camera moved.
+    RollingShutter {
+        /// The camera.
+        camera: usize,
+        /// By how much rows are displaced.
+        shutter: RollingShutter,
+    },
+    /// The board is longer in one direction than in the other, against its description.
+    StretchedBoard {
+        /// The camera by whose views that was found.
+        camera: usize,
+        /// By how much.
+        stretch: BoardStretch,
+    },
     /// The lens turns back or runs away within the image.
     LensEnds {
         /// The camera.
@@ -125,8 +148,42 @@ impl Diagnosis {
     pub fn is_failure(&self) -> bool {
         matches!(
             self,
-            Self::ForeignCamera { .. } | Self::AbsurdFit { .. } | Self::ManyLeftOut { .. }
+            Self::ForeignCamera { .. }
+                | Self::AbsurdFit { .. }
+                | Self::ManyLeftOut { .. }
+                | Self::ChangedCamera { .. }
         )
+    }
+
+    /// The camera whose lens is not that of the model by this, so that no view is to blame for its residuals.
+    pub fn misfit_of(&self) -> Option<usize> {
+        match *self {
+            Self::AbsurdFit { camera, .. }
+            | Self::PoorFit { camera, .. }
+            | Self::LackOfFit(LackOfFit::Lens { camera, .. }) => Some(camera),
+            Self::Remedied { camera, remedy: Remedy { instead: Instead::Model(_), .. } } => {
+                Some(camera)
+            }
+            _ => None,
+        }
+    }
+
+    /// The camera of whose state this is, and what is left where it is allowed for, px.
+    fn of_state(&self) -> Option<(usize, f64)> {
+        match self {
+            Self::ChangedCamera { camera, change } => Some((*camera, change.left_px)),
+            Self::RollingShutter { camera, shutter } => Some((*camera, shutter.left_px)),
+            Self::StretchedBoard { camera, stretch } => Some((*camera, stretch.left_px)),
+            _ => None,
+        }
+    }
+
+    /// Whether this explains the residuals of its camera at least as well as a remedy does.
+    fn explains(&self, (camera, remedy): &(usize, Remedy)) -> bool {
+        let is_shape =
+            matches!(self, Self::StretchedBoard { .. }) && remedy.instead == Instead::Shape;
+        let is_better = |(of, left_px)| of == *camera && (is_shape || left_px <= remedy.to_px);
+        self.of_state().is_some_and(is_better)
     }
 }
 
@@ -139,6 +196,9 @@ impl Calibration {
         let own = self.split().map_or_else(|_| self.clone(), |(own, _)| own);
         let alone = own.each_alone(found);
         let mut said = said(found, &alone);
+        if own.is_single() {
+            said.iter_mut().for_each(|said| own.refine(found, said));
+        }
         said.extend(own.open_labels());
         if let (true, Some((other, rms_px))) = (own.is_single(), own.other_minimum(found)) {
             said.push(Diagnosis::OtherMinimum { camera: 0, other, rms_px });
@@ -152,6 +212,34 @@ impl Calibration {
         let maps = self.symmetries.iter().flatten().filter(|_| is_of_place);
         let degrees = maps.map(|map| map.angle_rad().to_degrees().round() as u32).min()?;
         Some(Diagnosis::LabelsOpen { degrees })
+    }
+
+    /// Replaces what one step says of a change or a stretch by what a calibration finds that allows for it.
+    fn refine(&self, found: &Estimate, said: &mut Diagnosis) {
+        match said {
+            Diagnosis::ChangedCamera { change, .. } => {
+                let order =
+                    in_order(found.frames.iter().map(|frame| frame.name.as_str()).collect());
+                let (before, after) = order
+                    .split_at(order.iter().position(|name| *name == change.from_view).unwrap_or(0));
+                let focal_px = [before, after].map(|names| {
+                    let views = self.cameras[0].views.iter();
+                    let views = views.filter(|view| names.contains(&view.name)).cloned().collect();
+                    Some(self.of_views(views).adjusted().ok()?.cameras[0].camera.focal_px.x)
+                });
+                if let [Some(before), Some(after)] = focal_px {
+                    change.focal_px = [before, after];
+                }
+            }
+            Diagnosis::StretchedBoard { stretch, .. } if self.panels.len() == 1 => {
+                let bent = self.clone().board_shape(true).adjusted().ok();
+                if let Some(shape) = bent.and_then(|bent| bent.shape).map(|bent| bent.shape) {
+                    let part = shape.coefficients_mm[STRETCH] / shape.reach_mm;
+                    stretch.ratio = (1.0 + part) / (1.0 - part);
+                }
+            }
+            _ => {}
+        }
     }
 
     /// A camera of another valley that leaves not much more, where a model has several.
@@ -231,9 +319,44 @@ fn said(found: &Estimate, alone: &[Alone]) -> Vec<Diagnosis> {
         parameters: of.ill_conditioned.clone(),
         sufficient: alone.as_ref().and_then(|(alone, found)| alone.sufficient(found)),
     });
-    let causes = causes(found, alone);
-    let failures = foreign.chain(absurd).chain(many_left_out(found));
-    failures.chain(late).chain(ends).chain(gross).chain(causes).chain(open).collect()
+    let mut states = states(found);
+    let causes = causes(found, alone, &mut states);
+    let failures: Vec<Diagnosis> = foreign.chain(absurd).chain(many_left_out(found)).collect();
+    // Where the lens is not that of the model, photographs are not to blame.
+    let misfits: BTreeSet<usize> =
+        failures.iter().chain(&causes).filter_map(Diagnosis::misfit_of).collect();
+    let is_of_view = |said: &Diagnosis| match said {
+        Diagnosis::GrossErrors(Finding {
+            shared: Shared::View { camera, .. }, left_out, ..
+        }) => misfits.contains(camera) && !left_out,
+        _ => false,
+    };
+    let gross = gross.filter(|said| !is_of_view(said));
+    let before = failures.into_iter().chain(late).chain(states);
+    before.chain(ends).chain(gross).chain(causes).chain(open).collect()
+}
+
+/// What the views of each camera show that is not one camera in one state, or not the board that is described.
+fn states(found: &Estimate) -> Vec<Diagnosis> {
+    let of_camera = |(camera, of): (usize, &CameraEstimate)| {
+        let equations = found.states.get(camera)?.as_ref()?;
+        let State { change, shutter, stretch } =
+            State::of(equations, &of.camera, |frame| found.frames[frame].name.clone());
+        let change = change.map(|change| Diagnosis::ChangedCamera { camera, change });
+        let shutter = shutter.map(|shutter| Diagnosis::RollingShutter { camera, shutter });
+        let stretch = stretch.map(|stretch| Diagnosis::StretchedBoard { camera, stretch });
+        let said = change.into_iter().chain(shutter).chain(stretch);
+        // What still leaves an absurd fit explains nothing.
+        let most_px = FOREIGN_PART * f64::from(of.camera.width);
+        let explains = |said: &Diagnosis| said.of_state().is_some_and(|(_, px)| px < most_px);
+        Some(said.filter(explains).collect::<Vec<_>>())
+    };
+    found.cameras.iter().enumerate().filter_map(of_camera).flatten().collect()
+}
+
+/// Whether a state is what leaves patterns in the residuals.
+fn leaves_patterns(state: &Diagnosis) -> bool {
+    matches!(state, Diagnosis::RollingShutter { .. } | Diagnosis::StretchedBoard { .. })
 }
 
 /// Whether a camera leaves so much that it cannot be that of the pictures.
@@ -259,8 +382,8 @@ fn many_left_out(found: &Estimate) -> Option<Diagnosis> {
     (is_sought && is_many).then_some(Diagnosis::ManyLeftOut { left_out, all })
 }
 
-/// Why residuals are not noise.
-fn causes(found: &Estimate, alone: &[Alone]) -> Vec<Diagnosis> {
+/// Why residuals are not noise, and which of the states explain them better than any remedy does.
+fn causes(found: &Estimate, alone: &[Alone], states: &mut Vec<Diagnosis>) -> Vec<Diagnosis> {
     let remedies = alone.iter().enumerate().filter_map(|(camera, alone)| {
         let (alone, found) = alone.as_ref()?;
         Some((camera, alone.remedy(found)?))
@@ -271,6 +394,14 @@ fn causes(found: &Estimate, alone: &[Alone]) -> Vec<Diagnosis> {
     if remedies.iter().any(of(Instead::Camera)) {
         remedies.retain(of(Instead::Camera));
     }
+    let is_of_model = |(_, remedy): &&(usize, Remedy)| matches!(remedy.instead, Instead::Model(_));
+    states.retain(|state| {
+        let is_worse = |of: &(usize, Remedy)| {
+            state.of_state().is_some_and(|(camera, px)| camera == of.0 && px > of.1.to_px)
+        };
+        !remedies.iter().filter(is_of_model).any(is_worse)
+    });
+    remedies.retain(|remedy| !states.iter().any(|state| state.explains(remedy)));
     // There is one board, and one target.
     let mut told = Vec::new();
     remedies.retain(|(_, Remedy { instead, .. })| {
@@ -288,6 +419,7 @@ fn causes(found: &Estimate, alone: &[Alone]) -> Vec<Diagnosis> {
     }
     let told: Vec<&LackOfFit> = match (panels, remedies.is_empty()) {
         (true, _) => of_target,
+        (false, true) if states.iter().any(leaves_patterns) => Vec::new(),
         (false, true) => found.lack_of_fit.iter().collect(),
         (false, false) => Vec::new(),
     };
@@ -296,7 +428,11 @@ fn causes(found: &Estimate, alone: &[Alone]) -> Vec<Diagnosis> {
             |m: &&LackOfFit| matches!(m, LackOfFit::Lens { camera: c, .. } if *c == camera);
         // Of a single camera anything is.
         let is_single = found.cameras.len() == 1 && !(told.is_empty() && remedies.is_empty());
-        is_single || remedies.iter().any(|(of, _)| *of == camera) || told.iter().any(is_lens)
+        let is_of_state = |state: &Diagnosis| state.of_state().is_some_and(|(of, _)| of == camera);
+        is_single
+            || states.iter().any(is_of_state)
+            || remedies.iter().any(|(of, _)| *of == camera)
+            || told.iter().any(is_lens)
     };
     let is_poor = |(index, camera): &(usize, &CameraEstimate)| {
         camera.inlier_rms_px() > POOR_RMS_PX && !is_absurd(camera) && !is_named(*index)

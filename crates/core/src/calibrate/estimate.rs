@@ -12,6 +12,7 @@ use super::coverage::Coverage;
 use super::error::CalibrationError;
 use super::excluded::Excluded;
 use super::finding::Finding;
+use super::halves;
 use super::lack_of_fit::{LackOfFit, lack_of_fit};
 use super::lens_end::LensEnd;
 use super::loss::Loss;
@@ -23,7 +24,8 @@ use super::panel::PanelRef;
 use super::reweighting::{Settled, deviations, variance};
 use super::roughness::Roughness;
 use super::shape::{BoardShape, COUNT as SHAPE_COEFFICIENTS, Shape};
-use super::start::{Frame, LabelRotation};
+use super::start::{Frame, LabelRotation, in_order};
+use super::state_equations::StateEquations;
 use super::target_map::{CornerOffset, TargetMap};
 use super::uncertainty::{ObservedCovariance, ProjectionUncertainty};
 use crate::camera::{Camera, PROJECTION_PARAMETERS, Pose};
@@ -72,6 +74,8 @@ pub struct Estimate {
     pub steps: usize,
     /// What the corners say of the first camera and the board's shape, by which views are proposed.
     pub(super) known: Option<KnownSoFar>,
+    /// What the views of each camera say of its state.
+    pub(super) states: Vec<Option<StateEquations>>,
 }
 
 /// The estimate of one camera.
@@ -403,12 +407,19 @@ impl Estimate {
             let of_board = board_errors(minimum, whitening, loss, &found, *board_accuracy_mm);
             observed.with(of_board, drawn.as_ref())
         });
+        let states = states(frames, settled, loss);
         let mut views = views(cameras, frames, settled);
         let cameras = cameras.iter().enumerate().map(|(index, camera)| {
             let views = std::mem::take(&mut views[index]);
             let mut camera = camera_estimate(index, camera, views, settled, &found, &covariance);
-            camera.projection =
-                projection(index, &camera, settled, distances_mm, observed.as_ref());
+            camera.projection = projection(
+                &camera,
+                &states[index],
+                index,
+                settled,
+                distances_mm,
+                observed.as_ref(),
+            );
             let of_pose = layout.cameras[index].zip(observed.as_ref());
             camera.observed_pose_sd = of_pose.map(|(first, observed)| {
                 std::array::from_fn(|i| observed.covariance[(first + i, first + i)].sqrt())
@@ -453,10 +464,24 @@ impl Estimate {
             lack_of_fit: lack_of_fit(problem, whitening),
             steps: *steps,
             known: known(settled, &found, variance),
+            states,
             cameras,
             ..Self::default()
         })
     }
+}
+
+/// What the views of each camera say of its state, in the natural order of their names.
+fn states(frames: &[&Frame], settled: &Settled, loss: Loss) -> Vec<Option<StateEquations>> {
+    let Settled { minimum, whitening, .. } = settled;
+    let names = in_order(frames.iter().map(|frame| frame.name.as_str()).collect());
+    let places: BTreeMap<&str, usize> =
+        names.iter().enumerate().map(|(place, name)| (name.as_str(), place)).collect();
+    let mut order: Vec<usize> = (0..frames.len()).collect();
+    order.sort_by_key(|&frame| places.get(frames[frame].name.as_str()));
+    let cameras = 0..minimum.problem.cameras.len();
+    let of = |camera| StateEquations::of(&minimum.problem, whitening, loss, camera, &order);
+    cameras.map(of).collect()
 }
 
 /// The views of every camera, with all corners that are within its reach.
@@ -537,8 +562,9 @@ fn camera_estimate(
 
 /// How a camera's projections are known, with the covariance of what all frames share as these show it.
 fn projection(
-    index: usize,
     camera: &CameraEstimate,
+    state: &Option<StateEquations>,
+    index: usize,
     settled: &Settled,
     distances_mm: &[f64],
     observed: Option<&Observed>,
@@ -552,11 +578,13 @@ fn projection(
         let n = columns.len();
         let own =
             |of: &DMatrix<f64>| DMatrix::from_fn(n, n, |i, j| of[(columns[i].1, columns[j].1)]);
-        ObservedCovariance {
-            covariance: own(covariance),
-            of_board: of_board.as_ref().map(own),
-            freedom: *freedom,
-        }
+        let covariance = match state {
+            Some(state) => {
+                halves::raised(state, &camera.camera, own(covariance), &camera.covariance)
+            }
+            None => own(covariance),
+        };
+        ObservedCovariance { covariance, of_board: of_board.as_ref().map(own), freedom: *freedom }
     });
     let (whitening, free) = (&settled.whitening, camera.free());
     ProjectionUncertainty::of(problem, whitening, index, &free, distances_mm, observed)

@@ -3,6 +3,9 @@ use glam::DVec3;
 /// Coefficients of a shape.
 pub const COUNT: usize = 9;
 
+/// Index of the coefficient a₁.
+pub(super) const STRETCH: usize = 7;
+
 /// How a board's sheet differs from its plan: bent, stretched and sheared.
 ///
 /// With u, v the place on the board from its middle, of which the farthest corner is 1 away,

@@ -6,11 +6,12 @@ use super::finding::{Finding, Moved, Shared};
 use super::lack_of_fit::LackOfFit;
 use super::model::Model;
 use super::model_selection::{Instead, Remedy};
+use super::one_state::{BoardStretch, CameraChange, RollingShutter};
 use super::panel::PanelRef;
 use super::start::LabelRotation;
 use super::target_map::LEAST_TO_MEASURE;
 use crate::camera::Camera;
-use crate::words::counted;
+use crate::words::{counted, places};
 
 /// A panel that is turned by less looks only moved.
 const TURNED_DEG: f64 = 0.05;
@@ -47,12 +48,7 @@ impl<'a> Words<'a> {
             ),
             Diagnosis::AbsurdFit { camera, rms_px } => self.of_camera(
                 *camera,
-                format!(
-                    "corners are off by {rms_px:.1} px, more than {} % of the image's width: this is no \
-                     calibration; {}, or labels are wrong",
-                    100.0 * FOREIGN_PART,
-                    other_lens(self.model(*camera))
-                ),
+                does_not_fit(self.model(*camera), *rms_px),
             ),
             Diagnosis::ManyLeftOut { left_out, all } => self.many_left_out(*left_out, *all),
             Diagnosis::OtherMinimum { camera, other, rms_px } => self.other_minimum(*camera, other, *rms_px),
@@ -62,6 +58,14 @@ impl<'a> Words<'a> {
                 "the board has no tags and looks the same after a rotation by {degrees}°: what was found of its corners or \
                  its shape is right only if it was the same way round in all views"
             ),
+            Diagnosis::ChangedCamera { camera, change } => {
+                self.of_camera(*camera, changed(change))
+            }
+            Diagnosis::RollingShutter { camera, shutter } => {
+                let views = self.estimate.cameras.get(*camera).map_or(0, |of| of.views.len());
+                self.of_camera(*camera, rolling_shutter(shutter, views))
+            }
+            Diagnosis::StretchedBoard { stretch, .. } => stretched(stretch),
             Diagnosis::LensEnds { camera, end } => self.of_camera(*camera, end.to_string()),
             Diagnosis::GrossErrors(finding) => self.finding(finding),
             Diagnosis::Remedied { camera, remedy } => self.remedied(*camera, remedy),
@@ -321,6 +325,73 @@ impl<'a> Words<'a> {
             Some(name) => format!("camera {name}: {text}"),
             None => text,
         }
+    }
+}
+
+/// A camera of a model that does not fit the lens at all.
+fn does_not_fit(model: Option<Model>, rms_px: f64) -> String {
+    let of = model.map_or(String::new(), |model| format!("{model}, "));
+    let richer = model.map_or(&[] as &[Model], Model::richer).iter().copied();
+    // A lens of the other kind has a pupil that moves as often as not.
+    let fisheye = model.filter(|model| model.is_perspective()).map(|_| Model::Pupil);
+    let others: Vec<String> = richer.chain(fisheye).map(|model| model.to_string()).collect();
+    let advice = match others.as_slice() {
+        [] => "none of the richer models here does".to_owned(),
+        others => format!("try `calibrate::Model` {}", others.join(" or ")),
+    };
+    format!(
+        "the model does not fit the lens ({of}{rms_px:.1} px, more than {} % of the image's width): {advice}; or \
+         labels are wrong",
+        100.0 * FOREIGN_PART
+    )
+}
+
+fn changed(change: &CameraChange) -> String {
+    let CameraChange {
+        from_view, views: [before, after], focal_px: [first, second], sd_px, ..
+    } = change;
+    let digits = places(*sd_px).clamp(1, 3);
+    format!(
+        "the views do not show one camera: the focal length is {first:.digits$} px in the first {before} views and \
+         {second:.digits$} px in the {after} from {from_view} on, a difference of {:.digits$} ± {sd_px:.digits$} px \
+         ({}); what was found is neither: lock zoom and focus, and calibrate each group of views by itself",
+        second - first,
+        significant(change.significance)
+    )
+}
+
+fn rolling_shutter(shutter: &RollingShutter, all: usize) -> String {
+    let RollingShutter { shear_px, views, significance, left_px } = shutter;
+    format!(
+        "rows are displaced against each other, by {shear_px:.1} px from the first to the last one, in {views} of {all} \
+         views ({}; {left_px:.3} px are left where that is allowed for): the shutter reads row by row while board or \
+         camera move; hold both still for each picture, or take a camera with a global shutter",
+        significant(*significance)
+    )
+}
+
+fn stretched(stretch: &BoardStretch) -> String {
+    let BoardStretch { ratio, sd, significance, .. } = *stretch;
+    let (along, other, ratio) = match ratio > 1.0 {
+        true => ("its rows (x)", "its columns (y)", ratio),
+        false => ("its columns (y)", "its rows (x)", ratio.recip()),
+    };
+    let digits = places(100.0 * sd).clamp(1, 3);
+    format!(
+        "the board is {:.digits$} ± {:.digits$} % longer along {along} than described, compared with {other} ({}): it \
+         is another board, its tiles have two different edges, or the print was fitted to its page; correct the \
+         description, or measure both check bars for `Sighting::stretch`",
+        100.0 * (ratio - 1.0),
+        100.0 * sd,
+        significant(significance)
+    )
+}
+
+/// How often noise alone makes as much.
+fn significant(probability: f64) -> String {
+    match probability < 1e-6 {
+        true => "p < 10⁻⁶".to_owned(),
+        false => format!("p = {:.0e}", probability),
     }
 }
 

@@ -147,6 +147,27 @@ pub(super) struct DiagnosisRecord<'a> {
     instead: Option<String>,
     #[serde(skip_serializing_if = "Option::is_none")]
     rms_px_then: Option<f64>,
+    /// First view after a change of the camera, the focal lengths before and after, and the deviation of their
+    /// difference, px.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    from_view: Option<&'a str>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    focal_px: Option<[f64; 2]>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    sd_px: Option<f64>,
+    /// Displacement between the first and the last row, px, and the number of views that show it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    shear_px: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    views: Option<usize>,
+    /// Length of the board along x over that along y, as described 1, and its deviation.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    ratio: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    ratio_sd: Option<f64>,
+    /// Probability of as much by noise alone.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    significance: Option<f64>,
     #[serde(skip_serializing_if = "<[String]>::is_empty")]
     parameters: &'a [String],
     /// A smaller lens model that fits as well.
@@ -317,7 +338,7 @@ pub(super) fn map<'a>(estimate: &'a Estimate, found: &'a TargetMap) -> MapRecord
 }
 
 /// Kinds of diagnoses in files after which a calibration is not to be used as it is.
-const FAILURES: [&str; 3] = ["foreign_camera", "absurd_fit", "many_left_out"];
+const FAILURES: [&str; 4] = ["foreign_camera", "absurd_fit", "many_left_out", "changed_camera"];
 
 /// Whether a diagnosis of this kind in a file says that the calibration is not to be used as it is,
 /// as [`Diagnosis::is_failure`] does.
@@ -378,6 +399,34 @@ pub(super) fn diagnoses<'a>(
                 camera: name(*camera),
                 rms_px_then: Some(*rms_px),
                 other: other.parameter_names().into_iter().zip(other.parameters()).collect(),
+                ..text
+            },
+            Diagnosis::ChangedCamera { camera, change } => DiagnosisRecord {
+                kind: "changed_camera",
+                camera: name(*camera),
+                from_view: Some(&change.from_view),
+                focal_px: Some(change.focal_px),
+                sd_px: Some(change.sd_px),
+                rms_px_then: Some(change.left_px),
+                significance: Some(change.significance),
+                ..text
+            },
+            Diagnosis::RollingShutter { camera, shutter } => DiagnosisRecord {
+                kind: "rolling_shutter",
+                camera: name(*camera),
+                shear_px: Some(shutter.shear_px),
+                views: Some(shutter.views),
+                rms_px_then: Some(shutter.left_px),
+                significance: Some(shutter.significance),
+                ..text
+            },
+            Diagnosis::StretchedBoard { camera, stretch } => DiagnosisRecord {
+                kind: "stretched_board",
+                camera: name(*camera),
+                ratio: Some(stretch.ratio),
+                ratio_sd: Some(stretch.sd),
+                rms_px_then: Some(stretch.left_px),
+                significance: Some(stretch.significance),
                 ..text
             },
             Diagnosis::LensEnds { camera, end: LensEnd { steady_px, .. } } => DiagnosisRecord {

@@ -74,7 +74,7 @@ pub fn advice(report: &Report, surveys: &[Survey]) -> Vec<Advice> {
         let mut add = |weight, text: String| {
             found.push(Advice { weight, text: of_camera(report, camera, text) });
         };
-        views(report, camera, survey, &mut add);
+        views(report, (index, camera), survey, &mut add);
         coverage(report, camera, survey, &mut add);
         told(report, &mut add, Topic::Lens(index));
         superfluous(camera, &mut add);
@@ -168,6 +168,8 @@ impl Topic {
             Diagnosis::Remedied { .. }
             | Diagnosis::LackOfFit(_)
             | Diagnosis::PoorFit { .. }
+            | Diagnosis::RollingShutter { .. }
+            | Diagnosis::StretchedBoard { .. }
             | Diagnosis::OtherMinimum { .. } => Self::Cause,
             _ => Self::Whole,
         }
@@ -183,7 +185,7 @@ fn told(report: &Report, add: &mut impl FnMut(Weight, String), topic: Topic) {
 
 fn views(
     report: &Report,
-    camera: &CameraEstimate,
+    (index, camera): (usize, &CameraEstimate),
     survey: &Survey,
     add: &mut impl FnMut(Weight, String),
 ) {
@@ -218,7 +220,12 @@ fn views(
     let median = median(rms.collect()).unwrap_or_default();
     let bad = camera.views.iter().filter(|view| view.rms_px > BAD_VIEW * median);
     let bad: Vec<&str> = bad.map(|view| view.name.as_str()).collect();
-    if !bad.is_empty() {
+    // Where the lens is not that of the model, or rows are displaced, photographs are not to blame.
+    let is_other = |said: &Diagnosis| match said {
+        Diagnosis::RollingShutter { camera, .. } => *camera == index,
+        _ => said.misfit_of() == Some(index),
+    };
+    if !bad.is_empty() && !report.diagnoses.iter().any(is_other) {
         let bent =
             if report.has_panels() { "a panel that is bent or loose" } else { "a bent board" };
         let text = format!(
@@ -384,7 +391,7 @@ mod tests {
     use nalgebra::DMatrix;
 
     use super::*;
-    use deltille_core::calibrate::{Estimate, LackOfFit, Model, PanelPlace};
+    use deltille_core::calibrate::{Estimate, LackOfFit, Model, PanelPlace, ViewEstimate};
     use deltille_core::camera::{Camera, Pose};
 
     /// What is advised where no parameter of the lens is told from zero.
@@ -451,6 +458,33 @@ mod tests {
         }
         // What is said of the whole result comes first.
         assert!(found[3].text.starts_with("Camera c1 is 2 frames late"), "{found:?}");
+    }
+
+    /// Of a lens that is not that of the model some views are much worse than others.
+    #[test]
+    fn photographs_are_not_blamed_for_a_model_that_does_not_fit() {
+        let mut estimate = estimate(1, 1);
+        let view = |index: usize| ViewEstimate {
+            name: format!("{index}"),
+            image: String::new(),
+            frame: index,
+            pose: Pose::IDENTITY,
+            rms_px: if index == 0 { 90.0 } else { 9.0 },
+            corners: Vec::new(),
+        };
+        estimate.cameras[0].views = (0..12).map(view).collect();
+        for (diagnosis, is_blamed) in [
+            (None, true),
+            (Some(Diagnosis::AbsurdFit { camera: 0, rms_px: 9.0 }), false),
+            (Some(Diagnosis::LackOfFit(LackOfFit::Lens { camera: 0, rms_px: 9.0 })), false),
+        ] {
+            let diagnoses: Vec<Diagnosis> = diagnosis.into_iter().collect();
+            let mut report = Report::new("camera", &estimate);
+            report.diagnoses = &diagnoses;
+            let found = advice(&report, &[Survey::new(&estimate.cameras[0])]);
+            let blur = found.iter().any(|advice| advice.text.contains("motion blur"));
+            assert_eq!(blur, is_blamed, "{diagnoses:?}");
+        }
     }
 
     #[test]
