@@ -1116,6 +1116,7 @@ def compare(
     *,
     distance_mm: float | None = None,
     region: Literal["seen", "image"] | tuple[float, float, float, float] | None = None,
+    assume_target: bool = False,
 ) -> Comparison: ...
 def compare_rigs(
     first: Rig,
@@ -1123,6 +1124,7 @@ def compare_rigs(
     *,
     distance_mm: float | None = None,
     region: Literal["seen", "image"] | tuple[float, float, float, float] | None = None,
+    assume_target: bool = False,
 ) -> tuple[list[Comparison], list[Motion]]: ...
 @final
 class Located:

@@ -3,12 +3,14 @@
 use std::sync::Arc;
 
 use deltille::calibrate::{
-    self, CameraEstimate, CameraMotion, Diagnosis, Reference, Region, Words, views,
+    self, CameraEstimate, CameraMotion, Diagnosis, Estimate, Reference, Region, Words,
+    compare_boards, views,
 };
 use deltille::export::calibration::Sheet;
 use deltille::export::{comparison, pose};
 use deltille::glam::DVec2;
 use deltille::quantity::distance_mm;
+use deltille::targets::TargetIdentity;
 use numpy::{PyArray1, PyArray2};
 use pyo3::prelude::*;
 
@@ -23,8 +25,14 @@ use crate::solving::print_scale_of;
 use crate::targets::Target;
 
 /// A camera as found, or as given.
-pub enum Compared {
-    Cameras(Vec<CameraEstimate>),
+pub struct Compared(Estimate);
+
+impl Compared {
+    fn of(cameras: Vec<CameraEstimate>, calibrated_with: &[TargetIdentity]) -> Self {
+        let mut estimate = Estimate::default();
+        (estimate.cameras, estimate.calibrated_with) = (cameras, calibrated_with.to_vec());
+        Self(estimate)
+    }
 }
 
 impl<'a, 'py> FromPyObject<'a, 'py> for Compared {
@@ -32,13 +40,15 @@ impl<'a, 'py> FromPyObject<'a, 'py> for Compared {
 
     fn extract(given: Borrowed<'a, 'py, PyAny>) -> PyResult<Self> {
         if let Ok(rig) = given.cast::<Rig>() {
-            return Ok(Self::Cameras(rig.get().solved.estimate.cameras.clone()));
+            let found = &rig.get().solved.estimate;
+            return Ok(Self::of(found.cameras.clone(), &found.calibrated_with));
         }
         if let Ok(found) = given.cast::<CalibratedCamera>() {
-            return Ok(Self::Cameras(vec![found.get().estimate().clone()]));
+            let (found, all) = (found.get().estimate().clone(), &found.get().solved.estimate);
+            return Ok(Self::of(vec![found], &all.calibrated_with));
         }
         let camera = given.cast::<Camera>()?;
-        Ok(Self::Cameras(vec![CameraEstimate::given("", camera.get().0.clone())]))
+        Ok(Self::of(vec![CameraEstimate::given("", camera.get().0.clone())], &[]))
     }
 }
 
@@ -252,22 +262,27 @@ fn compared(
 ///     How far the points are by which they are compared, mm; infinity if left out.
 /// region : str or (float, float, float, float), optional
 ///     ``"seen"``, where both saw corners, ``"image"``, or pixels left, top, right, bottom.
+/// assume_target : bool, optional
+///     Whether they are compared even where both were calibrated with the same tags at different sizes.
 ///
 /// Returns
 /// -------
 /// Comparison
 #[pyfunction]
-#[pyo3(signature = (first, second, *, distance_mm = None, region = None))]
+#[pyo3(signature = (first, second, *, distance_mm = None, region = None, assume_target = false))]
 pub fn compare(
     py: Python<'_>,
     first: Compared,
     second: Compared,
     distance_mm: Option<f64>,
     region: Option<Part>,
+    assume_target: bool,
 ) -> PyResult<Comparison> {
     let region = region.map_or(Ok(Region::Seen), Part::region)?;
-    let (Compared::Cameras(first), Compared::Cameras(second)) = (first, second);
-    let ([one], [other]) = (first.as_slice(), second.as_slice()) else {
+    let (Compared(mut first), Compared(mut second)) = (first, second);
+    compare_boards(["first", "second"], [&mut first, &mut second], assume_target)
+        .raise(errors::calibration)?;
+    let ([one], [other]) = (first.cameras.as_slice(), second.cameras.as_slice()) else {
         let what = "rigs are compared by compare_rigs";
         return Err(raised::CalibrationError::new_err(what));
     };
@@ -279,7 +294,7 @@ pub fn compare(
 /// Parameters
 /// ----------
 /// first, second : Rig
-/// distance_mm, region
+/// distance_mm, region, assume_target
 ///     As of :func:`compare`.
 ///
 /// Returns
@@ -287,19 +302,22 @@ pub fn compare(
 /// cameras : list of Comparison
 /// motions : list of Motion
 #[pyfunction]
-#[pyo3(signature = (first, second, *, distance_mm = None, region = None))]
+#[pyo3(signature = (first, second, *, distance_mm = None, region = None, assume_target = false))]
 pub fn compare_rigs(
     py: Python<'_>,
     first: PyRef<'_, Rig>,
     second: PyRef<'_, Rig>,
     distance_mm: Option<f64>,
     region: Option<Part>,
+    assume_target: bool,
 ) -> PyResult<(Vec<Comparison>, Vec<Motion>)> {
     let region = region.map_or(Ok(Region::Seen), Part::region)?;
-    let (first, second) = (first.solved.clone(), second.solved.clone());
-    let others = &second.estimate.cameras;
+    let (mut first, mut second) = (first.solved.estimate.clone(), second.solved.estimate.clone());
+    compare_boards(["first", "second"], [&mut first, &mut second], assume_target)
+        .raise(errors::calibration)?;
+    let others = &second.cameras;
     let same = |one: &&CameraEstimate| others.iter().any(|other| other.name == one.name);
-    let own = first.estimate.cameras.iter().filter(same);
+    let own = first.cameras.iter().filter(same);
     let pairs =
         own.filter_map(|one| Some((one, others.iter().find(|other| other.name == one.name)?)));
     let pairs: Vec<_> = pairs.collect();

@@ -10,14 +10,15 @@ use glam::DVec2;
 use super::calibrating::distance;
 use super::camera_file;
 use super::files::{File, check_places, sample_of, text_file, write_all};
-use crate::calibrate::{CameraEstimate, CameraMotion, Comparison, Region, Verdict};
+use crate::calibrate::{
+    CameraEstimate, CameraMotion, Comparison, Estimate, Region, Verdict, compare_boards,
+};
 use crate::camera::Pose;
 use crate::cli::output::{self, Overwrite};
 use crate::cli::run::{FAILED, UNDECIDED};
 use crate::export::{comparison, saved};
 use crate::limits::Limits;
 use crate::report::comparison_svg;
-use crate::targets::{TargetIdentity, check_same_board};
 use crate::words::{counted, shown};
 
 /// Arguments of `deltille compare`.
@@ -71,14 +72,11 @@ fn tolerance(text: &str) -> Result<f64, String> {
 pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let path = args.output.as_deref().map(|path| output::file(path, "comparison", "json"));
     let path = path.transpose()?;
-    let (first, first_with) = read("FIRST", &args.first)?;
-    let (second, second_with) = read("SECOND", &args.second)?;
-    if !args.assume_target {
-        let [one, other] = [&args.first, &args.second].map(|path| path.display().to_string());
-        check_same_board([&one, &other], [&first_with, &second_with])
-            .map_err(|problem| anyhow!(problem))?;
-    }
-    let pairs = pairs(&first, &second)?;
+    let (mut first, mut second) = (read("FIRST", &args.first)?, read("SECOND", &args.second)?);
+    let [one, other] = [&args.first, &args.second].map(|path| path.display().to_string());
+    compare_boards([&one, &other], [&mut first, &mut second], args.assume_target)
+        .map_err(|problem| anyhow!(problem))?;
+    let pairs = pairs(&first.cameras, &second.cameras)?;
     if let Some(path) = &path {
         let json = sample_of(comparison::SCHEMA);
         check_places(output::folder_of(path), &files(path, &pairs, &[], &json), args.overwrite)?;
@@ -127,20 +125,19 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     })
 }
 
-/// The cameras of a calibration or rig, or the one of a camera file, and the targets that they were calibrated with.
-fn read(
-    option: &'static str,
-    path: &Path,
-) -> anyhow::Result<(Vec<CameraEstimate>, Vec<TargetIdentity>)> {
+/// A calibration or rig, or the camera of a camera file.
+fn read(option: &'static str, path: &Path) -> anyhow::Result<Estimate> {
     let is_json = path.extension().is_some_and(|end| end.eq_ignore_ascii_case("json"));
     if !is_json {
         let file = camera_file::read_with_targets(option, path)?;
-        return Ok((vec![CameraEstimate::given("", file.camera)], file.calibrated_with));
+        let mut given = Estimate::default();
+        given.cameras = vec![CameraEstimate::given("", file.camera)];
+        given.calibrated_with = file.calibrated_with;
+        return Ok(given);
     }
     let text = Limits::default().read_text(path).context(option)?;
     let found = saved::read_without_target(&text);
-    let found = found.with_context(|| format!("{option}: {}", path.display()))?;
-    Ok((found.cameras, found.calibrated_with))
+    found.with_context(|| format!("{option}: {}", path.display()))
 }
 
 /// The same cameras of both.

@@ -21,11 +21,12 @@ use glam::{DQuat, DVec2, DVec3};
 use nalgebra::{DMatrix, DVector};
 
 use super::coverage::Coverage;
-use super::estimate::CameraEstimate;
+use super::estimate::{CameraEstimate, Estimate};
 use super::uncertainty::{
     INFINITY_MM, ObservedCovariance, Source, by_motion, by_parameters, seen_at,
 };
 use crate::camera::Pose;
+use crate::identity::{check_result_of, check_same_board};
 use crate::statistics::{chi_squared_chance, f_chance};
 
 /// Places along the longer side of the image.
@@ -127,6 +128,28 @@ impl Default for Comparison {
             lacks_uncertainty: [false; 2],
         }
     }
+}
+
+/// Prepares two calibrations for comparisons. Those of one board share its errors, which then do not count; those of
+/// different boards do not. `what` names the two in messages, and `is_assumed` that labels of one board may be of two sizes.
+///
+/// # Errors
+/// Where they were made with boards of the same labels at different sizes, so that one of them is wrong.
+pub fn compare_boards(
+    what: [&str; 2],
+    [first, second]: [&mut Estimate; 2],
+    is_assumed: bool,
+) -> Result<(), String> {
+    let boards = [first.calibrated_with.as_slice(), second.calibrated_with.as_slice()];
+    if !is_assumed {
+        check_same_board(what, boards)?;
+    }
+    if check_result_of(boards[0], boards[1]).is_err() {
+        let cameras = first.cameras.iter_mut().chain(&mut second.cameras);
+        let known = cameras.filter_map(|camera| camera.projection.as_mut());
+        known.filter_map(|known| known.observed.as_mut()).for_each(|known| known.of_board = None);
+    }
+    Ok(())
 }
 
 impl Comparison {

@@ -70,7 +70,9 @@ mod words;
 
 pub use automatic::Candidate;
 pub use calibration::{Calibration, CameraViews, Intrinsics, PanelPlace};
-pub use comparison::{CameraMotion, Comparison, ComparisonError, Difference, Region};
+pub use comparison::{
+    CameraMotion, Comparison, ComparisonError, Difference, Region, compare_boards,
+};
 pub use coverage::Coverage;
 pub use diagnosis::Diagnosis;
 pub use error::{CalibrationError, TooPlain};
