@@ -136,7 +136,7 @@ impl Rig {
 
 #[test]
 fn an_upside_down_camera_is_found_where_it_is() {
-    for seed in 0..3 {
+    for seed in 0..2 {
         let mut random = ChaCha8Rng::seed_from_u64(100 + seed);
         let boards = moved(16, 0.6, 0.4, &mut random);
         let rig = Rig::of(&checkerboard(4, 6), &[0.0, PI], &boards, Model::Radtan, seed);
@@ -172,13 +172,11 @@ fn labels_that_change_from_moment_to_moment_are_brought_together() {
 #[test]
 fn nothing_is_rotated_where_labels_agree() {
     for (rows, cols, rolls) in [(4, 6, [0.0, 0.2]), (4, 7, [0.0, PI]), (5, 7, [0.1, -0.1])] {
-        for seed in 0..3 {
-            let mut random = ChaCha8Rng::seed_from_u64(seed);
-            let boards = moved(12, 0.6, 0.2, &mut random);
-            let rig = Rig::of(&checkerboard(rows, cols), &rolls, &boards, Model::Radtan, seed);
-            assert!(rig.off_mm() < 8.0, "{} mm", rig.off_mm());
-            assert_eq!(rig.said, [None, None], "{rows} × {cols}");
-        }
+        let mut random = ChaCha8Rng::seed_from_u64(u64::from(rows + cols));
+        let boards = moved(12, 0.6, 0.2, &mut random);
+        let rig = Rig::of(&checkerboard(rows, cols), &rolls, &boards, Model::Radtan, 1);
+        assert!(rig.off_mm() < 8.0, "{} mm", rig.off_mm());
+        assert_eq!(rig.said, [None, None], "{rows} × {cols}");
     }
 }
 

@@ -282,7 +282,7 @@ fn a_stream_says_that_files_would_have_other_corners() {
         told.contains("note: --stream located the corners of each image with the ink"),
         "{told}"
     );
-    assert!(lines.lines().all(|line| line.contains("\"pictures\":1")), "{lines}");
+    assert!(lines.lines().all(|line| line.contains("\"pictures\": 1}")));
     let first = paths[0].file_name().unwrap().to_string_lossy();
     assert!(!detect(&first, "--stream").1.contains("note:"));
     assert!(!detect("*.png", "--stream --ink none").1.contains("note:"));
