@@ -71,14 +71,13 @@ fn usual(delays: &[i32]) -> i32 {
 
 /// By how many frames a camera is later than another, and how many moments tell; `None` where too few do.
 fn delay_between(from: &Track, to: &Track, symmetries: &Symmetries) -> Option<(i32, usize)> {
-    let scatters = |how: &dyn Fn(&Track, &Track, i32) -> Option<(f64, usize)>| {
-        let all =
-            (-MOST_DELAY..=MOST_DELAY).filter_map(|delay| Some((delay, how(from, to, delay)?)));
+    let scatters = |how: &dyn Fn(i32) -> Option<(f64, usize)>| {
+        let all = (-MOST_DELAY..=MOST_DELAY).filter_map(|delay| Some((delay, how(delay)?)));
         all.collect::<Vec<(i32, (f64, usize))>>()
     };
-    let mut all = scatters(&|from, to, delay| scatter_of_poses(from, to, delay, symmetries));
+    let mut all = scatters(&|delay| scatter_of_poses(from, to, delay, symmetries));
     if all.is_empty() {
-        all = scatters(&scatter_of_turns);
+        all = scatters(&|delay| scatter_of_turns(from, to, delay));
     }
     let &(delay, (least, moments)) = all.iter().min_by(|a, b| a.1.0.total_cmp(&b.1.0))?;
     let in_time = all.iter().find(|(delay, _)| *delay == 0);
