@@ -65,6 +65,19 @@ pub fn schema(text: &[u8]) -> serde_json::Result<Option<String>> {
     serde_json::from_slice::<Head>(text).map(|head| head.schema.map(|schema| cut(&schema).into()))
 }
 
+/// The schema that a JSON text must name, likewise. It is read before all else, so that a file of another kind or version is
+/// reported as such.
+///
+/// # Errors
+/// Where it is no JSON, or names no schema.
+pub fn named_schema(json: &str) -> Result<String, ReadError> {
+    #[derive(Deserialize)]
+    struct Head {
+        schema: String,
+    }
+    read::<Head>(json).map(|head| cut(&head.schema).into())
+}
+
 /// Refuses a list, whose values would be taken for the fields in their order.
 fn check_object(text: &[u8]) -> serde_json::Result<()> {
     match text.trim_ascii_start().first() {

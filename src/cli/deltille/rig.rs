@@ -145,6 +145,9 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         }
         calibration = calibration.with(CameraViews::new(name, views, intrinsics));
     }
+    if !args.assume_target {
+        sightings::note_unnamed(seen.iter().flat_map(|(_, detections)| detections), &reference);
+    }
     let (mut tried, mut text) = (Vec::new(), String::new());
     for (index, (name, _)) in args.camera.iter().enumerate() {
         let of_camera = args.model.choose(&mut calibration, index);

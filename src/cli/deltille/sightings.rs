@@ -154,7 +154,7 @@ impl SightingsArgs {
             ),
         };
         let sheet = self.sheet.read(&limits, target.as_slice())?;
-        let Read { mut views, empty, mut left_out, ink, .. } =
+        let Read { mut views, empty, mut left_out, ink, detections } =
             read(&self.detections, &reference, &limits, self.assume_target)?;
         let board = match reference {
             Reference::Grid(grid) if measure_target => {
@@ -171,6 +171,9 @@ impl SightingsArgs {
         put_on(&sheet, target.as_ref(), &mut views)?;
         let panels = panels(&reference, &sheet)?;
         let print = Print { scale: sheet.print_scale, ink };
+        if !self.assume_target {
+            note_unnamed(&detections, &reference);
+        }
         let symmetries = reference.label_symmetries();
         let target = target.or(board);
         Ok(Sightings { panels, target, views, empty, left_out, print, symmetries })
@@ -323,8 +326,6 @@ pub fn read(
     }
     if is_assumed {
         detections.iter_mut().for_each(|(_, found)| found.forget_targets());
-    } else {
-        note_unnamed(&detections, reference);
     }
     let Shown { views, empty, left_out, .. } = views(&detections, reference)?;
     for (index, out) in &left_out {
@@ -336,13 +337,16 @@ pub fn read(
     Ok(Read { views, empty, left_out, ink, detections })
 }
 
-/// Notes once that detections do not say which target they are of.
-fn note_unnamed(detections: &[(String, Detection)], reference: &Reference) {
+/// Notes that some of the detections that show something do not say which target they are of.
+pub fn note_unnamed<'a>(
+    detections: impl IntoIterator<Item = &'a (String, Detection)>,
+    reference: &Reference,
+) {
     let Some(target) = reference.targets().first() else { return };
-    let shows = |found: &&(String, Detection)| !found.1.grids.is_empty();
-    let all = detections.iter().filter(shows).count();
-    let unnamed =
-        detections.iter().filter(shows).filter(|(_, found)| found.targets.is_empty()).count();
+    let shown = detections.into_iter().filter(|(_, found)| !found.grids.is_empty());
+    let (unnamed, all) = shown.fold((0, 0), |(unnamed, all), (_, found)| {
+        (unnamed + usize::from(found.targets.is_empty()), all + 1)
+    });
     if unnamed > 0 {
         let target = target.identity();
         tell!(

@@ -97,17 +97,12 @@ impl Target {
     /// # Errors
     /// Where it is no target file, of another version, or a field is wrong.
     pub fn from_json(text: &str) -> Result<Target, TargetFileError> {
-        // The schema is looked at first, so that a file of another version is called just that.
-        #[derive(Deserialize)]
-        struct Head {
-            schema: String,
+        let found = json::named_schema(text)?;
+        if json::kind(&found) != json::kind(SCHEMA) {
+            return Err(TargetFileError::Kind { found });
         }
-        let head: Head = json::read(text)?;
-        if json::kind(&head.schema) != json::kind(SCHEMA) {
-            return Err(TargetFileError::Kind { found: head.schema });
-        }
-        if head.schema != SCHEMA {
-            return Err(TargetFileError::Schema { found: head.schema });
+        if found != SCHEMA {
+            return Err(TargetFileError::Schema { found });
         }
         let TargetFile {
             schema: _,

@@ -159,16 +159,12 @@ pub fn is_foreign(text: &str) -> bool {
 /// # Errors
 /// When the text is not a detection, has another version, or a field, corner or grid is not valid.
 pub fn read(text: &str) -> Result<Detection, DetectionFileError> {
-    #[derive(Deserialize)]
-    struct Head {
-        schema: String,
+    let found = json::named_schema(text)?;
+    if json::kind(&found) != json::kind(SCHEMA) {
+        return Err(DetectionFileError::Kind { found });
     }
-    let Head { schema } = json::read(text)?;
-    if json::kind(&schema) != json::kind(SCHEMA) {
-        return Err(DetectionFileError::Kind { found: schema });
-    }
-    if schema != SCHEMA {
-        return Err(DetectionFileError::Schema { found: schema });
+    if found != SCHEMA {
+        return Err(DetectionFileError::Schema { found });
     }
     let DetectionFile {
         image,
