@@ -102,7 +102,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     check_places(folder, &planned, args.overwrite)?;
     let page = args.solve.page(&stem, args.overwrite)?;
     let measure = args.solve.measures_target();
-    let Sightings { views, panels, target, empty, left_out, print, symmetries } =
+    let Sightings { views, panels, target, empty, left_out, print, symmetries, unnamed } =
         args.sightings.read(measure)?;
     ensure!(!views.is_empty(), "no board of this kind in {}", counted(empty.len(), "picture"));
     if let (Some(known), Some(target), false) =
@@ -128,6 +128,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     };
     let listed = chosen(&tried);
     let mut solved = args.solve.solve(calibration, print, vec![tried])?;
+    unnamed.iter().for_each(|note| tell!("{note}"));
     ensure!(!solved.estimate.frames.is_empty(), "no view shows the target as this camera sees it");
     let of_test = solved.estimate.held_out.iter().flat_map(|test| &test.excluded);
     for out in solved.estimate.excluded.iter().chain(of_test) {

@@ -145,9 +145,6 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         }
         calibration = calibration.with(CameraViews::new(name, views, intrinsics));
     }
-    if !args.assume_target {
-        sightings::note_unnamed(seen.iter().flat_map(|(_, detections)| detections), &reference);
-    }
     let (mut tried, mut text) = (Vec::new(), String::new());
     for (index, (name, _)) in args.camera.iter().enumerate() {
         let of_camera = args.model.choose(&mut calibration, index);
@@ -159,6 +156,10 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     }
     let print = Print { scale: sheet.print_scale, ink: InkEstimate::of_all(&ink) };
     let mut solved = args.solve.solve(calibration, print, tried)?;
+    let detections = seen.iter().flat_map(|(_, detections)| detections);
+    if let (Some(note), false) = (sightings::unnamed(detections, &reference), args.assume_target) {
+        tell!("{note}");
+    }
     let of_test = solved.estimate.held_out.iter().flat_map(|test| &test.excluded);
     for out in solved.estimate.excluded.iter().chain(of_test) {
         tell!("{}: left out: {}", out.shown(), out.reason);

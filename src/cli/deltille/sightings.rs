@@ -109,6 +109,8 @@ pub struct Sightings {
     pub print: Print,
     /// See [`Reference::label_symmetries`].
     pub symmetries: Vec<Vec<LatticeMap>>,
+    /// What is to be noted of detections that do not name their target.
+    pub unnamed: Option<String>,
 }
 
 impl GridArgs {
@@ -171,12 +173,10 @@ impl SightingsArgs {
         put_on(&sheet, target.as_ref(), &mut views)?;
         let panels = panels(&reference, &sheet)?;
         let print = Print { scale: sheet.print_scale, ink };
-        if !self.assume_target {
-            note_unnamed(&detections, &reference);
-        }
+        let unnamed = unnamed(&detections, &reference).filter(|_| !self.assume_target);
         let symmetries = reference.label_symmetries();
         let target = target.or(board);
-        Ok(Sightings { panels, target, views, empty, left_out, print, symmetries })
+        Ok(Sightings { panels, target, views, empty, left_out, print, symmetries, unnamed })
     }
 }
 
@@ -337,26 +337,23 @@ pub fn read(
     Ok(Read { views, empty, left_out, ink, detections })
 }
 
-/// Notes that some of the detections that show something do not say which target they are of.
-pub fn note_unnamed<'a>(
+/// What is to be noted where some of the detections that show something do not say which target they are of.
+pub fn unnamed<'a>(
     detections: impl IntoIterator<Item = &'a (String, Detection)>,
     reference: &Reference,
-) {
-    let Some(target) = reference.targets().first() else { return };
+) -> Option<String> {
+    let target = reference.targets().first()?;
     let shown = detections.into_iter().filter(|(_, found)| !found.grids.is_empty());
     let (unnamed, all) = shown.fold((0, 0), |(unnamed, all), (_, found)| {
         (unnamed + usize::from(found.targets.is_empty()), all + 1)
     });
-    if unnamed > 0 {
-        let target = target.identity();
-        tell!(
-            "note: {unnamed} of {} not name the target that they were made with; assumed to be {target}",
-            match all {
-                1 => "1 detection does".to_owned(),
-                _ => format!("{all} detections do"),
-            }
-        );
-    }
+    let detections = if all == 1 { "detection does" } else { "detections do" };
+    (unnamed > 0).then(|| {
+        format!(
+            "note: {unnamed} of {all} {detections} not name the target that they were made with; assumed to be {}",
+            target.identity()
+        )
+    })
 }
 
 /// What detections say together of the ink; pictures that do not allow for it are told on standard error.

@@ -41,7 +41,7 @@ fn a_rendered_sheet_is_found_with_every_label_in_every_format() {
         let target = Target::from_json(&std::fs::read_to_string(path("board.json")).unwrap());
         let target = target.unwrap();
         let identity = target.identity();
-        assert_eq!(found.targets, [identity.clone()]);
+        assert_eq!(found.targets, std::slice::from_ref(&identity));
         assert_eq!((found.grids.len(), found.grids[0].panel), (1, Some(0)));
         assert_eq!(found.grids[0].corners.len(), 42);
         for (i, corner) in found.grids[0].corners.iter().enumerate() {

@@ -112,9 +112,8 @@ impl Mesh {
                 let inwards = if across.dot(middle - a) > 0.0 { across } else { -across };
                 // The diagonal of a face belongs to two triangles.
                 let key = (texture, ((a + b) * 50.0).as_ivec2().to_array());
-                match found.remove(&key) {
-                    None => drop(found.insert(key, ((a + b) / 2.0, inwards))),
-                    Some(_) => {}
+                if found.remove(&key).is_none() {
+                    found.insert(key, ((a + b) / 2.0, inwards));
                 }
             }
         }

@@ -69,14 +69,14 @@ struct Filled {
 
 impl Filled {
     fn new(path: &Path, fill: impl FnOnce(&mut dyn Write) -> io::Result<()>) -> io::Result<Self> {
-        Self::filled(path, fill).map_err(|error| match error.to_string().contains(PREFIX) {
+        Self::written(path, fill).map_err(|error| match error.to_string().contains(PREFIX) {
             // The temporary name means nothing to the user.
             true => io::Error::new(error.kind(), io::Error::from(error.kind()).to_string()),
             false => error,
         })
     }
 
-    fn filled(
+    fn written(
         path: &Path,
         fill: impl FnOnce(&mut dyn Write) -> io::Result<()>,
     ) -> io::Result<Self> {
