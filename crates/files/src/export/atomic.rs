@@ -43,7 +43,7 @@ pub fn write(
     Filled::new(path, fill).and_then(Filled::rename).map_err(failed)
 }
 
-/// Writes several files, as [`write`] does, after all of them are on the disk under temporary names: where one cannot be
+/// Writes several files, as [`write()`] does, after all of them are on the disk under temporary names: where one cannot be
 /// written, none is.
 ///
 /// # Errors
