@@ -1011,6 +1011,7 @@ def calibrate(
     distances_mm: Sequence[float] | None = None,
     names: Sequence[str] | None = None,
     assume_target: bool = False,
+    board_accuracy_mm: float | None = None,
 ) -> Calibration: ...
 def rig(
     cameras: Mapping[str, Sequence[Detection | Failure]],
@@ -1027,6 +1028,7 @@ def rig(
     print_scale: ArrayLike | None = None,
     distances_mm: Sequence[float] | None = None,
     assume_target: bool = False,
+    board_accuracy_mm: float | None = None,
 ) -> Rig: ...
 @final
 class NextView:

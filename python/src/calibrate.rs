@@ -57,6 +57,9 @@ use crate::solving::{How, ModelChoice, OneCamera, Seen, named, solve};
 ///     Names of the views.
 /// assume_target : bool, optional
 ///     Whether the target is taken even where the detections name another one.
+/// board_accuracy_mm : float, optional
+///     Standard deviation of the board's corners from the description, mm, for the observed deviations; 0.1, at most
+///     0.5 % of an edge, if left out, and of a measured target what it says of itself.
 ///
 /// Returns
 /// -------
@@ -70,7 +73,7 @@ use crate::solving::{How, ModelChoice, OneCamera, Seen, named, solve};
 #[pyo3(signature = (detections, target = None, model = "radtan", *, camera = None, grid = None, rows = None,
     cols = None, edge_mm = None, hold_out = None, loss = "huber", weights = "covariance", board_shape = false,
     measure_target = false, shape = None, print_scale = None, distances_mm = None, names = None,
-    assume_target = false))]
+    assume_target = false, board_accuracy_mm = None))]
 #[expect(clippy::too_many_arguments, reason = "keywords")]
 pub fn calibrate(
     py: Python<'_>,
@@ -92,8 +95,9 @@ pub fn calibrate(
     distances_mm: Option<Vec<f64>>,
     names: Option<Vec<String>>,
     assume_target: bool,
+    board_accuracy_mm: Option<f64>,
 ) -> PyResult<Py<Calibration>> {
-    let mut how = How::of(loss, weights, hold_out, distances_mm, print_scale)?;
+    let mut how = How::of(loss, weights, hold_out, distances_mm, print_scale, board_accuracy_mm)?;
     (how.board_shape, how.measure_target) = (board_shape, measure_target);
     let target = target.or_else(|| of_detections(&detections.all, grid.is_some()));
     let seen = Seen::of(target, grid, sides(rows, cols)?, edge_mm)?;
@@ -135,7 +139,8 @@ pub fn of_detections(detections: &[PyRef<'_, Detection>], is_grid: bool) -> Opti
 ///     Cameras that are known and kept.
 /// refine_target : bool, optional
 ///     Whether it is found, too, where the panels are on the target.
-/// hold_out, loss, weights, board_shape, measure_target, print_scale, distances_mm, assume_target
+/// hold_out, loss, weights, board_shape, measure_target, print_scale, distances_mm, assume_target,
+/// board_accuracy_mm
 ///     As of :func:`calibrate`.
 ///
 /// Returns
@@ -149,7 +154,7 @@ pub fn of_detections(detections: &[PyRef<'_, Detection>], is_grid: bool) -> Opti
 #[pyfunction]
 #[pyo3(signature = (cameras, target = None, model = "radtan", *, known = None, refine_target = false,
     hold_out = None, loss = "huber", weights = "covariance", board_shape = false, measure_target = false,
-    print_scale = None, distances_mm = None, assume_target = false))]
+    print_scale = None, distances_mm = None, assume_target = false, board_accuracy_mm = None))]
 #[expect(clippy::too_many_arguments, reason = "keywords")]
 pub fn rig(
     py: Python<'_>,
@@ -166,9 +171,10 @@ pub fn rig(
     print_scale: Option<&Bound<'_, PyAny>>,
     distances_mm: Option<Vec<f64>>,
     assume_target: bool,
+    board_accuracy_mm: Option<f64>,
 ) -> PyResult<Rig> {
     let wrong = |what: String| Err(raised::CalibrationError::new_err(what));
-    let mut how = How::of(loss, weights, hold_out, distances_mm, print_scale)?;
+    let mut how = How::of(loss, weights, hold_out, distances_mm, print_scale, board_accuracy_mm)?;
     (how.board_shape, how.measure_target) = (board_shape, measure_target);
     how.refine_target = refine_target;
     if cameras.len()? < 2 && !refine_target {

@@ -12,7 +12,7 @@ use deltille::camera;
 use deltille::detect;
 use deltille::export::calibration::{Print, Residuals, Sheet};
 use deltille::export::{calibration, rig};
-use deltille::quantity::{distance_mm, edge_mm, print_scale};
+use deltille::quantity::{board_accuracy_mm, distance_mm, edge_mm, print_scale};
 use deltille::targets;
 use pyo3::exceptions::PyUserWarning;
 use pyo3::prelude::*;
@@ -91,6 +91,7 @@ pub struct How {
     pub measure_target: bool,
     pub refine_target: bool,
     pub distances_mm: Vec<f64>,
+    pub board_accuracy_mm: Option<f64>,
     pub sheet: Sheet,
 }
 
@@ -102,6 +103,7 @@ impl How {
         hold_out: Option<i64>,
         distances_mm: Option<Vec<f64>>,
         print_scale: Option<&Bound<'_, PyAny>>,
+        accuracy_mm: Option<f64>,
     ) -> PyResult<Self> {
         let wrong = |what: &str| raised::CalibrationError::new_err(what.to_owned());
         let loss = match loss {
@@ -124,6 +126,9 @@ impl How {
             number("distances_mm", mm, distance_mm::RANGE, errors::calibration)?;
         }
         let print_scale = print_scale.map(print_scale_of).transpose()?;
+        let accuracy_mm = accuracy_mm.map(|mm| {
+            number("board_accuracy_mm", mm, board_accuracy_mm::RANGE, errors::calibration)
+        });
         Ok(Self {
             loss,
             weights,
@@ -132,6 +137,7 @@ impl How {
             measure_target: false,
             refine_target: false,
             distances_mm,
+            board_accuracy_mm: accuracy_mm.transpose()?,
             sheet: Sheet { print_scale, shape: None },
         })
     }
@@ -385,6 +391,9 @@ pub fn solve(
             .distances_mm(how.distances_mm)
             .hold_out(how.hold_out)
             .stopped_by(stop.clone());
+        if let Some(mm) = how.board_accuracy_mm {
+            calibration = calibration.board_accuracy_mm(Some(mm));
+        }
         let count = all.len();
         for (name, views, intrinsics) in all {
             calibration = calibration.camera(&name, views, intrinsics);

@@ -225,6 +225,8 @@ quantities! {
     rim_mm: 1e-3 to 1e5 "mm";
     /// The width of a gap between tags, in tags.
     gap_edges: 0.01 to 1.0 "edges";
+    /// Standard deviation of the corners of a board from its description: a board that is worse is of no use.
+    board_accuracy_mm: 0.0 to 10.0 "mm";
     /// A measured length over the stated one.
     print_scale: 0.5 to 2.0 "";
     /// A resolution.

@@ -21,7 +21,7 @@ use crate::cli::values::whole;
 use crate::export::calibration::{Print, Residuals};
 use crate::export::camera::FormatError;
 use crate::export::kind::Kind;
-use crate::quantity::distance_mm;
+use crate::quantity::{board_accuracy_mm, distance_mm};
 use crate::report::target_map_svg;
 use crate::targets::{self, Target, parse_length_mm};
 use crate::words::counted;
@@ -314,14 +314,8 @@ fn accuracy(text: &str) -> Result<f64, String> {
         return Ok(0.0);
     }
     let mm = parse_length_mm(text).map_err(|error| error.to_string())?;
-    match (0.0..=MOST_OFF_MM).contains(&mm) {
-        true => Ok(mm),
-        false => Err(format!("{text}: not between 0 and {MOST_OFF_MM} mm")),
-    }
+    board_accuracy_mm::RANGE.check(mm).map_err(|error| error.to_string())
 }
-
-/// Largest standard deviation of a board's corners, mm: no board that is off by more is of use.
-const MOST_OFF_MM: f64 = 10.0;
 
 /// How far a point is, mm.
 pub fn distance(text: &str) -> Result<f64, String> {
@@ -341,7 +335,12 @@ pub fn sureness(camera: &CameraEstimate) -> Option<String> {
         Some(format!("at {} {noise:.4} px from noise{observed}", far(mm)))
     });
     let told: Vec<String> = told.collect();
-    (!told.is_empty()).then(|| format!("projections are known to: {}", told.join("; ")))
+    let observed = camera.projection.as_ref().and_then(|known| known.observed.as_ref());
+    let board = match observed.is_some_and(|observed| observed.of_board.is_some()) {
+        true => "; observed deviations allow for errors of the board (--board-accuracy)",
+        false => "",
+    };
+    (!told.is_empty()).then(|| format!("projections are known to: {}{board}", told.join("; ")))
 }
 
 /// A camera that has all parameters that are found, and none of them zero: what a format cannot carry of it is
