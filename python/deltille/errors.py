@@ -6,6 +6,8 @@ Every exception is an :class:`Error`; most are a :class:`ValueError` too, files 
 import errno as _errno
 import os as _os
 import sys as _sys
+from typing import Any as _Any
+from typing import Optional as _Optional
 
 __all__ = [
     "ArgumentError",
@@ -80,17 +82,18 @@ class FolderError(FileError, IsADirectoryError):
     """A folder where a file is needed; ``filename`` is its name."""
 
 
-def _of_system(number, filename):
+def _of_system(number: _Optional[int], filename: str) -> FileError:
     """The exception for a number of the system; without one, of a folder where a file is needed."""
+    plain: _Any
     if number is None:
         plain = OSError(_errno.EISDIR, _os.strerror(_errno.EISDIR))
     elif _sys.platform == "win32":
         import ctypes
 
-        plain = ctypes.WinError(number)
+        plain = getattr(ctypes, "WinError")(number)
     else:
         plain = OSError(number, _os.strerror(number))
-    kinds = (MissingFileError, PermissionFileError, FolderError)
+    kinds: tuple[type[FileError], ...] = (MissingFileError, PermissionFileError, FolderError)
     kind = next((kind for kind in kinds if isinstance(plain, kind.__bases__[1])), FileError)
     return kind(plain.errno, plain.strerror, filename)
 
