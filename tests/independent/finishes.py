@@ -134,7 +134,7 @@ def corner(shape):
 
 
 def check_laser(program, folder, name, command, is_solid):
-    made = [program, *command.split(), "--name", name, "-o", folder]
+    made = [program, *command.split(), "--name", name, "-o", folder, "--force"]
     run(*made, "--svg", *(["--per-face"] if is_solid else []), "--no-verify")
     shapes = printed(sorted(folder.glob(f"{name}.svg")) + sorted(folder.glob(f"{name}-[0-9]*.svg")))
     told = []
@@ -192,7 +192,7 @@ def check_mirrored(program, folder):
         # Untagged boards have two mirror images alike, and circles are not for this detector.
         if name in ("circles", "plain", "black-squares"):
             continue
-        run(program, *command.split(), "--name", "back", "--pdf", "--mirrored", "-o", folder)
+        run(program, *command.split(), "--name", "back", "--pdf", "--mirrored", "-o", folder, "--force")
         back = drawn(folder / "back.pdf", folder / "back.png")
         description = json.loads((folder / "back.json").read_text())
         assert description["finish"] == {"mirrored": True}
