@@ -226,8 +226,8 @@ export const words = {
       corrected: "Cells corrected",
       cells: (count: number) => (count === 0 ? "none" : count === 1 ? "1" : `up to ${count}`),
       coins: "Fair coins",
-      natural: "Natural pictures (within a factor of 3)",
-      why: (kind: string) => `The probability that a ${kind === "checker" ? "square" : "triangle"} with a border that is no tag is read as one: where its cells are black or white by the fall of coins, and where it is cut from photographs, in which neighbours are mostly alike.`,
+      natural: "Natural pictures",
+      why: (kind: string) => `The probability that a ${kind === "checker" ? "square" : "triangle"} with a border that is no tag is read as one: where its cells are black or white by the fall of coins, and where it is cut from photographs, in which neighbours are mostly alike; that is known within a factor of 3.`,
       unknown: "Of square tags the latter is not known.",
       recommended: (most: number | null, rate: number) =>
         most === null ? `Believe no single tag: in photographs, more than ${rate.toExponential(0)} are false.` : `Whoever believes single tags corrects ${most === 0 ? "nothing" : most === 1 ? "1 cell at most" : `${most} cells at most`}: then it is below ${rate.toExponential(0)} in photographs.`,
