@@ -39,6 +39,10 @@
 //! has to be as great. Codes that the rules of the shipped families admit are rarer there than among codes that are drawn, so
 //! this decides where a family has simpler codes.
 //!
+//! Evidence weighs tiles, so many tags that agree outweigh one that does not. A print has no tag in another place and does not
+//! go on beyond its panel, though: where a clear code, or whole tiles beyond the panel, contradict a placement, nothing of the
+//! grid is labelled.
+//!
 //! Limits: codes are assumed to be drawn from their family; other lattices on the same board are
 //! not considered. The faces of a solid may lie in one grid, so that tiles beyond a panel do not
 //! count there; but all placements in a grid together must explain its codes better than a board
@@ -76,7 +80,8 @@ const MIN_LEAD: f64 = 6.0 * std::f64::consts::LN_2;
 /// Evidence from which mirrored placements are not tested any more, nats.
 const BEYOND_DOUBT: f64 = 40.0;
 
-/// Evidence from which a code that the target does not have is reported, nats.
+/// Evidence from which a tile certainly shows a code that is not predicted, nats: such as a code that the target does not
+/// have, or has elsewhere.
 const CLEARLY_OTHER: f64 = 7.0;
 
 /// Fractions of the tiles of a board that may be plain, for the board that shows plain tiles and codes
@@ -231,6 +236,8 @@ struct Shown {
     if_plain: [f64; DIRTY.len()],
     /// The word of the target that fits best.
     word: usize,
+    /// Whether a code of the family that the target does not have fits better.
+    is_foreign: bool,
     /// If it shows random cells, or the best of all codes, whichever fits better: with `word` among the
     /// codes, and without it.
     code: [f64; 2],
@@ -465,6 +472,7 @@ impl TagLabeller {
         let of_target = |evidence: f32| f64::from(evidence) - among(of_words.len());
         let mut code = [most, second].map(|evidence| of_target(evidence).max(0.0));
         // A code of the family that the target does not have may fit better than all of these.
+        let mut is_foreign = false;
         if let Some(decoder) = &self.decoder
             && let Some(decoded) = decoder.decode(reading.word(), self.sure_errors)
             && self.words.code_of(decoded.id).is_none()
@@ -472,6 +480,7 @@ impl TagLabeller {
             let evidence = self.words.evidence_of(decoder.word(decoded), &reading.half_odds);
             let clear = f64::from(evidence) - among(self.family_words);
             if evidence > most {
+                is_foreign = true;
                 code = code.map(|code| code.max(clear));
                 if clear > CLEARLY_OTHER {
                     noted.foreign_ids.insert(decoded.id);
@@ -485,7 +494,7 @@ impl TagLabeller {
             PLAIN_PARTS.map(|part| (part * plain.exp() + (1.0 - part) * code.exp()).ln())
         });
         let if_plain = DIRTY.map(|chance| or_spoilt(plain, chance));
-        Shown { if_plain, word, code, of_board }
+        Shown { if_plain, word, is_foreign, code, of_board }
     }
 
     /// The placements with sufficient evidence, best first. Each takes its corners from the grid, and
@@ -541,12 +550,19 @@ impl TagLabeller {
                 break;
             }
         }
+        let mut placements = placed.placements.iter();
+        placed.contradicted = placed.contradicted.or_else(|| {
+            placements
+                .find_map(|placement| self.contradiction(&sights[placement.sight], grid, placement))
+        });
         if self.panels_abut && !placed.placements.is_empty() {
             let (surplus, counts) = self.together(sights, &placed.placements);
             if surplus < 0.0 {
                 placed.contradicted = Some(counts);
-                placed.placements.clear();
             }
+        }
+        if placed.contradicted.is_some() {
+            placed.placements.clear();
         }
         placed
     }
@@ -623,6 +639,51 @@ impl TagLabeller {
         let (against, agreeing): (Vec<Judged>, Vec<Judged>) =
             self.judged(sight, placement, &BTreeSet::new()).partition(against);
         [agreeing.len(), against.len()]
+    }
+
+    /// Numbers of tiles that agree and that contradict a placement, where some do beyond doubt: clear codes that a hidden tile
+    /// does not show by chance, and whole tiles beyond a panel that has nothing beside it.
+    fn contradiction(
+        &self,
+        sight: &Sight,
+        grid: &SaddleGrid,
+        placement: &Placement,
+    ) -> Option<[usize; 2]> {
+        let tags = &self.panels[placement.panel].tags;
+        let is_elsewhere = |index: usize| {
+            let (tile, shown) = (sight.readings[index].tile, &sight.shown[index]);
+            let is_here = |tag: &LabelTag| {
+                self.words.turns() * tag.code + turns_of(placement.map, tile) == shown.word
+            };
+            let is_predicted =
+                tags.get(&placement.map.apply_tile(tile)).is_some_and(is_here) && !shown.is_foreign;
+            let is_of_panel = || {
+                let mut places = self.places[shown.word / self.words.turns()].iter();
+                places.any(|&(panel, _)| panel == placement.panel)
+            };
+            shown.code[0] > CLEARLY_OTHER && !is_predicted && (shown.is_foreign || is_of_panel())
+        };
+        // Codes of places are alike, and many: a misread one is another one.
+        let readings = 0..sight.readings.len();
+        let elsewhere = readings.filter(|&index| !self.is_dense && is_elsewhere(index)).count();
+        let beyond = if self.panels_abut { 0 } else { self.tiles_beyond(sight, grid, placement) };
+        let is_beyond_doubt = elsewhere > 0 || beyond as f64 * -SPOILT.ln() > CLEARLY_OTHER;
+        let [agreeing, disagreeing] = self.agreement(sight, placement);
+        is_beyond_doubt.then_some([agreeing, disagreeing.max(elsewhere).max(beyond)])
+    }
+
+    /// How many tiles of a grid have all of their corners beyond the panel. Along its border the tips of tiles may pass for
+    /// corners, but those are a single row.
+    fn tiles_beyond(&self, sight: &Sight, grid: &SaddleGrid, placement: &Placement) -> usize {
+        let Some(kind) = sight.readings.first().map(|reading| reading.tile.kind()) else {
+            return 0;
+        };
+        let side = |v: Vertex| if sight.mirrored { mirrored(v) } else { v };
+        let corners = &self.panels[placement.panel].corners;
+        let is_beyond = |v: &Vertex| !corners.contains(&placement.map.apply(side(*v)));
+        let beyond: BTreeSet<Vertex> = grid.keys().copied().filter(is_beyond).collect();
+        let tiles = beyond.iter().flat_map(|&vertex| kind.tiles_from(vertex));
+        tiles.filter(|tile| tile.vertices().all(|v| beyond.contains(&v))).count()
     }
 
     /// The tiles of a sight under a placement, without those that have a corner which is taken.
