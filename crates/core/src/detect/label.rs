@@ -1018,6 +1018,31 @@ mod tests {
         assert!(told > 20, "{told} times only it is said that other tiles contradict");
     }
 
+    /// Boards of the same ids with other rows and columns are labelled only where all of their tags are in the same places, and
+    /// no tile of theirs lies wholly beyond the panel. A single tag of 16 cells is no such evidence.
+    #[test]
+    fn boards_of_other_rows_and_columns_get_no_labels() {
+        let sizes = (5..12).flat_map(|rows| (6..13).map(move |cols| (rows, cols)));
+        let sizes: Vec<(u32, u32)> = sizes.filter(|&size| size != (8, 9)).collect();
+        for name in shipped_names() {
+            let family = Family::shipped(name).unwrap();
+            if family.dimension().bits() <= 16 {
+                continue;
+            }
+            let asked = board(&family, 0).unwrap();
+            for &(rows, cols) in &sizes {
+                let Some(shown) = board_of(&family, (rows, cols), TagSpec::default()) else {
+                    continue;
+                };
+                for found in found_in(&family, &asked, &shown, false).found {
+                    let of = format!("{name}, {rows} x {cols}");
+                    assert_eq!(found.tags.len(), shown.panels[0].tags.len(), "{of}");
+                    assert!(rows < 11 && cols < 12, "{of}");
+                }
+            }
+        }
+    }
+
     /// A board has the tags of some faces, but not as they lie on a solid: around each face that fits, and between
     /// them, are others.
     #[test]
