@@ -99,6 +99,7 @@ pub fn calibrate(
 ) -> PyResult<Py<Calibration>> {
     let mut how = How::of(loss, weights, hold_out, distances_mm, print_scale, board_accuracy_mm)?;
     (how.board_shape, how.measure_target) = (board_shape, measure_target);
+    how.assume_target = assume_target;
     let target = target.or_else(|| of_detections(&detections.all, grid.is_some()));
     let seen = Seen::of(target, grid, sides(rows, cols)?, edge_mm)?;
     if let Some(path) = shape {
@@ -111,7 +112,7 @@ pub fn calibrate(
     }
     let model = ModelChoice::of(model)?;
     let names = detections.names(names);
-    let detections = named(py, &detections.all, names, assume_target)?;
+    let detections = named(py, &detections.all, names)?;
     let known = camera.map(|camera| camera.0.clone());
     let one = OneCamera { name: "camera".to_owned(), detections, known };
     let solved = solve(py, seen, vec![one], false, model, how)?;
@@ -176,6 +177,7 @@ pub fn rig(
     let wrong = |what: String| Err(raised::CalibrationError::new_err(what));
     let mut how = How::of(loss, weights, hold_out, distances_mm, print_scale, board_accuracy_mm)?;
     (how.board_shape, how.measure_target) = (board_shape, measure_target);
+    how.assume_target = assume_target;
     how.refine_target = refine_target;
     if cameras.len()? < 2 && !refine_target {
         return wrong(
@@ -192,7 +194,7 @@ pub fn rig(
         let detections: Results<'_> = detections.extract()?;
         target = target.or_else(|| of_detections(&detections.all, false));
         let known = known.remove(&name).map(|camera| camera.0.clone());
-        let detections = named(py, &detections.all, None, assume_target)?;
+        let detections = named(py, &detections.all, None)?;
         let is_same = |one: &deltille::detect::Detection, other: &deltille::detect::Detection| {
             !one.grids.is_empty() && one.grids == other.grids
         };

@@ -468,7 +468,7 @@ pub fn pose_of(
     let mut detection = detection.clone();
     let reference = Reference::Target(&target.target);
     if assume_target {
-        Arc::make_mut(&mut detection.found).forget_targets();
+        Arc::make_mut(&mut detection.found).assume_targets(&[target.target.identity()]);
     }
     for grid in &detection.found.grids {
         reference.check_labels(&detection.found, grid).raise(errors::calibration)?;

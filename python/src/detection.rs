@@ -135,7 +135,8 @@ impl Detection {
         assume_target: bool,
     ) -> PyResult<Self> {
         if assume_target {
-            found.forget_targets();
+            let given: Vec<_> = targets.iter().map(|target| target.target.identity()).collect();
+            found.assume_targets(&given);
         }
         Self { found: Arc::new(found), targets }.checked()
     }

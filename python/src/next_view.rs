@@ -12,7 +12,7 @@ use crate::camera::Camera;
 use crate::detection::{Results, Targets};
 use crate::errors::{self, Raise, raised, unlocked};
 use crate::pose::Pose;
-use crate::solving::{ModelChoice, Seen, named};
+use crate::solving::{ModelChoice, Seen, assume, named};
 
 /// A view that is proposed: where to hold the board so that the camera is known best.
 #[pyclass(frozen, module = "deltille")]
@@ -200,7 +200,10 @@ pub fn next_view(
     let avoided: Vec<deltille::calibrate::NextView> =
         avoid.unwrap_or_default().iter().map(|view| view.next.clone()).collect();
     let guide = guide.within_mm(nearest, farthest).avoiding(&avoided);
-    let detections = named(py, &detections.all, None, assume_target)?;
+    let mut detections = named(py, &detections.all, None)?;
+    if assume_target {
+        assume(&mut detections, std::slice::from_ref(target));
+    }
     let reference = Reference::Target(target);
     let shown = views(&detections, &reference).raise(errors::calibration)?.views;
     let Guided { next, .. } = unlocked(py, || guide.after(&reference, &shown))?;

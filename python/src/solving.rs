@@ -92,6 +92,7 @@ pub struct How {
     pub refine_target: bool,
     pub distances_mm: Vec<f64>,
     pub board_accuracy_mm: Option<f64>,
+    pub assume_target: bool,
     pub sheet: Sheet,
 }
 
@@ -138,6 +139,7 @@ impl How {
             refine_target: false,
             distances_mm,
             board_accuracy_mm: accuracy_mm.transpose()?,
+            assume_target: false,
             sheet: Sheet { print_scale, shape: None },
         })
     }
@@ -188,7 +190,6 @@ pub fn named(
     py: Python<'_>,
     detections: &[PyRef<'_, Detection>],
     names: Option<Vec<String>>,
-    assume_target: bool,
 ) -> PyResult<Named> {
     if names.as_ref().is_some_and(|names| names.len() != detections.len()) {
         let what = "names: give as many as there are detections";
@@ -210,13 +211,17 @@ pub fn named(
             PyErr::warn(py, &py.get_type::<PyUserWarning>(), what, 2)?;
             continue;
         }
-        let mut found = (**found).clone();
-        if assume_target {
-            found.forget_targets();
-        }
-        all.push((name, found));
+        all.push((name, (**found).clone()));
     }
     Ok(all)
+}
+
+/// Takes detections for those of the targets that are given, whatever they name.
+pub fn assume(detections: &mut Named, targets: &[targets::Target]) {
+    let given: Vec<_> = targets.iter().map(targets::Target::identity).collect();
+    for (_, found) in detections {
+        found.assume_targets(&given);
+    }
 }
 
 /// What came of it.
@@ -349,7 +354,7 @@ pub fn solve(
         let reference = seen.reference();
         panels.extend(how.sheet.panels(&reference).raise(errors::calibration)?);
         let mut taken: BTreeSet<(usize, String)> = BTreeSet::new();
-        for (index, camera) in cameras.into_iter().enumerate() {
+        for (index, mut camera) in cameras.into_iter().enumerate() {
             if is_named
                 && let Some((twice, _)) =
                     camera.detections.iter().find(|(name, _)| !taken.insert((index, name.clone())))
@@ -361,6 +366,9 @@ pub fn solve(
                 let ink = found.ink?;
                 Some(if let Seen::Grid(grid) = &*seen { ink.on_print(grid.edge_mm) } else { ink })
             }));
+            if how.assume_target {
+                assume(&mut camera.detections, reference.targets());
+            }
             let shown = views(&camera.detections, &reference).raise(errors::calibration)?;
             let mut of_camera: Vec<View> = shown.views;
             let name = is_named.then(|| camera.name.clone());

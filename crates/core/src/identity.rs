@@ -63,7 +63,7 @@ impl From<Fingerprint> for String {
 ///
 /// Two targets with the same tags in the same tiles have the same [`labels`](Self::labels); the same
 /// [`fingerprint`](Self::fingerprint) have only those whose corners are also at the same positions. The name and the sizes are for
-/// messages.
+/// messages, which give the first half of the fingerprint, as sheets do.
 ///
 /// ```
 /// use deltille_core::targets::{BoardSpec, Target};
@@ -73,7 +73,7 @@ impl From<Fingerprint> for String {
 /// let [small, large] = [small.identity(), large.identity()];
 /// assert_eq!(small.labels, large.labels);
 /// assert_ne!(small.fingerprint, large.fingerprint);
-/// assert_eq!(small.to_string(), "desk (110 corners, edges of 20 mm)");
+/// assert_eq!(small.to_string(), format!("desk ({}, 110 corners, edges of 20 mm)", small.fingerprint.short()));
 /// # Ok::<(), deltille_core::targets::TargetError>(())
 /// ```
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -114,11 +114,12 @@ impl TargetIdentity {
     }
 }
 
-/// Refuses to use results of two targets together where their labels are the same and their corners are not: one of the
-/// descriptions is then not that of the board.
+/// Refuses to use results of two targets together where their tags are the same and the positions of their corners are not:
+/// one of the descriptions is then not that of the board.
 ///
 /// # Errors
-/// Which results were made with which target; `first` and `second` say what they are, such as `the camera`.
+/// Which results were made with which target; `first` and `second` say what they are, such as `the camera`. The caller adds
+/// what to do.
 pub fn check_same_board(
     [first, second]: [&str; 2],
     [of_first, of_second]: [&[TargetIdentity]; 2],
@@ -126,8 +127,8 @@ pub fn check_same_board(
     let mut pairs = of_first.iter().flat_map(|one| of_second.iter().map(move |other| (one, other)));
     match pairs.find(|(one, other)| one.is_confusable(other)) {
         Some((one, other)) => Err(format!(
-            "{first} is of {one}, {second} of {other}, which has the same labels at another size: only one can be the board that \
-             was photographed; give its description, or set `Detection::forget_targets` to assume this one"
+            "{first} was made with {one}, {second} with {other}: the tags are the same, the positions of the corners are not, so \
+             that at most one of them is the board that was photographed"
         )),
         None => Ok(()),
     }
@@ -150,10 +151,11 @@ pub fn check_result_of(
     }
 }
 
-/// The name and the size, such as `desk (110 corners, edges of 20 mm)`.
+/// The name, the first half of the fingerprint and the size, such as `desk (84457e08, 110 corners, edges of 20 mm)`.
 impl fmt::Display for TargetIdentity {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
-        write!(f, "{} ({}", self.name, counted(self.corners as usize, "corner"))?;
+        let corners = counted(self.corners as usize, "corner");
+        write!(f, "{} ({}, {corners}", self.name, self.fingerprint.short())?;
         if self.panels > 1 {
             write!(f, " on {}", counted(self.panels as usize, "panel"))?;
         }

@@ -18,7 +18,7 @@ pub fn read_with_targets(option: &str, path: &Path) -> anyhow::Result<CameraFile
     camera_file::read_with_targets(path).context(option.to_owned())
 }
 
-/// Refuses a camera that was calibrated with a target that has the labels of one of these at another size.
+/// Refuses a camera that was calibrated with a target that has the tags of one of these at another size.
 pub fn check_targets(
     path: &Path,
     calibrated_with: &[TargetIdentity],
@@ -26,8 +26,9 @@ pub fn check_targets(
 ) -> anyhow::Result<()> {
     let own: Vec<TargetIdentity> = targets.iter().map(Target::identity).collect();
     let camera = path.display().to_string();
-    check_same_board([&camera, "--target"], [calibrated_with, &own])
-        .map_err(|problem| anyhow!(problem))
+    check_same_board([&camera, "--target"], [calibrated_with, &own]).map_err(|problem| {
+        anyhow!("{problem}; give its description, or --assume-target to use this one")
+    })
 }
 
 /// Reads a camera file for these targets, see [`check_targets`]; with `is_assumed` it may be any camera's.

@@ -43,7 +43,7 @@ pub struct Args {
     /// Write the comparison, and a picture of the same name of each camera
     #[arg(short, long, value_name = "FILE.json")]
     output: Option<PathBuf>,
-    /// Compare even where both were calibrated with the same tags at different sizes
+    /// Compare even where both were calibrated with boards of the same tags at different sizes
     #[arg(long)]
     assume_target: bool,
     #[command(flatten)]
@@ -76,7 +76,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let [one, other] = [&args.first, &args.second].map(|path| path.display().to_string());
     compare_boards([&one, &other], [&mut first, &mut second], args.assume_target)
         .map_err(|problem| anyhow!(problem))?;
-    let pairs = pairs(&first.cameras, &second.cameras)?;
+    let pairs = pairs([&one, &other], [&first.cameras, &second.cameras])?;
     if let Some(path) = &path {
         let json = sample_of(comparison::SCHEMA);
         check_places(output::folder_of(path), &files(path, &pairs, &[], &json), args.overwrite)?;
@@ -142,8 +142,8 @@ fn read(option: &'static str, path: &Path) -> anyhow::Result<Estimate> {
 
 /// The same cameras of both.
 fn pairs<'a>(
-    first: &'a [CameraEstimate],
-    second: &'a [CameraEstimate],
+    [first_path, second_path]: [&str; 2],
+    [first, second]: [&'a [CameraEstimate]; 2],
 ) -> anyhow::Result<Vec<(&'a CameraEstimate, &'a CameraEstimate)>> {
     if let ([one], [other]) = (first, second) {
         return Ok(vec![(one, other)]);
@@ -152,12 +152,14 @@ fn pairs<'a>(
         second.iter().find(|other| other.name == one.name).map(|other| (one, other))
     };
     let pairs: Vec<_> = first.iter().filter_map(same).collect();
-    let names = |of: &[CameraEstimate]| {
-        of.iter().map(|camera| shown(&camera.name)).collect::<Vec<_>>().join(", ")
+    let names = |of: &[CameraEstimate]| match of {
+        [only] if only.name.is_empty() => "a camera without a name".to_owned(),
+        all => all.iter().map(|camera| shown(&camera.name)).collect::<Vec<_>>().join(", "),
     };
     ensure!(
         !pairs.is_empty(),
-        "no camera is in both: FIRST has {}, SECOND {}: give two calibrations of the same rig",
+        "no camera is in both: {first_path} has {}, {second_path} has {}: give two calibrations of the same rig, or two \
+         of the same camera",
         names(first),
         names(second)
     );
@@ -215,11 +217,18 @@ fn told(camera: &CameraEstimate, found: &Comparison, tolerance: f64) -> String {
             format!("{name}{meaning}\n")
         }
         (None, _) if verdict_of(found) == Verdict::Same => format!("{name}both are the same\n"),
-        (None, why) => format!(
-            "{name}cannot judge whether the camera has changed: {}; give the .json of `deltille calibrate` or `rig`, \
-             which has uncertainties, or --tolerance\n",
-            why.unwrap_or_default()
-        ),
+        (None, why) => {
+            let advice = match found.lacks_uncertainty {
+                [false, false] => "give a larger --region",
+                _ => {
+                    "give the .json of `deltille calibrate` or `rig`, which has them unless the camera was kept fixed"
+                }
+            };
+            format!(
+                "{name}cannot judge whether the camera has changed: {}; {advice}, or --tolerance\n",
+                why.unwrap_or_default()
+            )
+        }
     };
     format!(
         "{name}differs by {:.4} px (rms a coordinate), at most {:.4} px, over {} at {far}, after it is turned by \

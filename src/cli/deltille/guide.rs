@@ -78,7 +78,7 @@ pub struct Args {
     /// photograph
     #[arg(long, value_name = "FILE")]
     picture: Option<PathBuf>,
-    /// Use --target even where the camera was calibrated with the same tags at another size
+    /// Use --target even where the camera was calibrated with a board of the same tags at another size
     #[arg(long)]
     assume_target: bool,
     #[command(flatten)]

@@ -37,7 +37,7 @@ pub struct Args {
     /// The camera, as `deltille calibrate`, ROS or OpenCV write it
     #[arg(long, value_name = "FILE")]
     camera: PathBuf,
-    /// Use --target even where the camera was calibrated with the same tags at another size
+    /// Use --target even where the camera was calibrated with a board of the same tags at another size
     #[arg(long)]
     assume_target: bool,
     #[command(flatten)]

@@ -19,7 +19,7 @@ use crate::export::tables::folder;
 use crate::lattice::{GridKind, LatticeMap};
 use crate::limits::{Limits, ReadError};
 use crate::quantity::{edge_mm, print_scale};
-use crate::targets::{SIDES, Target, parse_length_mm};
+use crate::targets::{SIDES, Target, TargetIdentity, parse_length_mm};
 use crate::words::counted;
 
 /// Detections and what they show.
@@ -325,7 +325,7 @@ pub fn read(
         );
     }
     if is_assumed {
-        detections.iter_mut().for_each(|(_, found)| found.forget_targets());
+        assume(&mut detections, reference);
     }
     let Shown { views, empty, left_out, .. } = views(&detections, reference)?;
     for (index, out) in &left_out {
@@ -335,6 +335,19 @@ pub fn read(
     let left_out = left_out.into_iter().map(|(_, out)| out).collect();
     let ink = ink_of(&detections, reference);
     Ok(Read { views, empty, left_out, ink, detections })
+}
+
+/// Takes all detections for those of the targets that are given, and notes where they name others.
+fn assume(detections: &mut [(String, Detection)], reference: &Reference) {
+    let given: Vec<TargetIdentity> = reference.targets().iter().map(Target::identity).collect();
+    let replaced = detections.iter_mut().map(|(_, found)| found.assume_targets(&given));
+    let replaced: Vec<Vec<TargetIdentity>> = replaced.filter(|of_one| !of_one.is_empty()).collect();
+    if let (Some(seen), Some(own)) =
+        (replaced.first().and_then(|of_one| of_one.first()), given.first())
+    {
+        let detections = counted(replaced.len(), "detection");
+        tell!("note: --assume-target: {detections} of {seen} are taken for {own}");
+    }
 }
 
 /// What is to be noted where some of the detections that show something do not say which target they are of.

@@ -12,7 +12,7 @@ pub fn told(message: &impl Display) -> String {
 }
 
 /// What the page has no setting for.
-const ASSUME_TARGET: &str = ", or set `Detection::forget_targets` to assume this one";
+const ASSUME_TARGET: &str = ", or set `Detection::assume_targets` to assume this one";
 
 /// A text in which settings have the names of the page: what the library calls `BoardSpec::rows` is `rows`.
 pub fn named(text: &str) -> String {

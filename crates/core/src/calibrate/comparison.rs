@@ -131,18 +131,22 @@ impl Default for Comparison {
 }
 
 /// Prepares two calibrations for comparisons. Those of one board share its errors, which then do not count; those of
-/// different boards do not. `what` names the two in messages, and `is_assumed` that labels of one board may be of two sizes.
+/// different boards do not. `what` names the two in messages; with `assume_target` they are compared whatever they were made
+/// with.
 ///
 /// # Errors
-/// Where they were made with boards of the same labels at different sizes, so that one of them is wrong.
+/// Where they were made with boards of the same tags at different sizes, so that at most one of them is right.
 pub fn compare_boards(
     what: [&str; 2],
     [first, second]: [&mut Estimate; 2],
-    is_assumed: bool,
+    assume_target: bool,
 ) -> Result<(), String> {
     let boards = [first.calibrated_with.as_slice(), second.calibrated_with.as_slice()];
-    if !is_assumed {
-        check_same_board(what, boards)?;
+    if !assume_target {
+        check_same_board(what, boards).map_err(|problem| {
+            problem
+                + "; calibrate both with its description, or set `compare_boards::assume_target` to compare them as they are"
+        })?;
     }
     if check_result_of(boards[0], boards[1]).is_err() {
         let cameras = first.cameras.iter_mut().chain(&mut second.cameras);

@@ -43,7 +43,7 @@ impl UntaggedGrid {
     pub(super) fn check_target(&self, seen: Option<&TargetIdentity>) -> Result<(), String> {
         match seen {
             Some(seen) if seen.edge_mm != [self.edge_mm; 2] => Err(format!(
-                "it was detected as {seen}, and `UntaggedGrid::edge_mm` is {} mm: {ASSUME_TARGET}",
+                "it was detected as {seen}, but `UntaggedGrid::edge_mm` is {} mm: {ASSUME_TARGET}",
                 self.edge_mm
             )),
             _ => Ok(()),

@@ -40,7 +40,7 @@ const OF_ONE_TARGET: &str =
 
 /// What to do about detections of another target.
 pub(super) const ASSUME_TARGET: &str = "give the description that it was detected with, or set \
-                                        `Detection::forget_targets` to assume this one";
+                                        `Detection::assume_targets` to assume this one";
 
 /// Why labels of a grid without panel are not on the target.
 const CUT_OFF: &str = "its rows and columns are not those of the target: without tags they are known \
@@ -304,7 +304,7 @@ impl Reference<'_> {
         let confusable = identities.iter().find(|own| own.is_confusable(seen));
         match confusable.or_else(|| identities.first().filter(|_| grid.target.is_none())) {
             Some(own) => Err(format!(
-                "it was detected as {seen}, and the target given is {own}: {ASSUME_TARGET}"
+                "it was detected as {seen}, but the target given is {own}: {ASSUME_TARGET}"
             )),
             None => Ok(None),
         }

@@ -48,9 +48,25 @@ impl Detection {
         Self { image: image.into(), width, height, grids, ..Self::default() }
     }
 
-    /// Removes the identities of the targets, so that the detection is accepted with any target whose labels it has.
-    pub fn forget_targets(&mut self) {
-        self.targets.clear();
+    /// Takes its labels for those of the targets that are given, whatever targets it names, so that it is accepted with them:
+    /// each target that it names is replaced by the one with the same tags, or, where it names one alone, by the one that is
+    /// given. Without any given, as for an untagged grid, it names none afterwards. Returns the targets that were replaced.
+    pub fn assume_targets(&mut self, given: &[TargetIdentity]) -> Vec<TargetIdentity> {
+        if given.is_empty() {
+            return std::mem::take(&mut self.targets);
+        }
+        let only = given.first().filter(|_| given.len() == 1 && self.targets.len() == 1);
+        let mut replaced = Vec::new();
+        for own in &mut self.targets {
+            let same = given.iter().find(|other| other.is_confusable(own)).or(only);
+            if let Some(same) = same.filter(|_| !given.iter().any(|other| other.is_same_print(own)))
+            {
+                // Grids refer to it by its name.
+                let same = TargetIdentity { name: own.name.clone(), ..same.clone() };
+                replaced.push(std::mem::replace(own, same));
+            }
+        }
+        replaced
     }
 
     /// Identity of the target that a grid belongs to; `None` where the detection does not name it.
@@ -168,4 +184,31 @@ pub struct DecodedTag {
     pub col: i32,
     /// Number of bits that were misread and corrected.
     pub errors: u32,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::targets::{BoardSpec, Target};
+
+    #[test]
+    fn assumed_targets_replace_those_with_the_same_tags() {
+        let board = |name, cols, edge_mm| {
+            Target::new(name, BoardSpec::deltille(7, cols, edge_mm)).unwrap().identity()
+        };
+        let (small, large, wide) =
+            (board("desk", 8, 20.0), board("other", 8, 25.0), board("wall", 12, 30.0));
+        let of = |targets: &[&TargetIdentity]| {
+            let targets = targets.iter().map(|&target| target.clone()).collect();
+            Detection { targets, ..Detection::default() }
+        };
+        let mut both = of(&[&small, &wide]);
+        assert_eq!(both.assume_targets(&[wide.clone(), large.clone()]), [small.clone()]);
+        assert_eq!(both.targets[0].fingerprint, large.fingerprint);
+        assert_eq!(both.targets[0].name, small.name, "grids refer to it by its name");
+        assert_eq!(both.targets[1], wide);
+        assert_eq!(of(&[&small]).assume_targets(&[wide.clone()]), [small.clone()]);
+        assert!(of(&[&small, &wide]).assume_targets(std::slice::from_ref(&wide)).is_empty());
+        assert_eq!(of(&[&small]).assume_targets(&[]), [small]);
+    }
 }
