@@ -1,12 +1,14 @@
 """Standard deviations of a camera whose board is not quite what its description says, in simulation.
 
     python board_errors.py path/to/deltille FOLDER [--kind sheet|corners|both|none] [--size 0.05] [--views 20]
-                           [--seeds 1-40] [--noise 0.1] [--measure] [--accuracy 0.05mm]
+                           [--seeds 1-40] [--noise 0.1] [--measure] [--accuracy 0.05mm] [--repeats]
 
 A checkerboard of 10 × 11 corners, 20 mm apart, is in every view distorted alike: `sheet` is stretched, sheared and bent
 at random, `corners` displaces each corner by itself, with `--size` mm rms a coordinate; `both` has both. Prints how
 far fx, fy, cx, cy are from the truth in their deviations from noise and in the observed ones, rms over seeds, and with
---measure the same of the positions of corners. Needs numpy.
+--measure the same of the positions of corners. With --repeats the camera is calibrated a second time from other views
+of the same board, and `compare` has to find it unchanged: prints in how many of all repeats it does not, at 5 % and at
+its own level. Needs numpy.
 """
 
 import argparse
@@ -70,20 +72,15 @@ def view(random, board, noise):
             return pixels + random.normal(0, noise, pixels.shape)
 
 
-def simulate(args, seed):
-    folder = args.folder / f"{seed}"
-    shutil.rmtree(folder, ignore_errors=True)
+def calibrated(args, random, folder, corners_mm):
+    """The camera from new views of a board with these corners, mm."""
     (folder / "corners").mkdir(parents=True)
-    random = np.random.default_rng(seed)
-    rows, cols = (axis.ravel() for axis in np.mgrid[:ROWS, :COLS])
-    plan = np.stack([cols, rows, 0 * rows], 1) * EDGE_MM
-    offsets = errors(random, plan, args.kind, args.size)
     cov = [args.noise**2, 0.0, args.noise**2]
     for index in range(args.views):
-        pixels = view(random, plan + offsets, args.noise).tolist()
+        pixels = view(random, corners_mm, args.noise).tolist()
         corners = [
-            {"row": int(row), "col": int(col), "id": None, "x": x, "y": y, "cov": cov}
-            for row, col, (x, y) in zip(rows, cols, pixels)
+            {"row": index // COLS, "col": index % COLS, "id": None, "x": x, "y": y, "cov": cov}
+            for index, (x, y) in enumerate(pixels)
         ]
         grid = {"kind": "checker", "panel": None, "corners": corners, "tags": []}
         found = {"schema": "deltille/detection/1", "image": f"{index}.png", "width": WIDTH, "height": HEIGHT}
@@ -92,17 +89,38 @@ def simulate(args, seed):
     command += ["--edge", "20mm", "--model", "radtan", "-o", folder / "camera.yaml"]
     command += ["--measure-target"] * args.measure
     command += ["--board-accuracy", args.accuracy] if args.accuracy else []
+    run(command)
+    return folder / "camera.json"
+
+
+def run(command):
     done = subprocess.run([str(part) for part in command], capture_output=True, text=True)
     if done.returncode not in (0, 1):
         sys.exit(done.stderr)
-    found = {p["name"]: p for p in json.loads((folder / "camera.json").read_text())["parameters"]}
+
+
+def simulate(args, seed):
+    folder = args.folder / f"{seed}"
+    shutil.rmtree(folder, ignore_errors=True)
+    random = np.random.default_rng(seed)
+    rows, cols = (axis.ravel() for axis in np.mgrid[:ROWS, :COLS])
+    plan = np.stack([cols, rows, 0 * rows], 1) * EDGE_MM
+    offsets = errors(random, plan, args.kind, args.size)
+    camera = calibrated(args, random, folder / "first", plan + offsets)
+    found = {p["name"]: p for p in json.loads(camera.read_text())["parameters"]}
     off = [
         [(found[name]["value"] - value) / found[name].get(sd, np.nan) for name, value in TRUTH.items()]
         for sd in ("sd", "observed_sd")
     ]
-    mapped = of_map(folder / "camera-measured.json", plan, offsets) if args.measure else np.nan
+    mapped = of_map(camera.with_name("camera-measured.json"), plan, offsets) if args.measure else np.nan
+    repeated = [np.nan] * 3
+    if args.repeats:
+        again = calibrated(args, random, folder / "second", plan + offsets)
+        run([args.deltille, "compare", camera, again, "-o", folder / "compared.json"])
+        compared = json.loads((folder / "compared.json").read_text())["cameras"][0]
+        repeated = [compared[name] for name in ("rms_px", "expected_px", "chance")]
     shutil.rmtree(folder)
-    return np.array(off), mapped
+    return np.array(off), mapped, repeated
 
 
 def of_map(path, plan, offsets):
@@ -138,15 +156,21 @@ def main():
     parser.add_argument("--noise", type=float, default=0.1)
     parser.add_argument("--measure", action="store_true")
     parser.add_argument("--accuracy")
+    parser.add_argument("--repeats", action="store_true")
     args = parser.parse_args()
     low, high = map(int, args.seeds.split("-"))
     with ThreadPoolExecutor(2) as pool:
-        off, mapped = zip(*pool.map(lambda seed: simulate(args, seed), range(low, high + 1)))
+        off, mapped, repeated = zip(*pool.map(lambda seed: simulate(args, seed), range(low, high + 1)))
     noise, observed = np.sqrt(np.mean(np.square(off), 0))
     told = lambda values: ", ".join(f"{name} {value:.2f}" for name, value in zip(TRUTH, values))
     print(f"{args.kind} {args.size} mm, {args.views} views, {len(off)} seeds, {'measured' if args.measure else 'plain'}")
     print(f"  of noise: {told(noise)}; observed: {told(observed)}", end="")
-    print(f"; corners {np.sqrt(np.mean(mapped)):.2f}" if args.measure else "", flush=True)
+    print(f"; corners {np.sqrt(np.mean(mapped)):.2f}" if args.measure else "")
+    if args.repeats:
+        found, expected, chance = np.array(repeated).T
+        ratio = np.sqrt(np.mean(found**2) / np.mean(expected**2))
+        changed = [int((chance < level).sum()) for level in (0.05, 0.001)]
+        print(f"  repeats: found / expected {ratio:.2f}, changed at 5 % {changed[0]}, at the tool's own level {changed[1]}")
 
 
 if __name__ == "__main__":
