@@ -4,6 +4,7 @@
 //!   clean     any camera, board, number of views, noise, tilts and order of the poses
 //!   zoom      the focal length is 10 % longer from the middle of the views on
 //!   focus     0.5 % longer, noise 0.1 px, 25 views
+//!   centre    the principal point moves by 3 px instead, in a random direction
 //!   shutter   rows are read one after the other in 30 ms while the board moves at 200 mm/s
 //!   stretch   a board of 21 × 20 mm that is taken for 20 mm
 //!   curved    a board that is bent by 1 mm, poses in slow order: no change of the camera
@@ -22,7 +23,8 @@ use rand_distr::{Distribution, StandardNormal};
 use rayon::prelude::*;
 
 use crate::calibrate::{
-    Calibration, Diagnosis, Estimate, Model, Observation, PanelRef, Sighting, View,
+    Calibration, ChangedIntrinsic, Diagnosis, Estimate, Model, Observation, PanelRef, Sighting,
+    View,
 };
 use crate::camera::{BrownConrady, Camera, DoubleSphere, KannalaBrandt, Lens, Pose};
 
@@ -35,6 +37,9 @@ const MARGIN_PX: f64 = 4.0;
 /// How much longer a focal length is after a change of zoom, and of focus.
 const ZOOM: f64 = 1.10;
 const FOCUS: f64 = 1.005;
+
+/// How far a principal point moves, px.
+const CENTRE_PX: f64 = 3.0;
 
 /// A rolling shutter, s, and the speed of the board, mm/s.
 const READOUT_S: f64 = 0.03;
@@ -52,6 +57,8 @@ pub enum Scene {
     Zoom,
     /// The focal length changes by 0.5 %.
     Focus,
+    /// The principal point moves.
+    Centre,
     /// Rows are read one after the other while the board moves.
     Shutter,
     /// The board is longer in one direction.
@@ -62,8 +69,15 @@ pub enum Scene {
 
 impl Scene {
     /// All scenes.
-    pub const ALL: [Self; 6] =
-        [Self::Clean, Self::Zoom, Self::Focus, Self::Shutter, Self::Stretch, Self::Curved];
+    pub const ALL: [Self; 7] = [
+        Self::Clean,
+        Self::Zoom,
+        Self::Focus,
+        Self::Centre,
+        Self::Shutter,
+        Self::Stretch,
+        Self::Curved,
+    ];
 
     /// Its name.
     pub fn name(self) -> &'static str {
@@ -71,6 +85,7 @@ impl Scene {
             Self::Clean => "clean",
             Self::Zoom => "zoom",
             Self::Focus => "focus",
+            Self::Centre => "centre",
             Self::Shutter => "shutter",
             Self::Stretch => "stretch",
             Self::Curved => "curved",
@@ -93,8 +108,8 @@ pub struct Run {
     pub noise_px: f64,
     /// Whether poses change slowly.
     pub is_slow: bool,
-    /// What was said of the state of the camera and the board: the kind, and the ratio of focal lengths, the shear in
-    /// px, or the ratio of the board's lengths.
+    /// What was said of the state of the camera and the board: the kind, and the ratio of focal lengths or the motion of the
+    /// principal point in px, the shear in px, or the ratio of the board's lengths.
     pub said: Vec<(&'static str, f64)>,
     /// Whether there was a calibration at all.
     pub is_calibrated: bool,
@@ -253,7 +268,8 @@ impl World {
 
     fn views(&mut self) -> Vec<View> {
         let poses = self.poses();
-        let plain = self.camera.focal_px;
+        let (plain, centre_px) = (self.camera.focal_px, self.camera.centre_px);
+        let direction = DVec2::from_angle(self.random.random_range(0.0..TAU));
         let mut views = Vec::new();
         for (index, pose) in poses.iter().enumerate() {
             let longer = match self.scene {
@@ -261,7 +277,11 @@ impl World {
                 Scene::Focus => FOCUS,
                 _ => 1.0,
             };
-            self.camera.focal_px = plain * if 2 * index >= poses.len() { longer } else { 1.0 };
+            let by_px = if self.scene == Scene::Centre { CENTRE_PX } else { 0.0 };
+            if 2 * index >= poses.len() {
+                self.camera.focal_px = longer * plain;
+                self.camera.centre_px = centre_px + by_px * direction;
+            }
             let readout_s = if self.scene == Scene::Shutter { READOUT_S } else { 0.0 };
             let any = DVec3::new(self.normal(), self.normal(), self.normal());
             let view = self.seen(pose, SPEED_MM_S * any.normalize(), readout_s, true, index);
@@ -298,7 +318,9 @@ impl World {
 fn said(calibration: &Calibration, found: &Estimate) -> Vec<(&'static str, f64)> {
     let kind = |said: &Diagnosis| match said {
         Diagnosis::ChangedCamera { change, .. } => {
-            Some(("changed_camera", change.focal_px[1] / change.focal_px[0]))
+            let [before, after] = change.value_px;
+            let is_focal = change.intrinsic == ChangedIntrinsic::Focal;
+            Some(("changed_camera", if is_focal { after / before } else { after - before }))
         }
         Diagnosis::RollingShutter { shutter, .. } => Some(("rolling_shutter", shutter.shear_px)),
         Diagnosis::StretchedBoard { stretch, .. } => Some(("stretched_board", stretch.ratio)),

@@ -79,12 +79,20 @@ fn accuracy(map: &CornerMap, given_mm: Option<f64>) -> Option<f64> {
     Some(given_mm.unwrap_or_else(printed)).filter(|mm| *mm > 0.0)
 }
 
-/// How the shared unknowns and the offsets of corners, in this order, are off where the corners are found too: a column
-/// for each way in which a sheet differs from its plan, one standard deviation of it.
+/// How the shared unknowns and the offsets of corners, in this order, are off where the corners are found too: columns
+/// whose products with themselves sum to the covariance.
 ///
 /// The prior of the offsets is white, and draws a sheet that is distorted as a whole towards its plan where views
-/// do not determine it: with P the part of the prior in the normal equations H, by H⁻¹ P b. Of many views that is
-/// nothing, of four it is most of what is wrong.
+/// do not determine it: with P the part of the prior in the normal equations H, by X a = H⁻¹ P M a, where the columns of M
+/// are ways in which a sheet differs from its plan, one standard deviation of a printed sheet each, and a is how much of
+/// each there is. Of many views that is nothing, of four it is most of what is wrong. The views say of a, with the offsets
+/// b that were found,
+///
+/// ```text
+///     C = (1 + Mᵀ P M − Mᵀ P X)⁻¹,    mean C Mᵀ P b
+/// ```
+///
+/// so that a board that is found to be exact is not taken for a printed sheet.
 pub(super) fn drawn_to_plan(
     minimum: &Minimum,
     whitening: &Whitening,
@@ -96,16 +104,29 @@ pub(super) fn drawn_to_plan(
     let accuracy_mm = accuracy(map, accuracy_mm)?;
     // A scale is not measured: distances take it up.
     let sheets = sheets(map, &SHEET[1..]);
-    let off = sheets.column_iter().map(|sheet| {
-        let mut right = DVector::zeros(layout.shared + sheet.len());
-        for (i, offset) in sheet.iter().enumerate() {
-            let weight = (whitening.sigma / map.prior_mm[i % 3]).powi(2);
-            right[layout.shared + i] = accuracy_mm * weight * offset;
-        }
+    // P M, of which the normal equations have the square of sigma.
+    let pulls = DMatrix::from_fn(sheets.nrows(), sheets.ncols(), |i, mode| {
+        accuracy_mm * map.prior_mm[i % 3].powi(-2) * sheets[(i, mode)]
+    });
+    let off = pulls.column_iter().map(|pull| {
+        let mut right = DVector::zeros(layout.shared + pull.len());
+        right.rows_mut(layout.shared, pull.len()).copy_from(&(pull * whitening.sigma.powi(2)));
         normal.solve_without_frames(layout, found, &right)
     });
     let off = off.collect::<Option<Vec<_>>>()?;
-    (!off.is_empty()).then(|| DMatrix::from_columns(&off))
+    if off.is_empty() {
+        return None;
+    }
+    let off = DMatrix::from_columns(&off);
+    let of_corners = off.rows(layout.shared, sheets.nrows());
+    let said = pulls.tr_mul(&(&sheets * accuracy_mm - of_corners));
+    let precision = DMatrix::identity(off.ncols(), off.ncols()) + (&said + said.transpose()) * 0.5;
+    let covariance = precision.cholesky()?.inverse();
+    let offsets = map.offsets_mm.iter().flat_map(|offset| offset.to_array());
+    let found = DVector::from_iterator(sheets.nrows(), offsets);
+    let mean = &covariance * pulls.tr_mul(&found);
+    let root = (covariance + &mean * mean.transpose()).cholesky()?.l();
+    Some(off * root)
 }
 
 /// Displacements of a sheet as a whole, over the position from its middle: scaled, stretched, sheared, and bent.

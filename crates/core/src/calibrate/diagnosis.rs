@@ -86,7 +86,7 @@ pub enum Diagnosis {
         /// The least such rotation, degrees.
         degrees: u32,
     },
-    /// The views do not show one camera: from some view on its focal length is another one.
+    /// The views do not show one camera: from some view on its focal length or principal point is another one.
     ChangedCamera {
         /// The camera.
         camera: usize,
@@ -222,13 +222,14 @@ impl Calibration {
                     in_order(found.frames.iter().map(|frame| frame.name.as_str()).collect());
                 let (before, after) = order
                     .split_at(order.iter().position(|name| *name == change.from_view).unwrap_or(0));
-                let focal_px = [before, after].map(|names| {
+                let value_px = [before, after].map(|names| {
                     let views = self.cameras[0].views.iter();
                     let views = views.filter(|view| names.contains(&view.name)).cloned().collect();
-                    Some(self.of_views(views).adjusted().ok()?.cameras[0].camera.focal_px.x)
+                    let found = self.of_views(views).adjusted().ok()?;
+                    Some(change.intrinsic.of(&found.cameras[0].camera))
                 });
-                if let [Some(before), Some(after)] = focal_px {
-                    change.focal_px = [before, after];
+                if let [Some(before), Some(after)] = value_px {
+                    change.value_px = [before, after];
                 }
             }
             Diagnosis::StretchedBoard { stretch, .. } if self.panels.len() == 1 => {

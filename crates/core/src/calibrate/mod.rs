@@ -89,7 +89,7 @@ pub use loss::Loss;
 pub use model::{Model, ModelError};
 pub use model_selection::{Instead, Remedy};
 pub use next_view::{Guide, Guided, Held, Holding, NextView, ProposedCorner};
-pub use one_state::{BoardStretch, CameraChange, RollingShutter};
+pub use one_state::{BoardStretch, CameraChange, ChangedIntrinsic, RollingShutter};
 pub use panel::PanelRef;
 pub use problem::Observation;
 pub use shape::{BoardShape, COUNT as SHAPE_COEFFICIENTS, Shape};

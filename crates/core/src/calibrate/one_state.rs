@@ -1,7 +1,7 @@
 //! Whether the views show one camera in one state, and the board that is described.
 //!
 //! ```text
-//!   change     views 1 … k | k + 1 … n     one focal length for each group; every k is tried
+//!   change     views 1 … k | k + 1 … n     a focal length or principal point for each group; every k is tried
 //!   shutter    a displacement of the board in every view while the rows are read
 //!   stretch    x and y of the board in another ratio than described
 //! ```
@@ -9,7 +9,8 @@
 //! Each is a score test on [`StateEquations`]. Deviations are those of the scatter between views, so that
 //! errors of the model and of the board, which differ from view to view, do not pass for a change. Stretch, shear and
 //! bend of the board are unknowns of each test: a bent board that is seen from one side first and from the other
-//! later is no change of the camera.
+//! later is no change of the camera. Nor is a change that follows how the board is held, its tilt and its distance: many
+//! sequences go from one to another.
 
 use super::state_equations::{Candidate, Column, Effect, Fit, StateEquations};
 use super::weights::OUTLIER_SIGMA;
@@ -38,22 +39,73 @@ const LEAST_STRETCH: f64 = 0.005;
 /// A view shows a displacement by itself where the sum of three squares exceeds this: once in a thousand views.
 const OF_VIEW: f64 = 16.27;
 
-/// The focal length differs between the first views and the others.
+/// What of a camera changes from one view to the next: zoom and focus change the focal length; stabilised lenses and shifted
+/// ones move the principal point.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum ChangedIntrinsic {
+    /// The focal length.
+    Focal,
+    /// The principal point in x.
+    CentreX,
+    /// The principal point in y.
+    CentreY,
+}
+
+impl ChangedIntrinsic {
+    const ALL: [Self; 3] = [Self::Focal, Self::CentreX, Self::CentreY];
+
+    /// Its value, px; the focal length in x.
+    pub(super) fn of(self, camera: &Camera) -> f64 {
+        match self {
+            Self::Focal => camera.focal_px.x,
+            Self::CentreX => camera.centre_px.x,
+            Self::CentreY => camera.centre_px.y,
+        }
+    }
+
+    /// Its index among the parameters of a camera.
+    fn parameter(self) -> usize {
+        match self {
+            Self::Focal => 0,
+            Self::CentreX => 2,
+            Self::CentreY => 3,
+        }
+    }
+
+    fn candidate(self) -> Candidate {
+        match self {
+            Self::Focal => Candidate::Focal,
+            Self::CentreX => Candidate::CentreX,
+            Self::CentreY => Candidate::CentreY,
+        }
+    }
+}
+
+/// The camera differs between the first views and the others.
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct CameraChange {
+    /// What changed.
+    pub intrinsic: ChangedIntrinsic,
     /// Name of the first view after the change.
     pub from_view: String,
     /// How many views there are before and after it.
     pub views: [usize; 2],
-    /// Focal lengths in x before and after the change, px.
-    pub focal_px: [f64; 2],
+    /// The intrinsic before and after the change, px; focal lengths in x.
+    pub value_px: [f64; 2],
     /// Standard deviation of their difference, px.
     pub sd_px: f64,
     /// Probability of a difference as significant as this at any view of an unchanged camera.
     pub significance: f64,
     /// RMS residual of a coordinate that is left where the change is allowed for, px.
     pub left_px: f64,
+}
+
+impl CameraChange {
+    /// The values before and after, px, if it is this intrinsic that changed.
+    pub fn of(&self, intrinsic: ChangedIntrinsic) -> Option<[f64; 2]> {
+        (self.intrinsic == intrinsic).then_some(self.value_px)
+    }
 }
 
 /// Rows are displaced against each other as a rolling shutter does while the board moves.
@@ -99,29 +151,35 @@ impl State {
         camera: &Camera,
         name: impl Fn(usize) -> String,
     ) -> Self {
-        let focal_px = camera.focal_px.x;
         let stretch = stretch(equations);
         let step = step(equations);
         let change = step.as_ref().and_then(|step| {
-            let &Step { first, effect, significance, ref fit } = step;
+            let &Step { intrinsic, first, effect, significance, ref fit } = step;
             let left_px = equations.px() * fit.variance().sqrt();
-            let at_edge_px = f64::from(camera.width) / 2.0 * effect.value.abs();
-            if at_edge_px < LEAST_CHANGE * left_px {
+            // A relative change of the focal length, or px; and px at the edge of the image.
+            let (scale, at_edge) = match intrinsic {
+                ChangedIntrinsic::Focal => (camera.focal_px.x, f64::from(camera.width) / 2.0),
+                ChangedIntrinsic::CentreX | ChangedIntrinsic::CentreY => (1.0, 1.0),
+            };
+            if at_edge * effect.value.abs() < LEAST_CHANGE * left_px {
                 return None;
             }
             // Of the first group the camera is that of the fit.
-            let before = focal_px * (1.0 + equations.focal(fit, focal_px));
+            let unit = (intrinsic.candidate(), scale);
+            let before =
+                intrinsic.of(camera) + equations.change_px(fit, intrinsic.parameter(), unit);
             Some(CameraChange {
+                intrinsic,
                 from_view: name(equations.views.get(first)?.frame),
                 views: [first, equations.count() - first],
-                focal_px: [before, before + focal_px * effect.value],
-                sd_px: focal_px * effect.sd,
+                value_px: [before, before + scale * effect.value],
+                sd_px: scale * effect.sd,
                 significance,
                 left_px,
             })
         });
         // What one step leaves of a stretch may pass for a shutter, and what shutters do together for a stretch.
-        let shutter = shutter(equations, step.as_ref().map(|step| step.first));
+        let shutter = shutter(equations, step.as_ref());
         let (stretch, shutter) = match (stretch, shutter) {
             (Some((stretch, true)), Some(_)) => (Some(stretch), None),
             (Some((_, false)), Some(shutter)) => (None, Some(shutter)),
@@ -150,10 +208,17 @@ pub(super) fn significance(effect: Effect) -> f64 {
 
 /// A change at a view.
 struct Step {
+    intrinsic: ChangedIntrinsic,
     first: usize,
     effect: Effect,
     significance: f64,
     fit: Fit,
+}
+
+impl Step {
+    fn column(intrinsic: ChangedIntrinsic, first: usize, equations: &StateEquations) -> Column {
+        equations.weighted(intrinsic.candidate(), after(first, equations.count()))
+    }
 }
 
 pub(super) fn after(first: usize, count: usize) -> Vec<f64> {
@@ -164,24 +229,32 @@ pub(super) fn after(first: usize, count: usize) -> Vec<f64> {
 fn step(equations: &StateEquations) -> Option<Step> {
     let count = equations.count();
     let places = LEAST_VIEWS..(count + 1).saturating_sub(LEAST_VIEWS);
-    let tried = places.len() as f64;
-    let of = |first: usize| {
+    let tried = (places.len() * ChangedIntrinsic::ALL.len()) as f64;
+    let all = places.flat_map(|first| ChangedIntrinsic::ALL.map(|intrinsic| (intrinsic, first)));
+    let of = |(intrinsic, first): (ChangedIntrinsic, usize)| {
         let mut columns = base(equations);
-        columns.push(equations.weighted(Candidate::Focal, after(first, count)));
+        // What a lens of another model, or a board with errors, leaves depends on how the board is held.
+        for of_pose in [
+            equations.views.iter().map(|view| view.obliquity).collect::<Vec<f64>>(),
+            equations.views.iter().map(|view| view.log_distance).collect(),
+            (0..count).map(|view| view as f64).collect(),
+        ] {
+            columns.push(equations.weighted(intrinsic.candidate(), of_pose));
+        }
+        columns.push(Step::column(intrinsic, first, equations));
         let fit = equations.fit(&columns)?;
-        // Each group has its mean.
-        let effect = fit.effect(columns.len() - 1, 2.0)?;
+        // Each group has its mean, and so has how the board is held.
+        let effect = fit.effect(columns.len() - 1, 5.0)?;
         let significance = (tried * significance(effect)).min(1.0);
-        Some(Step { first, effect, significance, fit })
+        Some(Step { intrinsic, first, effect, significance, fit })
     };
-    let best = places.filter_map(of).min_by(|a, b| a.significance.total_cmp(&b.significance));
+    let best = all.filter_map(of).min_by(|a, b| a.significance.total_cmp(&b.significance));
     best.filter(|step| step.significance < SIGNIFICANT)
 }
 
-fn shutter(equations: &StateEquations, changed: Option<usize>) -> Option<RollingShutter> {
+fn shutter(equations: &StateEquations, changed: Option<&Step>) -> Option<RollingShutter> {
     let columns = || {
-        let step = changed
-            .map(|first| equations.weighted(Candidate::Focal, after(first, equations.count())));
+        let step = changed.map(|step| Step::column(step.intrinsic, step.first, equations));
         base(equations).into_iter().chain(step).collect::<Vec<Column>>()
     };
     let plain = equations.fit(&columns())?;

@@ -51,6 +51,9 @@ pub(super) enum Candidate {
 const CANDIDATES: usize = 11;
 
 impl Candidate {
+    /// What of a camera may change.
+    pub(super) const CAMERA: [Self; 3] = [Self::Focal, Self::CentreX, Self::CentreY];
+
     /// Displacements while the shutter passes the image.
     pub(super) const SHUTTER: [Self; 3] = [Self::ShutterX, Self::ShutterY, Self::ShutterZ];
 
@@ -72,16 +75,18 @@ pub(super) struct ViewEquations {
     px: f64,
     /// Root mean square of how a pixel moves with the board, px/mm, along x, y and z.
     pub px_per_mm: f64,
+    /// Mean squared sine of the angle between the line of sight and the normal of the board.
+    pub obliquity: f64,
+    /// Mean logarithm of the distance.
+    pub log_distance: f64,
 }
 
 /// What the views of a camera say, in their order.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct StateEquations {
     pub views: Vec<ViewEquations>,
-    /// Columns of the camera.
-    parameters: usize,
-    /// Whether the first two of them are the focal lengths.
-    is_focal_free: bool,
+    /// The parameters of the camera that have columns, by index.
+    free: Vec<usize>,
     /// Whether all corners are those of one panel.
     pub is_of_one_panel: bool,
 }
@@ -138,18 +143,14 @@ impl StateEquations {
         let seen: BTreeSet<usize> = of_camera().map(|block| block.frame).collect();
         let views = order.iter().copied().filter(|frame| seen.contains(frame));
         let views = views.filter_map(|frame| equations.of_view(frame)).collect();
-        Some(Self {
-            views,
-            parameters: equations.free.len(),
-            is_focal_free: equations.free.starts_with(&[0, 1]),
-            is_of_one_panel: panels.len() == 1,
-        })
+        Some(Self { views, free: equations.free, is_of_one_panel: panels.len() == 1 })
     }
 
     /// The same of some of the views only, by index.
     pub(super) fn some(&self, is_kept: impl Fn(usize) -> bool) -> Self {
         let views = self.views.iter().enumerate().filter(|&(index, _)| is_kept(index));
-        Self { views: views.map(|(_, view)| view.clone()).collect(), ..*self }
+        let views = views.map(|(_, view)| view.clone()).collect();
+        Self { views, free: self.free.clone(), ..*self }
     }
 
     /// How many views there are.
@@ -159,37 +160,42 @@ impl StateEquations {
 
     /// How many unknowns the camera has.
     pub(super) fn parameter_count(&self) -> usize {
-        self.parameters
+        self.free.len()
     }
 
     /// Whether the first two of them are the focal lengths.
     pub(super) fn is_focal_free(&self) -> bool {
-        self.is_focal_free
+        self.free.starts_with(&[0, 1])
     }
 
-    /// By which part the focal length in x changes in a fit whose first columns are those of the camera.
-    pub(super) fn focal(&self, fit: &Fit, focal_px: f64) -> f64 {
-        match (self.parameters, self.is_focal_free) {
-            (0, _) => fit.beta[0],
-            (_, true) => fit.beta[0] / focal_px,
-            (_, false) => 0.0,
+    /// By how much a parameter changes in a fit whose first columns are those of the camera, px; of a rigid camera the
+    /// candidate in its place, whose unit is so many px.
+    pub(super) fn change_px(
+        &self,
+        fit: &Fit,
+        parameter: usize,
+        (candidate, px): (Candidate, f64),
+    ) -> f64 {
+        if self.free.is_empty() {
+            let column = Candidate::CAMERA.iter().position(|&of| of == candidate);
+            return column.map_or(0.0, |column| px * fit.beta[column]);
         }
+        let column = self.free.iter().position(|&free| free == parameter);
+        column.map_or(0.0, |column| fit.beta[column])
     }
 
     /// The columns of the camera.
     pub(super) fn camera(&self) -> Vec<Column> {
-        let own = 0..self.parameters;
-        match self.parameters {
-            0 => [Candidate::Focal, Candidate::CentreX, Candidate::CentreY]
-                .map(|candidate| self.column(candidate))
-                .into(),
+        let own = 0..self.free.len();
+        match self.free.len() {
+            0 => Candidate::CAMERA.map(|candidate| self.column(candidate)).into(),
             _ => own.map(|index| Column { index, weights: None }).collect(),
         }
     }
 
     /// A candidate, the same in all views.
     pub(super) fn column(&self, candidate: Candidate) -> Column {
-        Column { index: self.parameters + candidate as usize, weights: None }
+        Column { index: self.free.len() + candidate as usize, weights: None }
     }
 
     /// A candidate times a weight for each view.
@@ -249,7 +255,7 @@ impl StateEquations {
         let residual = gram.nrows() - 1;
         let of_columns =
             columns.iter().map(|c| (c.index, c.weights.as_ref().map_or(1.0, |w| w[view])));
-        let of_each = each.iter().map(|&of| (self.parameters + of as usize, 1.0));
+        let of_each = each.iter().map(|&of| (self.free.len() + of as usize, 1.0));
         let chosen: Vec<(usize, f64)> =
             of_columns.chain([(residual, 1.0)]).chain(of_each).collect();
         DMatrix::from_fn(chosen.len(), chosen.len(), |i, j| {
@@ -352,6 +358,7 @@ impl Equations<'_> {
         let (p, n) = (free.len(), free.len() + CANDIDATES + 7);
         let mut gram = DMatrix::zeros(n, n);
         let (mut count, mut px, mut white, mut moves) = (0, 0.0, 0.0, 0.0);
+        let (mut obliquity, mut log_distance) = (0.0, 0.0);
         let blocks = problem.blocks.iter().zip(&whitening.blocks);
         let blocks = blocks.filter(|(block, _)| block.camera == camera && block.frame == frame);
         for (block, weights) in blocks {
@@ -405,6 +412,9 @@ impl Equations<'_> {
                 let first = a * x;
                 gram.ger(1.0, &first, &first, 1.0);
                 gram.ger(1.0, &second, &second, 1.0);
+                let normal = rotation * DVec3::Z;
+                obliquity += 1.0 - normal.dot(point.normalize()).powi(2);
+                log_distance += point.length().ln();
                 count += 1;
                 px += residual.length_squared();
                 white += whitened.length_squared();
@@ -420,6 +430,8 @@ impl Equations<'_> {
             freedom: (2 * count - 6) as f64,
             px: if white > 0.0 { (px / white).sqrt() } else { 0.0 },
             px_per_mm: (moves / (4 * count) as f64).sqrt(),
+            obliquity: obliquity / f64::from(count as u32),
+            log_distance: log_distance / f64::from(count as u32),
         })
     }
 }

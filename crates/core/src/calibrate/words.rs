@@ -6,7 +6,7 @@ use super::finding::{Finding, Moved, Shared};
 use super::lack_of_fit::LackOfFit;
 use super::model::Model;
 use super::model_selection::{Instead, Remedy};
-use super::one_state::{BoardStretch, CameraChange, RollingShutter};
+use super::one_state::{BoardStretch, CameraChange, ChangedIntrinsic, RollingShutter};
 use super::panel::PanelRef;
 use super::start::LabelRotation;
 use super::target_map::LEAST_TO_MEASURE;
@@ -346,15 +346,28 @@ fn does_not_fit(model: Option<Model>, rms_px: f64) -> String {
     )
 }
 
+/// What keeps the principal point where it is.
+const STABILISATION: &str = "switch image stabilisation off and fix the lens";
+
 fn changed(change: &CameraChange) -> String {
     let CameraChange {
-        from_view, views: [before, after], focal_px: [first, second], sd_px, ..
+        intrinsic,
+        from_view,
+        views: [before, after],
+        value_px: [first, second],
+        sd_px,
+        ..
     } = change;
     let digits = places(*sd_px).clamp(1, 3);
+    let (what, lock) = match intrinsic {
+        ChangedIntrinsic::Focal => ("the focal length", "lock zoom and focus"),
+        ChangedIntrinsic::CentreX => ("the principal point in x", STABILISATION),
+        ChangedIntrinsic::CentreY => ("the principal point in y", STABILISATION),
+    };
     format!(
-        "the views do not show one camera: the focal length is {first:.digits$} px in the first {before} views and \
+        "the views do not show one camera: {what} is {first:.digits$} px in the first {before} views and \
          {second:.digits$} px in the {after} from {from_view} on, a difference of {:.digits$} ± {sd_px:.digits$} px \
-         ({}); what was found is neither: lock zoom and focus, and calibrate each group of views by itself",
+         ({}); what was found is neither: {lock}, and calibrate each group of views by itself",
         second - first,
         significant(change.significance)
     )

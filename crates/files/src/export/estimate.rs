@@ -9,8 +9,8 @@ use serde::Serialize;
 use super::calibration::Residuals;
 use super::motion::Motion;
 use deltille_core::calibrate::{
-    BoardShape, CameraEstimate, Coverage, Diagnosis, Estimate, Instead, LackOfFit, LensEnd,
-    PanelRef, Source, TargetMap, ViewEstimate, Words,
+    BoardShape, CameraEstimate, ChangedIntrinsic, Coverage, Diagnosis, Estimate, Instead,
+    LackOfFit, LensEnd, PanelRef, Source, TargetMap, ViewEstimate, Words,
 };
 use deltille_core::camera::{Lens, SplineGrid};
 
@@ -147,12 +147,16 @@ pub(super) struct DiagnosisRecord<'a> {
     instead: Option<String>,
     #[serde(skip_serializing_if = "Option::is_none")]
     rms_px_then: Option<f64>,
-    /// First view after a change of the camera, the focal lengths before and after, and the deviation of their
+    /// First view after a change of the camera, the intrinsic that changed before and after, and the deviation of the
     /// difference, px.
     #[serde(skip_serializing_if = "Option::is_none")]
     from_view: Option<&'a str>,
     #[serde(skip_serializing_if = "Option::is_none")]
     focal_px: Option<[f64; 2]>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    cx_px: Option<[f64; 2]>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    cy_px: Option<[f64; 2]>,
     #[serde(skip_serializing_if = "Option::is_none")]
     sd_px: Option<f64>,
     /// Displacement between the first and the last row, px, and the number of views that show it.
@@ -405,7 +409,9 @@ pub(super) fn diagnoses<'a>(
                 kind: "changed_camera",
                 camera: name(*camera),
                 from_view: Some(&change.from_view),
-                focal_px: Some(change.focal_px),
+                focal_px: change.of(ChangedIntrinsic::Focal),
+                cx_px: change.of(ChangedIntrinsic::CentreX),
+                cy_px: change.of(ChangedIntrinsic::CentreY),
                 sd_px: Some(change.sd_px),
                 rms_px_then: Some(change.left_px),
                 significance: Some(change.significance),
