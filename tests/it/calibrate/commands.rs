@@ -6,7 +6,7 @@ use std::process::Output;
 use crate::common::command::deltille;
 use crate::common::page::Page;
 use crate::common::solids::cuboctahedron;
-use deltille::camera::{BrownConrady, Camera, Lens, Pose};
+use deltille::camera::{BrownConrady, Camera, CameraFile, Lens, Pose};
 use deltille::detect::{Detection, Grid, GridCorner};
 use deltille::export::detection;
 use deltille::family::Family;
@@ -264,7 +264,45 @@ fn what_is_wrong_is_told_on_the_terminal_in_the_file_and_on_the_page() {
     page.is("calibrate-warnings");
 }
 
-/// From the eleventh picture on the focal length is 2 % longer.
+#[test]
+fn a_pair_with_a_camera_upside_down_is_rectified_as_upright_as_the_first() {
+    let target = board(8, 9);
+    let second_from_first = Pose {
+        rotation: DQuat::from_euler(glam::EulerRot::XYZ, 0.02, -0.03, 3.13),
+        translation: DVec3::new(120.0, 2.0, 3.0),
+    };
+    let folder = folder(&target, &[]);
+    let at = folder.path();
+    let mut random = ChaCha8Rng::seed_from_u64(3);
+    for index in 0..10 {
+        let mut any = |reach: f64| random.random_range(-reach..reach);
+        let tilt = DVec3::new(any(0.6), any(0.6), any(0.2));
+        let rotation = DQuat::from_scaled_axis(tilt) * DQuat::from_rotation_x(std::f64::consts::PI);
+        let centre = DVec3::new(60.0 + any(40.0), any(40.0), 450.0 + any(80.0));
+        let pose = Pose { rotation, translation: centre - rotation * DVec3::new(150.0, 80.0, 0.0) };
+        for (name, pose) in [("first", pose), ("second", second_from_first.after(&pose))] {
+            let found = detection(&target, &camera(), &pose, &mut random);
+            std::fs::create_dir_all(at.join(name)).unwrap();
+            std::fs::write(at.join(format!("{name}/{index}.json")), detection::write(&found))
+                .unwrap();
+        }
+    }
+    done(at, "rig --camera first=first --camera second=second --target board.json --model radtan");
+    let said = done(at, "rectify rig.json --pair first,second -o pair");
+    assert!(said.contains("a point is in the same row of both pictures"), "{said}");
+    let pair = json(&at.join("pair/first-second.json"));
+    // Their diagonals are 1 where nothing is rotated.
+    let upright: Vec<f64> = [0, 4, 8]
+        .map(|place| pair["views"][0]["view_from_camera"][place].as_f64().unwrap())
+        .to_vec();
+    assert!(upright.iter().all(|cosine| *cosine > 0.99), "{upright:?}");
+    let views = ["first", "second"].map(|name| {
+        let text = std::fs::read_to_string(at.join(format!("pair/{name}-rectified.yaml")));
+        CameraFile::from_yaml(&text.unwrap()).unwrap()
+    });
+    assert!(views.iter().all(|view| view.calibrated_with == [target.identity()]));
+}
+
 #[test]
 fn a_change_of_zoom_ends_with_an_error_that_names_the_view() {
     let target = board(8, 9);
