@@ -1,6 +1,6 @@
 //! What was photographed, and the detections of it: the options of commands that calibrate.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, anyhow, bail, ensure};
@@ -340,12 +340,28 @@ pub fn read(
 /// What is to be noted where some of the detections that show something do not say which target they are of.
 pub fn unnamed<'a>(
     detections: impl IntoIterator<Item = &'a (String, Detection)>,
+    ensure!(!views.is_empty(), nothing_shown(&detections));
     reference: &Reference,
 ) -> Option<String> {
     let target = reference.targets().first()?;
     let shown = detections.into_iter().filter(|(_, found)| !found.grids.is_empty());
     let (unnamed, all) = shown.fold((0, 0), |(unnamed, all), (_, found)| {
         (unnamed + usize::from(found.targets.is_empty()), all + 1)
+/// That no picture shows the target, with the reason that most of them give.
+fn nothing_shown(detections: &[(String, Detection)]) -> String {
+    let mut given = BTreeMap::new();
+    for (_, found) in detections {
+        let reasons: BTreeMap<_, _> = found.reasons.iter().map(|why| (why.kind, why)).collect();
+        for (kind, why) in reasons {
+            given.entry(kind).or_insert((0, why)).0 += 1;
+        }
+    }
+    let pictures = counted(detections.len(), "picture");
+    let most = given.into_values().max_by_key(|(count, _)| *count);
+    let why = most.map(|(count, why)| format!("; {count} of them: {why}")).unwrap_or_default();
+    format!("no board of this kind in {pictures}{why}")
+}
+
     });
     let detections = if all == 1 { "detection does" } else { "detections do" };
     (unnamed > 0).then(|| {

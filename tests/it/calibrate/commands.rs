@@ -264,6 +264,15 @@ fn what_is_wrong_is_told_on_the_terminal_in_the_file_and_on_the_page() {
     page.is("calibrate-warnings");
 }
 
+/// From the eleventh picture on the focal length is 2 % longer.
+/// One line with the name of a file and what to do, exit code 2.
+fn refused(folder: &Path, args: &str, words: &[&str]) {
+    let said = String::from_utf8(output(folder, args).stderr).unwrap();
+    deltille(folder, args).code(2);
+    assert_eq!(said.lines().count(), 1, "{args}: {said}");
+    assert!(words.iter().all(|words| said.contains(words)), "{args}: {said}");
+}
+
 #[test]
 fn a_pair_with_a_camera_upside_down_is_rectified_as_upright_as_the_first() {
     let target = board(8, 9);
@@ -301,6 +310,31 @@ fn a_pair_with_a_camera_upside_down_is_rectified_as_upright_as_the_first() {
         CameraFile::from_yaml(&text.unwrap()).unwrap()
     });
     assert!(views.iter().all(|view| view.calibrated_with == [target.identity()]));
+}
+
+#[test]
+fn pictures_that_show_no_board_are_told_with_the_reason_of_most() {
+    let reasons = |kinds: &[&str]| {
+        let mut found = Detection::new("", [1600, 1200], Vec::new());
+        let figures = serde_json::json!({"id": 4, "tags": 1, "corners": 0});
+        let reason = |kind: &&str| {
+            serde_json::from_value(serde_json::json!({"kind": kind, "figures": figures})).unwrap()
+        };
+        found.reasons = kinds.iter().map(reason).collect();
+        found
+    };
+    let empty = [
+        reasons(&["no_corners"]),
+        reasons(&["other_ids", "other_ids"]),
+        reasons(&["other_ids"]),
+        reasons(&[]),
+    ];
+    let folder = folder(&board(8, 9), &empty);
+    let why = "no board of this kind in 4 pictures; 2 of them: 1 tag whose id the target does not have, such as 4";
+    refused(folder.path(), CALIBRATE, &[why]);
+    std::fs::create_dir(folder.path().join("b")).unwrap();
+    let rig = "rig --camera a=corners --camera b=b --target board.json";
+    refused(folder.path(), rig, &["--camera a", why]);
 }
 
 #[test]
