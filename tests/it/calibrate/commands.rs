@@ -338,6 +338,16 @@ fn pictures_that_show_no_board_are_told_with_the_reason_of_most() {
 }
 
 #[test]
+fn a_folder_that_is_given_twice_is_told_in_a_line() {
+    let folder = folder(&board(8, 9), &detections(&board(8, 9), 6, 0.7));
+    let command = CALIBRATE.replacen("corners", "corners corners", 1);
+    let said = String::from_utf8(output(folder.path(), &command).stderr).unwrap();
+    let copies: Vec<&str> = said.lines().filter(|line| line.contains("counted once")).collect();
+    let [line] = copies.as_slice() else { panic!("{said}") };
+    assert!(line.contains("corners/00.json") && line.ends_with("5 more likewise"), "{line}");
+}
+
+#[test]
 fn a_change_of_zoom_ends_with_an_error_that_names_the_view() {
     let target = board(8, 9);
     let mut seen = detections(&target, 20, 0.7);
