@@ -348,6 +348,19 @@ fn a_folder_that_is_given_twice_is_told_in_a_line() {
 }
 
 #[test]
+fn a_file_without_the_shape_of_a_sheet_is_refused_with_what_makes_one() {
+    let folder = folder(&board(8, 9), &detections(&board(8, 9), 6, 0.7));
+    let at = folder.path();
+    done(at, CALIBRATE);
+    for (name, text) in [("list.json", "[1]"), ("cut.json", "{"), ("other.yaml", "width: 1")] {
+        std::fs::write(at.join(name), text).unwrap();
+    }
+    for name in ["list.json", "cut.json", "other.yaml", "board.json", "camera.json"] {
+        refused(at, &format!("{CALIBRATE} --shape {name}"), &["--shape", name, "--board-shape"]);
+    }
+}
+
+#[test]
 fn a_change_of_zoom_ends_with_an_error_that_names_the_view() {
     let target = board(8, 9);
     let mut seen = detections(&target, 20, 0.7);
