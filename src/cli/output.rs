@@ -18,8 +18,8 @@ pub fn file(output: &Path, stem: &str, extension: &str) -> anyhow::Result<PathBu
     if output.is_dir() {
         return Ok(output.join(format!("{stem}.{extension}")));
     }
-    if output.is_file() && output.extension().is_none() {
-        bail!("-o {shown}: is a file; name a folder, or a file that ends in .{extension}");
+    if output.exists() && output.extension().is_none() {
+        bail!("-o {shown}: is no folder; name a folder, or a file that ends in .{extension}");
     }
     match output.extension() {
         Some(found) if found == extension => Ok(output.to_owned()),
@@ -195,12 +195,24 @@ pub fn folder_of(path: &Path) -> &Path {
     folder.unwrap_or(Path::new("."))
 }
 
-/// Refuses a folder in whose place there is a file.
+/// Extensions of files that these programs write, and of photographs: a new folder with one of them was meant to be a file.
+const OF_FILES: &str = "3mf cameramodel csv dsc dxf glb gltf html jpeg jpg json mtl ndjson npy obj orpc parquet pdf ply \
+                        png sdf stl svg tif tiff toml txt urdf usda xml yaml yml";
+
+/// Refuses a folder in whose place there is a file, and a new one whose name is that of a file.
 pub fn check_folder(folder: &Path) -> anyhow::Result<()> {
-    match folder.ancestors().find(|part| part.is_file()) {
-        Some(file) => bail!("{} is a file where a folder is needed: name a folder", file.display()),
-        None => Ok(()),
+    if let Some(file) = folder.ancestors().find(|part| part.exists() && !part.is_dir()) {
+        bail!("{} is a file where a folder is needed: name a folder", file.display());
     }
+    let extension = folder.extension().unwrap_or_default();
+    let is_of_file = OF_FILES.split(' ').any(|known| extension.eq_ignore_ascii_case(known));
+    ensure!(
+        folder.exists() || !is_of_file,
+        "{} looks like a file: give a folder, such as {}",
+        folder.display(),
+        folder.with_extension("").display()
+    );
+    Ok(())
 }
 
 /// Makes the folder that a file goes to, where there is none.

@@ -59,7 +59,7 @@ pub(super) fn verify(
 ) -> Result<Verdict, DocumentError> {
     let is_skeleton = super::file_name(path).ends_with(&threemf::skeleton_name(""));
     let names = if is_skeleton { threemf::SKELETON } else { threemf::INLAY };
-    let (refused, bodies) = construct::bodies(reader, path, names, verifier.target)?;
+    let (refused, bodies) = construct::bodies(reader, path, names, &verifier.target)?;
     match <[Body; 2]>::try_from(bodies) {
         _ if !refused.is_empty() => Ok(Verdict::new(path, Format::ThreeMf, refused)),
         Ok(bodies) => inlaid(verifier, path, &bodies),
@@ -138,7 +138,7 @@ fn triangles_of(body: &Body) -> Vec<Triangle> {
 }
 
 /// The faces of a target that is one board or a solid.
-fn faces<'a>(verifier: &Verifier<'a>) -> Option<Vec<Face<'a>>> {
+fn faces<'a>(verifier: &'a Verifier) -> Option<Vec<Face<'a>>> {
     let panels = &verifier.target.panels;
     match (&verifier.target.spec, panels.as_slice()) {
         (spec, [panel]) if spec.is_on_plate() => {

@@ -78,6 +78,7 @@ mod tile_table;
 mod tiles;
 mod verdict;
 
+use std::borrow::Cow;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 
@@ -244,7 +245,7 @@ pub fn verify(
 
 /// Compares artifacts with one target.
 pub struct Verifier<'a> {
-    target: &'a Target,
+    target: Cow<'a, Target>,
     family: Option<&'a Family>,
     detector: Detector,
     limits: Limits,
@@ -289,7 +290,7 @@ impl<'a> Verifier<'a> {
         }
         let detector = Detector::for_target(target, family, detector_config());
         Ok(Self {
-            target,
+            target: target.under_printed_name(),
             family,
             detector,
             limits: Limits::default(),
@@ -334,7 +335,7 @@ impl<'a> Verifier<'a> {
     /// each is a file of its own. Any other file is verified by itself.
     pub fn set_of(&self, path: &Path) -> Vec<PathBuf> {
         let in_parts = self.target.sheets.iter().any(|sheet| !sheet.pages.is_empty());
-        match in_parts || fold::is_net(self.target) {
+        match in_parts || fold::is_net(&self.target) {
             true => self.pages_with(path),
             false => vec![path.to_owned()],
         }
@@ -385,7 +386,7 @@ impl<'a> Verifier<'a> {
         };
         match format {
             Format::Dsc => return Ok(listing::verify(self, reader, path)?),
-            Format::Dxf | Format::Svg if laser::is_named(self.target, path) => {
+            Format::Dxf | Format::Svg if laser::is_named(&self.target, path) => {
                 return laser::verify(self, reader, path, format);
             }
             Format::Dxf => return cutting::verify(self, reader, path),
@@ -398,7 +399,7 @@ impl<'a> Verifier<'a> {
             Format::ThreeMf => return Ok(inlay::verify(self, reader, path)?),
             Format::Glb | Format::Obj | Format::Usda | Format::Stl => {}
         }
-        let (refused, parts) = construct::check(reader, path, format, self.target)?;
+        let (refused, parts) = construct::check(reader, path, format, &self.target)?;
         if construct::refuse(&refused) {
             return Ok(Verdict::new(path, format, refused));
         }
@@ -476,8 +477,8 @@ impl<'a> Verifier<'a> {
             verdicts.push(verdict);
             seen.push(found);
         }
-        if fold::is_net(self.target) && verdicts.len() == self.target.sheets.len() {
-            fold::check(self.target, &seen, &mut verdicts);
+        if fold::is_net(&self.target) && verdicts.len() == self.target.sheets.len() {
+            fold::check(&self.target, &seen, &mut verdicts);
         }
         let mut verdict =
             Verdict { artifact: of_all(&files), ..Verdict::new(path, format, findings) };
@@ -494,7 +495,7 @@ impl<'a> Verifier<'a> {
     ) -> Result<Vec<Finding>, DocumentError> {
         let mut refused = Vec::new();
         for file in files {
-            let (found, _) = construct::check(reader, file, format, self.target)?;
+            let (found, _) = construct::check(reader, file, format, &self.target)?;
             refused.extend(found.into_iter().map(|finding| match files.len() {
                 1 => finding,
                 _ => finding.on_page(file_name(file)),
@@ -547,7 +548,7 @@ impl<'a> Verifier<'a> {
         index: usize,
     ) -> Result<(SheetVerdict, Seen), DocumentError> {
         let layout = &self.target.sheets[index];
-        let (page, findings) = source.render(layout, self.wish_px_per_mm(layout), self.target)?;
+        let (page, findings) = source.render(layout, self.wish_px_per_mm(layout), &self.target)?;
         let mut verdict = SheetVerdict::new(index, &page, findings);
         let seen = self.verify_sheet(&page, layout, &mut verdict);
         Ok((verdict, seen))
@@ -569,7 +570,7 @@ impl<'a> Verifier<'a> {
         let mut check_bars_mm = Vec::new();
         for (source, SheetPage { label, window_mm, marks, .. }) in sources.iter().zip(&layout.pages)
         {
-            let (page, wrong) = source.render(marks, wish, self.target)?;
+            let (page, wrong) = source.render(marks, wish, &self.target)?;
             let mut verdict = SheetVerdict::new(index, &page, wrong);
             check_bars(&page, marks, &AffineMap::IDENTITY, &mut verdict);
             let logo = self.target.logo.as_ref();
@@ -578,7 +579,11 @@ impl<'a> Verifier<'a> {
             findings.extend(of_page.map(|finding| finding.on_page(label.clone())));
             check_bars_mm.extend(verdict.check_bars_mm);
             // Kept no finer than the sheet is looked at.
-            pages.push(if wish > most { source.render(marks, most, self.target)?.0 } else { page });
+            pages.push(if wish > most {
+                source.render(marks, most, &self.target)?.0
+            } else {
+                page
+            });
             // The whole sheet is compared after them.
             self.tell(before + pages.len() - 1, self.target.page_count());
         }

@@ -43,7 +43,7 @@ pub(super) fn verify(
     if findings.is_empty() {
         match dsc::read_in_mm(text, &verifier.target.name) {
             Ok(listed) => {
-                findings = compare(&listed, verifier.target, &mut list);
+                findings = compare(&listed, &verifier.target, &mut list);
                 findings.extend(written_otherwise(text, &listed).filter(|_| findings.is_empty()));
             }
             Err(error) => findings.push(ListFinding::Listed { problem: error.to_string() }.into()),

@@ -153,7 +153,7 @@ pub(super) fn verify(verifier: &Verifier, path: &Path, model: Model, format: For
         // As many as the faces have, all of which are looked at: there is nothing else.
         TargetSpec::Solid(spec) => Some(spec.polyhedron().triangles_mm().len()),
         spec if spec.is_on_plate() => {
-            findings.extend(beside_boards(&model, sides(verifier.target)));
+            findings.extend(beside_boards(&model, sides(&verifier.target)));
             Some(PLATE_TRIANGLES)
         }
         _ => None,
@@ -408,7 +408,7 @@ fn not_on_faces(verifier: &Verifier, model: &Model) -> Option<Finding> {
     let body = |problem: String| Some(MeshFinding::Body { problem }.into());
     let panels = match &verifier.target.spec {
         TargetSpec::Solid(_) => verifier.target.panels.as_slice(),
-        _ => sides(verifier.target),
+        _ => sides(&verifier.target),
     };
     let on_face = |panel: &Panel| front(model, panel, &verifier.face_outline_mm(panel));
     let fronts: Vec<&Triangle> =

@@ -104,7 +104,6 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let measure = args.solve.measures_target();
     let Sightings { views, panels, target, empty, left_out, print, symmetries, unnamed } =
         args.sightings.read(measure)?;
-    ensure!(!views.is_empty(), "no board of this kind in {}", counted(empty.len(), "picture"));
     if let (Some(known), Some(target), false) =
         (&args.fixed_intrinsics, &target, args.sightings.assumes_target())
     {

@@ -202,9 +202,16 @@ impl File {
         }
     }
 
-    /// A warning where this description replaces one that differs: files of the earlier target may remain beside it.
+    /// What is to be said where this file replaces a symbolic link, or this description one that differs: files of the
+    /// earlier target may remain beside it.
     fn replaced(&self, folder: &Path, staged: &Path, written: &[&str]) -> Option<String> {
         let path = folder.join(&self.name);
+        if let Ok(old) = fs::read_link(&path) {
+            let (path, old) = (path.display(), old.display());
+            return Some(format!(
+                "{path}: replaced the symbolic link to {old}, which stays as it was"
+            ));
+        }
         let is_other = self.kind == Kind::of_schema(targets::SCHEMA)
             && path.is_file()
             && !same_content(&path, &staged.join(&self.name));

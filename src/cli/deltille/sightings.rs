@@ -1,6 +1,6 @@
 //! What was photographed, and the detections of it: the options of commands that calibrate.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, anyhow, bail, ensure};
@@ -281,6 +281,7 @@ pub fn read(
     is_assumed: bool,
 ) -> anyhow::Result<Read> {
     let (mut files, mut detections, mut foreign) = (Vec::new(), Vec::new(), Vec::new());
+    let mut copies = Vec::new();
     let Places { texts, tables } = places(paths)?;
     for Place { path, is_named } in texts {
         let show = || path.display().to_string();
@@ -297,7 +298,7 @@ pub fn read(
         }
         let found: Detection = detection::read(&text).with_context(show)?;
         let name = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
-        add(&mut detections, &mut files, (name, found), path);
+        copies.extend(add(&mut detections, &mut files, (name, found), path));
     }
     for Tables { files: of_table, folder } in tables {
         // Beside the detections one by one they would count twice.
@@ -309,8 +310,16 @@ pub fn read(
         }
         for (name, found) in of_tables(&of_table, limits)? {
             let path = of_table[0].with_file_name(&found.image);
-            add(&mut detections, &mut files, (name, found), path);
+            copies.extend(add(&mut detections, &mut files, (name, found), path));
         }
+    }
+    if let Some((copy, first)) = copies.first() {
+        let others = match copies.len() - 1 {
+            0 => String::new(),
+            others => format!("; {others} more likewise"),
+        };
+        let (copy, first) = (copy.display(), first.display());
+        tell!("warning: {copy}: the same corners as in {first}, counted once{others}");
     }
     if let Some(first) = foreign.first() {
         let count = counted(foreign.len(), "file");
@@ -331,6 +340,7 @@ pub fn read(
     for (index, out) in &left_out {
         tell!("warning: left out: {}: {}", files[*index].display(), out.reason);
     }
+    ensure!(!views.is_empty(), nothing_shown(&detections));
     let empty = empty.into_iter().map(|index| files[index].clone()).collect();
     let left_out = left_out.into_iter().map(|(_, out)| out).collect();
     let ink = ink_of(&detections, reference);
@@ -348,6 +358,21 @@ fn assume(detections: &mut [(String, Detection)], reference: &Reference) {
         let detections = counted(replaced.len(), "detection");
         tell!("note: --assume-target: {detections} of {seen} are taken for {own}");
     }
+}
+
+/// That no picture shows the target, with the reason that most of them give.
+fn nothing_shown(detections: &[(String, Detection)]) -> String {
+    let mut given = BTreeMap::new();
+    for (_, found) in detections {
+        let reasons: BTreeMap<_, _> = found.reasons.iter().map(|why| (why.kind, why)).collect();
+        for (kind, why) in reasons {
+            given.entry(kind).or_insert((0, why)).0 += 1;
+        }
+    }
+    let pictures = counted(detections.len(), "picture");
+    let most = given.into_values().max_by_key(|(count, _)| *count);
+    let why = most.map(|(count, why)| format!("; {count} of them: {why}")).unwrap_or_default();
+    format!("no board of this kind in {pictures}{why}")
 }
 
 /// What is to be noted where some of the detections that show something do not say which target they are of.
@@ -396,20 +421,19 @@ pub fn is_same(one: &Detection, other: &Detection) -> bool {
     !one.grids.is_empty() && corners.eq(other.grids.iter().map(|grid| &grid.corners))
 }
 
-/// Adds a detection, unless it is of a picture that is there.
+/// Adds a detection, unless it is of a picture that is there: then returns its file, and the file of the other.
 fn add(
     detections: &mut Vec<(String, Detection)>,
     files: &mut Vec<PathBuf>,
     found: (String, Detection),
     path: PathBuf,
-) {
+) -> Option<(PathBuf, PathBuf)> {
     if let Some(first) = detections.iter().position(|(_, other)| is_same(&found.1, other)) {
-        let (path, first) = (path.display(), files[first].display());
-        tell!("warning: {path}: the same corners as in {first}, counted once");
-        return;
+        return Some((path, files[first].clone()));
     }
     detections.push(found);
     files.push(path);
+    None
 }
 
 /// The detections of tables, in the order in which their files would be as JSON.

@@ -14,8 +14,8 @@ use super::files::{File, Staged, bytes_file, check_places, same_file, sample_of,
 use super::images::{self, Images, Stems};
 use super::in_flight;
 use super::limits::ImageLimits;
-use crate::calibrate::CameraEstimate;
-use crate::camera::{Camera, Field, PixelMap, Rectification, Undistortion};
+use crate::calibrate::Estimate;
+use crate::camera::{Camera, CameraFile, Field, PixelMap, Rectification, Undistortion};
 use crate::cli::output::{self, Overwrite, say};
 use crate::cli::run::{self, BAD_INPUT, FAILED, Interrupted};
 use crate::cli::{interrupt, progress};
@@ -138,9 +138,10 @@ impl ViewArgs {
     }
 
     /// The files of a view beside its pictures.
-    fn files(&self, stem: &str, view: &Camera, map: &PixelMap) -> anyhow::Result<Vec<File>> {
+    fn files(&self, stem: &str, file: &CameraFile, map: &PixelMap) -> anyhow::Result<Vec<File>> {
+        let view = &file.camera;
         let mut files = vec![
-            text_file(format!("{stem}.yaml"), view.to_yaml()),
+            text_file(format!("{stem}.yaml"), file.to_yaml()),
             text_file(format!("{stem}-opencv.yaml"), opencv(view)?),
             text_file(format!("{stem}-ros.yaml"), ros(view, stem)?),
         ];
@@ -155,7 +156,8 @@ impl ViewArgs {
 
 /// Makes a pinhole view of a camera, and pictures of it.
 pub fn run(args: Args) -> anyhow::Result<ExitCode> {
-    let camera = camera_file::read("--camera", &args.camera)?;
+    let file = camera_file::read_with_targets("--camera", &args.camera)?;
+    let CameraFile { camera, calibrated_with } = file;
     let stem = args.camera.file_stem().unwrap_or_default().to_string_lossy().into_owned();
     let stem = format!("{stem}-undistorted");
     let made = Undistortion::new(&camera, args.view.size_of(&camera)?, args.view.field);
@@ -165,7 +167,8 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let pictures = Pictures { args: &args.view, folder, camera: &camera, end };
     pictures.check(&images)?;
     let map = args.view.map(&made);
-    let mut files = args.view.files(&stem, made.view(), &map)?;
+    let view = CameraFile { camera: made.view().clone(), calibrated_with };
+    let mut files = args.view.files(&stem, &view, &map)?;
     files.insert(0, text_file(format!("{stem}.json"), undistortion::write(&made, &map)));
     let staged = Staged::new(&args.view.output, &files, args.view.overwrite)?;
     say!("{}", told(made.view(), &map));
@@ -310,7 +313,7 @@ impl Made {
 
 /// Makes rectified views of two cameras of a rig, and pictures of them.
 pub fn run_pair(args: PairArgs) -> anyhow::Result<ExitCode> {
-    let cameras = read_rig(&args.rig)?;
+    let Estimate { cameras, calibrated_with, .. } = read_rig(&args.rig)?;
     let named = |name: &String| {
         cameras.iter().find(|camera| camera.name == *name).ok_or_else(|| {
             let names: Vec<&str> = cameras.iter().map(|camera| camera.name.as_str()).collect();
@@ -319,6 +322,11 @@ pub fn run_pair(args: PairArgs) -> anyhow::Result<ExitCode> {
     };
     let [first, second] = [named(&args.pair[0])?, named(&args.pair[1])?];
     let names = [first.name.as_str(), second.name.as_str()];
+    // A camera that was given to the rig was calibrated elsewhere.
+    let calibrated_with = [first, second].map(|camera| match camera.model {
+        Some(_) => calibrated_with.clone(),
+        None => Vec::new(),
+    });
     let size = args.view.size_of(&first.camera)?;
     let cameras = [first, second].map(|camera| (&camera.camera, camera.camera_from_rig));
     let made = Rectification::new(cameras, size, args.view.field).context("--pair")?;
@@ -340,8 +348,10 @@ pub fn run_pair(args: PairArgs) -> anyhow::Result<ExitCode> {
         text_file(format!("{stem}.json"), undistortion::write_pair(&made, names, &maps)),
         text_file(format!("{stem}-opencv.yaml"), undistortion::opencv_pair(&made)),
     ];
-    for ((name, view), map) in names.iter().zip(&made.views).zip(&maps) {
-        files.extend(args.view.files(&format!("{name}-rectified"), view.view(), map)?);
+    let views = made.views.iter().zip(calibrated_with);
+    for ((name, (view, calibrated_with)), map) in names.iter().zip(views).zip(&maps) {
+        let file = CameraFile { camera: view.view().clone(), calibrated_with };
+        files.extend(args.view.files(&format!("{name}-rectified"), &file, map)?);
         say!("{name}: {}", told(view.view(), map));
     }
     let baseline = made.baseline_mm;
@@ -359,12 +369,12 @@ pub fn run_pair(args: PairArgs) -> anyhow::Result<ExitCode> {
     made.end(staged)
 }
 
-/// The cameras of a rig's file.
-fn read_rig(path: &Path) -> anyhow::Result<Vec<CameraEstimate>> {
+/// What a rig's file holds.
+fn read_rig(path: &Path) -> anyhow::Result<Estimate> {
     let text = Limits::default().read_text(path)?;
-    let cameras = saved::read_cameras(&text).with_context(|| path.display().to_string())?;
-    if cameras.len() < 2 {
+    let found = saved::read_without_target(&text).with_context(|| path.display().to_string())?;
+    if found.cameras.len() < 2 {
         bail!("{}: a single camera: give the rig.json of `deltille rig`", path.display());
     }
-    Ok(cameras)
+    Ok(found)
 }

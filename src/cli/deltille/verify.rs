@@ -48,6 +48,7 @@ pub struct Args {
 pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let limits = args.limits.limits();
     let target = target_file::read(&args.target, &limits)?;
+    let target = target.under_printed_name();
     let family = target_file::family(&target, args.family.as_deref())?;
     let folder = args.target.parent().unwrap_or(Path::new("."));
     let alone = args.artifacts.len() == 1;

@@ -6,7 +6,7 @@ use std::process::Output;
 use crate::common::command::deltille;
 use crate::common::page::Page;
 use crate::common::solids::cuboctahedron;
-use deltille::camera::{BrownConrady, Camera, Lens, Pose};
+use deltille::camera::{BrownConrady, Camera, CameraFile, Lens, Pose};
 use deltille::detect::{Detection, Grid, GridCorner};
 use deltille::export::detection;
 use deltille::family::Family;
@@ -265,6 +265,101 @@ fn what_is_wrong_is_told_on_the_terminal_in_the_file_and_on_the_page() {
 }
 
 /// From the eleventh picture on the focal length is 2 % longer.
+/// One line with the name of a file and what to do, exit code 2.
+fn refused(folder: &Path, args: &str, words: &[&str]) {
+    let said = String::from_utf8(output(folder, args).stderr).unwrap();
+    deltille(folder, args).code(2);
+    assert_eq!(said.lines().count(), 1, "{args}: {said}");
+    assert!(words.iter().all(|words| said.contains(words)), "{args}: {said}");
+}
+
+#[test]
+fn a_pair_with_a_camera_upside_down_is_rectified_as_upright_as_the_first() {
+    let target = board(8, 9);
+    let second_from_first = Pose {
+        rotation: DQuat::from_euler(glam::EulerRot::XYZ, 0.02, -0.03, 3.13),
+        translation: DVec3::new(120.0, 2.0, 3.0),
+    };
+    let folder = folder(&target, &[]);
+    let at = folder.path();
+    let mut random = ChaCha8Rng::seed_from_u64(3);
+    for index in 0..10 {
+        let mut any = |reach: f64| random.random_range(-reach..reach);
+        let tilt = DVec3::new(any(0.6), any(0.6), any(0.2));
+        let rotation = DQuat::from_scaled_axis(tilt) * DQuat::from_rotation_x(std::f64::consts::PI);
+        let centre = DVec3::new(60.0 + any(40.0), any(40.0), 450.0 + any(80.0));
+        let pose = Pose { rotation, translation: centre - rotation * DVec3::new(150.0, 80.0, 0.0) };
+        for (name, pose) in [("first", pose), ("second", second_from_first.after(&pose))] {
+            let found = detection(&target, &camera(), &pose, &mut random);
+            std::fs::create_dir_all(at.join(name)).unwrap();
+            std::fs::write(at.join(format!("{name}/{index}.json")), detection::write(&found))
+                .unwrap();
+        }
+    }
+    done(at, "rig --camera first=first --camera second=second --target board.json --model radtan");
+    let said = done(at, "rectify rig.json --pair first,second -o pair");
+    assert!(said.contains("a point is in the same row of both pictures"), "{said}");
+    let pair = json(&at.join("pair/first-second.json"));
+    // Their diagonals are 1 where nothing is rotated.
+    let upright: Vec<f64> = [0, 4, 8]
+        .map(|place| pair["views"][0]["view_from_camera"][place].as_f64().unwrap())
+        .to_vec();
+    assert!(upright.iter().all(|cosine| *cosine > 0.99), "{upright:?}");
+    let views = ["first", "second"].map(|name| {
+        let text = std::fs::read_to_string(at.join(format!("pair/{name}-rectified.yaml")));
+        CameraFile::from_yaml(&text.unwrap()).unwrap()
+    });
+    assert!(views.iter().all(|view| view.calibrated_with == [target.identity()]));
+}
+
+#[test]
+fn pictures_that_show_no_board_are_told_with_the_reason_of_most() {
+    let reasons = |kinds: &[&str]| {
+        let mut found = Detection::new("", [1600, 1200], Vec::new());
+        let figures = serde_json::json!({"id": 4, "tags": 1, "corners": 0});
+        let reason = |kind: &&str| {
+            serde_json::from_value(serde_json::json!({"kind": kind, "figures": figures})).unwrap()
+        };
+        found.reasons = kinds.iter().map(reason).collect();
+        found
+    };
+    let empty = [
+        reasons(&["no_corners"]),
+        reasons(&["other_ids", "other_ids"]),
+        reasons(&["other_ids"]),
+        reasons(&[]),
+    ];
+    let folder = folder(&board(8, 9), &empty);
+    let why = "no board of this kind in 4 pictures; 2 of them: 1 tag whose id the target does not have, such as 4";
+    refused(folder.path(), CALIBRATE, &[why]);
+    std::fs::create_dir(folder.path().join("b")).unwrap();
+    let rig = "rig --camera a=corners --camera b=b --target board.json";
+    refused(folder.path(), rig, &["--camera a", why]);
+}
+
+#[test]
+fn a_folder_that_is_given_twice_is_told_in_a_line() {
+    let folder = folder(&board(8, 9), &detections(&board(8, 9), 6, 0.7));
+    let command = CALIBRATE.replacen("corners", "corners corners", 1);
+    let said = String::from_utf8(output(folder.path(), &command).stderr).unwrap();
+    let copies: Vec<&str> = said.lines().filter(|line| line.contains("counted once")).collect();
+    let [line] = copies.as_slice() else { panic!("{said}") };
+    assert!(line.contains("corners/00.json") && line.ends_with("5 more likewise"), "{line}");
+}
+
+#[test]
+fn a_file_without_the_shape_of_a_sheet_is_refused_with_what_makes_one() {
+    let folder = folder(&board(8, 9), &detections(&board(8, 9), 6, 0.7));
+    let at = folder.path();
+    done(at, CALIBRATE);
+    for (name, text) in [("list.json", "[1]"), ("cut.json", "{"), ("other.yaml", "width: 1")] {
+        std::fs::write(at.join(name), text).unwrap();
+    }
+    for name in ["list.json", "cut.json", "other.yaml", "board.json", "camera.json"] {
+        refused(at, &format!("{CALIBRATE} --shape {name}"), &["--shape", name, "--board-shape"]);
+    }
+}
+
 #[test]
 fn a_change_of_zoom_ends_with_an_error_that_names_the_view() {
     let target = board(8, 9);

@@ -124,6 +124,21 @@ fn the_same_board_is_accepted_by_any_name_and_format() {
     deltille(at, "compare measured/camera.json again/camera.json --tolerance 1").success();
 }
 
+/// Files of a target are verified by what was measured of it, too: they bear the name of its plan.
+#[test]
+fn prints_are_verified_by_a_refined_description() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    deltille(at, "board --rows 4 --cols 5 --name desk --svg --pdf --dsc --gltf").success();
+    let printed = Target::from_json(&fs::read_to_string(at.join("desk.json")).unwrap()).unwrap();
+    let name = deltille::Name::new("desk-refined").unwrap();
+    let refined = Target { name, plan: Some(printed.identity()), ..printed };
+    fs::write(at.join("desk-refined.json"), refined.to_json()).unwrap();
+    for files in ["desk.svg desk.pdf desk.dsc desk.glb", ""] {
+        deltille(at, &format!("verify desk-refined.json {files}")).success();
+    }
+}
+
 /// Detections of earlier versions and other programs do not name their target: a note says which one is assumed.
 #[test]
 fn detections_without_a_target_are_noted_once() {

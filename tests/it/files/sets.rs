@@ -10,6 +10,7 @@ use std::time::{Duration, Instant};
 use crate::common::command::deltille;
 use crate::common::folder::names;
 use crate::common::page::Page;
+use deltille::camera::Camera;
 use deltille::export::staging;
 
 const DELTILLE: &str = env!("CARGO_BIN_EXE_deltille");
@@ -33,6 +34,37 @@ fn run(program: &str, folder: &Path, args: &str) -> (Option<i32>, String) {
     let mut command = Command::new(program);
     let output = command.current_dir(folder).args(args.split_whitespace()).output().unwrap();
     (output.status.code(), String::from_utf8_lossy(&output.stderr).into_owned())
+}
+
+/// Each command says in a line that a new folder has the name of a file, or that a device is none; nothing is written.
+#[test]
+fn a_new_folder_with_the_name_of_a_file_is_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    std::fs::write(at.join("c.yaml"), Camera::pinhole(640, 480, 1.0).to_yaml()).unwrap();
+    deltille(at, "board --rows 4 --cols 4 --name b").success();
+    let before = names(at);
+    let refused = |args: &str, words: &str| {
+        let said = deltille(at, args).code(2);
+        let said = String::from_utf8(said.get_output().stderr.clone()).unwrap();
+        assert!(said.contains(words) && said.lines().count() == 1, "{args}: {said}");
+    };
+    let like_a_file = "-o: out.json looks like a file: give a folder, such as out";
+    for args in [
+        "board --rows 4 --cols 5",
+        "detect --target b.json none.png",
+        "undistort --camera c.yaml",
+        "rig --camera a=a --camera b=b --target b.json",
+    ] {
+        refused(&format!("{args} -o out.json"), like_a_file);
+    }
+    refused("undistort --camera c.yaml -o /dev/full", "-o: /dev/full");
+    let pose = "pose none.png --target b.json --camera c.yaml -o /dev/full";
+    refused(pose, "-o /dev/full: is no folder; name a folder, or a file that ends in .ndjson");
+    assert_eq!(names(at), before);
+    // Where it is there as a folder, it is meant.
+    std::fs::create_dir(at.join("out.json")).unwrap();
+    deltille(at, "board --rows 4 --cols 5 -o out.json --no-verify").success();
 }
 
 /// Every command replaces what it wrote itself, and nothing else without `--force`.

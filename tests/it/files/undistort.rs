@@ -2,7 +2,8 @@
 
 use std::fs;
 
-use deltille::camera::{BrownConrady, Camera, Lens};
+use deltille::camera::{BrownConrady, Camera, CameraFile, Lens};
+use deltille::targets::{BoardSpec, Target};
 use tempfile::TempDir;
 
 use crate::common::command::deltille;
@@ -45,6 +46,20 @@ fn colours_and_depth_stay_and_places_are_those_of_the_camera() {
     let refused = deltille(folder.path(), "undistort --camera camera.yaml photo.png -o new");
     let said = refused.code(2);
     assert!(String::from_utf8_lossy(&said.get_output().stderr).contains("would be lost"));
+}
+
+#[test]
+fn a_view_keeps_the_targets_that_the_camera_was_calibrated_with() {
+    let folder = folder();
+    let path = folder.path().join("camera.yaml");
+    let read = |path| CameraFile::from_yaml(&fs::read_to_string(path).unwrap()).unwrap();
+    let calibrated_with =
+        vec![Target::new("desk", BoardSpec::deltille(4, 5, 20.0)).unwrap().identity()];
+    let file = CameraFile { calibrated_with, ..read(path.clone()) };
+    fs::write(&path, file.to_yaml()).unwrap();
+    deltille(folder.path(), "undistort --camera camera.yaml -o new").success();
+    let view = read(folder.path().join("new/camera-undistorted.yaml"));
+    assert_eq!(view.calibrated_with, file.calibrated_with);
 }
 
 #[test]

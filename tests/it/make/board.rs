@@ -31,6 +31,22 @@ fn rows_and_columns_are_enough() {
 }
 
 #[test]
+fn a_symbolic_link_is_replaced_by_force_which_is_told() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    let made = |args: &str| deltille(at).args(args.split(' ')).assert();
+    made("board --rows 4 --cols 5 --name old").success();
+    let before = std::fs::read(at.join("old.json")).unwrap();
+    std::os::unix::fs::symlink("old.json", at.join("new.json")).unwrap();
+    let output = made("board --rows 6 --cols 5 --name new --force").success();
+    let said = String::from_utf8(output.get_output().stderr.clone()).unwrap();
+    let told = "new.json: replaced the symbolic link to old.json, which stays as it was";
+    assert!(said.contains(told), "{said}");
+    assert_eq!(std::fs::read(at.join("old.json")).unwrap(), before);
+    assert!(!at.join("new.json").is_symlink());
+}
+
+#[test]
 fn every_file_asked_for_is_written_under_its_name() {
     let folder = tempfile::tempdir().unwrap();
     let args = "board --rows 4 --cols 5 --edge 2cm --paper letter --orientation portrait --svg \

@@ -25,6 +25,25 @@ fn edit(path: &Path, from: &str, to: &str) {
 }
 
 #[test]
+fn a_damaged_usd_is_told_by_its_line() {
+    let folder = TempDir::new().unwrap();
+    let at = folder.path();
+    deltille(at, "board --rows 3 --cols 4 --name b --usd --no-verify").success();
+    let usd = at.join("b.usda");
+    let whole = fs::read_to_string(&usd).unwrap();
+    let verdict = || {
+        let said = deltille(at, "verify b.json b.usda").code(1);
+        String::from_utf8(said.get_output().stdout.clone()).unwrap()
+    };
+    edit(&usd, "upAxis", "upaxis");
+    let said = verdict();
+    assert!(said.contains("line 6: `upaxis") && said.contains("make it again"), "{said}");
+    fs::write(&usd, whole.lines().take(9).collect::<Vec<_>>().join("\n")).unwrap();
+    let said = verdict();
+    assert!(said.contains("line 10: the file ends") && said.contains("make it again"), "{said}");
+}
+
+#[test]
 fn what_verify_says() {
     let mut page = Page::default();
     let verify = |page: &mut Page, at: &Path, args: &str, code: i32| -> Value {

@@ -9,8 +9,8 @@
 //! Each is a score test on [`StateEquations`]. Deviations are those of the scatter between views, so that
 //! errors of the model and of the board, which differ from view to view, do not pass for a change. Stretch, shear and
 //! bend of the board are unknowns of each test: a bent board that is seen from one side first and from the other
-//! later is no change of the camera. Nor is a change that follows how the board is held, its tilt and its distance: many
-//! sequences go from one to another.
+//! later is no change of the camera. Nor is what a drift, or the tilt and the distance of the board, explain as well: many
+//! sequences go from frontal to oblique views.
 
 use super::state_equations::{Candidate, Column, Effect, Fit, StateEquations};
 use super::weights::OUTLIER_SIGMA;
@@ -233,23 +233,30 @@ fn step(equations: &StateEquations) -> Option<Step> {
     let all = places.flat_map(|first| ChangedIntrinsic::ALL.map(|intrinsic| (intrinsic, first)));
     let of = |(intrinsic, first): (ChangedIntrinsic, usize)| {
         let mut columns = base(equations);
-        // What a lens of another model, or a board with errors, leaves depends on how the board is held.
-        for of_pose in [
-            equations.views.iter().map(|view| view.obliquity).collect::<Vec<f64>>(),
-            equations.views.iter().map(|view| view.log_distance).collect(),
-            (0..count).map(|view| view as f64).collect(),
-        ] {
-            columns.push(equations.weighted(intrinsic.candidate(), of_pose));
-        }
         columns.push(Step::column(intrinsic, first, equations));
         let fit = equations.fit(&columns)?;
-        // Each group has its mean, and so has how the board is held.
-        let effect = fit.effect(columns.len() - 1, 5.0)?;
+        // Each group has its mean.
+        let effect = fit.effect(columns.len() - 1, 2.0)?;
         let significance = (tried * significance(effect)).min(1.0);
         Some(Step { intrinsic, first, effect, significance, fit })
     };
-    let best = all.filter_map(of).min_by(|a, b| a.significance.total_cmp(&b.significance));
-    best.filter(|step| step.significance < SIGNIFICANT)
+    let best = all.filter_map(of).min_by(|a, b| a.significance.total_cmp(&b.significance))?;
+    let smooth = smooth(best.intrinsic, equations)?;
+    (best.significance < SIGNIFICANT && best.fit.left < smooth.left).then_some(best)
+}
+
+/// The fit of an intrinsic that drifts from the first view to the last, and follows the tilt and the distance of the board. A
+/// lens that warms up drifts; what a model or a map of the board leaves follows tilt and distance.
+fn smooth(intrinsic: ChangedIntrinsic, equations: &StateEquations) -> Option<Fit> {
+    let views = equations.views.iter().enumerate();
+    let of_view = views.map(|(i, view)| [i as f64, view.obliquity, view.log_distance]);
+    let of_view: Vec<[f64; 3]> = of_view.collect();
+    let mut columns = base(equations);
+    columns.extend((0..3).map(|of| {
+        let weights = of_view.iter().map(|values| values[of]).collect();
+        equations.weighted(intrinsic.candidate(), weights)
+    }));
+    equations.fit(&columns)
 }
 
 fn shutter(equations: &StateEquations, changed: Option<&Step>) -> Option<RollingShutter> {

@@ -1,5 +1,6 @@
 //! Two cameras of a rig seen as if they stood side by side, with parallel axes: a point then lies in the same row of both
-//! pictures, or in the same column where one camera is above the other.
+//! pictures, or in the same column where one camera is above the other. Both pictures are as upright as that of the first
+//! camera, also where the second is mounted upside down or on its side.
 
 use glam::{DMat3, DMat4, DQuat, DVec3};
 
@@ -44,7 +45,9 @@ pub struct Rectification {
 }
 
 impl Rectification {
-    /// Rectifies two cameras with their poses, camera_from_rig.
+    /// Rectifies two cameras with their poses, camera_from_rig. Of the four rotations about the optical axis that put rows
+    /// or columns along the baseline, both views have the one that is nearest to the first camera's orientation. OpenCV's
+    /// `stereoRectify` takes the middle between both cameras, and rotates both pictures by 90° where one is upside down.
     ///
     /// # Errors
     /// Where they have no common view from the side.
@@ -102,13 +105,16 @@ impl Rectification {
 /// the first.
 fn common_frame(poses: [Pose; 2]) -> Result<(DQuat, DVec3), RectificationError> {
     let [from, to] = poses.map(|pose| pose.inverse().translation);
-    let axes = poses.map(|pose| pose.rotation.conjugate());
-    let [forward, right, down] =
-        [DVec3::Z, DVec3::X, DVec3::Y].map(|axis| axes[0] * axis + axes[1] * axis);
-    let angle = (axes[0] * DVec3::Z).angle_between(axes[1] * DVec3::Z);
+    let rotations = poses.map(|pose| pose.rotation.conjugate());
+    let axes = rotations.map(|rotation| rotation * DVec3::Z);
+    let angle = axes[0].angle_between(axes[1]);
     if angle > std::f64::consts::FRAC_PI_2 {
         return Err(RectificationError::Apart { degrees: angle.to_degrees() });
     }
+    let forward = (axes[0] + axes[1]).normalize();
+    // The first camera, turned on the shortest way to look there. The second may be upside down.
+    let upright = DQuat::from_rotation_arc(axes[0], forward) * rotations[0];
+    let [right, down] = [DVec3::X, DVec3::Y].map(|axis| upright * axis);
     let apart = to - from;
     let along = apart.try_normalize().ok_or(RectificationError::SamePlace)?;
     let to_axis = along.angle_between(forward);
@@ -171,6 +177,23 @@ mod tests {
                     let seen = camera.project(pose.apply(point)).unwrap();
                     assert!(made.views[index].place(pixel).unwrap().distance(seen) < 1e-6);
                 }
+            }
+        }
+    }
+
+    #[test]
+    fn views_are_as_upright_as_the_first_camera() {
+        let camera = Camera::pinhole(640, 480, 1.0);
+        let tilt = DQuat::from_scaled_axis(DVec3::new(0.03, -0.02, 0.01));
+        for degrees in [0.0, 90.0, 180.0, 270.0_f64] {
+            let rotation = tilt * DQuat::from_rotation_z(degrees.to_radians());
+            for at in [DVec3::X, DVec3::NEG_X, DVec3::Y, DVec3::NEG_Y] {
+                let second = Pose { rotation, translation: -(rotation * (120.0 * at)) };
+                let cameras = [(&camera, Pose::IDENTITY), (&camera, second)];
+                let made = Rectification::new(cameras, [640, 480], Field::Inside).unwrap();
+                let turned = made.views[0].view_from_camera().to_scaled_axis().length();
+                assert!(turned < 0.05, "{degrees}°, second at {at}: rotated by {turned} rad");
+                assert!(made.baseline_mm.normalize().distance(at) < 1e-9);
             }
         }
     }

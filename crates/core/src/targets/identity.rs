@@ -1,5 +1,7 @@
 //! What makes a target the one it is: its corners in space and its tags, whatever it is called and printed on.
 
+use std::borrow::Cow;
+
 use sha2::{Digest, Sha256};
 
 use super::{FamilyRef, GridKind, Panel, Target};
@@ -38,6 +40,14 @@ impl Target {
         let are_both_measured = self.plan.is_some() && other.plan.is_some();
         (self.panels == other.panels && self.family == other.family)
             || (are_both_measured && self.identity().is_same_print(&other.identity()))
+    }
+
+    /// The same target under the name that is on its prints: that of its plan, where this one was measured or refined.
+    pub fn under_printed_name(&self) -> Cow<'_, Self> {
+        match &self.plan {
+            Some(plan) => Cow::Owned(Self { name: plan.name.clone(), ..self.clone() }),
+            None => Cow::Borrowed(self),
+        }
     }
 
     /// Identity of the target as it was printed: of the one from which this target was measured or refined, or its own.

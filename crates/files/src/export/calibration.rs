@@ -51,7 +51,9 @@ pub enum Residuals {
 #[non_exhaustive]
 pub enum SheetError {
     /// The file is not a calibration.
-    #[error("not what `calibration::write` or `rig::write` made")]
+    #[error(
+        "not what `calibration::write` or `rig::write` made: make it by a calibration with `Calibration::board_shape`"
+    )]
     Foreign,
     /// A field is missing, or has an invalid value.
     #[error(

@@ -55,6 +55,14 @@ pub enum ConstructFinding {
         /// The construct or problem.
         construct: String,
     },
+    /// A line of a text format is not the one that the program writes.
+    #[error("{place}: {found}: the file was damaged or edited since it was written: make it again")]
+    OtherLine {
+        /// Its place, such as `line 12`.
+        place: String,
+        /// What is there: how the line begins, or that the file ends.
+        found: String,
+    },
     /// Content that no picture of the page shows: texts that are not those of the target, or marks
     /// beside the page.
     #[error("{place}: {problem}")]
@@ -76,6 +84,13 @@ impl Findings {
         if !self.is_full() {
             let (place, construct) = (place.into(), construct.into());
             self.0.push(ConstructFinding::Construct { place, construct }.into());
+        }
+    }
+
+    /// Adds a line that is not the one that the program writes.
+    fn add_other_line(&mut self, place: String, found: String) {
+        if !self.is_full() {
+            self.0.push(ConstructFinding::OtherLine { place, found }.into());
         }
     }
 
@@ -115,17 +130,22 @@ impl Findings {
                 Finding::Construct(ConstructFinding::Unseen { place, problem }) => {
                     self.unseen_unless(false, format!("{file}, {place}"), problem);
                 }
+                Finding::Construct(ConstructFinding::OtherLine { place, found }) => {
+                    self.add_other_line(format!("{file}, {place}"), found);
+                }
                 other => self.0.push(other),
             }
         }
     }
 }
 
-/// Whether a file has a construct that not every viewer shows alike, so that it is not rendered.
+/// Whether a file has a construct that not every viewer shows alike, or another line than the program writes, so that it
+/// is not rendered.
 /// Hidden content alone does not prevent that.
 pub(super) fn refuse(findings: &[Finding]) -> bool {
     let refuses = |finding: &Finding| {
-        matches!(finding, Finding::Construct(ConstructFinding::Construct { .. }))
+        use ConstructFinding::{Construct, OtherLine};
+        matches!(finding, Finding::Construct(Construct { .. } | OtherLine { .. }))
     };
     findings.iter().any(|finding| match finding {
         Finding::Page(PageFinding::OnPage { finding, .. }) => refuses(finding),

@@ -64,9 +64,10 @@ pub(super) fn same_lines(
             (None, None) => return,
             (line, stated) if line == stated => {}
             (line, _) => {
-                let line = line.unwrap_or_else(|| "its end".to_owned());
-                let start: String = line.trim().chars().take(40).collect();
-                found.add(format!("line {number}"), format!("`{start}`"));
+                let begins = |line: String| -> String { line.trim().chars().take(40).collect() };
+                let there = line.map(|line| format!("`{}`", begins(line)));
+                let there = there.unwrap_or_else(|| "the file ends".to_owned());
+                found.add_other_line(format!("line {number}"), there);
                 return;
             }
         }
