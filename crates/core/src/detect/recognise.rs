@@ -8,10 +8,10 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use super::detector::{Detector, DetectorConfig, MIN_LEVEL_SIDE, levels_of};
-use super::grow::{SaddleGrid, grids};
-use super::label::panel_from_grid;
-use super::saddles::SaddleFinder;
-use super::tags::{Read, TagPlace, TagReader};
+use crate::detect::grid::grow::{SaddleGrid, grids};
+use crate::detect::labels::evidence::panel_from_grid;
+use crate::detect::corners::saddles::SaddleFinder;
+use crate::detect::labels::tags::{Read, TagPlace, TagReader};
 use super::tiling::{CHECKER, DELTILLE, kind};
 use crate::family::{Decoder, Family};
 use crate::lattice::{GridKind, LatticeMap, Tile, Vertex};

@@ -1,0 +1,18 @@
+//! From pixels to corners, one by one.
+//!
+//! Comes in: the pyramid of an image. Goes out: corners with the edges that meet there ([`saddles::Saddle`]), not yet joined.
+//!
+//! 1. `ring` finds candidates: pixels around which dark and bright alternate three times, or twice on checkerboards.
+//! 2. `polynomial` fits a cubic surface (`cubic`) or a quadric (`quadric`) by fixed kernels (`cone_fit`) and moves to the point
+//!    where all second derivatives, or the gradient, vanish; J < 0, or it is not a corner.
+//! 3. `sectors` reads the six or four half-edges with their colours.
+//! 4. `saddles` runs these over all levels of the pyramid and merges what is found twice (`buckets`).
+
+pub(in crate::detect) mod buckets;
+pub(in crate::detect) mod cone_fit;
+pub(in crate::detect) mod cubic;
+pub(in crate::detect) mod polynomial;
+pub(in crate::detect) mod quadric;
+pub(in crate::detect) mod ring;
+pub(in crate::detect) mod saddles;
+pub(in crate::detect) mod sectors;

@@ -1,0 +1,515 @@
+//! The edges that meet at a corner, six or four, as directions with a sign.
+//!
+//! The paper takes the polarities from the roots of the cubic or quadratic form. A circle around
+//! the corner tells more: each of the N half-edges by itself, so that perspective and distortion
+//! may bend them, and proof that dark and bright really alternate. The form's roots serve where the
+//! circle is too noisy to read.
+//!
+//! ```text
+//!          ray 2   ray 1            rays run counter-clockwise on the print (image angles fall,
+//!             ╲  ░  ╱               y is down); the sector after an even ray is dark, so an
+//!           ███╲   ╱███             even ray is a step along a row of the lattice turned by a
+//!    ray 3 ─────·───── ray 0        multiple of 120°, with the black tile on its left
+//!           ░  ╱███╲  ░
+//!             ╱█████╲
+//!          ray 4   ray 5
+//! ```
+//!
+//! With four rays opposite sectors have the same colour, and those of one colour may be narrow.
+
+use std::f64::consts::{PI, TAU};
+use std::sync::LazyLock;
+
+use glam::DVec2;
+use multiversion::multiversion;
+
+use super::polynomial::Form;
+use crate::detect::tiling::kind;
+use crate::lattice::GridKind;
+use crate::raster::Gray;
+
+/// Samples on a circle. A sector seen at 75° is 17° wide; 7.5° steps put two samples into it.
+const SAMPLES: usize = 48;
+
+/// Radii of the circles, px, in the order of trial. Larger circles give better directions, smaller
+/// ones stay clear of the neighbours on small boards.
+const RADII_PX: [f64; 4] = [6.0, 4.5, 8.0, 3.5];
+
+/// Samples within this part of the largest deviation from the mean count for neither side.
+const DEAD_BAND: f64 = 0.12;
+
+/// Where the form's roots give the rays, every sector must leave the level by this part of the
+/// circle's amplitude: half of what an evenly divided circle shows under its own noise.
+const MIN_SECTOR: f64 = 0.3;
+
+/// Largest deviation of opposite rays from a straight line. Perspective keeps lines straight;
+/// within a circle of 8 px no lens bends them by more than a few degrees, noise and blur add some.
+const MAX_BEND_RAD: f64 = 20.0 * PI / 180.0;
+
+/// The middle of a checkerboard corner leaves the mean around it by less than this part of the
+/// circle's amplitude. Blur makes it that mean, but ink spreads or squares stop short, and the middle
+/// may be dark or bright, off by the amplitude. A bar across the circle, which looks like a corner
+/// there, has its own brightness in its middle, off by up to twice the amplitude.
+const MAX_CENTRE: f64 = 1.2;
+
+/// Steps of the search for the level between two classes of unequal size; it settles in two.
+const LEVEL_STEPS: usize = 4;
+
+/// Directions and brightness around a corner.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Sectors<const N: usize> {
+    /// Image angles of the N half-edges, counter-clockwise on the print, starting with one that
+    /// has a dark sector on its counter-clockwise side. Radians.
+    pub rays: [f64; N],
+    /// Brightness half-way between dark and bright.
+    pub level: f64,
+    /// Mean deviation from it: half the contrast.
+    pub amplitude: f64,
+}
+
+impl<const N: usize> Sectors<N> {
+    /// Reads the sectors around `position`, from circles or else from the form's roots.
+    pub fn read(image: &Gray<i16>, position: DVec2, form: &Form) -> Option<Self> {
+        let circles = RADII_PX.iter().filter_map(|&radius| {
+            Circle::<N>::sample(image, position, radius).filter(Circle::has_its_mean_in_the_middle)
+        });
+        let mut first = None;
+        for circle in circles {
+            if let Some(rays) = circle.crossings().and_then(|c| ordered_rays(&c)) {
+                return Some(circle.sectors(rays));
+            }
+            first.get_or_insert(circle);
+        }
+        let rays = ordered_rays(&roots(form)?)?;
+        first.filter(|circle| circle.alternates(&rays)).map(|circle| circle.sectors(rays))
+    }
+}
+
+/// The level half-way between dark and bright and the mean deviation from it on the smallest circle around
+/// a place; `None` at the border.
+pub fn contrast_around<const N: usize>(image: &Gray<i16>, position: DVec2) -> Option<(f64, f64)> {
+    let smallest = RADII_PX.into_iter().fold(f64::INFINITY, f64::min);
+    let circle = Circle::<N>::sample(image, position, smallest)?;
+    Some((circle.level, circle.amplitude()))
+}
+
+/// A sign change at an image angle; `rising` when brightness grows with the angle.
+#[derive(Clone, Copy, Debug)]
+struct Crossing {
+    angle: f64,
+    rising: bool,
+}
+
+/// Brightness on a circle around a corner with N rays, by rising image angle.
+struct Circle<const N: usize> {
+    level: f64,
+    deviations: [f64; SAMPLES],
+    /// Brightness of the middle minus the mean of the circle.
+    centre: f64,
+}
+
+impl<const N: usize> Circle<N> {
+    /// `None` when the circle leaves the image.
+    fn sample(image: &Gray<i16>, DVec2 { x, y }: DVec2, radius: f64) -> Option<Self> {
+        let inside = x - radius >= 0.0
+            && y - radius >= 0.0
+            && x + radius + 1.0 < image.width() as f64
+            && y + radius + 1.0 < image.height() as f64;
+        if !inside {
+            return None;
+        }
+        let values = on_circle(image, DVec2::new(x, y), radius, &DIRECTIONS);
+        let mean = sum(&values, |value| value) / SAMPLES as f64;
+        let level = match kind::<N>() {
+            // Opposite sectors have opposite colours, so the mean is the level of the edges.
+            GridKind::Deltille => mean,
+            GridKind::Checker => between_classes(&values, mean),
+        };
+        let centre = image.bilinear_inside(x, y) - mean;
+        Some(Self { level, deviations: values.map(|v| v - level), centre })
+    }
+
+    /// Whether what is in the middle may be a corner; odd ones have proved it by their oddness.
+    fn has_its_mean_in_the_middle(&self) -> bool {
+        match kind::<N>() {
+            GridKind::Deltille => true,
+            GridKind::Checker => self.centre.abs() < MAX_CENTRE * self.amplitude(),
+        }
+    }
+
+    /// Mean deviation from the level.
+    fn amplitude(&self) -> f64 {
+        sum(&self.deviations, f64::abs) / SAMPLES as f64
+    }
+
+    fn sectors(&self, rays: [f64; N]) -> Sectors<N> {
+        Sectors { rays, level: self.level, amplitude: self.amplitude() }
+    }
+
+    /// Whether the sectors between given rays are dark and bright in turn, on the average.
+    fn alternates(&self, rays: &[f64; N]) -> bool {
+        // How far behind the first ray the others are; rays run against the samples.
+        let behind = rays.map(|ray| in_one_turn(rays[0] - ray));
+        let (mut sums, mut counts) = ([0.0; N], [0.0; N]);
+        for (k, deviation) in self.deviations.iter().enumerate() {
+            let here = in_one_turn(rays[0] - angle_of(k as f64));
+            let sector = (0..N).rfind(|&i| behind[i] <= here).unwrap_or(0);
+            // What lies on a ray belongs to neither side.
+            if behind[sector] < here {
+                sums[sector] += deviation;
+                counts[sector] += 1.0;
+            }
+        }
+        let limit = MIN_SECTOR * self.amplitude();
+        (0..N).all(|i| {
+            let darkness = if i % 2 == 0 { -sums[i] } else { sums[i] };
+            counts[i] > 0.0 && darkness / counts[i] > limit
+        })
+    }
+
+    /// The N sign changes; `None` unless there are exactly so many.
+    fn crossings(&self) -> Option<[Crossing; N]> {
+        let dead = DEAD_BAND * largest(&self.deviations);
+        let clear = bits(&self.deviations, |d| d.abs() > dead);
+        // Nearly everything that is no corner ends here.
+        if changes(clear, bits(&self.deviations, |d| d > 0.0)) != N as u32 {
+            return None;
+        }
+        let is_clear = |k: &usize| self.deviations[*k].abs() > dead;
+        let mut a = (0..SAMPLES).rfind(is_clear)?;
+        let mut crossings = [Crossing { angle: 0.0, rising: false }; N];
+        let mut count = 0;
+        for b in (0..SAMPLES).filter(is_clear) {
+            if (self.deviations[a] > 0.0) != (self.deviations[b] > 0.0) {
+                *crossings.get_mut(count)? = self.crossing_between(a, b);
+                count += 1;
+            }
+            a = b;
+        }
+        // From before the first sample to after it is the last crossing of the circle.
+        if crossings[0].angle > crossings[N - 1].angle {
+            crossings.rotate_left(1);
+        }
+        (count == N).then_some(crossings)
+    }
+
+    /// Zero of the straight line through the clear samples a and b (b after a, round the circle).
+    fn crossing_between(&self, a: usize, b: usize) -> Crossing {
+        let (from, to) = (self.deviations[a], self.deviations[b]);
+        let steps = (b + SAMPLES - a) % SAMPLES;
+        // With samples in the dead band between them, the zero lies where the sign turns.
+        let mut start = 0;
+        while start + 1 < steps {
+            let next = self.deviations[(a + start + 1) % SAMPLES];
+            if (next > 0.0) != (from > 0.0) {
+                break;
+            }
+            start += 1;
+        }
+        let low = self.deviations[(a + start) % SAMPLES];
+        let high = self.deviations[(a + start + 1) % SAMPLES];
+        let fraction = if low == high { 0.5 } else { low / (low - high) };
+        Crossing { angle: angle_of(((a + start) % SAMPLES) as f64 + fraction), rising: to > from }
+    }
+}
+
+/// Unit vectors towards the samples.
+static DIRECTIONS: LazyLock<Directions> = LazyLock::new(|| {
+    let angles: [f64; SAMPLES] = std::array::from_fn(|k| angle_of(k as f64));
+    Directions { cos: angles.map(f64::cos), sin: angles.map(f64::sin) }
+});
+
+/// Cosines and sines of the angles of samples.
+struct Directions {
+    cos: [f64; SAMPLES],
+    sin: [f64; SAMPLES],
+}
+
+/// Bilinear samples on a circle in an image, in steps that vectors can take.
+#[multiversion(targets("x86_64+avx2"))]
+fn on_circle(
+    image: &Gray<i16>,
+    DVec2 { x, y }: DVec2,
+    radius: f64,
+    directions: &Directions,
+) -> [f64; SAMPLES] {
+    let width = image.width();
+    let pixels = image.pixels();
+    let (mut first, mut fx, mut fy) = ([0u32; SAMPLES], [0.0f32; SAMPLES], [0.0f32; SAMPLES]);
+    for k in 0..SAMPLES {
+        let u = x + radius * directions.cos[k];
+        let v = y + radius * directions.sin[k];
+        // By way of signed numbers, which processors convert at once.
+        let (left, top) = (u as i32, v as i32);
+        fx[k] = (u - f64::from(left)) as f32;
+        fy[k] = (v - f64::from(top)) as f32;
+        first[k] = top as u32 * width as u32 + left as u32;
+    }
+    let mut corners = [[0i16; SAMPLES]; 4];
+    for k in 0..SAMPLES {
+        let first = first[k] as usize;
+        let (upper, lower) = (&pixels[first..first + 2], &pixels[first + width..first + width + 2]);
+        corners[0][k] = upper[0];
+        corners[1][k] = upper[1];
+        corners[2][k] = lower[0];
+        corners[3][k] = lower[1];
+    }
+    let mut values = [0.0; SAMPLES];
+    for k in 0..SAMPLES {
+        let (a, b) = (f32::from(corners[0][k]), f32::from(corners[1][k]));
+        let (c, d) = (f32::from(corners[2][k]), f32::from(corners[3][k]));
+        let (upper, lower) = (a + fx[k] * (b - a), c + fx[k] * (d - c));
+        values[k] = f64::from(upper + fy[k] * (lower - upper));
+    }
+    values
+}
+
+/// A bit for each sample.
+const EVERY: u64 = (1 << SAMPLES) - 1;
+
+/// The bits of the samples of which something is true.
+fn bits(values: &[f64; SAMPLES], is: impl Fn(f64) -> bool) -> u64 {
+    values.iter().enumerate().fold(0, |bits, (k, &value)| bits | u64::from(is(value)) << k)
+}
+
+/// How often, round the circle, a clear sample is on another side than the clear one before it.
+fn changes(clear: u64, above: u64) -> u32 {
+    let next = |bits: u64, by: usize| (bits << by | bits >> (SAMPLES - by)) & EVERY;
+    let (mut known, mut sides) = (clear, clear & above);
+    // What is not clear takes the side of the nearest clear sample before it: one, two, four … before.
+    for by in [1, 2, 4, 8, 16, 32] {
+        sides |= next(sides, by) & !known;
+        known |= next(known, by);
+    }
+    (sides ^ next(sides, 1)).count_ones()
+}
+
+/// The sum over the samples, in four parts that do not wait for each other.
+fn sum(values: &[f64; SAMPLES], of: impl Fn(f64) -> f64) -> f64 {
+    let mut parts = [0.0; 4];
+    for group in values.as_chunks::<4>().0 {
+        for i in 0..4 {
+            parts[i] += of(group[i]);
+        }
+    }
+    (parts[0] + parts[1]) + (parts[2] + parts[3])
+}
+
+/// The largest size of a sample.
+fn largest(values: &[f64; SAMPLES]) -> f64 {
+    let mut parts = [0.0f64; 4];
+    for group in values.as_chunks::<4>().0 {
+        for i in 0..4 {
+            parts[i] = parts[i].max(group[i].abs());
+        }
+    }
+    parts[0].max(parts[1]).max(parts[2].max(parts[3]))
+}
+
+/// An angle between 0 and 2π; most need no division for that.
+fn in_one_turn(angle: f64) -> f64 {
+    if (0.0..TAU).contains(&angle) {
+        angle
+    } else if (-TAU..0.0).contains(&angle) {
+        angle + TAU
+    } else {
+        angle.rem_euclid(TAU)
+    }
+}
+
+fn angle_of(sample: f64) -> f64 {
+    sample * TAU / SAMPLES as f64
+}
+
+/// The level half-way between the means of what is above and of what is below it.
+fn between_classes(values: &[f64; SAMPLES], mean: f64) -> f64 {
+    let mut level = mean;
+    let total = SAMPLES as f64 * mean;
+    for _ in 0..LEVEL_STEPS {
+        let [above, count] = above_level(values, level);
+        if count == 0.0 || count == SAMPLES as f64 {
+            return mean;
+        }
+        let next = ((total - above) / (SAMPLES as f64 - count) + above / count) / 2.0;
+        if next == level {
+            break;
+        }
+        level = next;
+    }
+    level
+}
+
+/// Sum and number of the values above a level.
+#[multiversion(targets("x86_64+avx2"))]
+fn above_level(values: &[f64; SAMPLES], level: f64) -> [f64; 2] {
+    const LANES: usize = 8;
+    let (mut sums, mut counts) = ([0.0; LANES], [0.0; LANES]);
+    for group in values.as_chunks::<LANES>().0 {
+        for i in 0..LANES {
+            let one = if group[i] > level { 1.0 } else { 0.0 };
+            sums[i] += one * group[i];
+            counts[i] += one;
+        }
+    }
+    let (mut sum, mut count) = (0.0, 0.0);
+    for i in 0..LANES {
+        sum += sums[i];
+        count += counts[i];
+    }
+    [sum, count]
+}
+
+/// The zeros of the form around the circle; `None` unless all roots are real.
+fn roots<const N: usize>(form: &Form) -> Option<[Crossing; N]> {
+    let Directions { cos, sin } = &*DIRECTIONS;
+    let values: [f64; SAMPLES] = std::array::from_fn(|k| form.towards(DVec2::new(cos[k], sin[k])));
+    if changes(EVERY, bits(&values, |value| value > 0.0)) != N as u32 {
+        return None;
+    }
+    let mut crossings = [Crossing { angle: 0.0, rising: false }; N];
+    let mut count = 0;
+    for k in 0..SAMPLES {
+        let (from, to) = (values[k], values[(k + 1) % SAMPLES]);
+        if (from > 0.0) != (to > 0.0) && from != to {
+            let angle = angle_of(k as f64 + from / (from - to));
+            *crossings.get_mut(count)? = Crossing { angle, rising: to > from };
+            count += 1;
+        }
+    }
+    (count == N).then_some(crossings)
+}
+
+/// Rays in the order of [`Sectors::rays`]; `None` when opposite ones are not in line.
+fn ordered_rays<const N: usize>(crossings: &[Crossing; N]) -> Option<[f64; N]> {
+    let bend = |k: usize| turn(crossings[k].angle, crossings[k + N / 2].angle + PI).abs();
+    let straight = (0..N / 2).all(|k| bend(k) <= MAX_BEND_RAD);
+    if !straight {
+        return None;
+    }
+    // Falling image angle is counter-clockwise on the print. Going that way, a crossing that rises
+    // with the angle leads from bright to… dark: its counter-clockwise sector is dark.
+    let start = crossings.iter().position(|c| c.rising)?;
+    Some(std::array::from_fn(|k| crossings[(start + N - k) % N].angle))
+}
+
+/// The turn from `from` to `to`, −π to π.
+pub fn turn(from: f64, to: f64) -> f64 {
+    let turn = to - from;
+    // Most angles need no division to be brought into range.
+    let turn = if turn.abs() < 3.0 * PI { turn } else { turn.rem_euclid(TAU) };
+    if turn > PI {
+        turn - TAU
+    } else if turn <= -PI {
+        turn + TAU
+    } else {
+        turn
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const FLAT: Form = Form::Cubic([0.0; 4]);
+
+    /// A corner of N rays whose black tile lies between image angles −360°/N + tilt and tilt:
+    /// upright on the print, right of the corner.
+    fn corner<const N: usize>(tilt: f64) -> Gray<i16> {
+        Gray::from_fn(41, 41, |x, y| {
+            let theta = (y as f64 - 20.0).atan2(x as f64 - 20.0) - tilt;
+            match (0.5 * N as f64 * theta).sin() {
+                _ if (x, y) == (20, 20) => 400,
+                s if s < 0.0 => 100,
+                _ => 700,
+            }
+        })
+    }
+
+    #[test]
+    fn rays_follow_the_print_and_even_ones_have_black_on_their_left() {
+        rays_are_in_order::<6>();
+        rays_are_in_order::<4>();
+    }
+
+    fn rays_are_in_order<const N: usize>() {
+        let sector = TAU / N as f64;
+        for k in 0..20 {
+            let tilt = 0.3 * f64::from(k);
+            let image = corner::<N>(tilt);
+            let sectors = Sectors::<N>::read(&image, DVec2::splat(20.0), &FLAT).unwrap();
+            assert!((sectors.level - 400.0).abs() < 20.0 && sectors.amplitude > 250.0);
+            for (i, &ray) in sectors.rays.iter().enumerate() {
+                let next = sectors.rays[(i + 1) % N];
+                assert!((turn(ray, next) + sector).abs() < 0.25, "evenly, image angles fall");
+                let nearest = (0..N)
+                    .map(|n| turn(ray, tilt - n as f64 * sector))
+                    .min_by(|a, b| a.abs().total_cmp(&b.abs()));
+                assert!(nearest.unwrap().abs() < 0.12);
+            }
+            // Half a sector counter-clockwise of ray 0 the image is dark.
+            let middle = sectors.rays[0] - sector / 2.0;
+            let value = image.bilinear(20.0 + 6.0 * middle.cos(), 20.0 + 6.0 * middle.sin());
+            assert!(value < 400.0);
+        }
+    }
+
+    #[test]
+    fn corners_of_the_other_kind_and_flat_images_have_no_rays() {
+        let place = DVec2::splat(20.0);
+        assert!(Sectors::<6>::read(&corner::<4>(0.2), place, &FLAT).is_none());
+        assert!(Sectors::<4>::read(&corner::<6>(0.2), place, &FLAT).is_none());
+        assert!(Sectors::<6>::read(&Gray::new(41, 41), place, &FLAT).is_none());
+        assert!(Sectors::<4>::read(&Gray::new(41, 41), place, &FLAT).is_none());
+        assert!(Sectors::<6>::read(&Gray::new(3, 3), DVec2::ONE, &FLAT).is_none());
+    }
+
+    #[test]
+    fn circles_are_sampled_as_single_places_are() {
+        let image = Gray::from_fn(33, 29, |x, y| ((x * x * 31 + y * y * 17 + x * y) % 1024) as i16);
+        for (centre, radius) in [([9.3, 12.9], 8.0), ([16.0, 14.5], 4.5), ([25.99, 3.5], 3.5)] {
+            let values = on_circle(&image, centre.into(), radius, &DIRECTIONS);
+            for (k, value) in values.into_iter().enumerate() {
+                let (sin, cos) = angle_of(k as f64).sin_cos();
+                let [x, y] = [centre[0] + radius * cos, centre[1] + radius * sin];
+                assert_eq!(value, image.bilinear_inside(x, y));
+            }
+        }
+    }
+
+    #[test]
+    fn changes_are_counted_round_the_circle() {
+        assert_eq!(changes(EVERY, 0), 0);
+        assert_eq!(changes(0, EVERY), 0);
+        assert_eq!(changes(EVERY, 0b1111), 2);
+        assert_eq!(changes(EVERY, 1 << 47 | 1), 2);
+        // A gap takes the side of what is before it, whatever it shows.
+        assert_eq!(changes(EVERY & !0b1110, 0b0101), 2);
+        assert_eq!(changes(1 | 1 << 20 | 1 << 40, 1 << 20), 2);
+        assert_eq!(changes(1 | 1 << 20 | 1 << 30 | 1 << 40, 1 << 20 | 1 << 40), 4);
+    }
+
+    #[test]
+    fn a_bar_across_the_circle_is_no_corner() {
+        for half_width in [1.0, 2.0] {
+            let bar = |value: i16| {
+                Gray::from_fn(41, 41, |_, y| {
+                    if (y as f64 - 20.0).abs() < half_width { value } else { 400 }
+                })
+            };
+            assert!(Sectors::<4>::read(&bar(100), DVec2::splat(20.0), &FLAT).is_none());
+            assert!(Sectors::<4>::read(&bar(700), DVec2::splat(20.0), &FLAT).is_none());
+        }
+    }
+
+    #[test]
+    fn the_forms_roots_serve_as_rays() {
+        let monkey = Form::Cubic([1.0, 0.0, -3.0, 0.0]);
+        let rays: [f64; 6] = ordered_rays(&roots(&monkey).unwrap()).unwrap();
+        assert!(turn(rays[0], rays[3] + PI).abs() < 1e-9);
+        assert!(monkey.towards(DVec2::from_angle(rays[0] - 0.3)) < 0.0, "dark after an even ray");
+        let saddle = Form::Quadratic([1.0, 0.0, -1.0]);
+        let rays: [f64; 4] = ordered_rays(&roots(&saddle).unwrap()).unwrap();
+        assert!(turn(rays[0], rays[2] + PI).abs() < 1e-9);
+        assert!(saddle.towards(DVec2::from_angle(rays[0] - 0.3)) < 0.0, "dark after an even ray");
+    }
+}

@@ -1,0 +1,215 @@
+use std::collections::BTreeMap;
+
+use glam::DVec2;
+use serde::{Deserialize, Serialize};
+
+use super::tone::ToneEstimate;
+use super::ink::InkEstimate;
+use super::reason::Reason;
+use crate::lattice::GridKind;
+use crate::quantity;
+use crate::raster::{FileNotes, Pyramid};
+use crate::statistics::median;
+use crate::targets::TargetIdentity;
+
+/// What was found in one image.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[non_exhaustive]
+pub struct Detection {
+    /// File name of the image, or any name that the caller gave to it.
+    pub image: String,
+    /// Width of the image, px.
+    pub width: u32,
+    /// Height of the image, px.
+    pub height: u32,
+    /// What the image's file says beside its pixels.
+    #[serde(default, skip_serializing_if = "FileNotes::is_empty")]
+    pub file: FileNotes,
+    /// The targets that were looked for; empty where the corners are of no known target, or of an unknown one.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub targets: Vec<TargetIdentity>,
+    /// The grids that were found: labelled ones by the id of their panel, then the others, largest first.
+    pub grids: Vec<Grid>,
+    /// What was found of the camera's tone curve, where it was looked for.
+    pub tone: Option<ToneEstimate>,
+    /// What was found of the spread of ink, where it was looked for.
+    pub ink: Option<InkEstimate>,
+    /// Why there are no labels, where labels were looked for and no grid has any; and why there are no grids.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub reasons: Vec<Reason>,
+    /// Duration of each stage by its name, ms, where the detector has a clock; written only where it is asked for, as no two runs take the same.
+    #[serde(default)]
+    pub timing_ms: BTreeMap<String, f64>,
+}
+
+impl Detection {
+    /// What was found in an image of a width and height, px, by whatever found it.
+    pub fn new(image: impl Into<String>, [width, height]: [u32; 2], grids: Vec<Grid>) -> Self {
+        Self { image: image.into(), width, height, grids, ..Self::default() }
+    }
+
+    /// Takes its labels for those of the targets that are given, whatever targets it names, so that it is accepted with them:
+    /// each target that it names is replaced by the one with the same tags, or, where it names one alone, by the one that is
+    /// given. Without any given, as for an untagged grid, it names none afterwards. Returns the targets that were replaced.
+    pub fn assume_targets(&mut self, given: &[TargetIdentity]) -> Vec<TargetIdentity> {
+        if given.is_empty() {
+            return std::mem::take(&mut self.targets);
+        }
+        let only = given.first().filter(|_| given.len() == 1 && self.targets.len() == 1);
+        let mut replaced = Vec::new();
+        for own in &mut self.targets {
+            let same = given.iter().find(|other| other.is_confusable(own)).or(only);
+            if let Some(same) = same.filter(|_| !given.iter().any(|other| other.is_same_print(own)))
+            {
+                // Grids refer to it by its name.
+                let same = TargetIdentity { name: own.name.clone(), ..same.clone() };
+                replaced.push(std::mem::replace(own, same));
+            }
+        }
+        replaced
+    }
+
+    /// Identity of the target that a grid belongs to; `None` where the detection does not name it.
+    pub fn target_of(&self, grid: &Grid) -> Option<&TargetIdentity> {
+        match (&grid.target, self.targets.as_slice()) {
+            (None, [only]) => Some(only),
+            (None, _) => None,
+            (Some(name), all) => all.iter().find(|target| *target.name == **name),
+        }
+    }
+}
+
+/// A connected piece of a tiling.
+///
+/// On a grid with `panel: None` rows and columns are relative: a right-handed lattice with its
+/// own origin, correct up to a motion of the lattice.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Grid {
+    /// The tiling: triangles or squares.
+    pub kind: GridKind,
+    /// Name of the target that it belongs to, where several were looked for.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub target: Option<String>,
+    /// Id of the panel of the target; `None` where the grid has no labels.
+    pub panel: Option<u32>,
+    /// Whether it is seen as in a mirror. Its labels, if any, are those of the print.
+    #[serde(default, skip_serializing_if = "is_false")]
+    pub mirrored: bool,
+    /// The corners, ordered by row, then column.
+    pub corners: Vec<GridCorner>,
+    /// The tags that were decoded and agree with the labels.
+    pub tags: Vec<DecodedTag>,
+}
+
+impl Grid {
+    /// Median distance of corners that follow each other in a row or column, px; `None` where there
+    /// are none such.
+    pub fn edge_px(&self) -> Option<f64> {
+        let places: BTreeMap<(i32, i32), DVec2> =
+            self.corners.iter().map(|c| ((c.row, c.col), c.position())).collect();
+        let edges = self.corners.iter().flat_map(|c| {
+            let next = [(c.row, c.col + 1), (c.row + 1, c.col)];
+            let edges = next.into_iter().filter_map(|v| Some(c.position() - places.get(&v)?));
+            edges.map(|edge| edge.x.hypot(edge.y))
+        });
+        median(edges.collect())
+    }
+
+    /// Expresses positions in px of a level of the pyramid.
+    pub(in crate::detect) fn moved_to_level(&mut self, level: usize) {
+        for corner in &mut self.corners {
+            corner.move_to(Pyramid::from_level_0(level, corner.position()));
+        }
+    }
+
+    /// Undoes [`Self::moved_to_level`], for covariances too.
+    pub(in crate::detect) fn moved_from_level(&mut self, level: usize) {
+        let area = 4f64.powi(level as i32);
+        for corner in &mut self.corners {
+            corner.move_to(Pyramid::to_level_0(level, corner.position()));
+            corner.cov = corner.cov.map(|cov| cov.map(|entry| area * entry));
+        }
+    }
+}
+
+fn is_false(value: &bool) -> bool {
+    !value
+}
+
+/// A corner in the image.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct GridCorner {
+    /// Lattice row: on the panel, or relative where the grid has no labels.
+    #[serde(deserialize_with = "quantity::place_in_lattice::de")]
+    pub row: i32,
+    /// Lattice column, alike.
+    #[serde(deserialize_with = "quantity::place_in_lattice::de")]
+    pub col: i32,
+    /// Id of the corner in the target; `None` where the grid has no labels.
+    pub id: Option<u32>,
+    /// Horizontal position, px, to the right; pixel centres at integers.
+    #[serde(deserialize_with = "quantity::place_px::de")]
+    pub x: f64,
+    /// Vertical position, px, downwards; pixel centres at integers.
+    #[serde(deserialize_with = "quantity::place_px::de")]
+    pub y: f64,
+    /// Covariance xx, xy, yy of the position, px²; `None` where the method gives none.
+    pub cov: Option<[f64; 3]>,
+}
+
+impl GridCorner {
+    /// Position, px; x right, y down, pixel centres at integers.
+    pub fn position(&self) -> DVec2 {
+        DVec2::new(self.x, self.y)
+    }
+
+    /// Changes the position, px.
+    pub(in crate::detect) fn move_to(&mut self, position: DVec2) {
+        (self.x, self.y) = position.into();
+    }
+}
+
+/// A tag read in the image.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct DecodedTag {
+    /// Id of the tag: the index of its code in the family.
+    pub id: u32,
+    /// Name of the family, such as `delTag25h7`.
+    pub family: String,
+    /// Row of the tile's lower-left vertex, in the grid's rows.
+    #[serde(deserialize_with = "quantity::place_in_lattice::de")]
+    pub row: i32,
+    /// Column of the tile's lower-left vertex.
+    #[serde(deserialize_with = "quantity::place_in_lattice::de")]
+    pub col: i32,
+    /// Number of bits that were misread and corrected.
+    pub errors: u32,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::targets::{BoardSpec, Target};
+
+    #[test]
+    fn assumed_targets_replace_those_with_the_same_tags() {
+        let board = |name, cols, edge_mm| {
+            Target::new(name, BoardSpec::deltille(7, cols, edge_mm)).unwrap().identity()
+        };
+        let (small, large, wide) =
+            (board("desk", 8, 20.0), board("other", 8, 25.0), board("wall", 12, 30.0));
+        let of = |targets: &[&TargetIdentity]| {
+            let targets = targets.iter().map(|&target| target.clone()).collect();
+            Detection { targets, ..Detection::default() }
+        };
+        let mut both = of(&[&small, &wide]);
+        assert_eq!(both.assume_targets(&[wide.clone(), large.clone()]), vec![small.clone()]);
+        assert_eq!(both.targets[0].fingerprint, large.fingerprint);
+        assert_eq!(both.targets[0].name, small.name, "grids refer to it by its name");
+        assert_eq!(both.targets[1], wide);
+        let only = std::slice::from_ref(&wide);
+        assert_eq!(of(&[&small]).assume_targets(only), vec![small.clone()]);
+        assert!(of(&[&small, &wide]).assume_targets(only).is_empty());
+        assert_eq!(of(&[&small]).assume_targets(&[]), vec![small]);
+    }
+}

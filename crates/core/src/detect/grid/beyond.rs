@@ -1,0 +1,249 @@
+//! Whether a pattern goes on where a grid ends.
+//!
+//! A board ends: beyond its last squares lies paper, a table, or what covers it, and nothing of that keeps
+//! to the board's rows and columns. A screen of dots, a dither, a moiré or a field of random cells shows
+//! checkerboard corners only where its dots happen to meet; where they no longer do, dots and gaps go on
+//! at the same places. So two rows of squares are looked at beyond every end of a grid, and of those
+//! that are next to each other in a row it is counted how many are as different as black and white.
+//!
+//! ```text
+//!     ░░ ██ ░░ ██        ·  ·  ·  ·         squares of a grid (left), and what is beyond
+//!     ██ ░░ ██ ░░        ·  ·  ·  ·         its last row: paper, of one brightness, or
+//!     ──+──+──+──        ──+──+──+──        dots, which alternate as squares would
+//!     ░░ ██ ░░ ██        ░░ ██ ░░ ██
+//! ```
+//!
+//! Dots alternate everywhere, random cells half of the time, around boards a few in a hundred do. What
+//! lies beyond the picture, or where another grid begins, says nothing.
+
+use std::collections::BTreeMap;
+
+use glam::DVec2;
+
+use crate::detect::corners::buckets::Buckets;
+use super::checker_tiles::{CheckerTiles, Point, Square, moved};
+use crate::detect::detection::values::Grid;
+use crate::detect::tiling::{CHECKER, step};
+use crate::lattice::{GridKind, Vertex};
+use crate::raster::Gray;
+
+/// Largest part of the pairs of squares beyond a board that differ as black and white do.
+const MOST_DIFFERENT: f64 = 0.2;
+
+/// The same beyond rows of corners that are no area: in random cells they come about more easily.
+const MOST_DIFFERENT_ROWS: f64 = 0.08;
+
+/// The same beyond the complete squares of a grid. Single corners that stand apart are what a cover leaves of
+/// a board, with more of it beyond that is not covered; or gaps between dots, which all alternate.
+const MOST_DIFFERENT_SQUARES: f64 = 0.6;
+
+/// Fewer pairs than this say nothing.
+const LEAST_PAIRS: usize = 6;
+
+/// Rows of squares that are looked at beyond an end.
+const ROWS: i32 = 2;
+
+/// A square this near to the corner of another grid, in edges, is one of that grid.
+const OTHER_GRID: f64 = 1.0;
+
+/// Tells of each grid of a picture, of which `image` is the finest level, whether its pattern goes on where
+/// it ends. Six sectors that alternate do not come by chance, so of deltille grids it tells nothing.
+pub fn go_on(image: &Gray<i16>, grids: &[&Grid]) -> Vec<bool> {
+    let mut corners = Buckets::new(image.width(), image.height());
+    let mut owners = Vec::new();
+    let several = if grids.len() > 1 { grids } else { &[] };
+    for (i, grid) in several.iter().enumerate() {
+        for corner in &grid.corners {
+            corners.insert(corner.position());
+            owners.push(i);
+        }
+    }
+    let goes_on = |(i, grid): (usize, &&Grid)| {
+        let is_others = |place, reach| corners.within(place, reach).any(|(c, _)| owners[c] != i);
+        let goes_on = |tiles: &CheckerTiles, most| tiles.goes_on(is_others, most);
+        grid.kind == GridKind::Checker && {
+            let all = CheckerTiles::of(image.into(), grid);
+            let most = if all.is_compact() { MOST_DIFFERENT } else { MOST_DIFFERENT_ROWS };
+            goes_on(&all, most) || {
+                let squares = all.without_loose_corners();
+                let stand_apart = squares.corners.len() < all.corners.len();
+                stand_apart && goes_on(&squares, MOST_DIFFERENT_SQUARES)
+            }
+        }
+    };
+    grids.iter().enumerate().map(goes_on).collect()
+}
+
+impl CheckerTiles<'_> {
+    /// Whether more than some part of what is beyond alternates; `is_others` tells whether a corner of
+    /// another grid is within a distance of a place, px.
+    fn goes_on(&self, is_others: impl Fn(Point, f64) -> bool, most: f64) -> bool {
+        let Some([even, odd]) = self.levels() else {
+            return false;
+        };
+        let contrast = (even - odd).abs();
+        let (mut pairs, mut different) = (0, 0);
+        for k in 0..CHECKER {
+            let values = self.values_beyond(k, &is_others);
+            let along = along_end(k);
+            for (&square, value) in &values {
+                if let Some(next) = values.get(&(square + along)) {
+                    pairs += 1;
+                    different += usize::from((value - next).abs() >= 0.5 * contrast);
+                }
+            }
+        }
+        pairs >= LEAST_PAIRS && different as f64 >= most * pairs as f64
+    }
+
+    /// Brightness of the squares beyond the ends in direction `k`, by their lowest, leftmost vertices.
+    fn values_beyond(
+        &self,
+        k: usize,
+        is_others: impl Fn(Point, f64) -> bool,
+    ) -> BTreeMap<Vertex, f64> {
+        let mut squares: BTreeMap<Vertex, Vec<Square>> = BTreeMap::new();
+        for (&vertex, &corner) in &self.corners {
+            let Some(edges) = self.end(vertex, corner, k) else {
+                continue;
+            };
+            for row in 1..=ROWS {
+                for side in [0, -1] {
+                    let near = vertex + times(step::<CHECKER>(k), row) + times(along_end(k), side);
+                    let vertices = [near, near + along_end(k)];
+                    let vertices =
+                        vertices.map(|v| [v, v + step::<CHECKER>(k)]).into_iter().flatten();
+                    let vertices: Vec<Vertex> = vertices.collect();
+                    if vertices.iter().any(|v| self.corners.contains_key(v)) {
+                        continue;
+                    }
+                    let by = DVec2::new(f64::from(row), f64::from(side)) + 0.5;
+                    let middle = moved(corner, edges, by);
+                    let first = vertices.into_iter().min();
+                    let square = Square { middle, edges };
+                    squares.entry(first.unwrap_or(near)).or_default().push(square);
+                }
+            }
+        }
+        let value = |(vertex, predicted): (Vertex, Vec<Square>)| {
+            let count = predicted.len() as f64;
+            let middle = predicted.iter().map(|square| square.middle).sum::<DVec2>() / count;
+            let edges = predicted[0].edges;
+            let reach_px = OTHER_GRID * edges[0].length();
+            let value = self.value(Square { middle, edges })?;
+            (!is_others(middle, reach_px)).then_some((vertex, value))
+        };
+        squares.into_iter().filter_map(value).collect()
+    }
+
+    /// The edges at a corner behind which the grid ends in direction `k`: the one away from it, and one along
+    /// its end.
+    fn end(&self, vertex: Vertex, corner: Point, k: usize) -> Option<[Point; 2]> {
+        let at = |v: Vertex| self.corners.get(&v).copied();
+        let way = step::<CHECKER>(k);
+        if at(vertex + way).is_some() {
+            return None;
+        }
+        let before = at(vertex - way)?;
+        let along = match (at(vertex + along_end(k)), at(vertex - along_end(k))) {
+            (Some(next), Some(last)) => (next - last) / 2.0,
+            (Some(next), None) => next - corner,
+            (None, Some(last)) => corner - last,
+            (None, None) => return None,
+        };
+        Some([corner - before, along])
+    }
+}
+
+/// The step along an end in direction `k`, up or to the right.
+fn along_end(k: usize) -> Vertex {
+    step::<CHECKER>((k + 1) % 2)
+}
+
+fn times(step: Vertex, count: i32) -> Vertex {
+    Vertex::new(count * step.row, count * step.col)
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::detect::GridCorner;
+    use super::*;
+
+    const EDGE_PX: f64 = 20.0;
+
+    /// A grid of 5 × 6 corners in the middle of a picture.
+    fn grid() -> Grid {
+        let corner = |row: i32, col: i32| GridCorner {
+            row,
+            col,
+            id: None,
+            x: 100.0 + EDGE_PX * f64::from(col),
+            y: 200.0 - EDGE_PX * f64::from(row),
+            cov: None,
+        };
+        let corners = (0..5).flat_map(|row| (0..6).map(move |col| corner(row, col))).collect();
+        Grid {
+            kind: GridKind::Checker,
+            target: None,
+            panel: None,
+            mirrored: false,
+            corners,
+            tags: Vec::new(),
+        }
+    }
+
+    /// Squares inside the grid's outermost ones, and something beyond.
+    fn picture(beyond: impl Fn(i32, i32) -> i16) -> Gray<i16> {
+        Gray::from_fn(300, 300, |x, y| {
+            let col = ((x as f64 - 100.0) / EDGE_PX).floor() as i32;
+            let row = ((200.0 - y as f64) / EDGE_PX).floor() as i32;
+            let inside = (-1..5).contains(&row) && (-1..6).contains(&col);
+            match inside {
+                true if (row + col) % 2 == 0 => 100,
+                true => 800,
+                false => beyond(row, col),
+            }
+        })
+    }
+
+    fn goes_on(image: &Gray<i16>) -> bool {
+        go_on(image, &[&grid()]) == [true]
+    }
+
+    #[test]
+    fn paper_and_tables_end_a_board() {
+        assert!(!goes_on(&picture(|_, _| 800)));
+        assert!(!goes_on(&picture(|row, _| if row < 0 { 50 } else { 850 })));
+        // A margin of one square, then something dark.
+        let margin = |row, col| (-2..6).contains(&row) && (-2..7).contains(&col);
+        assert!(!goes_on(&picture(|row, col| if margin(row, col) { 800 } else { 100 })));
+    }
+
+    #[test]
+    fn dots_and_random_cells_go_on() {
+        assert!(goes_on(&picture(|row, col| if (row + col) % 2 == 0 { 100 } else { 800 })));
+        // Every second dot of every second row, as in a dither.
+        assert!(goes_on(&picture(|row, col| {
+            if row % 2 == 0 && col % 2 == 0 { 100 } else { 800 }
+        })));
+        let random = |row: i32, col: i32| (row * 7919 + col * 104_729).rem_euclid(101) % 2;
+        assert!(goes_on(&picture(|row, col| if random(row, col) == 0 { 100 } else { 800 })));
+    }
+
+    #[test]
+    fn what_belongs_to_another_grid_says_nothing() {
+        let image = picture(|row, col| if (row + col) % 2 == 0 { 100 } else { 800 });
+        let mut around = grid();
+        around.corners.clear();
+        for row in -4..9 {
+            for col in -4..10 {
+                if !(-1..6).contains(&row) || !(-1..7).contains(&col) {
+                    let (x, y) =
+                        (100.0 + EDGE_PX * f64::from(col), 200.0 - EDGE_PX * f64::from(row));
+                    around.corners.push(GridCorner { row, col, id: None, x, y, cov: None });
+                }
+            }
+        }
+        assert!(!go_on(&image, &[&grid(), &around])[0]);
+    }
+}

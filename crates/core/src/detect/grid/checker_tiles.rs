@@ -1,0 +1,134 @@
+//! The squares of a checkerboard as a picture shows them.
+
+use std::collections::BTreeMap;
+
+use glam::DVec2;
+
+use crate::detect::detection::values::Grid;
+use crate::detect::tiling::{CHECKER, step};
+use crate::lattice::Vertex;
+use crate::raster::ImageView;
+use crate::statistics::median;
+
+/// Squares are sampled in the middle and at so many edges from it along rows and columns: on a dot that
+/// is much smaller than its square too.
+const AROUND: f64 = 0.12;
+
+/// A grid that has fewer whole squares than this part of those of a square board with as many corners
+/// consists of rows rather than areas.
+const COMPACT: f64 = 2.0 / 3.0;
+
+/// A place in the image, px.
+pub type Point = DVec2;
+
+/// A square: its middle, and two of its edges.
+#[derive(Clone, Copy, Debug)]
+pub struct Square {
+    pub middle: Point,
+    pub edges: [Point; 2],
+}
+
+/// A square of which all four corners are known.
+#[derive(Clone, Copy, Debug)]
+pub struct WholeSquare {
+    /// Its lowest, leftmost vertex on the print.
+    pub vertex: Vertex,
+    /// The corner there, the one to the right, the one above, and the one across.
+    pub corners: [Point; 4],
+}
+
+impl WholeSquare {
+    /// The place at a part of the way to the right and a part of the way up.
+    pub fn place(&self, right: f64, up: f64) -> Point {
+        let [a, b, c, d] = self.corners;
+        let (low, high) = (a + right * (b - a), c + right * (d - c));
+        low + up * (high - low)
+    }
+
+    fn square(&self) -> Square {
+        let [corner, right, above, _] = self.corners;
+        Square { middle: self.place(0.5, 0.5), edges: [right - corner, above - corner] }
+    }
+}
+
+/// 0 for a square of one colour, 1 for one of the other.
+pub fn parity(vertex: Vertex) -> usize {
+    (vertex.row + vertex.col).rem_euclid(2) as usize
+}
+
+/// The corners of a grid in a picture.
+#[derive(Clone, Debug)]
+pub struct CheckerTiles<'a> {
+    pub image: ImageView<'a>,
+    pub corners: BTreeMap<Vertex, Point>,
+}
+
+impl<'a> CheckerTiles<'a> {
+    pub fn of(image: ImageView<'a>, grid: &Grid) -> Self {
+        let corner = |c: &crate::detect::GridCorner| (Vertex::new(c.row, c.col), c.position());
+        Self { image, corners: grid.corners.iter().map(corner).collect() }
+    }
+
+    pub fn has(&self, vertex: Vertex) -> bool {
+        self.corners.contains_key(&vertex)
+    }
+
+    pub fn at(&self, vertex: Vertex) -> Option<Point> {
+        self.corners.get(&vertex).copied()
+    }
+
+    /// The corners of whole squares.
+    pub fn without_loose_corners(&self) -> Self {
+        let is_in_one = |&(&v, _): &(&Vertex, &Point)| {
+            (0..CHECKER).any(|k| {
+                let [a, b] = [k, k + 1].map(step::<CHECKER>);
+                self.has(v + a) && self.has(v + b) && self.has(v + a + b)
+            })
+        };
+        let corners = self.corners.iter().filter(is_in_one).map(|(&v, &corner)| (v, corner));
+        Self { image: self.image, corners: corners.collect() }
+    }
+
+    pub fn whole_squares(&self) -> impl Iterator<Item = WholeSquare> {
+        self.corners.iter().filter_map(|(&vertex, &corner)| {
+            let at = |row, col| self.at(vertex + Vertex::new(row, col));
+            Some(WholeSquare { vertex, corners: [corner, at(0, 1)?, at(1, 0)?, at(1, 1)?] })
+        })
+    }
+
+    /// Whether the whole squares are as many as in an area without holes; not so in rows of corners.
+    pub fn is_compact(&self) -> bool {
+        let square = (self.corners.len() as f64).sqrt() - 1.0;
+        self.whole_squares().count() as f64 >= COMPACT * square * square
+    }
+
+    /// Brightness of the middles of the whole squares of either parity.
+    pub fn levels(&self) -> Option<[f64; 2]> {
+        let mut values = [Vec::new(), Vec::new()];
+        for square in self.whole_squares() {
+            values[parity(square.vertex)].extend(self.value(square.square()));
+        }
+        let [even, odd] = values.map(median);
+        Some([even?, odd?])
+    }
+
+    /// Brightness about the middle of a square; `None` where it lies outside the picture.
+    pub fn value(&self, Square { middle, edges }: Square) -> Option<f64> {
+        const PLACES: [[f64; 2]; 5] =
+            [[0.0, 0.0], [AROUND, 0.0], [-AROUND, 0.0], [0.0, AROUND], [0.0, -AROUND]];
+        let values = PLACES.map(|place| self.brightness(moved(middle, edges, place.into())));
+        Some(values.into_iter().sum::<Option<f64>>()? / PLACES.len() as f64)
+    }
+
+    /// Brightness of a place in the picture.
+    pub fn brightness(&self, DVec2 { x, y }: Point) -> Option<f64> {
+        let (width, height) = (self.image.width() as f64, self.image.height() as f64);
+        let inside = x >= 0.0 && y >= 0.0 && x + 1.0 < width && y + 1.0 < height;
+        inside.then(|| self.image.bilinear_inside(x, y))
+    }
+}
+
+/// A place moved by multiples of two edges.
+pub fn moved(place: Point, edges: [Point; 2], by: DVec2) -> Point {
+    place + by.x * edges[0] + by.y * edges[1]
+}

@@ -1,0 +1,173 @@
+//! Boards seen at a grazing angle, looked for in pictures that are compressed along their tiles.
+//!
+//! From 75° a tile is four times as wide as it is high, and its sectors are 15° wide: a circle around a
+//! corner that shows them leaves the tile. Compressed to half their width, along the direction nearest to
+//! theirs of a few, tiles look as from 60° or 65°.
+//!
+//! ```text
+//!     ╲▁▁▁▁▁▁╱▔▔▔▔▔▔╲▁▁▁▁▁▁╱        ╲▁▁╱▔▔╲▁▁╱
+//!     ╱▔▔▔▔▔▔╲▁▁▁▁▁▁╱▔▔▔▔▔▔╲   →    ╱▔▔╲▁▁╱▔▔╲
+//! ```
+
+use std::f64::consts::PI;
+
+use glam::DVec2;
+use nalgebra::{Matrix2, Vector2};
+use rayon::prelude::*;
+
+use crate::detect::detector::MIN_LEVEL_SIDE;
+use super::grow::{SaddleGrid, grids};
+use crate::detect::corners::saddles::{SaddleFinder, is_all_noise};
+use crate::raster::{Gray, Pyramid};
+
+/// Directions in a half-turn: none is more than 15° from one of them, where half the width leaves tiles that are four
+/// times as wide as high as if they were 2.4 times.
+const DIRECTIONS: usize = 6;
+
+/// Width of what is compressed.
+const WIDTH: f64 = 0.5;
+
+/// The finest level of a pyramid that has no more pixels than this is looked at: tiles of larger pictures are larger.
+const MOST_PIXELS: usize = 2_500_000;
+
+/// What is outside of a picture, of 1023.
+const OUTSIDE: i16 = 512;
+
+/// The grids of the direction in which the largest is seen, in px of level 0.
+pub fn foreshortened_grids<const N: usize>(
+    finder: &SaddleFinder<N>,
+    pyramid: &Pyramid,
+) -> Vec<SaddleGrid> {
+    let levels = pyramid.levels();
+    let fitting = levels.iter().position(|level| level.pixels().len() <= MOST_PIXELS);
+    let level = fitting.unwrap_or(levels.len() - 1);
+    let is_small = levels[level].width().min(levels[level].height()) < MIN_LEVEL_SIDE;
+    if is_small || is_all_noise(&levels[level]) {
+        return Vec::new();
+    }
+    let views = (0..DIRECTIONS).into_par_iter().map(|i| {
+        let view = View::new(&levels[level], PI * i as f64 / DIRECTIONS as f64);
+        let drawn = view.drawn(&levels[level]);
+        let compressed = Pyramid::new(&drawn, levels.len() - level, MIN_LEVEL_SIDE);
+        let saddles = finder.find(&compressed);
+        let mut found = grids(finder, &compressed, &saddles, None);
+        for placed in found.iter_mut().flat_map(|grid| grid.values_mut()) {
+            placed.position = Pyramid::to_level_0(level, view.in_picture(placed.position));
+        }
+        found
+    });
+    let size = |grids: &Vec<SaddleGrid>| grids.first().map_or(0, |grid| grid.len());
+    // Of directions as good as each other the first.
+    let better = |a, b| if size(&b) > size(&a) { b } else { a };
+    views.collect::<Vec<_>>().into_iter().reduce(better).unwrap_or_default()
+}
+
+/// A picture compressed in one direction.
+struct View {
+    picture_from_view: Matrix2<f64>,
+    /// Where the view's middle is in the picture, and in the view.
+    centres: [Vector2<f64>; 2],
+    size: [usize; 2],
+}
+
+impl View {
+    fn new(image: &Gray<i16>, angle: f64) -> Self {
+        let along = Vector2::new(angle.cos(), angle.sin());
+        let view_from_picture = Matrix2::identity() - (1.0 - WIDTH) * along * along.transpose();
+        let picture_from_view =
+            Matrix2::identity() + (1.0 / WIDTH - 1.0) * along * along.transpose();
+        let picture = Vector2::new(image.width() as f64, image.height() as f64);
+        let view = view_from_picture.abs() * picture;
+        Self {
+            picture_from_view,
+            centres: [picture, view].map(|size| (size - Vector2::repeat(1.0)) / 2.0),
+            size: [view.x.ceil() as usize, view.y.ceil() as usize],
+        }
+    }
+
+    fn in_picture(&self, at: DVec2) -> DVec2 {
+        let [picture, view] = self.centres;
+        let there = picture + self.picture_from_view * (Vector2::new(at.x, at.y) - view);
+        DVec2::new(there.x, there.y)
+    }
+
+    /// The picture as the view shows it, grey where it ends. (A pyramid's level is smooth enough to be
+    /// sampled at every second pixel.)
+    fn drawn(&self, image: &Gray<i16>) -> Gray<i16> {
+        // Steps are rounded: within a row that adds up to less than a tenth of a pixel.
+        let last = [image.width() as f64 - 2.1, image.height() as f64 - 2.1];
+        let [width, height] = self.size;
+        let step = DVec2::from_slice(self.picture_from_view.column(0).as_slice());
+        let mut drawn = Gray::new(width, height);
+        for (y, row) in drawn.pixels_mut().chunks_mut(width).enumerate() {
+            row.fill(OUTSIDE);
+            let first = self.in_picture(DVec2::new(0.0, y as f64));
+            // The part of the row that lies in the picture.
+            let (mut from, mut to) = (0.0, width as f64);
+            for i in 0..2 {
+                let ends = [(0.1 - first[i]) / step[i], (last[i] - first[i]) / step[i]];
+                if step[i].abs() > 1e-9 {
+                    from = f64::max(from, ends[0].min(ends[1]));
+                    to = f64::min(to, ends[0].max(ends[1]));
+                } else if !(0.0..=last[i]).contains(&first[i]) {
+                    to = from;
+                }
+            }
+            let (from, to) = (from.ceil(), to.floor());
+            if let Some(seen) = row.get_mut(from as usize..to as usize) {
+                sample(image, first + from * step, step, seen);
+            }
+        }
+        drawn
+    }
+}
+
+/// Bilinear samples along a line that lies inside of an image.
+fn sample(image: &Gray<i16>, first: DVec2, step: DVec2, out: &mut [i16]) {
+    /// Steps of a coordinate in a pixel, and weights of an interpolation.
+    const FINE: f64 = 65536.0;
+    const WEIGHTS: i32 = 256;
+    let (data, width) = (image.pixels(), image.width());
+    let [mut x, mut y] = (first * FINE).round().as_i64vec2().to_array();
+    let [dx, dy] = (step * FINE).round().as_i64vec2().to_array();
+    for pixel in out {
+        let [col, row] = [x, y].map(|c| (c.max(0) >> 16) as usize);
+        let [fx, fy] = [x, y].map(|c| (c >> 8) as i32 & (WEIGHTS - 1));
+        let at = row * width + col;
+        let (upper, lower) = (&data[at..at + 2], &data[at + width..at + width + 2]);
+        let across = |pair: &[i16]| i32::from(pair[0]) * (WEIGHTS - fx) + i32::from(pair[1]) * fx;
+        let sum = across(upper) * (WEIGHTS - fy) + across(lower) * fy;
+        *pixel = ((sum + (1 << 15)) >> 16) as i16;
+        (x, y) = (x + dx, y + dy);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_view_shows_a_place_where_it_says() {
+        let image = Gray::from_fn(200, 150, |x, y| {
+            let [u, v] = [x as f64 - 120.3, y as f64 - 60.8];
+            (1000.0 * (-(u * u + v * v) / 200.0).exp()) as i16
+        });
+        for i in 0..DIRECTIONS {
+            let view = View::new(&image, PI * i as f64 / DIRECTIONS as f64);
+            let drawn = view.drawn(&image);
+            let (mut sum, mut middle) = (0.0, DVec2::ZERO);
+            for y in 0..drawn.height() {
+                for x in 0..drawn.width() {
+                    let weight = match drawn.at(x, y) {
+                        OUTSIDE => 0.0,
+                        value => f64::from(value),
+                    };
+                    sum += weight;
+                    middle += weight * DVec2::new(x as f64, y as f64);
+                }
+            }
+            let found = view.in_picture(middle / sum);
+            assert!(found.distance(DVec2::new(120.3, 60.8)) < 0.1, "{found}");
+        }
+    }
+}

@@ -1,0 +1,146 @@
+//! Which corner follows which along each of the rays.
+
+use glam::DVec2;
+
+use super::edge::{MAX_CHORD_RAD, is_clean};
+use super::places::Places;
+use crate::detect::corners::saddles::Saddle;
+use crate::detect::corners::sectors::turn;
+use crate::raster::Pyramid;
+
+/// Nearest corners of like contrast looked at: up to six neighbours, the twelve behind them, and as many strangers.
+const NEAREST: usize = 36;
+
+/// Below the squared cosine of [`MAX_CHORD_RAD`].
+const LEAST_ALONG: f64 = 0.9;
+
+/// So many are looked at first; inside a board that is enough.
+const FIRST: usize = 12;
+
+/// Contrasts of neighbouring corners differ by less than this factor: light falls off slowly, and
+/// what is weaker is noise on the paper beside the board.
+pub const MAX_CONTRAST_RATIO: f64 = 3.0;
+
+/// The far end of an edge: a corner, and which of its rays looks back.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Link {
+    /// Index of the corner.
+    pub corner: usize,
+    /// Index of its ray.
+    pub ray: usize,
+}
+
+/// The links of a corner along its rays.
+pub type Links<const N: usize> = [Option<Link>; N];
+
+/// For every corner the links along its N rays; links are mutual.
+pub fn links<const N: usize>(pyramid: &Pyramid, saddles: &[Saddle<N>]) -> Vec<Links<N>> {
+    let positions: Vec<DVec2> = saddles.iter().map(|saddle| saddle.position).collect();
+    let places = Places::new(&positions);
+    let directions = |saddle: &Saddle<N>| saddle.sectors.rays.map(DVec2::from_angle);
+    let directions: Vec<Directions<N>> = saddles.iter().map(directions).collect();
+    let corners = Corners { pyramid, saddles, directions: &directions };
+    let mut found: Vec<Links<N>> = vec![[None; N]; saddles.len()];
+    for index in 0..saddles.len() {
+        // Between the corners of an enlarged picture its grain has hundreds of its own.
+        let alike = |other: usize| are_alike(&saddles[index], &saddles[other]);
+        let first = places.nearest(index, FIRST, alike);
+        corners.link_to(&mut found, index, &first);
+        if found[index].contains(&None) {
+            let all = places.nearest(index, NEAREST, alike);
+            corners.link_to(&mut found, index, &all[first.len()..]);
+        }
+    }
+    for a in 0..found.len() {
+        for i in 0..N {
+            if let Some(Link { corner, ray }) = found[a][i]
+                && found[corner][ray] != Some(Link { corner: a, ray: i })
+            {
+                found[a][i] = None;
+            }
+        }
+    }
+    found
+}
+
+/// Unit vectors along rays.
+type Directions<const N: usize> = [DVec2; N];
+
+/// The corners to be linked.
+struct Corners<'a, const N: usize> {
+    pyramid: &'a Pyramid<'a>,
+    saddles: &'a [Saddle<N>],
+    directions: &'a [Directions<N>],
+}
+
+impl<const N: usize> Corners<'_, N> {
+    /// Links a corner along its rays that have no link to those of `others`, nearest first, that they lead
+    /// to: the nearest corner along a ray counts.
+    fn link_to(&self, found: &mut [Links<N>], index: usize, others: &[usize]) {
+        let saddle = &self.saddles[index];
+        let mut links = found[index];
+        for &corner in others {
+            let other = &self.saddles[corner];
+            let open = |i: usize| links[i].is_none() && self.may_be_along(index, i, other.position);
+            let open: [bool; N] = std::array::from_fn(open);
+            if !open.contains(&true) {
+                continue;
+            }
+            let chord = chord_rad(saddle, other);
+            for i in (0..N).filter(|&i| open[i] && is_along(saddle, i, chord)) {
+                let Some(ray) = ray_back(chord, i, other) else {
+                    continue;
+                };
+                // What has been followed from the other end is clean.
+                let back = Some(Link { corner: index, ray: i });
+                let is_known = corner < index && found[corner][ray] == back;
+                if is_known || is_clean(self.pyramid, saddle, i, other, ray) {
+                    links[i] = Some(Link { corner, ray });
+                }
+            }
+            if !links.contains(&None) {
+                break;
+            }
+        }
+        found[index] = links;
+    }
+
+    /// Whether [`is_along`] may say that a place lies along a ray: without angles, and not too strictly.
+    fn may_be_along(&self, index: usize, i: usize, place: DVec2) -> bool {
+        let off = place - self.saddles[index].position;
+        let along = off.dot(self.directions[index][i]);
+        along > 0.0 && along * along >= LEAST_ALONG * off.length_squared()
+    }
+}
+
+/// The ray of `b` that looks back along ray `i` of `a`; `None` when they do not face each other.
+///
+/// Opposite ends of an edge see its dark side on opposite hands, so the rays differ in parity, and
+/// their contrasts are alike.
+pub fn facing_ray<const N: usize>(a: &Saddle<N>, i: usize, b: &Saddle<N>) -> Option<usize> {
+    let chord = chord_rad(a, b);
+    (are_alike(a, b) && is_along(a, i, chord)).then(|| ray_back(chord, i, b)).flatten()
+}
+
+/// Whether the contrasts of two corners may be those of neighbours.
+fn are_alike<const N: usize>(a: &Saddle<N>, b: &Saddle<N>) -> bool {
+    let (ours, theirs) = (a.sectors.amplitude, b.sectors.amplitude);
+    ours.max(theirs) <= MAX_CONTRAST_RATIO * ours.min(theirs)
+}
+
+/// Image angle of the way from one corner to another.
+fn chord_rad<const N: usize>(a: &Saddle<N>, b: &Saddle<N>) -> f64 {
+    (b.position - a.position).to_angle()
+}
+
+fn is_along<const N: usize>(saddle: &Saddle<N>, i: usize, chord: f64) -> bool {
+    turn(chord, saddle.sectors.rays[i]).abs() <= MAX_CHORD_RAD
+}
+
+/// The ray of a corner that looks back to where ray `i` of another comes from.
+fn ray_back<const N: usize>(chord: f64, i: usize, saddle: &Saddle<N>) -> Option<usize> {
+    let back = chord + std::f64::consts::PI;
+    let off = |j: usize| turn(back, saddle.sectors.rays[j]).abs();
+    let j = (0..N).filter(|j| j % 2 != i % 2).min_by(|&p, &q| off(p).total_cmp(&off(q)))?;
+    (off(j) <= MAX_CHORD_RAD).then_some(j)
+}

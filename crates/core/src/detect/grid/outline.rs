@@ -1,0 +1,172 @@
+//! Rows and columns of an untagged board that is seen whole, from its outline.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use glam::DVec2;
+
+use super::grow::SaddleGrid;
+use crate::lattice::{GridKind, LatticeMap, Vertex};
+
+/// All corners of the one board that is looked for.
+#[derive(Clone, Debug)]
+pub struct WholeBoard {
+    kind: GridKind,
+    vertices: BTreeSet<Vertex>,
+}
+
+impl WholeBoard {
+    /// A board with corners at these vertices.
+    pub fn new(kind: GridKind, vertices: impl IntoIterator<Item = Vertex>) -> Self {
+        Self { kind, vertices: vertices.into_iter().collect() }
+    }
+
+    /// How many corners it has.
+    pub fn corners(&self) -> usize {
+        self.vertices.len()
+    }
+
+    /// Whether a grid has the board's corners and no others, however it is turned and shifted.
+    pub fn is_shown_by<S>(&self, grid: &BTreeMap<Vertex, S>) -> bool {
+        grid.len() == self.vertices.len()
+            && (0..self.kind.steps().len() as i32).any(|turns| {
+                let turned = LatticeMap::new(self.kind, turns, Vertex::new(0, 0));
+                let first = grid.keys().map(|&v| turned.apply(v)).min();
+                let shift = self.vertices.first().zip(first).map(|(to, from)| *to - from);
+                shift.is_some_and(|shift| {
+                    let map = LatticeMap::new(self.kind, turns, shift);
+                    grid.keys().all(|&v| self.vertices.contains(&map.apply(v)))
+                })
+            })
+    }
+}
+
+/// The motion that puts a whole grid exactly onto an outline, if just one does. `inverted` boards
+/// show their upright tiles bright, so they lie half a turn round.
+pub fn fit_outline(
+    grid: &SaddleGrid,
+    outline: &BTreeSet<Vertex>,
+    inverted: bool,
+) -> Option<LatticeMap> {
+    if grid.len() != outline.len() {
+        return None;
+    }
+    let half_turn = if inverted { 3 } else { 0 };
+    let mut fitting = [0, 2, 4].into_iter().filter_map(|turns| {
+        let turned = LatticeMap::new(GridKind::Deltille, turns + half_turn, Vertex::new(0, 0));
+        // Lowest-leftmost corners must coincide.
+        let lowest = grid.keys().map(|&v| turned.apply(v)).min()?;
+        let map =
+            LatticeMap::new(GridKind::Deltille, turns + half_turn, *outline.first()? - lowest);
+        grid.keys().all(|&v| outline.contains(&map.apply(v))).then_some(map)
+    });
+    let map = fitting.next()?;
+    fitting.next().is_none().then_some(map)
+}
+
+/// The motion that labels a grid that shows a whole checkerboard.
+///
+/// A rectangle fits in two ways, a square in four. Row 0, column 0 is the lower left corner of the
+/// print when the print is turned so that the square at it, the one up and right of it, is dark;
+/// this tells the two ways apart where rows + columns is odd. Where it does not, they look the
+/// same, and the corner (0, 0) is the one that lies lowest in the image (then leftmost). On an
+/// `inverted` board that square is bright.
+pub fn fit_rectangle(
+    grid: &SaddleGrid,
+    (rows, cols): (u32, u32),
+    inverted: bool,
+) -> Option<LatticeMap> {
+    let (rows, cols) = (i32::try_from(rows).ok()?, i32::try_from(cols).ok()?);
+    let low = grid.keys().fold((i32::MAX, i32::MAX), |(r, c), v| (r.min(v.row), c.min(v.col)));
+    let high = grid.keys().fold((i32::MIN, i32::MIN), |(r, c), v| (r.max(v.row), c.max(v.col)));
+    let size = (high.0 - low.0 + 1, high.1 - low.1 + 1);
+    if grid.len() as i64 != i64::from(rows) * i64::from(cols) {
+        return None;
+    }
+    // Quarter turns of the labels against the grid's rows and columns: (0, 0) is then at the lower
+    // left, lower right, upper right or upper left of the grid.
+    let fitting = (0..4u8)
+        .filter(|turns| size == if turns.is_multiple_of(2) { (rows, cols) } else { (cols, rows) });
+    let origin = move |turns: u8| {
+        let row = if turns >= 2 { high.0 } else { low.0 };
+        let col = if matches!(turns, 1 | 2) { high.1 } else { low.1 };
+        Vertex::new(row, col)
+    };
+    let best = fitting.max_by(|&a, &b| {
+        let key = |turns: u8| {
+            let at = origin(turns);
+            // The square that the first row and column span at (0, 0), in the grid's labels.
+            let square =
+                (at.row - i32::from(turns >= 2)) + (at.col - i32::from(matches!(turns, 1 | 2)));
+            let place = grid.get(&at).map_or(DVec2::ZERO, |placed| placed.position);
+            ((square.rem_euclid(2) == 0) != inverted, [place.y, -place.x])
+        };
+        key(a).partial_cmp(&key(b)).unwrap_or(std::cmp::Ordering::Equal)
+    })?;
+    let back = -i32::from(best);
+    Some(LatticeMap::taking(GridKind::Checker, origin(best), Vertex::new(0, 0), back))
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use crate::detect::grid::grow::PlacedSaddle;
+    use super::*;
+
+    /// A board seen upright: the lower left vertex of the print is `low`, one pixel a column.
+    fn board(rows: i32, cols: i32, low: Vertex, turns: u8) -> SaddleGrid {
+        let vertices = (0..rows).flat_map(|r| (0..cols).map(move |c| (r, c)));
+        vertices
+            .map(|(r, c)| {
+                let (row, col) = match turns {
+                    0 => (r, c),
+                    1 => (c, -r),
+                    2 => (-r, -c),
+                    _ => (-c, r),
+                };
+                let position = DVec2::new(c.into(), -f64::from(r));
+                (low + Vertex::new(row, col), PlacedSaddle { position, amplitude: 1.0 })
+            })
+            .collect()
+    }
+
+    proptest! {
+        #[test]
+        fn labels_are_those_of_the_print_however_the_grid_counts(
+            rows in 2..7i32, cols in 2..7i32, row in -9..9i32, col in -9..9i32, turns in 0..4u8,
+            inverted: bool,
+        ) {
+            let grid = board(rows, cols, Vertex::new(row, col), turns);
+            let size = (rows as u32, cols as u32);
+            let motion = fit_rectangle(&grid, size, inverted).unwrap();
+            let map = |v| motion.apply(v);
+            let labels: BTreeSet<Vertex> = grid.keys().map(|&v| map(v)).collect();
+            prop_assert_eq!(labels.len(), grid.len());
+            prop_assert_eq!(labels.first(), Some(&Vertex::new(0, 0)));
+            prop_assert_eq!(labels.last(), Some(&Vertex::new(rows - 1, cols - 1)));
+            // Unmirrored, and neighbours stay neighbours.
+            let at = |label: Vertex| {
+                let (_, placed) = grid.iter().find(|(v, _)| map(**v) == label).unwrap();
+                placed.position
+            };
+            let (o, c, r) = (at(Vertex::new(0, 0)), at(Vertex::new(0, 1)), at(Vertex::new(1, 0)));
+            let cross = (c[0] - o[0]) * (r[1] - o[1]) - (c[1] - o[1]) * (r[0] - o[0]);
+            prop_assert_eq!(cross, -1.0);
+            // The square at (0, 0) is dark where a turn of the print can make it so.
+            let of_square = |label: Vertex| {
+                let corners = [(0, 0), (0, 1), (1, 0), (1, 1)].map(|(r, c)| label + Vertex::new(r, c));
+                let on_grid = grid.keys().filter(|v| corners.contains(&map(**v)));
+                let least = on_grid.fold((i32::MAX, i32::MAX), |m, v| (m.0.min(v.row), m.1.min(v.col)));
+                (least.0 + least.1).rem_euclid(2) == 0
+            };
+            let dark = of_square(Vertex::new(0, 0));
+            if (rows + cols) % 2 == 1 {
+                prop_assert_eq!(dark, !inverted);
+            } else if rows != cols {
+                prop_assert_eq!(dark, of_square(Vertex::new(rows - 2, cols - 2)));
+                prop_assert_eq!(o[1], 0.0, "the lower of the two");
+            }
+            prop_assert!(fit_rectangle(&grid, (size.0 + 1, size.1), inverted).is_none());
+        }
+    }
+}

@@ -1,0 +1,290 @@
+//! Joining of the parts of a partly covered board, through the local map of one part.
+//!
+//! A finger over a board leaves grids that no link joins, and single corners without a completely
+//! visible tile. The local map of a grid ([`LocalMap`]) predicts where its lattice continues behind
+//! the finger. A corner there belongs to the board when it lies at a vertex and all its edges have
+//! the predicted directions, each with its dark side on the right hand; a grid belongs to the same
+//! board when all its corners that are near enough do.
+
+use std::collections::BTreeMap;
+
+use glam::DVec2;
+
+use crate::detect::corners::buckets::Buckets;
+use super::edge::{MAX_CHORD_RAD, is_clean};
+use super::effort::Effort;
+use super::grow::{Growing, GrownSaddle};
+use super::links::MAX_CONTRAST_RATIO;
+use super::local_map::{Bend, LocalMap};
+use crate::detect::corners::saddles::Saddle;
+use crate::detect::corners::sectors::turn;
+use crate::detect::tiling::{kind, neighbours, step};
+use crate::lattice::{GridKind, LatticeMap, Vertex};
+use crate::raster::Pyramid;
+
+/// Greatest distance of a vertex from the corners of a grid, in edges of the map: farther away the
+/// map predicts next to nothing.
+const MAX_REACH: f64 = 4.0;
+
+/// Beyond a grid that approaches the camera, edges are on average at most this many times as long
+/// as its longest.
+const NEARER: f64 = 2.0;
+
+/// Largest standard deviations of a predicted position, in edges, in the order of trial: certain
+/// corners make the rest more certain. Within three of the largest a position is nearer to its
+/// vertex than anything else in a tile.
+const SIGMAS: [f64; 3] = [0.02, 0.04, 0.08];
+
+/// Greatest distance of a corner from its predicted position, in standard deviations.
+const MAX_SIGMAS: f64 = 3.0;
+
+/// At least one in so many edges to neighbours must be visible.
+const MOST_COVERED: usize = 3;
+
+/// Least number of corners of a grid that predicts others: an initial quad has four.
+const LEAST: usize = 5;
+
+/// Number of corners that are compared in the time of one look into the picture, for the budget.
+const CORNERS_IN_A_LOOK: usize = 100;
+
+/// Where a saddle is in a set of grids.
+type Owners = BTreeMap<usize, (usize, Vertex)>;
+
+/// Joins grids that are parts of one board, and lets them adopt single corners. `places` are those
+/// of all saddle points, `members` the indices of those in the grids. Returns which grids have
+/// grown.
+pub fn join<const N: usize>(
+    pyramid: &Pyramid,
+    (saddles, places): (&[Saddle<N>], &Buckets),
+    mut grids: Vec<Growing<N>>,
+    members: Vec<BTreeMap<usize, Vertex>>,
+    effort: &mut Effort,
+) -> Vec<(Growing<N>, bool)> {
+    let mut owners: Owners = BTreeMap::new();
+    for (grid, members) in members.into_iter().enumerate() {
+        owners.extend(members.into_iter().map(|(saddle, vertex)| (saddle, (grid, vertex))));
+    }
+    let mut order: Vec<usize> = (0..grids.len()).collect();
+    order.sort_by_key(|&i| std::cmp::Reverse(grids[i].len()));
+    let mut has_grown = vec![false; grids.len()];
+    for base in order {
+        while grids[base].len() >= LEAST {
+            let bend = bend(&grids[base]);
+            let candidates = candidates((saddles, places), &grids[base], &owners, base, bend);
+            if !effort.spend(grids[base].len() + candidates.len()) {
+                break;
+            }
+            // Nothing changes before something is adopted.
+            let mut adopt = |sigma| {
+                let given = (&candidates[..], bend, sigma);
+                adopt((pyramid, saddles), &mut grids, &mut owners, base, given, effort)
+            };
+            if !SIGMAS.into_iter().any(&mut adopt) {
+                break;
+            }
+            has_grown[base] = true;
+        }
+    }
+    grids.into_iter().zip(has_grown).filter(|(grid, _)| !grid.is_empty()).collect()
+}
+
+/// Adds to a grid the candidates that its map confirms, with a standard deviation of the prediction
+/// of at most `sigma` edges; returns whether there were any.
+fn adopt<const N: usize>(
+    (pyramid, saddles): (&Pyramid, &[Saddle<N>]),
+    grids: &mut [Growing<N>],
+    owners: &mut Owners,
+    base: usize,
+    (candidates, bend, sigma): (&[(usize, Vertex)], Bend, f64),
+    effort: &mut Effort,
+) -> bool {
+    let mut adopted = false;
+    for &(index, vertex) in candidates {
+        // The nearest corner of the grid is sought among all.
+        if !effort.spend(1 + grids[base].len() / CORNERS_IN_A_LOOK) {
+            break;
+        }
+        if grids[base].contains_key(&vertex) {
+            continue;
+        }
+        let Some(grown) = belongs(&grids[base], vertex, &saddles[index], bend, sigma) else {
+            continue;
+        };
+        if !is_joined(pyramid, &grids[base], vertex, &grown) {
+            continue;
+        }
+        match owners.get(&index).copied() {
+            Some((part, _)) if part == base => {}
+            Some((part, from)) => {
+                let turned = (grown.turn + N - grids[part][&from].turn) % N;
+                let map = LatticeMap::taking(kind::<N>(), from, vertex, turned as i32);
+                let is_worth = effort.spend(grids[part].len() + owners.len() / CORNERS_IN_A_LOOK);
+                if is_worth && is_part(&grids[base], &grids[part], map, bend, sigma) {
+                    for (from, corner) in std::mem::take(&mut grids[part]) {
+                        let turn = (corner.turn + turned) % N;
+                        grids[base].insert(map.apply(from), GrownSaddle { turn, ..corner });
+                    }
+                    for owner in owners.values_mut().filter(|owner| owner.0 == part) {
+                        *owner = (base, map.apply(owner.1));
+                    }
+                    adopted = true;
+                }
+            }
+            None => {
+                grids[base].insert(vertex, grown);
+                owners.insert(index, (base, vertex));
+                adopted = true;
+            }
+        }
+    }
+    adopted
+}
+
+fn at<const N: usize>(grid: &Growing<N>) -> impl Fn(Vertex) -> Option<DVec2> + Copy {
+    |v| grid.get(&v).map(|grown| grown.saddle.position)
+}
+
+fn bend<const N: usize>(grid: &Growing<N>) -> Bend {
+    let level = grid.values().map(|grown| grown.saddle.level).max().unwrap_or(0);
+    Bend::of::<N>(grid.keys().copied(), at(grid), level)
+}
+
+/// Saddle points near a vertex without a corner, with that vertex, the nearest to the grid first.
+fn candidates<const N: usize>(
+    (saddles, places): (&[Saddle<N>], &Buckets),
+    grid: &Growing<N>,
+    owners: &Owners,
+    base: usize,
+    bend: Bend,
+) -> Vec<(usize, Vertex)> {
+    let Some((middle, reach_px)) = surroundings(grid) else {
+        return Vec::new();
+    };
+    let corners: Vec<DVec2> = grid.values().map(|grown| grown.saddle.position).collect();
+    let (vertices, corners): (Vec<Vertex>, _) =
+        (grid.keys().copied().collect(), Buckets::of(&corners));
+    let mut maps: BTreeMap<Vertex, Option<LocalMap>> = BTreeMap::new();
+    let mut found: Vec<(f64, usize, Vertex)> = Vec::new();
+    for (index, _) in places.within(middle, reach_px) {
+        let saddle = &saddles[index];
+        if owners.get(&index).is_some_and(|&(grid, _)| grid == base) {
+            continue;
+        }
+        let Some(nearest) = corners.nearest(saddle.position).map(|index| vertices[index]) else {
+            continue;
+        };
+        let map =
+            maps.entry(nearest).or_insert_with(|| LocalMap::about::<N>(nearest, at(grid), bend));
+        let Some(DVec2 { x: col, y: row }) = map.and_then(|map| map.steps_to(saddle.position))
+        else {
+            continue;
+        };
+        let way = kind::<N>().position(row, col);
+        let step = Vertex::new(row.round() as i32, col.round() as i32);
+        let vertex = nearest + step;
+        if way.x.hypot(way.y) <= MAX_REACH && !grid.contains_key(&vertex) {
+            found.push((way.x.hypot(way.y), index, vertex));
+        }
+    }
+    found.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+    found.into_iter().map(|(_, index, vertex)| (index, vertex)).collect()
+}
+
+/// A circle (centre and radius, px) around all places that a grid predicts.
+fn surroundings<const N: usize>(grid: &Growing<N>) -> Option<(DVec2, f64)> {
+    let places: Vec<DVec2> = grid.values().map(|grown| grown.saddle.position).collect();
+    let edges_px = grid.iter().flat_map(|(&v, grown)| {
+        let neighbours = neighbours::<N>(v).into_iter().filter_map(at(grid));
+        neighbours.map(|place| place.distance(grown.saddle.position))
+    });
+    let longest_px = edges_px.reduce(f64::max)?;
+    let lower = places.iter().copied().reduce(DVec2::min)?;
+    let upper = places.iter().copied().reduce(DVec2::max)?;
+    let reach_px = lower.distance(upper) / 2.0 + NEARER * MAX_REACH * longest_px;
+    Some((lower.midpoint(upper), reach_px))
+}
+
+/// The saddle point as a corner of a grid, if it lies at a vertex and has the predicted edges.
+fn belongs<const N: usize>(
+    grid: &Growing<N>,
+    vertex: Vertex,
+    saddle: &Saddle<N>,
+    bend: Bend,
+    sigma: f64,
+) -> Option<GrownSaddle<N>> {
+    let map = LocalMap::about::<N>(vertex, at(grid), bend).filter(|map| map.sigma <= sigma)?;
+    if map.distance::<N>(saddle.position)? > MAX_SIGMAS * map.sigma {
+        return None;
+    }
+    let colours = contrast_near(grid, vertex)?;
+    let ours = saddle.sectors.amplitude;
+    if ours.max(colours) > MAX_CONTRAST_RATIO * ours.min(colours) {
+        return None;
+    }
+    // Even rays have the dark side on their left everywhere.
+    let parity = match kind::<N>() {
+        GridKind::Deltille => 0,
+        GridKind::Checker => (vertex.row + vertex.col).rem_euclid(2) as usize,
+    };
+    let direction = |k: usize| map.along(step::<N>(k)).to_angle();
+    let off = |shift: usize| {
+        let turns = (0..N).map(|k| turn(saddle.sectors.rays[k], direction(k + shift)).abs());
+        turns.fold(0.0, f64::max)
+    };
+    let turn = (parity..N).step_by(2).min_by(|&a, &b| off(a).total_cmp(&off(b)))?;
+    (off(turn) <= MAX_CHORD_RAD).then_some(GrownSaddle { saddle: *saddle, turn })
+}
+
+/// Whether a corner is connected to its neighbours in a grid: some of the edges between them are
+/// visible, if there are neighbours. Between separate dots none is.
+fn is_joined<const N: usize>(
+    pyramid: &Pyramid,
+    grid: &Growing<N>,
+    vertex: Vertex,
+    corner: &GrownSaddle<N>,
+) -> bool {
+    let (mut beside, mut clean) = (0, 0);
+    for k in 0..N {
+        let Some(other) = grid.get(&(vertex + step::<N>(k))) else {
+            continue;
+        };
+        let (ray, back) = (corner.ray(k), other.ray(k + N / 2));
+        beside += 1;
+        clean += usize::from(is_clean(pyramid, &corner.saddle, ray, &other.saddle, back));
+    }
+    MOST_COVERED * clean >= beside
+}
+
+/// The contrast of the corner of a grid that is nearest to a vertex on the lattice.
+fn contrast_near<const N: usize>(grid: &Growing<N>, vertex: Vertex) -> Option<f64> {
+    let far = |v: &Vertex| {
+        let step = *v - vertex;
+        let way = kind::<N>().position(step.row.into(), step.col.into());
+        way.x.hypot(way.y)
+    };
+    let nearest = grid.iter().min_by(|a, b| far(a.0).total_cmp(&far(b.0)))?;
+    Some(nearest.1.saddle.sectors.amplitude)
+}
+
+/// Whether a part, moved by a lattice map, continues a grid: no vertex is in both, and each of its
+/// corners is where the grid predicts it, as far as it does.
+fn is_part<const N: usize>(
+    grid: &Growing<N>,
+    part: &Growing<N>,
+    map: LatticeMap,
+    bend: Bend,
+    sigma: f64,
+) -> bool {
+    part.iter().all(|(&from, corner)| {
+        let vertex = map.apply(from);
+        if grid.contains_key(&vertex) {
+            return false;
+        }
+        let predicted =
+            LocalMap::about::<N>(vertex, at(grid), bend).filter(|map| map.sigma <= sigma);
+        predicted.is_none_or(|map| {
+            let distance = map.distance::<N>(corner.saddle.position);
+            distance.is_some_and(|distance| distance <= MAX_SIGMAS * map.sigma)
+        })
+    })
+}

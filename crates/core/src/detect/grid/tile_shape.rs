@@ -1,0 +1,149 @@
+//! Whether the tiles of a checkerboard without tags are squares.
+//!
+//! With a and b from 0 to 1 along and across a square, a board shows the product of two profiles, whose
+//! waves are
+//!
+//! ```text
+//!     f(a, b) = Σ F_jk sin(πja) sin(πkb),     j, k odd
+//! ```
+//!
+//! with F_jk = F_j F_k, and F_3 a third of F_1 that blur takes away from. A sum of two waves, however it is
+//! slanted, has corners like a blurred board, but F_3 is nothing along and across; a slanted board is blurred in
+//! one direction first. Dots that are round have waves along and across, but F_33 is negative, since they leave
+//! the corners of the squares.
+//!
+//! Random cells and those of a dither are squares. But a few of them that happen to alternate are rows of
+//! corners rather than areas; and many of them alternate but for single ones among the others, while what covers
+//! a board seldom ends with a square on all four sides.
+
+use std::collections::BTreeSet;
+
+use super::checker_tiles::{CheckerTiles, Point, Square, parity};
+use crate::detect::detection::values::Grid;
+use crate::lattice::{GridKind, Vertex};
+use crate::raster::ImageView;
+
+/// The least board, of 3 × 3 corners, has so many whole squares.
+const LEAST_SQUARES: usize = 4;
+
+/// Blur of a quarter of an edge, which the model reads in a wave, leaves an F_3 of 0.028 of F_1; a wave has none.
+const WAVE: f64 = 0.02;
+
+/// Of plain squares F_3 over F_1 is no more than this; tags have more.
+const PLAIN: f64 = 1.0 / 3.0;
+
+/// F_33 of squares is the product of F_3 along and across, and no less than this part of it.
+const LEAST_PRODUCT: f64 = 0.5;
+
+/// But for so many deviations, as waves tell that tiles of boards and dots do not have.
+const DEVIATIONS: f64 = 3.0;
+
+/// Fewer single squares of the wrong colour than this, or than a part of the whole ones, are dirt.
+const LEAST_WRONG: usize = 3;
+const WRONG_PART: f64 = 1.0 / 16.0;
+
+/// A square of the wrong colour is at least this near to it, as a part of the way from the right one.
+const WRONG: f64 = 0.75;
+
+/// Samples along and across a square.
+const SAMPLES: usize = 8;
+
+/// Whether a grid without tags is made of squares, with its corners refined. Of deltille grids it
+/// tells nothing.
+pub fn is_of_squares(image: ImageView, grid: &Grid, may_have_tags: bool) -> bool {
+    if grid.kind == GridKind::Deltille {
+        return true;
+    }
+    let tiles = CheckerTiles::of(image, grid);
+    let count = tiles.whole_squares().count();
+    count >= LEAST_SQUARES
+        && has_few_wrong_squares(&tiles, count)
+        && Waves::of(&tiles).is_none_or(|waves| waves.are_of_squares(may_have_tags))
+}
+
+/// Parts of F_11 that other waves have.
+#[derive(Clone, Copy, Debug)]
+struct Waves {
+    along: f64,
+    across: f64,
+    both: f64,
+    /// Deviation of each by noise and by the places of the corners: what waves have of which neither half is
+    /// like the other.
+    noise: f64,
+}
+
+impl Waves {
+    /// Of the whole squares together.
+    fn of(tiles: &CheckerTiles) -> Option<Self> {
+        let part = |i: usize| (i as f64 + 0.5) / SAMPLES as f64;
+        let mut mean = [[0.0; SAMPLES]; SAMPLES];
+        for square in tiles.whole_squares() {
+            let sign = [1.0, -1.0][parity(square.vertex)];
+            for (i, row) in mean.iter_mut().enumerate() {
+                for (j, sum) in row.iter_mut().enumerate() {
+                    // At the border of the picture a part of a square tells nothing.
+                    let value = tiles.brightness(square.place(part(j), part(i)));
+                    *sum += sign * value.unwrap_or(0.0);
+                }
+            }
+        }
+        let wave = |along: usize, across: usize| {
+            let sine = |k: usize, i: usize| (k as f64 * std::f64::consts::PI * part(i)).sin();
+            let row = |(i, row): (usize, &[f64; SAMPLES])| {
+                let along: f64 = row.iter().enumerate().map(|(j, v)| v * sine(along, j)).sum();
+                along * sine(across, i)
+            };
+            mean.iter().enumerate().map(row).sum::<f64>()
+        };
+        let whole = wave(1, 1);
+        let nothing = [(2, 2), (2, 4), (4, 2), (4, 4)].map(|(along, across)| wave(along, across));
+        let square: f64 = nothing.iter().map(|v| v * v).sum();
+        (whole != 0.0).then(|| Self {
+            along: wave(3, 1) / whole,
+            across: wave(1, 3) / whole,
+            both: wave(3, 3) / whole,
+            noise: (square / nothing.len() as f64).sqrt() / whole.abs(),
+        })
+    }
+
+    fn are_of_squares(self, may_have_tags: bool) -> bool {
+        let most = self.along.max(self.across);
+        let is_plain = !may_have_tags && most <= PLAIN;
+        let least = LEAST_PRODUCT * self.along * self.across - DEVIATIONS * self.noise;
+        most >= WAVE && !(is_plain && self.both < least)
+    }
+}
+
+/// Whether there are few single squares of the wrong colour among others.
+fn has_few_wrong_squares(tiles: &CheckerTiles, whole: usize) -> bool {
+    let Some(levels) = tiles.levels() else {
+        return true;
+    };
+    // Those above a corner, to its right and to its left.
+    let above = |v: &Vertex| [0, -1].map(|col| *v + Vertex::new(1, col));
+    let places: BTreeSet<Vertex> = tiles.corners.keys().flat_map(above).collect();
+    let is_wrong = |&vertex: &Vertex| {
+        let value = single(tiles, vertex).and_then(|square| tiles.value(square));
+        let (right, wrong) = (levels[parity(vertex)], levels[1 - parity(vertex)]);
+        value.is_some_and(|value| (value - right) / (wrong - right) >= WRONG)
+    };
+    let wrong = places.into_iter().filter(is_wrong).count();
+    wrong < LEAST_WRONG || (wrong as f64) < WRONG_PART * whole as f64
+}
+
+/// The square at a vertex, if none of its corners is known and some are on each of its sides.
+fn single(tiles: &CheckerTiles, vertex: Vertex) -> Option<Square> {
+    let at = |row, col| tiles.at(vertex + Vertex::new(row, col));
+    let own = [(0, 0), (0, 1), (1, 0), (1, 1)];
+    if own.into_iter().any(|(row, col)| at(row, col).is_some()) {
+        return None;
+    }
+    // Places on opposite sides have the square's middle between them, three edges apart on the print.
+    let opposite = |from: Option<Point>, to: Option<Point>| Some((from?, to?));
+    let below = opposite(at(-1, 0), at(2, 1)).or_else(|| opposite(at(-1, 1), at(2, 0)));
+    let beside = opposite(at(0, -1), at(1, 2)).or_else(|| opposite(at(1, -1), at(0, 2)));
+    let (up, right) = (below?, beside?);
+    let middle = (up.0 + up.1 + right.0 + right.1) / 4.0;
+    let edges = [right, up].map(|(from, to)| (to - from) / 3.0);
+    Some(Square { middle, edges })
+}

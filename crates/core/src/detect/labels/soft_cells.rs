@@ -1,0 +1,481 @@
+//! Soft decisions on the cells of a tag from the pixels of its tile: the log-odds of all cells from
+//! all samples at once, by linear Bayesian estimation under a known point spread function.
+//!
+//! With the border at 0 and white at 1, a sample at p is the sum of the cells c weighted by their
+//! share W in its blurred neighbourhood, and of the white beyond the border. With s = ±1 for white
+//! and black cells,
+//!
+//! ```text
+//!     x(p) = ½ Σ W(p,c) (1 + s(c)) + white(p) + error of the levels + noise
+//!     m    = K (x − ½ Σ W − white),     K = (WᵀW/σ² + 1)⁻¹ Wᵀ/σ²
+//! ```
+//!
+//! is the posterior mean of s, v its variance, and m/v half the log-odds that the cell is white.
+//! Errors of the grey levels, linear over the tile, are further unknowns that are solved for
+//! together with the cells.
+//!
+//! The shares depend only on the blur in tile coordinates, which neighbouring tiles have in common:
+//! K is computed once, and each tile then costs one multiplication.
+//!
+//! Limits: cells are treated as independent, although their errors are not where the blur is wide.
+
+use std::collections::BTreeMap;
+use std::rc::Rc;
+
+use glam::DVec2;
+use nalgebra::{DMatrix, Matrix2};
+
+use crate::detect::refine::blurred_corner::erf_sqrt_half;
+use crate::lattice::{GridKind, TagCells};
+
+/// A triangle is divided into 3² parts, of which a square has two.
+const DIVISIONS: usize = 3;
+
+/// Standard deviation of the blur that is added, in bit-widths: about the size of a part of a cell,
+/// which is represented by its middle.
+const PART_BLUR_BITS: f64 = 0.14;
+
+/// Steps by which blurs are distinguished: a seventh of their standard deviation, and a fifth in
+/// correlation.
+const LOG_VARIANCE_STEP: f64 = 0.3;
+const CORRELATION_STEP: f64 = 0.2;
+
+/// Standard deviation of a sample by model errors, over the contrast: positions, the shape of the
+/// blur, dirt.
+const MODEL_ERROR: f64 = 0.05;
+
+/// Number of pixels over which a sample between them averages the noise: 1 / (2/3)².
+const SAMPLE_PX2: f64 = 2.25;
+
+/// Factor of the noise variance of a sample: black, white and the width of the blur are measured
+/// with the same noise.
+const NOISE_WEIGHT: f64 = 1.5;
+
+/// Standard deviation of the grey levels, over the contrast, and of their slopes over a tile.
+const LEVEL_ERROR: f64 = 0.15;
+const SLOPE_ERROR: f64 = 0.2;
+
+/// Greatest half log-odds of a cell: one in two hundred is dirty on the print.
+const MOST_HALF_ODDS: f64 = 2.6;
+
+/// Rounds in which saturated or missing samples are replaced by the expectation from the others.
+const ROUNDS: usize = 6;
+
+/// The positions at which cells are sampled, and the geometry by which blur mixes them.
+#[derive(Clone, Debug)]
+pub struct CellModel {
+    kind: GridKind,
+    bits: usize,
+    /// Length of the tile's edge, bit-widths.
+    width: f64,
+    /// Distance from the tile's edges to the border of the tag.
+    margin_bits: f64,
+    /// Positions of samples, in tile coordinates.
+    points: Vec<DVec2>,
+    /// Parts of the cells: the bit, and their middle in tile coordinates.
+    parts: Vec<(usize, DVec2)>,
+}
+
+/// The blur in tile coordinates, and the noise.
+#[derive(Clone, Copy, Debug)]
+pub struct TileBlur {
+    /// Covariance uu, uv, vv, bit-widths².
+    pub covariance: [f64; 3],
+    /// Area of a bit-width squared of tile coordinates, px².
+    pub area_px2: f64,
+    /// Standard deviation of a sample, over the contrast.
+    pub noise: f64,
+}
+
+/// The estimator K with the terms that belong to it.
+#[derive(Debug)]
+pub struct Mixing {
+    bits: usize,
+    /// ½ Σ W + white, by sample.
+    middle: Vec<f32>,
+    /// By bit.
+    gain: Vec<Vec<f32>>,
+    /// ½ W by sample.
+    half_shares: Vec<Vec<f32>>,
+    /// 1/v by bit.
+    inverse_variance: Vec<f32>,
+    /// By sample, the deviation of what it would show if nothing were known of the cells.
+    spread: Vec<f32>,
+}
+
+/// Cache of mixings, by quantised blur.
+pub type Mixings = BTreeMap<[i32; 3], Rc<Mixing>>;
+
+/// A sample of a tile on the scale of black 0 and white 1.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Sample {
+    /// The measured value.
+    Share(f32),
+    /// A lower bound: the sample is saturated.
+    AtLeast(f32),
+    /// No information.
+    Erased,
+}
+
+impl CellModel {
+    /// A model for tags whose cells begin `inset_bits`, and whose border begins `margin_bits`, from
+    /// the edges of their tiles, in bit-widths.
+    pub fn new(cells: &TagCells, inset_bits: f64, margin_bits: f64) -> Self {
+        let bits = cells.dimension().bits();
+        let points = (0..bits).flat_map(|bit| {
+            let centre = cells.centre(bit, inset_bits);
+            let corners = cells.corners(bit, inset_bits);
+            let half_way = move |corner: DVec2| corner.midpoint(centre);
+            std::iter::once(centre).chain(corners.into_iter().map(half_way))
+        });
+        let parts = (0..bits).flat_map(|bit| {
+            let middles = parts_of(&cells.corners(bit, inset_bits));
+            middles.into_iter().map(move |middle| (bit as usize, middle))
+        });
+        Self {
+            kind: cells.kind(),
+            bits: bits as usize,
+            width: cells.width(inset_bits),
+            margin_bits,
+            points: points.collect(),
+            parts: parts.collect(),
+        }
+    }
+
+    /// The positions at which a tile is sampled, in tile coordinates.
+    pub fn points(&self) -> &[DVec2] {
+        &self.points
+    }
+
+    /// The same with the bit of the cell that each is in.
+    pub fn points_by_bit(&self) -> impl Iterator<Item = (usize, &DVec2)> {
+        let of_cell = self.points.len() / self.bits;
+        self.points.iter().enumerate().map(move |(i, point)| (i / of_cell, point))
+    }
+
+    /// Length of the tile's edge, bit-widths.
+    pub fn width(&self) -> f64 {
+        self.width
+    }
+
+    /// The mixing for a blur, from the cache `known` where one for nearly the same blur exists;
+    /// `None` where the equations cannot be solved.
+    pub fn mixing(&self, blur: TileBlur, known: &mut Mixings) -> Option<Rc<Mixing>> {
+        let [uu, uv, vv] = blur.covariance;
+        // Isotropic on the print.
+        let [puu, puv] = match self.kind {
+            GridKind::Deltille => [4.0 / 3.0, -2.0 / 3.0],
+            GridKind::Checker => [1.0, 0.0],
+        };
+        let part = PART_BLUR_BITS * PART_BLUR_BITS;
+        let (uu, uv, vv) = (uu + part * puu, uv + part * puv, vv + part * puu);
+        let key = [
+            (uu.ln() / LOG_VARIANCE_STEP).round() as i32,
+            (vv.ln() / LOG_VARIANCE_STEP).round() as i32,
+            (uv / (uu * vv).sqrt() / CORRELATION_STEP).round() as i32,
+        ];
+        if let Some(mixing) = known.get(&key) {
+            return Some(Rc::clone(mixing));
+        }
+        let [uu, vv] = [key[0], key[1]].map(|k| (f64::from(k) * LOG_VARIANCE_STEP).exp());
+        let correlation = (f64::from(key[2]) * CORRELATION_STEP).clamp(-0.95, 0.95);
+        let covariance = [uu, correlation * (uu * vv).sqrt(), vv];
+        let mixing = Rc::new(self.make(covariance, blur.area_px2, blur.noise)?);
+        known.insert(key, Rc::clone(&mixing));
+        Some(mixing)
+    }
+
+    fn make(&self, [uu, uv, vv]: [f64; 3], area_px2: f64, noise: f64) -> Option<Mixing> {
+        let determinant = uu * vv - uv * uv;
+        if determinant <= 0.0 || determinant.is_nan() {
+            return None;
+        }
+        let (n, bits) = (self.points.len(), self.bits);
+        let mut design = DMatrix::<f64>::zeros(n, bits + 3);
+        let part_area = 1.0 / (self.parts.len() / bits) as f64 * self.cell_area();
+        let gain = part_area / (std::f64::consts::TAU * determinant.sqrt());
+        for (i, point) in self.points.iter().enumerate() {
+            for &(bit, part) in &self.parts {
+                let DVec2 { x: du, y: dv } = (point - part) * self.width;
+                let distance2 = (vv * du * du - 2.0 * uv * du * dv + uu * dv * dv) / determinant;
+                if distance2 < 16.0 {
+                    design[(i, bit)] += 0.5 * gain * (-0.5 * distance2).exp();
+                }
+            }
+            design[(i, bits)] = LEVEL_ERROR;
+            let off_middle = point - self.kind.middle();
+            design[(i, bits + 1)] = SLOPE_ERROR * off_middle.x;
+            design[(i, bits + 2)] = SLOPE_ERROR * off_middle.y;
+        }
+        let white: Vec<f64> =
+            self.points.iter().map(|&p| self.white_beyond(p, [uu, uv, vv])).collect();
+        // Samples closer than pixels share their noise.
+        let samples_px2 = n as f64 / (bits as f64 * self.cell_area() * area_px2);
+        let variance = NOISE_WEIGHT * noise * noise * (SAMPLE_PX2 * samples_px2).max(1.0)
+            + MODEL_ERROR * MODEL_ERROR * samples_px2.max(1.0);
+        let mut normal = design.tr_mul(&design) / variance;
+        for i in 0..bits + 3 {
+            normal[(i, i)] += 1.0;
+        }
+        let inverse = normal.cholesky()?.inverse();
+        let gain = &inverse * design.transpose() / variance;
+        let half_shares: Vec<Vec<f32>> =
+            (0..n).map(|i| (0..bits).map(|c| design[(i, c)] as f32).collect()).collect();
+        let middle =
+            (0..n).map(|i| (white[i] + (0..bits).map(|c| design[(i, c)]).sum::<f64>()) as f32);
+        let row = |c: usize| (0..n).map(|i| gain[(c, i)] as f32).collect();
+        let inverse_variance = |c: usize| (1.0 / inverse[(c, c)].max(1e-3)) as f32;
+        let spread =
+            half_shares.iter().map(|row| row.iter().map(|w| w * w).sum::<f32>().sqrt()).collect();
+        Some(Mixing {
+            bits,
+            middle: middle.collect(),
+            gain: (0..bits).map(row).collect(),
+            half_shares,
+            inverse_variance: (0..bits).map(inverse_variance).collect(),
+            spread,
+        })
+    }
+
+    /// Area of a cell in squared bit-widths of the coordinates.
+    fn cell_area(&self) -> f64 {
+        match self.kind {
+            GridKind::Deltille => 0.5,
+            GridKind::Checker => 1.0,
+        }
+    }
+
+    /// The share of the white around the border in a sample.
+    fn white_beyond(&self, point: DVec2, [uu, uv, vv]: [f64; 3]) -> f64 {
+        let beyond = |inside_bits: f64, variance: f64| {
+            0.5 - 0.5 * f64::from(erf_sqrt_half((inside_bits / variance.sqrt()) as f32))
+        };
+        let (margin, width) = (self.margin_bits, self.width);
+        let DVec2 { x: u, y: v } = point * width;
+        let far = match self.kind {
+            GridKind::Deltille => beyond(width - u - v - margin, uu + 2.0 * uv + vv),
+            GridKind::Checker => beyond(width - u - margin, uu) + beyond(width - v - margin, vv),
+        };
+        (beyond(u - margin, uu) + beyond(v - margin, vv) + far).min(1.0)
+    }
+}
+
+impl Mixing {
+    /// Half the log-odds that each cell is white, by bit; `samples` are at the positions of
+    /// [`CellModel::points`].
+    pub fn half_odds(&self, samples: &[Sample]) -> Vec<f32> {
+        let whole = samples.iter().all(|sample| matches!(sample, Sample::Share(_)));
+        let mut off_middle: Vec<f32> = samples
+            .iter()
+            .zip(&self.middle)
+            .map(|(sample, middle)| match sample {
+                Sample::Share(share) => share - middle,
+                Sample::AtLeast(share) => (share - middle).max(0.0),
+                Sample::Erased => 0.0,
+            })
+            .collect();
+        let mut means = self.means(&off_middle);
+        if !whole {
+            for _ in 0..ROUNDS {
+                for (i, sample) in samples.iter().enumerate() {
+                    let predicted = || -> f32 {
+                        self.half_shares[i].iter().zip(&means).map(|(w, m)| w * m).sum()
+                    };
+                    match sample {
+                        Sample::Share(_) => {}
+                        Sample::AtLeast(share) => {
+                            let least = share - self.middle[i];
+                            off_middle[i] = mean_above(least, predicted(), self.spread[i]);
+                        }
+                        Sample::Erased => off_middle[i] = predicted(),
+                    }
+                }
+                means = self.means(&off_middle);
+            }
+        }
+        let most = MOST_HALF_ODDS as f32;
+        let odds = means.iter().zip(&self.inverse_variance);
+        odds.map(|(mean, inverse_variance)| (mean * inverse_variance).clamp(-most, most)).collect()
+    }
+
+    fn means(&self, off_middle: &[f32]) -> Vec<f32> {
+        let of_bit = |gain: &Vec<f32>| {
+            let mut lanes = [0.0f32; 8];
+            let (whole, rest) = (gain.chunks_exact(8), gain.len() / 8 * 8);
+            for (gain, off) in whole.zip(off_middle.chunks_exact(8)) {
+                for k in 0..8 {
+                    lanes[k] += gain[k] * off[k];
+                }
+            }
+            let rest = gain[rest..].iter().zip(&off_middle[rest..]).map(|(g, o)| g * o);
+            lanes.iter().sum::<f32>() + rest.sum::<f32>()
+        };
+        self.gain[..self.bits].iter().map(of_bit).collect()
+    }
+}
+
+/// Mean of a normal distribution with this mean and standard deviation, truncated below at `least`.
+fn mean_above(least: f32, mean: f32, deviation: f32) -> f32 {
+    let deviation = deviation.max(1e-3);
+    let at = (least - mean) / deviation;
+    let above = 0.5 - 0.5 * erf_sqrt_half(at);
+    if above < 1e-4 {
+        return least;
+    }
+    let density = (-0.5 * at * at).exp() / std::f32::consts::TAU.sqrt();
+    mean + deviation * density / above
+}
+
+/// Middles of the equal triangles that a cell is divided into.
+fn parts_of(cell: &[DVec2]) -> Vec<DVec2> {
+    let third = 1.0 / (3.0 * DIVISIONS as f64);
+    let rows = (0..DIVISIONS).flat_map(|j| (0..DIVISIONS - j).map(move |i| (i, j)));
+    let parts: Vec<DVec2> = rows
+        .flat_map(|(i, j)| {
+            let upright = [3 * i + 1, 3 * j + 1];
+            let inverted = (i + j + 1 < DIVISIONS).then_some([3 * i + 2, 3 * j + 2]);
+            [Some(upright), inverted].into_iter().flatten()
+        })
+        .map(|part| DVec2::from(part.map(|thirds| thirds as f64)) * third)
+        .collect();
+    let a = cell[0];
+    let triangles = cell[1..].windows(2);
+    let middles = triangles.flat_map(|bc| {
+        let (to_b, to_c) = (bc[0] - a, bc[1] - a);
+        parts.iter().map(move |part| a + part.x * to_b + part.y * to_c)
+    });
+    middles.collect()
+}
+
+/// Converts a covariance xx, xy, yy, px², to tile coordinates whose unit steps along u and v are
+/// the vectors `a` and `b`, px; also returns the area of a unit square, px².
+pub fn in_tile([xx, xy, yy]: [f64; 3], [a, b]: [DVec2; 2]) -> Option<([f64; 3], f64)> {
+    let jacobian = Matrix2::new(a.x, b.x, a.y, b.y);
+    let determinant = jacobian.determinant().abs();
+    let inverse = jacobian.try_inverse()?;
+    let covariance = Matrix2::new(xx, xy, xy, yy);
+    let mapped = inverse * covariance * inverse.transpose();
+    Some(([mapped[(0, 0)], mapped[(0, 1)], mapped[(1, 1)]], determinant))
+}
+
+#[cfg(test)]
+mod tests {
+    use rand::{Rng, SeedableRng};
+    use rand_chacha::ChaCha8Rng;
+    use rand_distr::{Distribution, StandardNormal};
+
+    use super::*;
+    use crate::lattice::Dimension;
+
+    const MARGIN_BITS: f64 = 0.5;
+    const INSET_BITS: f64 = 1.5;
+
+    /// Whether a polygon of either winding has a point.
+    fn has(polygon: &[DVec2], point: DVec2) -> bool {
+        let side = |i: usize| {
+            let (a, b) = (polygon[i], polygon[(i + 1) % polygon.len()]);
+            (b - a).perp_dot(point - a) > 0.0
+        };
+        (1..polygon.len()).all(|i| side(i) == side(0))
+    }
+
+    /// What a tag shows at a place of its tile: 1 for white.
+    fn drawn(cells: &TagCells, word: u64, point: DVec2) -> f32 {
+        let DVec2 { x: u, y: v } = point;
+        let (width, margin) = (cells.width(INSET_BITS), MARGIN_BITS);
+        let far = match cells.kind() {
+            GridKind::Deltille => width * (1.0 - u - v),
+            GridKind::Checker => width * (1.0 - u).min(1.0 - v),
+        };
+        if (width * u.min(v)).min(far) < margin {
+            return 1.0;
+        }
+        let bit =
+            (0..cells.dimension().bits()).find(|&bit| has(&cells.corners(bit, INSET_BITS), point));
+        bit.map_or(0.0, |bit| f32::from(u8::from(word >> bit & 1 == 1)))
+    }
+
+    /// Random samples of a tag under a blur that is the same in all directions on the print, and
+    /// that blur.
+    fn seen(
+        model: &CellModel,
+        cells: &TagCells,
+        word: u64,
+        bits: f64,
+        rng: &mut impl Rng,
+    ) -> Vec<Sample> {
+        let (width, noise) = (cells.width(INSET_BITS), StandardNormal);
+        let share = |&point: &DVec2, rng: &mut _| {
+            let mut sum = 0.0;
+            for _ in 0..400 {
+                let [a, b]: [f64; 2] = [0; 2].map(|_| noise.sample(rng));
+                let off = match cells.kind() {
+                    // Steps along u and v lie 60° apart.
+                    GridKind::Deltille => DVec2::new(a - b / 3f64.sqrt(), 2.0 * b / 3f64.sqrt()),
+                    GridKind::Checker => DVec2::new(a, b),
+                };
+                sum += drawn(cells, word, point + off * bits / width);
+            }
+            Sample::Share(sum / 400.0)
+        };
+        model.points().iter().map(|point| share(point, rng)).collect()
+    }
+
+    fn blur(kind: GridKind, bits: f64) -> TileBlur {
+        let variance = bits * bits;
+        let covariance = match kind {
+            GridKind::Deltille => [4.0 / 3.0, -2.0 / 3.0, 4.0 / 3.0].map(|of| of * variance),
+            GridKind::Checker => [variance, 0.0, variance],
+        };
+        TileBlur { covariance, area_px2: 16.0, noise: 0.05 }
+    }
+
+    /// The model reads tags that are drawn and blurred without it: all cells under a weak blur, and
+    /// under a strong one no more are wrong than the odds say.
+    #[test]
+    fn cells_are_as_often_wrong_as_their_odds_say() {
+        let mut rng = ChaCha8Rng::seed_from_u64(4);
+        for kind in [GridKind::Deltille, GridKind::Checker] {
+            let cells = TagCells::of(kind, Dimension::from_bits(25).unwrap());
+            let model = CellModel::new(&cells, INSET_BITS, MARGIN_BITS);
+            for bits in [0.25, 0.8, 1.1] {
+                let mixing = model.mixing(blur(kind, bits), &mut Mixings::new()).unwrap();
+                let (mut wrong, mut expected) = (0, 0.0);
+                for _ in 0..40 {
+                    let word = rng.random::<u64>() & cells.dimension().mask();
+                    let odds = mixing.half_odds(&seen(&model, &cells, word, bits, &mut rng));
+                    for (bit, half) in odds.iter().enumerate() {
+                        wrong += usize::from((*half > 0.0) != (word >> bit & 1 == 1));
+                        expected += 1.0 / (1.0 + (2.0 * half.abs()).exp());
+                    }
+                }
+                assert!(
+                    wrong as f32 <= 1.2 * expected,
+                    "{kind:?}, {bits}: {wrong}, expected {expected}"
+                );
+                assert!(bits > 0.3 || wrong == 0, "{kind:?}: {wrong} under hardly any blur");
+            }
+        }
+    }
+
+    /// Erased samples say nothing, and a bound says no more than what lies at it.
+    #[test]
+    fn what_is_not_seen_is_not_known() {
+        let mut rng = ChaCha8Rng::seed_from_u64(5);
+        let cells = TagCells::of(GridKind::Deltille, Dimension::from_bits(16).unwrap());
+        let model = CellModel::new(&cells, INSET_BITS, MARGIN_BITS);
+        let mixing = model.mixing(blur(cells.kind(), 0.4), &mut Mixings::new()).unwrap();
+        let samples = seen(&model, &cells, 0b1010_0110_0011_0101, 0.4, &mut rng);
+        let nothing = mixing.half_odds(&vec![Sample::Erased; samples.len()]);
+        assert!(nothing.iter().all(|half| half.abs() < 1e-6), "{nothing:?}");
+        let at_least = |sample: &Sample| match *sample {
+            Sample::Share(share) => Sample::AtLeast(share),
+            other => other,
+        };
+        let bounds: Vec<Sample> = samples.iter().map(at_least).collect();
+        let (seen, bounded) = (mixing.half_odds(&samples), mixing.half_odds(&bounds));
+        let sure =
+            |odds: &[f32]| odds.iter().filter(|half| **half < 0.0).map(|half| -half).sum::<f32>();
+        assert!(sure(&bounded) < sure(&seen), "black is not known from a bound below");
+    }
+}

@@ -1,0 +1,334 @@
+//! Reading tags out of tiles: for every cell the odds that it is white.
+
+use std::collections::BTreeMap;
+
+use glam::DVec2;
+
+use super::grid_light::{ClearDepth, GridLight};
+use crate::detect::grid::grow::SaddleGrid;
+use super::soft_cells::{CellModel, Mixings, Sample, TileBlur, in_tile};
+use super::tile_map::TileMap;
+use crate::family::Family;
+use crate::lattice::{GridKind, Tile, Vertex};
+use crate::raster::ImageView;
+use crate::targets::{Panel, TagsIn};
+
+/// The contrast at the edges of a tile must be this part of that at its corners.
+const MIN_CONTRAST: f64 = 0.4;
+
+/// Samples this much brighter than the white around are no paper, in contrasts, and by so many deviations of the noise
+/// more: without these, noise would take away white cells alone.
+const GLARE: f64 = 0.35;
+const GLARE_NOISE: f64 = 3.0;
+
+/// The part of the image's full scale from which a pixel may be saturated.
+const SATURATED: f64 = 0.985;
+
+/// Depth to which bright tiles without tags are looked into, and dark ones, in tile coordinates.
+const PLAIN_DEPTH: f64 = 0.2;
+
+/// The least depth, where a tag leaves no more.
+const LEAST_DEPTH: f64 = 0.06;
+
+/// The cells of a tile.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Reading {
+    /// The tile, in the grid's vertices.
+    pub tile: Tile,
+    /// Half the logarithm of the odds that a cell is of the colour around the border, by bit in the
+    /// coordinates of [`Tile::frame`].
+    pub half_odds: Vec<f32>,
+}
+
+impl Reading {
+    /// The most likely word.
+    pub fn word(&self) -> u64 {
+        self.half_odds.iter().rev().fold(0, |word, odds| word << 1 | u64::from(*odds > 0.0))
+    }
+
+    /// How much the cells tell, bits: one for each that is known, none for each that may be either.
+    pub fn bits_told(&self) -> f64 {
+        let told = |&half_odds: &f32| {
+            let wrong = 1.0 / (1.0 + (2.0 * f64::from(half_odds.abs())).exp());
+            let right = 1.0 - wrong;
+            1.0 + right * right.log2() + wrong * wrong.max(f64::MIN_POSITIVE).log2()
+        };
+        self.half_odds.iter().map(told).sum()
+    }
+}
+
+/// How the tags of a panel lie in their tiles.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct TagPlace {
+    /// Width of the border, bit-widths along the edge.
+    border_bits: f64,
+    /// Blank between the edges of the tile and the border.
+    margin_bits: f64,
+    tags_in: TagsIn,
+    /// Width of every second row and column of tiles, in edges, where these are gaps between tags.
+    gap_edges: Option<f64>,
+}
+
+impl TagPlace {
+    /// That of tags with a border of so many bits.
+    pub fn with(border_bits: f64, tags_in: TagsIn) -> Self {
+        Self { border_bits, margin_bits: tags_in.margin_bits(), tags_in, gap_edges: None }
+    }
+
+    /// That of the tags of `panel`.
+    pub fn of(panel: &Panel) -> Self {
+        let border_bits = panel.border_bits.unwrap_or(1.0);
+        let (margin_bits, tags_in) = (panel.tag_margin_bits(), panel.tags_in);
+        Self { border_bits, margin_bits, tags_in, gap_edges: panel.gap_edges }
+    }
+}
+
+/// Black and white beside edges of tiles that were looked at, by their vertex and direction.
+type EdgeLevels = BTreeMap<(Vertex, usize), Option<[f64; 2]>>;
+
+/// Reads the tags of one family that lie alike in their tiles.
+#[derive(Clone, Debug)]
+pub struct TagReader {
+    kind: GridKind,
+    tags_in: TagsIn,
+    gap_edges: Option<f64>,
+    model: CellModel,
+    clear: ClearDepth,
+    /// For each bit the one whose cell takes its place in a mirror.
+    mirror: Vec<u8>,
+    /// Bits of cells that no code uses, where there may be a hole.
+    free: u64,
+}
+
+/// What was read in a grid.
+#[derive(Clone, Debug, Default)]
+pub struct Read {
+    /// Tiles that may carry a tag.
+    pub readings: Vec<Reading>,
+    /// The median length of a bit, px.
+    pub bit_px: f64,
+    /// Deviation of the blur, px.
+    pub blur_px: f64,
+}
+
+impl TagReader {
+    /// A reader for tags that lie so in their tiles.
+    pub fn new(family: &Family, place: TagPlace) -> Self {
+        let TagPlace { border_bits, margin_bits, tags_in, gap_edges } = place;
+        let cells = family.cells();
+        let inset_bits = margin_bits + border_bits;
+        let width = cells.width(inset_bits);
+        let depth = |bits: f64| (bits / width).clamp(LEAST_DEPTH, PLAIN_DEPTH);
+        let clear = match tags_in {
+            TagsIn::Black => ClearDepth { dark: depth(border_bits), bright: PLAIN_DEPTH },
+            TagsIn::White => ClearDepth { dark: PLAIN_DEPTH, bright: depth(margin_bits) },
+        };
+        let model = CellModel::new(&cells, inset_bits, margin_bits);
+        Self {
+            kind: family.kind(),
+            tags_in,
+            gap_edges,
+            model,
+            clear,
+            mirror: cells.mirror(),
+            free: family.free_cells(),
+        }
+    }
+
+    /// Reads tiles of a grid whose corners are known: those that may carry a tag of a board that is not
+    /// inverted, or of one that is; no more than `most` of them, spread over the grid.
+    pub fn read(&self, image: ImageView, grid: &SaddleGrid, inverted: bool, most: usize) -> Read {
+        let ClearDepth { dark, bright } = self.clear;
+        let clear = if inverted { ClearDepth { dark: bright, bright: dark } } else { self.clear };
+        let Some(light) = GridLight::of(image, grid, self.kind, clear) else {
+            return Read::default();
+        };
+        let dark = (self.tags_in == TagsIn::Black) != inverted;
+        let tiles: Vec<Tile> = grid
+            .keys()
+            .flat_map(|&v| self.kind.tiles_from(v))
+            .filter(|tile| tile.is_dark() == dark)
+            .filter(|tile| tile.vertices().all(|v| grid.contains_key(&v)))
+            .collect();
+        let every = tiles.len().div_ceil(most.max(1)).max(1);
+        let (mut mixings, mut levels) = (Mixings::new(), BTreeMap::new());
+        let mut bits_px = Vec::new();
+        let mut readings = Vec::new();
+        for &tile in tiles.iter().step_by(every) {
+            if let Some((reading, bit_px)) =
+                self.read_tile(image, grid, tile, &light, (&mut mixings, &mut levels))
+            {
+                readings.push(reading);
+                bits_px.push(bit_px);
+            }
+        }
+        let bit_px = crate::statistics::median(bits_px).unwrap_or(0.0);
+        Read { readings, bit_px, blur_px: light.blur_px() }
+    }
+
+    /// What a tile without a tag shows: it is of one colour all over.
+    pub fn plain_word(&self) -> u64 {
+        match self.tags_in {
+            TagsIn::Black => 0,
+            TagsIn::White => u64::MAX,
+        }
+    }
+
+    /// A reading as it would be in a mirror.
+    pub fn mirrored(&self, reading: &Reading) -> Reading {
+        let tile = reading.tile;
+        Reading {
+            tile: Tile { anchor: Vertex::new(tile.anchor.col, tile.anchor.row), ..tile },
+            half_odds: self.mirror.iter().map(|&bit| reading.half_odds[usize::from(bit)]).collect(),
+        }
+    }
+
+    fn read_tile(
+        &self,
+        image: ImageView,
+        grid: &SaddleGrid,
+        tile: Tile,
+        light: &GridLight,
+        (mixings, edges): (&mut Mixings, &mut EdgeLevels),
+    ) -> Option<(Reading, f64)> {
+        let map = TileMap::new(grid, tile, self.gap_edges)?;
+        let levels = light.levels(image, grid, tile, edges)?;
+        let middle = self.kind.middle();
+        let [_, contrast] = levels.at(middle);
+        if contrast < MIN_CONTRAST * corner_contrast(image, grid, tile) {
+            return None;
+        }
+        let width = self.model.width();
+        let at = |by: DVec2| map.image_from_tile(middle + by);
+        let along = [0.25 * DVec2::X, 0.25 * DVec2::Y].map(|by| (at(by) - at(-by)) / (0.5 * width));
+        let (covariance, area_px2) = in_tile(light.blur_px2, along)?;
+        let noise = light.noise;
+        let mixing = self.model.mixing(TileBlur { covariance, area_px2, noise }, mixings)?;
+        let (right, lower) = (image.width() as f64 - 1.0, image.height() as f64 - 1.0);
+        // Cells of the colour around the border are 1, on inverted boards dark ones.
+        let inverted = tile.is_dark() != (self.tags_in == TagsIn::Black);
+        let full = SATURATED * f64::from(image.full_scale());
+        let brightest = 1.0 + GLARE + GLARE_NOISE * light.noise;
+        let mut samples = Vec::with_capacity(self.model.points().len());
+        for (bit, &point) in self.model.points_by_bit() {
+            let DVec2 { x, y } = map.image_from_tile(point);
+            let is_free = self.free >> bit & 1 == 1;
+            if is_free || !(x >= 0.0 && y >= 0.0 && x <= right && y <= lower) {
+                samples.push(Sample::Erased);
+                continue;
+            }
+            let value = f64::from(image.bilinear(x, y));
+            let [dark, contrast] = levels.at(point);
+            let brightness = (value - dark) / contrast;
+            let share = light.share(brightness).clamp(-0.5, 1.5) as f32;
+            let saturated = value >= full;
+            samples.push(if contrast <= 0.0 || contrast.is_nan() || brightness > brightest {
+                Sample::Erased
+            } else if saturated && light.clipped_share < 1.0 {
+                Sample::AtLeast(light.clipped_share as f32)
+            } else {
+                Sample::Share(share)
+            });
+        }
+        if inverted {
+            for sample in &mut samples {
+                *sample = match *sample {
+                    Sample::Share(share) => Sample::Share(1.0 - share),
+                    Sample::AtLeast(share) => Sample::Share(1.0 - share),
+                    Sample::Erased => Sample::Erased,
+                };
+            }
+        }
+        let mut half_odds = mixing.half_odds(&samples);
+        // What is in a hole tells nothing.
+        for (bit, odds) in half_odds.iter_mut().enumerate() {
+            if self.free >> bit & 1 == 1 {
+                *odds = 0.0;
+            }
+        }
+        let length = |step: DVec2| step.x.hypot(step.y);
+        Some((Reading { tile, half_odds }, length(along[0]).max(length(along[1]))))
+    }
+}
+
+/// Contrast between dark and bright around the corners of a tile, in units of the image.
+fn corner_contrast(image: ImageView, grid: &SaddleGrid, tile: Tile) -> f64 {
+    let amplitudes = tile.vertices().filter_map(|v| grid.get(&v));
+    let least = amplitudes.map(|p| p.amplitude).fold(f64::INFINITY, f64::min);
+    2.0 * least * f64::from(image.full_scale() / crate::raster::PYRAMID_FULL_SCALE)
+}
+
+#[cfg(test)]
+mod tests {
+    use glam::DVec3;
+
+    use crate::artwork;
+    use crate::camera::{Camera, Pose};
+    use crate::detect::{Detector, DetectorConfig};
+    use crate::family::{Construction, Family, FreeCells, Rules};
+    use crate::lattice::GridKind;
+    use crate::synth::{Light, scene_of_sheet};
+    use crate::targets::{BoardSpec, PaperSpec, TagSpec, Target, TargetSpec};
+
+    /// Ids of the tags that are read of a board of 8 × 10 corners, each with the number of its wrong cells.
+    fn read_back(target: &Target, printed: &Family, family: &Family) -> Vec<(u32, u32)> {
+        let sheets = artwork::draw(target, Some(printed)).unwrap().sheets;
+        let scene = scene_of_sheet(target, &sheets[0], 0);
+        let middle = DVec3::new(80.0, 60.0, 0.0);
+        let pose = Pose::looking_at(DVec3::new(100.0, 20.0, 340.0), middle, DVec3::Y);
+        let light = Light::default().noise(0.01);
+        let image = scene.render(&Camera::pinhole(1280, 960, 1.0), &pose, &light);
+        let image = image.map(|v| (v.clamp(0.0, 1.0) * 255.0 + 0.5) as u8);
+        let detector = Detector::for_target(target, Some(family), DetectorConfig::default());
+        let found = detector.detect(&image, "view");
+        assert!(found.grids.iter().all(|grid| grid.kind == GridKind::Deltille));
+        let tags = found.grids.iter().flat_map(|grid| &grid.tags);
+        tags.map(|tag| (tag.id, tag.errors)).collect()
+    }
+
+    /// The largest tags, whose cells fill a machine word, are read like others, on inverted boards, too.
+    #[test]
+    fn tags_of_64_cells_are_read() {
+        let family = Family::shipped("d64h12").unwrap();
+        for inverted in [false, true] {
+            let tags = TagSpec { family: "d64h12".to_owned(), first_id: 77, ..TagSpec::default() };
+            let spec = BoardSpec { tags: Some(tags), inverted, ..BoardSpec::deltille(8, 10, 20.0) };
+            let (spec, paper) = (TargetSpec::Board(spec), PaperSpec::default());
+            let target = Target::build("board", &spec, Some(&family), Some(&paper)).unwrap();
+            let mut read = read_back(&target, &family, &family);
+            read.sort_unstable();
+            let printed = (77..).take(target.panels[0].tags.len()).map(|id| (id, 0));
+            assert_eq!(read, printed.collect::<Vec<_>>(), "inverted: {inverted}");
+        }
+    }
+
+    /// Whatever is in the free cells, all tags of a board are read, and without an error.
+    #[test]
+    fn what_is_in_free_cells_does_not_matter() {
+        for like in ["delTag25h7", "delTag36h9"] {
+            let like = Family::shipped(like).unwrap();
+            let free = FreeCells::Centre.mask(like.dimension());
+            let codes: Vec<u64> =
+                like.codes().iter().copied().filter(|code| code & free == 0).collect();
+            let of = |codes: Vec<u64>, free| {
+                let (dimension, distance) = (like.dimension(), like.distance());
+                let source = Construction::Imported { source: "a test".to_owned() };
+                let rules = Rules { free, ..Rules::NONE };
+                Family::new("holed", dimension, distance, codes, rules, source).unwrap()
+            };
+            let family = of(codes.clone(), Some(FreeCells::Centre));
+            let tags = TagSpec { family: "holed".to_owned(), ..TagSpec::default() };
+            let spec = BoardSpec { tags: Some(tags), ..BoardSpec::deltille(8, 10, 20.0) };
+            let (spec, paper) = (TargetSpec::Board(spec), PaperSpec::default());
+            let target = Target::build("board", &spec, Some(&family), Some(&paper)).unwrap();
+            let tags = target.panels[0].tags.len();
+            for shown in [0, free, free & 0x5555_5555_5555, free & 0x0f0f_0f0f_0f0f] {
+                // As printed, or with something bright in the hole.
+                let printed = of(codes.iter().map(|code| code | shown).collect(), None);
+                let read = read_back(&target, &printed, &family);
+                let read: Vec<u32> = read.into_iter().map(|(_, errors)| errors).collect();
+                assert_eq!(read, vec![0; tags], "{} shows {shown:#x}", like.name());
+            }
+        }
+    }
+}

@@ -1,0 +1,485 @@
+//! The clear area around a corner: the pixels that show only this corner.
+//!
+//! ```text
+//!        2 ╱╲ 1        the tiles around a corner end at their far sides; in tiles with a tag the
+//!       ╱▒▒▒▒────╲      cells of the tag (▒) are cut out, and what lies between them and the edges
+//!    3 ╱ ▒▒ ·     ╲ 0   stays. From all of them the blur keeps its distance.
+//!      ╲    ▒▒    ╱
+//!     4 ╲──▒▒▒▒──╱ 5
+//! ```
+
+use std::cell::LazyCell;
+use std::collections::{BTreeMap, BTreeSet};
+use std::f64::consts::PI;
+
+use glam::{DMat2, DVec2};
+
+use crate::detect::detection::values::{Grid, GridCorner};
+use crate::detect::grid::local_map::{Bend, LocalMap};
+use crate::detect::tiling::{CHECKER, DELTILLE};
+use crate::family::Family;
+use crate::lattice::{GridKind, Tile, Vertex};
+use crate::targets::{Panel, TagsIn, Target};
+
+/// Distance to be kept from other edges, in standard deviations of the blur: beyond it, an edge
+/// changes grey values by less than 2.5 % of its contrast.
+const BLUR_MARGIN_SIGMAS: f64 = 2.0;
+
+/// Greatest distance of a corner from the chord of its neighbours, relative to the distance to
+/// them: lenses bend an edge by less than 0.3 rad from one corner to the next.
+const MOST_SAG: f64 = 0.15;
+
+/// Tiles by the id of their panel.
+type TilesOfPanels = BTreeMap<u32, BTreeSet<Tile>>;
+
+/// The tiles of a target with tags, and the area of the tag in its tile.
+#[derive(Clone, Debug, Default)]
+pub struct TagAreas {
+    /// Distance from the edges of a tile to what it shows of a tag, in edges along the other
+    /// edges; the smallest of all panels.
+    inset: f64,
+    /// Tiles with a tag, by panel id, of each target by its name where there are several.
+    targets: Vec<(Option<String>, TilesOfPanels)>,
+}
+
+impl TagAreas {
+    /// The tag areas of `target` with the tags of this family.
+    pub fn of(target: &Target, family: &Family) -> Self {
+        let tagged = || target.panels.iter().filter(|panel| !panel.tags.is_empty());
+        let inset = |panel: &Panel| {
+            let at = match panel.tags_in {
+                TagsIn::Black => panel.tag_inset_bits(),
+                TagsIn::White => panel.tag_margin_bits(),
+            };
+            at / family.cells().width(panel.tag_inset_bits())
+        };
+        let tiles = |panel: &Panel| panel.tags.iter().map(|tag| panel.tag_tile(tag)).collect();
+        Self {
+            inset: tagged().map(inset).fold(f64::INFINITY, f64::min),
+            targets: vec![(None, tagged().map(|panel| (panel.id, tiles(panel))).collect())],
+        }
+    }
+
+    /// The tag areas of several targets, by their names.
+    pub fn of_scene(targets: impl IntoIterator<Item = (String, Self)>) -> Self {
+        let mut all = Self { inset: f64::INFINITY, targets: Vec::new() };
+        for (name, of_target) in targets {
+            all.inset = all.inset.min(of_target.inset);
+            let tiles = of_target.targets.into_iter();
+            all.targets.extend(tiles.map(|(_, tiles)| (Some(name.clone()), tiles)));
+        }
+        all
+    }
+
+    /// Whether no tile shows a tag.
+    pub fn is_empty(&self) -> bool {
+        self.targets.iter().all(|(_, tiles)| tiles.is_empty())
+    }
+
+    /// Whether a tile of a grid may show a tag: as its panel has them, or any that could where the
+    /// panel is not known.
+    fn has(&self, grid: &Grid, tile: Tile) -> bool {
+        match grid.panel {
+            Some(panel) => {
+                let of_target = self.targets.iter().find(|(name, _)| *name == grid.target);
+                let tiles = of_target.and_then(|(_, tiles)| tiles.get(&panel));
+                tiles.is_some_and(|tiles| tiles.contains(&tile))
+            }
+            None => !self.is_empty() && tile == tile.kind().tag_tile(tile.anchor),
+        }
+    }
+}
+
+/// An empty span.
+pub const NOTHING: [f64; 2] = [f64::INFINITY, f64::NEG_INFINITY];
+
+/// Signed distance from a line, px: a·u + b·v + c.
+type Line = [f64; 3];
+
+/// The surroundings of a corner, px from it.
+#[derive(Clone, Debug, Default)]
+pub struct Surroundings {
+    /// Far sides of the tiles, positive towards the corner.
+    sides: Vec<Line>,
+    /// Tags: their sides, positive outside.
+    tags: Vec<Vec<Line>>,
+    /// The edges through the corner by rising angle; empty where nothing is known.
+    pub edges: Vec<Edge>,
+    /// Whether all its neighbours are in the grid.
+    pub is_inner: bool,
+}
+
+/// An edge through a corner.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Edge {
+    /// Direction within a half-turn, radians.
+    pub angle_rad: f64,
+    /// Curvature to the left of that direction (to greater v of u), 1/px.
+    pub bend: f64,
+    /// Distance in the picture, perpendicular to the edge, of something one edge length away on the
+    /// print, px.
+    pub across_px: f64,
+}
+
+impl Surroundings {
+    /// Ends of the clear part of a row at distance `v` from the corner, px, between the far sides
+    /// of the tiles under a blur of this standard deviation, px.
+    pub fn span(&self, v: f64, blur_px: f64) -> [f64; 2] {
+        if self.sides.is_empty() {
+            return NOTHING;
+        }
+        let margin = BLUR_MARGIN_SIGMAS * blur_px;
+        let [mut first, mut last] = [f64::NEG_INFINITY, f64::INFINITY];
+        for [a, b, c] in &self.sides {
+            let rest = margin - b * v - c;
+            if *a > 0.0 {
+                first = first.max(rest / a);
+            } else if *a < 0.0 {
+                last = last.min(rest / a);
+            } else if rest > 0.0 {
+                return NOTHING;
+            }
+        }
+        [first, last]
+    }
+
+    /// A predicate for places, px from the corner, at which no tag is visible under a blur of this
+    /// standard deviation, px.
+    pub fn off_tags(&self, blur_px: f64) -> impl Fn(DVec2) -> bool {
+        let margin = BLUR_MARGIN_SIGMAS * blur_px;
+        let circle2 = (self.distance_of_tags(DVec2::ZERO) - margin).max(0.0).powi(2);
+        move |place| place.length_squared() < circle2 || self.distance_of_tags(place) >= margin
+    }
+
+    /// Half the side of the largest clear square around the corner, px, under a blur of this
+    /// standard deviation, px.
+    pub fn clear_square_px(&self, blur_px: f64) -> f64 {
+        let clear = self.distance(DVec2::ZERO) - BLUR_MARGIN_SIGMAS * blur_px;
+        clear.max(0.0) * std::f64::consts::FRAC_1_SQRT_2
+    }
+
+    /// Distance from a point to the nearest thing that is not the corner, or less, px.
+    fn distance(&self, place: DVec2) -> f64 {
+        let sides = self.sides.iter().map(|[a, b, c]| a * place.x + b * place.y + c);
+        let nearest = sides.reduce(f64::min).unwrap_or(0.0);
+        nearest.min(self.distance_of_tags(place))
+    }
+
+    /// Distance from a point to the nearest tag, or less, px.
+    fn distance_of_tags(&self, DVec2 { x: u, y: v }: DVec2) -> f64 {
+        let from = |[a, b, c]: &Line| a * u + b * v + c;
+        let outside = |tag: &Vec<Line>| tag.iter().map(from).fold(f64::NEG_INFINITY, f64::max);
+        self.tags.iter().map(outside).fold(f64::INFINITY, f64::min)
+    }
+}
+
+/// The surroundings of every corner of a grid, in their order, in pixels of `scale` times the size
+/// of those of the grid. For a corner whose neighbours are collinear nothing is known, and nothing
+/// counts as clear.
+pub fn surroundings(grid: &Grid, tags: &TagAreas, scale: f64) -> Vec<Surroundings> {
+    surroundings_of(grid, tags, scale, 0..grid.corners.len())
+}
+
+/// The surroundings of some of the corners, by their index.
+pub fn surroundings_of(
+    grid: &Grid,
+    tags: &TagAreas,
+    scale: f64,
+    corners: impl Iterator<Item = usize>,
+) -> Vec<Surroundings> {
+    let places = Places::of(grid, scale);
+    let bend = LazyCell::new(|| places.bend(grid));
+    let around = |corner: &GridCorner| {
+        let vertex = Vertex::new(corner.row, corner.col);
+        let here = places.get(vertex)?;
+        let seen = |step: Vertex| places.get(vertex + step).map(|place| place - here);
+        let near = affine(grid.kind.steps().iter().filter_map(|&s| Some((s, seen(s)?))));
+        // For a single corner the corners beyond its neighbours predict where missing neighbours
+        // would be.
+        let map = match &near {
+            Some(_) => None,
+            None => Some(places.map_about(grid.kind, vertex, *bend)?),
+        };
+        let usual = |step| match &near {
+            Some(near) => near(step),
+            None => map.map_or(DVec2::ZERO, |map| map.along(step)),
+        };
+        let place = |step| seen(step).or_else(|| beyond(step, seen)).unwrap_or_else(|| usual(step));
+        let edges = edges(grid, &places, vertex, place);
+        let is_inner = grid.kind.steps().iter().all(|&step| seen(step).is_some());
+        let mut found = Surroundings { edges, is_inner, ..Default::default() };
+        for tile in grid.kind.tiles_around(vertex) {
+            let corners: Vec<Vertex> = tile.vertices().map(|v| v - vertex).collect();
+            let polygon: Vec<DVec2> = corners.iter().map(|&step| place(step)).collect();
+            let n = corners.len();
+            for (i, j) in (0..n).map(|i| (i, (i + 1) % n)) {
+                if corners[i] != Vertex::new(0, 0) && corners[j] != Vertex::new(0, 0) {
+                    found.sides.push(line(polygon[i], polygon[j], DVec2::ZERO));
+                }
+            }
+            if tags.has(grid, tile) {
+                found.tags.push(outline(&polygon, tags.inset));
+            }
+        }
+        Some(found)
+    };
+    corners.map(|i| around(&grid.corners[i]).unwrap_or_default()).collect()
+}
+
+/// The crossing of the lines through the neighbours of a corner, px, if the corner is displaced
+/// from them. `None` where it lies as near to them as lens distortion permits, and with fewer than
+/// two lines.
+pub fn crossing(grid: &Grid, corner: &GridCorner) -> Option<DVec2> {
+    let places = Places::of(grid, 1.0);
+    let vertex = Vertex::new(corner.row, corner.col);
+    let here = corner.position();
+    let (mut normal, mut right, mut lines) = (DMat2::ZERO, DVec2::ZERO, 0);
+    let mut nearest_px = f64::INFINITY;
+    let steps = grid.kind.steps();
+    for &s in &steps[..steps.len() / 2] {
+        let ends =
+            [(vertex + s, vertex - s), (vertex + s, vertex + s + s), (vertex - s, vertex - s - s)];
+        let ends = ends.into_iter().find_map(|(a, b)| Some((places.get(a)?, places.get(b)?)));
+        let Some((a, b)) = ends else { continue };
+        nearest_px = nearest_px.min(here.distance(a)).min(here.distance(b));
+        let [a, b, c] = line(a, b, DVec2::ZERO);
+        let n = DVec2::new(a, b);
+        normal += DMat2::from_cols(n.x * n, n.y * n);
+        right -= c * n;
+        lines += 1;
+    }
+    let crossing = (lines > 1).then(|| normal.inverse() * right)?;
+    (here.distance(crossing) > MOST_SAG * nearest_px).then_some(crossing)
+}
+
+/// The places of corners in the rectangle of rows and columns that they span.
+struct Places {
+    first: Vertex,
+    cols: usize,
+    places: Vec<Option<DVec2>>,
+}
+
+impl Places {
+    fn of(grid: &Grid, scale: f64) -> Self {
+        let range = |of: fn(&GridCorner) -> i32| {
+            let values = || grid.corners.iter().map(of);
+            let first = values().min().unwrap_or(0);
+            (first, values().max().map_or(0, |last| (last - first) as usize + 1))
+        };
+        let ((row, rows), (col, cols)) = (range(|c| c.row), range(|c| c.col));
+        let mut found =
+            Self { first: Vertex::new(row, col), cols, places: vec![None; rows * cols] };
+        for corner in &grid.corners {
+            if let Some(at) = found.index(Vertex::new(corner.row, corner.col)) {
+                found.places[at] = Some(corner.position() / scale);
+            }
+        }
+        found
+    }
+
+    fn index(&self, vertex: Vertex) -> Option<usize> {
+        let Vertex { row, col } = vertex - self.first;
+        let (row, col) = (usize::try_from(row).ok()?, usize::try_from(col).ok()?);
+        (col < self.cols).then_some(row * self.cols + col)
+    }
+
+    fn get(&self, vertex: Vertex) -> Option<DVec2> {
+        *self.places.get(self.index(vertex)?)?
+    }
+
+    fn bend(&self, grid: &Grid) -> Bend {
+        let vertices = grid.corners.iter().map(|corner| Vertex::new(corner.row, corner.col));
+        match grid.kind {
+            GridKind::Deltille => Bend::of::<DELTILLE>(vertices, |v| self.get(v), 0),
+            GridKind::Checker => Bend::of::<CHECKER>(vertices, |v| self.get(v), 0),
+        }
+    }
+
+    fn map_about(&self, kind: GridKind, vertex: Vertex, bend: Bend) -> Option<LocalMap> {
+        match kind {
+            GridKind::Deltille => LocalMap::about::<DELTILLE>(vertex, |v| self.get(v), bend),
+            GridKind::Checker => LocalMap::about::<CHECKER>(vertex, |v| self.get(v), bend),
+        }
+    }
+}
+
+/// Where a vertex lies that is not seen, if the two opposite are: as far as the first of them, or
+/// nearer by as much as that is nearer than the second.
+fn beyond(step: Vertex, seen: impl Fn(Vertex) -> Option<DVec2>) -> Option<DVec2> {
+    let back = Vertex::new(-step.row, -step.col);
+    let (first, second) = (seen(back)?, seen(back + back)?);
+    let shrinks = first.length() / (second - first).length();
+    Some(-first * shrinks.min(1.0))
+}
+
+/// The affine map of lattice steps that fits these best; `None` where they lie in one line.
+fn affine(known: impl Iterator<Item = (Vertex, DVec2)>) -> Option<impl Fn(Vertex) -> DVec2> {
+    let (mut normal, mut right) = (DMat2::ZERO, [DVec2::ZERO; 2]);
+    for (step, place) in known {
+        let step = DVec2::new(step.row.into(), step.col.into());
+        normal += DMat2::from_cols(step.x * step, step.y * step);
+        right = [0, 1].map(|i| right[i] + place[i] * step);
+    }
+    let rows = (normal.determinant() > 0.5).then(|| right.map(|r| normal.inverse() * r))?;
+    Some(move |v: Vertex| {
+        let v = DVec2::new(v.row.into(), v.col.into());
+        DVec2::from(rows.map(|row| row.dot(v)))
+    })
+}
+
+/// The edges through the corner at `vertex`, along the chords between its neighbours.
+fn edges(
+    grid: &Grid,
+    places: &Places,
+    vertex: Vertex,
+    place: impl Fn(Vertex) -> DVec2,
+) -> Vec<Edge> {
+    let steps = grid.kind.steps();
+    let at = |v: Vertex| places.get(v);
+    let bend_at = |v: Vertex, step: Vertex| Some(bend([at(v - step)?, at(v)?, at(v + step)?]));
+    let edge = |&step: &Vertex| {
+        let chord = place(step) - place(Vertex::new(0, 0) - step);
+        // Bends change slowly: three along a line tell more than one, and where the line is too short
+        // the next ones are bent like it.
+        let along = [vertex, vertex + step, vertex - step].into_iter();
+        let bend = mean(along.filter_map(|v| bend_at(v, step)))
+            .or_else(|| mean(grid.kind.neighbours(vertex).filter_map(|v| bend_at(v, step))))
+            .unwrap_or(0.0);
+        let along = chord.normalize_or_zero();
+        let off = steps.iter().map(|&other| along.perp_dot(place(other)).abs());
+        let across_px = off.sum::<f64>() / rows_apart(grid.kind);
+        let angle_rad = chord.to_angle();
+        // Turned by half, left is right.
+        match angle_rad {
+            ..0.0 => Edge { angle_rad: angle_rad + PI, bend: -bend, across_px },
+            PI.. => Edge { angle_rad: angle_rad - PI, bend: -bend, across_px },
+            _ => Edge { angle_rad, bend, across_px },
+        }
+    };
+    let mut edges: Vec<Edge> = steps[..steps.len() / 2].iter().map(edge).collect();
+    edges.sort_by(|a, b| a.angle_rad.total_cmp(&b.angle_rad));
+    edges
+}
+
+/// The sum of the distances of all neighbours from the line along one of them, in edges.
+fn rows_apart(kind: GridKind) -> f64 {
+    match kind {
+        GridKind::Deltille => 4.0 * 3f64.sqrt() / 2.0,
+        GridKind::Checker => 2.0,
+    }
+}
+
+fn mean(values: impl Iterator<Item = f64>) -> Option<f64> {
+    let (count, sum) = values.fold((0, 0.0), |(count, sum), value| (count + 1, sum + value));
+    (count > 0).then(|| sum / f64::from(count))
+}
+
+/// Curvature of the parabola through three points in the second, to the left of the way, 1/px.
+fn bend([a, b, c]: [DVec2; 3]) -> f64 {
+    let along = (c - a).normalize_or_zero();
+    let (before, after) = (b - a, c - b);
+    let (t0, t1) = (along.dot(before), along.dot(after));
+    let slopes = along.perp_dot(after) / t1 - along.perp_dot(before) / t0;
+    let bend = 2.0 * slopes / (t0 + t1);
+    if bend.is_finite() { bend } else { 0.0 }
+}
+
+/// The sides of what a tile shows of a tag, positive outside.
+fn outline(tile: &[DVec2], inset: f64) -> Vec<Line> {
+    let n = tile.len();
+    // Every corner moves along both edges that meet there.
+    let corner = |i: usize| {
+        let (here, next, last) = (tile[i], tile[(i + 1) % n], tile[(i + n - 1) % n]);
+        here + inset * (next + last - 2.0 * here)
+    };
+    let corners: Vec<DVec2> = (0..n).map(corner).collect();
+    let middle = corners.iter().sum::<DVec2>() / n as f64;
+    let sides = (0..n).map(|i| line(corners[i], corners[(i + 1) % n], middle));
+    sides.map(|side| side.map(|c| -c)).collect()
+}
+
+/// The line through two points, positive on the side of a third.
+fn line(a: DVec2, b: DVec2, inside: DVec2) -> Line {
+    let way = b - a;
+    let normal = way.perp() / way.x.hypot(way.y).max(f64::MIN_POSITIVE);
+    let offset = -normal.dot(a);
+    let sign = (normal.dot(inside) + offset).signum();
+    [sign * normal.x, sign * normal.y, sign * offset]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A grid of 5 × 5 corners in the picture.
+    fn grid(kind: GridKind, image: impl Fn(DVec2) -> DVec2) -> Grid {
+        let corners = (0..25).map(|i| {
+            let (row, col) = (i / 5, i % 5);
+            let DVec2 { x, y } = image(kind.position(row.into(), col.into()));
+            GridCorner { row, col, id: None, x, y, cov: None }
+        });
+        Grid {
+            kind,
+            target: None,
+            panel: None,
+            mirrored: false,
+            corners: corners.collect(),
+            tags: Vec::new(),
+        }
+    }
+
+    #[test]
+    fn lines_cross_in_the_corner_under_perspective_and_are_not_bent() {
+        let image = |DVec2 { x, y }: DVec2| {
+            let depth = 1.0 + 0.1 * x - 0.05 * y;
+            DVec2::new(300.0 + 30.0 * (x - 0.2 * y) / depth, 200.0 - 25.0 * y / depth)
+        };
+        for kind in [GridKind::Deltille, GridKind::Checker] {
+            let grid = grid(kind, image);
+            for around in surroundings(&grid, &TagAreas::default(), 1.0) {
+                assert!(around.edges.iter().all(|edge| edge.bend.abs() < 1e-9));
+            }
+            for corner in &grid.corners {
+                assert_eq!(crossing(&grid, corner), None);
+                let mistaken = GridCorner { x: corner.x + 4.0, y: corner.y - 6.0, ..*corner };
+                let found = crossing(&grid, &mistaken).unwrap();
+                assert!(found.distance(corner.position()) < 1e-9);
+            }
+        }
+    }
+
+    #[test]
+    fn lines_on_a_cylinder_are_bent_to_the_left_of_their_direction() {
+        // Rows are arcs of radius 400 px that curve towards greater v.
+        let image = |DVec2 { x, y }: DVec2| {
+            let angle = 0.05 * (x - 2.0);
+            let v = 200.0 - 20.0 * y + 400.0 * (1.0 - angle.cos());
+            DVec2::new(300.0 + 400.0 * angle.sin(), v)
+        };
+        let grid = grid(GridKind::Checker, image);
+        let around = surroundings(&grid, &TagAreas::default(), 1.0);
+        let along_row = around[12].edges[0];
+        assert!(along_row.angle_rad.abs() < 1e-9, "{along_row:?}");
+        assert!((400.0 * along_row.bend - 1.0).abs() < 0.01, "{along_row:?}");
+    }
+
+    #[test]
+    fn tags_and_far_sides_are_not_clear_and_what_lies_between_is() {
+        let grid = grid(GridKind::Checker, |place| {
+            DVec2::new(100.0 + 40.0 * place.x, 300.0 - 40.0 * place.y)
+        });
+        let tags =
+            TagAreas { inset: 0.25, targets: vec![(None, BTreeMap::from([(0, BTreeSet::new())]))] };
+        let around = &surroundings(&grid, &tags, 1.0)[12];
+        // Cells begin 10 px from both edges; the blur reaches 2 px.
+        let off_tags = around.off_tags(1.0);
+        let clear = |u: f64, v: f64| {
+            let [first, last] = around.span(v, 1.0);
+            (first..=last).contains(&u) && off_tags(DVec2::new(u, v))
+        };
+        assert!(clear(7.0, 7.0) && clear(35.0, 6.0) && clear(-6.0, 35.0));
+        assert!(!clear(12.0, 12.0) && !clear(9.0, 20.0) && !clear(39.0, 0.0));
+        let square_px = (10.0 - 2.0) * std::f64::consts::FRAC_1_SQRT_2;
+        assert!((around.clear_square_px(1.0) - square_px).abs() < 1e-9);
+    }
+}

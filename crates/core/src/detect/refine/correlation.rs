@@ -1,0 +1,293 @@
+//! How far the noise of a picture is from white, and what that does to positions.
+//!
+//! Demosaicing, JPEG and enlargement leave residuals r that depend on their neighbours, and where a model
+//! holds only nearly they are larger at the edges, which is where a position comes from. With c the
+//! influence of the pixels on a position (δx = Σ c r), ρ the residuals' correlation at a lag and R the noise's
+//! covariance, the variance of x is cᵀRc instead of σ² cᵀc:
+//!
+//! ```text
+//!     factor = Σ c² r²/(1 − H) / (σ² Σ c²) · (1 + Σ_lags ρ(lag) Σ c(p) c(p + lag) / Σ c²)
+//! ```
+//!
+//! pooled over corners of a picture. What is even about a corner (the same at opposite pixels) and what is odd have
+//! factors of their own: where the blur is not quite that of the model, after motion say, the residuals of a
+//! corner of three edges are odd, and so do not move it, since its influence is nearly even; of two edges it is the other
+//! way round. A fit takes out of its residuals what looks like its parameters:
+//! E[r rᵀ] = σ² (1 − H) with the hat matrix H of white noise, which is added again.
+
+use multiversion::multiversion;
+
+use crate::detect::lanes::{self, LANES};
+
+/// Residuals of a corner, and how its parameters answer to its pixels.
+#[derive(Clone, Debug)]
+pub struct Influence {
+    /// Pixels, counted from any.
+    pub places: Vec<[i32; 2]>,
+    /// The place of the corner among them, twice.
+    pub twice_middle: [i32; 2],
+    /// Pixels minus model.
+    pub residuals: Vec<f32>,
+    /// Influence on x and y.
+    pub on_position: [Vec<f32>; 2],
+    /// Columns Q with H = Q Qᵀ.
+    pub hat: Vec<Vec<f32>>,
+    /// Standard deviation of the residuals.
+    pub noise: f64,
+}
+
+/// Largest lags, px: of sensors and JPEG, and of enlarged pictures, whose grain is wider.
+const LAGS_PX: [i32; 2] = [2, 6];
+
+/// Mean correlation at the largest lag above which larger ones are looked at.
+const WIDE: f64 = 0.05;
+
+/// Factors that are believed: where motion is ten times the blur the noise is a tenth of the residuals, and enlarging by
+/// six gives 36.
+const FACTORS: [f64; 2] = [0.02, 40.0];
+
+/// Corners from which correlations are told; the sums of ten vary by some per cent.
+pub const CORNERS: usize = 10;
+
+/// Of so many one tells what fits take out of residuals, which depends on the windows alone and is nearly
+/// the same for all.
+const HAT_EVERY: usize = 4;
+
+impl Influence {
+    /// Pairs of opposite pixels, each of which is the first of one.
+    fn pairs(&self) -> Vec<(usize, usize)> {
+        // Where each pixel of the square around the corner is among them.
+        let reach =
+            self.places.iter().flatten().map(|c| c.unsigned_abs() as i32).max().unwrap_or(0);
+        let side = (2 * reach + 1) as usize;
+        let index = |[u, v]: [i32; 2]| {
+            let [u, v] = [u, v].map(|c| usize::try_from(c + reach).ok().filter(|&c| c < side));
+            Some(v? * side + u?)
+        };
+        let mut at = vec![None; side * side];
+        for (i, &place) in self.places.iter().enumerate() {
+            if let Some(index) = index(place) {
+                at[index] = Some(i);
+            }
+        }
+        let opposite =
+            |[u, v]: [i32; 2]| at[index([self.twice_middle[0] - u, self.twice_middle[1] - v])?];
+        let pair = |(i, &place): (usize, &[i32; 2])| Some((i, opposite(place)?));
+        self.places.iter().enumerate().filter_map(pair).collect()
+    }
+
+    /// What is the same at opposite pixels, and what is of opposite sign, of those that have both; with the columns of
+    /// the hat matrix where they are asked for.
+    fn parts(&self, with_hat: bool) -> [Part; 2] {
+        let pairs = self.pairs();
+        let mut squares = [1.0, -1.0].map(|_| vec![0.0; pairs.len()]);
+        let [even, odd] = &mut squares;
+        for q in &self.hat {
+            for ((even, odd), &(i, j)) in even.iter_mut().zip(&mut *odd).zip(&pairs) {
+                *even += 0.5 * (q[i] + q[j]).powi(2);
+                *odd += 0.5 * (q[i] - q[j]).powi(2);
+            }
+        }
+        let [even, odd] = squares;
+        [(1.0, even), (-1.0, odd)].map(|(sign, diagonal)| {
+            let part = |values: &[f32]| -> Vec<f32> {
+                let sum = |&(i, j): &(usize, usize)| values[i] + sign * values[j];
+                pairs.iter().map(|pair| std::f32::consts::FRAC_1_SQRT_2 * sum(pair)).collect()
+            };
+            let hat: &[Vec<f32>] = if with_hat { &self.hat } else { &[] };
+            Part {
+                places: pairs.iter().map(|&(i, _)| self.places[i]).collect(),
+                residuals: part(&self.residuals),
+                on_position: [0, 1].map(|i| part(&self.on_position[i])),
+                diagonal,
+                hat: hat.iter().map(|q| part(q)).collect(),
+                noise: self.noise,
+            }
+        })
+    }
+}
+
+/// What is even, or odd, about a corner.
+#[derive(Clone, Debug)]
+struct Part {
+    places: Vec<[i32; 2]>,
+    residuals: Vec<f32>,
+    on_position: [Vec<f32>; 2],
+    /// The diagonal of H.
+    diagonal: Vec<f32>,
+    /// The columns of Q, of one in [`HAT_EVERY`].
+    hat: Vec<Vec<f32>>,
+    noise: f64,
+}
+
+impl Part {
+    /// Sum of the squares of the influence.
+    fn strength(&self) -> f64 {
+        self.on_position.iter().flatten().map(|c| f64::from(c * c)).sum()
+    }
+}
+
+/// Factor of the covariances of positions against those under white noise.
+pub fn inflation(corners: &[Influence]) -> f64 {
+    let corners = &corners[..corners.len().min(CORNERS)];
+    if corners.is_empty() {
+        return 1.0;
+    }
+    let parts = corners.iter().enumerate().map(|(i, corner)| corner.parts(i % HAT_EVERY == 0));
+    let (even, odd): (Vec<Part>, Vec<Part>) = parts.map(|[even, odd]| (even, odd)).unzip();
+    let (mut factor, mut strength) = (both(&even, &odd), 0.0);
+    for parts in [even, odd] {
+        let weight: f64 = parts.iter().map(Part::strength).sum();
+        factor += weight * factor_of(&parts);
+        strength += weight;
+    }
+    let factor = factor / strength;
+    if factor.is_finite() { factor.clamp(FACTORS[0], FACTORS[1]) } else { 1.0 }
+}
+
+/// The factor of what is even, or odd.
+fn factor_of(parts: &[Part]) -> f64 {
+    let (narrow, rim) = lagged(parts, LAGS_PX[0]);
+    let lags = if rim > WIDE { lagged(parts, LAGS_PX[1]).0 } else { narrow };
+    uneven(parts) * lags
+}
+
+/// What the even and the odd part have in common: noise of another strength in black than in white.
+fn both(even: &[Part], odd: &[Part]) -> f64 {
+    let common = |(even, odd): (&Part, &Part)| {
+        let at = |i: usize| {
+            let [x, y] = [0, 1].map(|k| even.on_position[k][i] * odd.on_position[k][i]);
+            f64::from((x + y) * even.residuals[i] * odd.residuals[i])
+        };
+        2.0 * (0..even.residuals.len()).map(at).sum::<f64>() / even.noise.powi(2)
+    };
+    even.iter().zip(odd).map(common).sum()
+}
+
+/// How much larger residuals are where positions come from.
+fn uneven(corners: &[Part]) -> f64 {
+    let (mut seen, mut white) = (0.0, 0.0);
+    for corner in corners {
+        for i in 0..corner.residuals.len() {
+            let rest = (1.0 - corner.diagonal[i]).max(0.1);
+            let square = f64::from(corner.residuals[i].powi(2) / rest);
+            let influence: f32 = corner.on_position.iter().map(|c| c[i] * c[i]).sum();
+            seen += f64::from(influence) * square / corner.noise.powi(2);
+            white += f64::from(influence);
+        }
+    }
+    seen / white
+}
+
+/// The part of the lags, and the mean correlation at the largest.
+fn lagged(corners: &[Part], reach: i32) -> (f64, f64) {
+    let lags: Vec<[i32; 2]> = (0..=reach)
+        .flat_map(|v| (-reach..=reach).map(move |u| [u, v]))
+        .filter(|&[u, v]| v > 0 || u > 0)
+        .collect();
+    let mut pairs = vec![0.0; lags.len()];
+    let mut products = vec![0.0; lags.len()];
+    let mut influences = vec![0.0; lags.len()];
+    let (mut square, mut count, mut white) = (0.0, 0.0, 0.0);
+    let hats = corners.len() as f64 / corners.len().div_ceil(HAT_EVERY) as f64;
+    for corner in corners {
+        let field = Field::of(corner, reach);
+        let mask = field.spread([vec![1.0; corner.residuals.len()].as_slice()]);
+        let residual = field.spread([corner.residuals.as_slice()]);
+        let on_position = field.spread(corner.on_position.iter().map(Vec::as_slice));
+        let variance = corner.noise.powi(2);
+        square += field.product(&residual, 0) / variance;
+        count += field.product(&mask, 0);
+        white += field.product(&on_position, 0);
+        for (k, lag) in lags.iter().enumerate() {
+            let offset = field.offset(*lag);
+            pairs[k] += field.product(&mask, offset);
+            products[k] += field.product(&residual, offset) / variance;
+            influences[k] += field.product(&on_position, offset);
+        }
+        if !corner.hat.is_empty() {
+            let hat = field.spread(corner.hat.iter().map(Vec::as_slice));
+            square += hats * field.product(&hat, 0);
+            for (k, lag) in lags.iter().enumerate() {
+                products[k] += hats * field.product(&hat, field.offset(*lag));
+            }
+        }
+    }
+    let scale = square / count;
+    let correlation = |k: usize| products[k] / (pairs[k] * scale);
+    let part = (0..lags.len()).map(|k| 2.0 * correlation(k) * influences[k] / white).sum::<f64>();
+    let rim: Vec<f64> = (0..lags.len())
+        .filter(|&k| lags[k].iter().any(|l| l.abs() == reach) && lags[k].contains(&0))
+        .map(correlation)
+        .collect();
+    (1.0 + part, rim.iter().sum::<f64>() / rim.len() as f64)
+}
+
+/// A rectangle of pixels with room for lags at its sides.
+struct Field {
+    first: [i32; 2],
+    width: usize,
+    /// Pixels, in whole vectors, and with zeros behind them for the largest lag.
+    pixels: usize,
+    room: usize,
+    places: Vec<usize>,
+}
+
+impl Field {
+    fn of(corner: &Part, reach: i32) -> Self {
+        let ends = |i: usize| {
+            let values = || corner.places.iter().map(|p| p[i]);
+            (values().min().unwrap_or(0), values().max().unwrap_or(0))
+        };
+        let ((left, right), (top, bottom)) = (ends(0), ends(1));
+        let width = (right - left + 1 + reach) as usize;
+        let height = (bottom - top + 1) as usize;
+        let pixels = (width * height).next_multiple_of(LANES);
+        let mut field = Self { first: [left, top], width, pixels, room: 0, places: Vec::new() };
+        field.room = pixels + field.offset([reach, reach]);
+        field.places = corner.places.iter().map(|&place| field.index(place)).collect();
+        field
+    }
+
+    fn index(&self, [u, v]: [i32; 2]) -> usize {
+        (v - self.first[1]) as usize * self.width + (u - self.first[0]) as usize
+    }
+
+    fn offset(&self, [u, v]: [i32; 2]) -> usize {
+        (v * self.width as i32 + u) as usize
+    }
+
+    /// Values of the corner's pixels, one rectangle behind the other.
+    fn spread<'a>(&self, all: impl IntoIterator<Item = &'a [f32]>) -> Vec<f32> {
+        let mut fields = Vec::new();
+        for values in all {
+            let first = fields.len();
+            fields.resize(first + self.room, 0.0);
+            let field = &mut fields[first..];
+            self.places.iter().zip(values).for_each(|(&place, &value)| field[place] = value);
+        }
+        fields
+    }
+
+    /// Sum over such rectangles of the products of all values with those `offset` further.
+    fn product(&self, fields: &[f32], offset: usize) -> f64 {
+        lagged_product(fields, [self.pixels, self.room], offset)
+    }
+}
+
+#[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
+fn lagged_product(fields: &[f32], [pixels, room]: [usize; 2], offset: usize) -> f64 {
+    let mut sums = [0.0f32; LANES];
+    let mut first = 0;
+    while first < fields.len() {
+        let (here, _) = fields[first..first + pixels].as_chunks::<LANES>();
+        let (there, _) = fields[first + offset..first + offset + pixels].as_chunks::<LANES>();
+        for (here, there) in here.iter().zip(there) {
+            for k in 0..LANES {
+                sums[k] += here[k] * there[k];
+            }
+        }
+        first += room;
+    }
+    f64::from(lanes::sum(&sums))
+}

@@ -1,0 +1,382 @@
+//! Subpixel refinement of all corners of a grid, each from all pixels that show only this corner.
+//!
+//! The blur determines how far neighbouring edges reach into a window; it is estimated from a few
+//! corners, on coarser levels of the pyramid where the finest shows too little of it. The curvature
+//! of edges by lens distortion follows from the corners, which are then fitted again. Something
+//! that covers a part of the board may still lie beside a corner; then the residual of the model is
+//! larger than elsewhere in the grid, and smaller windows are tried. A corner at the end of the
+//! visible part of the board is dropped when no window shows it cleanly, since its position is
+//! biased by the cover.
+
+use std::collections::BTreeMap;
+
+use glam::DVec2;
+use rayon::prelude::*;
+
+use super::clearance::{Surroundings, TagAreas, crossing, surroundings, surroundings_of};
+use super::corner_model::{CornerFitter, MAX_WAY_PX};
+use crate::detect::detection::values::{Grid, GridCorner};
+use super::optics::{Optics, REACH_PX, REACH_SIGMAS, SAMPLES, Sample};
+use super::refiner::{MIN_MODEL_RADIUS, MIN_PIXELS, ModelFit, Refined, Refinement, Refiner, Room};
+use crate::lattice::Vertex;
+use crate::raster::{Gray, ImageView, Pyramid};
+use crate::statistics::median;
+
+/// Number of corners from which the blur is estimated, those with the most room of [`LOOKED_AT`]
+/// times as many, from all over the grid.
+const BLUR_CORNERS: usize = 15;
+const LOOKED_AT: usize = 4;
+
+/// Blur that is assumed before it is estimated, px: that of a good photograph.
+const USUAL_BLUR_PX: f64 = 1.0;
+
+/// Largest blur as a fraction of the radius of the largest window; a larger one is estimated again
+/// on a coarser level, because the window shows little but the middle of the edges.
+const MAX_BLUR: f64 = 0.5;
+
+/// Residuals above this many times the median of the grid show something else than the corner; the
+/// noise of a 7×7 window varies by a tenth.
+const MAX_RESIDUAL_RATIO: f64 = 3.0;
+
+/// Residuals below this fraction of the amplitude are no reason to doubt a corner: in a clean image
+/// the median is close to zero.
+const MIN_RESIDUAL: f64 = 0.05;
+
+/// Residuals above this many times the median show something beside noise, whose scatter in a window is a tenth.
+const UNUSUAL: f64 = 1.3;
+
+/// Greatest correlation of neighbouring residuals that is distinguished: from there on they are one
+/// shape all over the window.
+const MOST_CORRELATED: f64 = 0.9;
+
+/// Blur of which a picture loses nothing when it is sampled once a pixel, px: its spectrum falls to a
+/// ten-thousandth at the highest frequency.
+const SHARP_PX: f64 = 1.4;
+
+/// Least number of corners for a task on a thread of its own.
+const PART: usize = 128;
+
+/// A corner whose blur exceeds that of its neighbours by more than this factor is the rim of a
+/// cover: at the rims of fisheye pictures blur doubles from one corner to the next.
+const MAX_BLUR_RATIO: f64 = 3.0;
+
+/// Positions with a larger standard deviation than this, px, including the shape of the residuals,
+/// are dropped: the grid predicts as well.
+const WORST_SIGMA_PX: f64 = 3.0;
+
+/// A window is followed by one that is smaller by this factor.
+const NEXT_WINDOW: f64 = 0.7;
+
+impl Refiner {
+    /// The blur of each grid in px, where the model can tell it.
+    pub(in crate::detect) fn blurs(
+        &self,
+        fitter: &mut CornerFitter,
+        images: (ImageView, &[Gray<i16>]),
+        grids: &[Grid],
+        tags: &TagAreas,
+    ) -> Vec<Option<f64>> {
+        grids.iter().map(|grid| self.blur_of_grid(fitter, images, grid, tags)).collect()
+    }
+
+    /// The optics that the grids of a picture share, given their blurs, as one level of the pyramid
+    /// shows them.
+    pub(in crate::detect) fn optics(
+        &self,
+        fitter: &mut CornerFitter,
+        (image, level): (ImageView, usize),
+        (grids, blurs): (&[Grid], &[Option<f64>]),
+        tags: &TagAreas,
+    ) -> Optics {
+        let mut known = self.known.clone();
+        if self.method() == Refinement::Polynomial {
+            return known;
+        }
+        if level > 0 {
+            // The blur of an enlarged picture is no Gaussian, which ink would explain.
+            known = known.with_ink_as_known();
+        }
+        let all: usize = grids.iter().map(|grid| grid.corners.len()).sum();
+        let every = all.div_ceil(2 * LOOKED_AT * SAMPLES).max(1);
+        let mut places = Vec::new();
+        for (grid, blur) in grids.iter().zip(blurs) {
+            let Some(blur_px) = blur.filter(|px| *px <= MAX_BLUR * self.largest_radius()) else {
+                continue;
+            };
+            let looked_at = (0..grid.corners.len()).step_by(every);
+            for (i, around) in looked_at.clone().zip(surroundings_of(grid, tags, 1.0, looked_at)) {
+                let (order, clear_px) = (places.len(), around.clear_square_px(blur_px));
+                places.push((order, clear_px, blur_px, grid.corners[i], around));
+            }
+        }
+        places.retain(|(_, clear_px, ..)| *clear_px >= MIN_MODEL_RADIUS as f64);
+        places.sort_by(|a, b| b.1.total_cmp(&a.1));
+        // Those with the most room lie where the board is nearest; light differs from there to elsewhere.
+        places.truncate(SAMPLES.max(places.len() / 2));
+        places.sort_by_key(|(order, ..)| *order);
+        let count = places.len();
+        let taken = (0..count.min(SAMPLES)).map(|i| &places[i * count / SAMPLES.min(count)]);
+        let samples = taken.filter_map(|(_, _, blur_px, corner, around)| {
+            let room = self.near(around, *blur_px, &self.known);
+            let place = corner.position();
+            let fit = self.model(fitter, image, place, room, None)?;
+            let window = self.window(image, place, room).into_owned();
+            Some(Sample {
+                window,
+                centre: place.round(),
+                corner: fit.corner,
+                residual: fit.residual,
+            })
+        });
+        let samples = samples.collect();
+        self.joint_optics(fitter, image, samples, &known)
+    }
+
+    /// Refines the corners of a grid in place, given its blur in px, and drops corners that are
+    /// spoilt.
+    pub(in crate::detect) fn refine_grid(
+        &self,
+        fitter: &mut CornerFitter,
+        image: ImageView,
+        grid: &mut Grid,
+        tags: &TagAreas,
+        (optics, blur_px): (&Optics, Option<f64>),
+    ) {
+        let known_px = blur_px.unwrap_or(USUAL_BLUR_PX);
+        let mut around = surroundings(grid, tags, 1.0);
+        let mut refined = self.refine_each(image, grid, &around, (known_px, optics));
+        let displaced = self.put_back(grid, &refined);
+        if displaced.contains(&true) {
+            around = surroundings(grid, tags, 1.0);
+            refined = self.refine_each(image, grid, &around, (known_px, optics));
+        }
+        let residuals: Vec<f64> =
+            refined.iter().filter_map(|(_, fit)| Some((*fit)?.residual)).collect();
+        let judged = is_judge(&refined);
+        // What the picture has in common takes away what it leaves at most corners, not at all.
+        let usual = median(residuals).unwrap_or(0.0).max(optics.plain_residual);
+        let limit = (MAX_RESIDUAL_RATIO * usual).max(MIN_RESIDUAL);
+        let (mut kept, mut fits) = (Vec::new(), Vec::new());
+        for (i, (corner, (refined, fit))) in grid.corners.iter().zip(refined).enumerate() {
+            if displaced[i] && fit.is_none() {
+                continue;
+            }
+            let room = self.whole(&around[i], known_px, optics);
+            let clean = fit.is_some_and(|fit| fit.residual <= limit);
+            let modelled =
+                || self.method() == Refinement::Model && self.has_room(image, corner, room);
+            let (refined, fit) = if clean || !judged || !modelled() {
+                (Some(refined), fit.filter(|_| clean))
+            } else {
+                // Where the model finds nothing, as at the rim of a cover, nothing is known of the position.
+                let smaller = self.clean_fit(fitter, image, corner, room, limit);
+                let found = smaller.or(fit.filter(|_| around[i].is_inner));
+                (found.map(Refined::from), found)
+            };
+            if let Some(Refined { position: DVec2 { x, y }, cov, .. }) = refined {
+                kept.push(GridCorner { x, y, cov, ..*corner });
+                fits.push(fit);
+            }
+        }
+        grid.corners = kept;
+        self.follow_bends(image, grid, &fits, limit, (tags, known_px, optics));
+    }
+
+    /// Fits the corners again with the curvature of the edges, which follows from their positions;
+    /// fits with a residual above `limit` do not count.
+    fn follow_bends(
+        &self,
+        image: ImageView,
+        grid: &mut Grid,
+        fits: &[Option<ModelFit>],
+        limit: f64,
+        (tags, blur_px, optics): (&TagAreas, f64, &Optics),
+    ) {
+        let around = surroundings(grid, tags, 1.0);
+        let fits = each(fits.len(), |fitter, i| {
+            let fit = fits[i].as_ref()?;
+            let room = self.whole(&around[i], blur_px, optics);
+            let bent = self.model(fitter, image, fit.position(), room, Some(fit));
+            bent.filter(|fit| fit.residual <= limit).or(Some(*fit))
+        });
+        let noises = fits.iter().flatten().map(ModelFit::noise).collect();
+        let usual = median(noises).unwrap_or(0.0);
+        let blurs: BTreeMap<Vertex, f64> = grid
+            .corners
+            .iter()
+            .zip(&fits)
+            .filter_map(|(c, fit)| Some((Vertex::new(c.row, c.col), fit.as_ref()?.blur_px())))
+            .collect();
+        let kind = grid.kind;
+        let settled = |(corner, fit): (&GridCorner, &Option<ModelFit>)| {
+            let Some(fit) = fit else { return Some(*corner) };
+            let here = Vertex::new(corner.row, corner.col);
+            let around = kind.steps().iter().filter_map(|&step| blurs.get(&(here + step)).copied());
+            let usual_px = median(around.collect()).unwrap_or(fit.blur_px());
+            let DVec2 { x, y } = fit.position();
+            let cov = fit.cov.map(|c| c * shape_of_residuals(fit, usual));
+            let is_known = cov[0] + cov[2] < WORST_SIGMA_PX * WORST_SIGMA_PX;
+            let is_corner = is_known && fit.blur_px() <= MAX_BLUR_RATIO * usual_px;
+            is_corner.then_some(GridCorner { x, y, cov: Some(cov), ..*corner })
+        };
+        grid.corners = grid.corners.iter().zip(&fits).filter_map(settled).collect();
+    }
+
+    /// Whether the clear area around a corner suffices for the model.
+    fn has_room(&self, image: ImageView, corner: &GridCorner, room: Room) -> bool {
+        self.window(image, corner.position(), room).count() >= MIN_PIXELS
+    }
+
+    /// Refines all corners of a grid, each by itself.
+    fn refine_each(
+        &self,
+        image: ImageView,
+        grid: &Grid,
+        around: &[Surroundings],
+        (blur_px, optics): (f64, &Optics),
+    ) -> Vec<(Refined, Option<ModelFit>)> {
+        each(grid.corners.len(), |fitter, i| {
+            let room = self.near(&around[i], blur_px, optics);
+            self.refine_within(fitter, image, grid.corners[i].position(), room)
+        })
+    }
+
+    /// Moves corners at which the model fails, although it fits most others, to the crossing of the
+    /// lines of their neighbours, if that is outside the range of the model: a cell of a tag was
+    /// taken for them. Returns which corners were moved.
+    fn put_back(&self, grid: &mut Grid, refined: &[(Refined, Option<ModelFit>)]) -> Vec<bool> {
+        let judged = is_judge(refined);
+        let place = |(corner, (_, fit)): (&GridCorner, &(_, Option<ModelFit>))| {
+            let lost = judged && fit.is_none();
+            let place = lost.then(|| crossing(grid, corner)).flatten()?;
+            (place.distance(corner.position()) > MAX_WAY_PX).then_some(place)
+        };
+        let places: Vec<_> = grid.corners.iter().zip(refined).map(place).collect();
+        for (corner, place) in grid.corners.iter_mut().zip(&places) {
+            corner.move_to(place.unwrap_or(corner.position()));
+        }
+        places.iter().map(Option::is_some).collect()
+    }
+
+    /// All of the clear area around a corner, in the largest window.
+    fn whole<'a>(&self, around: &'a Surroundings, blur_px: f64, optics: &'a Optics) -> Room<'a> {
+        Room { around, blur_px, reach_px: self.largest_radius(), optics }
+    }
+
+    /// The immediate surroundings of a corner, from which the edges are initialised.
+    fn near<'a>(&self, around: &'a Surroundings, blur_px: f64, optics: &'a Optics) -> Room<'a> {
+        let reach_px = REACH_PX.max(REACH_SIGMAS * blur_px).round().min(self.largest_radius());
+        Room { reach_px, ..self.whole(around, blur_px, optics) }
+    }
+
+    /// The blur of a grid, px: as the finest level of the pyramid shows it that shows enough of it.
+    fn blur_of_grid(
+        &self,
+        fitter: &mut CornerFitter,
+        (image, levels): (ImageView, &[Gray<i16>]),
+        grid: &Grid,
+        tags: &TagAreas,
+    ) -> Option<f64> {
+        // In a grid without tags nothing indicates that its tiles are not plain.
+        let plain = TagAreas::default();
+        let shown = if grid.tags.is_empty() { &plain } else { tags };
+        let most_px = MAX_BLUR * self.largest_radius();
+        let mut known = self.blur(fitter, image, 0, grid, shown);
+        for (n, level) in levels.iter().enumerate().skip(1) {
+            if known.is_some_and(|blur_px| blur_px <= most_px * f64::from(1u32 << (n - 1))) {
+                break;
+            }
+            known = self.blur(fitter, level.into(), n, grid, shown).or(known);
+        }
+        known
+    }
+
+    /// The blur of a grid as `image`, a level of its pyramid, shows it, px of level 0: the median over
+    /// the corners with the most room.
+    fn blur(
+        &self,
+        fitter: &mut CornerFitter,
+        image: ImageView,
+        level: usize,
+        grid: &Grid,
+        tags: &TagAreas,
+    ) -> Option<f64> {
+        let scale = f64::from(1u32 << level);
+        let every = grid.corners.len().div_ceil(LOOKED_AT * BLUR_CORNERS).max(1);
+        let looked_at = (0..grid.corners.len()).step_by(every);
+        let around = surroundings_of(grid, tags, scale, looked_at.clone()).into_iter();
+        let mut places: Vec<(f64, GridCorner, Surroundings)> = looked_at
+            .zip(around)
+            .map(|(i, around)| (around.clear_square_px(USUAL_BLUR_PX), grid.corners[i], around))
+            .collect();
+        places.sort_by(|a, b| b.0.total_cmp(&a.0));
+        let fits = places.iter().take(BLUR_CORNERS).filter_map(|(clear_px, corner, around)| {
+            let place = Pyramid::from_level_0(level, corner.position());
+            // What is a wave shows in the middle of the tiles.
+            let reach_px = clear_px.max(MIN_MODEL_RADIUS as f64).floor();
+            let room = Room { around, blur_px: USUAL_BLUR_PX, reach_px, optics: &self.known };
+            self.model(fitter, image, place, room, None).map(|fit| scale * fit.blur_px())
+        });
+        median(fits.collect())
+    }
+
+    /// The model in the largest window smaller than that of `room` that leaves no more than `limit`.
+    fn clean_fit(
+        &self,
+        fitter: &mut CornerFitter,
+        image: ImageView,
+        corner: &GridCorner,
+        room: Room,
+        limit: f64,
+    ) -> Option<ModelFit> {
+        let least = MIN_MODEL_RADIUS as f64;
+        let first = room.clear_square_px();
+        let sides = std::iter::successors(Some(first), |side| Some(NEXT_WINDOW * side));
+        let sides =
+            sides.take_while(|&side| side / NEXT_WINDOW > least).map(|side| side.max(least));
+        let mut fits = sides.filter_map(|side| {
+            let room = Room { reach_px: side.floor(), ..room };
+            self.model(fitter, image, corner.position(), room, None)
+        });
+        fits.find(|fit| fit.residual <= limit)
+    }
+}
+
+/// The results of `work` for corners 0 to `count` − 1, in order, on the threads of the current
+/// pool.
+fn each<F: Send>(count: usize, work: impl Fn(&mut CornerFitter, usize) -> F + Sync) -> Vec<F> {
+    let parts = (0..count).into_par_iter().with_min_len(PART);
+    parts.map_init(CornerFitter::default, |fitter, i| work(fitter, i)).collect()
+}
+
+/// The level of the pyramid, of `levels`, on which a picture is refined: the coarsest on which its
+/// sharpest grid is no sharper than [`SHARP_PX`]. On the finest level an enlarged picture shows
+/// little but the middle of the edges, and noise is correlated over all pixels of the window.
+pub(in crate::detect) fn sharp_level(blurs: &[Option<f64>], levels: usize) -> usize {
+    let is_sampled_on = |&level: &usize| is_sampled(blurs, 1.0 / f64::from(1u32 << level));
+    (1..levels).rfind(is_sampled_on).unwrap_or(0)
+}
+
+/// Whether the sharpest grid is no sharper than [`SHARP_PX`] where its blur is `part` of the whole.
+pub(in crate::detect) fn is_sampled(blurs: &[Option<f64>], part: f64) -> bool {
+    let sharpest = blurs.iter().copied().flatten().reduce(f64::min);
+    sharpest.is_some_and(|blur_px| part * blur_px >= SHARP_PX)
+}
+
+/// Factor of the covariance of a corner for systematic residuals: those beyond the usual noise of
+/// the grid show something in the picture, such as glare or the rim of a cover, and neighbouring
+/// pixels then are not independent. Residuals with the correlation r between neighbours, in rows
+/// and in columns, count as ((1 + r)/(1 − r))² times their variance.
+fn shape_of_residuals(fit: &ModelFit, usual_noise: f64) -> f64 {
+    let share = 1.0 - (UNUSUAL * usual_noise / fit.noise()).powi(2);
+    let correlation = (1.0 - fit.whiteness).clamp(0.0, MOST_CORRELATED);
+    let together = ((1.0 + correlation) / (1.0 - correlation)).powi(2);
+    1.0 + share.max(0.0) * (together - 1.0)
+}
+
+/// Whether the model fits most corners of a grid. It cannot fit edges as sharp as pixels, and must
+/// not judge corners then.
+fn is_judge(refined: &[(Refined, Option<ModelFit>)]) -> bool {
+    let fitted = refined.iter().filter(|(_, fit)| fit.is_some()).count();
+    2 * fitted > refined.len()
+}
