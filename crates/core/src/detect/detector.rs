@@ -3,44 +3,33 @@
 use std::collections::BTreeMap;
 use std::time::Duration;
 
-use crate::detect::grid::beyond::go_on;
-use crate::detect::refine::clearance::TagAreas;
-use crate::detect::refine::corner_model::CornerFitter;
-use crate::detect::detection::tone::Tone;
-use crate::detect::detection::values::{Detection, Grid};
-use crate::detect::grid::foreshortened::foreshortened_grids;
-use crate::detect::grid::grow::{SaddleGrid, grids};
-use crate::detect::detection::ink::{Ink, InkEstimate};
-use crate::detect::labels::evidence::Budget;
-use crate::detect::labels::assignment::{FoundGrid, Labels, MOST_CORNERS, report_once};
-use crate::detect::refine::optics::Optics;
-use crate::detect::detection::reason::{Reason, ReasonKind};
-use crate::detect::refine::refiner::{Refinement, Refiner};
-use crate::detect::refine::refine_grid::{is_sampled, sharp_level};
-use crate::detect::corners::saddles::{SaddleFinder, too_many};
+use super::config::{
+    DetectorConfig, MIN_LEVEL_SIDE, MIN_UNTAGGED_EDGE_PX, PYRAMID_LEVELS, levels_of,
+};
 use super::scene::{SceneError, check_detectable, check_distinct};
-use crate::detect::grid::tile_shape::is_of_squares;
 use super::tiling::{CHECKER, DELTILLE, kind, step};
 use super::why;
 use crate::Clock;
+use crate::detect::corners::saddles::{SaddleFinder, too_many};
+use crate::detect::detection::ink::{Ink, InkEstimate};
+use crate::detect::detection::reason::{Reason, ReasonKind};
+use crate::detect::detection::values::{Detection, Grid};
+use crate::detect::grid::beyond::go_on;
+use crate::detect::grid::foreshortened::foreshortened_grids;
+use crate::detect::grid::grow::grids;
+use crate::detect::grid::saddle_grid::SaddleGrid;
+use crate::detect::grid::tile_shape::is_of_squares;
+use crate::detect::labels::assignment::{FoundGrid, Labels, MOST_CORNERS, report_once};
+use crate::detect::labels::evidence::Budget;
+use crate::detect::refine::clearance::TagAreas;
+use crate::detect::refine::corner_model::CornerFitter;
+use crate::detect::refine::optics::Optics;
+use crate::detect::refine::refine_grid::{is_sampled, sharp_level};
+use crate::detect::refine::refiner::Refiner;
 use crate::family::{Family, FamilyError};
 use crate::lattice::GridKind;
 use crate::raster::{FileNotes, Gray, ImageView, PYRAMID_FULL_SCALE, Pyramid};
 use crate::targets::{Target, TargetIdentity, least_untagged_corners};
-
-/// Most levels of the pyramid that every image has: the coarsest sees four times the blur that the finest can.
-const PYRAMID_LEVELS: usize = 3;
-
-/// Larger images have more, as long as a level is no narrower than this: an enlarged or blurred image
-/// shows no less than a small one, where a dozen corners in line are ten pixels apart.
-const MIN_FURTHER_SIDE: usize = 150;
-
-/// A level narrower than this shows no grid.
-pub(super) const MIN_LEVEL_SIDE: usize = 24;
-
-/// The median edge of a grid that no tag vouches for is no shorter than this, px. Blur leaves nothing
-/// of smaller tiles but their fundamental wave, and that is the same for squares, dots and threads.
-pub(super) const MIN_UNTAGGED_EDGE_PX: f64 = 7.0;
 
 /// Nor is its blur a larger part of the edge. It leaves less than a tenth of the next wave, and in the
 /// wave by itself the model reads a blur of 0.25 of the edge, of three waves 0.155.
@@ -56,61 +45,6 @@ const MOST_REASONS: usize = 3;
 
 /// A grid of the other tiling with fewer corners is no reason to ask whether that was meant.
 const LEAST_OTHER_CORNERS: usize = 20;
-
-/// Settings of a detector.
-///
-/// ```
-/// use deltille_core::detect::{DetectorConfig, Tone};
-///
-/// let config = DetectorConfig::default().tone(Tone::Linear).max_bit_errors(Some(1));
-/// ```
-#[derive(Clone, Debug, Default, PartialEq)]
-#[non_exhaustive]
-pub struct DetectorConfig {
-    /// Most bits of a tag that may be corrected; `None` for ⌊(h − 1)/2⌋, where h is the distance of its family.
-    pub max_bit_errors: Option<u32>,
-    /// Whether grids seen as in a mirror get labels too. They are those of the print, and belong to no
-    /// camera that looks at it: use them only to find out what was mirrored.
-    pub allow_mirrored: bool,
-    /// How the positions of corners are refined.
-    pub refinement: Refinement,
-    /// The camera's tone curve.
-    pub tone: Tone,
-    /// How far ink has spread on the print.
-    pub ink: Ink,
-}
-
-impl DetectorConfig {
-    /// With as many bits of a tag corrected, at most; see [`Self::max_bit_errors`].
-    #[must_use]
-    pub fn max_bit_errors(self, max_bit_errors: Option<u32>) -> Self {
-        Self { max_bit_errors, ..self }
-    }
-
-    /// With labels for grids seen as in a mirror, or without; see [`Self::allow_mirrored`].
-    #[must_use]
-    pub fn allow_mirrored(self, allow_mirrored: bool) -> Self {
-        Self { allow_mirrored, ..self }
-    }
-
-    /// With positions of corners refined like this.
-    #[must_use]
-    pub fn refinement(self, refinement: Refinement) -> Self {
-        Self { refinement, ..self }
-    }
-
-    /// With the camera's tone curve.
-    #[must_use]
-    pub fn tone(self, tone: Tone) -> Self {
-        Self { tone, ..self }
-    }
-
-    /// With the spread of ink on the print.
-    #[must_use]
-    pub fn ink(self, ink: Ink) -> Self {
-        Self { ink, ..self }
-    }
-}
 
 /// A level on which the whole board is looked for has so many pixels for each of its corners: where the board covers a
 /// third of the picture, its edges are 18 px long there.
@@ -768,13 +702,6 @@ fn refiner(kind: GridKind, config: DetectorConfig, edge_mm: Option<f64>) -> Refi
     Refiner::with_radii(kind, config.refinement, POLYNOMIAL_RADIUS, MODEL_RADIUS)
         .with_tone(config.tone)
         .with_ink(ink)
-}
-
-/// Number of levels of an image's pyramid.
-pub(super) fn levels_of(image: ImageView) -> usize {
-    let side = image.width().min(image.height());
-    let fitting = (side / MIN_FURTHER_SIDE).checked_ilog2().unwrap_or(0) as usize + 1;
-    fitting.max(PYRAMID_LEVELS)
 }
 
 /// Stopwatch of the stages.

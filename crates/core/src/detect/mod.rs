@@ -24,6 +24,7 @@
 //!
 //! Both tilings go the same way; `tiling` says where they differ.
 
+mod config;
 mod corners;
 mod detection;
 mod detector;
@@ -37,15 +38,16 @@ mod scene;
 mod tiling;
 mod why;
 
-pub use refine::corner_model::SLOPE_PRIOR;
+pub use config::DetectorConfig;
+pub use detection::ink::{Ink, InkEstimate};
+pub use detection::reason::{Reason, ReasonKind};
 pub use detection::tone::{Tone, ToneEstimate};
 pub use detection::values::{DecodedTag, Detection, Grid, GridCorner};
-pub use detector::{Detector, DetectorConfig};
-pub use detection::ink::{Ink, InkEstimate};
+pub use detector::Detector;
 pub use planning::proposal::{Proposal, Situation, Unsuited};
 pub use planning::reach::Reach;
-pub use detection::reason::{Reason, ReasonKind};
+pub use planning::watch::{Glance, Watch};
 pub use recognise::{Recognised, Recogniser};
+pub use refine::corner_model::SLOPE_PRIOR;
 pub use refine::refiner::{MAX_WINDOW_PX, RefineStatus, Refined, Refinement, Refiner};
 pub use scene::{SceneError, check_distinct};
-pub use planning::watch::{Glance, Watch};

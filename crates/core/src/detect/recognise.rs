@@ -7,12 +7,14 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use super::detector::{Detector, DetectorConfig, MIN_LEVEL_SIDE, levels_of};
-use crate::detect::grid::grow::{SaddleGrid, grids};
-use crate::detect::labels::evidence::panel_from_grid;
-use crate::detect::corners::saddles::SaddleFinder;
-use crate::detect::labels::tags::{Read, TagPlace, TagReader};
+use super::config::{DetectorConfig, MIN_LEVEL_SIDE, levels_of};
+use super::detector::Detector;
 use super::tiling::{CHECKER, DELTILLE, kind};
+use crate::detect::corners::saddles::SaddleFinder;
+use crate::detect::grid::grow::grids;
+use crate::detect::grid::saddle_grid::SaddleGrid;
+use crate::detect::labels::evidence::panel_from_grid;
+use crate::detect::labels::tags::{Read, TagPlace, TagReader};
 use crate::family::{Decoder, Family};
 use crate::lattice::{GridKind, LatticeMap, Tile, Vertex};
 use crate::raster::{ImageView, Pyramid};

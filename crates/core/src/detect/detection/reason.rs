@@ -85,7 +85,10 @@ impl ReasonKind {
 
 impl Reason {
     /// A reason with what was measured.
-    pub(in crate::detect) fn new<const N: usize>(kind: ReasonKind, figures: [(&str, f64); N]) -> Self {
+    pub(in crate::detect) fn new<const N: usize>(
+        kind: ReasonKind,
+        figures: [(&str, f64); N],
+    ) -> Self {
         Self::of(kind, figures)
     }
 

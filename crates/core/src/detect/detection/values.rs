@@ -3,9 +3,9 @@ use std::collections::BTreeMap;
 use glam::DVec2;
 use serde::{Deserialize, Serialize};
 
-use super::tone::ToneEstimate;
 use super::ink::InkEstimate;
 use super::reason::Reason;
+use super::tone::ToneEstimate;
 use crate::lattice::GridKind;
 use crate::quantity;
 use crate::raster::{FileNotes, Pyramid};

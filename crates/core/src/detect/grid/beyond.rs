@@ -20,8 +20,8 @@ use std::collections::BTreeMap;
 
 use glam::DVec2;
 
-use crate::detect::corners::buckets::Buckets;
 use super::checker_tiles::{CheckerTiles, Point, Square, moved};
+use crate::detect::corners::buckets::Buckets;
 use crate::detect::detection::values::Grid;
 use crate::detect::tiling::{CHECKER, step};
 use crate::lattice::{GridKind, Vertex};
@@ -166,8 +166,8 @@ fn times(step: Vertex, count: i32) -> Vertex {
 
 #[cfg(test)]
 mod tests {
-    use crate::detect::GridCorner;
     use super::*;
+    use crate::detect::GridCorner;
 
     const EDGE_PX: f64 = 20.0;
 

@@ -150,8 +150,8 @@ fn is_clean_along<const N: usize>(
 
 #[cfg(test)]
 mod tests {
-    use crate::detect::corners::sectors::Sectors;
     use super::*;
+    use crate::detect::corners::sectors::Sectors;
     use crate::raster::Gray;
 
     /// Dark above the arc y = 50 + bulge, bright below; corners at x = 20 and x = 80.

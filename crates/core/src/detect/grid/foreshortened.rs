@@ -15,8 +15,9 @@ use glam::DVec2;
 use nalgebra::{Matrix2, Vector2};
 use rayon::prelude::*;
 
-use crate::detect::detector::MIN_LEVEL_SIDE;
-use super::grow::{SaddleGrid, grids};
+use super::grow::grids;
+use super::saddle_grid::SaddleGrid;
+use crate::detect::config::MIN_LEVEL_SIDE;
 use crate::detect::corners::saddles::{SaddleFinder, is_all_noise};
 use crate::raster::{Gray, Pyramid};
 

@@ -14,7 +14,6 @@ use std::collections::{BTreeMap, BTreeSet, HashSet, VecDeque};
 
 use glam::DVec2;
 
-use crate::detect::corners::buckets::Buckets;
 use super::edge::{MAX_CHORD_RAD, is_clean_somehow};
 use super::effort::Effort;
 use super::links::{Link, Links, facing_ray, links};
@@ -22,6 +21,8 @@ use super::local_map::{Bend, LocalMap};
 use super::outline::WholeBoard;
 use super::parts::join;
 use super::rectified::Rectified;
+use super::saddle_grid::{Growing, GrownSaddle, PlacedSaddle, SaddleGrid};
+use crate::detect::corners::buckets::Buckets;
 use crate::detect::corners::saddles::{Saddle, SaddleFinder, merge_px, too_many};
 use crate::detect::corners::sectors::turn;
 use crate::detect::tiling::{kind, neighbours, step, tiles_from};
@@ -47,37 +48,6 @@ struct Place {
     /// Ray k points along step `k + turn` (mod N) of the lattice.
     turn: usize,
 }
-
-/// A corner of either tiling, as later stages need it.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct PlacedSaddle {
-    /// Position, px.
-    pub position: DVec2,
-    /// Half the difference of the grey values of bright and dark tiles around it.
-    pub amplitude: f64,
-}
-
-/// Corners by lattice vertex.
-pub type SaddleGrid = BTreeMap<Vertex, PlacedSaddle>;
-
-/// A corner in a grid while it grows.
-#[derive(Clone, Copy, Debug)]
-pub struct GrownSaddle<const N: usize> {
-    /// The corner.
-    pub saddle: Saddle<N>,
-    /// Ray k points along step `k + turn` (mod N) of the lattice.
-    pub turn: usize,
-}
-
-impl<const N: usize> GrownSaddle<N> {
-    /// Index of the ray along step `k` of the lattice.
-    pub fn ray(&self, k: usize) -> usize {
-        (k + N - self.turn) % N
-    }
-}
-
-/// A grid while it grows.
-pub type Growing<const N: usize> = BTreeMap<Vertex, GrownSaddle<N>>;
 
 /// All grids among the saddle points, by lattice vertex, those with most corners first. There are none
 /// where there are more saddle points than any board has. Corners that were not detected are sought
@@ -538,8 +508,8 @@ mod tests {
     use proptest::collection::vec;
     use proptest::prelude::*;
 
-    use crate::detect::tiling::{CHECKER, DELTILLE};
     use super::*;
+    use crate::detect::tiling::{CHECKER, DELTILLE};
     use crate::lattice::GridKind;
 
     /// A lattice of rows and columns about a place, with edges of this length, px.

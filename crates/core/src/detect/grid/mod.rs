@@ -1,6 +1,6 @@
 //! From corners to grids: which corner follows which, without labels.
 //!
-//! Comes in: corners with their half-edges. Goes out: grids ([`grow::SaddleGrid`]), lattice coordinates up to a motion.
+//! Comes in: corners with their half-edges. Goes out: grids ([`saddle_grid::SaddleGrid`]), lattice coordinates up to a motion.
 //!
 //! 1. `links` joins corners along clean edges (`edge`), by their neighbourhood (`places`).
 //! 2. `grow` starts from four corners, grows tile by tile and fills the gaps, where tiles are narrow in the frame of their
@@ -22,4 +22,5 @@ pub(in crate::detect) mod outline;
 pub(in crate::detect) mod parts;
 pub(in crate::detect) mod places;
 pub(in crate::detect) mod rectified;
+pub(in crate::detect) mod saddle_grid;
 pub(in crate::detect) mod tile_shape;

@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use glam::DVec2;
 
-use super::grow::SaddleGrid;
+use super::saddle_grid::SaddleGrid;
 use crate::lattice::{GridKind, LatticeMap, Vertex};
 
 /// All corners of the one board that is looked for.
@@ -110,8 +110,8 @@ pub fn fit_rectangle(
 mod tests {
     use proptest::prelude::*;
 
-    use crate::detect::grid::grow::PlacedSaddle;
     use super::*;
+    use crate::detect::grid::saddle_grid::PlacedSaddle;
 
     /// A board seen upright: the lower left vertex of the print is `low`, one pixel a column.
     fn board(rows: i32, cols: i32, low: Vertex, turns: u8) -> SaddleGrid {

@@ -10,12 +10,12 @@ use std::collections::BTreeMap;
 
 use glam::DVec2;
 
-use crate::detect::corners::buckets::Buckets;
 use super::edge::{MAX_CHORD_RAD, is_clean};
 use super::effort::Effort;
-use super::grow::{Growing, GrownSaddle};
 use super::links::MAX_CONTRAST_RATIO;
 use super::local_map::{Bend, LocalMap};
+use super::saddle_grid::{Growing, GrownSaddle};
+use crate::detect::corners::buckets::Buckets;
 use crate::detect::corners::saddles::Saddle;
 use crate::detect::corners::sectors::turn;
 use crate::detect::tiling::{kind, neighbours, step};

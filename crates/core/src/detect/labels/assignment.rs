@@ -7,12 +7,12 @@
 use std::collections::btree_map::Entry;
 use std::collections::{BTreeMap, BTreeSet};
 
-use crate::detect::detection::values::{DecodedTag, Grid, GridCorner};
-use crate::detect::detector::DetectorConfig;
-use crate::detect::grid::grow::SaddleGrid;
 use super::evidence::{Budget, Labelled, TagLabeller};
-use crate::detect::grid::outline::{WholeBoard, fit_outline, fit_rectangle};
+use crate::detect::config::DetectorConfig;
 use crate::detect::detection::reason::{Reason, ReasonKind};
+use crate::detect::detection::values::{DecodedTag, Grid, GridCorner};
+use crate::detect::grid::outline::{WholeBoard, fit_outline, fit_rectangle};
+use crate::detect::grid::saddle_grid::SaddleGrid;
 use crate::detect::why;
 use crate::family::Family;
 use crate::lattice::{GridKind, LatticeMap, Vertex};

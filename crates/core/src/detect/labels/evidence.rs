@@ -50,11 +50,11 @@
 
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 
-use crate::detect::detection::values::DecodedTag;
-use crate::detect::grid::grow::SaddleGrid;
 use super::assignment::mirrored;
 use super::tag_words::TargetWords;
 use super::tags::{Read, Reading, TagPlace, TagReader};
+use crate::detect::detection::values::DecodedTag;
+use crate::detect::grid::saddle_grid::SaddleGrid;
 use crate::family::{Decoder, Family, NaturalWords};
 use crate::lattice::{GridKind, LatticeMap, Orientation, Tile, Vertex};
 use crate::raster::ImageView;
@@ -872,8 +872,8 @@ mod tests {
     use glam::{DVec2, DVec3};
     use rayon::prelude::*;
 
-    use crate::detect::grid::grow::PlacedSaddle;
     use super::*;
+    use crate::detect::grid::saddle_grid::PlacedSaddle;
     use crate::family::{shipped_names, square_names};
     use crate::targets::{BoardSpec, PaperSpec, SolidShape, SolidSpec, TagSpec, TargetSpec};
 

@@ -18,8 +18,8 @@ use std::collections::BTreeMap;
 use glam::DVec2;
 use nalgebra::{Matrix3, Vector3};
 
+use crate::detect::grid::saddle_grid::SaddleGrid;
 use crate::detect::refine::blurred_corner::erf_sqrt_half;
-use crate::detect::grid::grow::SaddleGrid;
 use crate::lattice::{GridKind, Tile, Vertex};
 use crate::raster::ImageView;
 

@@ -5,9 +5,9 @@ use std::collections::BTreeMap;
 use glam::DVec2;
 
 use super::grid_light::{ClearDepth, GridLight};
-use crate::detect::grid::grow::SaddleGrid;
 use super::soft_cells::{CellModel, Mixings, Sample, TileBlur, in_tile};
 use super::tile_map::TileMap;
+use crate::detect::grid::saddle_grid::SaddleGrid;
 use crate::family::Family;
 use crate::lattice::{GridKind, Tile, Vertex};
 use crate::raster::ImageView;

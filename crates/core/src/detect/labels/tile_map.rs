@@ -1,7 +1,7 @@
 use glam::DVec2;
 use nalgebra::{RowVector2, SMatrix, SVector};
 
-use crate::detect::grid::grow::SaddleGrid;
+use crate::detect::grid::saddle_grid::SaddleGrid;
 use crate::lattice::{Tile, Vertex};
 
 /// Weight of a tile's own corners in the fit; the surroundings only bend the map.
@@ -102,7 +102,7 @@ fn tile_coordinates([a, b, _]: [Vertex; 3], vertex: Vertex) -> DVec2 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::detect::grid::grow::PlacedSaddle;
+    use crate::detect::grid::saddle_grid::PlacedSaddle;
     use crate::lattice::GridKind;
 
     /// Tiles of an AprilGrid, seen straight: the middle of each is in its middle, at the rim of the grid too.

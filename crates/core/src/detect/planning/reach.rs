@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-use crate::detect::detector::MIN_UNTAGGED_EDGE_PX;
+use crate::detect::config::MIN_UNTAGGED_EDGE_PX;
 use crate::family::Family;
 use crate::targets::{Target, TargetSpec};
 

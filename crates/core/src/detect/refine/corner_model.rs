@@ -36,10 +36,10 @@ use super::blurred_corner::{
     SweptDeltille, Triangle,
 };
 use super::correlation::Influence;
+use super::optics::{INK_UNIT, Optics, PARAMS as COMMON_PARAMS, STEP, Spread};
+use super::small_systems::solved;
 use crate::detect::detection::tone::{Piece, TONE_PARAMS};
 use crate::detect::lanes::LANES;
-use super::optics::{INK_UNIT, Optics, STEP, Spread};
-use super::small_systems::solved;
 use crate::raster::ImageView;
 
 /// Largest radius of a window, px.
@@ -298,7 +298,7 @@ pub(in crate::detect) enum Common {
 
 /// Parameters that are the corner's, and those of the optics behind them.
 pub(in crate::detect) const OWN: usize = PARAMS;
-pub(in crate::detect) const COMMON: usize = TONE_PARAMS + 4;
+pub(in crate::detect) const COMMON: usize = COMMON_PARAMS;
 const UNKNOWNS: usize = OWN + COMMON;
 
 /// The normal equations of a corner and the optics.

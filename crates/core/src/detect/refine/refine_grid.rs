@@ -15,9 +15,10 @@ use rayon::prelude::*;
 
 use super::clearance::{Surroundings, TagAreas, crossing, surroundings, surroundings_of};
 use super::corner_model::{CornerFitter, MAX_WAY_PX};
-use crate::detect::detection::values::{Grid, GridCorner};
-use super::optics::{Optics, REACH_PX, REACH_SIGMAS, SAMPLES, Sample};
+use super::optics::Optics;
 use super::refiner::{MIN_MODEL_RADIUS, MIN_PIXELS, ModelFit, Refined, Refinement, Refiner, Room};
+use super::shared_optics::{REACH_PX, REACH_SIGMAS, SAMPLES, Sample};
+use crate::detect::detection::values::{Grid, GridCorner};
 use crate::lattice::Vertex;
 use crate::raster::{Gray, ImageView, Pyramid};
 use crate::statistics::median;

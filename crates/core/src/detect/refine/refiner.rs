@@ -23,9 +23,10 @@ use glam::DVec2;
 use super::clearance::{Edge, NOTHING, Surroundings};
 use super::corner_model::{Accuracy, Corner, CornerFitter, Fitted, MAX_RADIUS, Window};
 use super::corner_start::{start, start_along};
-use crate::detect::detection::tone::Tone;
-use super::optics::{Optics, SAMPLES, Sample};
+use super::optics::Optics;
+use super::shared_optics::{SAMPLES, Sample};
 use crate::detect::corners::polynomial::Polynomial;
+use crate::detect::detection::tone::Tone;
 use crate::lattice::GridKind;
 use crate::raster::ImageView;
 
@@ -388,7 +389,12 @@ impl Refiner {
     }
 
     /// The pixels of a corner's room.
-    pub(in crate::detect) fn window(&self, image: ImageView, position: DVec2, room: Room) -> Cow<'_, Window> {
+    pub(in crate::detect) fn window(
+        &self,
+        image: ImageView,
+        position: DVec2,
+        room: Room,
+    ) -> Cow<'_, Window> {
         let radius = room.reach_px.min(self.largest_radius());
         let is_whole = radius <= room.clear_square_px().min(distance_to_rim(image, position));
         let whole = self.windows.iter().find(|w| w.radius() as f64 == radius && is_whole);

@@ -1,0 +1,82 @@
+//! Settings of a detector, and the least that it looks for in any image.
+
+use super::detection::ink::Ink;
+use super::detection::tone::Tone;
+use super::refine::refiner::Refinement;
+use crate::raster::ImageView;
+
+/// Most levels of the pyramid that every image has: the coarsest sees four times the blur that the finest can.
+pub(super) const PYRAMID_LEVELS: usize = 3;
+
+/// Larger images have more, as long as a level is no narrower than this: an enlarged or blurred image
+/// shows no less than a small one, where a dozen corners in line are ten pixels apart.
+const MIN_FURTHER_SIDE: usize = 150;
+
+/// A level narrower than this shows no grid.
+pub(super) const MIN_LEVEL_SIDE: usize = 24;
+
+/// The median edge of a grid that no tag vouches for is no shorter than this, px. Blur leaves nothing
+/// of smaller tiles but their fundamental wave, and that is the same for squares, dots and threads.
+pub(super) const MIN_UNTAGGED_EDGE_PX: f64 = 7.0;
+
+/// Settings of a detector.
+///
+/// ```
+/// use deltille_core::detect::{DetectorConfig, Tone};
+///
+/// let config = DetectorConfig::default().tone(Tone::Linear).max_bit_errors(Some(1));
+/// ```
+#[derive(Clone, Debug, Default, PartialEq)]
+#[non_exhaustive]
+pub struct DetectorConfig {
+    /// Most bits of a tag that may be corrected; `None` for ⌊(h − 1)/2⌋, where h is the distance of its family.
+    pub max_bit_errors: Option<u32>,
+    /// Whether grids seen as in a mirror get labels too. They are those of the print, and belong to no
+    /// camera that looks at it: use them only to find out what was mirrored.
+    pub allow_mirrored: bool,
+    /// How the positions of corners are refined.
+    pub refinement: Refinement,
+    /// The camera's tone curve.
+    pub tone: Tone,
+    /// How far ink has spread on the print.
+    pub ink: Ink,
+}
+
+impl DetectorConfig {
+    /// With as many bits of a tag corrected, at most; see [`Self::max_bit_errors`].
+    #[must_use]
+    pub fn max_bit_errors(self, max_bit_errors: Option<u32>) -> Self {
+        Self { max_bit_errors, ..self }
+    }
+
+    /// With labels for grids seen as in a mirror, or without; see [`Self::allow_mirrored`].
+    #[must_use]
+    pub fn allow_mirrored(self, allow_mirrored: bool) -> Self {
+        Self { allow_mirrored, ..self }
+    }
+
+    /// With positions of corners refined like this.
+    #[must_use]
+    pub fn refinement(self, refinement: Refinement) -> Self {
+        Self { refinement, ..self }
+    }
+
+    /// With the camera's tone curve.
+    #[must_use]
+    pub fn tone(self, tone: Tone) -> Self {
+        Self { tone, ..self }
+    }
+
+    /// With the spread of ink on the print.
+    #[must_use]
+    pub fn ink(self, ink: Ink) -> Self {
+        Self { ink, ..self }
+    }
+}
+
+/// Number of levels of an image's pyramid.
+pub(super) fn levels_of(image: ImageView) -> usize {
+    let side = image.width().min(image.height());
+    let fitting = (side / MIN_FURTHER_SIDE).checked_ilog2().unwrap_or(0) as usize + 1;
+    fitting.max(PYRAMID_LEVELS)
+}

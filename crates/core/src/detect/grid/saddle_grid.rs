@@ -1,0 +1,39 @@
+//! A grid of corners: while it grows, with the half-edges of each corner, and as later stages need it.
+
+use std::collections::BTreeMap;
+
+use glam::DVec2;
+
+use crate::detect::corners::saddles::Saddle;
+use crate::lattice::Vertex;
+
+/// A corner of either tiling, as later stages need it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PlacedSaddle {
+    /// Position, px.
+    pub position: DVec2,
+    /// Half the difference of the grey values of bright and dark tiles around it.
+    pub amplitude: f64,
+}
+
+/// Corners by lattice vertex.
+pub type SaddleGrid = BTreeMap<Vertex, PlacedSaddle>;
+
+/// A corner in a grid while it grows.
+#[derive(Clone, Copy, Debug)]
+pub struct GrownSaddle<const N: usize> {
+    /// The corner.
+    pub saddle: Saddle<N>,
+    /// Ray k points along step `k + turn` (mod N) of the lattice.
+    pub turn: usize,
+}
+
+impl<const N: usize> GrownSaddle<N> {
+    /// Index of the ray along step `k` of the lattice.
+    pub fn ray(&self, k: usize) -> usize {
+        (k + N - self.turn) % N
+    }
+}
+
+/// A grid while it grows.
+pub type Growing<const N: usize> = BTreeMap<Vertex, GrownSaddle<N>>;
