@@ -3,17 +3,6 @@
 use super::detection::ink::Ink;
 use super::detection::tone::Tone;
 use super::refine::refiner::Refinement;
-use crate::raster::ImageView;
-
-/// Most levels of the pyramid that every image has: the coarsest sees four times the blur that the finest can.
-pub(super) const PYRAMID_LEVELS: usize = 3;
-
-/// Larger images have more, as long as a level is no narrower than this: an enlarged or blurred image
-/// shows no less than a small one, where a dozen corners in line are ten pixels apart.
-const MIN_FURTHER_SIDE: usize = 150;
-
-/// A level narrower than this shows no grid.
-pub(super) const MIN_LEVEL_SIDE: usize = 24;
 
 /// The median edge of a grid that no tag vouches for is no shorter than this, px. Blur leaves nothing
 /// of smaller tiles but their fundamental wave, and that is the same for squares, dots and threads.
@@ -72,11 +61,4 @@ impl DetectorConfig {
     pub fn ink(self, ink: Ink) -> Self {
         Self { ink, ..self }
     }
-}
-
-/// Number of levels of an image's pyramid.
-pub(super) fn levels_of(image: ImageView) -> usize {
-    let side = image.width().min(image.height());
-    let fitting = (side / MIN_FURTHER_SIDE).checked_ilog2().unwrap_or(0) as usize + 1;
-    fitting.max(PYRAMID_LEVELS)
 }

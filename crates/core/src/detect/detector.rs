@@ -3,12 +3,11 @@
 use std::collections::BTreeMap;
 use std::time::Duration;
 
-use super::config::{
-    DetectorConfig, MIN_LEVEL_SIDE, MIN_UNTAGGED_EDGE_PX, PYRAMID_LEVELS, levels_of,
-};
+use super::config::{DetectorConfig, MIN_UNTAGGED_EDGE_PX};
+use super::labels::why;
+use super::levels::{MIN_LEVEL_SIDE, PYRAMID_LEVELS, levels_of};
 use super::scene::{SceneError, check_detectable, check_distinct};
 use super::tiling::{CHECKER, DELTILLE, kind, step};
-use super::why;
 use crate::Clock;
 use crate::detect::corners::saddles::{SaddleFinder, too_many};
 use crate::detect::detection::ink::{Ink, InkEstimate};

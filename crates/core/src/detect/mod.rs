@@ -31,12 +31,12 @@ mod detector;
 mod grid;
 mod labels;
 mod lanes;
+mod levels;
 mod planning;
 mod recognise;
 mod refine;
 mod scene;
 mod tiling;
-mod why;
 
 pub use config::DetectorConfig;
 pub use detection::ink::{Ink, InkEstimate};

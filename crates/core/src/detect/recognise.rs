@@ -7,8 +7,9 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use super::config::{DetectorConfig, MIN_LEVEL_SIDE, levels_of};
+use super::config::DetectorConfig;
 use super::detector::Detector;
+use super::levels::{MIN_LEVEL_SIDE, levels_of};
 use super::tiling::{CHECKER, DELTILLE, kind};
 use crate::detect::corners::saddles::SaddleFinder;
 use crate::detect::grid::grow::grids;

@@ -17,8 +17,8 @@ use rayon::prelude::*;
 
 use super::grow::grids;
 use super::saddle_grid::SaddleGrid;
-use crate::detect::config::MIN_LEVEL_SIDE;
 use crate::detect::corners::saddles::{SaddleFinder, is_all_noise};
+use crate::detect::levels::MIN_LEVEL_SIDE;
 use crate::raster::{Gray, Pyramid};
 
 /// Directions in a half-turn: none is more than 15° from one of them, where half the width leaves tiles that are four

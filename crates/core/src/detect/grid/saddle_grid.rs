@@ -19,6 +19,17 @@ pub struct PlacedSaddle {
 /// Corners by lattice vertex.
 pub type SaddleGrid = BTreeMap<Vertex, PlacedSaddle>;
 
+/// Where a vertex lies in the mirror: rows and columns are exchanged, which leaves upright tiles upright and
+/// dark squares dark.
+pub fn mirrored(vertex: Vertex) -> Vertex {
+    Vertex::new(vertex.col, vertex.row)
+}
+
+/// A grid with the vertices that it has in a mirror: that of a flopped picture, turned the right way.
+pub fn mirror_image(grid: &SaddleGrid) -> SaddleGrid {
+    grid.iter().map(|(&vertex, &placed)| (mirrored(vertex), placed)).collect()
+}
+
 /// A corner in a grid while it grows.
 #[derive(Clone, Copy, Debug)]
 pub struct GrownSaddle<const N: usize> {

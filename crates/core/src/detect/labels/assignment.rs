@@ -8,12 +8,12 @@ use std::collections::btree_map::Entry;
 use std::collections::{BTreeMap, BTreeSet};
 
 use super::evidence::{Budget, Labelled, TagLabeller};
+use super::why;
 use crate::detect::config::DetectorConfig;
 use crate::detect::detection::reason::{Reason, ReasonKind};
 use crate::detect::detection::values::{DecodedTag, Grid, GridCorner};
 use crate::detect::grid::outline::{WholeBoard, fit_outline, fit_rectangle};
-use crate::detect::grid::saddle_grid::SaddleGrid;
-use crate::detect::why;
+use crate::detect::grid::saddle_grid::{SaddleGrid, mirror_image, mirrored};
 use crate::family::Family;
 use crate::lattice::{GridKind, LatticeMap, Vertex};
 use crate::raster::ImageView;
@@ -242,17 +242,6 @@ fn in_scene(
 fn in_mirror(found: FoundGrid) -> (Grid, Option<Reason>) {
     let why = Reason::new(ReasonKind::Mirrored, [("corners", found.corners.len() as f64)]);
     (Grid { mirrored: true, ..unlabelled(found) }, Some(why))
-}
-
-/// Where a vertex lies in the mirror: rows and columns are exchanged, which leaves upright tiles upright and
-/// dark squares dark.
-pub(in crate::detect) fn mirrored(vertex: Vertex) -> Vertex {
-    Vertex::new(vertex.col, vertex.row)
-}
-
-/// A grid with the vertices that it has in a mirror: that of a flopped picture, turned the right way.
-pub(in crate::detect) fn mirror_image(grid: &SaddleGrid) -> SaddleGrid {
-    grid.iter().map(|(&vertex, &placed)| (mirrored(vertex), placed)).collect()
 }
 
 /// Leaves out of grids of one panel what a larger one, which comes before, has already: beside a tag of

@@ -50,11 +50,11 @@
 
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 
-use super::assignment::mirrored;
 use super::tag_words::TargetWords;
 use super::tags::{Read, Reading, TagPlace, TagReader};
 use crate::detect::detection::values::DecodedTag;
 use crate::detect::grid::saddle_grid::SaddleGrid;
+use crate::detect::grid::saddle_grid::mirrored;
 use crate::family::{Decoder, Family, NaturalWords};
 use crate::lattice::{GridKind, LatticeMap, Orientation, Tile, Vertex};
 use crate::raster::ImageView;

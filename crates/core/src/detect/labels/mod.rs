@@ -6,7 +6,7 @@
 //! 2. `tags` samples every tile through its map (`tile_map`); `soft_cells` gives the log-odds of its cells.
 //! 3. `tag_words` compares them with the words of the target.
 //! 4. `evidence` lets all tiles decide together where the grid lies on the target.
-//! 5. `assignment` gives the labels to the grids, by tags or by an outline.
+//! 5. `assignment` gives the labels to the grids, by tags or by an outline; `why` finds the reason where there are none.
 
 pub(in crate::detect) mod assignment;
 pub(in crate::detect) mod evidence;
@@ -15,3 +15,4 @@ pub(in crate::detect) mod soft_cells;
 pub(in crate::detect) mod tag_words;
 pub(in crate::detect) mod tags;
 pub(in crate::detect) mod tile_map;
+pub(in crate::detect) mod why;
