@@ -1,28 +1,20 @@
 //! From pixels to labelled corners.
 //!
-//! The stages, each in its file, each from the paper (§3) with what measurements added:
+//! Comes in: an image, and what is looked for. Goes out: a [`Detection`]. Data meets the chapters in this order, each from
+//! the paper (§3) with what measurements added:
 //!
-//! 1. `ring` finds candidates: pixels around which dark and bright alternate three times, or twice
-//!    on checkerboards.
-//! 2. `cubic` fits cubic surfaces and walks to the umbilic point; J < 0 or it is no corner.
-//!    `quadric` does so for the saddles of checkerboards.
-//! 3. `sectors` reads the six or four half-edges with their colours.
-//! 4. `links` joins corners along clean edges (`edge`).
-//! 5. `grow` starts from four corners, grows tile by tile and fills the gaps, where tiles are narrow
-//!    in the frame of their neighbours (`rectified`). `parts` joins what a cover separates, by where
-//!    the map of a grid (`local_map`) goes on. Both look as often as a picture is worth (`effort`).
-//! 6. `tags` reads the tiles, `label` lets all tags together decide panel, rows and columns; `labels`
-//!    gives them to the grids.
-//!    `beyond` refuses checkerboards without tags whose pattern goes on where they end, `tile_shape` those
-//!    whose tiles are no squares (`checker_tiles`).
-//! 7. `refine` gives the last word on positions: `cubic` or `quadric`, then `corner_model`, in windows
-//!    that `refine_grid` chooses by blur (`clearance`) and by what else they show.
-//! 8. `recognise` guesses which target it is, where none is given.
+//! 1. `levels` chooses the levels of the image's pyramid.
+//! 2. `corners` finds corners one by one, with the edges that meet there.
+//! 3. `grid` joins them: lattice coordinates without origin.
+//! 4. `labels` reads tags and decides where on the target a grid lies.
+//! 5. `refine` fits the final positions and their covariances to the raw pixels.
+//! 6. `detection` is the result as values.
 //!
-//! Beside them `reach` says from where a target can be used, `proposal` which board suits a camera, and `watch` which
-//! pictures of a stream are worth keeping.
+//! `detector` runs these stages with the settings of `config`, `recognise` guesses the target where none is given, `scene`
+//! tells whether several targets can be distinguished, and `planning` says what a camera will be able to see. A module imports
+//! from chapters above it in this list, or from `detection`, never in a circle.
 //!
-//! Both tilings go the same way; `tiling` says where they differ.
+//! Both tilings go the same way; `tiling` says where they differ, and `lanes` how many numbers a processor works on at once.
 
 mod config;
 mod corners;
