@@ -21,7 +21,7 @@ use crate::camera::Camera;
 use crate::detection::{Detection, Targets};
 use crate::errors::{self, Raise, raised, unlocked};
 use crate::pose::Pose;
-use crate::solving::print_scale_of;
+use crate::solving::{Solved, print_scale_of};
 use crate::targets::Target;
 
 /// A camera as found, or as given.
@@ -33,6 +33,14 @@ impl Compared {
         (estimate.cameras, estimate.calibrated_with) = (cameras, calibrated_with.to_vec());
         Self(estimate)
     }
+
+    /// Cameras of a calibration; the uncertainties of one that failed are not to be trusted.
+    fn of_solved(mut cameras: Vec<CameraEstimate>, solved: &Solved) -> Self {
+        if solved.said().iter().any(|(_, is_failure)| *is_failure) {
+            cameras.iter_mut().for_each(CameraEstimate::forget_uncertainties);
+        }
+        Self::of(cameras, &solved.estimate.calibrated_with)
+    }
 }
 
 impl<'a, 'py> FromPyObject<'a, 'py> for Compared {
@@ -40,12 +48,12 @@ impl<'a, 'py> FromPyObject<'a, 'py> for Compared {
 
     fn extract(given: Borrowed<'a, 'py, PyAny>) -> PyResult<Self> {
         if let Ok(rig) = given.cast::<Rig>() {
-            let found = &rig.get().solved.estimate;
-            return Ok(Self::of(found.cameras.clone(), &found.calibrated_with));
+            let solved = &rig.get().solved;
+            return Ok(Self::of_solved(solved.estimate.cameras.clone(), solved));
         }
         if let Ok(found) = given.cast::<CalibratedCamera>() {
-            let (found, all) = (found.get().estimate().clone(), &found.get().solved.estimate);
-            return Ok(Self::of(vec![found], &all.calibrated_with));
+            let found = found.get();
+            return Ok(Self::of_solved(vec![found.estimate().clone()], &found.solved));
         }
         let camera = given.cast::<Camera>()?;
         Ok(Self::of(vec![CameraEstimate::given("", camera.get().0.clone())], &[]))
@@ -312,7 +320,8 @@ pub fn compare_rigs(
     assume_target: bool,
 ) -> PyResult<(Vec<Comparison>, Vec<Motion>)> {
     let region = region.map_or(Ok(Region::Seen), Part::region)?;
-    let (mut first, mut second) = (first.solved.estimate.clone(), second.solved.estimate.clone());
+    let of = |rig: &Rig| Compared::of_solved(rig.solved.estimate.cameras.clone(), &rig.solved).0;
+    let (mut first, mut second) = (of(&first), of(&second));
     compare_boards(["first", "second"], [&mut first, &mut second], assume_target)
         .raise(errors::calibration)?;
     let others = &second.cameras;

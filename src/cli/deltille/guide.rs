@@ -352,7 +352,8 @@ impl Watch<'_> {
             }
         };
         let found = self.detector.detect(&picture, &show);
-        let corners: usize = found.grids.iter().map(|grid| grid.corners.len()).sum();
+        let labelled = found.grids.iter().filter(|grid| grid.panel.is_some());
+        let corners: usize = labelled.map(|grid| grid.corners.len()).sum();
         if corners == 0 {
             let why = found.reasons.first().map_or(String::new(), |why| format!(": {why}"));
             tell!("{show}: no board{why}");

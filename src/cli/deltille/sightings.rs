@@ -347,15 +347,18 @@ pub fn read(
     Ok(Read { views, empty, left_out, ink, detections })
 }
 
-/// Takes all detections for those of the targets that are given, and notes where they name others.
+/// Takes all detections for those of the targets that are given, and notes once where they name another one.
 fn assume(detections: &mut [(String, Detection)], reference: &Reference) {
-    let given: Vec<TargetIdentity> = reference.targets().iter().map(Target::identity).collect();
-    let replaced = detections.iter_mut().map(|(_, found)| found.assume_targets(&given));
-    let replaced: Vec<Vec<TargetIdentity>> = replaced.filter(|of_one| !of_one.is_empty()).collect();
-    if let (Some(seen), Some(own)) =
-        (replaced.first().and_then(|of_one| of_one.first()), given.first())
-    {
-        let detections = counted(replaced.len(), "detection");
+    let given = reference.identities();
+    let mut replaced: Vec<([TargetIdentity; 2], usize)> = Vec::new();
+    for pair in detections.iter_mut().flat_map(|(_, found)| found.assume_targets(&given)) {
+        match replaced.iter_mut().find(|(other, _)| *other == pair) {
+            Some((_, count)) => *count += 1,
+            None => replaced.push((pair, 1)),
+        }
+    }
+    for ([seen, own], count) in replaced {
+        let detections = counted(count, "detection");
         tell!("note: --assume-target: {detections} of {seen} are taken for {own}");
     }
 }

@@ -264,7 +264,6 @@ fn what_is_wrong_is_told_on_the_terminal_in_the_file_and_on_the_page() {
     page.is("calibrate-warnings");
 }
 
-/// From the eleventh picture on the focal length is 2 % longer.
 /// One line with the name of a file and what to do, exit code 2.
 fn refused(folder: &Path, args: &str, words: &[&str]) {
     let said = String::from_utf8(output(folder, args).stderr).unwrap();
@@ -360,6 +359,7 @@ fn a_file_without_the_shape_of_a_sheet_is_refused_with_what_makes_one() {
     }
 }
 
+/// From the eleventh picture on the focal length is 2 % longer.
 #[test]
 fn a_change_of_zoom_ends_with_an_error_that_names_the_view() {
     let target = board(8, 9);
@@ -380,6 +380,10 @@ fn a_change_of_zoom_ends_with_an_error_that_names_the_view() {
     assert!((focal(1) / focal(0) - 1.02).abs() < 1e-3, "{change}");
     let page = std::fs::read_to_string(folder.path().join("page.html")).unwrap();
     assert!(page.contains("The views do not show one camera"));
+    // What is said of such a camera is no measure of a change.
+    let result = output(folder.path(), "compare camera.json camera.json --distance 1m");
+    let said = String::from_utf8(result.stderr).unwrap();
+    assert!(said.contains("camera.json: the calibration failed: the views do not"), "{said}");
 }
 
 #[test]

@@ -64,9 +64,18 @@ fn every_command_refuses_a_description_of_another_size() {
     deltille(at, &format!("calibrate seen {SMALL} --model radtan -o right --board-shape"))
         .success();
 
+    // A board without description is one of its rows, columns and edges.
+    deltille(
+        at,
+        "calibrate seen --grid deltille --rows 7 --cols 8 --edge 20mm --model radtan -o plain.yaml",
+    )
+    .success();
+
     for command in [
         format!("calibrate seen {LARGE} --model radtan -o wrong"),
         "calibrate seen --grid deltille --edge 25mm --model radtan -o wrong".to_owned(),
+        "pose view-0.png --grid deltille --rows 7 --cols 8 --edge 25mm --camera plain.yaml"
+            .to_owned(),
         format!("calibrate tables {LARGE} --model radtan -o wrong"),
         "calibrate seen --target large/desk.dsc --model radtan -o wrong".to_owned(),
         format!("calibrate seen {LARGE} --fixed-intrinsics right/camera.yaml -o wrong"),

@@ -225,7 +225,7 @@ impl Calibration {
             [] | [_] => Self::new(panels),
             several => Self::of_targets(several.iter().map(of_target).collect::<Vec<_>>()),
         };
-        let identities = targets.iter().map(Target::identity).collect();
+        let identities = reference.identities();
         Self { identities, symmetries, ..calibration.board_accuracy_mm(accuracy_mm) }
     }
 

@@ -313,6 +313,12 @@ impl CameraEstimate {
         }
     }
 
+    /// Removes all uncertainties, as of a calibration that failed: they follow from residuals that the model does not explain.
+    pub fn forget_uncertainties(&mut self) {
+        self.covariance = DMatrix::zeros(0, 0);
+        (self.projection, self.pose_sd, self.observed_pose_sd) = (None, None, None);
+    }
+
     /// All its corners, by view.
     pub fn corners(&self) -> impl Iterator<Item = &Corner> {
         self.views.iter().flat_map(|view| &view.corners)

@@ -43,8 +43,8 @@ pub(super) const ASSUME_TARGET: &str = "give the description that it was detecte
                                         `Detection::assume_targets` to assume this one";
 
 /// Why labels of a grid without panel are not on the target.
-const CUT_OFF: &str = "its rows and columns are not those of the target: without tags they are known \
-                       only where the board is seen whole, and here a part of it is";
+const CUT_OFF: &str = "its rows and columns are not those of the target: it is another board, or a part of one without tags, \
+                       whose rows and columns are known only where it is seen whole";
 
 /// What was photographed.
 #[derive(Clone, Copy, Debug)]
@@ -170,6 +170,19 @@ impl Reference<'_> {
         }
     }
 
+    /// Identities of the targets; of an untagged board that of the target it makes, where its size is known.
+    pub fn identities(&self) -> Vec<TargetIdentity> {
+        match self {
+            Self::Grid(grid) => {
+                let made = grid.target("board").and_then(Result::ok);
+                made.map(|target| target.identity()).into_iter().collect()
+            }
+            Self::Target(_) | Self::Scene(_) => {
+                self.targets().iter().map(Target::identity).collect()
+            }
+        }
+    }
+
     /// The panel with an id, which is 0 on an untagged board, of the target of a name where there are several.
     pub fn panel(&self, target: Option<&str>, id: u32) -> Option<PanelRef> {
         if let Self::Grid(_) = self {
@@ -273,7 +286,7 @@ impl Reference<'_> {
     /// # Errors
     /// A sentence that says what is not on it.
     pub fn check_labels(&self, detection: &Detection, grid: &Grid) -> Result<(), String> {
-        let identities: Vec<TargetIdentity> = self.targets().iter().map(Target::identity).collect();
+        let identities = self.identities();
         match self.target_of(grid, detection.target_of(grid), &identities)? {
             Some(index) => self.on_target(index, grid).map(drop),
             None => Ok(()),
@@ -380,8 +393,7 @@ pub fn views(
     let mut wrong = 0;
     let mut copies = 0;
     let mut seen = HashMap::new();
-    let identities: Vec<TargetIdentity> =
-        reference.targets().iter().map(Target::identity).collect();
+    let identities = reference.identities();
     for (index, (name, detection)) in detections.iter().enumerate() {
         let size_px = [detection.width, detection.height];
         if let Some((first, other)) = detections.first()

@@ -75,6 +75,25 @@ pub fn read_without_target(text: &str) -> Result<Estimate, SavedError> {
     estimate(text, None)
 }
 
+/// Why the calibration of a file is not to be used as it is: the sentences of its [failures](calibration::is_failure).
+pub fn failures(text: &str) -> Vec<String> {
+    #[derive(Deserialize)]
+    struct Saved {
+        #[serde(default)]
+        diagnoses: Vec<Said>,
+    }
+    #[derive(Deserialize)]
+    struct Said {
+        kind: String,
+        text: String,
+    }
+    let said = serde_json::from_str::<Saved>(text).map(|saved| saved.diagnoses).unwrap_or_default();
+    said.into_iter()
+        .filter(|said| calibration::is_failure(&said.kind))
+        .map(|said| said.text)
+        .collect()
+}
+
 /// Reads the cameras of a calibration or a rig without knowing the target.
 ///
 /// # Errors

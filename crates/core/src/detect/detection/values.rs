@@ -50,10 +50,11 @@ impl Detection {
 
     /// Takes its labels for those of the targets that are given, whatever targets it names, so that it is accepted with them:
     /// each target that it names is replaced by the one with the same tags, or, where it names one alone, by the one that is
-    /// given. Without any given, as for an untagged grid, it names none afterwards. Returns the targets that were replaced.
-    pub fn assume_targets(&mut self, given: &[TargetIdentity]) -> Vec<TargetIdentity> {
+    /// given. Without any given, as for an untagged grid, it names none afterwards. Returns the targets that were replaced, each
+    /// with the one that is assumed.
+    pub fn assume_targets(&mut self, given: &[TargetIdentity]) -> Vec<[TargetIdentity; 2]> {
         if given.is_empty() {
-            return std::mem::take(&mut self.targets);
+            self.targets.clear();
         }
         let only = given.first().filter(|_| given.len() == 1 && self.targets.len() == 1);
         let mut replaced = Vec::new();
@@ -62,8 +63,8 @@ impl Detection {
             if let Some(same) = same.filter(|_| !given.iter().any(|other| other.is_same_print(own)))
             {
                 // Grids refer to it by its name.
-                let same = TargetIdentity { name: own.name.clone(), ..same.clone() };
-                replaced.push(std::mem::replace(own, same));
+                replaced.push([own.clone(), same.clone()]);
+                *own = TargetIdentity { name: own.name.clone(), ..same.clone() };
             }
         }
         replaced
@@ -203,13 +204,16 @@ mod tests {
             Detection { targets, ..Detection::default() }
         };
         let mut both = of(&[&small, &wide]);
-        assert_eq!(both.assume_targets(&[wide.clone(), large.clone()]), vec![small.clone()]);
+        let replaced = both.assume_targets(&[wide.clone(), large.clone()]);
+        assert_eq!(replaced, vec![[small.clone(), large.clone()]]);
         assert_eq!(both.targets[0].fingerprint, large.fingerprint);
         assert_eq!(both.targets[0].name, small.name, "grids refer to it by its name");
         assert_eq!(both.targets[1], wide);
         let only = std::slice::from_ref(&wide);
-        assert_eq!(of(&[&small]).assume_targets(only), vec![small.clone()]);
+        assert_eq!(of(&[&small]).assume_targets(only), vec![[small.clone(), wide.clone()]]);
         assert!(of(&[&small, &wide]).assume_targets(only).is_empty());
-        assert_eq!(of(&[&small]).assume_targets(&[]), vec![small]);
+        let mut without = of(&[&small]);
+        without.assume_targets(&[]);
+        assert!(without.targets.is_empty());
     }
 }
