@@ -2,6 +2,7 @@
 //! its path: `cargo test --release --test it detect::reasons`.
 
 mod calibrate;
+mod chapters;
 mod common;
 mod detect;
 mod families;
