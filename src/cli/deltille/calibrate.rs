@@ -15,7 +15,7 @@ use super::camera_file;
 use super::files::{File, check_places, same_file, sample_of, text_file, write_all};
 use super::page::check_images;
 use super::sightings::{Sightings, SightingsArgs};
-use crate::calibrate::{Calibration, CameraEstimate, Estimate, Intrinsics, Reference, Source};
+use crate::calibrate::{CameraEstimate, Estimate, Intrinsics, Source};
 use crate::camera::{Camera, CameraFile, Lens, PROJECTION_PARAMETERS, Pose, SplineGrid};
 use crate::cli::output::{self, Overwrite, tell};
 use crate::cli::run::{FAILED, report};
@@ -102,7 +102,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     check_places(folder, &planned, args.overwrite)?;
     let page = args.solve.page(&stem, args.overwrite)?;
     let measure = args.solve.measures_target();
-    let Sightings { views, panels, target, empty, left_out, print, symmetries, unnamed } =
+    let Sightings { calibration, views, target, empty, left_out, print, unnamed } =
         args.sightings.read(measure)?;
     if let (Some(known), Some(target), false) =
         (&args.fixed_intrinsics, &target, args.sightings.assumes_target())
@@ -115,11 +115,6 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     if let Some(folder) = &args.images {
         check_images(folder, &views)?;
     }
-    let calibration = match &target {
-        Some(target) => Calibration::of(&Reference::Target(target), panels),
-        None => Calibration::new(panels),
-    };
-    let calibration = calibration.label_symmetries(symmetries);
     let mut calibration = calibration.camera(&stem, views, intrinsics);
     let tried = match args.model {
         Some(model) => model.choose(&mut calibration, 0)?,

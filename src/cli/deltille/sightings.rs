@@ -9,14 +9,16 @@ use clap::ValueEnum;
 use super::limits::FileLimits;
 use super::{tables, target_file};
 use crate::SheetUseError;
-use crate::calibrate::{Excluded, PanelPlace, Reason, Reference, Shown, UntaggedGrid, View, views};
+use crate::calibrate::{
+    Calibration, Excluded, PanelPlace, Reason, Reference, Shown, UntaggedGrid, View, views,
+};
 use crate::cli::output::tell;
 use crate::cli::values::whole;
 use crate::detect::{Detection, InkEstimate};
 use crate::export::calibration::{self, Print, Sheet};
 use crate::export::detection;
 use crate::export::tables::folder;
-use crate::lattice::{GridKind, LatticeMap};
+use crate::lattice::GridKind;
 use crate::limits::{Limits, ReadError};
 use crate::quantity::{edge_mm, print_scale};
 use crate::targets::{SIDES, Target, TargetIdentity, parse_length_mm};
@@ -97,8 +99,8 @@ enum Kind {
 /// Views, and the panels that they show.
 pub struct Sightings {
     pub views: Vec<View>,
-    /// Where each panel is on the target.
-    pub panels: Vec<PanelPlace>,
+    /// A calibration of what was photographed, as yet without cameras.
+    pub calibration: Calibration,
     /// What was photographed, with its corners where the plan has them.
     pub target: Option<Target>,
     /// Files of the detections in which no view was found.
@@ -107,8 +109,6 @@ pub struct Sightings {
     pub left_out: Vec<Excluded>,
     /// What is known of the print.
     pub print: Print,
-    /// See [`Reference::label_symmetries`].
-    pub symmetries: Vec<Vec<LatticeMap>>,
     /// What is to be noted of detections that do not name their target.
     pub unnamed: Option<String>,
 }
@@ -174,9 +174,9 @@ impl SightingsArgs {
         let panels = panels(&reference, &sheet)?;
         let print = Print { scale: sheet.print_scale, ink };
         let unnamed = unnamed(&detections, &reference).filter(|_| !self.assume_target);
-        let symmetries = reference.label_symmetries();
+        let calibration = Calibration::of(&reference, panels);
         let target = target.or(board);
-        Ok(Sightings { panels, target, views, empty, left_out, print, symmetries, unnamed })
+        Ok(Sightings { calibration, target, views, empty, left_out, print, unnamed })
     }
 }
 
