@@ -104,7 +104,7 @@ pub fn calibrate(
     let seen = Seen::of(target, grid, sides(rows, cols)?, edge_mm)?;
     if let Some(path) = shape {
         let text = Limits::default().read_text(&path).raise_of_file(&path, errors::file)?;
-        let sheet = read_sheet(&text, seen.targets());
+        let sheet = read_sheet(&text, &seen.reference().identities());
         let wrong = |error| {
             raised::FileError::new_err(format!("{}: {}", path.display(), errors::told(&error)))
         };

@@ -118,7 +118,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         "--target: {} are boards that lie about: give the file of one of them",
         counted(target.panels.len(), "panel")
     );
-    let sheet = args.sheet.read(&limits, std::slice::from_ref(&target))?;
+    let sheet = args.sheet.read(&limits, &[target.identity()])?;
     let panels = sightings::panels(&reference, &sheet)?;
     let detector = Detector::for_targets(&[(&target, family.as_ref())], DetectorConfig::default());
     let detector = detector.context("--target")?;

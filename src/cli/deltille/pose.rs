@@ -65,7 +65,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         None => target_file::read_all_placed(&args.target, &limits).context("--target")?,
     };
     let families = target_file::families(&targets, args.family.as_deref())?;
-    let sheet = args.sheet.read(&limits, &targets)?;
+    let sheet = args.sheet.read(&limits, &Reference::Scene(&targets).identities())?;
     if let [_, _, ..] = targets.as_slice() {
         // Refuses what is known of one sheet alone.
         sightings::panels(&Reference::Scene(&targets), &sheet)?;

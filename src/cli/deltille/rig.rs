@@ -114,7 +114,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         (None, [only]) => Reference::Target(only),
         (None, several) => Reference::Scene(several),
     };
-    let sheet = args.sheet.read(&limits, &targets)?;
+    let sheet = args.sheet.read(&limits, &reference.identities())?;
     let panels = sightings::panels(&reference, &sheet)?;
     let cameras = args.camera.iter().map(|(name, _)| args.intrinsics(name, &targets));
     let cameras = cameras.collect::<anyhow::Result<Vec<Intrinsics>>>()?;

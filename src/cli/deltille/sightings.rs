@@ -155,7 +155,7 @@ impl SightingsArgs {
                 "give --target FILE, or --grid deltille or checker with --edge for untagged boards"
             ),
         };
-        let sheet = self.sheet.read(&limits, target.as_slice())?;
+        let sheet = self.sheet.read(&limits, &reference.identities())?;
         let Read { mut views, empty, mut left_out, ink, detections } =
             read(&self.detections, &reference, &limits, self.assume_target)?;
         let board = match reference {
@@ -182,7 +182,7 @@ impl SightingsArgs {
 
 impl SheetArgs {
     /// The sheet, where nothing is known as it was planned.
-    pub fn read(&self, limits: &Limits, targets: &[Target]) -> anyhow::Result<Sheet> {
+    pub fn read(&self, limits: &Limits, targets: &[TargetIdentity]) -> anyhow::Result<Sheet> {
         let Some(path) = &self.shape else {
             return Ok(Sheet { print_scale: self.print_scale, shape: None });
         };

@@ -86,7 +86,10 @@ fn every_command_refuses_a_description_of_another_size() {
     ] {
         is_refused(at, &command);
     }
-    // A sheet's shape is that of its board.
+    // A sheet's shape is that of its board, also of one without description.
+    let grid = "calibrate seen --grid deltille --rows 7 --cols 8 --model radtan";
+    deltille(at, &format!("{grid} --edge 20mm --board-shape -o bent.yaml")).success();
+    is_refused(at, &format!("{grid} --edge 25mm --assume-target --shape bent.json -o wrong"));
     let said = refused(deltille(
         at,
         &format!(

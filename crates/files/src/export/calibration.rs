@@ -16,7 +16,7 @@ use deltille_core::camera::SplineGrid;
 use deltille_core::detect::InkEstimate;
 use deltille_core::json::{self, ReadError};
 use deltille_core::quantity;
-use deltille_core::targets::{Target, TargetIdentity, check_result_of};
+use deltille_core::targets::{TargetIdentity, check_result_of};
 
 /// What a calibration found out about the printed sheet.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -105,7 +105,7 @@ impl StoredShape {
 ///
 /// # Errors
 /// When the file is not a calibration, a field is not valid, it was made with another target, or no shape was estimated.
-pub fn read_sheet(text: &str, targets: &[Target]) -> Result<Sheet, SheetError> {
+pub fn read_sheet(text: &str, targets: &[TargetIdentity]) -> Result<Sheet, SheetError> {
     let schema = json::schema(text.as_bytes()).ok().flatten();
     if !schema.is_some_and(|schema| [SCHEMA, super::rig::SCHEMA].contains(&schema.as_str())) {
         return Err(SheetError::Foreign);
@@ -114,8 +114,7 @@ pub fn read_sheet(text: &str, targets: &[Target]) -> Result<Sheet, SheetError> {
         ReadError::Json(_) => SheetError::Foreign,
         ReadError::Field { field, problem } => SheetError::Field { field, problem },
     })?;
-    let given: Vec<TargetIdentity> = targets.iter().map(Target::identity).collect();
-    check_result_of(&file.calibrated_with, &given).map_err(SheetError::OtherTarget)?;
+    check_result_of(&file.calibrated_with, targets).map_err(SheetError::OtherTarget)?;
     let shape = file.board_shape.ok_or(SheetError::Flat)?.shape();
     Ok(Sheet { print_scale: file.print_scale, shape: Some(shape) })
 }
