@@ -221,7 +221,7 @@ def test_pictures_that_cannot_be_read_are_passed_over(pictures, board):
 
 def test_labels_of_another_target_are_refused(detections):
     other = deltille.Board(9, 8, edge_mm=20)
-    with pytest.raises(deltille.DetectionError, match="it was detected as desk .* and the target given is board"):
+    with pytest.raises(deltille.DetectionError, match="it was detected as desk .* but the target given is board"):
         deltille.Detection.from_json(detections[0].to_json(), target=other)
 
 
