@@ -6,6 +6,8 @@ use anyhow::{Context, anyhow};
 
 use crate::camera::{Camera, CameraFile};
 use crate::camera_file;
+use crate::cli::output::tell;
+use crate::export::saved;
 use crate::targets::{Target, TargetIdentity, check_same_board};
 
 /// Reads the camera file that an option names.
@@ -29,6 +31,15 @@ pub fn check_targets(
     check_same_board([&camera, "--target"], [calibrated_with, &own]).map_err(|problem| {
         anyhow!("{problem}; give its description, or --assume-target to use this one")
     })
+}
+
+/// Warns where the calibration whose text this is has failed, and says whether it has.
+pub fn warn_if_failed(path: &Path, text: &str) -> bool {
+    let failures = saved::failures(text);
+    if let Some(failure) = failures.first() {
+        tell!("warning: {}: the calibration failed: {failure}", path.display());
+    }
+    !failures.is_empty()
 }
 
 /// Reads a camera file for these targets, see [`check_targets`]; with `is_assumed` it may be any camera's.

@@ -14,7 +14,7 @@ use crate::calibrate::{
     CameraEstimate, CameraMotion, Comparison, Estimate, Region, Verdict, compare_boards,
 };
 use crate::camera::Pose;
-use crate::cli::output::{self, Overwrite, tell};
+use crate::cli::output::{self, Overwrite};
 use crate::cli::run::{FAILED, UNDECIDED};
 use crate::export::{comparison, saved};
 use crate::limits::Limits;
@@ -139,8 +139,7 @@ fn read(option: &'static str, path: &Path) -> anyhow::Result<Estimate> {
     let found = saved::read_without_target(&text);
     let mut found = found.with_context(|| format!("{option}: {}", path.display()))?;
     // A calibration that failed has deviations of anything.
-    if let Some(failure) = saved::failures(&text).first() {
-        tell!("warning: {}: the calibration failed: {failure}", path.display());
+    if camera_file::warn_if_failed(path, &text) {
         found.cameras.iter_mut().for_each(CameraEstimate::forget_uncertainties);
     }
     Ok(found)

@@ -376,5 +376,6 @@ fn read_rig(path: &Path) -> anyhow::Result<Estimate> {
     if found.cameras.len() < 2 {
         bail!("{}: a single camera: give the rig.json of `deltille rig`", path.display());
     }
+    camera_file::warn_if_failed(path, &text);
     Ok(found)
 }

@@ -250,7 +250,7 @@ fn what_is_known_of_projections_is_read_back() {
         .solve()
         .unwrap();
     let text = calibration::write(&found, &[], Print::default(), Residuals::LeftOut).unwrap();
-    let read = saved::read_cameras(&text).unwrap().remove(0);
+    let read = saved::read_without_target(&text).unwrap().cameras.remove(0);
     let camera = &found.cameras[0];
     let [one, other] = [camera, &read].map(CameraEstimate::uncertainty_maps);
     // At infinity and two distances, from noise and observed.

@@ -229,15 +229,6 @@ impl Calibration {
         Self { identities, symmetries, ..calibration.board_accuracy_mm(accuracy_mm) }
     }
 
-    /// With the rotations of the labels of each panel that no picture shows, see
-    /// [`Reference::label_symmetries`](super::Reference::label_symmetries); unless said otherwise there are none. The
-    /// cameras of a rig must agree on the pose of the board, which decides between them, see
-    /// [`CameraEstimate::label_rotation`](super::CameraEstimate::label_rotation).
-    #[must_use]
-    pub fn label_symmetries(self, symmetries: Vec<Vec<LatticeMap>>) -> Self {
-        Self { symmetries, ..self }
-    }
-
     /// Adds a camera: of an unknown lens of a [`Model`], or a known [`Camera`] that is kept.
     #[must_use]
     pub fn camera(self, name: &str, views: Vec<View>, intrinsics: impl Into<Intrinsics>) -> Self {

@@ -94,14 +94,6 @@ pub fn failures(text: &str) -> Vec<String> {
         .collect()
 }
 
-/// Reads the cameras of a calibration or a rig without knowing the target.
-///
-/// # Errors
-/// When the file is not a calibration, or a field is not valid.
-pub fn read_cameras(text: &str) -> Result<Vec<CameraEstimate>, SavedError> {
-    Ok(read_without_target(text)?.cameras)
-}
-
 /// The target that was photographed, if known.
 type Panels<'a> = Option<&'a Reference<'a>>;
 

@@ -673,8 +673,10 @@ impl TagLabeller {
         let elsewhere = readings.filter(|&index| !self.is_dense && is_elsewhere(index)).count();
         let beyond = if self.panels_abut { 0 } else { self.beyond(sight, grid, placement) };
         let is_beyond_doubt = elsewhere > 0 || beyond as f64 * -SPOILT.ln() > CLEARLY_OTHER;
-        let [agreeing, disagreeing] = self.agreement(sight, placement);
-        is_beyond_doubt.then_some([agreeing, disagreeing.max(elsewhere).max(beyond)])
+        is_beyond_doubt.then(|| {
+            let [agreeing, disagreeing] = self.agreement(sight, placement);
+            [agreeing, disagreeing.max(elsewhere).max(beyond)]
+        })
     }
 
     /// How many corners of a grid beyond the panel show that the print continues there. Along its border the tips of tiles may

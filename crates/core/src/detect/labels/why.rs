@@ -2,9 +2,9 @@
 
 use glam::DVec2;
 
+use super::evidence::TagEvidence;
 use crate::detect::detection::reason::{Reason, ReasonKind};
 use crate::detect::grid::saddle_grid::SaddleGrid;
-use crate::detect::labels::evidence::TagEvidence;
 use crate::lattice::GridKind;
 use crate::raster::{Gray, PYRAMID_FULL_SCALE, Pyramid};
 use crate::statistics::median;
