@@ -212,7 +212,8 @@ impl Calibration {
             "own" => {
                 let camera = own.estimate().camera.clone();
                 let calibrated_with = own.solved.estimate.calibrated_with.clone();
-                CameraFile { camera, calibrated_with }.to_yaml()
+                let failed = saved::failures(&text_of(&own.solved, false)?).into_iter().next();
+                CameraFile { camera, calibrated_with, failed }.to_yaml()
             }
             _ => {
                 let stem = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();

@@ -6,6 +6,7 @@ use deltille::camera::{self, Lens};
 use deltille::export::artifacts::write_set;
 use deltille::export::camera as formats;
 use deltille::quantity::{Range, coefficient, focal_px, place_px};
+use deltille::words::shown;
 use deltille::{camera_file, glam};
 use glam::DVec2;
 use numpy::{PyArray1, PyArray2};
@@ -106,8 +107,13 @@ impl Camera {
     /// -------
     /// Camera
     #[staticmethod]
-    fn load(path: PathBuf) -> PyResult<Self> {
-        camera_file::read(&path).map(Self).raise_of_file(&path, errors::file)
+    fn load(py: Python<'_>, path: PathBuf) -> PyResult<Self> {
+        let file = camera_file::read_with_targets(&path).raise_of_file(&path, errors::file)?;
+        if let Some(failed) = &file.failed {
+            let what = format!("{}: the calibration failed: {}", path.display(), shown(failed));
+            errors::warn(py, &what)?;
+        }
+        Ok(Self(file.camera))
     }
 
     /// The camera of a text, as :meth:`load` reads it from files.

@@ -2,13 +2,14 @@
 
 use std::borrow::Cow;
 use std::error::Error;
+use std::ffi::CString;
 use std::fmt::Display;
 use std::io;
 use std::path::Path;
 
 use deltille::limits::{self, ReadError};
 use deltille::words::with_short_quotes;
-use pyo3::exceptions::PyKeyboardInterrupt;
+use pyo3::exceptions::{PyKeyboardInterrupt, PyUserWarning};
 use pyo3::prelude::*;
 
 /// The exceptions, which are written in Python as most of them have two bases.
@@ -239,6 +240,12 @@ fn of_system(number: Option<i32>, path: &Path) -> PyResult<PyErr> {
         let make = py.import("deltille.errors")?.getattr("_of_system")?;
         Ok(PyErr::from_value(make.call1((number, path.as_os_str()))?))
     })
+}
+
+/// Issues a `UserWarning` at the caller's line.
+pub fn warn(py: Python<'_>, what: &str) -> PyResult<()> {
+    let what = CString::new(what.replace('\0', "")).unwrap_or_default();
+    PyErr::warn(py, &py.get_type::<PyUserWarning>(), &what, 2)
 }
 
 /// Does work without the interpreter's lock; a panic becomes an exception.

@@ -14,7 +14,6 @@ use deltille::export::calibration::{Print, Residuals, Sheet};
 use deltille::export::{calibration, rig};
 use deltille::quantity::{board_accuracy_mm, distance_mm, edge_mm, print_scale};
 use deltille::targets;
-use pyo3::exceptions::PyUserWarning;
 use pyo3::prelude::*;
 use serde_json::Value;
 
@@ -206,9 +205,7 @@ pub fn named(
             !found.grids.is_empty() && found.grids == other.grids
         };
         if let Some((first, _)) = all.iter().find(is_same) {
-            let what = format!("{name}: the same corners as in {first}, counted once\0");
-            let what = std::ffi::CStr::from_bytes_until_nul(what.as_bytes()).unwrap_or_default();
-            PyErr::warn(py, &py.get_type::<PyUserWarning>(), what, 2)?;
+            errors::warn(py, &format!("{name}: the same corners as in {first}, counted once"))?;
             continue;
         }
         all.push((name, (**found).clone()));

@@ -20,8 +20,8 @@ use crate::camera::{Camera, CameraFile, Lens, PROJECTION_PARAMETERS, Pose, Splin
 use crate::cli::output::{self, Overwrite, tell};
 use crate::cli::run::{FAILED, report};
 use crate::cli::wording::in_options;
-use crate::export::calibration;
 use crate::export::camera::{FormatError, colmap, kalibr, mrcal, nerfstudio, opencv, ros};
+use crate::export::{calibration, saved};
 use crate::targets::TargetIdentity;
 use crate::words::{counted, places, shown};
 
@@ -215,7 +215,8 @@ impl Format {
         Ok(match self {
             Self::Own => {
                 let (camera, calibrated_with) = (camera.clone(), calibrated_with.to_vec());
-                let yaml = CameraFile { camera, calibrated_with }.to_yaml();
+                let failed = saved::failures(json).into_iter().next();
+                let yaml = CameraFile { camera, calibrated_with, failed }.to_yaml();
                 vec![named(".yaml", yaml), named(".json", json.to_owned())]
             }
             Self::Opencv => vec![named("-opencv.yaml", opencv(camera)?)],

@@ -9,15 +9,18 @@ use crate::camera_file;
 use crate::cli::output::tell;
 use crate::export::saved;
 use crate::targets::{Target, TargetIdentity, check_same_board};
+use crate::words::shown;
 
 /// Reads the camera file that an option names.
 pub fn read(option: &str, path: &Path) -> anyhow::Result<Camera> {
-    camera_file::read(path).context(option.to_owned())
+    read_with_targets(option, path).map(|file| file.camera)
 }
 
-/// Reads a camera file with the targets that the camera was calibrated with.
+/// Reads a camera file with the targets that the camera was calibrated with, and warns where its calibration failed.
 pub fn read_with_targets(option: &str, path: &Path) -> anyhow::Result<CameraFile> {
-    camera_file::read_with_targets(path).context(option.to_owned())
+    let file = camera_file::read_with_targets(path).context(option.to_owned())?;
+    warn_of(path, file.failed.as_deref());
+    Ok(file)
 }
 
 /// Refuses a camera that was calibrated with a target that has the tags of one of these at another size.
@@ -33,13 +36,17 @@ pub fn check_targets(
     })
 }
 
-/// Warns where the calibration whose text this is has failed, and says whether it has.
-pub fn warn_if_failed(path: &Path, text: &str) -> bool {
-    let failures = saved::failures(text);
-    if let Some(failure) = failures.first() {
-        tell!("warning: {}: the calibration failed: {failure}", path.display());
+/// Warns where the calibration whose text this is has failed, and says why it has.
+pub fn warn_if_failed(path: &Path, text: &str) -> Option<String> {
+    let failure = saved::failures(text).into_iter().next();
+    warn_of(path, failure.as_deref());
+    failure
+}
+
+fn warn_of(path: &Path, failure: Option<&str>) {
+    if let Some(failure) = failure {
+        tell!("warning: {}: the calibration failed: {}", path.display(), shown(failure));
     }
-    !failures.is_empty()
 }
 
 /// Reads a camera file for these targets, see [`check_targets`]; with `is_assumed` it may be any camera's.
@@ -49,7 +56,7 @@ pub fn read_for(
     targets: &[Target],
     is_assumed: bool,
 ) -> anyhow::Result<Camera> {
-    let CameraFile { camera, calibrated_with } = read_with_targets(option, path)?;
+    let CameraFile { camera, calibrated_with, .. } = read_with_targets(option, path)?;
     if !is_assumed {
         check_targets(path, &calibrated_with, targets)?;
     }

@@ -139,7 +139,7 @@ fn read(option: &'static str, path: &Path) -> anyhow::Result<Estimate> {
     let found = saved::read_without_target(&text);
     let mut found = found.with_context(|| format!("{option}: {}", path.display()))?;
     // A calibration that failed has deviations of anything.
-    if camera_file::warn_if_failed(path, &text) {
+    if camera_file::warn_if_failed(path, &text).is_some() {
         found.cameras.iter_mut().for_each(CameraEstimate::forget_uncertainties);
     }
     Ok(found)

@@ -25,7 +25,7 @@ use crate::cli::wording::in_options;
 use crate::detect::{Detection, InkEstimate};
 use crate::export::calibration::Print;
 use crate::export::camera::{FormatError, colmap, colmap_rig, kalibr};
-use crate::export::rig;
+use crate::export::{rig, saved};
 use crate::report::target_map_svg;
 use crate::targets::{Name, Target};
 use crate::words::counted;
@@ -224,12 +224,14 @@ impl Args {
     ) -> anyhow::Result<(Vec<File>, Vec<FormatError>)> {
         let mut refused = Vec::new();
         let mut files = vec![text_file("rig.json".to_owned(), json.to_owned())];
+        let failed = saved::failures(json).into_iter().next();
         for (name, camera, _) in cameras {
             let camera = (*camera).clone();
             // A camera that was given was calibrated elsewhere.
             let is_known = of_name(&self.known, name).is_some();
             let calibrated_with = if is_known { Vec::new() } else { found.calibrated_with.clone() };
-            let yaml = CameraFile { camera, calibrated_with }.to_yaml();
+            let failed = failed.clone().filter(|_| !is_known);
+            let yaml = CameraFile { camera, calibrated_with, failed }.to_yaml();
             files.push(text_file(format!("{name}.yaml"), yaml));
         }
         for format in &self.format {

@@ -157,7 +157,7 @@ impl ViewArgs {
 /// Makes a pinhole view of a camera, and pictures of it.
 pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let file = camera_file::read_with_targets("--camera", &args.camera)?;
-    let CameraFile { camera, calibrated_with } = file;
+    let CameraFile { camera, calibrated_with, failed } = file;
     let stem = args.camera.file_stem().unwrap_or_default().to_string_lossy().into_owned();
     let stem = format!("{stem}-undistorted");
     let made = Undistortion::new(&camera, args.view.size_of(&camera)?, args.view.field);
@@ -167,7 +167,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let pictures = Pictures { args: &args.view, folder, camera: &camera, end };
     pictures.check(&images)?;
     let map = args.view.map(&made);
-    let view = CameraFile { camera: made.view().clone(), calibrated_with };
+    let view = CameraFile { camera: made.view().clone(), calibrated_with, failed };
     let mut files = args.view.files(&stem, &view, &map)?;
     files.insert(0, text_file(format!("{stem}.json"), undistortion::write(&made, &map)));
     let staged = Staged::new(&args.view.output, &files, args.view.overwrite)?;
@@ -313,7 +313,8 @@ impl Made {
 
 /// Makes rectified views of two cameras of a rig, and pictures of them.
 pub fn run_pair(args: PairArgs) -> anyhow::Result<ExitCode> {
-    let Estimate { cameras, calibrated_with, .. } = read_rig(&args.rig)?;
+    let (found, failed) = read_rig(&args.rig)?;
+    let Estimate { cameras, calibrated_with, .. } = found;
     let named = |name: &String| {
         cameras.iter().find(|camera| camera.name == *name).ok_or_else(|| {
             let names: Vec<&str> = cameras.iter().map(|camera| camera.name.as_str()).collect();
@@ -350,7 +351,8 @@ pub fn run_pair(args: PairArgs) -> anyhow::Result<ExitCode> {
     ];
     let views = made.views.iter().zip(calibrated_with);
     for ((name, (view, calibrated_with)), map) in names.iter().zip(views).zip(&maps) {
-        let file = CameraFile { camera: view.view().clone(), calibrated_with };
+        let file =
+            CameraFile { camera: view.view().clone(), calibrated_with, failed: failed.clone() };
         files.extend(args.view.files(&format!("{name}-rectified"), &file, map)?);
         say!("{name}: {}", told(view.view(), map));
     }
@@ -369,13 +371,12 @@ pub fn run_pair(args: PairArgs) -> anyhow::Result<ExitCode> {
     made.end(staged)
 }
 
-/// What a rig's file holds.
-fn read_rig(path: &Path) -> anyhow::Result<Estimate> {
+/// The rig of a file, and why its calibration failed.
+fn read_rig(path: &Path) -> anyhow::Result<(Estimate, Option<String>)> {
     let text = Limits::default().read_text(path)?;
     let found = saved::read_without_target(&text).with_context(|| path.display().to_string())?;
     if found.cameras.len() < 2 {
         bail!("{}: a single camera: give the rig.json of `deltille rig`", path.display());
     }
-    camera_file::warn_if_failed(path, &text);
-    Ok(found)
+    Ok((found, camera_file::warn_if_failed(path, &text)))
 }

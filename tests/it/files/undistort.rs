@@ -49,17 +49,20 @@ fn colours_and_depth_stay_and_places_are_those_of_the_camera() {
 }
 
 #[test]
-fn a_view_keeps_the_targets_that_the_camera_was_calibrated_with() {
+fn a_view_keeps_what_is_known_of_the_calibration_of_its_camera() {
     let folder = folder();
     let path = folder.path().join("camera.yaml");
     let read = |path| CameraFile::from_yaml(&fs::read_to_string(path).unwrap()).unwrap();
     let calibrated_with =
         vec![Target::new("desk", BoardSpec::deltille(4, 5, 20.0)).unwrap().identity()];
-    let file = CameraFile { calibrated_with, ..read(path.clone()) };
+    let failed = Some("it left 90 px".to_owned());
+    let file = CameraFile { calibrated_with, failed, ..read(path.clone()) };
     fs::write(&path, file.to_yaml()).unwrap();
-    deltille(folder.path(), "undistort --camera camera.yaml -o new").success();
+    let said = deltille(folder.path(), "undistort --camera camera.yaml -o new").success();
+    let said = String::from_utf8_lossy(&said.get_output().stderr).into_owned();
+    assert!(said.contains("camera.yaml: the calibration failed: it left 90 px"), "{said}");
     let view = read(folder.path().join("new/camera-undistorted.yaml"));
-    assert_eq!(view.calibrated_with, file.calibrated_with);
+    assert_eq!((view.calibrated_with, view.failed), (file.calibrated_with, file.failed));
 }
 
 #[test]

@@ -7,7 +7,7 @@ use deltille_core::camera::{CameraFile, Pose};
 use deltille_core::detect::{Detection, InkEstimate};
 use deltille_core::targets::Target;
 use deltille_files::export::calibration::{Print, Residuals};
-use deltille_files::export::{calibration, camera, detection, next_view};
+use deltille_files::export::{calibration, camera, detection, next_view, saved};
 use deltille_files::report::{Report, Survey};
 use wasm_bindgen::prelude::*;
 
@@ -67,15 +67,17 @@ impl Solved {
             "sd": found.parameters.iter().map(|parameter| parameter.sd).collect::<Vec<_>>(),
             "projection_sd_px": found.projection_sd_px(None, deltille_core::calibrate::Source::Noise),
         });
+        let json = calibration::write(&estimate, &diagnoses, print, Residuals::LeftOut)
+            .map(|json| named(&json))
+            .unwrap_or_default();
+        let file = CameraFile {
+            camera: found.camera.clone(),
+            calibrated_with: estimate.calibrated_with.clone(),
+            failed: saved::failures(&json).into_iter().next(),
+        };
         Ok(Self {
-            json: calibration::write(&estimate, &diagnoses, print, Residuals::LeftOut)
-                .map(|json| named(&json))
-                .unwrap_or_default(),
-            yaml: CameraFile {
-                camera: found.camera.clone(),
-                calibrated_with: estimate.calibrated_with.clone(),
-            }
-            .to_yaml(),
+            yaml: file.to_yaml(),
+            json,
             opencv: camera::opencv(&found.camera).ok(),
             ros: camera::ros(&found.camera, "camera").ok(),
             page: named(&page.html()),

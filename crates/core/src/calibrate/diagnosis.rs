@@ -425,15 +425,19 @@ fn causes(found: &Estimate, alone: &[Alone], states: &mut Vec<Diagnosis>) -> Vec
         (false, false) => Vec::new(),
     };
     let is_named = |camera: usize| {
-        let is_lens =
-            |m: &&LackOfFit| matches!(m, LackOfFit::Lens { camera: c, .. } if *c == camera);
+        let poor_px = found.cameras[camera].inlier_rms_px();
+        // A target that leaves most of the error bends the cameras, too.
+        let is_cause = |misfit: &&LackOfFit| match **misfit {
+            LackOfFit::Lens { camera: of, .. } => of == camera,
+            LackOfFit::Target { rms_px, .. } => rms_px > 0.5 * poor_px,
+        };
         // Of a single camera anything is.
         let is_single = found.cameras.len() == 1 && !(told.is_empty() && remedies.is_empty());
         let is_of_state = |state: &Diagnosis| state.of_state().is_some_and(|(of, _)| of == camera);
         is_single
             || states.iter().any(is_of_state)
             || remedies.iter().any(|(of, _)| *of == camera)
-            || told.iter().any(is_lens)
+            || told.iter().any(is_cause)
     };
     let is_poor = |(index, camera): &(usize, &CameraEstimate)| {
         camera.inlier_rms_px() > POOR_RMS_PX && !is_absurd(camera) && !is_named(*index)

@@ -237,12 +237,22 @@ impl<'a> Words<'a> {
                 self.of_camera(camera, text)
             }
             LackOfFit::Target { rms_px, rms_mm, panel } => {
-                let cause = match self.is_solid() {
-                    true => self.moved_panels(Some(panel)),
-                    false => self.board(self.model(0)),
+                let board = self.board_among_targets(panel);
+                let (where_, cause) = match board {
+                    Some(name) => (
+                        format!("target {name}"),
+                        format!(
+                            "its board has another size or other labels than its description states, is not \
+                             flat or not printed as stated: measure its edges, or leave {name} out"
+                        ),
+                    ),
+                    None if self.is_solid() => {
+                        ("the target".to_owned(), self.moved_panels(Some(panel)))
+                    }
+                    None => ("the target".to_owned(), self.board(self.model(0))),
                 };
                 format!(
-                    "corners lie {rms_mm:.2} mm beside their places on the target, in all views alike \
+                    "corners lie {rms_mm:.2} mm beside their places on {where_}, in all views alike \
                      ({rms_px:.3} px): {cause}"
                 )
             }
@@ -304,6 +314,13 @@ impl<'a> Words<'a> {
                  `Calibration::measure_target`"
             ),
         }
+    }
+
+    /// The name of one of several targets that has this panel only, so that nothing moves on it.
+    fn board_among_targets(&self, panel: PanelRef) -> Option<&str> {
+        let targets = &self.estimate.targets;
+        let of_panel = targets.iter().find(|target| target.panels.contains(&panel.index()))?;
+        (targets.len() > 1 && of_panel.panels.len() == 1).then_some(of_panel.name.as_str())
     }
 
     /// Whether views show several panels, fixed to each other.

@@ -86,6 +86,8 @@ struct Own {
     distortion: Vec<f64>,
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     calibrated_with: Vec<TargetIdentity>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    failed: Option<String>,
 }
 
 /// The content of the project's own camera file.
@@ -95,6 +97,8 @@ pub struct CameraFile {
     pub camera: Camera,
     /// Identities of the targets that it was calibrated with; empty where they are not known.
     pub calibrated_with: Vec<TargetIdentity>,
+    /// Why the calibration failed, so that the camera is not to be used; `None` where it did not.
+    pub failed: Option<String>,
 }
 
 #[derive(Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
@@ -198,7 +202,7 @@ impl Camera {
 
     /// The text of the project's own camera file, with every digit, without the targets that it was calibrated with.
     pub fn to_yaml(&self) -> String {
-        CameraFile { camera: self.clone(), calibrated_with: Vec::new() }.to_yaml()
+        CameraFile { camera: self.clone(), calibrated_with: Vec::new(), failed: None }.to_yaml()
     }
 }
 
@@ -213,7 +217,7 @@ impl CameraFile {
         let foreign = text.contains("camera_matrix");
         let own = if foreign { from_foreign(text)? } else { parse(text)? };
         let Own { width, height, focal_px, centre_px, model, spline, mut distortion, .. } = own;
-        let calibrated_with = own.calibrated_with;
+        let (calibrated_with, failed) = (own.calibrated_with, own.failed);
         let key = |key, problem: String| CameraFileError::Key { key, problem };
         let numbers = [
             ("width", vec![f64::from(width)], quantity::side_px::RANGE),
@@ -253,7 +257,7 @@ impl CameraFile {
         }
         let lens = lens.with_parameters(&distortion);
         let camera = Camera { width, height, focal_px, centre_px, lens };
-        Ok(Self { camera, calibrated_with })
+        Ok(Self { camera, calibrated_with, failed })
     }
 
     /// The text of the file, with every digit.
@@ -278,6 +282,7 @@ impl CameraFile {
             spline,
             distortion,
             calibrated_with: self.calibrated_with.clone(),
+            failed: self.failed.clone(),
         };
         let yaml = serde_yaml_ng::to_string(&own).expect("plain data has a YAML form");
         format!("# deltille {}, camera\n{yaml}", env!("CARGO_PKG_VERSION"))
@@ -335,6 +340,7 @@ fn from_foreign(text: &str) -> Result<Own, CameraFileError> {
         spline: None,
         distortion: coefficients.data,
         calibrated_with: Vec::new(),
+        failed: None,
     })
 }
 

@@ -3,10 +3,11 @@
 //! What follows from nothing else in the file is left to the comparison with what was made: sheets, what is printed on them,
 //! the finish, and of a solid the walls of its skeleton. A spacing of tags may be another one that has the same tags.
 
+use super::identity::fingerprint;
 use super::json::{Problem, problem};
 use super::{
-    Corner, FamilyRef, PanelPose, TagPlacement, Target, TargetSpec, aprilgrid, board, charuco,
-    circles, solid, tag_sheet,
+    Corner, FamilyRef, Fingerprint, Panel, PanelPose, TagPlacement, Target, TargetSpec, aprilgrid,
+    board, charuco, circles, solid, tag_sheet,
 };
 use crate::family::shipped_name;
 
@@ -26,18 +27,7 @@ const ROTATION_SLACK: f64 = 1e-6;
 /// # Errors
 /// The field at fault, and what is wrong with it.
 pub(super) fn check(target: &Target) -> Result<(), Problem> {
-    let (made, tagged) = match &target.spec {
-        TargetSpec::Board(spec) => {
-            (spec.check().map(|()| board::untied_panels(spec)), spec.tags.is_some())
-        }
-        TargetSpec::Solid(spec) => (solid::untied_panels(spec), spec.tags.is_some()),
-        TargetSpec::Tags(spec) => (Ok(tag_sheet::panels(spec)), true),
-        TargetSpec::Charuco(spec) => (charuco::untied_panels(spec), true),
-        TargetSpec::AprilGrid(spec) => (aprilgrid::untied_panels(spec), true),
-        TargetSpec::Circles(spec) => (circles::untied_panels(spec), false),
-        TargetSpec::Listed(_) => return Ok(()),
-    };
-    let made = made.or_else(|error| problem("spec", error.to_string()))?;
+    let Some((made, tagged)) = made(&target.spec)? else { return Ok(()) };
     check_families(target)?;
     // Those that were held where the plan has them have no covariance beside others that have.
     let is_refined = target.panels.iter().any(|panel| panel.pose.covariance.is_some());
@@ -117,6 +107,36 @@ pub(super) fn check(target: &Target) -> Result<(), Problem> {
         }
     }
     Ok(())
+}
+
+/// Whether this may be the fingerprint of the print of which the target was measured or refined: that of its own panels
+/// without what was measured, or that of its spec.
+pub(super) fn may_be_of_print(target: &Target, plan: Fingerprint) -> Result<bool, Problem> {
+    let mut panels = target.panels.clone();
+    for corner in panels.iter_mut().flat_map(|panel| &mut panel.corners) {
+        corner.measured = None;
+    }
+    let family = target.family.as_ref();
+    let of_spec = made(&target.spec)?.map(|(panels, _)| fingerprint(&panels, family));
+    let is_refined = target.panels.iter().any(|panel| panel.pose.covariance.is_some());
+    Ok(fingerprint(&panels, family) == plan || of_spec.map_or(is_refined, |own| own == plan))
+}
+
+/// The panels that a spec makes, and whether they have tags; `None` where it lists what a file of another program has.
+fn made(spec: &TargetSpec) -> Result<Option<(Vec<Panel>, bool)>, Problem> {
+    let (made, tagged) = match spec {
+        TargetSpec::Board(spec) => {
+            (spec.check().map(|()| board::untied_panels(spec)), spec.tags.is_some())
+        }
+        TargetSpec::Solid(spec) => (solid::untied_panels(spec), spec.tags.is_some()),
+        TargetSpec::Tags(spec) => (Ok(tag_sheet::panels(spec)), true),
+        TargetSpec::Charuco(spec) => (charuco::untied_panels(spec), true),
+        TargetSpec::AprilGrid(spec) => (aprilgrid::untied_panels(spec), true),
+        TargetSpec::Circles(spec) => (circles::untied_panels(spec), false),
+        TargetSpec::Listed(_) => return Ok(None),
+    };
+    let made = made.or_else(|error| problem("spec", error.to_string()))?;
+    Ok(Some((made, tagged)))
 }
 
 /// Whether a panel is where it is in the plan.

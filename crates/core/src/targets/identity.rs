@@ -147,5 +147,9 @@ mod tests {
         assert!(read.identity().is_same_print(&plan.identity()));
         assert_ne!(read.identity().fingerprint, plan.identity().fingerprint);
         assert_eq!(read.identity().labels, plan.identity().labels);
+        let larger = board("desk", |spec| spec.edge_mm = 25.0).identity();
+        measured.plan = Some(larger);
+        let refused = Target::from_json(&measured.to_json()).unwrap_err();
+        assert!(refused.to_string().contains("plan.fingerprint"), "{refused}");
     }
 }

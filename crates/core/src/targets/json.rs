@@ -267,6 +267,10 @@ fn check_identity(target: &Target, stated: Option<Fingerprint>) -> Result<(), Pr
         Some(plan) if plan.labels != found.labels => {
             problem("plan.labels", "the corners or tags are not those of the plan")
         }
+        Some(plan) if !against_spec::may_be_of_print(target, plan.of_print())? => {
+            let what = format!("it is {}, which is not that of `spec`", plan.of_print());
+            problem("plan.fingerprint", what)
+        }
         _ => Ok(()),
     }
 }
