@@ -13,6 +13,22 @@ pub fn counted(count: usize, thing: &str) -> String {
     format!("{count} {thing}{}", if count == 1 { "" } else { "s" })
 }
 
+/// A p-value as tests give it: never rounded to zero, nor across the level of 0.01.
+///
+/// ```
+/// use deltille_core::words::p_value;
+///
+/// assert_eq!([0.25, 0.004, 3e-5, 0.0].map(p_value), ["p = 0.25", "p = 0.004", "p = 3e-5", "p < 10⁻⁶"]);
+/// ```
+pub fn p_value(probability: f64) -> String {
+    match probability {
+        p if p < 1e-6 => "p < 10⁻⁶".to_owned(),
+        p if p < 0.001 => format!("p = {p:.0e}"),
+        p if p < 0.01 => format!("p = {p:.3}"),
+        p => format!("p = {p:.2}"),
+    }
+}
+
 /// Most characters of a text of others that a message repeats.
 pub const MOST_QUOTED: usize = 80;
 

@@ -19,7 +19,7 @@ use crate::cli::run::{FAILED, UNDECIDED};
 use crate::export::{comparison, saved};
 use crate::limits::Limits;
 use crate::report::comparison_svg;
-use crate::words::{counted, shown};
+use crate::words::{counted, p_value, shown};
 
 /// Arguments of `deltille compare`.
 #[derive(clap::Args)]
@@ -249,13 +249,9 @@ fn told(camera: &CameraEstimate, found: &Comparison, tolerance: f64) -> String {
 fn verdict(chance: Option<f64>, is_significant: Option<bool>, changed: &str) -> String {
     match (chance, is_significant) {
         (Some(chance), Some(true)) => {
-            format!("more than chance makes (p = {chance:.1e}): {changed}")
+            format!("more than chance makes ({}): {changed}", p_value(chance))
         }
-        (Some(chance), _) => {
-            // Rounded to zero it would contradict the verdict.
-            let digits = if chance < 0.01 { 3 } else { 2 };
-            format!("no more than chance makes (p = {chance:.digits$})")
-        }
+        (Some(chance), _) => format!("no more than chance makes ({})", p_value(chance)),
         (None, _) => String::new(),
     }
 }

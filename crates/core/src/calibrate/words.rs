@@ -11,7 +11,7 @@ use super::panel::PanelRef;
 use super::start::LabelRotation;
 use super::target_map::LEAST_TO_MEASURE;
 use crate::camera::Camera;
-use crate::words::{counted, places};
+use crate::words::{counted, p_value, places};
 
 /// A panel that is turned by less looks only moved.
 const TURNED_DEG: f64 = 0.05;
@@ -386,7 +386,7 @@ fn changed(change: &CameraChange) -> String {
          {second:.digits$} px in the {after} from {from_view} on, a difference of {:.digits$} ± {sd_px:.digits$} px \
          ({}); what was found is neither: {lock}, and calibrate each group of views by itself",
         second - first,
-        significant(change.significance)
+        p_value(change.significance)
     )
 }
 
@@ -396,7 +396,7 @@ fn rolling_shutter(shutter: &RollingShutter, all: usize) -> String {
         "rows are displaced against each other, by {shear_px:.1} px from the first to the last one, in {views} of {all} \
          views ({}; {left_px:.3} px are left where that is allowed for): the shutter reads row by row while board or \
          camera move; hold both still for each picture, or take a camera with a global shutter",
-        significant(*significance)
+        p_value(*significance)
     )
 }
 
@@ -413,16 +413,8 @@ fn stretched(stretch: &BoardStretch) -> String {
          description, or measure both check bars for `Sighting::stretch`",
         100.0 * (ratio - 1.0),
         100.0 * sd,
-        significant(significance)
+        p_value(significance)
     )
-}
-
-/// How often noise alone makes as much.
-fn significant(probability: f64) -> String {
-    match probability < 1e-6 {
-        true => "p < 10⁻⁶".to_owned(),
-        false => format!("p = {:.0e}", probability),
-    }
 }
 
 /// What follows from parameters that the views leave open; `sufficient` is a smaller model that holds
