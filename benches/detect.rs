@@ -12,25 +12,26 @@ use deltille::clock;
 use deltille::detect::{Detector, DetectorConfig, Refinement};
 use deltille::family::Family;
 use deltille::lattice::GridKind;
+use deltille::layout::{PaperSpec, Printing};
 use deltille::raster::Gray;
 use deltille::synth::{Light, scene_of_sheet};
-use deltille::targets::{BoardSpec, PaperSpec, TagSpec, Target, TargetSpec};
+use deltille::targets::{BoardSpec, TagSpec, Target, TargetSpec};
 use glam::DVec3;
 
 /// A board of 10 × 11 corners with tags, seen at 35°.
 fn photograph() -> (Target, Family, Gray<u8>) {
     let family = Family::shipped(&TagSpec::default().family).expect("a shipped family");
     let spec = TargetSpec::Board(BoardSpec::new(GridKind::Deltille, 10, 11, 20.0));
-    let target = Target::build("board", &spec, Some(&family), Some(&PaperSpec::default()))
+    let target = Printing::build("board", &spec, Some(&family), Some(&PaperSpec::default()))
         .expect("a board that fits A3");
     let sheets = artwork::draw(&target, Some(&family)).expect("a board that can be drawn").sheets;
     let scene = scene_of_sheet(&target, &sheets[0], 0);
-    let centre = target.panels[0].middle_mm();
+    let centre = target.target.panels[0].middle_mm();
     let eye = centre + 420.0 * DVec3::new(0.4, -0.41, 0.82);
     let pose = Pose::looking_at(eye, centre, DVec3::Y);
     let light = Light::default().blur_px(0.8).noise(0.01).seed(1);
     let image = scene.render(&Camera::pinhole(1600, 1200, 75f64.to_radians()), &pose, &light);
-    (target, family, image.map(|v| (v * 255.0 + 0.5) as u8))
+    (target.target, family, image.map(|v| (v * 255.0 + 0.5) as u8))
 }
 
 fn detect(criterion: &mut Criterion) {

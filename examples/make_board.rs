@@ -8,20 +8,21 @@ use std::error::Error;
 use std::path::PathBuf;
 
 use deltille::export::pdf;
-use deltille::targets::{BoardSpec, Target};
+use deltille::layout::Printing;
+use deltille::targets::BoardSpec;
 use deltille::verify::Verifier;
 
 fn main() -> Result<(), Box<dyn Error>> {
     let folder = PathBuf::from(std::env::args().nth(1).unwrap_or_else(|| ".".to_owned()));
     std::fs::create_dir_all(&folder)?;
     // 10 rows of 11 corners, tiles of 20 mm, tags of the family that is the default.
-    let board = Target::new("desk", BoardSpec::deltille(10, 11, 20.0))?;
+    let board = Printing::new("desk", BoardSpec::deltille(10, 11, 20.0))?;
     let path = folder.join("desk.pdf");
     pdf::write(&board.draw()?, &path)?;
     // The description: detection and calibration start from it.
     std::fs::write(folder.join("desk.json"), board.to_json())?;
 
-    let family = board.family()?;
+    let family = board.target.family()?;
     let verdict = Verifier::new(&board, family.as_ref())?.verify_path(&path)?;
     println!("{verdict}");
     if !verdict.passed {

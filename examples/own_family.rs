@@ -12,7 +12,8 @@ use deltille::export::svg;
 use deltille::family::best::{Best, Budget};
 use deltille::family::{Control, certify};
 use deltille::lattice::Dimension;
-use deltille::targets::{BoardSpec, PaperSpec, TagSpec, Target, TargetSpec};
+use deltille::layout::{PaperSpec, Printing};
+use deltille::targets::{BoardSpec, TagSpec, TargetSpec};
 
 fn main() -> Result<(), Box<dyn Error>> {
     let folder = PathBuf::from(std::env::args().nth(1).unwrap_or_else(|| ".".to_owned()));
@@ -28,10 +29,10 @@ fn main() -> Result<(), Box<dyn Error>> {
 
     let tags = TagSpec { family: "own16h7.json".to_owned(), ..TagSpec::default() };
     let spec = TargetSpec::Board(BoardSpec { tags: Some(tags), ..BoardSpec::deltille(5, 6, 20.0) });
-    let board = Target::build("own", &spec, Some(&family), Some(&PaperSpec::default()))?;
+    let board = Printing::build("own", &spec, Some(&family), Some(&PaperSpec::default()))?;
     let drawn = artwork::draw(&board, Some(&family))?;
     svg::write(&drawn, 0, &folder.join("own.svg"))?;
     std::fs::write(folder.join("own.json"), board.to_json())?;
-    println!("{} tags on the board", board.panels[0].tags.len());
+    println!("{} tags on the board", board.target.panels[0].tags.len());
     Ok(())
 }

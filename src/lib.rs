@@ -30,8 +30,8 @@
 //! images row-major with y down, the board frame right-handed with x right and y up on the print.
 
 pub use deltille_core::{
-    Clock, Name, artwork, calibrate, camera, detect, glam, json, lattice, nalgebra, name, quantity,
-    raster, reading, statistics, synth, targets, words,
+    Clock, Name, artwork, calibrate, camera, detect, glam, json, lattice, layout, nalgebra, name,
+    quantity, raster, reading, statistics, synth, targets, words,
 };
 #[cfg(feature = "print")]
 pub use deltille_files::logo;

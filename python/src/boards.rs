@@ -5,7 +5,8 @@ use std::sync::Arc;
 
 use deltille::family;
 use deltille::lattice::GridKind;
-use deltille::targets::{BoardSpec, PaperSpec, TagSpec, TagsIn, TargetSpec, usual_edge_mm};
+use deltille::layout::{PaperSpec, usual_edge_mm};
+use deltille::targets::{BoardSpec, TagSpec, TagsIn, TargetSpec};
 use pyo3::prelude::*;
 
 use crate::arrays::whole;

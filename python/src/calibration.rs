@@ -8,8 +8,9 @@ use deltille::camera::CameraFile;
 use deltille::export::calibration::Residuals;
 use deltille::export::camera::{colmap, colmap_rig, kalibr};
 use deltille::export::saved;
+use deltille::layout::Printing;
 use deltille::limits::Limits;
-use deltille::{report, targets};
+use deltille::report;
 use numpy::PyArray2;
 use pyo3::prelude::*;
 
@@ -230,7 +231,11 @@ impl Calibration {
     fn measured_target(slf: PyRef<'_, Self>) -> PyResult<Option<Target>> {
         let solved = &slf.as_super().solved;
         let found = solved.estimate.map.as_ref().zip(solved.targets.first());
-        found.map(|(map, target)| Target::with_family(map.on(target), None)).transpose()
+        let measured = found.map(|(map, printing)| Printing {
+            target: map.on(&printing.target),
+            ..printing.clone()
+        });
+        measured.map(|printing| Target::with_family(printing, None)).transpose()
     }
 
     fn __repr__(slf: PyRef<'_, Self>) -> String {
@@ -253,7 +258,7 @@ pub fn pickled<'py>(
     solved: &Solved,
 ) -> crate::Reduced<'py, (String, Vec<String>)> {
     let restore = py.import("deltille._core")?.getattr(restore)?;
-    let targets = solved.targets.iter().map(targets::Target::to_json).collect();
+    let targets = solved.targets.iter().map(Printing::to_json).collect();
     Ok((restore, (solved.json(Residuals::Listed), targets)))
 }
 
@@ -271,7 +276,7 @@ pub fn _rig(json: &str, targets: Vec<String>) -> PyResult<Rig> {
 
 /// What was pickled.
 pub fn restored(json: &str, targets: &[String]) -> PyResult<Solved> {
-    let targets = targets.iter().map(|text| targets::Target::from_json(text).raise(errors::target));
+    let targets = targets.iter().map(|text| Printing::from_json(text).raise(errors::target));
     of_text(json, targets.collect::<PyResult<_>>()?).raise(errors::calibration)
 }
 
@@ -336,16 +341,18 @@ impl Rig {
     fn refined_targets(&self) -> PyResult<Vec<Target>> {
         let estimate = &self.solved.estimate;
         let all = self.solved.targets.iter().enumerate();
-        let refined = all.filter_map(|(index, target)| {
+        let refined = all.filter_map(|(index, printing)| {
+            let target = &printing.target;
             let found = match self.solved.targets.len() {
                 1 => estimate.clone(),
                 _ => estimate.of_target(index),
             };
             let refined = found.has_refined_panels().then(|| found.refined(target));
             let measured = found.map.as_ref().map(|map| map.on(refined.as_ref().unwrap_or(target)));
-            measured.or(refined)
+            let target = measured.or(refined)?;
+            Some(Printing { target, ..printing.clone() })
         });
-        refined.map(|target| Target::with_family(target, None)).collect()
+        refined.map(|printing| Target::with_family(printing, None)).collect()
     }
 
     /// Writes the rig.
@@ -420,8 +427,9 @@ fn text_of(solved: &Solved, residuals: bool) -> PyResult<String> {
 }
 
 /// A calibration or rig of a text.
-fn of_text(text: &str, targets: Vec<targets::Target>) -> Result<Solved, saved::SavedError> {
-    let estimate: Estimate = match targets.as_slice() {
+fn of_text(text: &str, targets: Vec<Printing>) -> Result<Solved, saved::SavedError> {
+    let scene: Vec<_> = targets.iter().map(|printing| printing.target.clone()).collect();
+    let estimate: Estimate = match scene.as_slice() {
         [] => saved::read_without_target(text)?,
         [only] => saved::read(text, &Reference::Target(only))?,
         several => saved::read(text, &Reference::Scene(several))?,
@@ -434,7 +442,7 @@ fn of_text(text: &str, targets: Vec<targets::Target>) -> Result<Solved, saved::S
 fn read(path: &std::path::Path, target: Option<Targets>, is_rig: bool) -> PyResult<Solved> {
     let text = Limits::default().read_text(path).raise_of_file(path, errors::file)?;
     let targets = target.map(|targets| targets.0).unwrap_or_default();
-    let targets = targets.iter().map(|target| (*target.target).clone()).collect();
+    let targets = targets.iter().map(|target| (*target.printing).clone()).collect();
     let wrong = |what: String| raised::FileError::new_err(format!("{}: {what}", path.display()));
     let solved = of_text(&text, targets).map_err(|error| wrong(errors::told(&error)))?;
     if is_rig && !solved.is_rig {

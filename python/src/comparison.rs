@@ -408,7 +408,7 @@ impl Located {
     fn to_json(&self) -> String {
         let found = self.estimate.as_ref().zip(self.view());
         match found {
-            Some((estimate, view)) => pose::write_line(estimate, view, &self.asked.target.target),
+            Some((estimate, view)) => pose::write_line(estimate, view, self.asked.target.target()),
             None => pose::write_none(&self.image, &self.target, self.why.as_deref().unwrap_or("")),
         }
     }
@@ -475,9 +475,9 @@ pub fn pose_of(
     };
     let print_scale = print_scale.map(print_scale_of).transpose()?;
     let mut detection = detection.clone();
-    let reference = Reference::Target(&target.target);
+    let reference = Reference::Target(target.target());
     if assume_target {
-        Arc::make_mut(&mut detection.found).assume_targets(&[target.target.identity()]);
+        Arc::make_mut(&mut detection.found).assume_targets(&[target.target().identity()]);
     }
     for grid in &detection.found.grids {
         reference.check_labels(&detection.found, grid).raise(errors::calibration)?;
@@ -505,9 +505,11 @@ impl Asked {
     }
 
     fn solve(self) -> PyResult<Located> {
-        let (found, target) = (&self.detection.found, self.target.target.clone());
-        let sheet = Sheet { print_scale: self.print_scale, shape: None };
-        let reference = Reference::Target(&target);
+        let (found, printing) = (&self.detection.found, self.target.printing.clone());
+        let sheets = printing.sheets.clone();
+        let sheet = Sheet { print_scale: self.print_scale, shape: None, sheets };
+        let target = &printing.target;
+        let reference = Reference::Target(target);
         let named = [(found.image.clone(), (**found).clone())];
         let of = |why: Option<String>, estimate: Option<calibrate::Estimate>, warnings| Located {
             estimate: estimate.map(Arc::new),

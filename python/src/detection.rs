@@ -120,12 +120,12 @@ impl Detection {
     /// The target of a grid, where it is known.
     fn target_of(&self, grid: &detect::Grid) -> Option<&targets::Target> {
         let named =
-            |name: &String| self.targets.iter().find(|target| *target.target.name == **name);
+            |name: &String| self.targets.iter().find(|target| *target.target().name == **name);
         let found = match &grid.target {
             Some(name) => named(name),
             None => self.targets.first(),
         };
-        found.map(|found| &*found.target)
+        found.map(|found| found.target())
     }
 
     /// A detection with its targets, which are taken even where it names others if they are assumed.
@@ -135,7 +135,7 @@ impl Detection {
         assume_target: bool,
     ) -> PyResult<Self> {
         if assume_target {
-            let given: Vec<_> = targets.iter().map(|target| target.target.identity()).collect();
+            let given: Vec<_> = targets.iter().map(|target| target.target().identity()).collect();
             found.assume_targets(&given);
         }
         Self { found: Arc::new(found), targets }.checked()
@@ -340,7 +340,7 @@ impl Detection {
     /// pathlib.Path
     #[pyo3(signature = (path, format = "json", *, overwrite = false))]
     fn save(&self, path: PathBuf, format: &str, overwrite: bool) -> PyResult<PathBuf> {
-        let target = self.targets.first().map(|target| &*target.target);
+        let target = self.targets.first().map(|target| target.target());
         let text = match format {
             "json" => detection::write(&self.found),
             "csv" => csv::write(&self.found),

@@ -203,7 +203,7 @@ impl Detector {
                         )));
                     }
                 }
-                let each = targets.iter().map(|of| (&*of.target, of.family.as_deref()));
+                let each = targets.iter().map(|of| (of.target(), of.family.as_deref()));
                 let each = each.collect::<Vec<_>>();
                 detect::Detector::for_targets(&each, config).raise(errors::detection)?
             }
@@ -364,7 +364,7 @@ impl Detector {
     }
 
     fn __repr__(&self) -> String {
-        let names: Vec<&str> = self.targets.iter().map(|of| &*of.target.name).collect();
+        let names: Vec<&str> = self.targets.iter().map(|of| &*of.target().name).collect();
         format!(
             "<Detector {}>",
             if names.is_empty() { "of untagged boards".into() } else { names.join(", ") }

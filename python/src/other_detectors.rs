@@ -4,7 +4,8 @@ use std::path::PathBuf;
 use std::sync::Arc;
 
 use deltille::family::{Family, dictionary};
-use deltille::targets::{AprilGridSpec, CharucoSpec, CirclesSpec, PaperSpec, TargetSpec};
+use deltille::layout::PaperSpec;
+use deltille::targets::{AprilGridSpec, CharucoSpec, CirclesSpec, TargetSpec};
 use pyo3::prelude::*;
 
 use crate::arrays::whole;

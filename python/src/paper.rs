@@ -4,9 +4,10 @@ use std::path::PathBuf;
 use std::sync::Arc;
 
 use deltille::family::Family;
+use deltille::layout::{DEFAULT_MARGIN_MM, Finish, PaperSpec, Printing, SolidSheets};
 use deltille::limits;
 use deltille::logo::{self, LogoError, MAX_LOGO_BYTES};
-use deltille::targets::{self, DEFAULT_MARGIN_MM, Finish, PaperSpec, SolidSheets, TargetSpec};
+use deltille::targets::TargetSpec;
 use pyo3::prelude::*;
 
 use crate::errors::{self, Raise, RaiseFile};
@@ -59,9 +60,9 @@ pub fn build(
     paper: &PaperSpec,
     finish: Finish,
 ) -> PyResult<Target> {
-    let target = targets::Target::build(name, spec, family.as_deref(), Some(paper));
-    let target = target.and_then(|target| target.finished(finish, paper.margin_mm));
-    Ok(Target { target: Arc::new(target.raise(errors::target)?), family })
+    let printing = Printing::build(name, spec, family.as_deref(), Some(paper));
+    let printing = printing.and_then(|printing| printing.finished(finish, paper.margin_mm));
+    Ok(Target { printing: Arc::new(printing.raise(errors::target)?), family })
 }
 
 /// A class of flat targets: its name, that of its files, what must be given, keywords of its own with their defaults, and
@@ -129,7 +130,7 @@ macro_rules! flat {
                 contour: Option<String>,
                 name: &str,
             ) -> PyResult<PyClassInitializer<Self>> {
-                let solids = deltille::targets::SolidSheets::default();
+                let solids = deltille::layout::SolidSheets::default();
                 let of_all = crate::paper::paper(paper, orientation, margin_mm, solids)?;
                 #[allow(unused_mut, reason = "few targets have a say in it")]
                 let mut $paper = crate::paper::with_logo(
@@ -138,7 +139,7 @@ macro_rules! flat {
                     logo_height_mm,
                 )?;
                 let (spec, family) = $make;
-                let finish = deltille::targets::Finish { mirrored, white, contour };
+                let finish = deltille::layout::Finish { mirrored, white, contour };
                 let target = crate::paper::build(name, &spec, family, &$paper, finish)?;
                 Ok(PyClassInitializer::from(target).add_subclass(Self))
             }

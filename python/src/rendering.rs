@@ -182,7 +182,7 @@ pub fn render<'py>(
 ) -> PyResult<(Bound<'py, PyAny>, Truth)> {
     let wrong = |what: String| raised::TargetError::new_err(what);
     let own = target.clone();
-    let of = &own.target;
+    let of = own.target();
     if !of.is_one_scene() {
         let what =
             format!("{} has several loose boards: render targets of one board, or solids", of.name);
@@ -222,9 +222,9 @@ pub fn render<'py>(
             return Err(wrong(what.to_owned()));
         }
     };
-    let name = own.target.name.to_string();
+    let name = own.target().name.to_string();
     let drawn = interruptible(py, move |_| {
-        let scene = scene_of_target(&own.target, own.family.as_deref())?;
+        let scene = scene_of_target(own.target(), own.family.as_deref())?;
         let image = scene.render(&camera, &pose.0, &light);
         Ok::<_, deltille::artwork::ArtworkError>((
             image,

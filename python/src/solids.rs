@@ -5,10 +5,11 @@ use std::sync::Arc;
 
 use deltille::export::solid_mesh;
 use deltille::family::Family;
+use deltille::layout::{Finish, PaperSpec, SolidSheets};
 use deltille::limits::Limits;
 use deltille::targets::{
-    ClosedMesh, Finish, NEAR_EQUILATERAL, Name, PaperSpec, SkeletonSpec, SolidShape, SolidSheets,
-    SolidSpec, TagSpec, TagsIn, TargetSpec,
+    ClosedMesh, NEAR_EQUILATERAL, Name, SkeletonSpec, SolidShape, SolidSpec, TagSpec, TagsIn,
+    TargetSpec,
 };
 use pyo3::prelude::*;
 

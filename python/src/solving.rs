@@ -12,6 +12,7 @@ use deltille::camera;
 use deltille::detect;
 use deltille::export::calibration::{Print, Residuals, Sheet};
 use deltille::export::{calibration, rig};
+use deltille::layout::Printing;
 use deltille::quantity::{board_accuracy_mm, distance_mm, edge_mm, print_scale};
 use deltille::targets;
 use pyo3::prelude::*;
@@ -26,7 +27,11 @@ use crate::interrupt::interruptible;
 /// What was photographed.
 pub enum Seen {
     /// Targets, of which there is at least one.
-    Targets(Vec<targets::Target>),
+    Targets {
+        targets: Vec<targets::Target>,
+        /// The same with their sheets.
+        printed: Vec<Printing>,
+    },
     /// An untagged board.
     Grid(UntaggedGrid),
 }
@@ -45,8 +50,10 @@ impl Seen {
                 "give a target, or grid=\"deltille\" or \"checker\" with edge_mm for untagged boards",
             ),
             (found, None) => {
-                let own = |target: &crate::targets::Target| (*target.target).clone();
-                Ok(Self::Targets(found.iter().map(own).collect()))
+                let own = |target: &crate::targets::Target| (*target.printing).clone();
+                let printed: Vec<Printing> = found.iter().map(own).collect();
+                let targets = printed.iter().map(|printing| printing.target.clone()).collect();
+                Ok(Self::Targets { targets, printed })
             }
             (found, Some(grid)) if found.is_empty() => {
                 let Some(edge_mm) = edge_mm else {
@@ -63,7 +70,7 @@ impl Seen {
     /// What views refer to.
     pub fn reference(&self) -> Reference<'_> {
         match self {
-            Self::Targets(targets) => match targets.as_slice() {
+            Self::Targets { targets, .. } => match targets.as_slice() {
                 [only] => Reference::Target(only),
                 several => Reference::Scene(several),
             },
@@ -74,7 +81,15 @@ impl Seen {
     /// The targets, none of a grid.
     pub fn targets(&self) -> &[targets::Target] {
         match self {
-            Self::Targets(targets) => targets,
+            Self::Targets { targets, .. } => targets,
+            Self::Grid(_) => &[],
+        }
+    }
+
+    /// The targets with their sheets, none of a grid.
+    fn printed(&self) -> &[Printing] {
+        match self {
+            Self::Targets { printed, .. } => printed,
             Self::Grid(_) => &[],
         }
     }
@@ -139,7 +154,7 @@ impl How {
             distances_mm,
             board_accuracy_mm: accuracy_mm.transpose()?,
             assume_target: false,
-            sheet: Sheet { print_scale, shape: None },
+            sheet: Sheet { print_scale, ..Sheet::default() },
         })
     }
 }
@@ -230,7 +245,7 @@ pub struct Solved {
     pub stated: Vec<PanelPlace>,
     /// Models that were tried, by camera.
     pub models: Vec<Vec<Candidate>>,
-    pub targets: Vec<targets::Target>,
+    pub targets: Vec<Printing>,
     pub model: String,
     /// Whether it is a rig, which may have one camera.
     pub is_rig: bool,
@@ -240,12 +255,7 @@ pub struct Solved {
 
 impl Solved {
     /// One that was read from a file.
-    pub fn read(
-        estimate: Estimate,
-        targets: Vec<targets::Target>,
-        model: String,
-        text: &str,
-    ) -> Self {
+    pub fn read(estimate: Estimate, targets: Vec<Printing>, model: String, text: &str) -> Self {
         let whole: Option<Value> = serde_json::from_str(text).ok();
         let file = whole.map(|whole| (text.to_owned(), whole));
         let (diagnoses, models) = (Vec::new(), Vec::new());
@@ -341,13 +351,16 @@ pub fn solve(
     cameras: Vec<OneCamera>,
     is_rig: bool,
     model: ModelChoice,
-    how: How,
+    mut how: How,
 ) -> PyResult<Solved> {
     let seen = Arc::new(seen);
     let mut all = Vec::new();
     let (mut left_out, mut ink, mut panels) = (Vec::new(), Vec::new(), Vec::new());
     let is_named = cameras.len() > 1;
     {
+        if let [only] = seen.printed() {
+            how.sheet.sheets = only.sheets.clone();
+        }
         let reference = seen.reference();
         panels.extend(how.sheet.panels(&reference).raise(errors::calibration)?);
         let mut taken: BTreeSet<(usize, String)> = BTreeSet::new();
@@ -426,10 +439,11 @@ pub fn solve(
         return Err(raised::CalibrationError::new_err(what));
     }
     estimate.excluded.splice(0..0, left_out);
-    let targets = match Arc::try_unwrap(seen) {
-        Ok(Seen::Targets(targets)) => targets,
-        Ok(Seen::Grid(grid)) => grid.target("board").and_then(Result::ok).into_iter().collect(),
-        Err(shared) => shared.targets().to_vec(),
+    let targets = match &*seen {
+        Seen::Targets { printed, .. } => printed.clone(),
+        Seen::Grid(grid) => {
+            grid.target("board").and_then(Result::ok).map(Printing::from).into_iter().collect()
+        }
     };
     let model = model.name();
     Ok(Solved { estimate, diagnoses, print, stated, models, targets, model, is_rig, file: None })

@@ -5,6 +5,7 @@ use std::sync::Arc;
 
 use deltille::export::artifacts::{Files, Making, What, make, write_set};
 use deltille::lattice::GridKind;
+use deltille::layout::Printing;
 use deltille::limits::Limits;
 use deltille::targets::{self, Corner, Panel};
 use deltille::{export, target_file};
@@ -32,31 +33,37 @@ use crate::verdict::{Proof, Verdict};
 #[pyclass(frozen, subclass, module = "deltille")]
 #[derive(Clone)]
 pub struct Target {
-    pub target: Arc<targets::Target>,
+    pub printing: Arc<Printing>,
     pub family: Option<Arc<deltille::family::Family>>,
 }
 
 impl Target {
     /// All corners with their panels.
     pub fn all(&self) -> impl Iterator<Item = (&Panel, &Corner)> {
-        of(&self.target)
+        of(self.target())
+    }
+
+    /// Its geometry and tags, whatever it is printed on.
+    pub fn target(&self) -> &targets::Target {
+        &self.printing.target
     }
 
     /// A target with the family that was given, else the one that it names.
-    pub fn with_family(target: targets::Target, family: Option<FamilyChoice>) -> PyResult<Self> {
+    pub fn with_family(printing: Printing, family: Option<FamilyChoice>) -> PyResult<Self> {
+        let target = &printing.target;
         let family = match family {
             Some(FamilyChoice::Family(family)) => Some(family),
             Some(FamilyChoice::Name(name)) => {
                 let name = name.to_string_lossy();
-                target_file::family(&target, Some(&name)).raise(errors::family)?.map(Arc::new)
+                target_file::family(target, Some(&name)).raise(errors::family)?.map(Arc::new)
             }
-            None => target_file::family(&target, None).raise(errors::family)?.map(Arc::new),
+            None => target_file::family(target, None).raise(errors::family)?.map(Arc::new),
         };
-        Ok(Self { target: Arc::new(target), family })
+        Ok(Self { printing: Arc::new(printing), family })
     }
 
     fn made(&self, what: What, making: Making) -> PyResult<Files> {
-        make(&self.target, self.family.as_deref(), what, making).raise(errors::target)
+        make(&self.printing, self.family.as_deref(), what, making).raise(errors::target)
     }
 }
 
@@ -90,25 +97,25 @@ impl Target {
     #[staticmethod]
     #[pyo3(signature = (text, *, family = None))]
     fn from_json(text: &str, family: Option<FamilyChoice>) -> PyResult<Self> {
-        Self::with_family(targets::Target::from_json(text).raise(errors::target)?, family)
+        Self::with_family(Printing::from_json(text).raise(errors::target)?, family)
     }
 
     /// The text of the target's description.
     fn to_json(&self) -> String {
-        self.target.to_json()
+        self.printing.to_json()
     }
 
     /// Name of the target, which is the stem of the names of its files.
     #[getter]
     fn name(&self) -> &str {
-        &self.target.name
+        &self.target().name
     }
 
     /// What tells this target from others, whatever it is called and printed on: ``name``, ``fingerprint``, ``labels``,
     /// ``panels``, ``corners`` and ``edge_mm``; of a measured or refined target also ``plan``, the fingerprint of its print.
     #[getter]
     fn identity<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        crate::detection::record(py, &self.target.identity())
+        crate::detection::record(py, &self.target().identity())
     }
 
     /// Places of all corners in the target's frame, N × 3, float64, mm: where they were measured, else as planned.
@@ -154,7 +161,7 @@ impl Target {
             };
             panel.tags.iter().map(tag).collect::<Vec<_>>()
         };
-        self.target.panels.iter().flat_map(of_panel).collect()
+        self.target().panels.iter().flat_map(of_panel).collect()
     }
 
     /// Ids of the tags, T, int64.
@@ -172,7 +179,7 @@ impl Target {
     /// Ids of the panels.
     #[getter]
     fn panels(&self) -> Vec<u32> {
-        self.target.panels.iter().map(|panel| panel.id).collect()
+        self.target().panels.iter().map(|panel| panel.id).collect()
     }
 
     /// The family of the tags; ``None`` of a target without.
@@ -184,13 +191,13 @@ impl Target {
     /// Whether places of its corners were measured.
     #[getter]
     fn is_measured(&self) -> bool {
-        self.target.is_measured()
+        self.target().is_measured()
     }
 
     /// Number of pages that it is printed on.
     #[getter]
     fn page_count(&self) -> usize {
-        self.target.page_count()
+        self.printing.page_count()
     }
 
     /// What is printed, as PDF.
@@ -268,7 +275,7 @@ impl Target {
         let given =
             Keywords { dpi, texture_dpi, texture_px, textures, plate_mm, inlay_mm, kerf_mm };
         let what = Formats::One(format.to_owned()).parsed()?;
-        let making = given.making(&self.target, &what)?;
+        let making = given.making(self.target(), &what)?;
         let files = PyDict::new(py);
         for (name, bytes) in unlocked(py, || self.made(what[0], making))?? {
             files.set_item(name, PyBytes::new(py, &bytes))?;
@@ -313,7 +320,7 @@ impl Target {
         let given =
             Keywords { dpi, texture_dpi, texture_px, textures, plate_mm, inlay_mm, kerf_mm };
         let formats = formats.map_or_else(|| Ok(vec![What::Pdf]), Formats::parsed)?;
-        let making = given.making(&self.target, &formats)?;
+        let making = given.making(self.target(), &formats)?;
         unlocked(py, || {
             let mut files = self.made(What::Json, making)?;
             for &what in formats.iter().filter(|what| **what != What::Json) {
@@ -340,7 +347,7 @@ impl Target {
     /// TargetError
     ///     Where both have an id; it names the first that is free.
     fn check_beside(&self, other: &Self) -> PyResult<()> {
-        self.target.check_beside(&other.target).raise(errors::target)
+        self.target().check_beside(other.target()).raise(errors::target)
     }
 
     /// Reads a file back and compares it with this target: every corner, tile and cell.
@@ -369,12 +376,12 @@ impl Target {
     ) -> PyResult<Verdict> {
         let proof = match artifact {
             Some(Proof::Bytes(bytes)) => {
-                let name = name.unwrap_or_else(|| format!("{}.pdf", self.target.name));
+                let name = name.unwrap_or_else(|| format!("{}.pdf", self.target().name));
                 (name.clone(), Some(vec![(name, bytes)]))
             }
             Some(Proof::Path(path)) => (path.to_string_lossy().into_owned(), None),
             None => {
-                let no_pages = self.target.sheets.is_empty();
+                let no_pages = self.printing.sheets.is_empty();
                 let usual = if no_pages { What::Gltf } else { What::Pdf };
                 let files = self.made(usual, Making::default())?;
                 (files[0].0.clone(), Some(files))
@@ -397,7 +404,7 @@ impl Target {
     #[pyo3(signature = (dialect = "fork"))]
     fn dsc(&self, dialect: &str) -> PyResult<String> {
         let dialect = dialect.parse::<Dialect>().raise(errors::target)?;
-        export::dsc::write(&self.target, dialect).raise(errors::target)
+        export::dsc::write(self.target(), dialect).raise(errors::target)
     }
 
     /// A small picture of the first page for notebooks.
@@ -421,19 +428,19 @@ impl Target {
     }
 
     fn __repr__(&self) -> String {
-        let tags: usize = self.target.panels.iter().map(|panel| panel.tags.len()).sum();
-        let family = self.target.family.as_ref().map_or("", |family| &family.name);
+        let tags: usize = self.target().panels.iter().map(|panel| panel.tags.len()).sum();
+        let family = self.target().family.as_ref().map_or("", |family| &family.name);
         format!(
             "<Target {}: {} panels, {} corners, {tags} tags {family}>",
-            self.target.name,
-            self.target.panels.len(),
+            self.target().name,
+            self.target().panels.len(),
             self.all().count(),
         )
         .replace(" >", ">")
     }
 
     fn __eq__(&self, other: &Self) -> bool {
-        self.target == other.target
+        self.printing == other.printing
     }
 
     fn __reduce__<'py>(
@@ -443,12 +450,12 @@ impl Target {
         let own = slf.get();
         let family = own.family.as_ref().map(|family| family.to_json());
         // A family has no file in common with that of its squares.
-        let is_mixed = own.target.family.as_ref().is_some_and(|family| family.squares.is_some());
+        let is_mixed = own.target().family.as_ref().is_some_and(|family| family.squares.is_some());
         let squares = own.family.as_ref().filter(|_| is_mixed);
         let squares = squares.and_then(|family| family.of_tiling(GridKind::Checker));
         let squares = squares.map(|family| family.to_json());
         let class = slf.get_type().name()?.to_string();
-        Ok((restore, (class, own.target.to_json(), family, squares)))
+        Ok((restore, (class, own.printing.to_json(), family, squares)))
     }
 }
 
@@ -461,12 +468,12 @@ pub fn _target<'py>(
     family: Option<&str>,
     squares: Option<&str>,
 ) -> PyResult<Bound<'py, PyAny>> {
-    let target = targets::Target::from_json(json).raise(errors::target)?;
+    let target = Printing::from_json(json).raise(errors::target)?;
     let read = |text| deltille::family::Family::from_json(text).raise(errors::family);
     let [family, squares] = [family, squares].map(|text| text.map(read).transpose());
     let (family, squares) = (family?, squares?);
     let family = deltille::family::Family::paired(family, squares);
-    let target = Target { target: Arc::new(target), family: family.map(Arc::new) };
+    let target = Target { printing: Arc::new(target), family: family.map(Arc::new) };
     macro_rules! of_class {
         ($($class:ident),*) => {
             match class_ {

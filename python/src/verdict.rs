@@ -32,7 +32,7 @@ impl Verdict {
         (name, files): (String, Option<Files>),
         stop: &AtomicBool,
     ) -> PyResult<Self> {
-        let verifier = Verifier::new(&target.target, target.family.as_deref());
+        let verifier = Verifier::new(&target.printing, target.family.as_deref());
         let verifier = verifier.raise(errors::verify)?.stopped_by(stop);
         let path = Path::new(&name);
         let verdict = match files {

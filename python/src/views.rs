@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use deltille::calibrate::{self as solver, ViewEstimate};
+use deltille::layout::Printing;
 use deltille::targets;
 use numpy::{PyArray1, PyArray2};
 use pyo3::prelude::*;
@@ -115,8 +116,8 @@ pub struct View {
 }
 
 /// Ids of corners on a target by panel, row and column.
-pub fn corner_ids(targets: &[targets::Target]) -> BTreeMap<(usize, i32, i32), i64> {
-    let panels = targets.iter().flat_map(|target| &target.panels).enumerate();
+pub fn corner_ids(targets: &[Printing]) -> BTreeMap<(usize, i32, i32), i64> {
+    let panels = targets.iter().flat_map(|printing| &printing.target.panels).enumerate();
     let of_panel = |(index, panel): (usize, &targets::Panel)| {
         let id = |corner: &targets::Corner| ((index, corner.row, corner.col), i64::from(corner.id));
         panel.corners.iter().map(id).collect::<Vec<_>>()

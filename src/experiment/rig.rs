@@ -249,7 +249,7 @@ fn target(object: Object) -> Result<(Target, Family), RigExperimentError> {
         }
     };
     let family = Family::shipped(spec.family().unwrap_or_default())?;
-    let target = Target::build(object.name(), &spec, Some(&family), None)?;
+    let target = Target::build(object.name(), &spec, Some(&family))?;
     if object == Object::Icosahedron {
         return Ok((target, family));
     }

@@ -12,6 +12,7 @@
 //! | 1 | [`camera`] | camera models and poses |
 //! | 2 | [`family`] | DelTag code families: search, certificates, decoding |
 //! | 3 | [`targets`] | what exists in the world: panels, corners and tags in millimetres |
+//! | 4 | [`layout`] | targets on paper: sheets with labels, check bars and cutting lines |
 //! | 4 | [`artwork`] | what is drawn, in millimetres, independent of file type |
 //! | 4 | [`detect`] | from pixels to labelled corners |
 //! | 5 | [`synth`] | a target seen by a camera, as an image |
@@ -29,6 +30,7 @@ pub mod family;
 mod identity;
 pub mod json;
 pub mod lattice;
+pub mod layout;
 pub mod name;
 pub mod polygon;
 pub mod quantity;

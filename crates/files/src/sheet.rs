@@ -1,6 +1,7 @@
 //! What is known of the printed sheet beforehand, put on views before they are calibrated.
 
 use deltille_core::calibrate::{PanelPlace, Reference, View};
+use deltille_core::layout::SheetLayout;
 use deltille_core::targets::{Target, TargetSpec};
 
 use crate::export::calibration::Sheet;
@@ -89,8 +90,9 @@ impl Sheet {
         }
         let with_skeleton =
             matches!(&target.spec, TargetSpec::Solid(spec) if spec.skeleton.is_some());
-        let mut sheets = target.sheets.iter();
-        if with_skeleton || (target.sheets.len() > 1 && sheets.all(|s| s.placements.len() == 1)) {
+        let is_single = |sheet: &SheetLayout| sheet.placements.len() == 1;
+        let is_one_by_one = self.sheets.len() > 1 && self.sheets.iter().all(is_single);
+        if with_skeleton || is_one_by_one {
             return Err(SheetUseError::OneByOne);
         }
         Ok(across)
@@ -118,8 +120,7 @@ impl Sheet {
         }
         for sighting in views.iter_mut().flat_map(|view| &mut view.sightings) {
             if let Some(scale) = self.print_scale {
-                let angle_rad =
-                    target.map_or(0.0, |target| angle_on_sheet(target, sighting.panel.id()));
+                let angle_rad = angle_on_sheet(&self.sheets, sighting.panel.id());
                 sighting.stretch(scale, angle_rad);
             }
             // The shape was found on corners that the scale had moved.
@@ -137,7 +138,7 @@ fn is_solid(target: &Target) -> bool {
 }
 
 /// How the panel of an id is turned on its sheet, rad; 0 where no sheet is described.
-fn angle_on_sheet(target: &Target, id: u32) -> f64 {
-    let mut placements = target.sheets.iter().flat_map(|sheet| &sheet.placements);
+fn angle_on_sheet(sheets: &[SheetLayout], id: u32) -> f64 {
+    let mut placements = sheets.iter().flat_map(|sheet| &sheet.placements);
     placements.find(|placement| placement.panel == id).map_or(0.0, |placement| placement.angle_rad)
 }

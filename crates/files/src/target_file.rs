@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 
 use deltille_core::family::{Family, PAIRS_COUNTED, certify_codes};
 use deltille_core::lattice::GridKind;
+use deltille_core::layout::Printing;
 use deltille_core::targets::{FamilyRef, OtherFamily, Target, TargetFileError, TargetIdentity};
 
 use crate::export::dsc::{self, DscError};
@@ -59,13 +60,13 @@ pub enum TargetReadError {
     },
 }
 
-/// Reads a target: `.dsc` by its extension, with the poses of its boards in a `.tp` of the same stem where it has none,
+/// Reads a target with its sheets: `.dsc` by its extension, with the poses of its boards in a `.tp` of the same stem where it has none,
 /// JSON otherwise. What killed runs have left in its folder is put in order
 /// before.
 ///
 /// # Errors
 /// Where the file cannot be read, or describes no target.
-pub fn read(path: &Path, limits: &Limits) -> Result<Target, TargetReadError> {
+pub fn read(path: &Path, limits: &Limits) -> Result<Printing, TargetReadError> {
     let extension = path.extension().unwrap_or_default().to_string_lossy().to_lowercase();
     let path_of = || path.to_owned();
     if MADE.contains(&extension.as_str()) {
@@ -81,11 +82,12 @@ pub fn read(path: &Path, limits: &Limits) -> Result<Target, TargetReadError> {
         let poses = poses_beside(path);
         return match target.overlapping_boards() {
             Some(_) if poses.exists() => tp::placed(&target, &limits.read_text(&poses)?)
+                .map(Printing::from)
                 .map_err(|error| TargetReadError::Tp { path: poses, error }),
-            _ => Ok(target),
+            _ => Ok(target.into()),
         };
     }
-    Target::from_json(&text).map_err(|error| TargetReadError::Json { path: path_of(), error })
+    Printing::from_json(&text).map_err(|error| TargetReadError::Json { path: path_of(), error })
 }
 
 /// The board that a description at a path describes, where a new text of the file would not describe its prints: they would

@@ -12,9 +12,10 @@ use super::fold::Seen;
 use super::tiles::PlacedPanel;
 use super::{Finding, SheetVerdict, TOLERANCE_MM, Verifier, detector_config};
 use deltille_core::detect::{Detection, Detector, GridCorner};
+use deltille_core::layout::SheetLayout;
 use deltille_core::polygon;
 use deltille_core::raster::{Gray, ImageView, Intensity};
-use deltille_core::targets::{Corner, Panel, SheetLayout};
+use deltille_core::targets::{Corner, Panel};
 use deltille_core::words::counted;
 
 /// An unlabelled corner is taken for a stated one within this many edges of it: less than half the
@@ -220,7 +221,7 @@ pub(super) fn check(
     let mut placed = Vec::new();
     for placement in &layout.placements {
         let id = placement.panel;
-        let Some(panel) = verifier.target.panels.iter().find(|panel| panel.id == id) else {
+        let Some(panel) = verifier.target().panels.iter().find(|panel| panel.id == id) else {
             verdict.findings.push(BoardFinding::PanelMissing { panel: id }.into());
             continue;
         };
@@ -231,7 +232,7 @@ pub(super) fn check(
                 verifier.detector.detect(&page.mirrored().blurred(), "mirror")
             });
             if mirrored.grids.iter().any(|grid| grid.panel == Some(id)) {
-                verdict.findings.push(match verifier.target.finish.mirrored {
+                verdict.findings.push(match verifier.printing.finish.mirrored {
                     true => BoardFinding::NotMirrored { panel: id }.into(),
                     false => BoardFinding::Mirrored { panel: id }.into(),
                 });
@@ -286,7 +287,7 @@ fn another_board(verifier: &Verifier, page: &Page, verdict: &mut SheetVerdict) {
         use BoardFinding::{CornerExtra, PanelMissing};
         matches!(finding, Finding::Board(PanelMissing { .. } | CornerExtra { .. }))
     });
-    let Some(kind) = verifier.target.panels.first().map(|panel| panel.kind).filter(|_| unknown)
+    let Some(kind) = verifier.target().panels.first().map(|panel| panel.kind).filter(|_| unknown)
     else {
         return;
     };

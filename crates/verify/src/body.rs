@@ -59,7 +59,7 @@ pub(super) fn verify(
     format: Format,
 ) -> Result<Verdict, DocumentError> {
     let unreadable = |problem: &str| DocumentError::unreadable(path, problem);
-    let target = &verifier.target;
+    let target = verifier.target();
     let TargetSpec::Solid(spec) = &target.spec else {
         return Err(unreadable("the target is no solid"));
     };

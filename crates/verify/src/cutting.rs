@@ -93,11 +93,11 @@ pub(super) fn verify(
 
 /// The drawing that the target states.
 fn stated(verifier: &Verifier, path: &Path) -> Result<CutDrawing, VerifyError> {
-    let target = &verifier.target;
+    let target = verifier.target();
     let stem = path.file_stem().unwrap_or_default().to_string_lossy();
     let drawing = match stem.rsplit_once('-').map(|(_, last)| last) {
         Some("panels") => artwork::panels_to_cut(target),
-        Some("net") => artwork::net_to_cut(target),
+        Some("net") => artwork::net_to_cut(&verifier.printing),
         _ => {
             let (path, target) = (path.to_owned(), target.name.to_string());
             return Err(VerifyError::WhichDrawing { path, target });

@@ -20,7 +20,8 @@ use serde::Serialize;
 
 use super::{Finding, FoldVerdict, SheetVerdict};
 use deltille_core::artwork;
-use deltille_core::targets::{Label, SheetLayout, Target, TargetSpec};
+use deltille_core::layout::{Label, Printing, SheetLayout};
+use deltille_core::targets::TargetSpec;
 use deltille_core::words::counted;
 
 /// Largest distance of a folded corner, or of an end of an edge, from its stated position, mm: that
@@ -143,15 +144,15 @@ fn enumerate(numbers: &[usize]) -> String {
 pub(super) type Seen = BTreeMap<u32, BTreeMap<u32, DVec2>>;
 
 /// Whether the sheets of a target are a net: whether faces of a solid are joined by folds.
-pub(super) fn is_net(target: &Target) -> bool {
+pub(super) fn is_net(printing: &Printing) -> bool {
     let folds = |sheet: &SheetLayout| sheet.lines.iter().any(|line| line.kind.joins_faces());
-    matches!(target.spec, TargetSpec::Solid(_)) && target.sheets.iter().any(folds)
+    matches!(printing.target.spec, TargetSpec::Solid(_)) && printing.sheets.iter().any(folds)
 }
 
 /// Folds the net that was detected, and adds what deviates to the verdicts of the sheets, which are
 /// in the order of `seen`. If a face was not detected, nothing is checked: the sheet lacks it anyway.
-pub(super) fn check(target: &Target, seen: &[Seen], verdicts: &mut [SheetVerdict]) {
-    let Some(net) = Net::new(target, seen) else { return };
+pub(super) fn check(printing: &Printing, seen: &[Seen], verdicts: &mut [SheetVerdict]) {
+    let Some(net) = Net::new(printing, seen) else { return };
     let mut carried = vec![None; net.faces.len()];
     let mut misplaced = false;
     let mut deviations = vec![0.0f64; verdicts.len()];
@@ -316,7 +317,8 @@ struct Net {
 
 impl Net {
     /// The net of a target from the corners detected on each sheet; `None` where a face is missing.
-    fn new(target: &Target, seen: &[Seen]) -> Option<Self> {
+    fn new(printing: &Printing, seen: &[Seen]) -> Option<Self> {
+        let target = &printing.target;
         let TargetSpec::Solid(spec) = &target.spec else { return None };
         let (outlines, solid) = (spec.faces().ok()?, spec.polyhedron());
         let mut net = Self {
@@ -360,7 +362,7 @@ impl Net {
                 names: Vec::new(),
             });
         }
-        for (sheet, layout) in target.sheets.iter().enumerate() {
+        for (sheet, layout) in printing.sheets.iter().enumerate() {
             net.find_folds(sheet, layout);
             net.read_numbers(sheet, layout);
         }

@@ -19,10 +19,11 @@ use super::{
     DocumentError, Finding, Format, InlayVerdict, Page, SheetVerdict, Verdict, Verifier, body,
     construct,
 };
+use deltille_core::layout::{Placement, SheetLayout};
 use deltille_core::polygon;
 use deltille_core::polygon::rectangle;
 use deltille_core::raster::{Coverage, Gray};
-use deltille_core::targets::{Panel, Placement, SheetLayout, TargetSpec};
+use deltille_core::targets::{Panel, TargetSpec};
 use deltille_files::export::inlay::Body;
 use deltille_files::export::threemf;
 
@@ -59,7 +60,7 @@ pub(super) fn verify(
 ) -> Result<Verdict, DocumentError> {
     let is_skeleton = super::file_name(path).ends_with(&threemf::skeleton_name(""));
     let names = if is_skeleton { threemf::SKELETON } else { threemf::INLAY };
-    let (refused, bodies) = construct::bodies(reader, path, names, &verifier.target)?;
+    let (refused, bodies) = construct::bodies(reader, path, names, &verifier.printing)?;
     match <[Body; 2]>::try_from(bodies) {
         _ if !refused.is_empty() => Ok(Verdict::new(path, Format::ThreeMf, refused)),
         Ok(bodies) => inlaid(verifier, path, &bodies),
@@ -91,7 +92,7 @@ fn inlaid(verifier: &Verifier, path: &Path, bodies: &[Body; 2]) -> Result<Verdic
         .map(|face| triangles.each_ref().map(|triangles| face.front(triangles)))
         .collect();
     let black_mm2: f64 = fronts.iter().map(|[_, black]| area(black)).sum();
-    let plate = match &verifier.target.spec {
+    let plate = match &verifier.target().spec {
         spec if spec.is_on_plate() => {
             let depths =
                 triangles[0].iter().flatten().map(|&v| -faces[0].panel.pose.panel_from_target(v).z);
@@ -139,8 +140,8 @@ fn triangles_of(body: &Body) -> Vec<Triangle> {
 
 /// The faces of a target that is one board or a solid.
 fn faces<'a>(verifier: &'a Verifier) -> Option<Vec<Face<'a>>> {
-    let panels = &verifier.target.panels;
-    match (&verifier.target.spec, panels.as_slice()) {
+    let panels = &verifier.target().panels;
+    match (&verifier.target().spec, panels.as_slice()) {
         (spec, [panel]) if spec.is_on_plate() => {
             Some(vec![Face { panel, outline: rectangle(panel.field_mm()).to_vec() }])
         }
@@ -248,7 +249,7 @@ fn not_filled(
             return Some(format!("{found:.2} cm² of the {stated:.2} cm² of a face are there"));
         }
     }
-    let stated = match (&verifier.target.spec, inlay.plate_mm) {
+    let stated = match (&verifier.target().spec, inlay.plate_mm) {
         (TargetSpec::Solid(spec), _) => body::volume(spec.polyhedron().triangles_mm().into_iter()),
         (_, plate_mm) => polygon::area(&faces[0].outline) * plate_mm.unwrap_or_default(),
     };

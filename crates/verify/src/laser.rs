@@ -52,7 +52,7 @@ pub(super) fn verify(
     format: Format,
 ) -> Result<Verdict, VerifyError> {
     let nothing = |source| VerifyError::NothingToCut { path: path.to_owned(), source };
-    let boards = artwork::laser_boards(&verifier.target).map_err(nothing)?;
+    let boards = artwork::laser_boards(&verifier.printing).map_err(nothing)?;
     let mut cut = CutVerdict::default();
     let with = |cut, findings| Verdict { cut: Some(cut), ..Verdict::new(path, format, findings) };
     let found = match read(verifier, reader, path, format)? {
@@ -65,7 +65,7 @@ pub(super) fn verify(
         return Ok(with(cut, vec![missing.into()]));
     };
     let kerf_mm = (by_mm / KERF_STEP_MM).round() * KERF_STEP_MM;
-    let stated = match artwork::to_laser(&verifier.target, verifier.family, kerf_mm.max(0.0)) {
+    let stated = match artwork::to_laser(&verifier.printing, verifier.family, kerf_mm.max(0.0)) {
         Ok(stated) if kerf_mm >= 0.0 => stated,
         Ok(_) | Err(CuttingError::Kerf { .. }) => {
             return Ok(with(cut, vec![CutFinding::NoKerf { by_mm }.into()]));
@@ -100,8 +100,8 @@ fn read(
     };
     Ok(match format {
         Format::Svg => {
-            let subject = artwork::subject(&verifier.target);
-            laser_svg::read(&text, &verifier.target.name, &subject).map_err(|line| {
+            let subject = artwork::subject(verifier.target());
+            laser_svg::read(&text, &verifier.target().name, &subject).map_err(|line| {
                 refused(line, "something that is not written for a laser".to_owned())
             })
         }
@@ -191,7 +191,7 @@ fn surfaces(
                 let burnt = artwork::moved_inwards(&path.points_mm, -kerf_mm / 2.0);
                 let seen = burnt.into_iter().map(|point| board.board_from_drawing(point));
                 let mut seen: Vec<DVec2> = seen.collect();
-                if verifier.target.finish.mirrored {
+                if verifier.printing.finish.mirrored {
                     seen.reverse();
                 }
                 seen

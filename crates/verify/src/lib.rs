@@ -87,7 +87,8 @@ use glam::DVec2;
 use deltille_core::artwork::CuttingError;
 use deltille_core::detect::{Detector, DetectorConfig, Ink, Tone};
 use deltille_core::family::Family;
-use deltille_core::targets::{OtherFamily, SheetLayout, SheetPage, Target};
+use deltille_core::layout::{Printing, SheetLayout, SheetPage};
+use deltille_core::targets::{OtherFamily, Target};
 use deltille_files::export::sheet_file_name;
 use deltille_files::limits::{Guard, Limits};
 use fit::AffineMap;
@@ -217,13 +218,14 @@ pub enum VerifyError {
 /// ```
 /// use deltille_core::artwork;
 /// use deltille_core::lattice::GridKind;
-/// use deltille_core::targets::{BoardSpec, PaperSpec, Target, TargetSpec};
+/// use deltille_core::layout::{PaperSpec, Printing};
+/// use deltille_core::targets::{BoardSpec, TargetSpec};
 /// use deltille_files::export::svg;
 /// use deltille_verify::{Artifact, verify};
 ///
 /// let spec = BoardSpec { tags: None, ..BoardSpec::new(GridKind::Deltille, 4, 5, 20.0) };
 /// let spec = TargetSpec::Board(spec);
-/// let board = Target::build("board", &spec, None, Some(&PaperSpec::default()))?;
+/// let board = Printing::build("board", &spec, None, Some(&PaperSpec::default()))?;
 /// let mut artwork = artwork::draw(&board, None)?;
 /// let good = [Artifact::new("board.svg", svg::to_string(&artwork, 0))];
 /// assert!(verify(&board, None, "board.svg", &good)?.passed);
@@ -235,17 +237,17 @@ pub enum VerifyError {
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 pub fn verify(
-    target: &Target,
+    printing: &Printing,
     family: Option<&Family>,
     name: &str,
     files: &[Artifact],
 ) -> Result<Verdict, VerifyError> {
-    Verifier::new(target, family)?.verify(name, files)
+    Verifier::new(printing, family)?.verify(name, files)
 }
 
 /// Compares artifacts with one target.
 pub struct Verifier<'a> {
-    target: Cow<'a, Target>,
+    printing: Cow<'a, Printing>,
     family: Option<&'a Family>,
     detector: Detector,
     limits: Limits,
@@ -264,11 +266,12 @@ pub struct Progress {
 }
 
 impl<'a> Verifier<'a> {
-    /// A verifier for the artifacts of `target`; `family` must be given if the target has tags.
+    /// A verifier for the artifacts of a target as it is printed; `family` must be given if the target has tags.
     ///
     /// # Errors
     /// When the target needs another family.
-    pub fn new(target: &'a Target, family: Option<&'a Family>) -> Result<Self, VerifyError> {
+    pub fn new(printing: &'a Printing, family: Option<&'a Family>) -> Result<Self, VerifyError> {
+        let target = &printing.target;
         for kind in target.tilings() {
             let Some(needed) = target.family.as_ref().map(|family| family.of_tiling(kind)) else {
                 continue;
@@ -290,7 +293,7 @@ impl<'a> Verifier<'a> {
         }
         let detector = Detector::for_target(target, family, detector_config());
         Ok(Self {
-            target: target.under_printed_name(),
+            printing: printing.under_printed_name(),
             family,
             detector,
             limits: Limits::default(),
@@ -298,6 +301,11 @@ impl<'a> Verifier<'a> {
             cancel: None,
             progress: None,
         })
+    }
+
+    /// The target, under the name that is on its prints.
+    fn target(&self) -> &Target {
+        &self.printing.target
     }
 
     /// The same verifier with other limits for reading artifacts than the default.
@@ -334,8 +342,8 @@ impl<'a> Verifier<'a> {
     /// The files that are verified together with `path`: all pages of a net, or of a board over several pages, where
     /// each is a file of its own. Any other file is verified by itself.
     pub fn set_of(&self, path: &Path) -> Vec<PathBuf> {
-        let in_parts = self.target.sheets.iter().any(|sheet| !sheet.pages.is_empty());
-        match in_parts || fold::is_net(&self.target) {
+        let in_parts = self.printing.sheets.iter().any(|sheet| !sheet.pages.is_empty());
+        match in_parts || fold::is_net(&self.printing) {
             true => self.pages_with(path),
             false => vec![path.to_owned()],
         }
@@ -344,7 +352,7 @@ impl<'a> Verifier<'a> {
     /// The files of all pages when `path` holds one of them; `path` alone when it holds all.
     pub fn pages_with(&self, path: &Path) -> Vec<PathBuf> {
         let single = matches!(Format::of(path), Some(Format::Svg | Format::Png));
-        let count = self.target.page_count();
+        let count = self.printing.page_count();
         if !single || count == 1 || self.sheet_of(path).is_err() {
             return vec![path.to_owned()];
         }
@@ -378,7 +386,7 @@ impl<'a> Verifier<'a> {
     /// Compares an artifact whose files come from `reader`.
     fn verify_by(&self, reader: &Reader, path: &Path) -> Result<Verdict, VerifyError> {
         let name = file_name(path);
-        if let Some(whole) = whole_of(&self.target.name, &name) {
+        if let Some(whole) = whole_of(&self.target().name, &name) {
             return Err(VerifyError::PartOf { path: path.to_owned(), whole });
         }
         let Some(format) = Format::of(path) else {
@@ -386,7 +394,7 @@ impl<'a> Verifier<'a> {
         };
         match format {
             Format::Dsc => return Ok(listing::verify(self, reader, path)?),
-            Format::Dxf | Format::Svg if laser::is_named(&self.target, path) => {
+            Format::Dxf | Format::Svg if laser::is_named(self.target(), path) => {
                 return laser::verify(self, reader, path, format);
             }
             Format::Dxf => return cutting::verify(self, reader, path),
@@ -399,7 +407,7 @@ impl<'a> Verifier<'a> {
             Format::ThreeMf => return Ok(inlay::verify(self, reader, path)?),
             Format::Glb | Format::Obj | Format::Usda | Format::Stl => {}
         }
-        let (refused, parts) = construct::check(reader, path, format, &self.target)?;
+        let (refused, parts) = construct::check(reader, path, format, &self.printing)?;
         if construct::refuse(&refused) {
             return Ok(Verdict::new(path, format, refused));
         }
@@ -419,8 +427,8 @@ impl<'a> Verifier<'a> {
         path: &Path,
         format: Format,
     ) -> Result<Verdict, VerifyError> {
-        if self.target.sheets.is_empty() {
-            let (path, target) = (path.to_owned(), self.target.name.to_string());
+        if self.printing.sheets.is_empty() {
+            let (path, target) = (path.to_owned(), self.target().name.to_string());
             return Err(VerifyError::NoSheets { path, target });
         }
         let mut findings = Vec::new();
@@ -436,7 +444,7 @@ impl<'a> Verifier<'a> {
         findings.extend(refused);
         let documents: Vec<Document> =
             files.iter().map(|file| Document::read_by(reader, file)).collect::<Result<_, _>>()?;
-        let stated = self.target.page_count();
+        let stated = self.printing.page_count();
         // For each page of the target the page of a file that shows it.
         let sources: Vec<Option<Source>> = match format {
             Format::Pdf => {
@@ -459,7 +467,7 @@ impl<'a> Verifier<'a> {
         };
         let (mut verdicts, mut seen) = (Vec::new(), Vec::new());
         let mut first = 0;
-        for (index, layout) in self.target.sheets.iter().enumerate() {
+        for (index, layout) in self.printing.sheets.iter().enumerate() {
             if self.cancel.is_some_and(|flag| flag.load(Ordering::Relaxed)) {
                 return Err(VerifyError::Cancelled);
             }
@@ -477,8 +485,8 @@ impl<'a> Verifier<'a> {
             verdicts.push(verdict);
             seen.push(found);
         }
-        if fold::is_net(&self.target) && verdicts.len() == self.target.sheets.len() {
-            fold::check(&self.target, &seen, &mut verdicts);
+        if fold::is_net(&self.printing) && verdicts.len() == self.printing.sheets.len() {
+            fold::check(&self.printing, &seen, &mut verdicts);
         }
         let mut verdict =
             Verdict { artifact: of_all(&files), ..Verdict::new(path, format, findings) };
@@ -495,7 +503,7 @@ impl<'a> Verifier<'a> {
     ) -> Result<Vec<Finding>, DocumentError> {
         let mut refused = Vec::new();
         for file in files {
-            let (found, _) = construct::check(reader, file, format, &self.target)?;
+            let (found, _) = construct::check(reader, file, format, &self.printing)?;
             refused.extend(found.into_iter().map(|finding| match files.len() {
                 1 => finding,
                 _ => finding.on_page(file_name(file)),
@@ -506,7 +514,7 @@ impl<'a> Verifier<'a> {
 
     /// The page that a file of a single page shows, by its name.
     fn sheet_of(&self, path: &Path) -> Result<usize, VerifyError> {
-        let count = self.target.page_count();
+        let count = self.printing.page_count();
         let stem = path.file_stem().unwrap_or_default().to_string_lossy();
         let number = stem.rsplit_once('-').and_then(|(_, number)| number.parse::<usize>().ok());
         match number {
@@ -514,7 +522,7 @@ impl<'a> Verifier<'a> {
             Some(number) if (1..=count).contains(&number) => Ok(number - 1),
             _ => {
                 let extension = path.extension().unwrap_or_default().to_string_lossy();
-                let example = sheet_file_name(&self.target.name, 0, count, &extension);
+                let example = sheet_file_name(&self.target().name, 0, count, &extension);
                 Err(VerifyError::WhichSheet { path: path.to_owned(), sheets: count, example })
             }
         }
@@ -524,7 +532,7 @@ impl<'a> Verifier<'a> {
     fn placed<'p>(&'p self, page: &'p Page, layout: &'p SheetLayout) -> Vec<PlacedPanel<'p>> {
         let found_from_stated = AffineMap::IDENTITY;
         let placed = layout.placements.iter().filter_map(|placement| {
-            let panel = self.target.panels.iter().find(|panel| panel.id == placement.panel)?;
+            let panel = self.target().panels.iter().find(|panel| panel.id == placement.panel)?;
             Some(PlacedPanel::new(page, panel, placement, found_from_stated).among(layout))
         });
         placed.collect()
@@ -532,7 +540,7 @@ impl<'a> Verifier<'a> {
 
     /// Print resolution, or finer where the cells of tags are small.
     fn wish_px_per_mm(&self, layout: &SheetLayout) -> f64 {
-        let panels = self.target.panels.iter();
+        let panels = self.target().panels.iter();
         let here = panels.filter(|panel| layout.placements.iter().any(|p| p.panel == panel.id));
         let cells_mm = here.filter_map(|panel| {
             panel.border_bits?;
@@ -547,8 +555,9 @@ impl<'a> Verifier<'a> {
         source: Source,
         index: usize,
     ) -> Result<(SheetVerdict, Seen), DocumentError> {
-        let layout = &self.target.sheets[index];
-        let (page, findings) = source.render(layout, self.wish_px_per_mm(layout), &self.target)?;
+        let layout = &self.printing.sheets[index];
+        let (page, findings) =
+            source.render(layout, self.wish_px_per_mm(layout), self.printing.finish.mirrored)?;
         let mut verdict = SheetVerdict::new(index, &page, findings);
         let seen = self.verify_sheet(&page, layout, &mut verdict);
         Ok((verdict, seen))
@@ -562,7 +571,7 @@ impl<'a> Verifier<'a> {
         index: usize,
         before: usize,
     ) -> Result<(SheetVerdict, Seen), DocumentError> {
-        let layout = &self.target.sheets[index];
+        let layout = &self.printing.sheets[index];
         let wish = self.wish_px_per_mm(layout);
         let most = (document::MAX_PIXELS / (layout.width_mm * layout.height_mm)).sqrt();
         let mut pages = Vec::with_capacity(sources.len());
@@ -570,22 +579,22 @@ impl<'a> Verifier<'a> {
         let mut check_bars_mm = Vec::new();
         for (source, SheetPage { label, window_mm, marks, .. }) in sources.iter().zip(&layout.pages)
         {
-            let (page, wrong) = source.render(marks, wish, &self.target)?;
+            let (page, wrong) = source.render(marks, wish, self.printing.finish.mirrored)?;
             let mut verdict = SheetVerdict::new(index, &page, wrong);
             check_bars(&page, marks, &AffineMap::IDENTITY, &mut verdict);
-            let logo = self.target.logo.as_ref();
+            let logo = self.printing.logo.as_ref();
             marks::check(&page, (marks, logo), &[], Some(*window_mm), &mut verdict);
             let of_page = verdict.findings.into_iter();
             findings.extend(of_page.map(|finding| finding.on_page(label.clone())));
             check_bars_mm.extend(verdict.check_bars_mm);
             // Kept no finer than the sheet is looked at.
             pages.push(if wish > most {
-                source.render(marks, most, &self.target)?.0
+                source.render(marks, most, self.printing.finish.mirrored)?.0
             } else {
                 page
             });
             // The whole sheet is compared after them.
-            self.tell(before + pages.len() - 1, self.target.page_count());
+            self.tell(before + pages.len() - 1, self.printing.page_count());
         }
         let (sheet, different) = assemble::assemble(&pages, layout, wish.min(most));
         let mut verdict = SheetVerdict::new(index, &sheet, different);
@@ -616,7 +625,7 @@ impl<'a> Verifier<'a> {
         let in_place = verdict.findings.iter().all(Finding::is_local);
         check_bars(page, layout, &found_from_stated, verdict);
         if in_place {
-            let logo = self.target.logo.as_ref();
+            let logo = self.printing.logo.as_ref();
             marks::check(page, (layout, logo), &placed, None, verdict);
         }
         seen
@@ -653,7 +662,7 @@ impl Source<'_> {
         &self,
         layout: &SheetLayout,
         px_per_mm: f64,
-        target: &Target,
+        is_mirrored: bool,
     ) -> Result<(Page, Vec<Finding>), DocumentError> {
         let tolerance_mm = self.document.size_tolerance_mm();
         let stated_mm = DVec2::new(layout.width_mm, layout.height_mm);
@@ -662,7 +671,7 @@ impl Source<'_> {
             return Err(self.document.too_large(found_mm, stated_mm));
         }
         let mut page = self.document.render(self.page, px_per_mm)?;
-        let turned = |page: Page| if target.finish.mirrored { page.mirrored() } else { page };
+        let turned = |page: Page| if is_mirrored { page.mirrored() } else { page };
         if (found_mm - stated_mm).abs().max_element() > tolerance_mm {
             let page = turned(page);
             return Ok((page, vec![PageFinding::PageSize { found_mm, stated_mm }.into()]));

@@ -41,9 +41,9 @@ pub(super) fn verify(
     let mut list = ListVerdict::default();
     let mut findings = unlisted(text);
     if findings.is_empty() {
-        match dsc::read_in_mm(text, &verifier.target.name) {
+        match dsc::read_in_mm(text, &verifier.target().name) {
             Ok(listed) => {
-                findings = compare(&listed, &verifier.target, &mut list);
+                findings = compare(&listed, verifier.target(), &mut list);
                 findings.extend(written_otherwise(text, &listed).filter(|_| findings.is_empty()));
             }
             Err(error) => findings.push(ListFinding::Listed { problem: error.to_string() }.into()),

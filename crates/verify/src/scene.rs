@@ -14,14 +14,14 @@ pub(super) fn verify(
     path: &Path,
     format: Format,
 ) -> Result<Verdict, VerifyError> {
-    let (refused, _) = construct::check(reader, path, format, &verifier.target)?;
+    let (refused, _) = construct::check(reader, path, format, &verifier.printing)?;
     if construct::refuse(&refused) {
         return Ok(Verdict::new(path, format, refused));
     }
-    let mesh = path.with_file_name(format!("{}.obj", verifier.target.name));
+    let mesh = path.with_file_name(format!("{}.obj", verifier.target().name));
     let mut verdict = verifier.verify_by(reader, &mesh)?;
     if format == Format::Mjcf && verdict.passed {
-        verdict.findings = construct::check_parts(reader, path, &mesh, &verifier.target)?;
+        verdict.findings = construct::check_parts(reader, path, &mesh, &verifier.printing)?;
         verdict.passed = verdict.findings.is_empty();
     }
     Ok(Verdict { artifact: super::file_name(path), format, ..verdict })

@@ -147,13 +147,13 @@ pub(super) fn verify(verifier: &Verifier, path: &Path, model: Model, format: For
     if let Some((scale, radius_mm)) = scale
         && (scale - 1.0).abs() * radius_mm > MESH_TOLERANCE_MM
     {
-        findings.push(BoardFinding::Scale { panel: verifier.target.panels[0].id, scale }.into());
+        findings.push(BoardFinding::Scale { panel: verifier.target().panels[0].id, scale }.into());
     }
-    let stated = match &verifier.target.spec {
+    let stated = match &verifier.target().spec {
         // As many as the faces have, all of which are looked at: there is nothing else.
         TargetSpec::Solid(spec) => Some(spec.polyhedron().triangles_mm().len()),
         spec if spec.is_on_plate() => {
-            findings.extend(beside_boards(&model, sides(&verifier.target)));
+            findings.extend(beside_boards(&model, sides(verifier.target())));
             Some(PLATE_TRIANGLES)
         }
         _ => None,
@@ -182,12 +182,12 @@ pub(super) fn verify(verifier: &Verifier, path: &Path, model: Model, format: For
         findings.push(MeshFinding::Normals { triangles: wrong }.into());
     }
     if scale.is_none_or(|(scale, _)| (scale - 1.0).abs() < MAX_SCALE_ERROR) {
-        let panels = verifier.target.panels.par_iter();
+        let panels = verifier.target().panels.par_iter();
         let done = AtomicUsize::new(0);
         let check = |panel| {
             let verdict = check_face(verifier, &model, panel);
             let done = done.fetch_add(1, Ordering::Relaxed) + 1;
-            verifier.tell(done, verifier.target.panels.len());
+            verifier.tell(done, verifier.target().panels.len());
             verdict
         };
         faces = panels.map(check).collect();
@@ -229,7 +229,7 @@ fn beside_boards(model: &Model, sides: &[Panel]) -> Option<Finding> {
 /// Largest distance from the origin on the mesh over that on the target's solid, and the latter,
 /// mm.
 fn scale(verifier: &Verifier, model: &Model) -> Option<(f64, f64)> {
-    let TargetSpec::Solid(spec) = &verifier.target.spec else { return None };
+    let TargetSpec::Solid(spec) = &verifier.target().spec else { return None };
     let radius = |lengths: &mut dyn Iterator<Item = f64>| lengths.fold(0.0, f64::max);
     let stated = radius(&mut spec.polyhedron().vertices_mm.iter().map(|v| v.length()));
     let vertices = model.triangles.iter().flat_map(|triangle| triangle.vertices_mm);
@@ -391,9 +391,9 @@ impl Verifier<'_> {
     /// The outline of a panel's face, or of the side of a plate, counter-clockwise in the panel frame, mm.
     fn face_outline_mm(&self, panel: &Panel) -> Vec<DVec2> {
         let of_plate = || rectangle(panel.field_mm()).to_vec();
-        let TargetSpec::Solid(spec) = &self.target.spec else { return of_plate() };
+        let TargetSpec::Solid(spec) = &self.target().spec else { return of_plate() };
         let solid = spec.polyhedron();
-        let index = self.target.panels.iter().position(|p| p.id == panel.id);
+        let index = self.target().panels.iter().position(|p| p.id == panel.id);
         let Some(index) = index.filter(|&index| index < solid.faces.len()) else {
             return of_plate();
         };
@@ -406,15 +406,15 @@ impl Verifier<'_> {
 /// of different resolutions, or ink in a texture that no triangle shows.
 fn not_on_faces(verifier: &Verifier, model: &Model) -> Option<Finding> {
     let body = |problem: String| Some(MeshFinding::Body { problem }.into());
-    let panels = match &verifier.target.spec {
-        TargetSpec::Solid(_) => verifier.target.panels.as_slice(),
-        _ => sides(&verifier.target),
+    let panels = match &verifier.target().spec {
+        TargetSpec::Solid(_) => verifier.target().panels.as_slice(),
+        _ => sides(verifier.target()),
     };
     let on_face = |panel: &Panel| front(model, panel, &verifier.face_outline_mm(panel));
     let fronts: Vec<&Triangle> =
         panels.iter().flat_map(on_face).map(|front| front.triangle).collect();
     let (on_faces, all) = (fronts.len(), model.triangles.len());
-    if on_faces != all && matches!(verifier.target.spec, TargetSpec::Solid(_)) {
+    if on_faces != all && matches!(verifier.target().spec, TargetSpec::Solid(_)) {
         return body(format!("{on_faces} of {all} triangles lie on the faces"));
     }
     if !fronts.iter().zip(&model.triangles).all(|(front, next)| std::ptr::eq(*front, next)) {
@@ -451,7 +451,7 @@ fn seen_corners<'a>(
 ) -> Vec<Seen<'a>> {
     let mut all = Vec::new();
     for grid in &detection.grids {
-        let labelled = verifier.target.panels.iter().find(|panel| Some(panel.id) == grid.panel);
+        let labelled = verifier.target().panels.iter().find(|panel| Some(panel.id) == grid.panel);
         for corner in &grid.corners {
             let at_mm = meet(corner.position()).unwrap_or(DVec3::NAN);
             let stated = match labelled {
@@ -513,10 +513,10 @@ fn texel_px(model: &Model, panel: &Panel, px_per_mm: f64) -> f64 {
 
 /// What is wrong with the surface where everything on it is right: its vertices, and that it is closed.
 fn wrong_surface(verifier: &Verifier, model: &Model) -> Option<Finding> {
-    let stated: Vec<DVec3> = match &verifier.target.spec {
+    let stated: Vec<DVec3> = match &verifier.target().spec {
         TargetSpec::Solid(spec) => spec.polyhedron().vertices_mm,
         spec if spec.is_on_plate() => {
-            plate_vertices(verifier.target.panels.first()?, spec.two_sided_mm(), model)
+            plate_vertices(verifier.target().panels.first()?, spec.two_sided_mm(), model)
         }
         _ => return None,
     };
@@ -551,7 +551,7 @@ fn wrong_surface(verifier: &Verifier, model: &Model) -> Option<Finding> {
     }
     let triangles = model.triangles.iter().map(|triangle| triangle.vertices_mm);
     let volume = super::body::volume(triangles);
-    let least = match &verifier.target.spec {
+    let least = match &verifier.target().spec {
         TargetSpec::Solid(spec) => {
             super::body::volume(spec.polyhedron().triangles_mm().into_iter())
         }

@@ -12,9 +12,10 @@ use deltille::export::{detection, dxf, gltf, laser_svg, obj as obj_writer, pdf a
 use deltille::export::{png, stl as stl_writer, svg as svg_writer, threemf};
 use deltille::family::Family;
 use deltille::lattice::GridKind;
+use deltille::layout::{PaperSpec, Printing};
 use deltille::photograph;
 use deltille::raster::{AnyGray, Gray};
-use deltille::targets::{BoardSpec, PaperSpec, SolidShape, SolidSpec, Target, TargetSpec};
+use deltille::targets::{BoardSpec, SolidShape, SolidSpec, TargetSpec};
 use image::{DynamicImage, GrayImage, ImageFormat};
 use tempfile::TempDir;
 
@@ -22,17 +23,17 @@ use tempfile::TempDir;
 pub static FAMILY: LazyLock<Family> = LazyLock::new(|| Family::shipped("delTag16h5").unwrap());
 
 /// A board of which there are pages.
-pub static BOARD: LazyLock<Target> = LazyLock::new(|| {
+pub static BOARD: LazyLock<Printing> = LazyLock::new(|| {
     let mut spec = BoardSpec::new(GridKind::Deltille, 3, 4, 9.0);
     if let Some(tags) = &mut spec.tags {
         tags.family = "delTag16h5".to_owned();
     }
     let paper = PaperSpec { size: Some("74x52mm".parse().unwrap()), ..PaperSpec::default() };
-    Target::build("b", &TargetSpec::Board(spec), Some(&FAMILY), Some(&paper)).unwrap()
+    Printing::build("b", &TargetSpec::Board(spec), Some(&FAMILY), Some(&paper)).unwrap()
 });
 
 /// A solid of which there are meshes.
-pub static SOLID: LazyLock<Target> = LazyLock::new(|| {
+pub static SOLID: LazyLock<Printing> = LazyLock::new(|| {
     let mut spec = SolidSpec {
         edge_mm: 60.0,
         tiles: 6,
@@ -44,12 +45,12 @@ pub static SOLID: LazyLock<Target> = LazyLock::new(|| {
         // The wider the bits, the smaller is the texture.
         tags.border_bits = 0.6;
     }
-    Target::build("t", &TargetSpec::Solid(spec), Some(&FAMILY), Some(&PaperSpec::default()))
+    Printing::build("t", &TargetSpec::Solid(spec), Some(&FAMILY), Some(&PaperSpec::default()))
         .unwrap()
 });
 
 static MESH: LazyLock<TexturedMesh> =
-    LazyLock::new(|| TexturedMesh::new(&SOLID, Some(&FAMILY), Meshing::default()).unwrap());
+    LazyLock::new(|| TexturedMesh::new(&SOLID.target, Some(&FAMILY), Meshing::default()).unwrap());
 
 /// Stem of the files of an extension, which tells what is in them.
 pub fn stem(extension: &str) -> &'static str {
@@ -74,7 +75,8 @@ pub fn target() -> Vec<u8> {
 
 pub fn detection() -> Vec<u8> {
     static TEXT: LazyLock<String> = LazyLock::new(|| {
-        let detector = Detector::for_target(&BOARD, Some(&FAMILY), DetectorConfig::default());
+        let detector =
+            Detector::for_target(&BOARD.target, Some(&FAMILY), DetectorConfig::default());
         detection::write(&detector.detect(&photograph(), "b.png"))
     });
     TEXT.clone().into_bytes()
@@ -108,7 +110,7 @@ pub fn points() -> Vec<u8> {
 }
 
 pub fn dsc() -> Vec<u8> {
-    dsc::write(&BOARD, Dialect::Fork).unwrap().into_bytes()
+    dsc::write(&BOARD.target, Dialect::Fork).unwrap().into_bytes()
 }
 
 pub fn obj() -> Vec<u8> {
@@ -120,12 +122,12 @@ pub fn glb() -> Vec<u8> {
 }
 
 pub fn stl() -> Vec<u8> {
-    let TargetSpec::Solid(spec) = &SOLID.spec else { unreachable!("it was built as one") };
+    let TargetSpec::Solid(spec) = &SOLID.target.spec else { unreachable!("it was built as one") };
     stl_writer::to_bytes("t", &spec.polyhedron().triangles_mm())
 }
 
 pub fn ply() -> Vec<u8> {
-    let TargetSpec::Solid(spec) = &SOLID.spec else { unreachable!("it was built as one") };
+    let TargetSpec::Solid(spec) = &SOLID.target.spec else { unreachable!("it was built as one") };
     let triangles = spec.polyhedron().triangles_mm();
     let vertices = triangles.iter().flatten().map(|v| format!("{} {} {}\n", v.x, v.y, v.z));
     let faces = (0..triangles.len()).map(|i| format!("3 {} {} {}\n", 3 * i, 3 * i + 1, 3 * i + 2));
@@ -139,16 +141,16 @@ pub fn ply() -> Vec<u8> {
 }
 
 pub fn threemf() -> Vec<u8> {
-    threemf::to_bytes(&InlaidBodies::new(&BOARD, Some(&FAMILY), Meshing::default()).unwrap())
+    threemf::to_bytes(&InlaidBodies::new(&BOARD.target, Some(&FAMILY), Meshing::default()).unwrap())
 }
 
 pub fn dxf() -> Vec<u8> {
-    dxf::text(&artwork::panels_to_cut(&SOLID).unwrap()).into_bytes()
+    dxf::text(&artwork::panels_to_cut(&SOLID.target).unwrap()).into_bytes()
 }
 
 pub fn laser() -> Vec<u8> {
     let drawing = artwork::to_laser(&BOARD, Some(&FAMILY), 0.1).unwrap();
-    laser_svg::text(&drawing, "b", &artwork::subject(&BOARD)).into_bytes()
+    laser_svg::text(&drawing, "b", &artwork::subject(&BOARD.target)).into_bytes()
 }
 
 pub fn pdf() -> Vec<u8> {

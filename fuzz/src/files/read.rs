@@ -8,9 +8,9 @@ use deltille::export::dsc::{self, Dialect};
 use deltille::export::{calibration, csv, detection as detections, orpc, solid_mesh};
 use deltille::family::Family;
 use deltille::lattice::GridKind;
+use deltille::layout::Printing;
 use deltille::limits::Limits;
 use deltille::photograph;
-use deltille::targets::Target;
 use deltille::verify::Verifier;
 use glam::{DVec2, DVec3};
 
@@ -41,12 +41,12 @@ fn assert_finite(numbers: impl IntoIterator<Item = f64>) {
 }
 
 pub fn target(file: File) -> bool {
-    let Some(Ok(target)) = file.text().map(Target::from_json) else { return false };
-    for panel in &target.panels {
+    let Some(Ok(target)) = file.text().map(Printing::from_json) else { return false };
+    for panel in &target.target.panels {
         let corners = panel.corners.iter();
         assert!(corners.into_iter().all(|c| c.panel_mm.is_finite() && c.target_mm.is_finite()));
     }
-    let again = Target::from_json(&target.to_json()).expect("what is written is read");
+    let again = Printing::from_json(&target.to_json()).expect("what is written is read");
     assert_eq!(again, target);
     true
 }
@@ -56,7 +56,9 @@ pub fn detection(file: File) -> bool {
     assert_finite(found.grids.iter().flat_map(|grid| &grid.corners).flat_map(|c| [c.x, c.y]));
     let again = detections::read(&detections::write(&found)).expect("what is written is read");
     assert_eq!(again, found);
-    for list in [csv::write(&found), orpc::write(&found, None), orpc::write(&found, Some(&BOARD))] {
+    for list in
+        [csv::write(&found), orpc::write(&found, None), orpc::write(&found, Some(&BOARD.target))]
+    {
         assert!(!list.contains("NaN") && !list.contains("inf"), "{list}");
     }
     true
@@ -137,7 +139,7 @@ pub fn solid(file: File) -> bool {
     verify(&SOLID, file.path)
 }
 
-fn verify(target: &Target, path: &Path) -> bool {
+fn verify(target: &Printing, path: &Path) -> bool {
     let verifier = Verifier::new(target, Some(&FAMILY)).expect("it was built with this family");
     let Ok(verdict) = verifier.within(limits()).verify_path(path) else { return false };
     let sheets = verdict.sheets.iter().flat_map(|sheet| &sheet.findings);

@@ -24,7 +24,7 @@ const BOARD: [u32; 2] = [10, 11];
 /// How many tags a target takes with the settings that `deltille` has by default.
 fn tags_of(spec: &TargetSpec) -> anyhow::Result<usize> {
     let family = Family::shipped(&TagSpec::default().family)?;
-    let target = Target::build("probe", spec, Some(&family), None)?;
+    let target = Target::build("probe", spec, Some(&family))?;
     Ok(target.panels.iter().map(|panel| panel.tags.len()).sum())
 }
 

@@ -11,10 +11,9 @@ use crate::cli::interrupt;
 use crate::cli::output::{Overwrite, say};
 use crate::cli::run::{FAILED, Interrupted};
 use crate::cli::values::{Ids, name, whole};
+use crate::layout::{DEFAULT_MARGIN_MM, PaperSpec, Printing};
 use crate::limits::Limits;
-use crate::targets::{
-    DEFAULT_MARGIN_MM, PaperSpec, TagSheetSpec, Target, TargetSpec, parse_length_mm,
-};
+use crate::targets::{TagSheetSpec, TargetSpec, parse_length_mm};
 use crate::verify::{Verifier, VerifyError};
 
 /// More pages at once are a mistake.
@@ -103,7 +102,7 @@ pub(super) fn run(args: Args) -> anyhow::Result<ExitCode> {
     };
     let count = spec.ids.len();
     let name = args.name.unwrap_or_else(|| format!("{}-sheet", family.name()));
-    let target = Target::build(&name, &TargetSpec::Tags(spec), Some(&family), Some(&paper))?;
+    let target = Printing::build(&name, &TargetSpec::Tags(spec), Some(&family), Some(&paper))?;
     let pages = target.sheets.len();
     ensure!(
         pages <= MOST_PAGES,

@@ -8,7 +8,7 @@ use crate::cli::output::{self, Overwrite, say};
 use crate::cli::values::{Ids, name, whole};
 use crate::export::kind::Kind;
 use crate::export::{png, svg};
-use crate::targets::Finish;
+use crate::layout::Finish;
 
 /// Most tags on one picture: a sheet of A0 size at the default edge.
 const MOST_TAGS: usize = 600;

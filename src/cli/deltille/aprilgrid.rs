@@ -6,12 +6,13 @@ use anyhow::Context;
 
 use super::files::text_file;
 use super::meshes::PlateMeshes;
-use super::printing::{Printing, page};
+use super::printing::{PrintingArgs, page};
 use super::settings::TAGS;
 use crate::cli::output::tell;
 use crate::cli::values::{Grid, number, whole};
 use crate::family;
-use crate::targets::{AprilGridSpec, TargetSpec, parse_length_mm, tag_range};
+use crate::layout::tag_range;
+use crate::targets::{AprilGridSpec, TargetSpec, parse_length_mm};
 
 #[derive(clap::Args)]
 pub struct Args {
@@ -40,7 +41,7 @@ pub struct Args {
           value_parser = whole(0..=u32::MAX))]
     board_id: u32,
     #[command(flatten)]
-    printing: Printing,
+    printing: PrintingArgs,
     #[command(flatten)]
     meshes: PlateMeshes,
 }
@@ -63,20 +64,20 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let target =
         args.printing.build("aprilgrid", &TargetSpec::AprilGrid(spec.clone()), family, is_made)?;
     let mut files = args.printing.files(&target, family, is_made)?;
-    let (meshes, texture) = args.meshes.files(&target, family)?;
+    let (meshes, texture) = args.meshes.files(&target.target, family)?;
     files.extend(meshes);
     match spec.to_kalibr_yaml() {
-        Some(yaml) => files.push(text_file(format!("{}.yaml", target.name), yaml)),
+        Some(yaml) => files.push(text_file(format!("{}.yaml", target.target.name), yaml)),
         None => tell!(
             "no {}.yaml is written: Kalibr reads tags of aprilTag36h11 with a border of 2 bits only",
-            target.name
+            target.target.name
         ),
     }
     let [columns, rows] = spec.tags;
     let last = spec.first_id + spec.count() - 1;
     let summary = format!(
         "{}: {columns} × {rows} tags, edge {} mm, gaps {} mm, {}{}{texture}",
-        target.name,
+        target.target.name,
         spec.tag_mm,
         (spec.gap * spec.tag_mm * 1e3).round() / 1e3,
         tag_range(family.map_or("", |family| family.name()), spec.first_id, last),

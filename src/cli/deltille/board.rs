@@ -17,7 +17,8 @@ use crate::cli::output::tell;
 use crate::export::dsc;
 use crate::family::{self, Family, FamilyError, FamilyFileError, square_names};
 use crate::lattice::GridKind;
-use crate::targets::{Target, TargetSpec, tag_range};
+use crate::layout::{Printing, tag_range};
+use crate::targets::TargetSpec;
 
 /// Arguments of both.
 #[derive(clap::Args)]
@@ -82,42 +83,44 @@ pub fn run(grid: GridKind, args: Args) -> anyhow::Result<ExitCode> {
         idle_without_pages(&plan.paper)?;
     }
     let paper = is_printed.then_some(&plan.paper);
-    let target = Target::build(&plan.name, &spec, family.as_ref(), paper)?;
+    let printing = Printing::build(&plan.name, &spec, family.as_ref(), paper)?;
     let finishing = &settings.finishing;
-    let target = finishing.applied(target, plan.paper.margin_mm, plan.pdf, laser)?;
-    args.delivery.check_beside(&target)?;
+    let printing = finishing.applied(printing, plan.paper.margin_mm, plan.pdf, laser)?;
+    let target = &printing.target;
+    args.delivery.check_beside(target)?;
     let template = args.save_template.as_deref().map(|path| {
         let text = settings.clone().with_edge(plan.spec.edge_mm).to_toml(grid);
         Template::new(path, text, args.delivery.overwrite)
     });
     let template = template.transpose()?;
-    let mut files = files(&plan, &target, family.as_ref())?;
-    let (meshes, texture) = meshes.files(&target, family.as_ref())?;
+    let mut files = files(&plan, &printing, family.as_ref())?;
+    let (meshes, texture) = meshes.files(target, family.as_ref())?;
     files.extend(meshes);
-    files.extend(laser.files(&target, family.as_ref())?);
-    let told = summary(&target) + &texture;
-    let delivered = args.delivery.deliver(&target, family.as_ref(), &files, &told)?;
+    files.extend(laser.files(&printing, family.as_ref())?);
+    let told = summary(&printing) + &texture;
+    let delivered = args.delivery.deliver(&printing, family.as_ref(), &files, &told)?;
     template.map_or(Ok(()), |template| template.write())?;
     Ok(delivered)
 }
 
 /// The files of a plan. What can be refused is refused here, before anything is written.
-fn files(plan: &Plan, target: &Target, family: Option<&Family>) -> anyhow::Result<Vec<File>> {
-    let name = &target.name;
-    let mut files = vec![text_file(format!("{name}.json"), target.to_json())];
+fn files(plan: &Plan, printing: &Printing, family: Option<&Family>) -> anyhow::Result<Vec<File>> {
+    let name = &printing.target.name;
+    let mut files = vec![text_file(format!("{name}.json"), printing.to_json())];
     if let Some(dialect) = plan.dsc {
-        let text = dsc::write(target, dialect).context("--dsc")?;
+        let text = dsc::write(&printing.target, dialect).context("--dsc")?;
         files.push(text_file(format!("{name}.dsc"), text));
     }
     let formats = Formats { pdf: plan.pdf, svg: plan.svg, png: plan.png };
-    if !target.sheets.is_empty() {
-        files.extend(drawn(name, artwork::draw(target, family)?, formats, plan.dpi));
+    if !printing.sheets.is_empty() {
+        files.extend(drawn(name, artwork::draw(printing, family)?, formats, plan.dpi));
     }
     Ok(files)
 }
 
 /// One line on what was made.
-fn summary(target: &Target) -> String {
+fn summary(printing: &Printing) -> String {
+    let target = &printing.target;
     let panels = &target.panels;
     let TargetSpec::Board(spec) = &target.spec else { return target.name.to_string() };
     let edge = spec.edge_mm;
@@ -132,12 +135,12 @@ fn summary(target: &Target) -> String {
         let last = ids.next_back().unwrap_or(first);
         text += &format!(", {}", tag_range(&family.name, first, last));
     }
-    let Some(sheet) = target.sheets.first() else { return text };
+    let Some(sheet) = printing.sheets.first() else { return text };
     let page = sheet.pages.first().map_or(sheet, |page| &page.marks);
     let [width, height] = [page.width_mm, page.height_mm].map(|mm| (mm * 1e3).round() / 1e3);
     let pages = match sheet.page_count() {
         1 => "page".to_owned(),
-        _ => format!("{} pages", target.page_count()),
+        _ => format!("{} pages", printing.page_count()),
     };
     text + &format!(", {pages} {width} × {height} mm")
 }

@@ -107,7 +107,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     if let (Some(known), Some(target), false) =
         (&args.fixed_intrinsics, &target, args.sightings.assumes_target())
     {
-        camera_file::check_targets(known, &known_with, std::slice::from_ref(target))?;
+        camera_file::check_targets(known, &known_with, std::slice::from_ref(&target.target))?;
     }
     for picture in &empty {
         tell!("{}: no board, left out", picture.display());

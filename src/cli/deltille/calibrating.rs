@@ -21,9 +21,10 @@ use crate::cli::values::whole;
 use crate::export::calibration::{Print, Residuals};
 use crate::export::camera::FormatError;
 use crate::export::kind::Kind;
+use crate::layout::Printing;
 use crate::quantity::{board_accuracy_mm, distance_mm};
 use crate::report::target_map_svg;
-use crate::targets::{self, Target, parse_length_mm};
+use crate::targets::{self, parse_length_mm};
 use crate::words::counted;
 
 /// How a calibration is solved, and the page about it.
@@ -282,11 +283,13 @@ impl Calibrated {
     }
 
     /// The measured target and its picture, `<stem>-measured.json` and `.svg`; none where it was not measured.
-    pub fn measured(&self, stem: &str, target: Option<&Target>) -> Vec<File> {
-        let Some((map, target)) = self.estimate.map.as_ref().zip(target) else { return Vec::new() };
+    pub fn measured(&self, stem: &str, printing: Option<&Printing>) -> Vec<File> {
+        let Some((map, printing)) = self.estimate.map.as_ref().zip(printing) else {
+            return Vec::new();
+        };
         let file = |end: &str, text: String| text_file(format!("{stem}-measured.{end}"), text);
-        let target = map.on(target);
-        vec![file("json", target.to_json()), file("svg", target_map_svg(map))]
+        let measured = Printing { target: map.on(&printing.target), ..printing.clone() };
+        vec![file("json", measured.to_json()), file("svg", target_map_svg(map))]
     }
 
     /// What is known of the print and the sheet, a line each.

@@ -3,11 +3,12 @@
 use std::process::ExitCode;
 
 use super::meshes::PlateMeshes;
-use super::printing::{Printing, page};
+use super::printing::{PrintingArgs, page};
 use super::settings::TAGS;
 use crate::cli::values::{Grid, whole};
 use crate::family::{Family, dictionary};
-use crate::targets::{CharucoSpec, TargetSpec, parse_length_mm, tag_range};
+use crate::layout::tag_range;
+use crate::targets::{CharucoSpec, TargetSpec, parse_length_mm};
 
 #[derive(clap::Args)]
 pub struct Args {
@@ -37,7 +38,7 @@ pub struct Args {
           value_parser = whole(0..=u32::MAX))]
     board_id: u32,
     #[command(flatten)]
-    printing: Printing,
+    printing: PrintingArgs,
     #[command(flatten)]
     meshes: PlateMeshes,
 }
@@ -62,13 +63,13 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let target =
         args.printing.build("charuco", &TargetSpec::Charuco(spec.clone()), family, is_made)?;
     let mut files = args.printing.files(&target, family, is_made)?;
-    let (meshes, texture) = args.meshes.files(&target, family)?;
+    let (meshes, texture) = args.meshes.files(&target.target, family)?;
     files.extend(meshes);
     let last = spec.first_id + spec.markers() - 1;
     let [columns, rows] = spec.squares;
     let summary = format!(
         "{}: {columns} × {rows} squares, edge {} mm, markers {} mm, {}{}{texture}",
-        target.name,
+        target.target.name,
         spec.square_mm,
         spec.marker_mm,
         tag_range(&spec.dictionary, spec.first_id, last),

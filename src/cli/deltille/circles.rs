@@ -2,7 +2,7 @@
 
 use std::process::ExitCode;
 
-use super::printing::{Printing, page};
+use super::printing::{PrintingArgs, page};
 use crate::cli::values::{Grid, whole};
 use crate::targets::{CirclesSpec, TargetSpec, parse_length_mm};
 
@@ -26,7 +26,7 @@ pub struct Args {
           value_parser = whole(0..=u32::MAX))]
     board_id: u32,
     #[command(flatten)]
-    printing: Printing,
+    printing: PrintingArgs,
 }
 
 /// Makes a grid, writes its files, and verifies what it wrote.
@@ -43,7 +43,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let files = args.printing.files(&target, None, false)?;
     let summary = format!(
         "{}: {} × {} circles, spacing {} mm, diameter {} mm{}",
-        target.name,
+        target.target.name,
         spec.circles[0],
         spec.circles[1],
         spec.spacing_mm,

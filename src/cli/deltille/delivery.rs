@@ -12,6 +12,7 @@ use super::target_file;
 use super::verify::{self, Proof};
 use crate::cli::output::{self, Overwrite, Telling, say};
 use crate::family::Family;
+use crate::layout::Printing;
 use crate::limits::Limits;
 use crate::targets::Target;
 use crate::verify::{Format, whole_of};
@@ -58,7 +59,7 @@ impl Delivery {
     pub fn check_beside(&self, target: &Target) -> anyhow::Result<()> {
         for path in &self.with {
             let other = target_file::read(path, &self.limits.limits()).context("--with")?;
-            target.check_beside(&other)?;
+            target.check_beside(&other.target)?;
         }
         Ok(())
     }
@@ -76,11 +77,12 @@ impl Delivery {
     /// Writes all files or none, says so after `summary`, and compares them with the target.
     pub fn deliver(
         &self,
-        target: &Target,
+        printing: &Printing,
         family: Option<&Family>,
         files: &[File],
         summary: &str,
     ) -> anyhow::Result<ExitCode> {
+        let target = &printing.target;
         let written = write_all(&self.output, files, self.overwrite)?;
         if !self.telling.is_json() {
             for line in summary.lines() {
@@ -100,7 +102,8 @@ impl Delivery {
             .cloned()
             .collect();
         // They were just made, however large.
-        let prove = || verify::prove(target, family, &artifacts, false, self.telling, Limits::NONE);
+        let prove =
+            || verify::prove(printing, family, &artifacts, false, self.telling, Limits::NONE);
         let proof = (!self.no_verify && !artifacts.is_empty()).then(prove).transpose()?;
         let code = proof.as_ref().map_or(ExitCode::SUCCESS, Proof::code);
         if self.telling.is_json() {

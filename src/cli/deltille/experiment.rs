@@ -338,9 +338,10 @@ impl PhotographsArgs {
     /// What is photographed.
     fn subjects(&self) -> anyhow::Result<Vec<Subject>> {
         if let Some(path) = &self.target {
-            let target = target_file::read(path, &Limits::default())?;
-            let family = target_file::family(&target, self.family.as_deref())?;
-            let subject = Subject::new(&target.name, &target, family.as_ref());
+            let printing = target_file::read(path, &Limits::default())?;
+            let target = &printing.target;
+            let family = target_file::family(target, self.family.as_deref())?;
+            let subject = Subject::new(&target.name, &printing, family.as_ref());
             return Ok(vec![subject.with_context(|| path.display().to_string())?]);
         }
         let wanted =

@@ -10,7 +10,7 @@ use super::settings::{is_false, length, refuse_idle};
 use crate::artwork::CuttingError;
 use crate::export::artifacts::{MakeError, Making, What, make};
 use crate::family::Family;
-use crate::targets::{Finish, Target};
+use crate::layout::{Finish, Printing};
 
 /// Heading of these options.
 const FINISHING: &str = "Glass, print shops, lasers";
@@ -72,13 +72,13 @@ impl Finishing {
     /// The target with this finish, which is laid out within this margin.
     pub fn applied(
         &self,
-        target: Target,
+        printing: Printing,
         margin_mm: f64,
         pdf: bool,
         laser: &Laser,
-    ) -> anyhow::Result<Target> {
+    ) -> anyhow::Result<Printing> {
         laser.check_use()?;
-        if self.mirrored && target.sheets.is_empty() && !laser.is_any() {
+        if self.mirrored && printing.sheets.is_empty() && !laser.is_any() {
             bail!("--mirrored: a mesh is never mirrored: add --pdf or --laser, or leave it out");
         }
         let spots = [("--white", self.white.is_some()), ("--contour", self.contour.is_some())];
@@ -87,7 +87,7 @@ impl Finishing {
         }
         let (white, contour) = (self.white.clone(), self.contour.clone());
         let finish = Finish { mirrored: self.mirrored, white, contour };
-        Ok(target.finished(finish, margin_mm)?)
+        Ok(printing.finished(finish, margin_mm)?)
     }
 }
 
@@ -110,14 +110,14 @@ impl Laser {
     }
 
     /// The drawings that are asked for.
-    pub fn files(&self, target: &Target, family: Option<&Family>) -> anyhow::Result<Vec<File>> {
+    pub fn files(&self, printing: &Printing, family: Option<&Family>) -> anyhow::Result<Vec<File>> {
         let mut making = Making::default();
         making.kerf_mm = length("kerf", &self.kerf)?.unwrap_or(0.0);
         let formats = [(LaserFormat::Dxf, What::LaserDxf), (LaserFormat::Svg, What::LaserSvg)];
         let asked = formats.into_iter().filter(|(format, _)| self.laser.contains(format));
         let mut files = Vec::new();
         for (_, what) in asked {
-            let made = make(target, family, what, making);
+            let made = make(printing, family, what, making);
             let is_kerf = matches!(made, Err(MakeError::Cutting(CuttingError::Kerf { .. })));
             let made = made.context(if is_kerf { "--kerf" } else { "--laser" })?;
             files.extend(made.into_iter().map(|(name, bytes)| bytes_file(name, bytes)));

@@ -24,6 +24,7 @@ use crate::detect::{Detection, Detector, DetectorConfig};
 use crate::export::calibration::Sheet;
 use crate::export::kind::Kind;
 use crate::export::{next_view, svg};
+use crate::layout::Printing;
 use crate::limits::Limits;
 use crate::photograph;
 use crate::raster::AnyGray;
@@ -101,11 +102,12 @@ fn px(text: &str) -> Result<f64, String> {
 /// Proposes one view after the other until they are enough.
 pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let limits = args.limits.limits();
-    let target = match (&args.target, args.grid.read_target()?) {
+    let printing: Printing = match (&args.target, args.grid.read_target()?) {
         (Some(path), _) => target_file::read_placed(path, &limits).context("--target")?,
-        (None, Some((_, target))) => target,
+        (None, Some((_, target))) => target.into(),
         (None, None) => bail!("give --target FILE, or --grid for an untagged board"),
     };
+    let target = &printing.target;
     let family = target_file::family(&target, args.family.as_deref())?;
     ensure!(
         args.folder.is_dir(),
@@ -118,7 +120,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         "--target: {} are boards that lie about: give the file of one of them",
         counted(target.panels.len(), "panel")
     );
-    let sheet = args.sheet.read(&limits, &[target.identity()])?;
+    let sheet = args.sheet.read(&limits, &[target.identity()], std::slice::from_ref(&printing))?;
     let panels = sightings::panels(&reference, &sheet)?;
     let detector = Detector::for_targets(&[(&target, family.as_ref())], DetectorConfig::default());
     let detector = detector.context("--target")?;

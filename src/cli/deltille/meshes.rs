@@ -171,7 +171,8 @@ impl Meshes {
             let bodies = bodies.map_err(|error| refusal(&error, Some("--3mf")))?;
             files.push(bytes_file(format!("{}.3mf", target.name), threemf::to_bytes(&bodies)));
             if matches!(&target.spec, TargetSpec::Solid(spec) if spec.skeleton.is_some()) {
-                let skeleton = make(target, family, What::Skeleton3mf, Making::default());
+                let skeleton =
+                    make(&target.clone().into(), family, What::Skeleton3mf, Making::default());
                 let skeleton = skeleton.context("--3mf")?.into_iter();
                 files.extend(skeleton.map(|(name, bytes)| bytes_file(name, bytes)));
             }

@@ -12,7 +12,8 @@ use crate::cli::values::number;
 use crate::detect::{Proposal, Situation};
 use crate::family::{self, places};
 use crate::lattice::GridKind;
-use crate::targets::{BoardSpec, PaperSpec, TagSpec, TagsIn};
+use crate::layout::PaperSpec;
+use crate::targets::{BoardSpec, TagSpec, TagsIn};
 use crate::words::counted;
 
 /// Tilts for which it is told how far a board is labelled, °.

@@ -60,12 +60,13 @@ pub struct Args {
 /// Finds the target in each image and says where it is, a line of JSON each.
 pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let limits = args.limits.limits();
-    let targets = match args.grid.read_target()? {
-        Some((_, target)) => vec![target],
+    let printed = match args.grid.read_target()? {
+        Some((_, target)) => vec![target.into()],
         None => target_file::read_all_placed(&args.target, &limits).context("--target")?,
     };
+    let targets: Vec<Target> = printed.iter().map(|one| one.target.clone()).collect();
     let families = target_file::families(&targets, args.family.as_deref())?;
-    let sheet = args.sheet.read(&limits, &Reference::Scene(&targets).identities())?;
+    let sheet = args.sheet.read(&limits, &Reference::Scene(&targets).identities(), &printed)?;
     if let [_, _, ..] = targets.as_slice() {
         // Refuses what is known of one sheet alone.
         sightings::panels(&Reference::Scene(&targets), &sheet)?;

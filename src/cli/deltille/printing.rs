@@ -12,11 +12,12 @@ use super::settings::{DEFAULT_DPI, DPI, PAPER, PRINT, refuse_idle};
 use crate::artwork;
 use crate::cli::values::{name, whole};
 use crate::family::Family;
-use crate::targets::{DEFAULT_MARGIN_MM, PaperSpec, Target, TargetSpec, parse_length_mm};
+use crate::layout::{self, DEFAULT_MARGIN_MM, PaperSpec};
+use crate::targets::{TargetSpec, parse_length_mm};
 
 /// Paper, and files to print.
 #[derive(clap::Args)]
-pub struct Printing {
+pub struct PrintingArgs {
     /// A0 to A5, letter, legal, tabloid, or a size such as 297x420mm [default: the smallest of A4
     /// to A0 that takes the target]
     #[arg(long, help_heading = PAPER, value_name = "SIZE")]
@@ -62,7 +63,7 @@ pub struct Printing {
     laser: Laser,
 }
 
-impl Printing {
+impl PrintingArgs {
     /// Whether a PDF is written: where nothing else is asked for, too, and no mesh `is_made`.
     fn is_pdf(&self, is_made: bool) -> bool {
         self.pdf || !(self.svg || self.png || self.laser.is_any() || is_made)
@@ -75,7 +76,7 @@ impl Printing {
         spec: &TargetSpec,
         family: Option<&Family>,
         is_made: bool,
-    ) -> anyhow::Result<Target> {
+    ) -> anyhow::Result<layout::Printing> {
         if self.dpi.is_some() && !self.png {
             bail!("--dpi: there is no PNG to write: add --png");
         }
@@ -93,27 +94,29 @@ impl Printing {
         if !is_printed {
             idle_without_pages(&paper)?;
         }
-        let target = Target::build(name, spec, family, is_printed.then_some(&paper))?;
+        let paper_of_print = is_printed.then_some(&paper);
+        let printing = layout::Printing::build(name, spec, family, paper_of_print)?;
         let pdf = self.is_pdf(is_made);
-        let target = self.finishing.applied(target, paper.margin_mm, pdf, &self.laser)?;
-        self.delivery.check_beside(&target)?;
-        Ok(target)
+        let printing = self.finishing.applied(printing, paper.margin_mm, pdf, &self.laser)?;
+        self.delivery.check_beside(&printing.target)?;
+        Ok(printing)
     }
 
     /// The description of a target, and its pages; without a PDF that is not asked for where something else `is_made`.
     pub fn files(
         &self,
-        target: &Target,
+        printing: &layout::Printing,
         family: Option<&Family>,
         is_made: bool,
     ) -> anyhow::Result<Vec<File>> {
         let formats = Formats { pdf: self.is_pdf(is_made), svg: self.svg, png: self.png };
         let dpi = self.dpi.unwrap_or(DEFAULT_DPI);
-        let mut files = vec![text_file(format!("{}.json", target.name), target.to_json())];
-        if !target.sheets.is_empty() {
-            files.extend(drawn(&target.name, artwork::draw(target, family)?, formats, dpi));
+        let name = &printing.target.name;
+        let mut files = vec![text_file(format!("{name}.json"), printing.to_json())];
+        if !printing.sheets.is_empty() {
+            files.extend(drawn(name, artwork::draw(printing, family)?, formats, dpi));
         }
-        files.extend(self.laser.files(target, family)?);
+        files.extend(self.laser.files(printing, family)?);
         Ok(files)
     }
 }
@@ -131,8 +134,8 @@ pub fn idle_without_pages(paper: &PaperSpec) -> anyhow::Result<()> {
 }
 
 /// The paper of a target in words.
-pub fn page(target: &Target) -> String {
-    let sheet = target.sheets.first();
+pub fn page(printing: &layout::Printing) -> String {
+    let sheet = printing.sheets.first();
     sheet.map_or_else(String::new, |sheet| {
         let [width, height] = [sheet.width_mm, sheet.height_mm].map(|mm| (mm * 1e3).round() / 1e3);
         format!(", page {width} × {height} mm")

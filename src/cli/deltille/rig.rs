@@ -26,6 +26,7 @@ use crate::detect::{Detection, InkEstimate};
 use crate::export::calibration::Print;
 use crate::export::camera::{FormatError, colmap, colmap_rig, kalibr};
 use crate::export::{rig, saved};
+use crate::layout::Printing;
 use crate::report::target_map_svg;
 use crate::targets::{Name, Target};
 use crate::words::counted;
@@ -105,20 +106,21 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     check_folders(&args.camera)?;
     check_folder(&args.output).context("-o")?;
     let limits = args.limits.limits();
-    let (targets, grid) = match args.grid.read_target()? {
-        Some((grid, target)) => (vec![target], Some(grid)),
+    let (printed, grid) = match args.grid.read_target()? {
+        Some((grid, target)) => (vec![target.into()], Some(grid)),
         None => (target_file::read_all_placed(&args.target, &limits).context("--target")?, None),
     };
+    let targets: Vec<Target> = printed.iter().map(|one| one.target.clone()).collect();
     let reference = match (grid, targets.as_slice()) {
         (Some(grid), _) => Reference::Grid(grid),
         (None, [only]) => Reference::Target(only),
         (None, several) => Reference::Scene(several),
     };
-    let sheet = args.sheet.read(&limits, &reference.identities())?;
+    let sheet = args.sheet.read(&limits, &reference.identities(), &printed)?;
     let panels = sightings::panels(&reference, &sheet)?;
     let cameras = args.camera.iter().map(|(name, _)| args.intrinsics(name, &targets));
     let cameras = cameras.collect::<anyhow::Result<Vec<Intrinsics>>>()?;
-    args.check_files(&cameras, &targets)?;
+    args.check_files(&cameras, &printed)?;
     let page = args.solve.page("rig", args.overwrite)?;
     let mut calibration = Calibration::of(&reference, panels).refine_panels(args.refine_target);
     let (mut left_out, mut ink, mut seen) = (Vec::new(), Vec::new(), Vec::new());
@@ -176,7 +178,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let cameras = estimate.cameras.iter();
     let cameras = cameras.map(|c| (c.name.as_str(), &c.camera, c.camera_from_rig));
     let cameras = cameras.collect::<Vec<_>>();
-    let (files, refused) = args.files(&cameras, &in_options(&json), estimate, &targets)?;
+    let (files, refused) = args.files(&cameras, &in_options(&json), estimate, &printed)?;
     let mut written = write_all(&args.output, &files, args.overwrite)?;
     if let Some(page) = page {
         let folder = |(name, _): &(String, PathBuf)| of_name(&args.images, name);
@@ -203,14 +205,14 @@ impl Args {
     }
 
     /// Refuses before the work what could not be written after it.
-    fn check_files(&self, cameras: &[Intrinsics], targets: &[Target]) -> anyhow::Result<()> {
+    fn check_files(&self, cameras: &[Intrinsics], printed: &[Printing]) -> anyhow::Result<()> {
         let samples: Vec<Camera> = cameras.iter().map(sample).collect();
         let cameras = self.camera.iter().zip(&samples);
         let cameras = cameras.map(|((name, _), camera)| (name.as_str(), camera, Pose::IDENTITY));
         let mut found = Estimate::default();
         found.map = self.solve.measures_target().then(|| TargetMap::new(Vec::new(), [0.0; 2]));
         let json = sample_of(rig::SCHEMA);
-        let (files, _) = self.files(&cameras.collect::<Vec<_>>(), &json, &found, targets)?;
+        let (files, _) = self.files(&cameras.collect::<Vec<_>>(), &json, &found, printed)?;
         check_places(&self.output, &files, self.overwrite)
     }
 
@@ -220,7 +222,7 @@ impl Args {
         cameras: &[(&str, &Camera, Pose)],
         json: &str,
         found: &Estimate,
-        targets: &[Target],
+        printed: &[Printing],
     ) -> anyhow::Result<(Vec<File>, Vec<FormatError>)> {
         let mut refused = Vec::new();
         let mut files = vec![text_file("rig.json".to_owned(), json.to_owned())];
@@ -240,14 +242,15 @@ impl Args {
                 Err(error) => refused.push(error),
             }
         }
-        for (index, target) in targets.iter().enumerate() {
-            files.extend(self.files_of_target(&found.of_target(index), target)?);
+        for (index, printing) in printed.iter().enumerate() {
+            files.extend(self.files_of_target(&found.of_target(index), printing)?);
         }
         Ok((files, refused))
     }
 
     /// A target as it was found, where that was asked for.
-    fn files_of_target(&self, found: &Estimate, target: &Target) -> anyhow::Result<Vec<File>> {
+    fn files_of_target(&self, found: &Estimate, printing: &Printing) -> anyhow::Result<Vec<File>> {
+        let target = &printing.target;
         let refined = self.refine_target.then(|| found.refined(target));
         let measured = found.map.as_ref().map(|map| map.on(refined.as_ref().unwrap_or(target)));
         let end = if measured.is_some() { "-measured" } else { "" };
@@ -259,7 +262,8 @@ impl Args {
             "-o: {} would overwrite the target that was given: choose another folder",
             place.display()
         );
-        let file = text_file(format!("{name}.json"), target.to_json());
+        let printing = Printing { target, ..printing.clone() };
+        let file = text_file(format!("{name}.json"), printing.to_json());
         let drawn = found.map.as_ref().map(target_map_svg);
         let drawn = drawn.map(|svg| text_file(format!("{name}.svg"), svg));
         Ok([file].into_iter().chain(drawn).collect())

@@ -16,10 +16,8 @@ use crate::cli::values::{number, whole};
 use crate::export::dsc::Dialect;
 use crate::family::places;
 use crate::lattice::GridKind;
-use crate::targets::{
-    BORDER_BITS, BoardSpec, DEFAULT_MARGIN_MM, MOST_ROWS, PaperSpec, SIDES, TagSpec, TagsIn,
-    parse_length_mm, usual_edge_mm,
-};
+use crate::layout::{DEFAULT_MARGIN_MM, PaperSpec, usual_edge_mm};
+use crate::targets::{BORDER_BITS, BoardSpec, MOST_ROWS, SIDES, TagSpec, TagsIn, parse_length_mm};
 
 /// Resolution of PNG files, dots per inch.
 pub const DEFAULT_DPI: u32 = 300;

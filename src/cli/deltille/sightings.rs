@@ -19,6 +19,7 @@ use crate::export::calibration::{self, Print, Sheet};
 use crate::export::detection;
 use crate::export::tables::folder;
 use crate::lattice::GridKind;
+use crate::layout::Printing;
 use crate::limits::{Limits, ReadError};
 use crate::quantity::{edge_mm, print_scale};
 use crate::targets::{SIDES, Target, TargetIdentity, parse_length_mm};
@@ -102,7 +103,7 @@ pub struct Sightings {
     /// A calibration of what was photographed, as yet without cameras.
     pub calibration: Calibration,
     /// What was photographed, with its corners where the plan has them.
-    pub target: Option<Target>,
+    pub target: Option<Printing>,
     /// Files of the detections in which no view was found.
     pub empty: Vec<PathBuf>,
     /// What does not belong to the target.
@@ -147,15 +148,15 @@ impl SightingsArgs {
     pub fn read(&self, measure_target: bool) -> anyhow::Result<Sightings> {
         let limits = self.limits.limits();
         let target = self.target.as_deref().map(|path| target_file::read_placed(path, &limits));
-        let target: Option<Target> = target.transpose().context("--target")?;
+        let target: Option<Printing> = target.transpose().context("--target")?;
         let reference = match (&target, self.grid.read()?) {
-            (Some(target), _) => Reference::Target(target),
+            (Some(printing), _) => Reference::Target(&printing.target),
             (None, Some(grid)) => Reference::Grid(grid),
             _ => bail!(
                 "give --target FILE, or --grid deltille or checker with --edge for untagged boards"
             ),
         };
-        let sheet = self.sheet.read(&limits, &reference.identities())?;
+        let sheet = self.sheet.read(&limits, &reference.identities(), target.as_slice())?;
         let Read { mut views, empty, mut left_out, ink, detections } =
             read(&self.detections, &reference, &limits, self.assume_target)?;
         let board = match reference {
@@ -170,25 +171,35 @@ impl SightingsArgs {
         if measure_target {
             left_out.extend(take_sure(&mut views, &reference)?);
         }
-        put_on(&sheet, target.as_ref(), &mut views)?;
+        put_on(&sheet, reference.targets().first(), &mut views)?;
         let panels = panels(&reference, &sheet)?;
         let print = Print { scale: sheet.print_scale, ink };
         let unnamed = unnamed(&detections, &reference).filter(|_| !self.assume_target);
         let calibration = Calibration::of(&reference, panels);
-        let target = target.or(board);
+        let target = target.or(board.map(Printing::from));
         Ok(Sightings { calibration, target, views, empty, left_out, print, unnamed })
     }
 }
 
 impl SheetArgs {
-    /// The sheet, where nothing is known as it was planned.
-    pub fn read(&self, limits: &Limits, targets: &[TargetIdentity]) -> anyhow::Result<Sheet> {
+    /// The sheet, where nothing is known as it was planned; `printed` are the targets with their sheets.
+    pub fn read(
+        &self,
+        limits: &Limits,
+        targets: &[TargetIdentity],
+        printed: &[Printing],
+    ) -> anyhow::Result<Sheet> {
+        let sheets = match printed {
+            [only] => only.sheets.clone(),
+            _ => Vec::new(),
+        };
         let Some(path) = &self.shape else {
-            return Ok(Sheet { print_scale: self.print_scale, shape: None });
+            return Ok(Sheet { print_scale: self.print_scale, shape: None, sheets });
         };
         let show = || format!("--shape: {}", path.display());
         let text = limits.read_text(path).context("--shape")?;
-        calibration::read_sheet(&text, targets).with_context(show)
+        let sheet = calibration::read_sheet(&text, targets).with_context(show)?;
+        Ok(Sheet { sheets, ..sheet })
     }
 }
 

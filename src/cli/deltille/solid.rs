@@ -20,10 +20,11 @@ use crate::export::artifacts::{self, Making, What};
 use crate::export::dsc;
 use crate::export::solid_mesh;
 use crate::family::{self, Family};
+use crate::layout::{Printing, tag_range};
 use crate::quantity::unit_mm;
 use crate::targets::{
     ClosedMesh, NEAR_EQUILATERAL, Name, Skeleton, SolidShape, SolidSpec, Target, TargetSpec,
-    parse_box_mm, tag_range,
+    parse_box_mm,
 };
 
 /// Arguments of the commands that make solids.
@@ -182,20 +183,21 @@ fn run_with(
     let net = settings.dxf && !settings.per_face;
     let layout = (settings.printed() || net).then_some(&paper);
     let solid = TargetSpec::Solid(spec.clone());
-    let target = Target::build(&name, &solid, family, layout)?;
-    args.delivery.check_beside(&target)?;
+    let printing = Printing::build(&name, &solid, family, layout)?;
+    let target = &printing.target;
+    args.delivery.check_beside(target)?;
     let template = args
         .save_template
         .as_deref()
         .map(|path| Template::new(path, settings.to_toml(command), args.delivery.overwrite));
     let template = template.transpose()?;
-    let mut files = files(&settings, &target, net, &spec, family)?;
-    let (textured, texture) = meshes.files(&target, family, None)?;
+    let mut files = files(&settings, &printing, net, &spec, family)?;
+    let (textured, texture) = meshes.files(target, family, None)?;
     files.extend(textured);
-    files.extend(settings.laser.files(&target, family)?);
-    files.extend(pages(&settings, &target, family)?);
-    let told = summary(&target, &spec)? + &texture;
-    let delivered = args.delivery.deliver(&target, family, &files, &told)?;
+    files.extend(settings.laser.files(&printing, family)?);
+    files.extend(pages(&settings, &printing, family)?);
+    let told = summary(target, &spec)? + &texture;
+    let delivered = args.delivery.deliver(&printing, family, &files, &told)?;
     template.map_or(Ok(()), |template| template.write())?;
     Ok(delivered)
 }
@@ -235,15 +237,15 @@ fn meshes_of(settings: &SolidSettings) -> Meshes {
 /// The description, bodies, and files to cut and to list. What can be refused is refused here, before anything is written.
 fn files(
     settings: &SolidSettings,
-    target: &Target,
+    printing: &Printing,
     net: bool,
     spec: &SolidSpec,
     family: Option<&Family>,
 ) -> anyhow::Result<Vec<File>> {
-    let name = &target.name;
-    let mut files = vec![text_file(format!("{name}.json"), target.to_json())];
+    let name = &printing.target.name;
+    let mut files = vec![text_file(format!("{name}.json"), printing.to_json())];
     if let Some(dialect) = settings.dsc()? {
-        let text = dsc::write(target, dialect).context("--dsc")?;
+        let text = dsc::write(&printing.target, dialect).context("--dsc")?;
         files.push(text_file(format!("{name}.dsc"), text));
     }
     let asked = [
@@ -253,7 +255,7 @@ fn files(
         (net, What::Net),
     ];
     for (_, what) in asked.into_iter().filter(|(is_asked, _)| *is_asked) {
-        let made = artifacts::make(target, family, what, Making::default())?;
+        let made = artifacts::make(printing, family, what, Making::default())?;
         files.extend(made.into_iter().map(|(name, bytes)| bytes_file(name, bytes)));
     }
     Ok(files)
@@ -262,16 +264,16 @@ fn files(
 /// The pages that are asked for.
 fn pages(
     settings: &SolidSettings,
-    target: &Target,
+    printing: &Printing,
     family: Option<&Family>,
 ) -> anyhow::Result<Vec<File>> {
     if !settings.printed() {
         return Ok(Vec::new());
     }
-    let artwork = artwork::draw(target, family)?;
+    let artwork = artwork::draw(printing, family)?;
     let SolidSettings { pdf, svg, png, .. } = *settings;
     let dpi = settings.dpi.unwrap_or(DEFAULT_DPI);
-    Ok(files::drawn(&target.name, artwork, files::Formats { pdf, svg, png }, dpi))
+    Ok(files::drawn(&printing.target.name, artwork, files::Formats { pdf, svg, png }, dpi))
 }
 
 /// One line on what was made, and one on the panels of a skeleton.

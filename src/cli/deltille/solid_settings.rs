@@ -17,9 +17,9 @@ use crate::cli::values::{number, whole};
 use crate::export::dsc::Dialect;
 use crate::family::places;
 use crate::lattice::GridKind;
+use crate::layout::{DEFAULT_MARGIN_MM, PaperSpec, SolidSheets};
 use crate::targets::{
-    BORDER_BITS, DEFAULT_MARGIN_MM, FACE_TILES, MOST_ROWS, PaperSpec, SkeletonSpec, SolidShape,
-    SolidSheets, SolidSpec, TagSpec, TagsIn,
+    BORDER_BITS, FACE_TILES, MOST_ROWS, SkeletonSpec, SolidShape, SolidSpec, TagSpec, TagsIn,
 };
 
 /// Heading of the help.

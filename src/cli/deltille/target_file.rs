@@ -7,26 +7,27 @@ use anyhow::{Context, anyhow, bail};
 use crate::cli::output::tell;
 use crate::detect::check_distinct;
 use crate::family::{self, Family};
+use crate::layout::Printing;
 use crate::limits::Limits;
 use crate::target_file::{self, TargetFamilyError};
 use crate::targets::Target;
 
-/// Reads a target: `.dsc` by its extension, JSON otherwise.
-pub fn read(path: &Path, limits: &Limits) -> anyhow::Result<Target> {
+/// Reads a target with its sheets: `.dsc` by its extension, JSON otherwise.
+pub fn read(path: &Path, limits: &Limits) -> anyhow::Result<Printing> {
     Ok(target_file::read(path, limits)?)
 }
 
 /// The same where poses are asked for; tells where a `.dsc` lacks those of its boards.
-pub fn read_placed(path: &Path, limits: &Limits) -> anyhow::Result<Target> {
+pub fn read_placed(path: &Path, limits: &Limits) -> anyhow::Result<Printing> {
     let target = read(path, limits)?;
-    tell_missing(path, &target);
+    tell_missing(path, &target.target);
     Ok(target)
 }
 
 /// The same of several files, see [`read_all`].
-pub fn read_all_placed(paths: &[PathBuf], limits: &Limits) -> anyhow::Result<Vec<Target>> {
-    let targets = read_all(paths, limits)?;
-    paths.iter().zip(&targets).for_each(|(path, target)| tell_missing(path, target));
+pub fn read_all_placed(paths: &[PathBuf], limits: &Limits) -> anyhow::Result<Vec<Printing>> {
+    let targets = read_each(paths, limits)?;
+    paths.iter().zip(&targets).for_each(|(path, target)| tell_missing(path, &target.target));
     Ok(targets)
 }
 
@@ -38,9 +39,13 @@ fn tell_missing(path: &Path, target: &Target) {
 
 /// The targets of several files, which can be told apart.
 pub fn read_all(paths: &[PathBuf], limits: &Limits) -> anyhow::Result<Vec<Target>> {
+    Ok(read_each(paths, limits)?.into_iter().map(|printing| printing.target).collect())
+}
+
+fn read_each(paths: &[PathBuf], limits: &Limits) -> anyhow::Result<Vec<Printing>> {
     let targets =
         paths.iter().map(|path| read(path, limits)).collect::<anyhow::Result<Vec<_>>>()?;
-    check_distinct(&targets.iter().collect::<Vec<_>>())?;
+    check_distinct(&targets.iter().map(|printing| &printing.target).collect::<Vec<_>>())?;
     Ok(targets)
 }
 

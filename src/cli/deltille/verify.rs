@@ -18,6 +18,7 @@ use crate::cli::run::{self, FAILED};
 use crate::export::kind::Kind;
 use crate::export::{laser_file_name, sheet_file_name, stl, threemf};
 use crate::family::Family;
+use crate::layout::Printing;
 use crate::limits::Limits;
 use crate::targets::Target;
 use crate::verify::{Progress, Verdict, Verifier};
@@ -47,14 +48,14 @@ pub struct Args {
 /// Compares files with the target that they should show.
 pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let limits = args.limits.limits();
-    let target = target_file::read(&args.target, &limits)?;
-    let target = target.under_printed_name();
-    let family = target_file::family(&target, args.family.as_deref())?;
+    let printing = target_file::read(&args.target, &limits)?;
+    let printing = printing.under_printed_name();
+    let family = target_file::family(&printing.target, args.family.as_deref())?;
     let folder = args.target.parent().unwrap_or(Path::new("."));
     let alone = args.artifacts.len() == 1;
     let artifacts = match args.artifacts.as_slice() {
         [] => {
-            let mut beside = artifacts_beside(folder, &target);
+            let mut beside = artifacts_beside(folder, &printing);
             // A description is not proved by itself.
             beside.retain(|path| !same_file(path, &args.target));
             beside
@@ -62,7 +63,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         given => given.to_vec(),
     };
     if artifacts.is_empty() {
-        let name = &target.name;
+        let name = &printing.target.name;
         bail!(
             "no {name}.pdf, .svg, .png, .glb, .obj, .sdf, .urdf, .xml, .usda, .3mf, .stl, .dsc or .dxf beside {}: name the files",
             args.target.display()
@@ -73,7 +74,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         output::check_writable("--report", path)?;
     }
     interrupt::stands("not all was compared");
-    let proof = prove(&target, family.as_ref(), &artifacts, alone, args.telling, limits)?;
+    let proof = prove(&printing, family.as_ref(), &artifacts, alone, args.telling, limits)?;
     if let Some(path) = &args.report {
         let json = serde_json::to_string_pretty(&proof).context("--report")? + "\n";
         output::write(path, json.as_bytes(), args.overwrite).context("--report")?;
@@ -91,7 +92,7 @@ const TICK: Duration = Duration::from_millis(200);
 /// Verifies files, and prints a line on each unless the whole is to be JSON. All pages of a target are among them,
 /// unless one is verified `alone`.
 pub fn prove(
-    target: &Target,
+    printing: &Printing,
     family: Option<&Family>,
     artifacts: &[PathBuf],
     alone: bool,
@@ -103,9 +104,9 @@ pub fn prove(
         bar.set_length(total as u64);
         bar.set_position(done as u64);
     };
-    let verifier = Verifier::new(target, family)?.within(limits).stopped_by(interrupt::flag());
+    let verifier = Verifier::new(printing, family)?.within(limits).stopped_by(interrupt::flag());
     let verifier = verifier.telling(&show);
-    let mut proof = Proof::of(target);
+    let mut proof = Proof::of(&printing.target);
     let mut done = BTreeSet::new();
     for path in artifacts {
         // The pages of a net are verified together.
@@ -142,10 +143,10 @@ pub fn prove(
 }
 
 /// The artifacts of a target that are in a folder; those that cannot be its own are named.
-fn artifacts_beside(folder: &Path, target: &Target) -> Vec<PathBuf> {
-    let name = &target.name;
+fn artifacts_beside(folder: &Path, printing: &Printing) -> Vec<PathBuf> {
+    let name = &printing.target.name;
     let present = |name: String| Some(folder.join(name)).filter(|path| path.is_file());
-    let count = target.page_count();
+    let count = printing.page_count();
     let drawn = ["svg", "png"].into_iter().flat_map(|extension| {
         let page = move |index| sheet_file_name(name, index, count, extension);
         let single = (count == 0).then(|| format!("{name}.{extension}"));
@@ -160,7 +161,7 @@ fn artifacts_beside(folder: &Path, target: &Target) -> Vec<PathBuf> {
     let laser = ["dxf", "svg"].map(|extension| laser_file_name(name, extension));
     let more = skeletons.into_iter().chain(panels).chain(laser);
     let meshes = meshes.into_iter().chain(more).filter_map(present);
-    if target.sheets.is_empty() {
+    if printing.sheets.is_empty() {
         for path in printed {
             tell!(
                 "{}: not compared, {name} as described was not laid out on paper: print it anew, \
@@ -170,7 +171,7 @@ fn artifacts_beside(folder: &Path, target: &Target) -> Vec<PathBuf> {
         }
         return meshes.collect();
     }
-    for path in pages_too_many(folder, target) {
+    for path in pages_too_many(folder, printing) {
         tell!(
             "{}: not compared, {name} has {}: remove it, or name it otherwise",
             path.display(),
@@ -181,19 +182,21 @@ fn artifacts_beside(folder: &Path, target: &Target) -> Vec<PathBuf> {
 }
 
 /// Files with the names of pages that the target does not have, in order.
-fn pages_too_many(folder: &Path, target: &Target) -> Vec<PathBuf> {
+fn pages_too_many(folder: &Path, printing: &Printing) -> Vec<PathBuf> {
     let pages: BTreeSet<String> = ["svg", "png"]
         .into_iter()
         .flat_map(|extension| {
-            let count = target.page_count();
-            (0..count).map(move |page| sheet_file_name(&target.name, page, count, extension))
+            let count = printing.page_count();
+            (0..count)
+                .map(move |page| sheet_file_name(&printing.target.name, page, count, extension))
         })
         .collect();
     let is_too_many = |path: &PathBuf| {
         let [stem, extension] =
             [path.file_stem(), path.extension()].map(|part| part.and_then(|p| p.to_str()));
         let (Some(stem), Some("svg" | "png")) = (stem, extension) else { return false };
-        let number = stem.strip_prefix(&*target.name).and_then(|rest| rest.strip_prefix('-'));
+        let number =
+            stem.strip_prefix(&*printing.target.name).and_then(|rest| rest.strip_prefix('-'));
         let of_page = number.is_some_and(|number| number.parse::<usize>().is_ok());
         let file = path.file_name().map(|name| name.to_string_lossy().into_owned());
         // A target may have that name too.

@@ -48,7 +48,8 @@ use crate::detect::{Detector, DetectorConfig};
 use crate::export::{ExportError, atomic};
 use crate::family::Family;
 use crate::lattice::GridKind;
-use crate::targets::{BoardSpec, PaperSpec, Target, TargetSpec};
+use crate::layout::{PaperSpec, Printing};
+use crate::targets::{BoardSpec, TargetSpec};
 use crate::verify::DocumentError;
 
 /// Why a page cannot be photographed.
@@ -143,12 +144,12 @@ impl Subject {
     /// Where the target has no sheet, or the family is missing.
     pub fn new(
         name: &str,
-        target: &Target,
+        printing: &Printing,
         family: Option<&Family>,
     ) -> Result<Self, PhotographError> {
-        let page = PrintedPage::new(target, family)?;
-        let detector =
-            Detector::for_target(target, family, DetectorConfig::default()).with_clock(clock::now);
+        let page = PrintedPage::new(printing, family)?;
+        let detector = Detector::for_target(&printing.target, family, DetectorConfig::default())
+            .with_clock(clock::now);
         Ok(Self { name: name.to_owned(), page, detector })
     }
 
@@ -158,9 +159,9 @@ impl Subject {
     /// Where the board cannot be made.
     pub fn of_kind(kind: Kind, family: Option<&Family>) -> Result<Self, PhotographError> {
         let (spec, paper) = (TargetSpec::Board(kind.spec()), PaperSpec::default());
-        let target = Target::build(kind.name(), &spec, family, Some(&paper))
+        let printing = Printing::build(kind.name(), &spec, family, Some(&paper))
             .expect("the boards of the experiment can be made");
-        Self::new(kind.name(), &target, family)
+        Self::new(kind.name(), &printing, family)
     }
 }
 

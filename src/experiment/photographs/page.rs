@@ -12,7 +12,7 @@ use crate::artwork;
 use crate::export::pdf;
 use crate::family::Family;
 use crate::lattice::GridKind;
-use crate::targets::Target;
+use crate::layout::Printing;
 use crate::verify::Document;
 
 /// Resolution asked for, px/mm: 1200 dpi. Large pages come coarser.
@@ -61,14 +61,15 @@ impl PrintedPage {
     ///
     /// # Errors
     /// Where the target has no sheet, or the family is missing.
-    pub fn new(target: &Target, family: Option<&Family>) -> Result<Self, PhotographError> {
-        let (Some(panel), Some(sheet)) = (target.panels.first(), target.sheets.first()) else {
+    pub fn new(printing: &Printing, family: Option<&Family>) -> Result<Self, PhotographError> {
+        let (Some(panel), Some(sheet)) = (printing.target.panels.first(), printing.sheets.first())
+        else {
             return Err(PhotographError::NoSheet);
         };
         if !sheet.pages.is_empty() {
             return Err(PhotographError::SeveralPages);
         }
-        let artwork = artwork::draw(target, family)?;
+        let artwork = artwork::draw(printing, family)?;
         let folder = tempfile::tempdir()?;
         let path = folder.path().join("page.pdf");
         pdf::write(&artwork, &path)?;
@@ -76,6 +77,7 @@ impl PrintedPage {
         let page = document.render(0, PX_PER_MM)?;
         let vertices = Vertices::of_first_page(&std::fs::read(&path)?)?;
 
+        let target = &printing.target;
         let meeting = match panel.kind {
             GridKind::Deltille => 3,
             GridKind::Checker => 2,

@@ -34,7 +34,7 @@ fn json(path: &Path) -> Value {
 fn board(rows: u32, cols: u32) -> Target {
     let family = Family::shipped(&TagSpec::default().family).unwrap();
     let spec = BoardSpec::new(GridKind::Deltille, rows, cols, 20.0);
-    Target::build("board", &TargetSpec::Board(spec), Some(&family), None).unwrap()
+    Target::build("board", &TargetSpec::Board(spec), Some(&family)).unwrap()
 }
 
 fn camera() -> Camera {
@@ -506,7 +506,7 @@ fn what_calibrate_refuses() {
         cut.corners.iter_mut().for_each(|c| (c.row, c.id) = (c.row - 1, None));
     };
     let spec = BoardSpec { tags: None, ..BoardSpec::new(GridKind::Deltille, 8, 9, 20.0) };
-    let plain = Target::build("board", &TargetSpec::Board(spec), None, None).unwrap();
+    let plain = Target::build("board", &TargetSpec::Board(spec), None).unwrap();
     page.warned(self::folder(&plain, &with(1, &cut_off)).path(), &format!("deltille {CALIBRATE}"));
     page.is("calibrate");
 }
@@ -518,7 +518,7 @@ fn a_rig_is_calibrated_from_pictures() {
     let at = folder.path();
     let family = Family::shipped("delTag25h7").unwrap();
     let spec = TargetSpec::Solid(SolidSpec::new(SolidShape::Icosahedron));
-    let target = Target::build("ico", &spec, Some(&family), None).unwrap();
+    let target = Target::build("ico", &spec, Some(&family)).unwrap();
     std::fs::write(at.join("ico.json"), target.to_json()).unwrap();
     let camera = Camera::centred(1200, 900, 1700.0, camera().lens);
     std::fs::write(at.join("true.yaml"), camera.to_yaml()).unwrap();
@@ -784,7 +784,7 @@ fn of_displaced_panel(target: &Target, count: usize, by_mm: DVec3) -> Vec<Detect
 fn a_displaced_panel_is_named_on_the_terminal_in_the_file_and_on_the_page() {
     let family = Family::shipped("delTag25h7").unwrap();
     let spec = TargetSpec::Solid(SolidSpec::new(SolidShape::Icosahedron));
-    let target = Target::build("board", &spec, Some(&family), None).unwrap();
+    let target = Target::build("board", &spec, Some(&family)).unwrap();
     let mut detections = of_displaced_panel(&target, 20, DVec3::new(0.0, 0.36, 0.48));
     detections[2].grids[0].corners[3].y = 1e5;
     let folder = folder(&target, &detections);
@@ -868,12 +868,12 @@ fn boards_of_a_list_without_poses_are_each_taken_by_itself() {
     let at = folder.path();
     let family = Family::shipped(&TagSpec::default().family).unwrap();
     let spec = BoardSpec { boards: 3, ..BoardSpec::new(GridKind::Deltille, 5, 6, 20.0) };
-    let sheets = Target::build("cube", &TargetSpec::Board(spec), Some(&family), None).unwrap();
+    let sheets = Target::build("cube", &TargetSpec::Board(spec), Some(&family)).unwrap();
     std::fs::write(at.join("cube.dsc"), dsc::write(&sheets, Dialect::Fork).unwrap()).unwrap();
     let read = || target_file::read(&at.join("cube.dsc"), &Limits::default());
 
     let loose = read().unwrap();
-    assert!(loose.is_loose() && loose.overlapping_boards() == Some([0, 1]));
+    assert!(loose.target.is_loose() && loose.target.overlapping_boards() == Some([0, 1]));
     let told = output(at, "calibrate none.json --target cube.dsc --model radtan");
     let told = String::from_utf8_lossy(&told.stderr).into_owned();
     assert!(told.contains("the poses of its 3 boards on the target are missing"), "{told}");
@@ -883,8 +883,8 @@ fn boards_of_a_list_without_poses_are_each_taken_by_itself() {
                  2\n0 0 1 -10\n0 1 0 3\n-1 0 0 618\n7\n1 0 0 0\n0 1 0 0\n0 0 1 0\n";
     std::fs::write(at.join("cube.tp"), poses).unwrap();
     let cube = read().unwrap();
-    assert!(!cube.is_loose());
-    let corner = cube.panels[1].corners[7];
+    assert!(!cube.target.is_loose());
+    let corner = cube.target.panels[1].corners[7];
     let [x, y] = corner.panel_mm.to_array();
     assert!(corner.target_mm.distance(DVec3::new(617.5, 4.0 + y, 12.0 + x)) < 1e-9);
 

@@ -25,13 +25,13 @@ const SIZE_PX: [u32; 2] = [1600, 1200];
 fn board() -> Target {
     let family = Family::shipped(&TagSpec::default().family).unwrap();
     let spec = BoardSpec::new(GridKind::Deltille, 8, 11, 20.0);
-    Target::build("board", &TargetSpec::Board(spec), Some(&family), None).unwrap()
+    Target::build("board", &TargetSpec::Board(spec), Some(&family)).unwrap()
 }
 
 fn icosahedron() -> Target {
     let family = Family::shipped("delTag25h7").unwrap();
     let spec = TargetSpec::Solid(SolidSpec::new(SolidShape::Icosahedron));
-    Target::build("ico", &spec, Some(&family), None).unwrap()
+    Target::build("ico", &spec, Some(&family)).unwrap()
 }
 
 fn camera(model: Model) -> Camera {

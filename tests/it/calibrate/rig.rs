@@ -49,7 +49,7 @@ fn simulated(seed: u64, frames: usize) -> Simulated {
     let mut random = ChaCha8Rng::seed_from_u64(seed);
     let spec = TargetSpec::Solid(SolidSpec::new(SolidShape::Icosahedron));
     let family = Family::shipped("delTag25h7").unwrap();
-    let target = Target::build("ico", &spec, Some(&family), None).unwrap();
+    let target = Target::build("ico", &spec, Some(&family)).unwrap();
     let stated: Vec<Pose> = target.panels.iter().map(|panel| panel.pose.to_pose()).collect();
     let panels: Vec<Pose> = stated
         .iter()

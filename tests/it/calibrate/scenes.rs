@@ -41,7 +41,7 @@ fn board(name: &str, first_id: u32) -> Target {
     let family = Family::shipped(&TagSpec::default().family).unwrap();
     let mut spec = BoardSpec::new(GridKind::Deltille, 8, 11, 20.0);
     spec.tags.as_mut().unwrap().first_id = first_id;
-    Target::build(name, &TargetSpec::Board(spec), Some(&family), None).unwrap()
+    Target::build(name, &TargetSpec::Board(spec), Some(&family)).unwrap()
 }
 
 fn any(random: &mut ChaCha8Rng, reach: f64) -> DVec3 {
@@ -251,7 +251,7 @@ fn icosahedron() -> Target {
     let family = Family::shipped(&TagSpec::default().family).unwrap();
     let spec =
         TargetSpec::Solid(SolidSpec { edge_mm: 200.0, ..SolidSpec::new(SolidShape::Icosahedron) });
-    Target::build("ico", &spec, Some(&family), None).unwrap()
+    Target::build("ico", &spec, Some(&family)).unwrap()
 }
 
 /// Cameras around an icosahedron that is carried about and turned between frames, little enough to be a motion.

@@ -6,7 +6,7 @@ use assert_cmd::Command;
 use assert_cmd::assert::Assert;
 use deltille::detect::ReasonKind;
 use deltille::export::detection;
-use deltille::targets::Target;
+use deltille::layout::Printing;
 
 /// A folder with a board as `board.json`, `board.dsc` and `sheet/board.png`.
 fn board() -> tempfile::TempDir {
@@ -19,9 +19,9 @@ fn board() -> tempfile::TempDir {
 }
 
 /// Where a corner of the target lies in the image of its sheet, px.
-fn image_of(target: &Target, corner: usize, dpi: f64) -> [f64; 2] {
+fn image_of(target: &Printing, corner: usize, dpi: f64) -> [f64; 2] {
     let (placement, sheet) = (&target.sheets[0].placements[0], &target.sheets[0]);
-    let place = placement.origin_mm + target.panels[0].corners[corner].panel_mm;
+    let place = placement.origin_mm + target.target.panels[0].corners[corner].panel_mm;
     [place.x / 25.4 * dpi - 0.5, (sheet.height_mm - place.y) / 25.4 * dpi - 0.5]
 }
 
@@ -38,9 +38,9 @@ fn a_rendered_sheet_is_found_with_every_label_in_every_format() {
         let json = std::fs::read_to_string(path("out/board.json")).unwrap();
         let found = detection::read(&json).unwrap();
         assert_eq!(detection::write(&found), json);
-        let target = Target::from_json(&std::fs::read_to_string(path("board.json")).unwrap());
+        let target = Printing::from_json(&std::fs::read_to_string(path("board.json")).unwrap());
         let target = target.unwrap();
-        let identity = target.identity();
+        let identity = target.target.identity();
         assert_eq!(found.targets, std::slice::from_ref(&identity));
         assert_eq!((found.grids.len(), found.grids[0].panel), (1, Some(0)));
         assert_eq!(found.grids[0].corners.len(), 42);
@@ -126,11 +126,11 @@ fn mirrored_boards_are_told_and_labelled_where_that_is_allowed() {
 
         let found = detected("--allow-mirrored");
         let target = folder.path().join(printed);
-        let target = Target::from_json(&std::fs::read_to_string(target).unwrap()).unwrap();
+        let target = Printing::from_json(&std::fs::read_to_string(target).unwrap()).unwrap();
         assert!(found.grids[0].mirrored && found.grids[0].corners.len() == 42, "{what}");
         assert_eq!(found.grids[0].panel.is_some(), what.contains("target"), "{what}");
         for (i, corner) in found.grids[0].corners.iter().enumerate() {
-            let on_print = &target.panels[0].corners[i];
+            let on_print = &target.target.panels[0].corners[i];
             assert_eq!((corner.row, corner.col), (on_print.row, on_print.col), "{what}");
             let [x, y] = image_of(&target, i, 200.0);
             let x = f64::from(found.width) - 1.0 - x;

@@ -9,9 +9,10 @@ use deltille::camera::Camera;
 use deltille::detect::{Detector, DetectorConfig};
 use deltille::family::Family;
 use deltille::lattice::GridKind;
+use deltille::layout::{PaperSpec, Printing};
 use deltille::raster::{Gray, gaussian};
 use deltille::synth::{Light, Scene, scene_of_sheet};
-use deltille::targets::{BoardSpec, PaperSpec, TagSpec, Target, TargetSpec};
+use deltille::targets::{BoardSpec, TagSpec, Target, TargetSpec};
 use glam::DVec3;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -39,11 +40,12 @@ fn board(family: &Family, first_id: u32, spacing: u32, cols: u32) -> Board {
     let bits_across = f64::from(family.dimension().rows()) + 3.0 * tags.border_bits;
     let plain = BoardSpec::new(GridKind::Deltille, 8, cols, EDGE_MM);
     let spec = TargetSpec::Board(BoardSpec { tags: Some(tags), ..plain });
-    let target = Target::build("board", &spec, Some(family), Some(&PaperSpec::default())).unwrap();
+    let target =
+        Printing::build("board", &spec, Some(family), Some(&PaperSpec::default())).unwrap();
     let sheets = artwork::draw(&target, Some(family)).unwrap().sheets;
     let scene = scene_of_sheet(&target, &sheets[0], 0);
-    let centre_mm = target.panels[0].middle_mm();
-    Board { target, scene, centre_mm, bit_mm: EDGE_MM / bits_across }
+    let centre_mm = target.target.panels[0].middle_mm();
+    Board { target: target.target, scene, centre_mm, bit_mm: EDGE_MM / bits_across }
 }
 
 /// A family of as many bits whose codes are coin tosses.

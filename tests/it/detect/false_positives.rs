@@ -7,8 +7,9 @@ use deltille::artwork::text;
 use deltille::detect::{Detector, DetectorConfig};
 use deltille::family::Family;
 use deltille::lattice::GridKind;
+use deltille::layout::{PaperSpec, Printing};
 use deltille::raster::{Coverage, Gray, gaussian};
-use deltille::targets::{BoardSpec, PaperSpec, TagSpec, Target, TargetSpec};
+use deltille::targets::{BoardSpec, TagSpec, TargetSpec};
 use glam::DVec2;
 use kurbo::{Affine, PathEl};
 use rand::{Rng, SeedableRng};
@@ -25,7 +26,8 @@ const ANGLES_DEG: [f64; 4] = [0.0, 15.0, 37.0, 45.0];
 static DETECTORS: LazyLock<Vec<(&str, Detector)>> = LazyLock::new(|| {
     let family = Family::shipped(&TagSpec::default().family).unwrap();
     let spec = TargetSpec::Board(BoardSpec::new(GridKind::Deltille, 10, 11, 20.0));
-    let target = Target::build("board", &spec, Some(&family), Some(&PaperSpec::default())).unwrap();
+    let target =
+        Printing::build("board", &spec, Some(&family), Some(&PaperSpec::default())).unwrap();
     let config = DetectorConfig::default();
     let grid = |kind, size| Detector::for_grid(kind, size, config.clone());
     vec![
@@ -33,7 +35,7 @@ static DETECTORS: LazyLock<Vec<(&str, Detector)>> = LazyLock::new(|| {
         ("deltille of 10 × 11", grid(GridKind::Deltille, Some((10, 11)))),
         ("checker", grid(GridKind::Checker, None)),
         ("checker of 8 × 11", grid(GridKind::Checker, Some((8, 11)))),
-        ("target", Detector::for_target(&target, Some(&family), config)),
+        ("target", Detector::for_target(&target.target, Some(&family), config)),
     ]
 });
 

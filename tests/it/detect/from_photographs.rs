@@ -7,8 +7,9 @@ use deltille::camera::{BrownConrady, Camera, KannalaBrandt, Lens};
 use deltille::detect::{Detector, DetectorConfig};
 use deltille::family::Family;
 use deltille::lattice::GridKind;
+use deltille::layout::{PaperSpec, Printing};
 use deltille::synth::{Light, scene_of_sheet};
-use deltille::targets::{BoardSpec, PaperSpec, TagSpec, Target, TargetSpec};
+use deltille::targets::{BoardSpec, TagSpec, TargetSpec};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 
@@ -19,10 +20,10 @@ fn lenses_that_bend_edges_are_found_within_their_deviations() {
     let family = Family::shipped(&TagSpec::default().family).unwrap();
     let spec = TargetSpec::Board(BoardSpec::new(GridKind::Deltille, 8, 9, 18.0));
     let paper = PaperSpec::default();
-    let target = Target::build("board", &spec, Some(&family), Some(&paper)).unwrap();
+    let target = Printing::build("board", &spec, Some(&family), Some(&paper)).unwrap();
     let sheets = artwork::draw(&target, Some(&family)).unwrap().sheets;
     let scene = scene_of_sheet(&target, &sheets[0], 0);
-    let detector = Detector::for_target(&target, Some(&family), DetectorConfig::default());
+    let detector = Detector::for_target(&target.target, Some(&family), DetectorConfig::default());
 
     let barrel = BrownConrady { radial: [-0.3, 0.1, 0.0], ..BrownConrady::default() };
     let fisheye = KannalaBrandt { k: vec![0.05, -0.01, 0.002, 0.0] };
@@ -34,15 +35,15 @@ fn lenses_that_bend_edges_are_found_within_their_deviations() {
         let mut rng = ChaCha8Rng::seed_from_u64(11);
         let seen = (0..14u32).map(|view| {
             let distance_mm = 0.3 * camera.focal_px.x + 8.0 * f64::from(view);
-            let centre_mm = target.panels[0].middle_mm();
+            let centre_mm = target.target.panels[0].middle_mm();
             let pose = tilted(&mut rng, centre_mm, distance_mm, 0.05 * f64::from(view));
             let light = Light::default().seed(view.into());
             let image = scene.render(&camera, &pose, &light).map(|v| (v * 255.0 + 0.5) as u8);
             (format!("{view:02}"), detector.detect(&image, "view.png"))
         });
         let seen: Vec<_> = seen.collect();
-        let shown = views(&seen, &Reference::Target(&target)).unwrap();
-        let panels = Reference::Target(&target).panels();
+        let shown = views(&seen, &Reference::Target(&target.target)).unwrap();
+        let panels = Reference::Target(&target.target).panels();
         let found = Calibration::new(panels).camera("", shown.views, model).solve().unwrap();
         assert!(found.rms_px < 0.006, "{model}: {} px", found.rms_px);
         assert!(found.frames.len() >= 13, "{model}: {} views", found.frames.len());

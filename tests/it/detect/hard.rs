@@ -9,9 +9,10 @@ use deltille::artwork;
 use deltille::camera::{Camera, Pose};
 use deltille::detect::{Detection, Detector, DetectorConfig};
 use deltille::family::Family;
+use deltille::layout::{PaperSpec, Printing};
 use deltille::raster::Gray;
 use deltille::synth::{Light, Scene, Surface, Truth, scene_of_sheet};
-use deltille::targets::{BoardSpec, PaperSpec, TagSpec, Target, TargetSpec};
+use deltille::targets::{BoardSpec, TagSpec, Target, TargetSpec};
 use glam::{DQuat, DVec2, DVec3};
 use image::ImageFormat;
 use rand::SeedableRng;
@@ -37,12 +38,13 @@ impl Board {
         let plain = BoardSpec::new(deltille::lattice::GridKind::Deltille, 6, 7, EDGE_MM);
         let spec = TargetSpec::Board(BoardSpec { inverted, ..plain });
         let target =
-            Target::build("board", &spec, Some(&family), Some(&PaperSpec::default())).unwrap();
+            Printing::build("board", &spec, Some(&family), Some(&PaperSpec::default())).unwrap();
         let sheets = artwork::draw(&target, Some(&family)).unwrap().sheets;
         let scene = scene_of_sheet(&target, &sheets[0], 0);
-        let centre_mm = target.panels[0].middle_mm();
-        let detector = Detector::for_target(&target, Some(&family), DetectorConfig::default());
-        Self { target, scene, centre_mm, detector, bit_mm: EDGE_MM / bits_across }
+        let centre_mm = target.target.panels[0].middle_mm();
+        let detector =
+            Detector::for_target(&target.target, Some(&family), DetectorConfig::default());
+        Self { target: target.target, scene, centre_mm, detector, bit_mm: EDGE_MM / bits_across }
     }
 
     /// Seen with `bit_px` pixels to a tag bit in the middle, before the tilt shortens it.

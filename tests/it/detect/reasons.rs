@@ -5,9 +5,10 @@ use deltille::camera::{Camera, Pose};
 use deltille::detect::{Detection, Detector, DetectorConfig, ReasonKind};
 use deltille::family::Family;
 use deltille::lattice::GridKind;
+use deltille::layout::{PaperSpec, Printing};
 use deltille::raster::Gray;
 use deltille::synth::{Light, Scene, scene_of_sheet};
-use deltille::targets::{BoardSpec, PaperSpec, TagSpec, Target, TargetSpec};
+use deltille::targets::{BoardSpec, TagSpec, TargetSpec};
 use glam::DVec3;
 
 struct Board {
@@ -21,11 +22,11 @@ fn board(grid: GridKind, change: impl Fn(&mut BoardSpec)) -> Board {
     change(&mut spec);
     let family = spec.tags.as_ref().map(|tags| Family::shipped(&tags.family).unwrap());
     let (spec, paper) = (TargetSpec::Board(spec), PaperSpec::default());
-    let target = Target::build("board", &spec, family.as_ref(), Some(&paper)).unwrap();
-    let detector = Detector::for_target(&target, family.as_ref(), DetectorConfig::default());
+    let target = Printing::build("board", &spec, family.as_ref(), Some(&paper)).unwrap();
+    let detector = Detector::for_target(&target.target, family.as_ref(), DetectorConfig::default());
     let sheets = artwork::draw(&target, family.as_ref()).unwrap().sheets;
     let scene = scene_of_sheet(&target, &sheets[0], 0);
-    Board { detector, scene, centre_mm: target.panels[0].middle_mm() }
+    Board { detector, scene, centre_mm: target.target.panels[0].middle_mm() }
 }
 
 impl Board {

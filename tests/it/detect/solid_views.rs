@@ -19,7 +19,7 @@ fn solid(shape: SolidShape, first_id: u32, board_id: u32) -> (Target, Family, Sc
     let tags = TagSpec { first_id, ..TagSpec::default() };
     let spec = SolidSpec { board_id, tags: Some(tags), ..SolidSpec::new(shape) };
     let family = Family::shipped("delTag25h7").unwrap();
-    let target = Target::build("solid", &TargetSpec::Solid(spec), Some(&family), None).unwrap();
+    let target = Target::build("solid", &TargetSpec::Solid(spec), Some(&family)).unwrap();
     let scene = scene_of_target(&target, Some(&family)).unwrap();
     (target, family, scene)
 }
@@ -379,7 +379,7 @@ fn inverted_faces_are_labelled_and_bare_ones_are_not() {
         spec.tags = spec.tags.filter(|_| tags);
         let family = spec.tags.as_ref().map(|tags| Family::shipped(&tags.family).unwrap());
         let spec = TargetSpec::Solid(spec);
-        let target = Target::build("o", &spec, family.as_ref(), None).unwrap();
+        let target = Target::build("o", &spec, family.as_ref()).unwrap();
         let scene = scene_of_target(&target, family.as_ref()).unwrap();
         let camera = Camera::pinhole(1200, 900, 1500.0);
         let eye = DVec3::new(260.0, 180.0, 330.0);

@@ -8,9 +8,10 @@ use deltille::camera::{Camera, KannalaBrandt, Lens, Pose};
 use deltille::detect::{Detection, Detector, DetectorConfig};
 use deltille::family::Family;
 use deltille::lattice::GridKind;
+use deltille::layout::{PaperSpec, Printing};
 use deltille::raster::Gray;
 use deltille::synth::{Light, Scene, Truth, scene_of_sheet};
-use deltille::targets::{BoardSpec, PaperSpec, TagSpec, Target, TargetSpec};
+use deltille::targets::{BoardSpec, TagSpec, Target, TargetSpec};
 use glam::{DVec2, DVec3};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
@@ -28,11 +29,11 @@ fn board(tags: Option<TagSpec>, inverted: bool) -> Board {
     let spec = BoardSpec { board_id: 4, tags, inverted, ..plain };
     let paper = PaperSpec::default();
     let target =
-        Target::build("board", &TargetSpec::Board(spec), family.as_ref(), Some(&paper)).unwrap();
+        Printing::build("board", &TargetSpec::Board(spec), family.as_ref(), Some(&paper)).unwrap();
     let sheets = artwork::draw(&target, family.as_ref()).unwrap().sheets;
     let scene = scene_of_sheet(&target, &sheets[0], 0);
-    let centre_mm = target.panels[0].middle_mm();
-    Board { target, family, scene, centre_mm }
+    let centre_mm = target.target.panels[0].middle_mm();
+    Board { target: target.target, family, scene, centre_mm }
 }
 
 impl Board {
@@ -144,7 +145,7 @@ fn what_a_coarser_level_shows_whole_is_where_the_finest_shows_it() {
     for kind in [GridKind::Deltille, GridKind::Checker] {
         let board = BoardSpec { tags: None, ..BoardSpec::new(kind, 8, 9, 18.0) };
         let spec = TargetSpec::Board(board);
-        let target = Target::build("board", &spec, None, Some(&PaperSpec::default())).unwrap();
+        let target = Printing::build("board", &spec, None, Some(&PaperSpec::default())).unwrap();
         let sheets = artwork::draw(&target, None).unwrap().sheets;
         let scene = scene_of_sheet(&target, &sheets[0], 0);
         let detector = |size| Detector::for_grid(kind, size, DetectorConfig::default());
@@ -152,7 +153,7 @@ fn what_a_coarser_level_shows_whole_is_where_the_finest_shows_it() {
         let mut rng = ChaCha8Rng::seed_from_u64(7);
         for view in 0..6u32 {
             let (distance_mm, tilt) = (300.0 + 120.0 * f64::from(view), 0.15 * f64::from(view));
-            let pose = tilted(&mut rng, target.panels[0].middle_mm(), distance_mm, tilt);
+            let pose = tilted(&mut rng, target.target.panels[0].middle_mm(), distance_mm, tilt);
             let light = Light::default().seed(view.into());
             let image = eight_bits(&scene.render(&camera, &pose, &light));
             let places = |found: Detection| -> Vec<DVec2> {

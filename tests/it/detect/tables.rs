@@ -21,7 +21,7 @@ use crate::common::command::deltille;
 fn board() -> Target {
     let family = Family::shipped(&TagSpec::default().family).unwrap();
     let spec = TargetSpec::Board(BoardSpec::new(GridKind::Deltille, 6, 7, 20.0));
-    Target::build("board", &spec, Some(&family), None).unwrap()
+    Target::build("board", &spec, Some(&family)).unwrap()
 }
 
 /// Views of a board from several sides, with everything that a detection may have.

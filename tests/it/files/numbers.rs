@@ -9,8 +9,9 @@ use deltille::export::calibration::{self, Print, Residuals};
 use deltille::export::{camera, detection, dsc, orpc};
 use deltille::family::Family;
 use deltille::lattice::GridKind;
+use deltille::layout::{PaperSpec, Printing};
 use deltille::targets::{
-    BoardSpec, ClosedMesh, PaperSpec, Polyhedron, SolidShape, SolidSpec, Target, TargetSpec,
+    BoardSpec, ClosedMesh, Polyhedron, SolidShape, SolidSpec, Target, TargetSpec,
 };
 use glam::DVec3;
 use rand::SeedableRng;
@@ -112,54 +113,54 @@ fn is_finite_json(text: &str, what: &str) {
     numbers(&serde_json::from_str(text).unwrap(), "", what);
 }
 
-fn board() -> Target {
+fn board() -> Printing {
     let spec = BoardSpec::new(GridKind::Deltille, 5, 4, 20.0);
     let family = Family::shipped("delTag25h7").unwrap();
     let paper = PaperSpec::default();
-    Target::build("board", &TargetSpec::Board(spec), Some(&family), Some(&paper)).unwrap()
+    Printing::build("board", &TargetSpec::Board(spec), Some(&family), Some(&paper)).unwrap()
 }
 
-fn solid() -> Target {
+fn solid() -> Printing {
     let spec = SolidSpec { tiles: 6, ..SolidSpec::new(SolidShape::Tetrahedron) };
     let family = Family::shipped("delTag25h7").unwrap();
-    Target::build("solid", &TargetSpec::Solid(spec), Some(&family), None).unwrap()
+    Target::build("solid", &TargetSpec::Solid(spec), Some(&family)).unwrap().into()
 }
 
 /// A solid that its triangles describe.
-fn mesh() -> Target {
+fn mesh() -> Printing {
     let octahedron = Polyhedron::octahedron(120.0);
     let (mesh, _) = ClosedMesh::new(&octahedron.vertices_mm, &octahedron.faces).unwrap();
     let spec = SolidSpec { tiles: 6, ..SolidSpec::new(SolidShape::Mesh(mesh)) };
     let family = Family::shipped("delTag25h7").unwrap();
-    Target::build("mesh", &TargetSpec::Solid(spec), Some(&family), None).unwrap()
+    Target::build("mesh", &TargetSpec::Solid(spec), Some(&family)).unwrap().into()
 }
 
 /// A solid whose sides are numbers.
-fn cuboid() -> Target {
+fn cuboid() -> Printing {
     let shape = SolidShape::Cuboid(DVec3::new(90.0, 70.0, 60.0));
     let spec = SolidSpec { tiles: 6, ..SolidSpec::new(shape) };
     let family = Family::shipped("aprilTag36h11").unwrap();
-    Target::build("cuboid", &TargetSpec::Solid(spec), Some(&family), None).unwrap()
+    Target::build("cuboid", &TargetSpec::Solid(spec), Some(&family)).unwrap().into()
 }
 
 /// The solid as it is measured: poses with their covariances.
-fn measured() -> Target {
+fn measured() -> Printing {
     let mut target = solid();
-    for panel in &mut target.panels {
+    for panel in &mut target.target.panels {
         let entry = |i: usize, j: usize| if i == j { 1e-4 } else { 1e-6 };
         panel.pose.covariance = Some(std::array::from_fn(|i| std::array::from_fn(|j| entry(i, j))));
     }
     target
 }
 
-fn pictures(target: &Target) -> Vec<(String, Detection)> {
+fn pictures(target: &Printing) -> Vec<(String, Detection)> {
     let camera = Camera::from_yaml(CAMERA).unwrap();
     let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(7);
-    let middle = target.panels[0].middle_mm();
+    let middle = target.target.panels[0].middle_mm();
     (0..5)
         .map(|index| {
             let pose = tilted(&mut rng, middle, 260.0, 0.5);
-            let panel = &target.panels[0];
+            let panel = &target.target.panels[0];
             let corner = |corner: &deltille::targets::Corner| {
                 let (x, y) = camera.project(pose.apply(corner.target_mm)).unwrap().into();
                 let (row, col, id) = (corner.row, corner.col, Some(corner.id));
@@ -187,11 +188,11 @@ const CAMERA: &str = "width: 1280\nheight: 960\nfocal_px: [1100.5, 1100]\ncentre
 fn targets() {
     for target in [board(), solid(), mesh(), cuboid(), measured()] {
         for (text, what) in changed(&target.to_json(), 150) {
-            match Target::from_json(&text) {
+            match Printing::from_json(&text) {
                 Err(error) => is_told(&error.to_string(), &what),
                 Ok(target) => {
                     is_finite_json(&target.to_json(), &what);
-                    if let Ok(text) = dsc::write(&target, dsc::Dialect::Fork) {
+                    if let Ok(text) = dsc::write(&target.target, dsc::Dialect::Fork) {
                         is_finite(&text, &what);
                     }
                 }
@@ -203,14 +204,15 @@ fn targets() {
 #[test]
 fn lists() {
     for target in [board(), solid()] {
-        let text = dsc::write(&target, dsc::Dialect::Fork).unwrap();
+        let text = dsc::write(&target.target, dsc::Dialect::Fork).unwrap();
         for (text, what) in changed(&text, 120) {
             match dsc::read(&text, "list") {
                 Err(error) => is_told(&error.to_string(), &what),
                 Ok(target) => {
                     is_finite_json(&target.to_json(), &what);
                     // What is read can be written and read again.
-                    Target::from_json(&target.to_json()).unwrap_or_else(|e| panic!("{what}: {e}"));
+                    Printing::from_json(&target.to_json())
+                        .unwrap_or_else(|e| panic!("{what}: {e}"));
                     is_finite(&dsc::write(&target, dsc::Dialect::Fork).unwrap(), &what);
                 }
             }
@@ -291,18 +293,18 @@ fn detections() {
             Ok(read) => read,
         };
         is_finite_json(&detection::write(&read), &what);
-        is_finite(&orpc::write(&read, Some(&target)), &what);
+        is_finite(&orpc::write(&read, Some(&target.target)), &what);
         read.grids.iter().for_each(|grid| assert!(grid.edge_px().is_none_or(f64::is_finite)));
         let mut all = pictures.clone();
         all[0].1 = read;
-        let shown = match views(&all, &Reference::Target(&target)) {
+        let shown = match views(&all, &Reference::Target(&target.target)) {
             Ok(shown) => shown,
             Err(error) => {
                 is_told(&error.to_string(), &what);
                 continue;
             }
         };
-        let panels = Reference::Target(&target).panels();
+        let panels = Reference::Target(&target.target).panels();
         let calibration = Calibration::new(panels).camera("", shown.views, Model::Radtan);
         match calibration.solve() {
             Err(error) => is_told(&error.to_string(), &what),

@@ -5,16 +5,17 @@ use deltille::detect::{Detection, Detector, DetectorConfig};
 use deltille::export::{detection, dsc, solid_mesh};
 use deltille::family::Family;
 use deltille::lattice::GridKind;
+use deltille::layout::{PaperSpec, Printing};
 use deltille::photograph;
 use deltille::raster::{Gray, ImageView};
-use deltille::targets::{BoardSpec, PaperSpec, SolidShape, SolidSpec, TagSpec, Target, TargetSpec};
+use deltille::targets::{BoardSpec, SolidShape, SolidSpec, TagSpec, Target, TargetSpec};
 use deltille::verify::Document;
 use proptest::prelude::*;
 
-fn board() -> (Target, Family) {
+fn board() -> (Printing, Family) {
     let family = Family::shipped(&TagSpec::default().family).unwrap();
     let spec = TargetSpec::Board(BoardSpec::new(GridKind::Deltille, 5, 6, 20.0));
-    let target = Target::build("board", &spec, Some(&family), Some(&PaperSpec::default()));
+    let target = Printing::build("board", &spec, Some(&family), Some(&PaperSpec::default()));
     (target.unwrap(), family)
 }
 
@@ -29,7 +30,7 @@ fn detectors() -> [Detector; 3] {
     let (target, family) = board();
     [
         Detector::for_grid(GridKind::Deltille, Some((5, 6)), DetectorConfig::default()),
-        Detector::for_target(&target, Some(&family), DetectorConfig::default()),
+        Detector::for_target(&target.target, Some(&family), DetectorConfig::default()),
         Detector::for_grid(GridKind::Checker, None, DetectorConfig::default()),
     ]
 }
@@ -65,12 +66,12 @@ fn a_hundred_megapixels_are_searched() {
 fn files() -> Vec<String> {
     let (target, family) = board();
     let octahedron = SolidSpec::new(SolidShape::Octahedron);
-    let solid = Target::build("o", &TargetSpec::Solid(octahedron), Some(&family), None).unwrap();
+    let solid = Target::build("o", &TargetSpec::Solid(octahedron), Some(&family)).unwrap();
     let image = Gray::from_fn(64, 48, |x, y| (x * y % 251) as u8);
     vec![
         target.to_json(),
         solid.to_json(),
-        dsc::write(&target, dsc::Dialect::Fork).unwrap(),
+        dsc::write(&target.target, dsc::Dialect::Fork).unwrap(),
         Family::shipped("d16h5").unwrap().to_json(),
         detection::write(&detectors()[0].detect(&image, "noise.png")),
         "width: 640\nheight: 480\nfocal_px: [500, 500]\ncentre_px: [320, 240]\nmodel: pinhole\n"
@@ -81,7 +82,7 @@ fn files() -> Vec<String> {
 /// Every reader of text on any text: none may panic. How many take it for theirs.
 fn read_all(text: &str) -> usize {
     let read = [
-        Target::from_json(text).is_ok(),
+        Printing::from_json(text).is_ok(),
         dsc::read(text, "x").is_ok(),
         Family::from_json(text).is_ok(),
         detection::read(text).is_ok(),

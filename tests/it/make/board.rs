@@ -6,7 +6,8 @@ use crate::common::folder::names;
 use crate::common::page::Page;
 use assert_cmd::Command;
 use deltille::export::dsc;
-use deltille::targets::{Target, TargetSpec};
+use deltille::layout::Printing;
+use deltille::targets::TargetSpec;
 use proptest::prelude::*;
 
 fn deltille(folder: &Path) -> Command {
@@ -15,8 +16,8 @@ fn deltille(folder: &Path) -> Command {
     command
 }
 
-fn read(path: &Path) -> Target {
-    Target::from_json(&std::fs::read_to_string(path).unwrap()).unwrap()
+fn read(path: &Path) -> Printing {
+    Printing::from_json(&std::fs::read_to_string(path).unwrap()).unwrap()
 }
 
 #[test]
@@ -25,8 +26,8 @@ fn rows_and_columns_are_enough() {
     deltille(folder.path()).args(["board", "--rows", "10", "--cols", "11"]).assert().success();
     assert_eq!(names(folder.path()), ["board.json", "board.pdf"]);
     let target = read(&folder.path().join("board.json"));
-    assert_eq!(target.panels[0].corners.len(), 110);
-    assert_eq!(target.panels[0].edge_mm, 20.0);
+    assert_eq!(target.target.panels[0].corners.len(), 110);
+    assert_eq!(target.target.panels[0].edge_mm, 20.0);
     assert_eq!((target.sheets[0].width_mm, target.sheets[0].height_mm), (297.0, 210.0));
 }
 
@@ -56,10 +57,11 @@ fn every_file_asked_for_is_written_under_its_name() {
     let expected = ["two-1.png", "two-1.svg", "two-2.png", "two-2.svg", "two.dsc", "two.json"];
     assert_eq!(names(&out), expected);
     let target = read(&out.join("two.json"));
-    let ids: Vec<u32> = target.panels.iter().flat_map(|p| &p.tags).map(|tag| tag.id).collect();
+    let ids: Vec<u32> =
+        target.target.panels.iter().flat_map(|p| &p.tags).map(|tag| tag.id).collect();
     assert_eq!(ids, (7..7 + ids.len() as u32).collect::<Vec<_>>());
     let listed = dsc::read(&std::fs::read_to_string(out.join("two.dsc")).unwrap(), "two").unwrap();
-    let panels = target.panels.iter().zip(&listed.panels);
+    let panels = target.target.panels.iter().zip(&listed.panels);
     panels.for_each(|(a, b)| assert_eq!((&a.corners, &a.tags), (&b.corners, &b.tags)));
 }
 
@@ -68,7 +70,7 @@ fn a_paper_alone_is_filled() {
     let folder = tempfile::tempdir().unwrap();
     let args = "board --rows 10 --cols 11 --paper a3";
     deltille(folder.path()).args(args.split(' ')).assert().success();
-    assert_eq!(read(&folder.path().join("board.json")).panels[0].edge_mm, 28.0);
+    assert_eq!(read(&folder.path().join("board.json")).target.panels[0].edge_mm, 28.0);
 }
 
 #[test]
@@ -83,7 +85,7 @@ fn a_saved_template_makes_the_same_board_and_options_win_over_it() {
     let other = "board --template t.toml --rows 4 --untagged --svg -o other";
     deltille(folder.path()).args(other.split(' ')).assert().success();
     assert_eq!(names(&folder.path().join("other")), ["board.json", "board.svg"]);
-    let TargetSpec::Board(spec) = read(&folder.path().join("other/board.json")).spec else {
+    let TargetSpec::Board(spec) = read(&folder.path().join("other/board.json")).target.spec else {
         panic!("a board")
     };
     assert_eq!((spec.rows, spec.cols, spec.tags), (4, 6, None));
@@ -96,21 +98,21 @@ fn dense_boards_have_a_place_code_in_every_tile_also_by_template_and_on_solids()
         "board --dense --rows 6 --cols 7 --board-id 254 --save-template t.toml --name d --png";
     deltille(folder.path()).args(args.split(' ')).assert().success();
     let first = read(&folder.path().join("d.json"));
-    assert_eq!(first.family.as_ref().unwrap().name, "dense9");
+    assert_eq!(first.target.family.as_ref().unwrap().name, "dense9");
     // Every upright tile between corners.
-    assert_eq!(first.panels[0].tags.len(), 5 * 6);
+    assert_eq!(first.target.panels[0].tags.len(), 5 * 6);
     let again = "board --template t.toml -o again";
     deltille(folder.path()).args(again.split(' ')).assert().success();
     assert_eq!(first, read(&folder.path().join("again/d.json")));
     let other = "board --template t.toml --family d25h7 -o other";
     deltille(folder.path()).args(other.split(' ')).assert().success();
-    let TargetSpec::Board(spec) = read(&folder.path().join("other/d.json")).spec else {
+    let TargetSpec::Board(spec) = read(&folder.path().join("other/d.json")).target.spec else {
         panic!("a board")
     };
     assert_eq!(spec.tags.map(|tags| (tags.family, tags.spacing)), Some(("d25h7".to_owned(), 3)));
     // Boards of other ids show other words.
-    let ids = |target: &Target| -> Vec<u32> {
-        target.panels.iter().flat_map(|panel| &panel.tags).map(|tag| tag.id).collect()
+    let ids = |target: &Printing| -> Vec<u32> {
+        target.target.panels.iter().flat_map(|panel| &panel.tags).map(|tag| tag.id).collect()
     };
     let solid = "octahedron --dense --tiles 6 --stl";
     deltille(folder.path()).args(solid.split(' ')).assert().success();
@@ -135,7 +137,7 @@ fn boards_that_are_packed_on_a_sheet_are_proved_each() {
         let told: serde_json::Value = serde_json::from_slice(&made.get_output().stdout).unwrap();
         assert_eq!(told["proof"]["passed"], true, "{args}");
         let target = read(&folder.path().join("packed.json"));
-        assert_eq!((target.panels.len(), target.sheets.len()), (boards, sheets), "{args}");
+        assert_eq!((target.target.panels.len(), target.sheets.len()), (boards, sheets), "{args}");
     }
 }
 
@@ -151,7 +153,7 @@ fn a_note_goes_with_every_board_that_is_cut_out() {
     assert_eq!(notes.len(), 6);
     assert!(texts().any(|text| text.text.to_string().starts_with("board · Lab-3 · ")));
     for placed in target.sheets.iter().flat_map(|sheet| &sheet.placements) {
-        let panel = target.panels.iter().find(|panel| panel.id == placed.panel).unwrap();
+        let panel = target.target.panels.iter().find(|panel| panel.id == placed.panel).unwrap();
         let [left, lower, ..] = panel.bounds_mm();
         let below = placed.page_from_panel(glam::DVec2::new(left, lower));
         let is_its = |at: glam::DVec2| {

@@ -17,7 +17,7 @@ fn board(rows: u32, cols: u32, edge_mm: f64, boards: u32) -> Target {
     let plain = BoardSpec::new(GridKind::Deltille, rows, cols, edge_mm);
     let spec = BoardSpec { boards, board_id: 5, ..plain };
     let family = Family::shipped("delTag25h7").unwrap();
-    Target::build("board", &TargetSpec::Board(spec), Some(&family), None).unwrap()
+    Target::build("board", &TargetSpec::Board(spec), Some(&family)).unwrap()
 }
 
 /// A triangular face with `side` corners along its base, in the plane turned by `pose`.

@@ -7,9 +7,10 @@ use deltille::artwork::{self, Artwork, Paint, Part, Shape};
 use deltille::export::{pdf, png, svg};
 use deltille::family::Family;
 use deltille::lattice::GridKind;
+use deltille::layout::{PaperSpec, Printing};
 use deltille::photograph;
 use deltille::raster::{AnyGray, Gray};
-use deltille::targets::{BoardSpec, PaperSpec, TagSpec, Target, TargetSpec};
+use deltille::targets::{BoardSpec, TagSpec, TargetSpec};
 use deltille::verify::Document;
 use kurbo::BezPath;
 use lopdf::Object;
@@ -20,7 +21,7 @@ fn tiny(inverted: bool) -> Artwork {
     let spec = BoardSpec { tags, inverted, ..BoardSpec::new(GridKind::Deltille, 2, 3, 20.0) };
     let family = Family::shipped("delTag25h7").unwrap();
     let paper = PaperSpec::default();
-    let target = Target::build("tiny", &TargetSpec::Board(spec), Some(&family), Some(&paper));
+    let target = Printing::build("tiny", &TargetSpec::Board(spec), Some(&family), Some(&paper));
     artwork::draw(&target.unwrap(), Some(&family)).unwrap()
 }
 

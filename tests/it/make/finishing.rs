@@ -4,7 +4,8 @@
 use crate::common::page::Page;
 use deltille::artwork::{CutDrawing, CutLayer, to_laser};
 use deltille::export::{dxf, laser_svg, pdf, svg};
-use deltille::targets::{BoardSpec, Finish, Target};
+use deltille::layout::{Finish, Printing};
+use deltille::targets::BoardSpec;
 use deltille::verify::{Artifact, verify};
 
 #[test]
@@ -48,19 +49,19 @@ fn boards_are_made_for_glass_print_shops_and_lasers() {
 }
 
 /// A board, finished.
-fn board(mirrored: bool, white: bool, contour: bool) -> Target {
+fn board(mirrored: bool, white: bool, contour: bool) -> Printing {
     let finish = Finish {
         mirrored,
         white: white.then(|| "White".to_owned()),
         contour: contour.then(|| "CutContour".to_owned()),
     };
-    let board = Target::new("desk", BoardSpec::deltille(3, 4, 20.0)).unwrap();
+    let board = Printing::new("desk", BoardSpec::deltille(3, 4, 20.0)).unwrap();
     board.finished(finish, 5.0).unwrap()
 }
 
 /// What is said of a file.
-fn said(target: &Target, name: &str, bytes: impl Into<Vec<u8>>) -> String {
-    let family = target.family().unwrap();
+fn said(target: &Printing, name: &str, bytes: impl Into<Vec<u8>>) -> String {
+    let family = target.target.family().unwrap();
     let file = [Artifact::new(name, bytes.into())];
     verify(target, family.as_ref(), name, &file).unwrap().to_string()
 }
@@ -68,7 +69,7 @@ fn said(target: &Target, name: &str, bytes: impl Into<Vec<u8>>) -> String {
 #[test]
 fn pages_are_turned_over_where_they_are_said_to_be_and_nowhere_else() {
     let [plain, pane] = [false, true].map(|mirrored| board(mirrored, false, false));
-    let page = |target: &Target| svg::to_string(&target.draw().unwrap(), 0);
+    let page = |target: &Printing| svg::to_string(&target.draw().unwrap(), 0);
     assert!(said(&pane, "desk.svg", page(&pane)).contains("verified, 12 corners"));
     let wrong = said(&pane, "desk.svg", page(&plain));
     assert!(wrong.contains("board 0 is not mirrored, as it should be"), "{wrong}");
@@ -79,7 +80,7 @@ fn pages_are_turned_over_where_they_are_said_to_be_and_nowhere_else() {
 #[test]
 fn spot_colours_are_those_of_the_description() {
     let stated = board(true, true, true);
-    let bytes = |target: &Target| pdf::to_bytes(&target.draw().unwrap());
+    let bytes = |target: &Printing| pdf::to_bytes(&target.draw().unwrap());
     assert!(said(&stated, "desk.pdf", bytes(&stated)).contains("verified, 12 corners"));
     let mut renamed = stated.clone();
     renamed.finish.white = Some("Varnish".to_owned());
@@ -127,11 +128,11 @@ fn with_content(bytes: &[u8], (from, to): (&str, &str)) -> Vec<u8> {
 #[test]
 fn what_a_laser_would_do_wrong_is_named() {
     let target = board(false, false, false);
-    let family = target.family().unwrap();
+    let family = target.target.family().unwrap();
     let good = to_laser(&target, family.as_ref(), 0.2).unwrap();
     let file = |drawing: &CutDrawing, name: &str| match name {
         "desk-laser.dxf" => dxf::text(drawing),
-        _ => laser_svg::text(drawing, "desk", &deltille::artwork::subject(&target)),
+        _ => laser_svg::text(drawing, "desk", &deltille::artwork::subject(&target.target)),
     };
     type Change = fn(&mut CutDrawing);
     let changes: [(Change, &str); 6] = [

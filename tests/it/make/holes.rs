@@ -5,7 +5,8 @@ use deltille::artwork::{CutLayer, CutPath, draw, to_laser};
 use deltille::export::svg;
 use deltille::family::Family;
 use deltille::lattice::Vertex;
-use deltille::targets::{BoardSpec, PaperSpec, TagSpec, Target, TargetSpec};
+use deltille::layout::{PaperSpec, Printing};
+use deltille::targets::{BoardSpec, TagSpec, TargetSpec};
 use deltille::verify::{Artifact, verify};
 
 use crate::common::command::deltille;
@@ -50,13 +51,13 @@ fn every_format_with_holes_is_proved() {
 }
 
 /// A board, its family, and the page.
-fn board(hole_mm: Option<f64>) -> (Target, Family) {
+fn board(hole_mm: Option<f64>) -> (Printing, Family) {
     let folder = tempfile::tempdir().unwrap();
     let family = holed(folder.path());
     let tags = TagSpec { family: "holed".to_owned(), hole_mm, ..TagSpec::default() };
     let spec = BoardSpec { tags: Some(tags), ..BoardSpec::deltille(4, 5, 30.0) };
     let spec = TargetSpec::Board(spec);
-    (Target::build("desk", &spec, Some(&family), Some(&PaperSpec::default())).unwrap(), family)
+    (Printing::build("desk", &spec, Some(&family), Some(&PaperSpec::default())).unwrap(), family)
 }
 
 #[test]
@@ -82,7 +83,7 @@ fn area(path: &CutPath) -> f64 {
 #[test]
 fn a_laser_cuts_the_holes_first() {
     let (target, family) = board(Some(1.5));
-    let panel = &target.panels[0];
+    let panel = &target.target.panels[0];
     let drawing = to_laser(&target, Some(&family), 0.1).unwrap();
     let cut: Vec<_> = drawing.paths.iter().filter(|path| path.layer == CutLayer::Cut).collect();
     let (plate, holes) = cut.split_last().unwrap();

@@ -6,7 +6,8 @@ use crate::common::page::Page;
 use deltille::export::inlay::{Body, InlaidBodies};
 use deltille::export::mesh::Meshing;
 use deltille::export::threemf;
-use deltille::targets::{BoardSpec, Target};
+use deltille::layout::Printing;
+use deltille::targets::BoardSpec;
 use deltille::verify::{Artifact, verify};
 use glam::DVec3;
 
@@ -97,9 +98,9 @@ fn boards_and_solids_are_two_bodies_to_print() {
 
 /// What is wrong with the bodies of a board, after they were changed.
 fn verdict_on(change: impl FnOnce(&mut InlaidBodies)) -> String {
-    let board = Target::new("desk", BoardSpec::deltille(3, 4, 20.0)).unwrap();
-    let family = board.family().unwrap();
-    let mut bodies = InlaidBodies::new(&board, family.as_ref(), Meshing::default()).unwrap();
+    let board = Printing::new("desk", BoardSpec::deltille(3, 4, 20.0)).unwrap();
+    let family = board.target.family().unwrap();
+    let mut bodies = InlaidBodies::new(&board.target, family.as_ref(), Meshing::default()).unwrap();
     change(&mut bodies);
     let file = [Artifact::new("desk.3mf", threemf::to_bytes(&bodies))];
     verify(&board, family.as_ref(), "desk.3mf", &file).unwrap().to_string()
@@ -141,9 +142,9 @@ fn bodies_that_were_changed_are_refused() {
 
 #[test]
 fn a_small_file_that_unpacks_to_a_large_one_is_not_unpacked() {
-    let board = Target::new("desk", BoardSpec::deltille(3, 4, 20.0)).unwrap();
-    let family = board.family().unwrap();
-    let bodies = InlaidBodies::new(&board, family.as_ref(), Meshing::default()).unwrap();
+    let board = Printing::new("desk", BoardSpec::deltille(3, 4, 20.0)).unwrap();
+    let family = board.target.family().unwrap();
+    let bodies = InlaidBodies::new(&board.target, family.as_ref(), Meshing::default()).unwrap();
     let mut file = threemf::to_bytes(&bodies);
     // The length of the model, in its entry of the directory and before it.
     let name = b"3D/3dmodel.model";

@@ -9,10 +9,8 @@ use crate::common::verdict::{assert_found, findings};
 use deltille::artwork::{self, Artwork, Part};
 use deltille::export::{pdf, png, sheet_file_name, svg};
 use deltille::family::Family;
-use deltille::targets::{
-    BoardSpec, Label, LineKind, PaperSpec, SheetText, SolidShape, SolidSheets, SolidSpec, Target,
-    TargetSpec,
-};
+use deltille::layout::{Label, LineKind, PaperSpec, Printing, SheetText, SolidSheets};
+use deltille::targets::{BoardSpec, SolidShape, SolidSpec, TargetSpec};
 use deltille::verify::{Finding, FoldFinding, Verdict, Verifier};
 use glam::DVec2;
 use kurbo::Affine;
@@ -23,33 +21,33 @@ fn family() -> Family {
 }
 
 /// A tetrahedron that is small enough for every test.
-fn net(paper: &PaperSpec) -> Target {
+fn net(paper: &PaperSpec) -> Printing {
     let spec = SolidSpec {
         edge_mm: 70.0,
         tiles: 7,
         margin_mm: 4.0,
         ..SolidSpec::new(SolidShape::Tetrahedron)
     };
-    Target::build("t", &TargetSpec::Solid(spec), Some(&family()), Some(paper)).unwrap()
+    Printing::build("t", &TargetSpec::Solid(spec), Some(&family()), Some(paper)).unwrap()
 }
 
 /// On four pages that are joined.
-fn tiled() -> Target {
+fn tiled() -> Printing {
     let size = Some("100x150mm".parse().unwrap());
     net(&PaperSpec { size, solids: SolidSheets::SeamedNet, ..PaperSpec::default() })
 }
 
 /// In pieces of whole faces.
-fn in_pieces() -> Target {
+fn in_pieces() -> Printing {
     net(&PaperSpec { size: Some("100x150mm".parse().unwrap()), ..PaperSpec::default() })
 }
 
-fn draw(target: &Target) -> Artwork {
+fn draw(target: &Printing) -> Artwork {
     artwork::draw(target, Some(&family())).unwrap()
 }
 
 /// Writes an artwork and compares it with a target.
-fn verify(target: &Target, artwork: &Artwork, extension: &str) -> Verdict {
+fn verify(target: &Printing, artwork: &Artwork, extension: &str) -> Verdict {
     let folder = tempfile::tempdir().unwrap();
     let count = artwork.sheets.len();
     let path = |index| folder.path().join(sheet_file_name("t", index, count, extension));
@@ -68,7 +66,7 @@ fn verify(target: &Target, artwork: &Artwork, extension: &str) -> Verdict {
 fn a_net_is_proved_in_every_format_on_one_page_and_on_several() {
     for (target, pages) in [(net(&PaperSpec::default()), 1), (tiled(), 4)] {
         assert_eq!(target.page_count(), pages);
-        assert_eq!(Target::from_json(&target.to_json()).unwrap(), target);
+        assert_eq!(Printing::from_json(&target.to_json()).unwrap(), target);
         for extension in ["pdf", "svg", "png"] {
             let verdict = verify(&target, &draw(&target), extension);
             assert!(verdict.passed, "{verdict}");
@@ -105,9 +103,9 @@ fn a_board_larger_than_the_paper_is_a_poster() {
     let size = Some("100x150mm".parse().unwrap());
     let paper = PaperSpec { size, poster: true, ..PaperSpec::default() };
     let spec = TargetSpec::Board(BoardSpec::deltille(5, 6, 25.0));
-    let target = Target::build("t", &spec, Some(&family()), Some(&paper)).unwrap();
+    let target = Printing::build("t", &spec, Some(&family()), Some(&paper)).unwrap();
     assert_eq!((target.sheets.len(), target.page_count()), (1, 4));
-    assert_eq!(Target::from_json(&target.to_json()).unwrap(), target);
+    assert_eq!(Printing::from_json(&target.to_json()).unwrap(), target);
     for extension in ["pdf", "svg", "png"] {
         let verdict = verify(&target, &draw(&target), extension);
         assert!(verdict.passed, "{verdict}");
@@ -123,7 +121,7 @@ fn a_board_larger_than_the_paper_is_a_poster() {
         let size = Some("A5".parse().unwrap());
         let paper = PaperSpec { size, poster: true, ..PaperSpec::default() };
         let spec = TargetSpec::Board(BoardSpec::deltille(10, 11, edge_mm));
-        let target = Target::build("t", &spec, Some(&family()), Some(&paper)).unwrap();
+        let target = Printing::build("t", &spec, Some(&family()), Some(&paper)).unwrap();
         let verdict = verify(&target, &draw(&target), "svg");
         assert!(verdict.passed, "{verdict}");
     }
@@ -133,21 +131,21 @@ fn a_board_larger_than_the_paper_is_a_poster() {
     assert!(!verify(&target, &swapped, "svg").passed);
     // Without it, the board is refused.
     let paper = PaperSpec { poster: false, ..paper };
-    let error = Target::build("t", &spec, Some(&family()), Some(&paper)).unwrap_err();
+    let error = Printing::build("t", &spec, Some(&family()), Some(&paper)).unwrap_err();
     assert!(error.to_string().contains("`PaperSpec::poster`"), "{error}");
 }
 
 /// The panel of another placement in the place of this one, as if the layout were wrong.
-fn swap(target: &mut Target, a: usize, b: usize) {
+fn swap(target: &mut Printing, a: usize, b: usize) {
     let placements = &mut target.sheets[0].placements;
     (placements[a].panel, placements[b].panel) = (placements[b].panel, placements[a].panel);
 }
 
 /// A placement turned about the middle of its face.
-fn turn(target: &mut Target, at: usize) {
-    let TargetSpec::Solid(spec) = &target.spec else { panic!("a solid") };
+fn turn(target: &mut Printing, at: usize) {
+    let TargetSpec::Solid(spec) = &target.target.spec else { panic!("a solid") };
     let placement = &mut target.sheets[0].placements[at];
-    let panel = target.panels.iter().position(|panel| panel.id == placement.panel).unwrap();
+    let panel = target.target.panels.iter().position(|panel| panel.id == placement.panel).unwrap();
     let outline = spec.faces().unwrap().swap_remove(panel).outline_mm;
     let sides = outline.len() as f64;
     let middle = outline.iter().sum::<DVec2>() / sides;
@@ -230,8 +228,8 @@ fn a_turned_square_does_not_fold_into_the_cube() {
     let spec = SolidSpec { edge_mm: 70.0, ..SolidSpec::new(SolidShape::Cube) };
     let family = Family::shipped("aprilTag36h11").unwrap();
     let paper = PaperSpec::default();
-    let cube = Target::build("t", &TargetSpec::Solid(spec), Some(&family), Some(&paper)).unwrap();
-    let verdict = |target: &Target| {
+    let cube = Printing::build("t", &TargetSpec::Solid(spec), Some(&family), Some(&paper)).unwrap();
+    let verdict = |target: &Printing| {
         let artwork = artwork::draw(target, Some(&family)).unwrap();
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("t.svg");
@@ -387,7 +385,7 @@ fn a_concave_mesh_prints_as_a_net_and_as_single_faces() {
     let sheet = &report["artifacts"][0]["sheets"][0];
     assert_eq!((&sheet["corners_found"], &sheet["fold"]["edges"]), (&360.into(), &36.into()));
     let json = std::fs::read_to_string(folder.path().join("icosahedron.json")).unwrap();
-    let target = Target::from_json(&json).unwrap();
+    let target = Printing::from_json(&json).unwrap();
     let count = |kind| {
         let lines = target.sheets.iter().flat_map(|sheet| &sheet.lines);
         lines.filter(|line| line.kind == kind).count()

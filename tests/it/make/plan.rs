@@ -10,8 +10,9 @@ use deltille::experiment::photographs::photograph::take;
 use deltille::experiment::photographs::scene::Scene;
 use deltille::family::Family;
 use deltille::lattice::GridKind;
+use deltille::layout::{PaperSpec, Printing};
 use deltille::synth::{Light, scene_of_target};
-use deltille::targets::{BoardSpec, PaperSpec, TagSpec, Target, TargetSpec};
+use deltille::targets::{BoardSpec, TagSpec, Target, TargetSpec};
 use glam::DVec3;
 
 #[test]
@@ -65,7 +66,7 @@ fn boards_are_labelled_as_far_as_is_said() {
         };
         let family = tags.as_ref().map(|(_, family)| *family);
         let board = situation.board(kind, tags, &PaperSpec::default()).unwrap().spec;
-        let target = Target::build("plan", &TargetSpec::Board(board), family, None).unwrap();
+        let target = Target::build("plan", &TargetSpec::Board(board), family).unwrap();
         let reach = Reach::of(&target, family);
         for tilt_deg in [0.0f64, 30.0, 45.0, 60.0] {
             let limit = reach.labelled_to_mm(situation.focal_px, tilt_deg.to_radians());
@@ -95,8 +96,8 @@ impl Windows {
     fn new(family: &Family) -> Self {
         let spec = BoardSpec { tags: Some(TagSpec::dense()), ..BoardSpec::deltille(12, 12, 20.0) };
         let (spec, paper) = (TargetSpec::Board(spec), PaperSpec::default());
-        let board = Target::build("board", &spec, Some(family), Some(&paper)).unwrap();
-        let detector = Detector::for_target(&board, Some(family), DetectorConfig::default());
+        let board = Printing::build("board", &spec, Some(family), Some(&paper)).unwrap();
+        let detector = Detector::for_target(&board.target, Some(family), DetectorConfig::default());
         Self {
             page: PrintedPage::new(&board, Some(family)).unwrap(),
             studio: Studio::new(1),

@@ -4,11 +4,11 @@ use std::path::Path;
 
 use crate::common::command::deltille;
 use crate::common::folder::names;
-use deltille::targets::Target;
+use deltille::layout::Printing;
 use glam::DVec3;
 
-fn read(path: &Path) -> Target {
-    Target::from_json(&std::fs::read_to_string(path).unwrap()).unwrap()
+fn read(path: &Path) -> Printing {
+    Printing::from_json(&std::fs::read_to_string(path).unwrap()).unwrap()
 }
 
 /// The pages are proved with the ids in their white tiles, and the proof sees when one of them is another.
@@ -50,7 +50,7 @@ fn two_sides_of_a_board_lie_behind_each_other() {
         "board --rows 6 --cols 7 --edge 25mm --two-sided 4mm --pdf --gltf --save-template t.toml";
     deltille(folder.path(), args).success();
     let target = read(&folder.path().join("board.json"));
-    let [front, back] = &target.panels[..] else { panic!("two panels") };
+    let [front, back] = &target.target.panels[..] else { panic!("two panels") };
     let [left, lower, right, upper] = front.field_mm();
     for (corner, other) in front.corners.iter().zip(&back.corners) {
         let DVec3 { x, y, .. } = corner.target_mm;
@@ -102,7 +102,7 @@ fn a_template_makes_a_solid_again_and_options_win_over_it() {
     assert_eq!(first, read(&folder.path().join("again/t.json")));
     deltille(folder.path(), "tetrahedron --template t.toml --dense --svg -o other").success();
     let other = read(&folder.path().join("other/t.json"));
-    assert_eq!(other.family.unwrap().name, "dense9");
+    assert_eq!(other.target.family.unwrap().name, "dense9");
     assert!(!names(&folder.path().join("other")).contains(&"t.pdf".to_owned()));
     let said = deltille(folder.path(), "octahedron --template t.toml").code(2);
     let said = String::from_utf8(said.get_output().stderr.clone()).unwrap();
@@ -134,7 +134,7 @@ fn every_kind_of_target_carries_a_logo() {
         deltille(folder.path(), &format!("{plain} -o plain --force --no-verify")).success();
         let name = format!("{}.json", args.split(' ').next().unwrap());
         let [with, without] = ["logo", "plain"].map(|at| read(&folder.path().join(at).join(&name)));
-        assert_eq!(with.panels, without.panels, "{args}");
+        assert_eq!(with.target.panels, without.target.panels, "{args}");
         for (with, without) in with.sheets.iter().zip(&without.sheets) {
             assert_eq!(with.placements, without.placements, "{args}");
             let pages = with.pages.iter().map(|page| &page.marks);

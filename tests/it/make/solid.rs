@@ -8,7 +8,8 @@ use crate::common::page::Page;
 use crate::common::solids::{cuboctahedron, rhombic_dodecahedron, truncated_tetrahedron};
 use deltille::export::dsc;
 use deltille::lattice::GridKind;
-use deltille::targets::{LineKind, Target, TargetSpec};
+use deltille::layout::{LineKind, Printing};
+use deltille::targets::{Target, TargetSpec};
 use glam::DVec2;
 
 #[test]
@@ -42,8 +43,8 @@ fn every_format_is_written_and_the_dsc_reads_back() {
     assert_eq!(names(&out), expected);
     let read = |name: &str| std::fs::read_to_string(out.join(name)).unwrap();
     let (target, listed) =
-        (Target::from_json(&read("t.json")).unwrap(), dsc::read(&read("t.dsc"), "t").unwrap());
-    for (a, b) in target.panels.iter().zip(&listed.panels) {
+        (Printing::from_json(&read("t.json")).unwrap(), dsc::read(&read("t.dsc"), "t").unwrap());
+    for (a, b) in target.target.panels.iter().zip(&listed.panels) {
         assert_eq!((&a.corners, &a.tags), (&b.corners, &b.tags));
         let turned = a.pose.rotation.iter().zip(&b.pose.rotation).map(|(a, b)| (a - b).abs());
         assert!(turned.fold(0.0, f64::max) < 1e-9);
@@ -152,10 +153,10 @@ fn any_closed_mesh_becomes_a_target() {
     page.is("solid-of-a-mesh");
     // The description is enough to make the target again.
     let target = std::fs::read_to_string(path.join("new/gyro.json")).unwrap();
-    let target = Target::from_json(&target).unwrap();
+    let target = Printing::from_json(&target).unwrap();
     let family = deltille::family::Family::shipped("delTag25h7").unwrap();
-    let again = Target::build("gyro", &target.spec, Some(&family), None).unwrap();
-    for (made, read) in again.panels.iter().zip(&target.panels) {
+    let again = Target::build("gyro", &target.target.spec, Some(&family)).unwrap();
+    for (made, read) in again.panels.iter().zip(&target.target.panels) {
         assert_eq!((made.id, &made.corners, &made.tags), (read.id, &read.corners, &read.tags));
     }
     assert_eq!(again.panels.len(), 16);
@@ -182,8 +183,8 @@ fn a_tetrahedron_with_each_face_cut_in_four_is_sixteen_faces() {
     std::fs::write(path.join("cut.obj"), text).unwrap();
     deltille(path, "solid --mesh cut.obj --gltf --obj --pdf --dxf --tiles 6 --name flat").success();
     let json = std::fs::read_to_string(path.join("flat.json")).unwrap();
-    let Target { panels, sheets, .. } = Target::from_json(&json).unwrap();
-    assert_eq!(panels.len(), 16);
+    let Printing { target, sheets, .. } = Printing::from_json(&json).unwrap();
+    assert_eq!(target.panels.len(), 16);
     // The faces of a quarter lie in one plane: its three inner edges are not folded.
     let lines = || sheets.iter().flat_map(|sheet| &sheet.lines);
     let count = |kind| lines().filter(|line| line.kind == kind).count();
@@ -346,8 +347,8 @@ fn meshes_of_other_faces_become_targets() {
     }
     // Of two families the tags of either kind have their own ids.
     let target = std::fs::read_to_string(path.join("cubocta.json")).unwrap();
-    let target = Target::from_json(&target).unwrap();
-    let kinds = |kind| target.panels.iter().filter(move |panel| panel.kind == kind);
+    let target = Printing::from_json(&target).unwrap();
+    let kinds = |kind| target.target.panels.iter().filter(move |panel| panel.kind == kind);
     for (kind, faces) in [(GridKind::Deltille, 8), (GridKind::Checker, 6)] {
         let ids: Vec<u32> = kinds(kind).flat_map(|panel| &panel.tags).map(|tag| tag.id).collect();
         assert!(kinds(kind).count() == faces && ids == (0..ids.len() as u32).collect::<Vec<_>>());
@@ -388,10 +389,12 @@ fn a_cuboid_is_made_photographed_and_found() {
     }
     page.is("cuboid");
     let target = std::fs::read_to_string(path.join("box.json")).unwrap();
-    let target = Target::from_json(&target).unwrap();
-    assert!(target.panels.iter().all(|panel| panel.edge_mm == target.panels[0].edge_mm));
+    let target = Printing::from_json(&target).unwrap();
+    assert!(
+        target.target.panels.iter().all(|panel| panel.edge_mm == target.target.panels[0].edge_mm)
+    );
     // Squares of 8.25 mm within margins of 7 mm: 17 along 146 mm, 12 along 106 mm, 8 along 66 mm.
-    let boards: Vec<_> = target.panels.iter().map(|panel| panel.matrix).collect();
+    let boards: Vec<_> = target.target.panels.iter().map(|panel| panel.matrix).collect();
     assert_eq!(boards, [[16, 7], [11, 7], [16, 7], [11, 7], [11, 16], [11, 16]]);
     std::fs::write(path.join("camera.yaml"), CAMERA).unwrap();
     deltille(path, "render box.json --camera camera.yaml --eye 260,-260,240").success();
@@ -404,7 +407,8 @@ fn wrong_marks_on_a_mesh_are_named() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path();
     deltille(path, "tetrahedron --edge 80mm --tiles 7 --face-margin 4mm --obj --name t").success();
-    let target = Target::from_json(&std::fs::read_to_string(path.join("t.json")).unwrap()).unwrap();
+    let target =
+        Printing::from_json(&std::fs::read_to_string(path.join("t.json")).unwrap()).unwrap();
     let written = std::fs::read(path.join("t-texture.png")).unwrap();
     let good = image::open(path.join("t-texture.png")).unwrap().into_luma8();
     let obj = std::fs::read_to_string(path.join("t.obj")).unwrap();
@@ -419,7 +423,7 @@ fn wrong_marks_on_a_mesh_are_named() {
     // Texels of the first face from millimetres of its panel: its lower edge is horizontal.
     let (w, h) = (f64::from(good.width()), f64::from(good.height()));
     let texels_per_mm = (uv[1][0] - uv[0][0]) * w / 80.0;
-    let panel = &target.panels[0];
+    let panel = &target.target.panels[0];
     let margin = 4.0;
     let left = -1.5 * panel.edge_mm - 3f64.sqrt() * margin;
     let lower = -0.75f64.sqrt() * panel.edge_mm - margin;
@@ -553,7 +557,7 @@ fn single_faces_are_cut_to_the_seats_of_the_skeleton() {
     let path = folder.path();
     deltille(path, "tetrahedron --skeleton --per-face --svg --dxf").success();
     let json = std::fs::read_to_string(path.join("tetrahedron.json")).unwrap();
-    let sheet = &Target::from_json(&json).unwrap().sheets[0];
+    let sheet = &Printing::from_json(&json).unwrap().sheets[0];
     // Two marks at each vertex; the lines through those along an edge make the outline.
     let cuts: Vec<_> = sheet.lines.iter().filter(|line| line.kind == LineKind::Cut).collect();
     let between = cuts[0].from_mm.distance(cuts[1].from_mm);
@@ -677,11 +681,13 @@ fn solids_are_untagged_and_inverted() {
         {
             deltille(path, &format!("{solid} {how} {formats} --name s --force")).success();
             let target = std::fs::read_to_string(path.join("s.json")).unwrap();
-            let target = Target::from_json(&target).unwrap();
-            let TargetSpec::Solid(spec) = &target.spec else { panic!("{solid} is a solid") };
+            let target = Printing::from_json(&target).unwrap();
+            let TargetSpec::Solid(spec) = &target.target.spec else { panic!("{solid} is a solid") };
             assert_eq!(spec.margin_mm, face_margin, "{solid} {how}");
-            assert_eq!(target.family.is_none(), how.contains("untagged"));
-            assert!(target.panels.iter().all(|panel| panel.inverted == how.contains("invert")));
+            assert_eq!(target.target.family.is_none(), how.contains("untagged"));
+            assert!(
+                target.target.panels.iter().all(|panel| panel.inverted == how.contains("invert"))
+            );
         }
     }
     // On panels of a skeleton the black lies whole, with the margin that is usual and with the least.

@@ -5,7 +5,8 @@ use crate::common::page::Page;
 use deltille::artwork;
 use deltille::export::svg;
 use deltille::family::Family;
-use deltille::targets::{PaperSpec, TagSheetSpec, Target, TargetSpec};
+use deltille::layout::{PaperSpec, Printing};
+use deltille::targets::{TagSheetSpec, TargetSpec};
 use deltille::verify::{Finding, MarkFinding, TileFinding, Verifier};
 
 #[test]
@@ -57,7 +58,7 @@ fn verdict(ids: &[u32], edit: impl Fn(&str) -> String) -> deltille::verify::Verd
         let (family_name, ids) = ("delTag25h7".to_owned(), ids.to_vec());
         let spec = TagSheetSpec { family: family_name, ids, edge_mm: 40.0, border_bits: 1.5 };
         let paper = PaperSpec { size: Some("A5".parse().unwrap()), ..PaperSpec::default() };
-        Target::build("tags", &TargetSpec::Tags(spec), Some(&family), Some(&paper)).unwrap()
+        Printing::build("tags", &TargetSpec::Tags(spec), Some(&family), Some(&paper)).unwrap()
     };
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("tags.svg");

@@ -8,7 +8,8 @@ use deltille::export::{pdf, png, svg};
 use deltille::family::Family;
 use deltille::glam::DVec2;
 use deltille::lattice::{GridKind, Vertex};
-use deltille::targets::{BoardSpec, Logo, PaperSpec, TagSpec, TagsIn, Target, TargetSpec};
+use deltille::layout::{Logo, PaperSpec, Printing};
+use deltille::targets::{BoardSpec, TagSpec, TagsIn, TargetSpec};
 use deltille::verify::{Finding, TileFinding, Verdict, Verifier};
 use kurbo::{Affine, BezPath, Point};
 use serde_json::json;
@@ -18,7 +19,7 @@ use tempfile::TempDir;
 const DPI: f64 = 300.0;
 
 struct Board {
-    target: Target,
+    target: Printing,
     family: Family,
 }
 
@@ -55,7 +56,7 @@ fn board_on(spec: BoardSpec, paper: &PaperSpec) -> Board {
     let family = spec.tags.as_ref().map_or("delTag25h7", |tags| &tags.family);
     let family = Family::shipped(family).unwrap();
     let spec = TargetSpec::Board(spec);
-    let target = Target::build("b", &spec, Some(&family), Some(paper)).unwrap();
+    let target = Printing::build("b", &spec, Some(&family), Some(paper)).unwrap();
     Board { target, family }
 }
 
@@ -86,7 +87,7 @@ impl Board {
 
     /// The first tag's tile.
     fn tag(&self, index: usize) -> (i32, i32) {
-        let tag = self.target.panels[0].tags[index];
+        let tag = self.target.target.panels[0].tags[index];
         (tag.row, tag.col)
     }
 }
@@ -99,7 +100,7 @@ fn tile(artwork: &mut Artwork, (row, col): (i32, i32)) -> &mut Shape {
 
 /// Exchanges black and white in one cell: with the even-odd rule a loop more toggles its inside.
 fn flip(board: &Board, artwork: &mut Artwork, at: (i32, i32), bit: u32) {
-    let (panel, placement) = (&board.target.panels[0], board.target.sheets[0].placements[0]);
+    let (panel, placement) = (&board.target.target.panels[0], board.target.sheets[0].placements[0]);
     assert_eq!(placement.angle_rad, 0.0);
     let [a, b, c] = panel.kind.tag_tile(Vertex::new(at.0, at.1)).frame().map(|v| {
         let place = placement.page_from_panel(panel.lattice_mm(v));
@@ -139,7 +140,7 @@ fn whole_sheets_pass_in_every_format() {
                 assert!(verdict.passed, "{spec:?}: {verdict}");
                 let sheet = &verdict.sheets[0];
                 assert_eq!((sheet.corners_found, sheet.corners), (35, 35));
-                assert_eq!(sheet.tags_exact, board.target.panels[0].tags.len());
+                assert_eq!(sheet.tags_exact, board.target.target.panels[0].tags.len());
                 assert!(sheet.max_deviation_mm < 0.006, "{spec:?}: {verdict}");
             }
         }
@@ -150,7 +151,7 @@ fn whole_sheets_pass_in_every_format() {
 fn swapped_tags_are_named() {
     for board in all_specs().map(board) {
         let mut swapped = board.target.clone();
-        let tags = &mut swapped.panels[0].tags;
+        let tags = &mut swapped.target.panels[0].tags;
         (tags[0].id, tags[1].id) = (tags[1].id, tags[0].id);
         let artwork = artwork::draw(&swapped, Some(&board.family)).unwrap();
         let (row, col) = board.tag(0);

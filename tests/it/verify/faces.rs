@@ -6,7 +6,8 @@ use deltille::artwork::subject;
 use deltille::export::artifacts::{Making, What, make};
 use deltille::family::Family;
 use deltille::lattice::GridKind;
-use deltille::targets::{BoardSpec, PaperSpec, SolidShape, SolidSpec, Target, TargetSpec};
+use deltille::layout::{PaperSpec, Printing};
+use deltille::targets::{BoardSpec, SolidShape, SolidSpec, TargetSpec};
 use deltille::verify::{Artifact, Verifier};
 use glam::DVec2;
 use image::{GrayImage, Luma};
@@ -23,7 +24,7 @@ fn with_pixels(paint: impl Fn(&mut GrayImage) + 'static) -> Damage {
 
 /// A mesh in all formats, in memory.
 struct Mesh {
-    target: Target,
+    target: Printing,
     family: Family,
     files: Vec<(String, Vec<u8>)>,
 }
@@ -32,7 +33,7 @@ impl Mesh {
     fn new(spec: TargetSpec, textures: u32) -> Self {
         let family = Family::shipped("delTag25h7").unwrap();
         let paper = PaperSpec::default();
-        let target = Target::build("m", &spec, Some(&family), Some(&paper)).unwrap();
+        let target = Printing::build("m", &spec, Some(&family), Some(&paper)).unwrap();
         let mut making = Making::default();
         making.mesh.textures = textures;
         // Of MuJoCo, which takes parts of it, too.
@@ -153,7 +154,7 @@ fn a_wrong_texel_at_any_edge_of_a_face_is_found() {
     ];
     for (spec, textures, depth) in cases {
         let mesh = Mesh::new(spec, textures);
-        let what = subject(&mesh.target);
+        let what = subject(&mesh.target.target);
         assert!(mesh.passes("m.obj", &mesh.files), "{what}");
         let edges = mesh.edges();
         assert!(edges.len() >= 4, "{what}: {}", edges.len());

@@ -7,8 +7,9 @@ use deltille::export::mesh::{Meshing, Resolution, TexturedMesh};
 use deltille::export::{dxf, gltf, obj, pdf, png, sheet_file_name, stl, svg};
 use deltille::family::Family;
 use deltille::lattice::GridKind;
+use deltille::layout::{PaperSpec, Printing};
 use deltille::limits::{Guard, Limits};
-use deltille::targets::{BoardSpec, PaperSpec, SolidShape, SolidSpec, Target, TargetSpec};
+use deltille::targets::{BoardSpec, SolidShape, SolidSpec, TargetSpec};
 use deltille::verify::{Artifact, Verdict, Verifier, VerifyError, verify};
 
 const DPI: f64 = 150.0;
@@ -17,11 +18,11 @@ fn family() -> Family {
     Family::shipped("delTag25h7").unwrap()
 }
 
-fn build(name: &str, spec: TargetSpec, paper: PaperSpec) -> Target {
-    Target::build(name, &spec, Some(&family()), Some(&paper)).unwrap()
+fn build(name: &str, spec: TargetSpec, paper: PaperSpec) -> Printing {
+    Printing::build(name, &spec, Some(&family()), Some(&paper)).unwrap()
 }
 
-fn board() -> Target {
+fn board() -> Printing {
     let spec = BoardSpec::new(GridKind::Deltille, 4, 5, 20.0);
     build("b", TargetSpec::Board(spec), PaperSpec::default())
 }
@@ -31,36 +32,36 @@ fn icosahedron() -> SolidSpec {
 }
 
 /// The pages of a target, one by one.
-fn pages(target: &Target) -> Vec<Artifact> {
+fn pages(target: &Printing) -> Vec<Artifact> {
     let artwork = artwork::draw(target, Some(&family())).unwrap();
     let count = artwork.sheets.len();
     let page = |index| {
-        let name = sheet_file_name(&target.name, index, count, "svg");
+        let name = sheet_file_name(&target.target.name, index, count, "svg");
         Artifact::new(name, svg::to_string(&artwork, index))
     };
     (0..count).map(page).collect()
 }
 
 /// What every target has.
-fn drawn(target: &Target) -> Vec<Artifact> {
+fn drawn(target: &Printing) -> Vec<Artifact> {
     let artwork = artwork::draw(target, Some(&family())).unwrap();
-    let named = |extension: &str| format!("{}.{extension}", target.name);
+    let named = |extension: &str| format!("{}.{extension}", target.target.name);
     let mut files = pages(target);
     files.push(Artifact::new(named("pdf"), pdf::to_bytes(&artwork)));
-    files.push(Artifact::new(named("dsc"), dsc::write(target, Dialect::Fork).unwrap()));
+    files.push(Artifact::new(named("dsc"), dsc::write(&target.target, Dialect::Fork).unwrap()));
     files
 }
 
 /// A board in its four formats.
-fn board_files(target: &Target) -> Vec<Artifact> {
+fn board_files(target: &Printing) -> Vec<Artifact> {
     let artwork = artwork::draw(target, Some(&family())).unwrap();
     let picture = png::to_bytes(&artwork.sheets[0], &artwork.title, DPI).unwrap();
     [drawn(target), vec![Artifact::new("b.png", picture)]].concat()
 }
 
 /// A solid in all its formats.
-fn solid_files(target: &Target, spec: &SolidSpec) -> Vec<Artifact> {
-    let mesh = TexturedMesh::new(target, Some(&family()), Meshing::default()).unwrap();
+fn solid_files(target: &Printing, spec: &SolidSpec) -> Vec<Artifact> {
+    let mesh = TexturedMesh::new(&target.target, Some(&family()), Meshing::default()).unwrap();
     let body = stl::to_bytes("i", &spec.polyhedron().triangles_mm());
     let cut = |drawing| dxf::text(&drawing);
     let more = [
@@ -69,7 +70,7 @@ fn solid_files(target: &Target, spec: &SolidSpec) -> Vec<Artifact> {
         Artifact::new("i.mtl", obj::material(&mesh)),
         Artifact::new(obj::texture_name("i", 0, 1), mesh.textures[0].png.as_slice()),
         Artifact::new("i.stl", body),
-        Artifact::new("i-panels.dxf", cut(artwork::panels_to_cut(target).unwrap())),
+        Artifact::new("i-panels.dxf", cut(artwork::panels_to_cut(&target.target).unwrap())),
         Artifact::new("i-net.dxf", cut(artwork::net_to_cut(target).unwrap())),
     ];
     [drawn(target), more.to_vec()].concat()
@@ -98,7 +99,7 @@ fn replace<'a>(from: &'a str, to: &'a str) -> impl Fn(&mut Vec<u8>) + 'a {
 }
 
 #[track_caller]
-fn compare(target: &Target, name: &str, files: &[Artifact]) -> Verdict {
+fn compare(target: &Printing, name: &str, files: &[Artifact]) -> Verdict {
     verify(target, Some(&family()), name, files).unwrap()
 }
 
@@ -209,7 +210,7 @@ fn labels_of_a_net_in_memory_are_compared_by_what_they_say() {
     let target = build("i", TargetSpec::Solid(icosahedron()), paper);
     let whole = pages(&target);
     let renumbered = target.to_json().replacen("\"text\": \"face 3\"", "\"text\": \"face 4\"", 1);
-    let renumbered = Target::from_json(&renumbered).unwrap();
+    let renumbered = Printing::from_json(&renumbered).unwrap();
     let name = whole[0].name();
     assert_told(&compare(&target, name, &pages(&renumbered)), "differs from the description");
     assert_told(&compare(&renumbered, name, &pages(&renumbered)), "instead of face 3");

@@ -6,7 +6,8 @@ use deltille::export::artifacts::{Making, What, make};
 use deltille::export::dsc::Dialect;
 use deltille::family::Family;
 use deltille::lattice::GridKind;
-use deltille::targets::{BoardSpec, PaperSpec, Target, TargetSpec};
+use deltille::layout::{PaperSpec, Printing};
+use deltille::targets::{BoardSpec, TargetSpec};
 use deltille::verify::{Artifact, Verifier};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -44,7 +45,7 @@ fn mutant(bytes: &[u8], random: &mut ChaCha8Rng) -> (String, Vec<u8>) {
 fn what_breaks_a_grammar_is_refused() {
     let family = Family::shipped("delTag25h7").unwrap();
     let spec = TargetSpec::Board(BoardSpec::new(GridKind::Deltille, 4, 5, 20.0));
-    let target = Target::build("g", &spec, Some(&family), Some(&PaperSpec::default())).unwrap();
+    let target = Printing::build("g", &spec, Some(&family), Some(&PaperSpec::default())).unwrap();
     let verifier = Verifier::new(&target, Some(&family)).unwrap();
     let formats = [
         What::Svg,

@@ -3,9 +3,9 @@
 use deltille_core::detect::Reach;
 use deltille_core::family::Family;
 use deltille_core::lattice::GridKind;
+use deltille_core::layout::{DEFAULT_MARGIN_MM, PaperSpec, Printing, SolidSheets, usual_edge_mm};
 use deltille_core::targets::{
-    BoardSpec, ClosedMesh, DEFAULT_MARGIN_MM, PaperSpec, SkeletonSpec, SolidShape, SolidSheets,
-    SolidSpec, TagSpec, TagsIn, Target, TargetSpec, usual_edge_mm,
+    BoardSpec, ClosedMesh, SkeletonSpec, SolidShape, SolidSpec, TagSpec, TagsIn, TargetSpec,
 };
 use deltille_files::export::artifacts::{Making, What, make};
 use deltille_files::export::obj;
@@ -184,7 +184,7 @@ pub fn family_of_settings(settings: &str) -> Result<Option<String>, JsError> {
 /// A target that was made, with the family of its tags.
 #[wasm_bindgen]
 pub struct Made {
-    target: Target,
+    printing: Printing,
     family: Option<Family>,
 }
 
@@ -200,18 +200,19 @@ impl Made {
         let (spec, paper) = (wanted.spec()?, wanted.paper()?);
         let family = family.map(|file| Family::from_json(&file)).transpose().raise()?;
         let family = family.filter(|_| spec.family().is_some());
-        let target = Target::build(&wanted.name, &spec, family.as_ref(), Some(&paper)).raise()?;
-        Ok(Self { target, family })
+        let printing =
+            Printing::build(&wanted.name, &spec, family.as_ref(), Some(&paper)).raise()?;
+        Ok(Self { printing, family })
     }
 
     /// The description.
     pub fn json(&self) -> String {
-        self.target.to_json()
+        self.printing.to_json()
     }
 
     /// What it offers and from where a camera can use it, as JSON.
     pub fn reach(&self) -> String {
-        let reach = Reach::of(&self.target, self.family.as_ref());
+        let reach = Reach::of(&self.printing.target, self.family.as_ref());
         serde_json::to_string(&reach).unwrap_or_default()
     }
 
@@ -219,13 +220,13 @@ impl Made {
     /// width of its pictures, px, can use it; nothing where there are none.
     pub fn distances_mm(&self, field_of_view_deg: f64, width_px: f64) -> Option<Vec<f64>> {
         let focal_px = width_px / 2.0 / (field_of_view_deg.to_radians() / 2.0).tan();
-        let reach = Reach::of(&self.target, self.family.as_ref());
+        let reach = Reach::of(&self.printing.target, self.family.as_ref());
         Some(reach.distances_mm(focal_px, width_px)?.to_vec())
     }
 
     /// How the faces of a solid hang together in its net, as JSON; an empty list where there is no net.
     pub fn hinges(&self) -> String {
-        serde_json::to_string(&self.target.hinges()).unwrap_or_default()
+        serde_json::to_string(&self.printing.hinges()).unwrap_or_default()
     }
 
     /// Names and bytes of the files of a format, one after the other.
@@ -236,7 +237,7 @@ impl Made {
         let what: What = format.parse().raise()?;
         let mut making = Making::default();
         making.dpi = dpi;
-        let made = make(&self.target, self.family.as_ref(), what, making).raise()?;
+        let made = make(&self.printing, self.family.as_ref(), what, making).raise()?;
         let files = Array::new();
         for (name, bytes) in made {
             files.push(&JsValue::from_str(&name));

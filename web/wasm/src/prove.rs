@@ -1,7 +1,7 @@
 //! Files read back and compared with their target.
 
 use deltille_core::family::Family;
-use deltille_core::targets::Target;
+use deltille_core::layout::Printing;
 use deltille_verify::{Artifact, Verifier};
 use js_sys::Uint8Array;
 use wasm_bindgen::prelude::*;
@@ -20,9 +20,9 @@ pub fn prove(
     names: Vec<String>,
     contents: Vec<Uint8Array>,
 ) -> Result<String, JsError> {
-    let target = Target::from_json(target).raise()?;
+    let printing = Printing::from_json(target).raise()?;
     let family = family.map(|file| Family::from_json(&file)).transpose().raise()?;
-    let verifier = Verifier::new(&target, family.as_ref()).raise()?;
+    let verifier = Verifier::new(&printing, family.as_ref()).raise()?;
     let files = names.iter().zip(&contents);
     let artifacts: Vec<_> =
         files.map(|(name, bytes)| Artifact::new(name.clone(), bytes.to_vec())).collect();

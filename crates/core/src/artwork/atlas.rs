@@ -7,7 +7,8 @@ use glam::DVec2;
 use super::board::draw_panel;
 use super::{ArtworkError, Sheet};
 use crate::family::Family;
-use crate::targets::{Face, Panel, Placement, Target};
+use crate::layout::Placement;
+use crate::targets::{Face, Panel, Target};
 
 /// White between two faces, px: more than the filters of the first mipmap levels reach.
 const PADDING_PX: f64 = 16.0;

@@ -8,21 +8,19 @@ use kurbo::{Affine, BezPath, Circle, Point, Rect, Shape as _};
 use super::{ArtworkError, Paint, Part, Shape, Sheet, cells, check_bar, strokes_mm, text, window};
 use crate::family::Family;
 use crate::lattice::{TagCells, Tile};
-use crate::targets::{
-    Logo, Panel, Placement, SheetLayout, SheetLine, SheetPage, SheetText, TagPlacement, TagsIn,
-    Target,
-};
+use crate::layout::{Logo, Placement, Printing, SheetLayout, SheetLine, SheetPage, SheetText};
+use crate::targets::{Panel, TagPlacement, TagsIn, Target};
 
 /// How far the curves of a disc may be from a circle, mm.
 const DISC_TOLERANCE_MM: f64 = 1e-4;
 
 /// Draws sheet `index` of a target, in the frame of the whole sheet, mm.
 pub(super) fn sheet(
-    target: &Target,
+    printing: &Printing,
     family: Option<&Family>,
     index: usize,
 ) -> Result<Sheet, ArtworkError> {
-    let layout = &target.sheets[index];
+    let (target, layout) = (&printing.target, &printing.sheets[index]);
     let mut shapes = Vec::new();
     for placement in &layout.placements {
         let panel = target.panels.iter().find(|panel| panel.id == placement.panel);
@@ -30,14 +28,14 @@ pub(super) fn sheet(
             panel.ok_or(ArtworkError::NoSuchPanel { sheet: index + 1, panel: placement.panel })?;
         shapes.extend(draw_panel(target, panel, placement, family)?);
     }
-    shapes.extend(marks(layout, target.logo.as_ref())?);
+    shapes.extend(marks(layout, printing.logo.as_ref())?);
     Ok(Sheet { width_mm: layout.width_mm, height_mm: layout.height_mm, shapes })
 }
 
 /// Draws a page that shows a part of a sheet, in the frame of the page, mm.
 pub(super) fn page(
     sheet: &Sheet,
-    target: &Target,
+    printing: &Printing,
     layout: &SheetLayout,
     page: &SheetPage,
 ) -> Result<Sheet, ArtworkError> {
@@ -51,7 +49,7 @@ pub(super) fn page(
     // Lines, texts and logos of the page itself are numbered on from those of the sheet.
     let (lines, texts) = (layout.lines.len(), layout.texts.len());
     let logos = layout.logos.len();
-    shapes.extend(marks(&page.marks, target.logo.as_ref())?.into_iter().map(|shape| {
+    shapes.extend(marks(&page.marks, printing.logo.as_ref())?.into_iter().map(|shape| {
         let part = match shape.part {
             Part::Line { kind, index } => Part::Line { kind, index: index + lines },
             Part::Label { index } => Part::Label { index: index + texts },

@@ -6,10 +6,10 @@ use glam::DVec2;
 
 use super::atlas::Packing;
 use super::text::MissingGlyph;
-use crate::targets::{
-    Label, LineKind, Placement, SheetLayout, Target, TargetError, TargetSpec, edge_numbers,
-    edge_text, upright_number,
+use crate::layout::{
+    Label, LineKind, Placement, Printing, SheetLayout, edge_numbers, edge_text, upright_number,
 };
+use crate::targets::{Target, TargetError, TargetSpec};
 
 /// Blank between panels, mm: more than the width of any cut.
 pub(super) const GAP_MM: f64 = 4.0;
@@ -141,12 +141,12 @@ pub fn panels_to_cut(target: &Target) -> Result<CutDrawing, CuttingError> {
 ///
 /// # Errors
 /// When the target was not laid out as a net of closed outlines.
-pub fn net_to_cut(target: &Target) -> Result<CutDrawing, CuttingError> {
-    let no_net = || CuttingError::NotNet(target.name.to_string());
+pub fn net_to_cut(printing: &Printing) -> Result<CutDrawing, CuttingError> {
+    let no_net = || CuttingError::NotNet(printing.target.name.to_string());
     let mut drawing = CutDrawing::default();
     let mut right_mm = 0.0;
     // The guide has no piece of it.
-    for sheet in target.sheets.iter().filter(|sheet| !sheet.placements.is_empty()) {
+    for sheet in printing.sheets.iter().filter(|sheet| !sheet.placements.is_empty()) {
         let mut piece = CutDrawing::default();
         for points_mm in outlines(sheet).ok_or_else(no_net)? {
             piece.paths.push(CutPath { layer: CutLayer::Cut, closed: true, points_mm });
@@ -215,18 +215,14 @@ fn outlines(sheet: &SheetLayout) -> Option<Vec<Vec<DVec2>>> {
 }
 
 /// The number of a face, centred on its incircle.
-fn face_number(
-    placement: &Placement,
-    outline: &[DVec2],
-    index: usize,
-) -> crate::targets::SheetText {
+fn face_number(placement: &Placement, outline: &[DVec2], index: usize) -> crate::layout::SheetText {
     let corners: Vec<_> = outline.iter().map(|corner| corner.extend(0.0)).collect();
     let circle = crate::targets::Incircle::of(&corners);
     let text = upright_number(index);
     let cap = (FACE_CAP.0 * circle.radius).min(FACE_CAP.1);
     let width = text.len() as f64 * ADVANCE_CAPS * cap;
     let at = circle.centre.truncate() - DVec2::new(width, cap) / 2.0;
-    crate::targets::SheetText {
+    crate::layout::SheetText {
         text: Label::Words(text),
         at_mm: placement.page_from_panel(at),
         angle_rad: placement.angle_rad,

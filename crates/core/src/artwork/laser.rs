@@ -22,8 +22,9 @@ use super::cutting::{CutDrawing, CutLayer, CutPath, CuttingError, GAP_MM};
 use super::{ArtworkError, board, cells};
 use crate::family::Family;
 use crate::lattice::{GridKind, Tile, Vertex};
+use crate::layout::{Placement, Printing};
 use crate::polygon::rectangle;
-use crate::targets::{Face, Panel, Placement, TagPlacement, TagsIn, Target, TargetSpec};
+use crate::targets::{Face, Panel, TagPlacement, TagsIn, Target, TargetSpec};
 
 /// Widest kerf, mm: less than the gap between two plates.
 const WIDEST_KERF_MM: f64 = 3.0;
@@ -82,13 +83,14 @@ impl LaserBoard<'_> {
 ///
 /// # Errors
 /// When the target is neither made of boards nor a solid.
-pub fn laser_boards(target: &Target) -> Result<Vec<LaserBoard<'_>>, CuttingError> {
+pub fn laser_boards(printing: &Printing) -> Result<Vec<LaserBoard<'_>>, CuttingError> {
+    let target = &printing.target;
     let mut boards = match &target.spec {
         TargetSpec::Tags(_) => return Err(CuttingError::NotBoard(target.name.to_string())),
         TargetSpec::Solid(spec) => faces_in_rows(target, &spec.panel_faces()?),
         _ => plates_in_rows(target),
     };
-    if target.finish.mirrored {
+    if printing.finish.mirrored {
         let seen = boards.iter().flat_map(|board| {
             board.plate_mm.iter().map(|&corner| board.placement.page_from_panel(corner).x)
         });
@@ -135,11 +137,12 @@ fn faces_in_rows<'a>(target: &'a Target, faces: &[Face]) -> Vec<LaserBoard<'a>> 
 /// # Errors
 /// When the target is neither made of boards nor a solid, its family is missing or lacks a code, or the beam is too wide.
 pub fn to_laser(
-    target: &Target,
+    printing: &Printing,
     family: Option<&Family>,
     kerf_mm: f64,
 ) -> Result<CutDrawing, CuttingError> {
-    let boards = laser_boards(target)?;
+    let boards = laser_boards(printing)?;
+    let target = &printing.target;
     let finest = target.panels.iter().map(|panel| finest_mm(panel, family));
     let most_mm = (KERF_PART * finest.fold(f64::INFINITY, f64::min)).min(WIDEST_KERF_MM);
     if !(0.0..=most_mm).contains(&kerf_mm) {
@@ -350,14 +353,15 @@ mod tests {
                 tags.first_id = first_id;
                 tags.spacing = 2;
             }
-            let target = Target::new("board", spec).unwrap();
+            let printing = Printing::new("board", spec).unwrap();
+            let target = &printing.target;
             let family = target.family().unwrap();
             let family = family.as_ref();
-            let exact = to_laser(&target, family, 0.0).unwrap();
-            let black = drawn(&target, family);
+            let exact = to_laser(&printing, family, 0.0).unwrap();
+            let black = drawn(target, family);
             prop_assert!((area(&exact, CutLayer::Engrave) / black - 1.0).abs() < 1e-9);
             let kerf = 0.1;
-            let narrow = to_laser(&target, family, kerf).unwrap();
+            let narrow = to_laser(&printing, family, kerf).unwrap();
             let back = |path: &CutPath| match path.layer {
                 CutLayer::Engrave => moved_inwards(&path.points_mm, -kerf / 2.0),
                 _ => moved_inwards(&path.points_mm, kerf / 2.0),

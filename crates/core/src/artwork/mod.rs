@@ -7,7 +7,7 @@
 //! No two shapes overlap: a black tile is one path whose holes are the merged white cells of its
 //! tag, and white is bare paper. Two tiles share only a vertex, so that no renderer shows a seam.
 //!
-//! Frame: the page frame of [`SheetLayout`](crate::targets::SheetLayout), origin at the lower-left
+//! Frame: the page frame of [`SheetLayout`](crate::layout::SheetLayout), origin at the lower-left
 //! corner of the page, x right, y up.
 
 mod atlas;
@@ -26,7 +26,8 @@ use kurbo::{Affine, BezPath};
 
 use crate::family::Family;
 use crate::lattice::GridKind;
-use crate::targets::{Finish, LineKind, Panel, Placement, SheetText, Target};
+use crate::layout::{Finish, LineKind, Placement, Printing, SheetText};
+use crate::targets::{Panel, Target};
 use crate::words::counted;
 
 pub use atlas::Atlas;
@@ -113,14 +114,14 @@ pub enum Part {
     },
     /// A check bar of the sheet, by index.
     CheckBar {
-        /// Position in [`SheetLayout::check_bars`](crate::targets::SheetLayout::check_bars).
+        /// Position in [`SheetLayout::check_bars`](crate::layout::SheetLayout::check_bars).
         index: usize,
     },
     /// A line to cut or to fold along, by index.
     Line {
         /// Its purpose.
         kind: LineKind,
-        /// Position in [`SheetLayout::lines`](crate::targets::SheetLayout::lines), lines of a page
+        /// Position in [`SheetLayout::lines`](crate::layout::SheetLayout::lines), lines of a page
         /// after those of its sheet.
         index: usize,
     },
@@ -173,7 +174,7 @@ pub enum ArtworkError {
     UnknownFamily(String),
 }
 
-impl Target {
+impl Printing {
     /// Draws every page of a target whose family, if any, is shipped with the library.
     ///
     /// # Errors
@@ -181,14 +182,16 @@ impl Target {
     /// lacks a character of a text.
     ///
     /// ```
-    /// use deltille_core::targets::{BoardSpec, Target};
+    /// use deltille_core::layout::Printing;
+    /// use deltille_core::targets::BoardSpec;
     ///
-    /// let artwork = Target::new("desk", BoardSpec::deltille(4, 5, 20.0))?.draw()?;
+    /// let artwork = Printing::new("desk", BoardSpec::deltille(4, 5, 20.0))?.draw()?;
     /// assert_eq!(artwork.sheets.len(), 1);
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
     pub fn draw(&self) -> Result<Artwork, ArtworkError> {
-        let family = self.family().map_err(|e| ArtworkError::UnknownFamily(e.to_string()))?;
+        let family =
+            self.target.family().map_err(|e| ArtworkError::UnknownFamily(e.to_string()))?;
         draw(self, family.as_ref())
     }
 }
@@ -200,23 +203,23 @@ impl Target {
 /// # Errors
 /// When the family is missing or lacks a code, a sheet shows an unknown panel, or the font lacks a
 /// character of a text.
-pub fn draw(target: &Target, family: Option<&Family>) -> Result<Artwork, ArtworkError> {
-    let mut sheets = Vec::with_capacity(target.page_count());
-    for (index, layout) in target.sheets.iter().enumerate() {
-        let sheet = board::sheet(target, family, index)?;
+pub fn draw(printing: &Printing, family: Option<&Family>) -> Result<Artwork, ArtworkError> {
+    let mut sheets = Vec::with_capacity(printing.page_count());
+    for (index, layout) in printing.sheets.iter().enumerate() {
+        let sheet = board::sheet(printing, family, index)?;
         if layout.pages.is_empty() {
             sheets.push(sheet);
             continue;
         }
         for page in &layout.pages {
-            sheets.push(board::page(&sheet, target, layout, page)?);
+            sheets.push(board::page(&sheet, printing, layout, page)?);
         }
     }
-    if target.finish.mirrored {
+    if printing.finish.mirrored {
         sheets.iter_mut().for_each(Sheet::mirror);
     }
-    let (title, subject) = (target.name.to_string(), subject(target));
-    Ok(Artwork { title, subject, sheets, finish: target.finish.clone() })
+    let (title, subject) = (printing.target.name.to_string(), subject(&printing.target));
+    Ok(Artwork { title, subject, sheets, finish: printing.finish.clone() })
 }
 
 /// Draws the tiles of one panel in the frame of the panel, mm.

@@ -31,7 +31,7 @@ impl UntaggedGrid {
         let [rows, cols] = self.size?;
         let plain = BoardSpec::new(self.kind, rows, cols, self.edge_mm);
         let spec = BoardSpec { tags: None, ..plain };
-        Some(Target::build(name, &TargetSpec::Board(spec), None, None))
+        Some(Target::build(name, &TargetSpec::Board(spec), None))
     }
 
     /// Where a corner is, mm.

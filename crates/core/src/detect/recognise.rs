@@ -18,10 +18,11 @@ use crate::detect::labels::evidence::panel_from_grid;
 use crate::detect::labels::tags::{Read, TagPlace, TagReader};
 use crate::family::{Decoder, Family};
 use crate::lattice::{GridKind, LatticeMap, Tile, Vertex};
+use crate::layout::{PaperSpec, usual_edge_mm};
 use crate::raster::{ImageView, Pyramid};
 use crate::targets::{
-    BoardSpec, PaperSpec, SolidShape, SolidSpec, TagSpec, TagsIn, Target, TargetSpec,
-    board_vertices, tagged_tiles, usual_edge_mm,
+    BoardSpec, SolidShape, SolidSpec, TagSpec, TagsIn, Target, TargetSpec, board_vertices,
+    tagged_tiles,
 };
 
 /// Grids that are looked at, the largest ones.
@@ -119,7 +120,7 @@ fn confirmed(image: ImageView, seen: &Sighting, spec: TargetSpec) -> Option<Reco
         TargetSpec::Solid(solid) => solid.shape.name(),
         _ => "board",
     };
-    let target = Target::build(name, &spec, Some(seen.family), None).ok()?;
+    let target = Target::build(name, &spec, Some(seen.family)).ok()?;
     let detector = Detector::for_target(&target, Some(seen.family), DetectorConfig::default());
     let found = detector.detect(image, "");
     let labelled = found.grids.iter().filter(|grid| grid.panel.is_some());

@@ -4,7 +4,7 @@ use kurbo::{BezPath, PathEl};
 use super::{Scene, Surface};
 use crate::artwork::{Paint, Shape, Sheet};
 use crate::camera::Pose;
-use crate::targets::{Placement, Target};
+use crate::layout::{Placement, Printing};
 
 /// Curves of letters are replaced by chords that leave them by less than this, mm.
 const FLATTENING_MM: f64 = 0.005;
@@ -13,10 +13,10 @@ const FLATTENING_MM: f64 = 0.005;
 ///
 /// All panels of the page must lie in one plane of the target, as those of boards do; the page is
 /// one surface, labelled with the id of its first panel, that holds the corners of all.
-pub fn scene_of_sheet(target: &Target, sheet: &Sheet, index: usize) -> Scene {
-    let placements = target.sheets.get(index).map_or(&[][..], |layout| &layout.placements);
+pub fn scene_of_sheet(printing: &Printing, sheet: &Sheet, index: usize) -> Scene {
+    let placements = printing.sheets.get(index).map_or(&[][..], |layout| &layout.placements);
     let panels = placements.iter().filter_map(|placement| {
-        let panel = target.panels.iter().find(|panel| panel.id == placement.panel)?;
+        let panel = printing.target.panels.iter().find(|panel| panel.id == placement.panel)?;
         Some((placement, panel))
     });
     let mut surface: Option<Surface> = None;

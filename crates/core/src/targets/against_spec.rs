@@ -3,8 +3,8 @@
 //! What follows from nothing else in the file is left to the comparison with what was made: sheets, what is printed on them,
 //! the finish, and of a solid the walls of its skeleton. A spacing of tags may be another one that has the same tags.
 
+use super::error::{Problem, problem};
 use super::identity::fingerprint;
-use super::json::{Problem, problem};
 use super::{
     Corner, FamilyRef, Fingerprint, Panel, PanelPose, TagPlacement, Target, TargetSpec, aprilgrid,
     board, charuco, circles, solid, tag_sheet,
@@ -185,7 +185,7 @@ mod tests {
     fn said<S: Into<TargetSpec>>(spec: S, change: impl Fn(&mut Target)) -> Option<String> {
         let spec = spec.into();
         let family = Family::shipped("delTag25h7").unwrap();
-        let mut target = Target::build("board", &spec, Some(&family), None).unwrap();
+        let mut target = Target::build("board", &spec, Some(&family)).unwrap();
         change(&mut target);
         Target::from_json(&target.to_json()).err().map(|error| error.to_string())
     }

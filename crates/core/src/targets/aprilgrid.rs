@@ -10,15 +10,11 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::build::needed;
 use super::capacity::{Setting, check_ids};
-use super::layout::imprint;
 use super::length::format_mm;
-use super::single_panel::{SinglePanel, sheet};
 use super::spec::BORDER_BITS;
 use super::{
-    Corner, FamilyRef, Fingerprint, GridKind, Outline, Panel, PanelPose, PaperSpec, SheetLayout,
-    TagPlacement, TagsIn, TargetError, identity, tag_range,
+    Corner, FamilyRef, GridKind, Outline, Panel, PanelPose, TagPlacement, TagsIn, TargetError,
 };
 use crate::family::Family;
 use crate::lattice::Vertex;
@@ -115,7 +111,7 @@ impl AprilGridSpec {
     }
 
     /// The panel of a checked spec.
-    fn panel(&self) -> Panel {
+    pub(crate) fn panel(&self) -> Panel {
         let [columns, rows] = self.tags;
         let mut panel = Panel {
             id: self.board_id,
@@ -159,15 +155,12 @@ pub(super) fn untied_panels(spec: &AprilGridSpec) -> Result<Vec<Panel>, TargetEr
     Ok(vec![spec.panel()])
 }
 
-/// The panel and the sheet of a grid.
-pub(super) fn parts(
-    name: &str,
+/// The panel of a grid, and its family.
+pub(super) fn tagged(
     spec: &AprilGridSpec,
-    family: Option<&Family>,
-    paper: Option<&PaperSpec>,
-) -> Result<(Vec<Panel>, FamilyRef, Vec<SheetLayout>), TargetError> {
+    family: &Family,
+) -> Result<(Vec<Panel>, FamilyRef), TargetError> {
     let panels = untied_panels(spec)?;
-    let family = needed(family, &spec.family)?;
     if family.kind() != GridKind::Checker {
         let problem = format!("{} has triangular tags, not square ones", family.name());
         return Err(TargetError::invalid("TagSpec::family", problem));
@@ -175,32 +168,7 @@ pub(super) fn parts(
     let ids = (spec.first_id, spec.count().into());
     let family =
         check_ids(Setting::TAGS, ids, family, || "make fewer `AprilGridSpec::tags`".to_owned())?;
-    let label = label(name, spec, &family, identity::fingerprint(&panels, Some(&family)));
-    let single = SinglePanel {
-        of_size: &|tag_mm| AprilGridSpec { tag_mm, ..spec.clone() }.panel(),
-        size_mm: spec.tag_mm,
-        setting: "AprilGridSpec::tag_mm",
-        fewer: "fewer `AprilGridSpec::tags`",
-    };
-    let sheets = paper.map(|paper| sheet(&single, paper, label)).transpose()?;
-    Ok((panels, family, sheets.into_iter().collect()))
-}
-
-/// All that is needed to make it again.
-fn label(name: &str, spec: &AprilGridSpec, family: &FamilyRef, target: Fingerprint) -> String {
-    let [columns, rows] = spec.tags;
-    let last = spec.first_id + spec.count() - 1;
-    let parts = [
-        name.to_owned(),
-        format!("AprilGrid {columns} × {rows} tags"),
-        format!("tagSize {}", format_mm(spec.tag_mm)),
-        format!("tagSpacing {}", spec.gap),
-        tag_range(&family.name, spec.first_id, last),
-        format!("border {} bits", spec.border_bits),
-        format!("board {}", spec.board_id),
-        imprint(target),
-    ];
-    parts.join(" · ")
+    Ok((panels, family))
 }
 
 #[cfg(test)]
@@ -219,8 +187,7 @@ mod tests {
         ) {
             let spec = AprilGridSpec { gap, ..AprilGridSpec::new([columns, rows], tag_mm) };
             let target = Target::build(
-                "grid", &spec.clone().into(), Family::shipped("t36h11").ok().as_ref(), None,
-            ).unwrap();
+                "grid", &spec.clone().into(), Family::shipped("t36h11").ok().as_ref()).unwrap();
             let panel = &target.panels[0];
             prop_assert_eq!(panel.corners.len() as u32, 4 * columns * rows);
             let place = |i: u32| (f64::from(i / 2) * (1.0 + gap) + f64::from(i % 2)) * tag_mm;

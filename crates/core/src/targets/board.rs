@@ -47,7 +47,7 @@ pub fn board_vertices(kind: GridKind, rows: u32, cols: u32) -> Vec<Vertex> {
 }
 
 /// Width and height of the drawn tiles, mm; what [`Panel::bounds_mm`] finds without a panel at hand.
-pub(super) fn size_mm(spec: &BoardSpec) -> DVec2 {
+pub(crate) fn size_mm(spec: &BoardSpec) -> DVec2 {
     let (rows, cols) = (f64::from(spec.rows), f64::from(spec.cols));
     let edges = match spec.grid {
         GridKind::Deltille => DVec2::new(cols + 1.5, (rows + 1.0) * ROW_HEIGHT),
@@ -95,7 +95,7 @@ pub(crate) fn tagged_tiles(
 }
 
 /// The panels of a checked spec, and the family of its tags.
-pub(super) fn panels(
+pub(crate) fn panels(
     spec: &BoardSpec,
     family: Option<&Family>,
 ) -> Result<(Vec<Panel>, Option<FamilyRef>), TargetError> {
@@ -119,7 +119,7 @@ pub(super) fn panels(
 }
 
 /// The panels of a checked spec, whether or not its family has so many tags.
-pub(super) fn untied_panels(spec: &BoardSpec) -> Vec<Panel> {
+pub(crate) fn untied_panels(spec: &BoardSpec) -> Vec<Panel> {
     let vertices = board_vertices(spec.grid, spec.rows, spec.cols);
     let tagged = |tags: &TagSpec| tagged_tiles(spec.grid, &vertices, tags.spacing, tags.tags_in);
     let tiles = spec.tags.as_ref().map_or_else(Vec::new, tagged);

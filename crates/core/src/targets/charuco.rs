@@ -14,14 +14,10 @@
 use glam::{DMat3, DVec3};
 use serde::{Deserialize, Serialize};
 
-use super::build::needed;
 use super::capacity::{Setting, check_ids};
-use super::layout::imprint;
 use super::length::format_mm;
-use super::single_panel::{SinglePanel, sheet};
 use super::{
-    Corner, FamilyRef, Fingerprint, GridKind, Outline, Panel, PanelPose, PaperSpec, SheetLayout,
-    TagPlacement, TagsIn, TargetError, identity, tag_range,
+    Corner, FamilyRef, GridKind, Outline, Panel, PanelPose, TagPlacement, TagsIn, TargetError,
 };
 use crate::family::{Family, dictionary, dictionary_names};
 use crate::lattice::{Dimension, TagCells, Vertex};
@@ -81,7 +77,7 @@ impl CharucoSpec {
     }
 
     /// Checks every number by itself; returns the dimension of the markers.
-    pub(super) fn check(&self) -> Result<Dimension, TargetError> {
+    pub(crate) fn check(&self) -> Result<Dimension, TargetError> {
         if let Some(side) = self.squares.iter().find(|side| !SIDES.contains(side)) {
             let problem = format!("{side} is not between {} and {}", SIDES.start(), SIDES.end());
             return Err(TargetError::invalid("CharucoSpec::squares", problem));
@@ -121,7 +117,7 @@ impl CharucoSpec {
     }
 
     /// The panel of a checked spec with markers of this dimension.
-    fn panel(&self, dimension: Dimension) -> Panel {
+    pub(crate) fn panel(&self, dimension: Dimension) -> Panel {
         let [columns, rows] = self.squares.map(|side| side as i32);
         let (first, kind, edge_mm) = (self.first_col(), GridKind::Checker, self.square_mm);
         let bit_mm = self.marker_mm / TagCells::of(kind, dimension).width(BORDER_BITS);
@@ -179,15 +175,12 @@ pub(super) fn untied_panels(spec: &CharucoSpec) -> Result<Vec<Panel>, TargetErro
     Ok(vec![spec.panel(spec.check()?)])
 }
 
-/// The panel and the sheet of a board.
-pub(super) fn parts(
-    name: &str,
+/// The panel of a board, and its dictionary.
+pub(super) fn tagged(
     spec: &CharucoSpec,
-    family: Option<&Family>,
-    paper: Option<&PaperSpec>,
-) -> Result<(Vec<Panel>, FamilyRef, Vec<SheetLayout>), TargetError> {
-    let dimension = spec.check()?;
-    let family = needed(family, &spec.dictionary)?;
+    family: &Family,
+) -> Result<(Vec<Panel>, FamilyRef), TargetError> {
+    let panels = untied_panels(spec)?;
     if dictionary(&spec.dictionary).is_none_or(|(name, _)| name != family.name()) {
         let given = format!("{} is given", family.name());
         return Err(TargetError::Family { wanted: spec.dictionary.clone(), given });
@@ -196,39 +189,7 @@ pub(super) fn parts(
     let family = check_ids(Setting::TAGS, ids, family, || {
         "take a larger `CharucoSpec::dictionary`, or fewer `CharucoSpec::squares`".to_owned()
     })?;
-    let panel = spec.panel(dimension);
-    let target = identity::fingerprint(std::slice::from_ref(&panel), Some(&family));
-    let label = label(name, spec, &family, target);
-    let single = SinglePanel {
-        of_size: &|square_mm| {
-            let marker_mm = spec.marker_mm * square_mm / spec.square_mm;
-            CharucoSpec { square_mm, marker_mm, ..spec.clone() }.panel(dimension)
-        },
-        size_mm: spec.square_mm,
-        setting: "CharucoSpec::square_mm",
-        fewer: "fewer `CharucoSpec::squares`",
-    };
-    let sheets = paper.map(|paper| sheet(&single, paper, label)).transpose()?;
-    Ok((vec![panel], family, sheets.into_iter().collect()))
-}
-
-/// All that is needed to make it again.
-fn label(name: &str, spec: &CharucoSpec, family: &FamilyRef, target: Fingerprint) -> String {
-    let [columns, rows] = spec.squares;
-    let last = spec.first_id + spec.markers() - 1;
-    let mut parts = vec![
-        name.to_owned(),
-        format!("ChArUco {columns} × {rows} squares"),
-        format!("square {}", format_mm(spec.square_mm)),
-        format!("marker {}", format_mm(spec.marker_mm)),
-        tag_range(&family.name, spec.first_id, last),
-    ];
-    if spec.legacy {
-        parts.push("legacy pattern".to_owned());
-    }
-    parts.push(format!("board {}", spec.board_id));
-    parts.push(imprint(target));
-    parts.join(" · ")
+    Ok((panels, family))
 }
 
 #[cfg(test)]
@@ -279,9 +240,7 @@ mod tests {
         let good = CharucoSpec::new([8, 6], 30.0, "5x5_100");
         let family = Family::shipped("5x5_100").unwrap();
         let said = |spec: CharucoSpec| {
-            let paper = PaperSpec::default();
-            let built = Target::build("board", &spec.into(), Some(&family), Some(&paper));
-            built.unwrap_err().to_string()
+            Target::build("board", &spec.into(), Some(&family)).unwrap_err().to_string()
         };
         let cases = [
             (CharucoSpec { squares: [2, 6], ..good.clone() }, "`CharucoSpec::squares`: 2 is not"),

@@ -13,13 +13,8 @@
 use glam::{DMat3, DVec3};
 use serde::{Deserialize, Serialize};
 
-use super::layout::imprint;
 use super::length::format_mm;
-use super::single_panel::{SinglePanel, sheet};
-use super::{
-    Corner, Fingerprint, GridKind, Outline, Panel, PanelPose, PaperSpec, SheetLayout, TagsIn,
-    TargetError, identity,
-};
+use super::{Corner, GridKind, Outline, Panel, PanelPose, TagsIn, TargetError};
 use crate::quantity;
 
 /// Range of circles along a side.
@@ -83,7 +78,7 @@ impl CirclesSpec {
     }
 
     /// The panel of a checked spec: its corners are the middles of the circles.
-    fn panel(&self) -> Panel {
+    pub(crate) fn panel(&self) -> Panel {
         let [columns, rows] = self.circles.map(|side| side as i32);
         let (kind, edge_mm) = (GridKind::Checker, self.spacing_mm);
         let downwards = DMat3::from_diagonal(DVec3::new(1.0, -1.0, -1.0));
@@ -127,43 +122,6 @@ impl CirclesSpec {
 pub(super) fn untied_panels(spec: &CirclesSpec) -> Result<Vec<Panel>, TargetError> {
     spec.check()?;
     Ok(vec![spec.panel()])
-}
-
-/// The panel and the sheet of a grid.
-pub(super) fn parts(
-    name: &str,
-    spec: &CirclesSpec,
-    paper: Option<&PaperSpec>,
-) -> Result<(Vec<Panel>, Vec<SheetLayout>), TargetError> {
-    let panels = untied_panels(spec)?;
-    let single = SinglePanel {
-        of_size: &|spacing_mm| {
-            let diameter_mm = spec.diameter_mm * spacing_mm / spec.spacing_mm;
-            CirclesSpec { spacing_mm, diameter_mm, ..spec.clone() }.panel()
-        },
-        size_mm: spec.spacing_mm,
-        setting: "CirclesSpec::spacing_mm",
-        fewer: "fewer `CirclesSpec::circles`",
-    };
-    let sheets = paper
-        .map(|paper| sheet(&single, paper, label(name, spec, identity::fingerprint(&panels, None))))
-        .transpose()?;
-    Ok((panels, sheets.into_iter().collect()))
-}
-
-/// All that is needed to make it again.
-fn label(name: &str, spec: &CirclesSpec, target: Fingerprint) -> String {
-    let [columns, rows] = spec.circles;
-    let kind = if spec.asymmetric { "asymmetric circles" } else { "circles" };
-    let parts = [
-        name.to_owned(),
-        format!("{columns} × {rows} {kind}"),
-        format!("spacing {}", format_mm(spec.spacing_mm)),
-        format!("diameter {}", format_mm(spec.diameter_mm)),
-        format!("board {}", spec.board_id),
-        imprint(target),
-    ];
-    parts.join(" · ")
 }
 
 #[cfg(test)]

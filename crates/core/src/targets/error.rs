@@ -85,7 +85,17 @@ pub enum TargetError {
 }
 
 impl TargetError {
-    pub(super) fn invalid(setting: &'static str, problem: impl Into<String>) -> Self {
+    pub(crate) fn invalid(setting: &'static str, problem: impl Into<String>) -> Self {
         Self::Invalid { setting, problem: problem.into() }
     }
+}
+
+/// A field, and what is wrong with it.
+pub(crate) type Problem = (String, String);
+
+pub(crate) fn problem<T>(
+    field: impl Into<String>,
+    problem: impl Into<String>,
+) -> Result<T, Problem> {
+    Err((field.into(), problem.into()))
 }

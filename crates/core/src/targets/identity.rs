@@ -1,7 +1,5 @@
 //! What makes a target the one it is: its corners in space and its tags, whatever it is called and printed on.
 
-use std::borrow::Cow;
-
 use sha2::{Digest, Sha256};
 
 use super::{FamilyRef, GridKind, Panel, Target};
@@ -42,14 +40,6 @@ impl Target {
             || (are_both_measured && self.identity().is_same_print(&other.identity()))
     }
 
-    /// The same target under the name that is on its prints: that of its plan, where this one was measured or refined.
-    pub fn under_printed_name(&self) -> Cow<'_, Self> {
-        match &self.plan {
-            Some(plan) => Cow::Owned(Self { name: plan.name.clone(), ..self.clone() }),
-            None => Cow::Borrowed(self),
-        }
-    }
-
     /// Identity of the target as it was printed: of the one from which this target was measured or refined, or its own.
     pub(crate) fn printed(&self) -> TargetIdentity {
         self.plan.clone().unwrap_or_else(|| self.identity())
@@ -57,7 +47,7 @@ impl Target {
 }
 
 /// Fingerprint of the target with these panels.
-pub(super) fn fingerprint(panels: &[Panel], family: Option<&FamilyRef>) -> Fingerprint {
+pub(crate) fn fingerprint(panels: &[Panel], family: Option<&FamilyRef>) -> Fingerprint {
     hash(panels, family, true)
 }
 
@@ -100,7 +90,7 @@ mod tests {
     use glam::DVec3;
 
     use super::*;
-    use crate::targets::{BoardSpec, MeasuredPlace, PaperSpec, TargetSpec};
+    use crate::targets::{BoardSpec, MeasuredPlace};
 
     fn board(name: &str, edit: impl Fn(&mut BoardSpec)) -> Target {
         let mut spec = BoardSpec::deltille(5, 6, 20.0);
@@ -111,16 +101,7 @@ mod tests {
     #[test]
     fn a_fingerprint_depends_on_corners_and_tags_alone() {
         let desk = board("desk", |_| {}).identity();
-        let on_paper = {
-            let paper = PaperSpec { note: Some("lab 3".to_owned()), ..PaperSpec::default() };
-            let spec = TargetSpec::Board(BoardSpec::deltille(5, 6, 20.0));
-            let family = crate::family::Family::shipped("delTag25h7").unwrap();
-            Target::build("wall", &spec, Some(&family), Some(&paper)).unwrap()
-        };
-        assert_eq!(desk.fingerprint, on_paper.identity().fingerprint);
-        let read = Target::from_json(&on_paper.to_json()).unwrap();
-        assert_eq!(read.identity(), on_paper.identity());
-
+        assert_eq!(desk.fingerprint, board("wall", |_| {}).identity().fingerprint);
         let others = [
             board("desk", |spec| spec.edge_mm = 20.001),
             board("desk", |spec| spec.rows = 6),

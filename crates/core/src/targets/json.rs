@@ -2,12 +2,12 @@
 
 use std::collections::BTreeSet;
 
-use glam::DVec2;
+use serde::de::{DeserializeOwned, IgnoredAny};
 use serde::{Deserialize, Serialize};
 
+use super::error::{Problem, problem};
 use super::{
-    FamilyRef, Fingerprint, Finish, GridKind, Logo, Name, Panel, SheetLayout, Target,
-    TargetIdentity, TargetSpec, against_spec,
+    FamilyRef, Fingerprint, GridKind, Name, Panel, Target, TargetIdentity, TargetSpec, against_spec,
 };
 use crate::json::{self, ReadError};
 use crate::lattice::Vertex;
@@ -28,9 +28,6 @@ const MEASURED_SLACK_EDGES: f64 = 0.5;
 /// How far its target position may be from that by its panel's pose, in edges: what six written digits of a
 /// rotation leave on a panel of a thousand edges.
 const POSE_SLACK_EDGES: f64 = 0.001;
-
-/// Longest side of a sheet, mm: more than any paper, and than the net of any solid that is made.
-const LONGEST_SHEET_MM: f64 = 20_000.0;
 
 /// How far the rotation of a pose may be from orthonormal: what six written digits leave.
 const ROTATION_SLACK: f64 = 1e-5;
@@ -70,56 +67,14 @@ pub enum TargetFileError {
     },
 }
 
-#[derive(Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-struct TargetFile {
-    schema: String,
-    name: Name,
-    /// Absent in files of earlier versions.
-    #[serde(default)]
-    fingerprint: Option<Fingerprint>,
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    plan: Option<TargetIdentity>,
-    spec: TargetSpec,
-    family: Option<FamilyRef>,
-    panels: Vec<Panel>,
-    #[serde(default)]
-    sheets: Vec<SheetLayout>,
-    #[serde(default, skip_serializing_if = "Finish::is_plain")]
-    finish: Finish,
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    logo: Option<Logo>,
-}
-
 impl Target {
     /// Reads the text of a target file.
     ///
     /// # Errors
-    /// Where it is no target file, of another version, or a field is wrong.
+    /// Where it is no target file, of another version, or a field is wrong. The sheets are not looked at, see
+    /// [`Printing::from_json`](crate::layout::Printing::from_json).
     pub fn from_json(text: &str) -> Result<Target, TargetFileError> {
-        let found = json::named_schema(text)?;
-        if json::kind(&found) != json::kind(SCHEMA) {
-            return Err(TargetFileError::Kind { found });
-        }
-        if found != SCHEMA {
-            return Err(TargetFileError::Schema { found });
-        }
-        let TargetFile {
-            schema: _,
-            name,
-            fingerprint,
-            plan,
-            spec,
-            family,
-            panels,
-            sheets,
-            finish,
-            logo,
-        } = json::read(text)?;
-        let target = Target { name, spec, family, panels, sheets, finish, logo, plan };
-        check(&target)
-            .and_then(|()| check_identity(&target, fingerprint))
-            .map_err(|(field, problem)| TargetFileError::Field { field, problem })?;
+        let (target, _) = read::<IgnoredAny, IgnoredAny, IgnoredAny>(text)?;
         Ok(target)
     }
 
@@ -133,22 +88,76 @@ impl Target {
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
     pub fn to_json(&self) -> String {
-        let fingerprint = Some(self.identity().fingerprint);
-        let Target { name, spec, family, panels, sheets, finish, logo, plan } = self.clone();
-        let schema = SCHEMA.to_owned();
-        let file = TargetFile {
-            schema,
-            name,
-            fingerprint,
-            plan,
-            spec,
-            family,
-            panels,
-            sheets,
-            finish,
-            logo,
-        };
-        json::to_text(&file, 4)
+        write(self, Printed::<(), (), ()> { sheets: Vec::new(), finish: None, logo: None })
+    }
+}
+
+/// What a target file says of the print: sheets `S`, a finish `F` and a logo `L`.
+pub(crate) struct Printed<S, F, L> {
+    pub sheets: Vec<S>,
+    /// `None` where it is plain.
+    pub finish: Option<F>,
+    pub logo: Option<L>,
+}
+
+#[derive(Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct TargetFile<S, F, L> {
+    schema: String,
+    name: Name,
+    /// Absent in files of earlier versions.
+    fingerprint: Option<Fingerprint>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    plan: Option<TargetIdentity>,
+    spec: TargetSpec,
+    family: Option<FamilyRef>,
+    panels: Vec<Panel>,
+    sheets: Option<Vec<S>>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    finish: Option<F>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    logo: Option<L>,
+}
+
+/// Reads a target, and what its file says of the print.
+pub(crate) fn read<S, F, L>(text: &str) -> Result<(Target, Printed<S, F, L>), TargetFileError>
+where
+    S: DeserializeOwned,
+    F: DeserializeOwned,
+    L: DeserializeOwned,
+{
+    let found = json::named_schema(text)?;
+    if json::kind(&found) != json::kind(SCHEMA) {
+        return Err(TargetFileError::Kind { found });
+    }
+    if found != SCHEMA {
+        return Err(TargetFileError::Schema { found });
+    }
+    let file: TargetFile<S, F, L> = json::read(text)?;
+    let TargetFile { name, fingerprint, plan, spec, family, panels, sheets, finish, logo, .. } =
+        file;
+    let target = Target { name, spec, family, panels, plan };
+    check(&target).and_then(|()| check_identity(&target, fingerprint))?;
+    Ok((target, Printed { sheets: sheets.unwrap_or_default(), finish, logo }))
+}
+
+/// The text of a target and its print.
+pub(crate) fn write<S: Serialize, F: Serialize, L: Serialize>(
+    target: &Target,
+    printed: Printed<S, F, L>,
+) -> String {
+    let fingerprint = Some(target.identity().fingerprint);
+    let Target { name, spec, family, panels, plan } = target.clone();
+    let Printed { sheets, finish, logo } = printed;
+    let (schema, sheets) = (SCHEMA.to_owned(), Some(sheets));
+    let file =
+        TargetFile { schema, name, fingerprint, plan, spec, family, panels, sheets, finish, logo };
+    json::to_text(&file, 4)
+}
+
+impl From<Problem> for TargetFileError {
+    fn from((field, problem): Problem) -> Self {
+        Self::Field { field, problem }
     }
 }
 
@@ -159,16 +168,6 @@ impl From<ReadError> for TargetFileError {
             ReadError::Field { field, problem } => Self::Field { field, problem },
         }
     }
-}
-
-/// A field, and what is wrong with it.
-pub type Problem = (String, String);
-
-pub(super) fn problem<T>(
-    field: impl Into<String>,
-    problem: impl Into<String>,
-) -> Result<T, Problem> {
-    Err((field.into(), problem.into()))
 }
 
 /// Checks what the types do not say; returns the field at fault and what is wrong with it.
@@ -220,34 +219,7 @@ pub fn check(target: &Target) -> Result<(), Problem> {
             return problem("family", "there are tags, so there must be a family");
         }
     }
-    against_spec::check(target)?;
-    let named = |setting: &str| {
-        let field = setting.rsplit_once(':').map_or(setting, |(_, field)| field);
-        format!("finish.{field}")
-    };
-    target.finish.check().or_else(|(setting, what)| problem(named(setting), what))?;
-    for (s, sheet) in target.sheets.iter().enumerate() {
-        check_sheet(sheet, target, &format!("sheets[{s}]"))?;
-        for (p, page) in sheet.pages.iter().enumerate() {
-            let field = format!("sheets[{s}].pages[{p}]");
-            check_sheet(&page.marks, target, &format!("{field}.marks"))?;
-            if !page.marks.placements.is_empty() || !page.marks.pages.is_empty() {
-                let what = "a page has no panels and no pages of its own, its sheet has them";
-                return problem(format!("{field}.marks"), what);
-            }
-            let [left, lower, right, upper] = page.window_mm;
-            let [width, height] = [page.marks.width_mm, page.marks.height_mm];
-            let on_page = 0.0 <= left && left < right && right <= width;
-            if !(on_page && 0.0 <= lower && lower < upper && upper <= height) {
-                return problem(format!("{field}.window_mm"), "it does not lie on the page");
-            }
-        }
-        if let Some(placed) = sheet.placements.iter().find(|p| !panels.contains(&p.panel)) {
-            let what = format!("there is no panel {}", placed.panel);
-            return problem(format!("sheets[{s}].placements"), what);
-        }
-    }
-    Ok(())
+    against_spec::check(target)
 }
 
 /// Checks that the corners and tags are those of the stated fingerprint, and that a plan has the same labels.
@@ -272,28 +244,6 @@ fn check_identity(target: &Target, stated: Option<Fingerprint>) -> Result<(), Pr
             problem("plan.fingerprint", what)
         }
         _ => Ok(()),
-    }
-}
-
-/// Checks the size of a sheet, that its lines lie on it, and that there is a logo where it has one.
-fn check_sheet(sheet: &SheetLayout, target: &Target, field: &str) -> Result<(), Problem> {
-    let sides = [("width_mm", sheet.width_mm), ("height_mm", sheet.height_mm)];
-    if let Some((side, _)) = sides.iter().find(|(_, mm)| *mm <= 0.0) {
-        return problem(format!("{field}.{side}"), "it must be positive");
-    }
-    if let Some((side, _)) = sides.iter().find(|(_, mm)| *mm > LONGEST_SHEET_MM) {
-        let what = format!("it is more than {LONGEST_SHEET_MM} mm");
-        return problem(format!("{field}.{side}"), what);
-    }
-    if !sheet.logos.is_empty() && target.logo.is_none() {
-        return problem("logo", format!("`{field}.logos` places one, so there must be one"));
-    }
-    let on_sheet = |DVec2 { x, y }: DVec2| {
-        (0.0..=sheet.width_mm).contains(&x) && (0.0..=sheet.height_mm).contains(&y)
-    };
-    match sheet.lines.iter().position(|l| !on_sheet(l.from_mm) || !on_sheet(l.to_mm)) {
-        Some(line) => problem(format!("{field}.lines[{line}]"), "it does not lie on the sheet"),
-        None => Ok(()),
     }
 }
 
@@ -401,73 +351,4 @@ fn check_covariance(covariance: &[[f64; 6]; 6]) -> Result<(), String> {
 fn is_covariance(&[xx, xy, xz, yy, yz, zz]: &[f64; 6]) -> bool {
     let matrix = nalgebra::Matrix3::new(xx, xy, xz, xy, yy, yz, xz, yz, zz);
     matrix.symmetric_eigenvalues().min() >= -COVARIANCE_SLACK * matrix.amax()
-}
-
-#[cfg(test)]
-mod tests {
-    use proptest::prelude::*;
-
-    use super::*;
-    use crate::family::Family;
-    use crate::targets::{BoardSpec, PaperSpec, TagSpec};
-
-    fn board(rows: u32, cols: u32, edge_mm: f64, tagged: bool, boards: u32) -> Target {
-        let tags = tagged.then(TagSpec::default);
-        let inverted = rows % 2 == 1;
-        let plain = BoardSpec::new(GridKind::Deltille, rows, cols, edge_mm);
-        let spec = BoardSpec { boards, board_id: 3, tags, inverted, ..plain };
-        let family = Family::shipped("delTag25h7").unwrap();
-        let paper = PaperSpec::default();
-        Target::build("board", &TargetSpec::Board(spec), Some(&family), Some(&paper)).unwrap()
-    }
-
-    proptest! {
-        #[test]
-        fn writing_and_reading_changes_nothing(
-            rows in 3u32..12, cols in 3u32..12, edge_mm in 5.0f64..30.0,
-            tagged: bool, boards in 1u32..3,
-        ) {
-            let target = board(rows, cols, edge_mm, tagged, if tagged { boards } else { 1 });
-            let json = target.to_json();
-            prop_assert_eq!(&Target::from_json(&json).unwrap(), &target);
-        }
-
-        #[test]
-        fn truncated_files_are_refused(cut in 0.0f64..1.0) {
-            let json = board(3, 3, 20.0, true, 1).to_json();
-            let end = (cut * (json.len() - 2) as f64) as usize;
-            if let Some(part) = json.get(..end) {
-                prop_assert!(matches!(Target::from_json(part), Err(TargetFileError::Json(_))));
-            }
-        }
-    }
-
-    /// What is said about a file in which `from` is replaced by `to`.
-    fn complaint(from: &str, to: &str) -> String {
-        let json = board(4, 4, 20.0, true, 1).to_json();
-        assert!(json.contains(from), "{from} is not in {json}");
-        Target::from_json(&json.replacen(from, to, 1)).unwrap_err().to_string()
-    }
-
-    #[test]
-    fn every_error_names_its_field() {
-        assert!(complaint("target/1", "target/9").contains("`schema` is `deltille/target/9`"));
-        let cases = [
-            (r#""edge_mm": 20.0"#, r#""edge_mm": "wide""#, "spec"),
-            (r#""id": 3"#, r#""id": -3"#, "panels[0].id"),
-            (r#""kind": "deltille""#, r#""kind": "hexagons""#, "panels[0].kind"),
-            (r#""panel_mm": [20.0"#, r#""panel_mm": [21.0"#, "panels[0].corners[0].panel_mm"),
-            (r#""target_mm": [20.0"#, r#""target_mm": [21.0"#, "panels[0].corners[0].target_mm"),
-            (r#""col": 2"#, r#""col": 1"#, "panels[0].corners[1].row"),
-            (r#""id": 1, "row""#, r#""id": 0, "row""#, "panels[0].corners[1].id"),
-            (r#""rotation": [1.0"#, r#""rotation": [0.9"#, "panels[0].pose.rotation"),
-            (r#""width_mm": "#, r#""width_mm": -"#, "sheets[0].width_mm"),
-            (r#""panel": 3"#, r#""panel": 4"#, "sheets[0].placements"),
-            (r#""matrix""#, r#""matrices""#, "panels[0].matrices"),
-        ];
-        for (from, to, field) in cases {
-            let said = complaint(from, to);
-            assert!(said.starts_with(&format!("field `{field}")), "{from}: {said}");
-        }
-    }
 }

@@ -8,39 +8,27 @@
 //! up on the print, z towards the viewer; `target = rotation · panel + translation`.
 
 mod against_spec;
-mod angles;
+pub(crate) mod angles;
 mod aprilgrid;
-mod board;
-mod build;
+pub(crate) mod board;
+pub(crate) mod build;
 mod capacity;
 mod charuco;
 mod circles;
 mod closed_mesh;
-mod error;
+pub(crate) mod error;
 mod face;
-mod face_sheet;
-mod finish;
-mod guide;
-mod identity;
+pub(crate) mod identity;
 pub mod json;
-mod label;
-mod layout;
-mod length;
-mod logo;
-mod net;
-mod packed;
+pub(crate) mod length;
 mod panel;
-mod paper;
-mod polyhedron;
+pub(crate) mod polyhedron;
 mod pose;
-mod poster;
-mod single_panel;
 mod skeleton;
 mod solid;
 mod spec;
 mod symmetry;
-mod tag_ids;
-mod tag_sheet;
+pub(crate) mod tag_sheet;
 
 use glam::{DVec2, DVec3};
 use serde::{Deserialize, Serialize};
@@ -53,23 +41,14 @@ use crate::quantity;
 pub use aprilgrid::AprilGridSpec;
 pub(crate) use board::tagged_tiles;
 pub use board::{board_vertices, zigzag_vertices};
-pub use build::{largest_edge_mm, usual_edge_mm};
 pub use charuco::CharucoSpec;
 pub use circles::CirclesSpec;
 pub use closed_mesh::is_coordinate;
 pub use closed_mesh::{ClosedMesh, ClosedMeshError, FaceNoun, NEAR_EQUILATERAL};
 pub use error::TargetError;
 pub use face::{Face, FaceBoard};
-pub use face_sheet::{edge_numbers, edge_text, upright_number};
-pub use finish::Finish;
 pub use json::{SCHEMA, TargetFileError};
-pub use label::Label;
-pub use layout::CHECK_BAR_STROKE_MM;
-pub use layout::tag_range;
 pub use length::{BoxError, LengthError, parse_box_mm, parse_length_mm};
-pub use logo::{Logo, LogoPlacement, MOST_LOGO_BYTES};
-pub use net::Hinge;
-pub use paper::{DEFAULT_MARGIN_MM, Orientation, PaperError, PaperSize, PaperSpec, SolidSheets};
 pub use polyhedron::{Polyhedron, triangles};
 pub use skeleton::Incircle;
 pub use skeleton::{Skeleton, SkeletonSpec};
@@ -79,7 +58,7 @@ pub use spec::{
 };
 pub(crate) use symmetry::symmetries;
 
-/// A target: its panels, and the sheets they are printed on.
+/// A target: its panels with their corners and tags, whatever they are printed on.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Target {
     /// Name of the target, which is the stem of the names of its files.
@@ -90,12 +69,6 @@ pub struct Target {
     pub family: Option<FamilyRef>,
     /// Planar pieces, by ascending id.
     pub panels: Vec<Panel>,
-    /// Where the panels lie on paper; empty when the target came from a file without sheets.
-    pub sheets: Vec<SheetLayout>,
-    /// How they are printed.
-    pub finish: Finish,
-    /// The logo on them.
-    pub logo: Option<Logo>,
     /// Identity of the target as printed, where this one has measured corners or refined panels.
     pub plan: Option<TargetIdentity>,
 }
@@ -348,69 +321,6 @@ pub struct TagPlacement {
     pub col: i32,
 }
 
-/// One printed page: its size, where panels lie on it, and its check bars.
-///
-/// The page frame has its origin at the lower-left corner of the page, x right, y up, mm.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct SheetLayout {
-    /// Page width, mm.
-    #[serde(deserialize_with = "quantity::length_mm::de")]
-    pub width_mm: f64,
-    /// Page height, mm.
-    #[serde(deserialize_with = "quantity::length_mm::de")]
-    pub height_mm: f64,
-    /// Panels on the page.
-    pub placements: Vec<Placement>,
-    /// Lines of stated length, to be measured with a ruler.
-    pub check_bars: Vec<CheckBar>,
-    /// Marks to cut and fold along.
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub lines: Vec<SheetLine>,
-    /// The label and the words on the check bars.
-    pub texts: Vec<SheetText>,
-    /// Where the logo of the target lies.
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub logos: Vec<LogoPlacement>,
-    /// The pages that show this sheet in parts, where it is larger than the paper; it is then
-    /// printed on none of its own.
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub pages: Vec<SheetPage>,
-}
-
-/// A page that shows a window onto a sheet that is larger than the paper.
-///
-/// ```text
-///    ┌──────────────┐
-///    │┌────────────┐│   in the window the sheet, cut off at its rim: the same
-///    ││            ││   paper position, `sheet_at_mm` less, is that on the sheet;
-///    ││            ││   around it the marks of the page
-///    │└────────────┘│
-///    │ ├──────────┤ │
-///    └──────────────┘
-/// ```
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct SheetPage {
-    /// Its place among the pages: rows are letters from the top, columns numbers from the left.
-    pub label: String,
-    /// Left, lower, right and upper end of the window on the page, mm.
-    #[serde(deserialize_with = "quantity::place_mm::de")]
-    pub window_mm: [f64; 4],
-    /// Position of the sheet's lower-left corner on the page, mm.
-    #[serde(deserialize_with = "quantity::place_mm::de")]
-    pub sheet_at_mm: DVec2,
-    /// Size of the page, and what is printed around the window.
-    pub marks: SheetLayout,
-}
-
-impl SheetLayout {
-    /// On how many pages it is printed.
-    pub fn page_count(&self) -> usize {
-        self.pages.len().max(1)
-    }
-}
-
 impl Target {
     /// The same target with its panels in other places, as they were measured; `poses` are as many
     /// as it has panels.
@@ -456,7 +366,7 @@ impl Target {
     /// Its panels of a tiling alone.
     pub(crate) fn of_tiling(&self, kind: GridKind) -> Self {
         let panels = self.panels.iter().filter(|panel| panel.kind == kind).cloned().collect();
-        Self { panels, sheets: Vec::new(), ..self.clone() }
+        Self { panels, ..self.clone() }
     }
 
     /// The ids of its tags in tiles of a kind, and their family.
@@ -519,132 +429,6 @@ impl Target {
         let (sum, count) = variances.fold((0.0, 0), |(sum, count), v| (sum + v, count + 1));
         (count > 0).then(|| (sum / f64::from(count)).sqrt())
     }
-
-    /// On how many pages all its sheets are printed.
-    pub fn page_count(&self) -> usize {
-        self.sheets.iter().map(SheetLayout::page_count).sum()
-    }
-}
-
-/// `page = turn(angle) · panel + origin`.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Placement {
-    /// Id of the panel.
-    pub panel: u32,
-    /// Counter-clockwise turn of the panel on the page, radians.
-    #[serde(deserialize_with = "quantity::angle_rad::de")]
-    pub angle_rad: f64,
-    /// Page position of the panel's origin, mm.
-    #[serde(deserialize_with = "quantity::place_mm::de")]
-    pub origin_mm: DVec2,
-}
-
-impl Placement {
-    /// Page position of a point of the panel, mm.
-    pub fn page_from_panel(&self, point: DVec2) -> DVec2 {
-        let right = angles::direction(self.angle_rad);
-        self.origin_mm + right * point.x + right.perp() * point.y
-    }
-
-    /// A point of the page in the frame of the panel, mm.
-    pub fn panel_from_page(&self, point: DVec2) -> DVec2 {
-        let right = angles::direction(self.angle_rad);
-        let from_origin = point - self.origin_mm;
-        DVec2::new(from_origin.dot(right), from_origin.dot(right.perp()))
-    }
-}
-
-/// A straight line of a page.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct SheetLine {
-    /// What it is for.
-    pub kind: LineKind,
-    /// One end on the page, mm.
-    #[serde(deserialize_with = "quantity::place_mm::de")]
-    pub from_mm: DVec2,
-    /// The other end on the page, mm.
-    #[serde(deserialize_with = "quantity::place_mm::de")]
-    pub to_mm: DVec2,
-    /// Its width, mm.
-    #[serde(deserialize_with = "quantity::length_mm::de")]
-    pub width_mm: f64,
-}
-
-/// What a line of a page is for.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub enum LineKind {
-    /// To cut along; drawn through.
-    Cut,
-    /// To fold along, away from the print; dashed.
-    Fold,
-    /// To fold along, towards the print; dash-dotted.
-    Valley,
-    /// Between two faces in one plane, not to be folded; dotted.
-    Flat,
-    /// A stroke of a registration cross: pages that share it are laid on one another, single faces
-    /// on their seats; a mark at a corner of a plate; or of the overview of such pages, or another picture. Drawn through.
-    Align,
-}
-
-impl LineKind {
-    /// Whether paper goes on beyond it, to another face or to a tab.
-    pub fn joins_faces(self) -> bool {
-        matches!(self, Self::Fold | Self::Valley | Self::Flat)
-    }
-
-    /// Its name in files.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Cut => "cut",
-            Self::Fold => "fold",
-            Self::Valley => "valley",
-            Self::Flat => "flat",
-            Self::Align => "align",
-        }
-    }
-}
-
-/// A check bar: the distance between the outer edges of its two end strokes is its length.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct CheckBar {
-    /// One end on the page, mm.
-    #[serde(deserialize_with = "quantity::place_mm::de")]
-    pub from_mm: DVec2,
-    /// The other end on the page, mm.
-    #[serde(deserialize_with = "quantity::place_mm::de")]
-    pub to_mm: DVec2,
-}
-
-impl CheckBar {
-    /// The length that it states and has, mm.
-    pub fn length_mm(&self) -> f64 {
-        let way = self.to_mm - self.from_mm;
-        way.x.hypot(way.y)
-    }
-}
-
-/// One line of text on a page, set in the built-in font.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct SheetText {
-    /// What it says.
-    pub text: Label,
-    /// Left end of the base line on the page, mm.
-    #[serde(deserialize_with = "quantity::place_mm::de")]
-    pub at_mm: DVec2,
-    /// Counter-clockwise turn of the base line, radians.
-    #[serde(deserialize_with = "quantity::angle_rad::de")]
-    pub angle_rad: f64,
-    /// Height of a capital letter, mm.
-    #[serde(deserialize_with = "quantity::length_mm::de")]
-    pub cap_height_mm: f64,
-    /// The line is set smaller where it would be longer than this, mm.
-    #[serde(deserialize_with = "quantity::length_mm::de")]
-    pub max_width_mm: f64,
 }
 
 #[cfg(test)]
@@ -665,7 +449,7 @@ mod tests {
         let now = of(&codes).extending(&then).unwrap();
         let tags = TagSpec { family: "grown".to_owned(), ..TagSpec::default() };
         let spec = BoardSpec { tags: Some(tags), ..BoardSpec::deltille(8, 10, 20.0) };
-        let mut board = Target::build("old", &TargetSpec::Board(spec), Some(&then), None).unwrap();
+        let mut board = Target::build("old", &TargetSpec::Board(spec), Some(&then)).unwrap();
         let named = board.family.clone().unwrap();
         assert_eq!(board.check_family(&named, &then), Ok(()));
         assert_eq!(board.check_family(&named, &now), Ok(()));

@@ -42,7 +42,7 @@ impl Panel {
 
     /// Whether another panel faces the same way in the same plane, and a corner of one lies on a tile between corners of
     /// the other: one would hide the other.
-    pub(super) fn overlaps(&self, other: &Panel) -> bool {
+    pub(crate) fn overlaps(&self, other: &Panel) -> bool {
         let normal = |panel: &Panel| panel.pose.matrix().z_axis;
         let apart_mm = (other.middle_mm() - self.middle_mm()).dot(normal(self)).abs();
         let is_plane = normal(self).dot(normal(other)) > SAME_WAY
@@ -225,7 +225,7 @@ impl Panel {
     }
 
     /// Width of the quiet zone around tiles of a given edge, mm.
-    pub(super) fn quiet_zone_at_mm(edge_mm: f64) -> f64 {
+    pub(crate) fn quiet_zone_at_mm(edge_mm: f64) -> f64 {
         (QUIET_EDGES * edge_mm).max(QUIET_MIN_MM)
     }
 }

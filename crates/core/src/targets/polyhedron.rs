@@ -126,7 +126,7 @@ impl Polyhedron {
 }
 
 /// The sides of a face: pairs of vertices.
-pub(super) fn sides(face: &[usize]) -> impl Iterator<Item = (usize, usize)> {
+pub(crate) fn sides(face: &[usize]) -> impl Iterator<Item = (usize, usize)> {
     face.iter().copied().zip(face.iter().copied().cycle().skip(1))
 }
 
@@ -136,7 +136,7 @@ pub fn triangles<T: Copy>(corners: &[T]) -> Vec<[T; 3]> {
 }
 
 /// A normal of a flat polygon whose length is twice its area.
-pub(super) fn normal(corners: &[DVec3]) -> DVec3 {
+pub(crate) fn normal(corners: &[DVec3]) -> DVec3 {
     let normals = triangles(corners).into_iter().map(|[a, b, c]| (b - a).cross(c - a));
     normals.reduce(|sum, normal| sum + normal).unwrap_or_default()
 }

@@ -174,7 +174,7 @@ fn tag_count(faces: &[Face], kind: GridKind, tags: &TagSpec) -> u64 {
 }
 
 /// The panels of a checked spec, a face each, and the family of their tags.
-pub(super) fn panels(
+pub(crate) fn panels(
     spec: &SolidSpec,
     family: Option<&Family>,
 ) -> Result<(Vec<Panel>, Option<FamilyRef>), TargetError> {
@@ -226,7 +226,7 @@ fn family_of(
 }
 
 /// The panels of a checked spec, whether or not its family has so many tags.
-pub(super) fn untied_panels(spec: &SolidSpec) -> Result<Vec<Panel>, TargetError> {
+pub(crate) fn untied_panels(spec: &SolidSpec) -> Result<Vec<Panel>, TargetError> {
     Ok(on_faces(spec, &spec.faces()?))
 }
 
@@ -297,7 +297,7 @@ mod tests {
 
     fn build(spec: &SolidSpec) -> Result<Target, TargetError> {
         let family = Family::shipped(&spec.tags.as_ref().unwrap().family).unwrap();
-        Target::build("solid", &TargetSpec::Solid(spec.clone()), Some(&family), None)
+        Target::build("solid", &TargetSpec::Solid(spec.clone()), Some(&family))
     }
 
     /// The published icosahedron has 13 tiles a side, 66 corners and 10 tags on a face.

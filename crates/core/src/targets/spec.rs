@@ -283,7 +283,7 @@ impl TagSpec {
     }
 
     /// The tags in some tiles of the panel with an id, where those of a family begin with `first`.
-    pub(super) fn placements(&self, panel: u32, first: u32, tiles: &[Vertex]) -> Vec<TagPlacement> {
+    pub(crate) fn placements(&self, panel: u32, first: u32, tiles: &[Vertex]) -> Vec<TagPlacement> {
         let tiles = tiles.iter().zip(0..);
         let of_tile = |(tile, i): (&Vertex, u32)| TagPlacement {
             id: match self.is_dense() {
@@ -445,12 +445,12 @@ impl SolidSpec {
     }
 
     /// Width of the black around the tiles, mm; `None` where tiles are black on white.
-    pub(super) fn rim_mm(&self) -> Option<f64> {
+    pub(crate) fn rim_mm(&self) -> Option<f64> {
         self.inverted.then_some(RIM_PART * self.margin_mm)
     }
 
     /// Width of the white along the edges of a face, mm.
-    pub(super) fn white_margin_mm(&self) -> f64 {
+    pub(crate) fn white_margin_mm(&self) -> f64 {
         self.margin_mm - self.rim_mm().unwrap_or_default()
     }
 
@@ -468,7 +468,7 @@ impl SolidSpec {
     }
 
     /// Checks every number by itself.
-    pub(super) fn check(&self) -> Result<(), TargetError> {
+    pub(crate) fn check(&self) -> Result<(), TargetError> {
         if !SOLID_EDGE_MM.contains(&self.edge_mm) {
             let edge = format_mm(self.edge_mm);
             let problem = match &self.shape {
@@ -677,7 +677,7 @@ impl BoardSpec {
     }
 
     /// How many panels they are: one for each side.
-    pub(super) fn panel_count(&self) -> u32 {
+    pub(crate) fn panel_count(&self) -> u32 {
         self.boards * if self.two_sided_mm.is_some() { 2 } else { 1 }
     }
 
@@ -707,7 +707,7 @@ impl BoardSpec {
     }
 
     /// Checks every number by itself.
-    pub(super) fn check(&self) -> Result<(), TargetError> {
+    pub(crate) fn check(&self) -> Result<(), TargetError> {
         self.check_sides()?;
         for (setting, value) in [("BoardSpec::rows", self.rows), ("BoardSpec::cols", self.cols)] {
             if !SIDES.contains(&value) {

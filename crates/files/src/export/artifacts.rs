@@ -27,6 +27,7 @@ use crate::limits::{Limits, ReadError};
 use crate::target_file;
 use deltille_core::artwork::{self, ArtworkError, CuttingError};
 use deltille_core::family::Family;
+use deltille_core::layout::Printing;
 use deltille_core::targets::{
     Skeleton, SolidSpec, Target, TargetError, TargetIdentity, TargetSpec,
 };
@@ -183,16 +184,17 @@ pub type Files = Vec<(String, Vec<u8>)>;
 /// # Errors
 /// Where the target has none of that kind, or its family is missing.
 pub fn make(
-    target: &Target,
+    printing: &Printing,
     family: Option<&Family>,
     what: What,
     making: Making,
 ) -> Result<Files, MakeError> {
+    let target = &printing.target;
     let name = &target.name;
     let named = |end: &str, bytes: Vec<u8>| vec![(format!("{name}{end}"), bytes)];
     Ok(match what {
-        What::Json => named(".json", target.to_json().into_bytes()),
-        What::Pdf | What::Svg | What::Png => drawn(target, family, what, making)?,
+        What::Json => named(".json", printing.to_json().into_bytes()),
+        What::Pdf | What::Svg | What::Png => drawn(printing, family, what, making)?,
         What::Dsc(dialect) => named(".dsc", dsc::write(target, dialect)?.into_bytes()),
         What::Gltf | What::Obj | What::Sdf | What::Urdf | What::Mjcf | What::Usd => {
             of_mesh(&TexturedMesh::new(target, family, making.mesh)?, what)
@@ -213,13 +215,13 @@ pub fn make(
         What::Panels => {
             named("-panels.dxf", dxf::text(&artwork::panels_to_cut(target)?).into_bytes())
         }
-        What::Net => named("-net.dxf", dxf::text(&artwork::net_to_cut(target)?).into_bytes()),
+        What::Net => named("-net.dxf", dxf::text(&artwork::net_to_cut(printing)?).into_bytes()),
         What::LaserDxf => {
-            let drawing = artwork::to_laser(target, family, making.kerf_mm)?;
+            let drawing = artwork::to_laser(printing, family, making.kerf_mm)?;
             vec![(laser_file_name(name, "dxf"), dxf::text(&drawing).into_bytes())]
         }
         What::LaserSvg => {
-            let drawing = artwork::to_laser(target, family, making.kerf_mm)?;
+            let drawing = artwork::to_laser(printing, family, making.kerf_mm)?;
             let text = laser_svg::text(&drawing, name, &artwork::subject(target));
             vec![(laser_file_name(name, "svg"), text.into_bytes())]
         }
@@ -277,16 +279,16 @@ fn skeleton(target: &Target) -> Result<Skeleton, MakeError> {
 
 /// The pages of a target.
 fn drawn(
-    target: &Target,
+    printing: &Printing,
     family: Option<&Family>,
     what: What,
     making: Making,
 ) -> Result<Files, MakeError> {
-    if target.sheets.is_empty() {
-        return Err(MakeError::NoSheets(target.name.to_string()));
+    if printing.sheets.is_empty() {
+        return Err(MakeError::NoSheets(printing.target.name.to_string()));
     }
-    let artwork = artwork::draw(target, family)?;
-    let (name, count) = (&target.name, artwork.sheets.len());
+    let artwork = artwork::draw(printing, family)?;
+    let (name, count) = (&printing.target.name, artwork.sheets.len());
     let pages = 0..count;
     Ok(match what {
         What::Svg => pages

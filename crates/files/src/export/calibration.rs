@@ -15,16 +15,19 @@ use deltille_core::calibrate::{Diagnosis, Estimate, Excluded, SHAPE_COEFFICIENTS
 use deltille_core::camera::SplineGrid;
 use deltille_core::detect::InkEstimate;
 use deltille_core::json::{self, ReadError};
+use deltille_core::layout::SheetLayout;
 use deltille_core::quantity;
 use deltille_core::targets::{TargetIdentity, check_result_of};
 
-/// What a calibration found out about the printed sheet.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+/// What is known of the printed sheet before a calibration.
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Sheet {
     /// Print scale, measured over stated length, across and up the sheet; `None` where it was not measured.
     pub print_scale: Option<[f64; 2]>,
     /// Deviation of the sheet from its plan after that scale; `None` where no shape was estimated.
     pub shape: Option<Shape>,
+    /// The sheets of the only target, which say how its panels are turned on paper; empty where they are not described.
+    pub sheets: Vec<SheetLayout>,
 }
 
 /// What is known of the print that was photographed, besides its plan.
@@ -116,7 +119,7 @@ pub fn read_sheet(text: &str, targets: &[TargetIdentity]) -> Result<Sheet, Sheet
     })?;
     check_result_of(&file.calibrated_with, targets).map_err(SheetError::OtherTarget)?;
     let shape = file.board_shape.ok_or(SheetError::Flat)?.shape();
-    Ok(Sheet { print_scale: file.print_scale, shape: Some(shape) })
+    Ok(Sheet { print_scale: file.print_scale, shape: Some(shape), sheets: Vec::new() })
 }
 
 /// Schema and version that this crate writes.

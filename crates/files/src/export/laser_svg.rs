@@ -93,12 +93,13 @@ fn points(outline: &str) -> Option<Vec<DVec2>> {
 mod tests {
     use super::*;
     use deltille_core::artwork::to_laser;
-    use deltille_core::targets::{BoardSpec, Target};
+    use deltille_core::layout::Printing;
+    use deltille_core::targets::BoardSpec;
 
     #[test]
     fn what_is_written_is_read_and_nothing_else() {
-        let board = Target::new("board", BoardSpec::deltille(3, 4, 20.0)).unwrap();
-        let drawing = to_laser(&board, board.family().unwrap().as_ref(), 0.15).unwrap();
+        let board = Printing::new("board", BoardSpec::deltille(3, 4, 20.0)).unwrap();
+        let drawing = to_laser(&board, board.target.family().unwrap().as_ref(), 0.15).unwrap();
         let good = text(&drawing, "board", "a board");
         let read_back = read(&good, "board", "a board").unwrap();
         assert_eq!(text(&read_back, "board", "a board"), good);

@@ -16,7 +16,7 @@ use sha2::{Digest, Sha256};
 
 use super::{ExportError, GENERATOR, atomic};
 use deltille_core::artwork::{Artwork, Paint, Part, Sheet};
-use deltille_core::targets::{Finish, LineKind};
+use deltille_core::layout::{Finish, LineKind};
 
 /// Version of the PDF format.
 pub const VERSION: &str = "1.6";

@@ -19,7 +19,8 @@ mod painted;
 
 use std::time::Duration;
 
-use deltille_core::targets::{Logo, TargetError};
+use deltille_core::layout::Logo;
+use deltille_core::targets::TargetError;
 use glam::DVec2;
 use usvg::roxmltree::{Document, ParsingOptions};
 

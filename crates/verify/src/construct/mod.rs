@@ -27,7 +27,7 @@ use serde_json::Value;
 use super::reader::Reader;
 use super::{Artifact, DocumentError, Finding, Format, PageFinding};
 use deltille_core::artwork::{drawn_lines, subject};
-use deltille_core::targets::{Finish, LineKind, SheetLayout, Target};
+use deltille_core::layout::{Finish, LineKind, Printing, SheetLayout};
 use deltille_files::export::inlay::Body;
 use deltille_files::export::mesh::extras;
 use deltille_files::export::scene;
@@ -170,12 +170,13 @@ struct Words {
 
 impl Words {
     /// The texts that belong to a target.
-    fn of(target: &Target) -> Self {
-        let (title, finish) = (target.name.to_string(), target.finish.clone());
+    fn of(printing: &Printing) -> Self {
+        let target = &printing.target;
+        let (title, finish) = (target.name.to_string(), printing.finish.clone());
         let cut = |layout: &SheetLayout| {
             drawn_lines(layout).filter(|(_, line)| line.kind == LineKind::Cut).count()
         };
-        let cut_lines = target.sheets.iter().map(cut).collect();
+        let cut_lines = printing.sheets.iter().map(cut).collect();
         Self { title, subject: subject(target), extras: extras(target), finish, cut_lines }
     }
 
@@ -205,10 +206,10 @@ pub(super) fn check(
     reader: &Reader,
     path: &Path,
     format: Format,
-    target: &Target,
+    printing: &Printing,
 ) -> Result<(Vec<Finding>, Vec<Artifact>), DocumentError> {
     let bytes = reader.read(path)?;
-    let (words, limits) = (Words::of(target), reader.limits);
+    let (words, limits) = (Words::of(printing), reader.limits);
     if format == Format::Obj {
         let checked = obj::check(reader, path, &bytes, &words);
         return checked.map(|(found, parts)| (found.0, parts));
@@ -242,9 +243,9 @@ pub(super) fn bodies(
     reader: &Reader,
     path: &Path,
     names: &'static [&str],
-    target: &Target,
+    printing: &Printing,
 ) -> Result<(Vec<Finding>, Vec<Body>), DocumentError> {
-    let (bytes, words, limits) = (reader.read(path)?, Words::of(target), reader.limits);
+    let (bytes, words, limits) = (reader.read(path)?, Words::of(printing), reader.limits);
     let check = move || threemf::check(&bytes, names, &words, &limits);
     let (found, bodies) = reader.run(path, check)?;
     Ok((found.0, bodies))
@@ -260,10 +261,10 @@ pub(super) fn check_parts(
     reader: &Reader,
     path: &Path,
     mesh: &Path,
-    target: &Target,
+    printing: &Printing,
 ) -> Result<Vec<Finding>, DocumentError> {
     let count = textures_of_mjcf(&reader.read(path)?);
-    Ok(obj::check_parts(reader, mesh, count, &Words::of(target))?.0)
+    Ok(obj::check_parts(reader, mesh, count, &Words::of(printing))?.0)
 }
 
 /// Number of textures of a model for MuJoCo.

@@ -8,7 +8,7 @@ use lopdf::xref::XrefEntry;
 use lopdf::{Dictionary, Document, Object, ObjectId, StringFormat, decode_text_string};
 
 use super::{Findings, Words, is_creator, pdf_content, unpack};
-use deltille_core::targets::Finish;
+use deltille_core::layout::Finish;
 use deltille_files::export::pdf::{VERSION, color_spaces, graphics_states};
 use deltille_files::limits::Limits;
 

@@ -7,7 +7,7 @@ use kurbo::{BezPath, Shape as _};
 
 use super::ink::Ink;
 use super::{Findings, OFF_PAGE, start};
-use deltille_core::targets::Finish;
+use deltille_core::layout::Finish;
 use deltille_files::export::pdf::{CONTOUR, OVERPRINT, WHITE};
 use deltille_files::limits::{Exceeded, Limits};
 

@@ -27,7 +27,8 @@ use deltille::export::{dxf, gltf, obj as obj_writer, pdf as pdf_writer, png as p
 use deltille::export::{stl as stl_writer, svg as svg_writer};
 use deltille::family::Family;
 use deltille::lattice::GridKind;
-use deltille::targets::{BoardSpec, PaperSpec, SolidShape, SolidSpec, Target, TargetSpec};
+use deltille::layout::{PaperSpec, Printing};
+use deltille::targets::{BoardSpec, SolidShape, SolidSpec, TargetSpec};
 use deltille::verify::{Finding, Format, Verdict, Verifier, whole_of};
 use deltille::words::shown;
 use tempfile::TempDir;
@@ -61,7 +62,7 @@ fn cases(file: &'static str, rows: Vec<Row>) -> Vec<Case> {
 
 /// A target with its files in a folder.
 struct Artifacts {
-    target: Target,
+    target: Printing,
     family: Family,
     folder: TempDir,
 }
@@ -86,13 +87,14 @@ static SOLID: LazyLock<Artifacts> = LazyLock::new(|| {
     artifacts.draw();
     let (target, write) =
         (&artifacts.target, |name: &str, bytes: &[u8]| artifacts.write(name, bytes));
-    let mesh = TexturedMesh::new(target, Some(&artifacts.family), Meshing::default()).unwrap();
+    let mesh =
+        TexturedMesh::new(&target.target, Some(&artifacts.family), Meshing::default()).unwrap();
     write("t.glb", &gltf::to_bytes(&mesh));
     write("t.obj", obj_writer::text(&mesh).as_bytes());
     write("t.mtl", obj_writer::material(&mesh).as_bytes());
     write("t-texture.png", &mesh.textures[0].png);
     write("t.stl", &stl_writer::to_bytes("t", &spec.polyhedron().triangles_mm()));
-    write("t-panels.dxf", dxf::text(&artwork::panels_to_cut(target).unwrap()).as_bytes());
+    write("t-panels.dxf", dxf::text(&artwork::panels_to_cut(&target.target).unwrap()).as_bytes());
     write("t-net.dxf", dxf::text(&artwork::net_to_cut(target).unwrap()).as_bytes());
     artifacts
 });
@@ -119,7 +121,7 @@ impl Artifacts {
     fn new(name: &str, spec: &TargetSpec) -> Self {
         let family = Family::shipped("delTag25h7").unwrap();
         let paper = PaperSpec::default();
-        let target = Target::build(name, spec, Some(&family), Some(&paper)).unwrap();
+        let target = Printing::build(name, spec, Some(&family), Some(&paper)).unwrap();
         Self { target, family, folder: TempDir::new().unwrap() }
     }
 
@@ -130,11 +132,12 @@ impl Artifacts {
     /// Writes the formats that all targets have.
     fn draw(&self) {
         let artwork = artwork::draw(&self.target, Some(&self.family)).unwrap();
-        let path = |extension| self.folder.path().join(format!("{}.{extension}", self.target.name));
+        let path =
+            |extension| self.folder.path().join(format!("{}.{extension}", self.target.target.name));
         pdf_writer::write(&artwork, &path("pdf")).unwrap();
         svg_writer::write(&artwork, 0, &path("svg")).unwrap();
         png_writer::write(&artwork.sheets[0], &artwork.title, &path("png"), 300.0).unwrap();
-        let list = dsc::write(&self.target, Dialect::Fork).unwrap();
+        let list = dsc::write(&self.target.target, Dialect::Fork).unwrap();
         fs::write(path("dsc"), list).unwrap();
     }
 
@@ -211,7 +214,9 @@ fn undamaged_artifacts_pass() {
         for entry in fs::read_dir(artifacts.folder.path()).unwrap() {
             let path = entry.unwrap().path();
             let name = path.file_name().unwrap().to_string_lossy();
-            if Format::of(&path).is_none() || whole_of(&artifacts.target.name, &name).is_some() {
+            if Format::of(&path).is_none()
+                || whole_of(&artifacts.target.target.name, &name).is_some()
+            {
                 continue;
             }
             let verdict = artifacts.verify(&path).unwrap();

@@ -207,7 +207,7 @@ fn the_shape_of_the_board_is_among_what_views_are_chosen_for() {
 fn a_solid_shows_several_faces_and_boards_without_tags_are_whole() {
     let spec = TargetSpec::Solid(SolidSpec::new(SolidShape::Icosahedron));
     let family = spec_family(&spec);
-    let solid = Target::build("solid", &spec, family.as_ref(), None).unwrap();
+    let solid = Target::build("solid", &spec, family.as_ref()).unwrap();
     let next = Guide::new(&solid, [1280, 960], Model::Radtan).unwrap().next(0, None);
     let panels: std::collections::BTreeSet<PanelRef> =
         next.corners.iter().map(|c| c.panel).collect();

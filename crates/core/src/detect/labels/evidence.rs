@@ -896,7 +896,7 @@ mod tests {
     use super::*;
     use crate::detect::grid::saddle_grid::PlacedSaddle;
     use crate::family::{shipped_names, square_names};
-    use crate::targets::{BoardSpec, PaperSpec, SolidShape, SolidSpec, TagSpec, TargetSpec};
+    use crate::targets::{BoardSpec, SolidShape, SolidSpec, TagSpec, TargetSpec};
 
     /// Noise, of full scale, at which more than a tenth of the cells of four pixels a bit are taken for the other.
     const NOISE_OF_A_TENTH: f64 = 0.335;
@@ -951,8 +951,7 @@ mod tests {
     fn board_of(family: &Family, (rows, cols): (u32, u32), tags: TagSpec) -> Option<Target> {
         let mut spec = BoardSpec::new(family.kind(), rows, cols, 20.0);
         spec.tags = Some(TagSpec { family: family.name().to_owned(), ..tags });
-        let paper = PaperSpec::default();
-        Target::build("board", &TargetSpec::Board(spec), Some(family), Some(&paper)).ok()
+        Target::build("board", &TargetSpec::Board(spec), Some(family)).ok()
     }
 
     /// Boards of every family with about so many first ids, as they are and flopped.
@@ -1075,8 +1074,7 @@ mod tests {
                 let tags = tags.clone();
                 let spec =
                     SolidSpec { tiles, tags: Some(tags), ..SolidSpec::new(SolidShape::Octahedron) };
-                let Ok(solid) = Target::build("o", &TargetSpec::Solid(spec), Some(&family), None)
-                else {
+                let Ok(solid) = Target::build("o", &TargetSpec::Solid(spec), Some(&family)) else {
                     continue;
                 };
                 // Smaller boards have just the tags of a face, or one more.
@@ -1174,7 +1172,6 @@ mod tests {
             "dense",
             &TargetSpec::Board(spec),
             Some(&Family::shipped("dense9").unwrap()),
-            None,
         );
         let (target, family) = (target.unwrap(), Family::shipped("dense9").unwrap());
         let labeller = TagLabeller::new(&target, &family, None).unwrap();
@@ -1276,8 +1273,7 @@ mod tests {
         let family = Family::shipped("d36h11").unwrap();
         let target = board(&family, 0).unwrap();
         let labeller = TagLabeller::new(&target, &family, None).unwrap();
-        let sheet = &crate::artwork::draw(&target, Some(&family)).unwrap().sheets[0];
-        let scene = crate::synth::scene_of_sheet(&target, sheet, 0);
+        let scene = crate::synth::scene_of_target(&target, Some(&family)).unwrap();
         let panel = &target.panels[0];
         let camera = crate::camera::Camera::pinhole(160, 160, 0.3);
         let bits_across = family.cells().width(panel.tag_inset_bits());

@@ -3,9 +3,8 @@
 use super::reach::{COMFORTABLE_BIT_PX, COMFORTABLE_EDGE_PX, Reach, shortening};
 use crate::family::Family;
 use crate::lattice::{GridKind, ROW_HEIGHT};
-use crate::targets::{
-    BoardSpec, PaperSpec, TagSpec, Target, TargetError, TargetSpec, largest_edge_mm,
-};
+use crate::layout::{PaperSpec, largest_edge_mm};
+use crate::targets::{BoardSpec, TagSpec, Target, TargetError, TargetSpec};
 
 /// The part of a picture that a board may fill: beyond, a hand moves it out.
 const FILLED: f64 = 0.9;
@@ -94,7 +93,8 @@ impl Situation {
     /// use deltille_core::detect::Situation;
     /// use deltille_core::family::Family;
     /// use deltille_core::lattice::GridKind;
-    /// use deltille_core::targets::{PaperSpec, TagSpec};
+    /// use deltille_core::layout::PaperSpec;
+    /// use deltille_core::targets::TagSpec;
     ///
     /// let webcam = Situation {
     ///     focal_px: 1000.0,
@@ -122,7 +122,7 @@ impl Situation {
         spec.tags = tags.as_ref().map(|(tags, _)| tags.clone());
         let family = tags.map(|(_, family)| family);
         // A board of tiles of one millimetre tells what of a tile must be seen.
-        let unit = Target::build("plan", &TargetSpec::Board(spec.clone()), family, None)?;
+        let unit = Target::build("plan", &TargetSpec::Board(spec.clone()), family)?;
         let unit = Reach::of(&unit, family);
         let comfortable = if family.is_some() { COMFORTABLE_BIT_PX } else { COMFORTABLE_EDGE_PX };
         let px_at_far = self.focal_px / far_mm * shortening(family.is_some(), self.tilt_rad);
@@ -154,7 +154,7 @@ impl Situation {
         });
         let found = smaller.take_while(|&sides| takes(sides)).find(|&sides| fits(sides));
         [spec.rows, spec.cols] = found.ok_or(Unsuited::Paper { edge_mm, far_mm })?;
-        let target = Target::build("plan", &TargetSpec::Board(spec.clone()), family, None)?;
+        let target = Target::build("plan", &TargetSpec::Board(spec.clone()), family)?;
         Ok(Proposal { spec, reach: Reach::of(&target, family), whole_from_mm })
     }
 }

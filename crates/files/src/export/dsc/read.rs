@@ -10,8 +10,8 @@ use deltille_core::lattice::{GridKind, Vertex};
 use deltille_core::quantity::{Range, border_bits, edge_mm, place_mm};
 use deltille_core::statistics::median;
 use deltille_core::targets::{
-    Corner, FamilyRef, Finish, ListFormat, ListedSpec, Name, Outline, Panel, PanelPose,
-    TagPlacement, TagsIn, Target, TargetSpec,
+    Corner, FamilyRef, ListFormat, ListedSpec, Name, Outline, Panel, PanelPose, TagPlacement,
+    TagsIn, Target, TargetSpec,
 };
 use deltille_core::words::{counted, quoted};
 
@@ -85,9 +85,6 @@ fn read_in(text: &str, name: &str, units: &[Units]) -> Result<Target, DscError> 
         spec: TargetSpec::Listed(ListedSpec { format }),
         panels: panels.collect::<Result<_, _>>()?,
         family: Some(family_ref(&family, &blocks)?),
-        sheets: Vec::new(),
-        finish: Finish::default(),
-        logo: None,
         plan: None,
     };
     deltille_core::targets::json::check(&target)

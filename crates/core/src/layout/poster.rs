@@ -11,12 +11,13 @@
 
 use glam::DVec2;
 
-use super::angles::direction;
-use super::layout::{ADVANCE_CAPS, Arrangement, Footprint, fit_upright};
+use super::arrangement::{ADVANCE_CAPS, Arrangement, Footprint, fit_upright};
 use super::net::plane::{Motion, bounds, gap_mm};
 use super::paper::{Orientation, PaperSize, PaperSpec};
-use super::{Label, LineKind, SheetLayout, SheetLine, SheetPage, SheetText, TargetError};
+use super::{Label, LineKind, SheetLayout, SheetLine, SheetPage, SheetText};
 use crate::polygon::rectangle;
+use crate::targets::TargetError;
+use crate::targets::angles::direction;
 
 /// Width of what neighbouring windows share, mm.
 const OVERLAP_MM: f64 = 10.0;

@@ -16,15 +16,15 @@ use std::f64::consts::TAU;
 
 use glam::{DVec2, DVec3};
 
-use super::layout::{ADVANCE_CAPS, Footprint, fit_upright};
-use super::length::format_mm;
+use super::arrangement::{ADVANCE_CAPS, Footprint, fit_upright};
 use super::paper::{Orientation, PaperSize, PaperSpec, SolidSheets};
-use super::{
-    BoardSpec, Corner, Incircle, Label, LineKind, Panel, Polyhedron, SheetLayout, SheetLine,
-    SheetText, SolidSpec, Target, TargetError, TargetSpec,
-};
+use super::{Label, LineKind, Printing, SheetLayout, SheetLine, SheetText};
 use crate::lattice::{GridKind, Tile};
 use crate::polygon::rectangle;
+use crate::targets::length::format_mm;
+use crate::targets::{
+    BoardSpec, Corner, Incircle, Panel, Polyhedron, SolidSpec, Target, TargetError, TargetSpec,
+};
 use crate::words::counted;
 
 /// Sides of the paper that is taken as it is, mm: what is printed at a desk. Else the page is an A4.
@@ -71,7 +71,7 @@ const BOARD_FROM: DVec3 = DVec3::new(-0.3, 0.4, 0.85);
 /// The page for a target that was laid out on `paper`.
 pub(super) fn sheet(
     title: &str,
-    target: &Target,
+    printing: &Printing,
     paper: &PaperSpec,
 ) -> Result<SheetLayout, TargetError> {
     let paper = PaperSpec {
@@ -92,11 +92,11 @@ pub(super) fn sheet(
             format!("{} leaves no room for the guide: take less", format_mm(paper.margin_mm));
         TargetError::invalid("PaperSpec::margin_mm", problem)
     })?;
-    let mut sheet = arrangement.sheet(0, [0.0; 4], description(title, target));
+    let mut sheet = arrangement.sheet(0, [0.0; 4], description(title, &printing.target));
     sheet.placements.clear();
     let [left, lower, right, upper] = arrangement.clear_mm();
     let (least, most) = (DVec2::new(left, lower + BLANK_MM), DVec2::new(right - BLANK_MM, upper));
-    Ok(Page { sheet, least, most }.filled(target, &paper))
+    Ok(Page { sheet, least, most }.filled(printing, &paper))
 }
 
 /// The paper itself where it is printed at a desk, else an A4.
@@ -132,12 +132,13 @@ struct Page {
 }
 
 impl Page {
-    fn filled(mut self, target: &Target, paper: &PaperSpec) -> SheetLayout {
+    fn filled(mut self, printing: &Printing, paper: &PaperSpec) -> SheetLayout {
+        let target = &printing.target;
         self.most.y -= NAME_CAP_MM;
         self.text(target.name.to_string(), DVec2::new(self.least.x, self.most.y), NAME_CAP_MM);
         self.most.y -= BLANK_MM;
         self.ruler();
-        let steps = self.wrapped(&steps(target, paper));
+        let steps = self.wrapped(&steps(printing, paper));
         let room = self.most.y - self.least.y;
         let height = (room - height(&steps) - BLANK_MM)
             .clamp(PICTURE_SHARE.0 * room, PICTURE_SHARE.1 * room);
@@ -445,7 +446,8 @@ fn tile_lines(panel: &Panel) -> Vec<[DVec2; 2]> {
 }
 
 /// What to do with the sheets of a target.
-fn steps(target: &Target, paper: &PaperSpec) -> Vec<String> {
+fn steps(printing: &Printing, paper: &PaperSpec) -> Vec<String> {
+    let target = &printing.target;
     let name = &target.name;
     let mut steps = vec![
         "Print at 100 %, without \"fit to page\", on matt paper. Measure the lines of stated length on each sheet, \
@@ -454,7 +456,7 @@ fn steps(target: &Target, paper: &PaperSpec) -> Vec<String> {
     ];
     match &target.spec {
         TargetSpec::Solid(spec) => steps.extend(steps_of_solid(spec, paper)),
-        _ => steps.extend(steps_of_board(target)),
+        _ => steps.extend(steps_of_board(printing)),
     }
     match &target.spec {
         TargetSpec::Circles(_) => steps.push(format!(
@@ -479,17 +481,17 @@ fn steps(target: &Target, paper: &PaperSpec) -> Vec<String> {
     steps
 }
 
-fn steps_of_board(target: &Target) -> Vec<String> {
+fn steps_of_board(printing: &Printing) -> Vec<String> {
     let mut steps = Vec::new();
-    if target.sheets.iter().any(|sheet| !sheet.pages.is_empty()) {
+    if printing.sheets.iter().any(|sheet| !sheet.pages.is_empty()) {
         let trim = "Trim pages along the line at their left and upper end, and lay them on the crosses of the pages that they name.";
         steps.push(trim.to_owned());
     }
-    if target.sheets.iter().any(|sheet| sheet.placements.len() > 1) {
+    if printing.sheets.iter().any(|sheet| sheet.placements.len() > 1) {
         steps.push("Cut the boards apart along the lines; each has a label of its own.".to_owned());
     }
     let flat = "Lay a straightedge on it: what bends by a millimetre is worth less than a smaller board that does not.";
-    steps.push(match &target.spec {
+    steps.push(match &printing.target.spec {
         TargetSpec::Board(BoardSpec { two_sided_mm: Some(mm), .. }) => format!(
             "Cut both sides from mark to mark and glue them without bubbles on the two sides of a plate that stays flat and is as \
              large, so that they are {} apart with their paper; or print them on the plate, turned about its upright edge. The \
@@ -573,7 +575,7 @@ mod tests {
     use crate::targets::SolidShape;
 
     fn guide(spec: impl Into<TargetSpec>) -> SheetLayout {
-        let target = Target::new("target", spec).unwrap();
+        let target = Printing::new("target", spec).unwrap();
         sheet("target", &target, &PaperSpec::default()).unwrap()
     }
 
@@ -582,8 +584,8 @@ mod tests {
     #[test]
     fn a_convex_solid_shows_the_faces_towards_the_eye() {
         let solid = SolidSpec::new(SolidShape::Icosahedron);
-        let target = Target::new("target", solid.clone()).unwrap();
-        let model = Model::of(&target);
+        let target = Printing::new("target", solid.clone()).unwrap();
+        let model = Model::of(&target.target);
         let (polyhedron, edges) = (solid.polyhedron(), solid.polyhedron().edges());
         let is_front = |face: usize| polyhedron.normal(face).dot(model.view.towards) > 0.0;
         for (edge, (line, _)) in edges.iter().zip(&model.lines) {

@@ -9,20 +9,18 @@ use super::plane::{Motion, bounds};
 use super::tabs::{self, Tab};
 use super::unfold::{self, Piece, Side, Sides};
 use crate::lattice::{GridKind, Vertex};
-use crate::polygon;
-use crate::targets::angles::turn_of;
-use crate::targets::face_sheet::edge_numbers;
-use crate::targets::identity;
-use crate::targets::layout::{
+use crate::layout::arrangement::{
     ADVANCE_CAPS, Arrangement, Footprint, fit_upright, imprint, tag_range,
 };
+use crate::layout::face_sheet::edge_numbers;
+use crate::layout::paper::{PaperSpec, SolidSheets};
+use crate::layout::poster::{MOST_PAGES, Poster};
+use crate::layout::{Label, LineKind, Placement, SheetLayout, SheetLine, SheetText};
+use crate::polygon;
+use crate::targets::angles::turn_of;
+use crate::targets::identity;
 use crate::targets::length::format_mm;
-use crate::targets::paper::{PaperSpec, SolidSheets};
-use crate::targets::poster::{MOST_PAGES, Poster};
-use crate::targets::{
-    Face, FamilyRef, Label, LineKind, Panel, Placement, Polyhedron, SheetLayout, SheetLine,
-    SheetText, SolidSpec, TargetError,
-};
+use crate::targets::{Face, FamilyRef, Panel, Polyhedron, SolidSpec, TargetError};
 
 /// Faces that rise or fall from one plane by less than this are not folded, radians (a tenth of a
 /// degree): no hand makes so slight a fold, and the neighbours hold the paper in its place.
@@ -610,8 +608,9 @@ mod tests {
     use super::super::plane::gap_mm;
     use super::*;
     use crate::family::Family;
-    use crate::targets::poster::TICK_MM;
-    use crate::targets::{SolidShape, Target, TargetSpec};
+    use crate::layout::Printing;
+    use crate::layout::poster::TICK_MM;
+    use crate::targets::{SolidShape, TargetSpec};
 
     /// The rectangle that a text takes, by estimate.
     fn text_box(text: &SheetText) -> [DVec2; 4] {
@@ -622,9 +621,10 @@ mod tests {
     }
 
     /// Page positions of a placed panel's outline.
-    fn outline(target: &Target, placement: &Placement) -> Vec<DVec2> {
-        let TargetSpec::Solid(spec) = &target.spec else { panic!("a solid") };
-        let index = target.panels.iter().position(|panel| panel.id == placement.panel).unwrap();
+    fn outline(target: &Printing, placement: &Placement) -> Vec<DVec2> {
+        let TargetSpec::Solid(spec) = &target.target.spec else { panic!("a solid") };
+        let index =
+            target.target.panels.iter().position(|panel| panel.id == placement.panel).unwrap();
         on_page(placement, &spec.faces().unwrap()[index].outline_mm)
     }
 
@@ -652,20 +652,20 @@ mod tests {
             let solids = if seams { SolidSheets::SeamedNet } else { SolidSheets::Net };
             let paper = PaperSpec { size: size[paper].clone(), solids, ..PaperSpec::default() };
             let target =
-                Target::build("net", &TargetSpec::Solid(spec), Some(&family), Some(&paper)).unwrap();
-            prop_assert_eq!(&Target::from_json(&target.to_json()).unwrap(), &target);
+                Printing::build("net", &TargetSpec::Solid(spec), Some(&family), Some(&paper)).unwrap();
+            prop_assert_eq!(&Printing::from_json(&target.to_json()).unwrap(), &target);
             prop_assert!(!seams || target.sheets.len() == 1);
             let placements = target.sheets.iter().flat_map(|sheet| &sheet.placements);
             let mut faces: Vec<u32> = placements.map(|p| p.panel).collect();
             faces.sort_unstable();
-            prop_assert_eq!(faces, target.panels.iter().map(|p| p.id).collect::<Vec<_>>());
+            prop_assert_eq!(faces, target.target.panels.iter().map(|p| p.id).collect::<Vec<_>>());
             for sheet in &target.sheets {
                 check_sheet(&target, sheet)?;
             }
         }
     }
 
-    fn check_sheet(target: &Target, sheet: &SheetLayout) -> Result<(), TestCaseError> {
+    fn check_sheet(target: &Printing, sheet: &SheetLayout) -> Result<(), TestCaseError> {
         let outlines: Vec<_> = sheet.placements.iter().map(|p| outline(target, p)).collect();
         for (n, a) in outlines.iter().enumerate() {
             prop_assert!(a.iter().all(|p| p.x > 0.0 && p.y > 0.0));
@@ -673,7 +673,7 @@ mod tests {
             prop_assert!(outlines[n + 1..].iter().all(|b| gap_mm(a, b) > -1e-6));
         }
         let tiles = sheet.placements.iter().map(|placement| {
-            let panel = target.panels.iter().find(|p| p.id == placement.panel).unwrap();
+            let panel = target.target.panels.iter().find(|p| p.id == placement.panel).unwrap();
             on_page(placement, &tiles_outline(panel))
         });
         let lines = sheet.lines.iter().map(|l| vec![l.from_mm, l.to_mm]);
@@ -686,7 +686,7 @@ mod tests {
         }
         for line in sheet.lines.iter().filter(|_| !sheet.pages.is_empty()) {
             let shown = |at: DVec2| {
-                let on = |page: &&crate::targets::SheetPage| {
+                let on = |page: &&crate::layout::SheetPage| {
                     let [left, lower, right, upper] = page.window_mm;
                     let DVec2 { x, y } = at + page.sheet_at_mm;
                     left <= x && x <= right && lower <= y && y <= upper
@@ -706,7 +706,7 @@ mod tests {
     }
 
     /// Sheets of a target, and the part of their area that faces take.
-    fn used(target: &Target) -> (usize, f64) {
+    fn used(target: &Printing) -> (usize, f64) {
         let area = |placement: &Placement| polygon::area(&outline(target, placement));
         let faces: f64 = target.sheets.iter().flat_map(|s| &s.placements).map(area).sum();
         let paper: f64 = target.sheets.iter().map(|s| s.width_mm * s.height_mm).sum();
@@ -718,7 +718,7 @@ mod tests {
         let spec = TargetSpec::Solid(SolidSpec::new(SolidShape::Icosahedron));
         let family = Family::shipped("delTag25h7").unwrap();
         let paper = PaperSpec { size: Some("A4".parse().unwrap()), ..PaperSpec::default() };
-        let target = Target::build("net", &spec, Some(&family), Some(&paper)).unwrap();
+        let target = Printing::build("net", &spec, Some(&family), Some(&paper)).unwrap();
         let (sheets, _) = used(&target);
         assert!(sheets <= 10, "{sheets}");
         assert_eq!(target.page_count(), sheets);
@@ -754,7 +754,7 @@ mod tests {
         let family = Family::shipped("d36h9").unwrap();
         let paper = PaperSpec::default();
         let target =
-            Target::build("ball", &TargetSpec::Solid(spec), Some(&family), Some(&paper)).unwrap();
+            Printing::build("ball", &TargetSpec::Solid(spec), Some(&family), Some(&paper)).unwrap();
         let (sheets, part) = used(&target);
         assert!(sheets <= 4 && part >= 0.55, "{sheets} sheets, {part:.2} of them used");
         for sheet in &target.sheets {
@@ -768,7 +768,7 @@ mod tests {
         let size = |shape| {
             let spec = TargetSpec::Solid(SolidSpec::new(shape));
             let paper = PaperSpec::default();
-            let target = Target::build("net", &spec, Some(&family), Some(&paper)).unwrap();
+            let target = Printing::build("net", &spec, Some(&family), Some(&paper)).unwrap();
             [target.sheets[0].width_mm, target.sheets[0].height_mm]
         };
         assert_eq!(size(SolidShape::Tetrahedron), [420.0, 297.0]);

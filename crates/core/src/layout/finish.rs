@@ -4,8 +4,9 @@
 use glam::DVec2;
 use serde::{Deserialize, Serialize};
 
-use super::{LineKind, SheetLayout, SheetLine, Target, TargetError};
+use super::{LineKind, Printing, SheetLayout, SheetLine};
 use crate::polygon::rectangle;
+use crate::targets::TargetError;
 
 /// Width of the line to cut along, mm: the quarter of a point that print shops ask for.
 const CONTOUR_MM: f64 = 0.1;
@@ -73,7 +74,7 @@ impl Finish {
     }
 }
 
-impl Target {
+impl Printing {
     /// The same target printed otherwise. A contour is a line to cut along in the middle of what the paper's margin leaves
     /// blank; where boards are to be cut apart, it is the lines for that, of a board with two sides the outline of its plate. `margin_mm` is that margin.
     ///
@@ -82,10 +83,11 @@ impl Target {
     /// mirrored.
     ///
     /// ```
-    /// use deltille_core::targets::{BoardSpec, Finish, Target};
+    /// use deltille_core::layout::{Finish, Printing};
+    /// use deltille_core::targets::BoardSpec;
     ///
     /// let finish = Finish { mirrored: true, ..Finish::default() };
-    /// let pane = Target::new("pane", BoardSpec::deltille(4, 5, 20.0))?.finished(finish, 5.0)?;
+    /// let pane = Printing::new("pane", BoardSpec::deltille(4, 5, 20.0))?.finished(finish, 5.0)?;
     /// assert!(pane.to_json().contains("\"mirrored\": true"));
     /// # Ok::<(), deltille_core::targets::TargetError>(())
     /// ```
@@ -99,15 +101,16 @@ impl Target {
             let problem = "the guide is for paper, to be read as it is: make it with a plain print";
             return Err(TargetError::invalid("PaperSpec::guide_page", problem));
         }
-        if finish.mirrored && self.spec.two_sided_mm().is_some() {
+        if finish.mirrored && self.target.spec.two_sided_mm().is_some() {
             let problem = "each side is seen from its own front: leave the mirror image out";
             return Err(TargetError::invalid("BoardSpec::two_sided_mm", problem));
         }
         if finish.contour.is_some() {
             for sheet in &mut self.sheets {
-                let side = sheet.placements.first().filter(|_| self.spec.two_sided_mm().is_some());
+                let side =
+                    sheet.placements.first().filter(|_| self.target.spec.two_sided_mm().is_some());
                 let side = side.and_then(|placed| {
-                    let panel = self.panels.iter().find(|panel| panel.id == placed.panel)?;
+                    let panel = self.target.panels.iter().find(|panel| panel.id == placed.panel)?;
                     Some((panel.field_mm(), *placed))
                 });
                 match side {
@@ -130,7 +133,7 @@ fn add_contour(sheet: &mut SheetLayout, margin_mm: f64) {
     if sheet.lines.iter().any(|line| line.kind == LineKind::Cut) {
         return;
     }
-    let inset = margin_mm.max(super::layout::LEAST_MARGIN_MM) / 2.0;
+    let inset = margin_mm.max(super::arrangement::LEAST_MARGIN_MM) / 2.0;
     let (right, upper) = (sheet.width_mm - inset, sheet.height_mm - inset);
     add_outline(sheet, rectangle([inset, inset, right, upper]));
 }
@@ -155,7 +158,7 @@ mod tests {
     fn names_of_inks_are_told_from_other_words() {
         let refused = |white: &str, contour: &str| {
             let [white, contour] = [white, contour].map(|name| Some(name.to_owned()));
-            let board = Target::new("board", BoardSpec::deltille(4, 5, 20.0)).unwrap();
+            let board = Printing::new("board", BoardSpec::deltille(4, 5, 20.0)).unwrap();
             board.finished(Finish { mirrored: false, white, contour }, 5.0).unwrap_err().to_string()
         };
         assert!(refused("black", "CutContour").starts_with("`Finish::white`: `black` stands for"));

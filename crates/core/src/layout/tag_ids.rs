@@ -4,12 +4,12 @@ use std::collections::BTreeSet;
 
 use glam::DVec2;
 
-use super::length::format_mm;
-use super::{
-    GridKind, Label, Panel, Placement, SheetText, TagPlacement, TagsIn, Target, TargetError,
-};
+use super::{Label, Placement, Printing, SheetText};
 use crate::family::places;
+use crate::lattice::GridKind;
 use crate::lattice::{Tile, Vertex};
+use crate::targets::length::format_mm;
+use crate::targets::{Panel, TagPlacement, TagsIn, TargetError};
 
 /// Capital height, in edges of a tile, and the most of it, mm: small beside what a corner is measured from.
 const CAP: (f64, f64) = (0.09, 1.8);
@@ -21,8 +21,9 @@ const DIGIT_CAPS: f64 = 0.85;
 const LEAST_CAP_MM: f64 = 0.7;
 
 /// Adds the ids to all sheets of a target.
-pub(super) fn add(target: &mut Target) -> Result<(), TargetError> {
+pub(super) fn add(printing: &mut Printing) -> Result<(), TargetError> {
     let refused = |problem: String| Err(TargetError::invalid("PaperSpec::tag_ids", problem));
+    let target = &printing.target;
     if target.panels.iter().all(|panel| panel.tags.is_empty()) {
         return refused("there are no tags: leave it out".to_owned());
     }
@@ -41,7 +42,7 @@ pub(super) fn add(target: &mut Target) -> Result<(), TargetError> {
             ));
         }
     }
-    for sheet in &mut target.sheets {
+    for sheet in &mut printing.sheets {
         for placement in &sheet.placements {
             let panel = target.panels.iter().find(|panel| panel.id == placement.panel);
             sheet.texts.extend(panel.into_iter().flat_map(|panel| of_panel(panel, placement)));
@@ -87,12 +88,13 @@ mod tests {
     use proptest::prelude::*;
 
     use super::*;
-    use crate::targets::{BoardSpec, PaperSpec, SolidShape, SolidSpec, TargetSpec};
+    use crate::layout::PaperSpec;
+    use crate::targets::{BoardSpec, SolidShape, SolidSpec, TargetSpec};
 
-    fn target(spec: &TargetSpec) -> Result<Target, TargetError> {
+    fn target(spec: &TargetSpec) -> Result<Printing, TargetError> {
         let paper = PaperSpec { tag_ids: true, ..PaperSpec::default() };
         let family = spec.family().map(|name| crate::family::Family::shipped(name).unwrap());
-        Target::build("target", spec, family.as_ref(), Some(&paper))
+        Printing::build("target", spec, family.as_ref(), Some(&paper))
     }
 
     proptest! {
@@ -105,7 +107,7 @@ mod tests {
             let mut spec = BoardSpec::new(kind, rows, cols, 20.0);
             spec.tags.as_mut().unwrap().spacing = spacing;
             let target = target(&spec.into()).unwrap();
-            let (sheet, panel) = (&target.sheets[0], &target.panels[0]);
+            let (sheet, panel) = (&target.sheets[0], &target.target.panels[0]);
             let placement = &sheet.placements[0];
             let ids: Vec<(String, Tile)> = sheet.texts.iter().rev().take(panel.tags.len()).map(|text| {
                 let half = DVec2::new(text.max_width_mm / 1.1, text.cap_height_mm) / 2.0;

@@ -18,15 +18,15 @@
 
 use glam::DVec2;
 
-use super::angles::turn_of;
-use super::layout::{ADVANCE_CAPS, Arrangement, Footprint, fit, imprint, tag_range};
-use super::length::format_mm;
+use super::arrangement::{ADVANCE_CAPS, Arrangement, Footprint, fit, imprint, tag_range};
 use super::net::Sides;
 use super::paper::PaperSpec;
-use super::polyhedron::sides;
-use super::{
-    Face, FamilyRef, Fingerprint, Label, LineKind, Panel, Placement, Polyhedron, SheetLayout,
-    SheetLine, SheetText, SolidSpec, TargetError, identity,
+use super::{Label, LineKind, Placement, SheetLayout, SheetLine, SheetText};
+use crate::targets::angles::turn_of;
+use crate::targets::length::format_mm;
+use crate::targets::polyhedron::sides;
+use crate::targets::{
+    Face, FamilyRef, Fingerprint, Panel, Polyhedron, SolidSpec, TargetError, identity,
 };
 
 /// White beyond the edges of a face, mm: what cutting and gluing by hand are off, and some more.

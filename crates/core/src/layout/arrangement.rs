@@ -15,15 +15,14 @@ use std::f64::consts::FRAC_PI_2;
 
 use glam::DVec2;
 
-use super::length::format_mm;
 use super::logo::{LogoPlacement, LogoSize};
 use super::paper::{Orientation, PaperSize, PaperSpec};
-use super::{
-    BoardSpec, CheckBar, FamilyRef, Fingerprint, GridKind, Label, LineKind, Panel, Placement,
-    SheetLayout, SheetLine, SheetText, TagsIn, TargetError, board,
-};
+use super::{CheckBar, Label, LineKind, Placement, SheetLayout, SheetLine, SheetText};
 use crate::family::places;
+use crate::lattice::GridKind;
 use crate::polygon::rectangle;
+use crate::targets::length::format_mm;
+use crate::targets::{BoardSpec, FamilyRef, Fingerprint, Panel, TagsIn, TargetError, board};
 
 /// Capital height of the words on a check bar, mm: 7 pt, small print that is still easy to read.
 const BAR_CAP_MM: f64 = 1.8;
@@ -530,14 +529,15 @@ mod tests {
     use proptest::prelude::*;
 
     use super::*;
-    use crate::targets::{Target, TargetSpec, least_untagged_corners};
+    use crate::layout::Printing;
+    use crate::targets::{TargetSpec, least_untagged_corners};
 
     fn spec(rows: u32, cols: u32, edge_mm: f64) -> BoardSpec {
         BoardSpec { tags: None, ..BoardSpec::new(GridKind::Deltille, rows, cols, edge_mm) }
     }
 
-    fn build(spec: &BoardSpec, paper: &PaperSpec) -> Result<Target, TargetError> {
-        Target::build("board", &TargetSpec::Board(spec.clone()), None, Some(paper))
+    fn build(spec: &BoardSpec, paper: &PaperSpec) -> Result<Printing, TargetError> {
+        Printing::build("board", &TargetSpec::Board(spec.clone()), None, Some(paper))
     }
 
     fn on(size: &str, orientation: Orientation) -> PaperSpec {
@@ -545,8 +545,8 @@ mod tests {
     }
 
     /// Page rectangle of a placed panel's ink.
-    fn ink(target: &Target) -> [f64; 4] {
-        let (panel, placement) = (&target.panels[0], &target.sheets[0].placements[0]);
+    fn ink(target: &Printing) -> [f64; 4] {
+        let (panel, placement) = (&target.target.panels[0], &target.sheets[0].placements[0]);
         let [left, lower, right, upper] =
             if panel.inverted { panel.field_mm() } else { panel.bounds_mm() };
         let corners = [DVec2::new(left, lower), DVec2::new(right, upper)];
@@ -621,8 +621,8 @@ mod tests {
             let sheet = &target.sheets[0];
             let [left, lower, right, upper] = ink(&target);
             let margin = margin.max(LEAST_MARGIN_MM);
-            let edge_blank = if inverted { margin } else { margin.max(target.panels[0].quiet_zone_mm()) };
-            let mark_blank = if inverted { FIELD_GAP_MM } else { target.panels[0].quiet_zone_mm() };
+            let edge_blank = if inverted { margin } else { margin.max(target.target.panels[0].quiet_zone_mm()) };
+            let mark_blank = if inverted { FIELD_GAP_MM } else { target.target.panels[0].quiet_zone_mm() };
             let slack = 1e-9;
             prop_assert!(left >= edge_blank - slack && upper <= sheet.height_mm - edge_blank + slack);
             let [below, beside] = &sheet.check_bars[..] else { panic!("two bars") };

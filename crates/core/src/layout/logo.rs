@@ -11,8 +11,9 @@ use glam::DVec2;
 use kurbo::{BezPath, PathEl, Point};
 use serde::{Deserialize, Serialize};
 
-use super::length::format_mm;
-use super::{PaperSpec, SheetLayout, TargetError};
+use super::{PaperSpec, SheetLayout};
+use crate::targets::TargetError;
+use crate::targets::length::format_mm;
 use crate::{polygon, quantity};
 
 /// Height of a logo in the units of its outline: of one that is 12 mm high a unit is 1.2 µm.
@@ -49,7 +50,7 @@ const SLACK_MM: f64 = 1e-6;
 /// the even-odd rule.
 ///
 /// ```
-/// use deltille_core::targets::Logo;
+/// use deltille_core::layout::Logo;
 /// use glam::DVec2;
 ///
 /// let triangle = [(0.0, 7.0), (4.0, 0.0), (8.0, 7.0)].map(DVec2::from).to_vec();
@@ -319,10 +320,10 @@ mod tests {
     use super::*;
     use crate::artwork;
     use crate::family::Family;
-    use crate::targets::{
-        BoardSpec, CHECK_BAR_STROKE_MM, CirclesSpec, GridKind, SolidShape, SolidSheets, SolidSpec,
-        Target, TargetSpec,
-    };
+    use crate::lattice::GridKind;
+    use crate::layout::Printing;
+    use crate::layout::{CHECK_BAR_STROKE_MM, SolidSheets};
+    use crate::targets::{BoardSpec, CirclesSpec, SolidShape, SolidSpec, TargetSpec};
 
     /// A frame that is `width` times as wide as high.
     fn frame(width: f64) -> Logo {
@@ -335,9 +336,9 @@ mod tests {
         Logo::from_outlines(&[rectangle(0.0), hole]).unwrap()
     }
 
-    fn build(spec: &TargetSpec, paper: &PaperSpec) -> Result<Target, TargetError> {
+    fn build(spec: &TargetSpec, paper: &PaperSpec) -> Result<Printing, TargetError> {
         let family = spec.family().map(|name| Family::shipped(name).unwrap());
-        Target::build("target", spec, family.as_ref(), Some(paper))
+        Printing::build("target", spec, family.as_ref(), Some(paper))
     }
 
     fn rectangle_of(points: &[DVec2]) -> [DVec2; 2] {
@@ -355,8 +356,8 @@ mod tests {
         let (Ok(plain), Ok(target)) = (build(spec, &plain), build(spec, paper)) else {
             return Ok(());
         };
-        prop_assert_eq!(&Target::from_json(&target.to_json()).unwrap(), &target);
-        prop_assert_eq!(&plain.panels, &target.panels);
+        prop_assert_eq!(&Printing::from_json(&target.to_json()).unwrap(), &target);
+        prop_assert_eq!(&plain.target.panels, &target.target.panels);
         let logo = target.logo.as_ref().unwrap();
         for (sheet, plain) in target.sheets.iter().zip(&plain.sheets) {
             prop_assert_eq!(&sheet.placements, &plain.placements);
@@ -384,7 +385,8 @@ mod tests {
                         prop_assert!(apart(around, line, 0.0), "{around:?} meets {line:?}");
                     }
                     for placement in &page.placements {
-                        let panel = &target.panels[usize::try_from(placement.panel).unwrap()];
+                        let panel =
+                            &target.target.panels[usize::try_from(placement.panel).unwrap()];
                         let quiet = if panel.inverted { 0.0 } else { panel.quiet_zone_mm() };
                         let [x0, y0, x1, y1] =
                             if panel.inverted { panel.field_mm() } else { panel.bounds_mm() };

@@ -4,8 +4,9 @@ use glam::DVec3;
 use serde::Serialize;
 
 use super::unfold::{Side, Sides};
+use crate::layout::Printing;
 use crate::targets::angles::angle;
-use crate::targets::{SolidSpec, Target, TargetSpec};
+use crate::targets::{SolidSpec, TargetSpec};
 
 /// Sides that lie on each other on a sheet differ by less, mm.
 const TOUCHING_MM: f64 = 0.01;
@@ -24,21 +25,22 @@ pub struct Hinge {
     pub angle_rad: f64,
 }
 
-impl Target {
+impl Printing {
     /// How the faces of a solid hang together on its sheets: each after the one that it hangs on. Empty where the sheets
     /// are no nets.
     ///
     /// ```
-    /// use deltille_core::targets::{PaperSpec, SolidShape, SolidSpec, Target};
+    /// use deltille_core::layout::Printing;
+    /// use deltille_core::targets::{SolidShape, SolidSpec};
     ///
-    /// let die = Target::new("die", SolidSpec::new(SolidShape::Icosahedron))?;
+    /// let die = Printing::new("die", SolidSpec::new(SolidShape::Icosahedron))?;
     /// let hinges = die.hinges();
     /// assert_eq!(hinges.iter().filter(|hinge| hinge.on.is_none()).count(), 1);
     /// assert_eq!(hinges.len(), 20);
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
     pub fn hinges(&self) -> Vec<Hinge> {
-        let TargetSpec::Solid(spec) = &self.spec else { return Vec::new() };
+        let TargetSpec::Solid(spec) = &self.target.spec else { return Vec::new() };
         if self.sheets.iter().all(|sheet| sheet.placements.len() < 2) {
             return Vec::new();
         }
@@ -47,15 +49,16 @@ impl Target {
 }
 
 /// The hinges of the sheets of a solid; `None` where its faces have no boards.
-fn of_sheets(target: &Target, spec: &SolidSpec) -> Option<Vec<Hinge>> {
+fn of_sheets(printing: &Printing, spec: &SolidSpec) -> Option<Vec<Hinge>> {
     let (solid, faces) = (spec.polyhedron(), spec.faces().ok()?);
     let sides = Sides::new(&solid);
     let mut hinges = Vec::with_capacity(faces.len());
-    for sheet in &target.sheets {
+    for sheet in &printing.sheets {
         // Of each face the ends of its sides on the sheet.
         let mut on_sheet = vec![None; faces.len()];
         for placement in &sheet.placements {
-            let face = target.panels.iter().position(|panel| panel.id == placement.panel)?;
+            let face =
+                printing.target.panels.iter().position(|panel| panel.id == placement.panel)?;
             let outline = faces.get(face)?.outline_mm.iter();
             let corners: Vec<_> =
                 outline.map(|&corner| placement.page_from_panel(corner)).collect();
@@ -110,7 +113,7 @@ mod tests {
         use SolidShape::{Cube, Icosahedron, Octahedron, Tetrahedron};
         for shape in [Tetrahedron, Octahedron, Icosahedron, Cube] {
             let spec = SolidSpec::new(shape);
-            let target = Target::new("solid", spec.clone()).unwrap();
+            let target = Printing::new("solid", spec.clone()).unwrap();
             let (solid, faces) = (spec.polyhedron(), spec.faces().unwrap());
             let hinges = target.hinges();
             assert_eq!(hinges.len(), faces.len());
@@ -134,7 +137,7 @@ mod tests {
             let sheet = &target.sheets[0];
             let on_paper: Vec<_> = (0..faces.len())
                 .flat_map(|face| {
-                    let id = target.panels[face].id;
+                    let id = target.target.panels[face].id;
                     let placement = sheet.placements.iter().find(|p| p.panel == id).unwrap();
                     let outline = faces[face].outline_mm.iter();
                     outline.map(|&corner| placement.page_from_panel(corner)).collect::<Vec<_>>()
@@ -151,6 +154,6 @@ mod tests {
     #[test]
     fn what_is_no_net_has_no_hinges() {
         let board = crate::targets::BoardSpec::deltille(10, 11, 20.0);
-        assert!(Target::new("board", board).unwrap().hinges().is_empty());
+        assert!(Printing::new("board", board).unwrap().hinges().is_empty());
     }
 }

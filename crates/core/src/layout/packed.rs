@@ -13,16 +13,15 @@ use std::cmp::Reverse;
 
 use glam::DVec2;
 
-use super::layout::{
+use super::arrangement::{
     ADVANCE_CAPS, Arrangement, Footprint, check_margin, label, label_of_one, on_page,
 };
 use super::logo::{LogoPlacement, LogoSize};
 use super::paper::PaperSpec;
-use super::{
-    BoardSpec, FamilyRef, GridKind, Label, LineKind, Panel, Placement, SheetLayout, SheetLine,
-    SheetText, TargetError, identity, layout,
-};
+use super::{Label, LineKind, Placement, SheetLayout, SheetLine, SheetText};
+use crate::lattice::GridKind;
 use crate::lattice::ROW_HEIGHT;
+use crate::targets::{BoardSpec, FamilyRef, Panel, TargetError, identity};
 
 /// Capital height of a board's label, mm.
 const LABEL_CAP_MM: f64 = 2.0;
@@ -127,7 +126,7 @@ pub(super) fn sheets(
     let note = paper.note.as_deref().map(str::trim);
     cell.check_note(note)?;
     let (grid @ [columns, rows], arrangement) = arrange(&cell, panels.len(), paper)?
-        .ok_or_else(|| layout::does_not_fit(spec, paper, |spec| fits(spec, paper)))?;
+        .ok_or_else(|| super::arrangement::does_not_fit(spec, paper, |spec| fits(spec, paper)))?;
     let target = identity::fingerprint(panels, family);
     let pages: Vec<&[Panel]> = panels.chunks(columns * rows).collect();
     let count = pages.len();
@@ -143,7 +142,7 @@ pub(super) fn sheets(
 
 /// Whether a board of this kind finds room.
 pub(super) fn fits(spec: &BoardSpec, paper: &PaperSpec) -> bool {
-    let panels = super::board::untied_panels(&BoardSpec { boards: 1, ..spec.clone() });
+    let panels = crate::targets::board::untied_panels(&BoardSpec { boards: 1, ..spec.clone() });
     let cell = panels.first().map(|panel| Cell::new(spec, panel, paper));
     cell.is_some_and(|cell| arrange(&cell, 1, paper).is_ok_and(|found| found.is_some()))
 }

@@ -1,0 +1,250 @@
+//! A target with the sheets that it is printed on.
+
+use std::borrow::Cow;
+
+use super::arrangement::{arrange, label};
+use super::paper::{PaperSpec, SolidSheets};
+use super::poster::Poster;
+use super::{
+    Finish, LineKind, Logo, Placement, SheetLayout, SheetLine, face_sheet, guide, logo, net,
+    packed, single_panel, tag_ids, tag_sheet,
+};
+use crate::family::Family;
+use crate::polygon::rectangle;
+use crate::targets::angles::turn_of;
+use crate::targets::build::shipped_family;
+use crate::targets::{BoardSpec, FamilyRef, Panel, Target, TargetError, TargetSpec, identity};
+
+/// A target, and the sheets that it is printed on.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Printing {
+    /// What is printed.
+    pub target: Target,
+    /// Where its panels lie on paper; empty where it was made, or read from a file, without sheets.
+    pub sheets: Vec<SheetLayout>,
+    /// How they are printed.
+    pub finish: Finish,
+    /// The logo on them.
+    pub logo: Option<Logo>,
+}
+
+impl From<Target> for Printing {
+    /// Without sheets.
+    fn from(target: Target) -> Self {
+        Self { target, sheets: Vec::new(), finish: Finish::default(), logo: None }
+    }
+}
+
+impl Printing {
+    /// Makes what `spec` asks for with a family that is shipped, laid out on the smallest paper that takes it.
+    ///
+    /// # Errors
+    /// Where the name is no file name, a number is out of its range, the family is not shipped or has too
+    /// few codes, or nothing up to A0 takes the target.
+    ///
+    /// ```
+    /// use deltille_core::layout::Printing;
+    /// use deltille_core::targets::BoardSpec;
+    ///
+    /// let desk = Printing::new("desk", BoardSpec::deltille(10, 11, 20.0))?;
+    /// assert_eq!(desk.target.panels[0].corners.len(), 110);
+    /// assert_eq!([desk.sheets[0].width_mm, desk.sheets[0].height_mm], [297.0, 210.0]);
+    /// # Ok::<(), deltille_core::targets::TargetError>(())
+    /// ```
+    pub fn new(name: &str, spec: impl Into<TargetSpec>) -> Result<Self, TargetError> {
+        let spec = spec.into();
+        Self::build(name, &spec, shipped_family(&spec)?.as_ref(), Some(&PaperSpec::default()))
+    }
+
+    /// Makes what `spec` asks for, laid out on `paper`; without paper there are no sheets. `family` holds the codes of the
+    /// tags; an untagged target needs none.
+    ///
+    /// # Errors
+    /// Where a number is out of its range, the family is another one or has too few codes, or the paper has no room for
+    /// the target.
+    pub fn build(
+        name: &str,
+        spec: &TargetSpec,
+        family: Option<&Family>,
+        paper: Option<&PaperSpec>,
+    ) -> Result<Self, TargetError> {
+        let target = Target::build(name, spec, family)?;
+        match paper {
+            Some(paper) => Self::on_paper(target, family, paper),
+            None => Ok(target.into()),
+        }
+    }
+
+    /// Lays a target out on paper.
+    fn on_paper(
+        target: Target,
+        family: Option<&Family>,
+        paper: &PaperSpec,
+    ) -> Result<Self, TargetError> {
+        logo::check(paper)?;
+        let title = match &paper.note {
+            Some(note) => format!("{} · {}", target.name, checked_note(note)?),
+            None => target.name.to_string(),
+        };
+        let Target { spec, panels, family: named, .. } = &target;
+        let sheets = match spec {
+            TargetSpec::Board(spec) => board_sheets(&title, spec, panels, named.as_ref(), paper)?,
+            TargetSpec::Solid(spec) => match paper.solids {
+                SolidSheets::Net | SolidSheets::SeamedNet => {
+                    net::sheets(&title, spec, panels, named.as_ref(), paper)?
+                }
+                SolidSheets::PerFace => {
+                    face_sheet::sheets(&title, spec, panels, named.as_ref(), paper)?
+                }
+            },
+            TargetSpec::Tags(spec) => family
+                .map_or(Ok(Vec::new()), |family| tag_sheet::sheets(&title, spec, family, paper))?,
+            TargetSpec::Charuco(_) | TargetSpec::AprilGrid(_) | TargetSpec::Circles(_) => {
+                single_panel::sheets(&title, &target, paper)?
+            }
+            TargetSpec::Listed(_) => return Err(TargetError::Listed),
+        };
+        logo::check_sheets(&sheets, paper)?;
+        let logo = paper.logo.clone();
+        let mut printing = Self { target, sheets, finish: Finish::default(), logo };
+        if paper.tag_ids {
+            tag_ids::add(&mut printing)?;
+        }
+        if paper.guide_page {
+            printing.sheets.push(guide::sheet(&title, &printing, paper)?);
+        }
+        Ok(printing)
+    }
+
+    /// The same under the name that is on the sheets: that of the plan, where the target was measured or refined.
+    pub fn under_printed_name(&self) -> Cow<'_, Self> {
+        let Some(plan) = &self.target.plan else { return Cow::Borrowed(self) };
+        let target = Target { name: plan.name.clone(), ..self.target.clone() };
+        Cow::Owned(Self { target, ..self.clone() })
+    }
+
+    /// On how many pages all its sheets are printed.
+    pub fn page_count(&self) -> usize {
+        self.sheets.iter().map(SheetLayout::page_count).sum()
+    }
+}
+
+/// Most characters of a note: with more the label that it stands in could not be read any more.
+const LONGEST_NOTE: usize = 80;
+
+/// A note that can be printed.
+fn checked_note(note: &str) -> Result<&str, TargetError> {
+    let refused = |problem: String| Err(TargetError::invalid("PaperSpec::note", problem));
+    let is_printed = |c: char| (' '..='~').contains(&c) || "°±·×–−".contains(c);
+    let count = note.chars().count();
+    match note.chars().find(|&c| !is_printed(c)) {
+        Some(other) => {
+            refused(format!("the built-in font has no {other:?}: use ASCII and ° ± · × – −"))
+        }
+        None if count > LONGEST_NOTE => {
+            refused(format!("{count} characters are more than {LONGEST_NOTE}: take fewer"))
+        }
+        None if note.trim().is_empty() => {
+            refused("there is nothing in it: leave it out".to_owned())
+        }
+        None => Ok(note.trim()),
+    }
+}
+
+/// The sheets of boards.
+fn board_sheets(
+    name: &str,
+    board: &BoardSpec,
+    panels: &[Panel],
+    family: Option<&FamilyRef>,
+    paper: &PaperSpec,
+) -> Result<Vec<SheetLayout>, TargetError> {
+    if paper.packed {
+        if board.two_sided_mm.is_some() {
+            let problem = "each side of a board has a sheet of its own: leave it out";
+            return Err(TargetError::invalid("PaperSpec::packed", problem));
+        }
+        return packed::sheets(name, board, panels, family, paper);
+    }
+    let target = identity::fingerprint(panels, family);
+    let words = |panel: &Panel| label(name, board, std::slice::from_ref(panel), family, target);
+    match arrange(board, paper) {
+        Ok(arrangement) => {
+            let sheet = |panel: &Panel| {
+                let ink = if panel.inverted { panel.field_mm() } else { panel.bounds_mm() };
+                let mut sheet = arrangement.sheet(panel.id, ink, words(panel));
+                let large_id = arrangement.large_id(board, panel.id, ink);
+                sheet.texts.extend(large_id.filter(|id| !arrangement.logo_meets(&sheet, id)));
+                if board.two_sided_mm.is_some() {
+                    sheet.lines.extend(arrangement.crop_marks(panel.id, ink, panel.field_mm()));
+                }
+                sheet
+            };
+            Ok(panels.iter().map(sheet).collect())
+        }
+        Err(TargetError::DoesNotFit { .. }) if paper.poster => {
+            panels.iter().map(|panel| poster(board, panel, paper, &words(panel))).collect()
+        }
+        Err(error) => Err(error),
+    }
+}
+
+/// A board that is larger than the paper, over several pages.
+fn poster(
+    board: &BoardSpec,
+    panel: &Panel,
+    paper: &PaperSpec,
+    label: &str,
+) -> Result<SheetLayout, TargetError> {
+    let corners = rectangle(panel.field_mm());
+    let poster = Poster::new(&corners, paper)?;
+    poster.check("the board", ("BoardSpec::edge_mm", board.edge_mm), "", paper)?;
+    let mut sheet = poster.sheet();
+    let motion = poster.sheet_from_points();
+    sheet.placements.push(Placement {
+        panel: panel.id,
+        angle_rad: turn_of(motion.turn),
+        origin_mm: motion.shift,
+    });
+    // Crosses keep out of the board and its quiet zone.
+    let field = corners.map(|corner| motion.apply(corner));
+    let outline = field.iter().zip(field.iter().cycle().skip(1));
+    let outline: Vec<SheetLine> = outline
+        .map(|(&from_mm, &to_mm)| SheetLine {
+            kind: LineKind::Align,
+            from_mm,
+            to_mm,
+            width_mm: 0.15,
+        })
+        .collect();
+    let of = match (board.boards, panel.id) {
+        (1, 0) => String::new(),
+        (_, id) => format!("board {id} · "),
+    };
+    let tiles = vec![field.to_vec()];
+    poster.add_pages(&mut sheet, tiles, &outline, (label, &of), |_, _| Vec::new());
+    Ok(sheet)
+}
+
+/// The edge of a board's tiles where none is asked for, mm: that of the published board, which fits A4 with 10 × 11 corners;
+/// on a certain paper the largest in whole millimetres that fits. Where nothing fits, making the board says so.
+pub fn usual_edge_mm(spec: &BoardSpec, paper: &PaperSpec) -> f64 {
+    const USUAL_MM: f64 = 20.0;
+    let fitting = paper.size.as_ref().and_then(|_| largest_edge_mm(spec, paper));
+    fitting.unwrap_or(USUAL_MM)
+}
+
+/// The largest edge in whole millimetres with which a board fits on paper, if one of 5 mm does.
+pub fn largest_edge_mm(spec: &BoardSpec, paper: &PaperSpec) -> Option<f64> {
+    // A metre fits next to nothing, and the refusal proposes an edge that does.
+    let probe = BoardSpec { edge_mm: 1000.0, ..spec.clone() };
+    if paper.packed {
+        let of_edge = |mm: u32| BoardSpec { edge_mm: f64::from(mm), ..spec.clone() };
+        return (5..=1000).rev().find(|&mm| packed::fits(&of_edge(mm), paper)).map(f64::from);
+    }
+    match arrange(&probe, paper) {
+        Ok(_) => Some(probe.edge_mm),
+        Err(TargetError::DoesNotFit { fitting_edge_mm, .. }) => fitting_edge_mm.map(f64::from),
+        Err(_) => None,
+    }
+}
