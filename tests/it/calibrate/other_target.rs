@@ -5,6 +5,7 @@ use std::path::Path;
 
 use crate::common::command::deltille;
 use assert_cmd::assert::Assert;
+use deltille::layout::Printing;
 use deltille::camera::Camera;
 use deltille::export::detection;
 use deltille::targets::Target;
@@ -142,9 +143,10 @@ fn prints_are_verified_by_a_refined_description() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
     deltille(at, "board --rows 4 --cols 5 --name desk --svg --pdf --dsc --gltf").success();
-    let printed = Target::from_json(&fs::read_to_string(at.join("desk.json")).unwrap()).unwrap();
-    let name = deltille::Name::new("desk-refined").unwrap();
-    let refined = Target { name, plan: Some(printed.identity()), ..printed };
+    let text = fs::read_to_string(at.join("desk.json")).unwrap();
+    let mut refined = Printing::from_json(&text).unwrap();
+    refined.target.plan = Some(refined.target.identity());
+    refined.target.name = deltille::Name::new("desk-refined").unwrap();
     fs::write(at.join("desk-refined.json"), refined.to_json()).unwrap();
     for files in ["desk.svg desk.pdf desk.dsc desk.glb", ""] {
         deltille(at, &format!("verify desk-refined.json {files}")).success();

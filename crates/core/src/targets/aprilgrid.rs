@@ -86,7 +86,7 @@ impl AprilGridSpec {
         Some(lines.map(|line| line + "\n").concat())
     }
 
-    fn check(&self) -> Result<(), TargetError> {
+    pub(super) fn check(&self) -> Result<(), TargetError> {
         if let Some(side) = self.tags.iter().find(|side| !SIDES.contains(side)) {
             let problem = format!("{side} is not between {} and {}", SIDES.start(), SIDES.end());
             return Err(TargetError::invalid("AprilGridSpec::tags", problem));

@@ -56,10 +56,12 @@ impl Target {
                 (panels, Some(family))
             }
             TargetSpec::Charuco(spec) => {
+                spec.check()?;
                 let (panels, family) = charuco::tagged(spec, needed(family, &spec.dictionary)?)?;
                 (panels, Some(family))
             }
             TargetSpec::AprilGrid(spec) => {
+                spec.check()?;
                 let (panels, family) = aprilgrid::tagged(spec, needed(family, &spec.family)?)?;
                 (panels, Some(family))
             }
