@@ -5,9 +5,9 @@ use std::path::Path;
 
 use crate::common::command::deltille;
 use assert_cmd::assert::Assert;
-use deltille::layout::Printing;
 use deltille::camera::Camera;
 use deltille::export::detection;
+use deltille::layout::Printing;
 use deltille::targets::Target;
 
 const SMALL: &str = "--target small/desk.json";

@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 
 use glam::DVec2;
 
-use super::{Printing, SheetLayout};
+use crate::layout::{Printing, SheetLayout};
 use crate::targets::TargetFileError;
 use crate::targets::error::{Problem, problem};
 use crate::targets::json::{self, Printed};

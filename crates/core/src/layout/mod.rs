@@ -4,35 +4,20 @@
 //! [sheets](SheetLayout), its [finish](Finish) and its [logo](Logo), of which `artwork` draws the pages. In the order in
 //! which a target meets them:
 //!
-//! 1. `paper` says what is printed on; `printing` chooses how a kind of target is laid out.
-//! 2. `arrangement` places a board, its label and its check bars on a page; `single_panel`, `tag_sheet`, `packed`, `poster`,
-//!    `face_sheet` and `net` do so for other targets, several boards a sheet, several sheets a board, and solids.
-//! 3. `label`, `tag_ids`, `logo` and `guide` add what is printed beside a target; `finish` mirrors it or adds spot colours.
-//! 4. `sheet` has the values that all of them fill; `json` reads and writes them with their target.
+//! 1. `paper`: what is printed on; `printing`: how a kind of target is laid out on it;
+//! 2. `placing`: where panels and check bars lie on one page, several pages, or the sheets of a solid;
+//! 3. `marks`: what is printed beside a target: labels, ids, a logo, a guide page, and how all of it is finished;
+//! 4. `sheet`: the values that these fill; `json`: the target file that holds them.
 
-mod arrangement;
-mod face_sheet;
-mod finish;
-mod guide;
 mod json;
-mod label;
-mod logo;
-mod net;
-mod packed;
+mod marks;
 mod paper;
-mod poster;
+mod placing;
 mod printing;
 mod sheet;
-mod single_panel;
-mod tag_ids;
-mod tag_sheet;
 
-pub use arrangement::{CHECK_BAR_STROKE_MM, tag_range};
-pub use face_sheet::{edge_numbers, edge_text, upright_number};
-pub use finish::Finish;
-pub use label::Label;
-pub use logo::{Logo, LogoPlacement, MOST_LOGO_BYTES};
-pub use net::Hinge;
+pub use marks::{Finish, Label, Logo, LogoPlacement, MOST_LOGO_BYTES};
 pub use paper::{DEFAULT_MARGIN_MM, Orientation, PaperError, PaperSize, PaperSpec, SolidSheets};
+pub use placing::{CHECK_BAR_STROKE_MM, Hinge, edge_numbers, edge_text, tag_range, upright_number};
 pub use printing::{Printing, largest_edge_mm, usual_edge_mm};
 pub use sheet::{CheckBar, LineKind, Placement, SheetLayout, SheetLine, SheetPage, SheetText};

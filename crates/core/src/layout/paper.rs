@@ -3,7 +3,7 @@ use std::str::FromStr;
 
 use glam::DVec2;
 
-use super::Logo;
+use crate::layout::Logo;
 use crate::targets::length::{format_mm, parse_length_mm};
 
 /// Sizes with a name: short and long side, mm (ISO 216; ANSI A and B, US legal).

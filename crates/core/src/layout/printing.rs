@@ -2,14 +2,19 @@
 
 use std::borrow::Cow;
 
-use super::arrangement::{arrange, label};
 use super::paper::{PaperSpec, SolidSheets};
-use super::poster::Poster;
-use super::{
-    Finish, LineKind, Logo, Placement, SheetLayout, SheetLine, face_sheet, guide, logo, net,
-    packed, single_panel, tag_ids, tag_sheet,
-};
 use crate::family::Family;
+use crate::layout::marks::guide;
+use crate::layout::marks::logo;
+use crate::layout::marks::tag_ids;
+use crate::layout::placing::arrangement::{arrange, label};
+use crate::layout::placing::face_sheet;
+use crate::layout::placing::net;
+use crate::layout::placing::packed;
+use crate::layout::placing::poster::Poster;
+use crate::layout::placing::single_panel;
+use crate::layout::placing::tag_sheet;
+use crate::layout::{Finish, LineKind, Logo, Placement, SheetLayout, SheetLine};
 use crate::polygon::rectangle;
 use crate::targets::angles::turn_of;
 use crate::targets::build::shipped_family;

@@ -3,7 +3,7 @@
 use glam::DVec2;
 use serde::{Deserialize, Serialize};
 
-use super::{Label, LogoPlacement};
+use crate::layout::{Label, LogoPlacement};
 use crate::quantity;
 use crate::targets::angles;
 

@@ -4,10 +4,10 @@ use std::collections::BTreeSet;
 
 use glam::DVec2;
 
-use super::{Label, Placement, Printing, SheetText};
 use crate::family::places;
 use crate::lattice::GridKind;
 use crate::lattice::{Tile, Vertex};
+use crate::layout::{Label, Placement, Printing, SheetText};
 use crate::targets::length::format_mm;
 use crate::targets::{Panel, TagPlacement, TagsIn, TargetError};
 
@@ -21,7 +21,7 @@ const DIGIT_CAPS: f64 = 0.85;
 const LEAST_CAP_MM: f64 = 0.7;
 
 /// Adds the ids to all sheets of a target.
-pub(super) fn add(printing: &mut Printing) -> Result<(), TargetError> {
+pub(in crate::layout) fn add(printing: &mut Printing) -> Result<(), TargetError> {
     let refused = |problem: String| Err(TargetError::invalid("PaperSpec::tag_ids", problem));
     let target = &printing.target;
     if target.panels.iter().all(|panel| panel.tags.is_empty()) {

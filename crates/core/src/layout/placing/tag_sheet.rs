@@ -10,10 +10,10 @@
 use glam::DVec2;
 
 use super::arrangement::{ADVANCE_CAPS, Arrangement, Footprint, check_margin, on_page};
-use super::paper::{PaperSize, PaperSpec};
-use super::{Label, Placement, SheetLayout, SheetText};
 use crate::family::Family;
 use crate::lattice::ROW_HEIGHT;
+use crate::layout::paper::{PaperSize, PaperSpec};
+use crate::layout::{Label, Placement, SheetLayout, SheetText};
 use crate::targets::length::format_mm;
 use crate::targets::tag_sheet::EDGE_MM;
 use crate::targets::{TagSheetSpec, TargetError};
@@ -62,7 +62,7 @@ impl Blanks {
 }
 
 /// The sheets of some tags.
-pub(super) fn sheets(
+pub(in crate::layout) fn sheets(
     name: &str,
     spec: &TagSheetSpec,
     family: &Family,

@@ -9,12 +9,12 @@ use super::plane::{Motion, bounds};
 use super::tabs::{self, Tab};
 use super::unfold::{self, Piece, Side, Sides};
 use crate::lattice::{GridKind, Vertex};
-use crate::layout::arrangement::{
+use crate::layout::paper::{PaperSpec, SolidSheets};
+use crate::layout::placing::arrangement::{
     ADVANCE_CAPS, Arrangement, Footprint, fit_upright, imprint, tag_range,
 };
-use crate::layout::face_sheet::edge_numbers;
-use crate::layout::paper::{PaperSpec, SolidSheets};
-use crate::layout::poster::{MOST_PAGES, Poster};
+use crate::layout::placing::face_sheet::edge_numbers;
+use crate::layout::placing::poster::{MOST_PAGES, Poster};
 use crate::layout::{Label, LineKind, Placement, SheetLayout, SheetLine, SheetText};
 use crate::polygon;
 use crate::targets::angles::turn_of;
@@ -609,7 +609,7 @@ mod tests {
     use super::*;
     use crate::family::Family;
     use crate::layout::Printing;
-    use crate::layout::poster::TICK_MM;
+    use crate::layout::placing::poster::TICK_MM;
     use crate::targets::{SolidShape, TargetSpec};
 
     /// The rectangle that a text takes, by estimate.

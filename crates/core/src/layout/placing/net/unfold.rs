@@ -333,7 +333,7 @@ mod tests {
     use proptest::prelude::*;
 
     use super::*;
-    use crate::layout::net::tabs;
+    use crate::layout::placing::net::tabs;
 
     /// A named solid with its vertices moved; a face keeps its lengths, not its angles.
     fn dented(shape: &SolidShape, moves: &[DVec3]) -> Polyhedron {

@@ -16,10 +16,10 @@ use std::f64::consts::TAU;
 
 use glam::{DVec2, DVec3};
 
-use super::arrangement::{ADVANCE_CAPS, Footprint, fit_upright};
-use super::paper::{Orientation, PaperSize, PaperSpec, SolidSheets};
-use super::{Label, LineKind, Printing, SheetLayout, SheetLine, SheetText};
 use crate::lattice::{GridKind, Tile};
+use crate::layout::paper::{Orientation, PaperSize, PaperSpec, SolidSheets};
+use crate::layout::placing::arrangement::{ADVANCE_CAPS, Footprint, fit_upright};
+use crate::layout::{Label, LineKind, Printing, SheetLayout, SheetLine, SheetText};
 use crate::polygon::rectangle;
 use crate::targets::length::format_mm;
 use crate::targets::{
@@ -69,7 +69,7 @@ const SOLID_FROM: DVec3 = DVec3::new(0.55, -0.75, 0.42);
 const BOARD_FROM: DVec3 = DVec3::new(-0.3, 0.4, 0.85);
 
 /// The page for a target that was laid out on `paper`.
-pub(super) fn sheet(
+pub(in crate::layout) fn sheet(
     title: &str,
     printing: &Printing,
     paper: &PaperSpec,

@@ -16,11 +16,11 @@ use glam::DVec2;
 use super::arrangement::{
     ADVANCE_CAPS, Arrangement, Footprint, check_margin, label, label_of_one, on_page,
 };
-use super::logo::{LogoPlacement, LogoSize};
-use super::paper::PaperSpec;
-use super::{Label, LineKind, Placement, SheetLayout, SheetLine, SheetText};
 use crate::lattice::GridKind;
 use crate::lattice::ROW_HEIGHT;
+use crate::layout::marks::logo::{LogoPlacement, LogoSize};
+use crate::layout::paper::PaperSpec;
+use crate::layout::{Label, LineKind, Placement, SheetLayout, SheetLine, SheetText};
 use crate::targets::{BoardSpec, FamilyRef, Panel, TargetError, identity};
 
 /// Capital height of a board's label, mm.
@@ -113,7 +113,7 @@ impl Cell {
 }
 
 /// Sheets with as many boards on each as fit.
-pub(super) fn sheets(
+pub(in crate::layout) fn sheets(
     name: &str,
     spec: &BoardSpec,
     panels: &[Panel],
@@ -141,7 +141,7 @@ pub(super) fn sheets(
 }
 
 /// Whether a board of this kind finds room.
-pub(super) fn fits(spec: &BoardSpec, paper: &PaperSpec) -> bool {
+pub(in crate::layout) fn fits(spec: &BoardSpec, paper: &PaperSpec) -> bool {
     let panels = crate::targets::board::untied_panels(&BoardSpec { boards: 1, ..spec.clone() });
     let cell = panels.first().map(|panel| Cell::new(spec, panel, paper));
     cell.is_some_and(|cell| arrange(&cell, 1, paper).is_ok_and(|found| found.is_some()))
@@ -175,7 +175,7 @@ fn arrange(
         });
         fitting.max_by_key(|(grid, _)| worth(*grid))
     };
-    let on_size = |size: &super::PaperSize| {
+    let on_size = |size: &crate::layout::PaperSize| {
         let found = paper.pages_mm(size).into_iter().filter_map(on_sheet);
         found.max_by_key(|(grid, _)| worth(*grid))
     };

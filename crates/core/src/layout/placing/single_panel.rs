@@ -1,8 +1,8 @@
 //! Sheets of ChArUco boards, AprilGrids and circles: their panel in the middle of the smallest paper that takes it.
 
-use super::SheetLayout;
 use super::arrangement::{Footprint, fit, imprint, tag_range};
-use super::paper::PaperSpec;
+use crate::layout::SheetLayout;
+use crate::layout::paper::PaperSpec;
 use crate::targets::length::format_mm;
 use crate::targets::{
     AprilGridSpec, CharucoSpec, CirclesSpec, Panel, Target, TargetError, TargetSpec, identity,
@@ -57,7 +57,7 @@ impl SinglePanel<'_> {
 }
 
 /// The sheet of a target of one of these kinds; of another there is none.
-pub(super) fn sheets(
+pub(in crate::layout) fn sheets(
     title: &str,
     target: &Target,
     paper: &PaperSpec,

@@ -20,8 +20,8 @@ use glam::DVec2;
 
 use super::arrangement::{ADVANCE_CAPS, Arrangement, Footprint, fit, imprint, tag_range};
 use super::net::Sides;
-use super::paper::PaperSpec;
-use super::{Label, LineKind, Placement, SheetLayout, SheetLine, SheetText};
+use crate::layout::paper::PaperSpec;
+use crate::layout::{Label, LineKind, Placement, SheetLayout, SheetLine, SheetText};
 use crate::targets::angles::turn_of;
 use crate::targets::length::format_mm;
 use crate::targets::polyhedron::sides;
@@ -57,7 +57,7 @@ const INNER_CAP: (f64, f64) = (0.35, 2.0);
 const INNER_PLACE: f64 = 0.9;
 
 /// The sheets of a solid's faces, one each.
-pub(super) fn sheets(
+pub(in crate::layout) fn sheets(
     name: &str,
     spec: &SolidSpec,
     panels: &[Panel],

@@ -11,7 +11,7 @@ use glam::DVec2;
 use kurbo::{BezPath, PathEl, Point};
 use serde::{Deserialize, Serialize};
 
-use super::{PaperSpec, SheetLayout};
+use crate::layout::{PaperSpec, SheetLayout};
 use crate::targets::TargetError;
 use crate::targets::length::format_mm;
 use crate::{polygon, quantity};
@@ -220,7 +220,7 @@ pub struct LogoPlacement {
 
 /// How large a logo is to be.
 #[derive(Clone, Copy)]
-pub(super) struct LogoSize {
+pub(in crate::layout) struct LogoSize {
     /// Width, in heights.
     width: f64,
     /// The height that is asked for, mm.
@@ -260,7 +260,7 @@ impl LogoSize {
 }
 
 /// Refuses a height without a logo, or one that no logo has.
-pub(super) fn check(paper: &PaperSpec) -> Result<(), TargetError> {
+pub(in crate::layout) fn check(paper: &PaperSpec) -> Result<(), TargetError> {
     let refused = |problem| Err(TargetError::invalid("PaperSpec::logo_height_mm", problem));
     match paper.logo_height_mm {
         Some(_) if paper.logo.is_none() => {
@@ -275,7 +275,10 @@ pub(super) fn check(paper: &PaperSpec) -> Result<(), TargetError> {
 }
 
 /// Refuses sheets on which the logo found too little room.
-pub(super) fn check_sheets(sheets: &[SheetLayout], paper: &PaperSpec) -> Result<(), TargetError> {
+pub(in crate::layout) fn check_sheets(
+    sheets: &[SheetLayout],
+    paper: &PaperSpec,
+) -> Result<(), TargetError> {
     let pages = sheets.iter().flat_map(|sheet| {
         let pages = sheet.pages.iter().map(|page| &page.marks);
         std::iter::once(sheet).chain(pages)

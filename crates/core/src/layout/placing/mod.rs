@@ -1,0 +1,21 @@
+//! Where panels lie on pages.
+//!
+//! In come the panels of a target and the paper, out go sheets with placements, check bars, lines and texts. In the order of
+//! what a sheet takes:
+//!
+//! 1. `arrangement`: one board with its label and check bars on the smallest page that takes it, which the others use;
+//! 2. `single_panel`: boards of other detectors; `tag_sheet`: single tags in rows;
+//! 3. `packed`: several boards on a sheet; `poster`: one board or net over several pages;
+//! 4. `face_sheet`: a sheet for each face of a solid; `net`: the faces of a solid in one piece, to be folded.
+
+pub(in crate::layout) mod arrangement;
+pub(in crate::layout) mod face_sheet;
+pub(in crate::layout) mod net;
+pub(in crate::layout) mod packed;
+pub(in crate::layout) mod poster;
+pub(in crate::layout) mod single_panel;
+pub(in crate::layout) mod tag_sheet;
+
+pub use arrangement::{CHECK_BAR_STROKE_MM, tag_range};
+pub use face_sheet::{edge_numbers, edge_text, upright_number};
+pub use net::Hinge;
