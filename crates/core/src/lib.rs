@@ -21,6 +21,7 @@
 //! Conventions: lengths in millimetres, angles in radians, pixel centres at integer coordinates,
 //! images row-major with y down, the board frame right-handed with x right and y up on the print.
 
+mod angles;
 pub mod artwork;
 pub mod calibrate;
 pub mod camera;

@@ -6,9 +6,11 @@
 //!
 //! 1. `paper`: what is printed on; `printing`: how a kind of target is laid out on it;
 //! 2. `placing`: where panels and check bars lie on one page, several pages, or the sheets of a solid;
-//! 3. `marks`: what is printed beside a target: labels, ids, a logo, a guide page, and how all of it is finished;
-//! 4. `sheet`: the values that these fill; `json`: the target file that holds them.
+//! 3. `marks`: what is printed beside a target: labels, ids of tags, a logo;
+//! 4. `finish`: how all of it is printed: mirrored, in spot colours, with lines to cut along;
+//! 5. `sheet`: the values that these fill; `json`: the target file that holds them.
 
+mod finish;
 mod json;
 mod marks;
 mod paper;
@@ -16,7 +18,8 @@ mod placing;
 mod printing;
 mod sheet;
 
-pub use marks::{Finish, Label, Logo, LogoPlacement, MOST_LOGO_BYTES};
+pub use finish::Finish;
+pub use marks::{Label, Logo, LogoPlacement, MOST_LOGO_BYTES};
 pub use paper::{DEFAULT_MARGIN_MM, Orientation, PaperError, PaperSize, PaperSpec, SolidSheets};
 pub use placing::{CHECK_BAR_STROKE_MM, Hinge, edge_numbers, edge_text, tag_range, upright_number};
 pub use printing::{Printing, largest_edge_mm, usual_edge_mm};

@@ -3,12 +3,13 @@
 use std::borrow::Cow;
 
 use super::paper::{PaperSpec, SolidSheets};
+use crate::angles::turn_of;
 use crate::family::Family;
-use crate::layout::marks::guide;
 use crate::layout::marks::logo;
 use crate::layout::marks::tag_ids;
 use crate::layout::placing::arrangement::{arrange, label};
 use crate::layout::placing::face_sheet;
+use crate::layout::placing::guide;
 use crate::layout::placing::net;
 use crate::layout::placing::packed;
 use crate::layout::placing::poster::Poster;
@@ -16,7 +17,6 @@ use crate::layout::placing::single_panel;
 use crate::layout::placing::tag_sheet;
 use crate::layout::{Finish, LineKind, Logo, Placement, SheetLayout, SheetLine};
 use crate::polygon::rectangle;
-use crate::targets::angles::turn_of;
 use crate::targets::build::shipped_family;
 use crate::targets::{BoardSpec, FamilyRef, Panel, Target, TargetError, TargetSpec, identity};
 
@@ -113,10 +113,14 @@ impl Printing {
         let logo = paper.logo.clone();
         let mut printing = Self { target, sheets, finish: Finish::default(), logo };
         if paper.tag_ids {
-            tag_ids::add(&mut printing)?;
+            tag_ids::add(&printing.target, &mut printing.sheets)?;
         }
         if paper.guide_page {
-            printing.sheets.push(guide::sheet(&title, &printing, paper)?);
+            printing.sheets.push(guide::sheet(
+                &title,
+                (&printing.target, &printing.sheets),
+                paper,
+            )?);
         }
         Ok(printing)
     }

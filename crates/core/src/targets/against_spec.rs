@@ -5,11 +5,16 @@
 
 use super::error::{Problem, problem};
 use super::identity::fingerprint;
-use super::{
-    Corner, FamilyRef, Fingerprint, Panel, PanelPose, TagPlacement, Target, TargetSpec, aprilgrid,
-    board, charuco, circles, solid, tag_sheet,
-};
 use crate::family::shipped_name;
+use crate::targets::boards::aprilgrid;
+use crate::targets::boards::board;
+use crate::targets::boards::charuco;
+use crate::targets::boards::circles;
+use crate::targets::boards::tag_sheet;
+use crate::targets::solids::solid;
+use crate::targets::{
+    Corner, FamilyRef, Fingerprint, Panel, PanelPose, TagPlacement, Target, TargetSpec,
+};
 
 /// How far an edge may be from that of the spec, mm: what written digits leave.
 const SPEC_SLACK_MM: f64 = 1e-6;

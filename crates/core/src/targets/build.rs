@@ -1,9 +1,12 @@
-use super::capacity::Setting;
-use super::{
-    FamilyRef, Name, Target, TargetError, TargetSpec, aprilgrid, board, charuco, circles, solid,
-    tag_sheet,
-};
 use crate::family::{Family, FamilyError, places};
+use crate::targets::boards::aprilgrid;
+use crate::targets::boards::board;
+use crate::targets::boards::capacity::Setting;
+use crate::targets::boards::charuco;
+use crate::targets::boards::circles;
+use crate::targets::boards::tag_sheet;
+use crate::targets::solids::solid;
+use crate::targets::{FamilyRef, Name, Target, TargetError, TargetSpec};
 
 impl Target {
     /// Makes what `spec` asks for with a family that is shipped.

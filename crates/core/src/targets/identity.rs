@@ -2,8 +2,9 @@
 
 use sha2::{Digest, Sha256};
 
-use super::{FamilyRef, GridKind, Panel, Target};
 use crate::identity::{Fingerprint, TargetIdentity};
+use crate::lattice::GridKind;
+use crate::targets::{FamilyRef, Panel, Target};
 
 /// Corners closer than this, mm, count as the same point: a hundredth of what printers resolve, and a thousand times what
 /// any file format of a target rounds off.

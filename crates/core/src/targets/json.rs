@@ -5,14 +5,14 @@ use std::collections::BTreeSet;
 use serde::de::{DeserializeOwned, IgnoredAny};
 use serde::{Deserialize, Serialize};
 
+use super::against_spec;
 use super::error::{Problem, problem};
-use super::{
-    FamilyRef, Fingerprint, GridKind, Name, Panel, Target, TargetIdentity, TargetSpec, against_spec,
-};
 use crate::json::{self, ReadError};
+use crate::lattice::GridKind;
 use crate::lattice::Vertex;
 use crate::quantity;
 use crate::reading::in_words;
+use crate::targets::{FamilyRef, Fingerprint, Name, Panel, Target, TargetIdentity, TargetSpec};
 
 /// Schema and version that this crate writes and reads.
 pub const SCHEMA: &str = "deltille/target/1";

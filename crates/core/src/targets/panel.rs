@@ -1,10 +1,178 @@
+//! A planar piece of a target: its tiling, corners and tags.
+
 use std::collections::BTreeSet;
 
 use glam::{DVec2, DVec3};
 
-use super::{Corner, Outline, Panel, TagPlacement, TagsIn};
+use serde::{Deserialize, Serialize};
+
+use crate::lattice::GridKind;
 use crate::lattice::{Tile, Vertex};
 use crate::polygon::{grown, hull, rectangle};
+use crate::quantity;
+use crate::targets::PanelPose;
+
+/// How far the tiles of a panel reach beyond its corners.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Outline {
+    /// The black tiles that touch a corner.
+    #[default]
+    Touching,
+    /// The same and one tile more at the right end of the lowest row, so that every row of a
+    /// zigzag board has as many tiles as the next.
+    Zigzag,
+    /// The same and one tile more at each end of a triangle of corners, so that the tiles fill a
+    /// triangle.
+    Triangle,
+}
+
+/// Which tiles carry tags, by their colour on a board that is not inverted.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum TagsIn {
+    /// Black tiles: the tile itself is the tag's border.
+    #[default]
+    Black,
+    /// White squares of a checkerboard: the tag has a border of its own, and white around it.
+    White,
+}
+
+impl TagsIn {
+    /// Whether it is what goes without saying in files.
+    pub fn is_black(&self) -> bool {
+        *self == Self::Black
+    }
+}
+
+/// A planar piece of a target: a board, or a face of a solid.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Panel {
+    /// Board id, unique within the target.
+    pub id: u32,
+    /// The tiling.
+    pub kind: GridKind,
+    /// Length of a tile's edge, mm.
+    #[serde(deserialize_with = "quantity::edge_mm::de")]
+    pub edge_mm: f64,
+    /// Border of its tags in bit-widths along the edge; `None` without tags.
+    #[serde(default, deserialize_with = "quantity::border_bits::de")]
+    pub border_bits: Option<f64>,
+    /// Which squares of a checkerboard carry its tags.
+    #[serde(default, skip_serializing_if = "TagsIn::is_black")]
+    pub tags_in: TagsIn,
+    /// Blank between a tile and the border of the tag in it, bit-widths, where it is not the usual one.
+    #[serde(
+        default,
+        skip_serializing_if = "Option::is_none",
+        deserialize_with = "quantity::border_bits::de"
+    )]
+    pub tag_margin_bits: Option<f64>,
+    /// Width of every second row and column of tiles of a checkerboard, in edges, where these are gaps between
+    /// tags: those of which the lower left vertex has an odd row, or an odd column.
+    #[serde(
+        default,
+        skip_serializing_if = "Option::is_none",
+        deserialize_with = "quantity::gap_edges::de"
+    )]
+    pub gap_edges: Option<f64>,
+    /// Diameter of the discs that are drawn about the corners instead of tiles, mm.
+    #[serde(
+        default,
+        skip_serializing_if = "Option::is_none",
+        deserialize_with = "quantity::edge_mm::de"
+    )]
+    pub discs_mm: Option<f64>,
+    /// Diameter of the hole in the middle of each tag, mm.
+    #[serde(
+        default,
+        skip_serializing_if = "Option::is_none",
+        deserialize_with = "quantity::edge_mm::de"
+    )]
+    pub hole_mm: Option<f64>,
+    /// Whether the colours are exchanged: white upright tiles, or squares, on a black field.
+    pub inverted: bool,
+    /// Width of the black around the tiles, mm, where that follows their outline: on an inverted face of a solid.
+    #[serde(
+        default,
+        skip_serializing_if = "Option::is_none",
+        deserialize_with = "quantity::rim_mm::de"
+    )]
+    pub rim_mm: Option<f64>,
+    /// Which tiles are drawn around the corners.
+    #[serde(default)]
+    pub outline: Outline,
+    /// Columns and rows of the matrix in which `.dsc` and `.orpc` files number the corners
+    /// (`docs/formats.md`, “.dsc target descriptions”); it holds every corner.
+    #[serde(deserialize_with = "quantity::side_of_matrix::de")]
+    pub matrix: [u32; 2],
+    /// Pose of the panel: from the panel frame to the target frame.
+    pub pose: PanelPose,
+    /// Saddle points, ordered by row, then column.
+    pub corners: Vec<Corner>,
+    /// Tags, ordered like the corners.
+    pub tags: Vec<TagPlacement>,
+}
+
+/// A vertex of a panel where all tiles meet (six of a deltille, four of a checkerboard).
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Corner {
+    /// Id of the corner, unique within the target.
+    pub id: u32,
+    /// Lattice row.
+    #[serde(deserialize_with = "quantity::place_in_lattice::de")]
+    pub row: i32,
+    /// Lattice column.
+    #[serde(deserialize_with = "quantity::place_in_lattice::de")]
+    pub col: i32,
+    /// Position in the panel frame, mm.
+    #[serde(deserialize_with = "quantity::place_mm::de")]
+    pub panel_mm: DVec2,
+    /// Position in the target frame, mm.
+    #[serde(deserialize_with = "quantity::place_mm::de")]
+    pub target_mm: DVec3,
+    /// Where it is on the target that was made, where that was measured. The positions above are those of
+    /// the plan.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub measured: Option<MeasuredPlace>,
+}
+
+impl Corner {
+    /// How far from its place in the plan it is, in the panel frame, mm; zero where that was not measured.
+    pub fn offset_mm(&self) -> DVec3 {
+        self.measured.map_or(DVec3::ZERO, |place| place.offset_mm)
+    }
+}
+
+/// Where a corner of a target that was made is, as the views of a calibration have it.
+///
+/// Offsets are relative to the plan where it fits the corners best, in any place and turn and at any scale.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct MeasuredPlace {
+    /// Offset from the plan, along the axes of the panel frame, mm.
+    #[serde(deserialize_with = "quantity::place_mm::de")]
+    pub offset_mm: DVec3,
+    /// Covariance of that, mm²: xx, xy, xz, yy, yz, zz.
+    #[serde(deserialize_with = "quantity::figure::de")]
+    pub covariance_mm2: [f64; 6],
+}
+
+/// A tag in the upright tile, or the square, whose lower-left vertex is (row, col).
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct TagPlacement {
+    /// Index of the code in the family.
+    pub id: u32,
+    /// Row of the tile's lower-left vertex.
+    #[serde(deserialize_with = "quantity::place_in_lattice::de")]
+    pub row: i32,
+    /// Column of the tile's lower-left vertex.
+    #[serde(deserialize_with = "quantity::place_in_lattice::de")]
+    pub col: i32,
+}
 
 /// White left around the tiles of a panel, in edges. All six tiles of every corner lie inside the
 /// tiles' bounding box, so that nothing is measured beyond it; the quiet zone only has to keep

@@ -1,8 +1,33 @@
+//! The pose of a panel on its target.
+
 use glam::{DMat3, DQuat, DVec2, DVec3};
 use nalgebra::{Matrix3, Vector3};
 
-use super::{Corner, PanelPose};
+use serde::{Deserialize, Serialize};
+
 use crate::camera::Pose;
+use crate::quantity;
+use crate::targets::Corner;
+
+/// `target = rotation · panel + translation`.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct PanelPose {
+    /// Rotation matrix, row-major.
+    #[serde(deserialize_with = "quantity::cosine::de")]
+    pub rotation: [f64; 9],
+    /// Translation, mm.
+    #[serde(deserialize_with = "quantity::place_mm::de")]
+    pub translation_mm: DVec3,
+    /// Covariance of a small turn (rad) and move (mm) along the target's axes, where the pose was
+    /// measured.
+    #[serde(
+        default,
+        skip_serializing_if = "Option::is_none",
+        deserialize_with = "quantity::pose_covariance::de"
+    )]
+    pub covariance: Option<[[f64; 6]; 6]>,
+}
 
 /// Corners within this of their places count as unrotated, in parts of the panel's extent: the
 /// written digits of a flat target.

@@ -2,8 +2,8 @@
 
 use std::collections::BTreeSet;
 
-use super::Panel;
 use crate::lattice::{GridKind, LatticeMap, Vertex};
+use crate::targets::Panel;
 
 impl Panel {
     /// The rotations, other than none, that take the corners of a panel without tags to its corners and its dark tiles

@@ -7,9 +7,9 @@ use glam::DVec2;
 use crate::family::places;
 use crate::lattice::GridKind;
 use crate::lattice::{Tile, Vertex};
-use crate::layout::{Label, Placement, Printing, SheetText};
+use crate::layout::{Label, Placement, SheetLayout, SheetText};
 use crate::targets::length::format_mm;
-use crate::targets::{Panel, TagPlacement, TagsIn, TargetError};
+use crate::targets::{Panel, TagPlacement, TagsIn, Target, TargetError};
 
 /// Capital height, in edges of a tile, and the most of it, mm: small beside what a corner is measured from.
 const CAP: (f64, f64) = (0.09, 1.8);
@@ -21,9 +21,11 @@ const DIGIT_CAPS: f64 = 0.85;
 const LEAST_CAP_MM: f64 = 0.7;
 
 /// Adds the ids to all sheets of a target.
-pub(in crate::layout) fn add(printing: &mut Printing) -> Result<(), TargetError> {
+pub(in crate::layout) fn add(
+    target: &Target,
+    sheets: &mut [SheetLayout],
+) -> Result<(), TargetError> {
     let refused = |problem: String| Err(TargetError::invalid("PaperSpec::tag_ids", problem));
-    let target = &printing.target;
     if target.panels.iter().all(|panel| panel.tags.is_empty()) {
         return refused("there are no tags: leave it out".to_owned());
     }
@@ -42,7 +44,7 @@ pub(in crate::layout) fn add(printing: &mut Printing) -> Result<(), TargetError>
             ));
         }
     }
-    for sheet in &mut printing.sheets {
+    for sheet in sheets {
         for placement in &sheet.placements {
             let panel = target.panels.iter().find(|panel| panel.id == placement.panel);
             sheet.texts.extend(panel.into_iter().flat_map(|panel| of_panel(panel, placement)));
@@ -89,6 +91,7 @@ mod tests {
 
     use super::*;
     use crate::layout::PaperSpec;
+    use crate::layout::Printing;
     use crate::targets::{BoardSpec, SolidShape, SolidSpec, TargetSpec};
 
     fn target(spec: &TargetSpec) -> Result<Printing, TargetError> {

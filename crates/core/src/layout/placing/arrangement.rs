@@ -21,8 +21,9 @@ use crate::layout::marks::logo::{LogoPlacement, LogoSize};
 use crate::layout::paper::{Orientation, PaperSize, PaperSpec};
 use crate::layout::{CheckBar, Label, LineKind, Placement, SheetLayout, SheetLine, SheetText};
 use crate::polygon::rectangle;
+use crate::targets::boards::board;
 use crate::targets::length::format_mm;
-use crate::targets::{BoardSpec, FamilyRef, Fingerprint, Panel, TagsIn, TargetError, board};
+use crate::targets::{BoardSpec, FamilyRef, Fingerprint, Panel, TagsIn, TargetError};
 
 /// Capital height of the words on a check bar, mm: 7 pt, small print that is still easy to read.
 const BAR_CAP_MM: f64 = 1.8;

@@ -20,11 +20,11 @@ use glam::DVec2;
 
 use super::arrangement::{ADVANCE_CAPS, Arrangement, Footprint, fit, imprint, tag_range};
 use super::net::Sides;
+use crate::angles::turn_of;
 use crate::layout::paper::PaperSpec;
 use crate::layout::{Label, LineKind, Placement, SheetLayout, SheetLine, SheetText};
-use crate::targets::angles::turn_of;
 use crate::targets::length::format_mm;
-use crate::targets::polyhedron::sides;
+use crate::targets::solids::polyhedron::sides;
 use crate::targets::{
     Face, FamilyRef, Fingerprint, Panel, Polyhedron, SolidSpec, TargetError, identity,
 };

@@ -6,10 +6,12 @@
 //! 1. `arrangement`: one board with its label and check bars on the smallest page that takes it, which the others use;
 //! 2. `single_panel`: boards of other detectors; `tag_sheet`: single tags in rows;
 //! 3. `packed`: several boards on a sheet; `poster`: one board or net over several pages;
-//! 4. `face_sheet`: a sheet for each face of a solid; `net`: the faces of a solid in one piece, to be folded.
+//! 4. `face_sheet`: a sheet for each face of a solid; `net`: the faces of a solid in one piece, to be folded;
+//! 5. `guide`: a page of its own that says what to do with the others.
 
 pub(in crate::layout) mod arrangement;
 pub(in crate::layout) mod face_sheet;
+pub(in crate::layout) mod guide;
 pub(in crate::layout) mod net;
 pub(in crate::layout) mod packed;
 pub(in crate::layout) mod poster;

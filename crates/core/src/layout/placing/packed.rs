@@ -142,7 +142,8 @@ pub(in crate::layout) fn sheets(
 
 /// Whether a board of this kind finds room.
 pub(in crate::layout) fn fits(spec: &BoardSpec, paper: &PaperSpec) -> bool {
-    let panels = crate::targets::board::untied_panels(&BoardSpec { boards: 1, ..spec.clone() });
+    let panels =
+        crate::targets::boards::board::untied_panels(&BoardSpec { boards: 1, ..spec.clone() });
     let cell = panels.first().map(|panel| Cell::new(spec, panel, paper));
     cell.is_some_and(|cell| arrange(&cell, 1, paper).is_ok_and(|found| found.is_some()))
 }

@@ -13,11 +13,11 @@ use glam::DVec2;
 
 use super::arrangement::{ADVANCE_CAPS, Arrangement, Footprint, fit_upright};
 use super::net::plane::{Motion, bounds, gap_mm};
+use crate::angles::direction;
 use crate::layout::paper::{Orientation, PaperSize, PaperSpec};
 use crate::layout::{Label, LineKind, SheetLayout, SheetLine, SheetPage, SheetText};
 use crate::polygon::rectangle;
 use crate::targets::TargetError;
-use crate::targets::angles::direction;
 
 /// Width of what neighbouring windows share, mm.
 const OVERLAP_MM: f64 = 10.0;

@@ -14,8 +14,8 @@ use crate::family::Family;
 use crate::lattice::ROW_HEIGHT;
 use crate::layout::paper::{PaperSize, PaperSpec};
 use crate::layout::{Label, Placement, SheetLayout, SheetText};
+use crate::targets::boards::tag_sheet::EDGE_MM;
 use crate::targets::length::format_mm;
-use crate::targets::tag_sheet::EDGE_MM;
 use crate::targets::{TagSheetSpec, TargetError};
 
 /// Blank around a tag: so many edges, at least so many mm, and at least a cell's edge.

@@ -4,8 +4,8 @@ use glam::DVec3;
 use serde::Serialize;
 
 use super::unfold::{Side, Sides};
+use crate::angles::angle;
 use crate::layout::Printing;
-use crate::targets::angles::angle;
 use crate::targets::{SolidSpec, TargetSpec};
 
 /// Sides that lie on each other on a sheet differ by less, mm.

@@ -8,6 +8,7 @@ use super::nest::{self, Outline, Place};
 use super::plane::{Motion, bounds};
 use super::tabs::{self, Tab};
 use super::unfold::{self, Piece, Side, Sides};
+use crate::angles::turn_of;
 use crate::lattice::{GridKind, Vertex};
 use crate::layout::paper::{PaperSpec, SolidSheets};
 use crate::layout::placing::arrangement::{
@@ -17,7 +18,6 @@ use crate::layout::placing::face_sheet::edge_numbers;
 use crate::layout::placing::poster::{MOST_PAGES, Poster};
 use crate::layout::{Label, LineKind, Placement, SheetLayout, SheetLine, SheetText};
 use crate::polygon;
-use crate::targets::angles::turn_of;
 use crate::targets::identity;
 use crate::targets::length::format_mm;
 use crate::targets::{Face, FamilyRef, Panel, Polyhedron, SolidSpec, TargetError};

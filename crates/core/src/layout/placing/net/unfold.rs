@@ -8,7 +8,7 @@ use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
 use super::plane::{Motion, TOUCHING_MM, bounds, gap_mm};
-use crate::targets::polyhedron::sides;
+use crate::targets::solids::polyhedron::sides;
 use crate::targets::{Polyhedron, SolidShape};
 
 /// Seed of the search for nets of meshes: any will do, a fixed one makes results repeatable.

@@ -16,10 +16,10 @@ use std::f64::consts::TAU;
 
 use glam::{DVec2, DVec3};
 
+use super::arrangement::{ADVANCE_CAPS, Footprint, fit_upright};
 use crate::lattice::{GridKind, Tile};
 use crate::layout::paper::{Orientation, PaperSize, PaperSpec, SolidSheets};
-use crate::layout::placing::arrangement::{ADVANCE_CAPS, Footprint, fit_upright};
-use crate::layout::{Label, LineKind, Printing, SheetLayout, SheetLine, SheetText};
+use crate::layout::{Label, LineKind, SheetLayout, SheetLine, SheetText};
 use crate::polygon::rectangle;
 use crate::targets::length::format_mm;
 use crate::targets::{
@@ -71,7 +71,7 @@ const BOARD_FROM: DVec3 = DVec3::new(-0.3, 0.4, 0.85);
 /// The page for a target that was laid out on `paper`.
 pub(in crate::layout) fn sheet(
     title: &str,
-    printing: &Printing,
+    (target, sheets): (&Target, &[SheetLayout]),
     paper: &PaperSpec,
 ) -> Result<SheetLayout, TargetError> {
     let paper = PaperSpec {
@@ -92,11 +92,11 @@ pub(in crate::layout) fn sheet(
             format!("{} leaves no room for the guide: take less", format_mm(paper.margin_mm));
         TargetError::invalid("PaperSpec::margin_mm", problem)
     })?;
-    let mut sheet = arrangement.sheet(0, [0.0; 4], description(title, &printing.target));
+    let mut sheet = arrangement.sheet(0, [0.0; 4], description(title, target));
     sheet.placements.clear();
     let [left, lower, right, upper] = arrangement.clear_mm();
     let (least, most) = (DVec2::new(left, lower + BLANK_MM), DVec2::new(right - BLANK_MM, upper));
-    Ok(Page { sheet, least, most }.filled(printing, &paper))
+    Ok(Page { sheet, least, most }.filled((target, sheets), &paper))
 }
 
 /// The paper itself where it is printed at a desk, else an A4.
@@ -132,13 +132,16 @@ struct Page {
 }
 
 impl Page {
-    fn filled(mut self, printing: &Printing, paper: &PaperSpec) -> SheetLayout {
-        let target = &printing.target;
+    fn filled(
+        mut self,
+        (target, sheets): (&Target, &[SheetLayout]),
+        paper: &PaperSpec,
+    ) -> SheetLayout {
         self.most.y -= NAME_CAP_MM;
         self.text(target.name.to_string(), DVec2::new(self.least.x, self.most.y), NAME_CAP_MM);
         self.most.y -= BLANK_MM;
         self.ruler();
-        let steps = self.wrapped(&steps(printing, paper));
+        let steps = self.wrapped(&steps((target, sheets), paper));
         let room = self.most.y - self.least.y;
         let height = (room - height(&steps) - BLANK_MM)
             .clamp(PICTURE_SHARE.0 * room, PICTURE_SHARE.1 * room);
@@ -446,8 +449,7 @@ fn tile_lines(panel: &Panel) -> Vec<[DVec2; 2]> {
 }
 
 /// What to do with the sheets of a target.
-fn steps(printing: &Printing, paper: &PaperSpec) -> Vec<String> {
-    let target = &printing.target;
+fn steps((target, sheets): (&Target, &[SheetLayout]), paper: &PaperSpec) -> Vec<String> {
     let name = &target.name;
     let mut steps = vec![
         "Print at 100 %, without \"fit to page\", on matt paper. Measure the lines of stated length on each sheet, \
@@ -456,7 +458,7 @@ fn steps(printing: &Printing, paper: &PaperSpec) -> Vec<String> {
     ];
     match &target.spec {
         TargetSpec::Solid(spec) => steps.extend(steps_of_solid(spec, paper)),
-        _ => steps.extend(steps_of_board(printing)),
+        _ => steps.extend(steps_of_board(target, sheets)),
     }
     match &target.spec {
         TargetSpec::Circles(_) => steps.push(format!(
@@ -481,17 +483,17 @@ fn steps(printing: &Printing, paper: &PaperSpec) -> Vec<String> {
     steps
 }
 
-fn steps_of_board(printing: &Printing) -> Vec<String> {
+fn steps_of_board(target: &Target, sheets: &[SheetLayout]) -> Vec<String> {
     let mut steps = Vec::new();
-    if printing.sheets.iter().any(|sheet| !sheet.pages.is_empty()) {
+    if sheets.iter().any(|sheet| !sheet.pages.is_empty()) {
         let trim = "Trim pages along the line at their left and upper end, and lay them on the crosses of the pages that they name.";
         steps.push(trim.to_owned());
     }
-    if printing.sheets.iter().any(|sheet| sheet.placements.len() > 1) {
+    if sheets.iter().any(|sheet| sheet.placements.len() > 1) {
         steps.push("Cut the boards apart along the lines; each has a label of its own.".to_owned());
     }
     let flat = "Lay a straightedge on it: what bends by a millimetre is worth less than a smaller board that does not.";
-    steps.push(match &printing.target.spec {
+    steps.push(match &target.spec {
         TargetSpec::Board(BoardSpec { two_sided_mm: Some(mm), .. }) => format!(
             "Cut both sides from mark to mark and glue them without bubbles on the two sides of a plate that stays flat and is as \
              large, so that they are {} apart with their paper; or print them on the plate, turned about its upright edge. The \
@@ -572,11 +574,12 @@ fn wrapped(text: &str, most: usize) -> Vec<String> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::layout::Printing;
     use crate::targets::SolidShape;
 
     fn guide(spec: impl Into<TargetSpec>) -> SheetLayout {
         let target = Printing::new("target", spec).unwrap();
-        sheet("target", &target, &PaperSpec::default()).unwrap()
+        sheet("target", (&target.target, &target.sheets), &PaperSpec::default()).unwrap()
     }
 
     /// Of an icosahedron that hides nothing but its own back, every edge of a face towards the eye is seen, whole, and

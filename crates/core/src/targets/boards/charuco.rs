@@ -15,13 +15,14 @@ use glam::{DMat3, DVec3};
 use serde::{Deserialize, Serialize};
 
 use super::capacity::{Setting, check_ids};
-use super::length::format_mm;
-use super::{
-    Corner, FamilyRef, GridKind, Outline, Panel, PanelPose, TagPlacement, TagsIn, TargetError,
-};
 use crate::family::{Family, dictionary, dictionary_names};
+use crate::lattice::GridKind;
 use crate::lattice::{Dimension, TagCells, Vertex};
 use crate::quantity;
+use crate::targets::length::format_mm;
+use crate::targets::{
+    Corner, FamilyRef, Outline, Panel, PanelPose, TagPlacement, TagsIn, TargetError,
+};
 
 /// Range of squares along a side: with three there is a row of two corners.
 const SIDES: std::ops::RangeInclusive<u32> = 3..=200;
@@ -171,12 +172,12 @@ impl CharucoSpec {
 }
 
 /// The panels that a spec asks for, whether or not its dictionary has so many markers.
-pub(super) fn untied_panels(spec: &CharucoSpec) -> Result<Vec<Panel>, TargetError> {
+pub(in crate::targets) fn untied_panels(spec: &CharucoSpec) -> Result<Vec<Panel>, TargetError> {
     Ok(vec![spec.panel(spec.check()?)])
 }
 
 /// The panel of a board, and its dictionary.
-pub(super) fn tagged(
+pub(in crate::targets) fn tagged(
     spec: &CharucoSpec,
     family: &Family,
 ) -> Result<(Vec<Panel>, FamilyRef), TargetError> {

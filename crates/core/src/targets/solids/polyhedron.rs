@@ -2,7 +2,7 @@
 
 use glam::DVec3;
 
-use super::angles::direction;
+use crate::angles::direction;
 
 /// A closed solid of flat, convex faces, mm; right-handed. Named solids have their centre in the
 /// origin, meshes keep the origin of their file.

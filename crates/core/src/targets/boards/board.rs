@@ -5,11 +5,12 @@ use std::collections::BTreeMap;
 use glam::{DMat3, DVec2, DVec3};
 
 use super::capacity::{Setting, check_family, wider_spacing};
-use super::{
-    BoardSpec, Corner, FamilyRef, GridKind, Outline, Panel, PanelPose, TagSpec, TagsIn, TargetError,
-};
 use crate::family::Family;
+use crate::lattice::GridKind;
 use crate::lattice::{ROW_HEIGHT, Vertex};
+use crate::targets::{
+    BoardSpec, Corner, FamilyRef, Outline, Panel, PanelPose, TagSpec, TagsIn, TargetError,
+};
 
 /// The corners of a zigzag board of `rows × cols` corners, by row, then column: every second row
 /// starts one column further left, so that odd rows lie half an edge to the right of even ones;

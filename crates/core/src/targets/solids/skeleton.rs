@@ -17,10 +17,10 @@ use glam::DVec3;
 use nalgebra::{DMatrix, DVector};
 use serde::{Deserialize, Serialize};
 
-use super::angles::{angle, tangent};
-use super::length::format_mm;
 use super::polyhedron::normal;
-use super::{ClosedMesh, Polyhedron, TargetError};
+use crate::angles::{angle, tangent};
+use crate::targets::length::format_mm;
+use crate::targets::{ClosedMesh, Polyhedron, TargetError};
 
 /// Material left at the foot of a rib on either side of the edge, mm: two lines of a 0.4 mm nozzle.
 const FOOT_MM: f64 = 0.8;

@@ -16,11 +16,11 @@
 
 use glam::{DMat3, DVec2, DVec3};
 
-use super::angles::direction;
-use super::board::board_vertices;
-use super::spec::MOST_ROWS;
-use super::{Incircle, Outline, PanelPose, Polyhedron};
+use crate::angles::direction;
 use crate::lattice::{GridKind, ROW_HEIGHT, Vertex};
+use crate::targets::boards::board::board_vertices;
+use crate::targets::boards::tag_spec::MOST_ROWS;
+use crate::targets::{Incircle, Outline, PanelPose, Polyhedron};
 
 /// Cosine of the least angle of a face that counts as rectangular: angles may be 1° off. Along a side of
 /// 150 mm that takes 2.6 mm, which the margin has; a board on a face with other angles would be much
@@ -140,7 +140,7 @@ impl Polyhedron {
     }
 
     /// The edge of the squares on all rectangular faces, mm: so many along the shortest side.
-    pub(super) fn square_edge_mm(&self, tiles: u32, margin_mm: f64) -> f64 {
+    pub(in crate::targets) fn square_edge_mm(&self, tiles: u32, margin_mm: f64) -> f64 {
         let rectangles =
             (0..self.faces.len()).filter(|&face| self.tiling(face) == GridKind::Checker);
         let sides = rectangles.map(|face| self.flat(face).room(margin_mm).1.min_element());
@@ -148,7 +148,7 @@ impl Polyhedron {
     }
 
     /// As [`Self::face`], with squares of a known edge.
-    pub(super) fn face_with_squares(
+    pub(in crate::targets) fn face_with_squares(
         &self,
         face: usize,
         tiles: u32,

@@ -1,17 +1,32 @@
 //! Single tags: a panel of one tile for each.
 
-use super::length::format_mm;
-use super::spec::BORDER_BITS;
-use super::{
-    FamilyRef, GridKind, Outline, Panel, PanelPose, TagPlacement, TagSheetSpec, TagsIn, TargetError,
-};
+use serde::{Deserialize, Serialize};
+
+use super::tag_spec::BORDER_BITS;
 use crate::family::Family;
+use crate::lattice::GridKind;
+use crate::targets::length::format_mm;
+use crate::targets::{FamilyRef, Outline, Panel, PanelPose, TagPlacement, TagsIn, TargetError};
+
+/// Single tags on sheets: a panel of one tile without corners for each, whose id is the tag's.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct TagSheetSpec {
+    /// Family name, or path of a family file.
+    pub family: String,
+    /// Tags in the order of printing, each once.
+    pub ids: Vec<u32>,
+    /// Length of a tag's edge, mm.
+    pub edge_mm: f64,
+    /// Width of the border, in widths of a bit, 0.6 to 10.
+    pub border_bits: f64,
+}
 
 /// Range of a tag's edge, mm: what office printers resolve in a tag, and what fits the largest page.
 pub(crate) const EDGE_MM: std::ops::RangeInclusive<f64> = 5.0..=2000.0;
 
 /// A panel for each tag, and their family.
-pub(super) fn tagged(
+pub(in crate::targets) fn tagged(
     spec: &TagSheetSpec,
     family: &Family,
 ) -> Result<(Vec<Panel>, FamilyRef), TargetError> {
@@ -20,7 +35,7 @@ pub(super) fn tagged(
 }
 
 /// A panel for each tag, by their ids.
-pub(super) fn panels(spec: &TagSheetSpec) -> Vec<Panel> {
+pub(in crate::targets) fn panels(spec: &TagSheetSpec) -> Vec<Panel> {
     let mut panels: Vec<Panel> = spec.ids.iter().map(|&id| panel(spec, id)).collect();
     panels.sort_by_key(|panel| panel.id);
     panels

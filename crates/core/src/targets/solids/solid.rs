@@ -4,16 +4,18 @@ use std::collections::BTreeMap;
 
 use glam::DVec3;
 
-use super::board::tagged_tiles;
-use super::capacity::{Setting, check_family, wider_spacing};
-use super::length::format_mm;
-use super::spec::MOST_ROWS;
-use super::{
-    Corner, Face, FaceBoard, FamilyRef, GridKind, Incircle, Panel, Polyhedron, Skeleton,
-    SolidShape, SolidSpec, TagSpec, TagsIn, TargetError,
-};
+use super::solid_spec::mean_side;
 use crate::family::Family;
+use crate::lattice::GridKind;
 use crate::lattice::Vertex;
+use crate::targets::boards::board::tagged_tiles;
+use crate::targets::boards::capacity::{Setting, check_family, wider_spacing};
+use crate::targets::boards::tag_spec::MOST_ROWS;
+use crate::targets::length::format_mm;
+use crate::targets::{
+    Corner, Face, FaceBoard, FamilyRef, Incircle, Panel, Polyhedron, Skeleton, SolidShape,
+    SolidSpec, TagSpec, TagsIn, TargetError,
+};
 
 /// Least blank along the edges of a panel in a skeleton, mm: room for the number of its face, and
 /// for a cut that is off.
@@ -151,11 +153,6 @@ impl SolidSpec {
         );
         TargetError::invalid("SolidSpec::edge_mm", problem)
     }
-}
-
-/// The mean side of a cuboid.
-pub(super) fn mean_side(sides: DVec3) -> f64 {
-    sides.element_sum() / 3.0
 }
 
 /// The tiles of a face that carry tags.

@@ -11,14 +11,15 @@
 use serde::{Deserialize, Serialize};
 
 use super::capacity::{Setting, check_ids};
-use super::length::format_mm;
-use super::spec::BORDER_BITS;
-use super::{
-    Corner, FamilyRef, GridKind, Outline, Panel, PanelPose, TagPlacement, TagsIn, TargetError,
-};
+use super::tag_spec::BORDER_BITS;
 use crate::family::Family;
+use crate::lattice::GridKind;
 use crate::lattice::Vertex;
 use crate::quantity;
+use crate::targets::length::format_mm;
+use crate::targets::{
+    Corner, FamilyRef, Outline, Panel, PanelPose, TagPlacement, TagsIn, TargetError,
+};
 
 /// Range of tags along a side: fewer corners than those of four tags may be texture.
 const SIDES: std::ops::RangeInclusive<u32> = 2..=100;
@@ -86,7 +87,7 @@ impl AprilGridSpec {
         Some(lines.map(|line| line + "\n").concat())
     }
 
-    pub(super) fn check(&self) -> Result<(), TargetError> {
+    pub(in crate::targets) fn check(&self) -> Result<(), TargetError> {
         if let Some(side) = self.tags.iter().find(|side| !SIDES.contains(side)) {
             let problem = format!("{side} is not between {} and {}", SIDES.start(), SIDES.end());
             return Err(TargetError::invalid("AprilGridSpec::tags", problem));
@@ -150,13 +151,13 @@ impl AprilGridSpec {
 }
 
 /// The panels that a spec asks for, whether or not its family has so many tags.
-pub(super) fn untied_panels(spec: &AprilGridSpec) -> Result<Vec<Panel>, TargetError> {
+pub(in crate::targets) fn untied_panels(spec: &AprilGridSpec) -> Result<Vec<Panel>, TargetError> {
     spec.check()?;
     Ok(vec![spec.panel()])
 }
 
 /// The panel of a grid, and its family.
-pub(super) fn tagged(
+pub(in crate::targets) fn tagged(
     spec: &AprilGridSpec,
     family: &Family,
 ) -> Result<(Vec<Panel>, FamilyRef), TargetError> {

@@ -7,8 +7,8 @@ use std::fmt;
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
 
-use super::angles::angle;
 use super::polyhedron::{normal, sides, triangles};
+use crate::angles::angle;
 
 /// Largest deviation of an edge from the mean of its face for a face that counts as
 /// near-equilateral. The faces of geodesic spheres, made of equal triangles as nearly as a sphere

@@ -1,14 +1,15 @@
 //! What to do where a family has too few codes for a target.
 
-use super::{FamilyRef, GridKind, TagSpec, TargetError};
 use crate::family::{Family, smallest_shipped};
+use crate::lattice::GridKind;
+use crate::targets::{FamilyRef, TagSpec, TargetError};
 
 /// Spacings beyond this are not proposed: a tag in twenty tiles is easily hidden.
 const SPARSEST: u32 = 20;
 
 /// What sets the family and the ids of tags.
 #[derive(Clone, Copy)]
-pub(super) struct Setting {
+pub(in crate::targets) struct Setting {
     family: &'static str,
     first_id: &'static str,
 }
@@ -35,7 +36,7 @@ impl Setting {
 }
 
 /// Checks that a family has `count` codes from the first id on; `instead` says what else to change.
-pub(super) fn check_ids(
+pub(in crate::targets) fn check_ids(
     setting: Setting,
     (first, count): (u32, u64),
     family: &Family,
@@ -58,7 +59,7 @@ pub(super) fn check_ids(
 /// Checks that the family is there, for tiles of this kind, and has `needed` codes from the first
 /// id on; `instead` lists
 /// what other than ids and family to change, given how many codes there are from the first id on.
-pub(super) fn check_family(
+pub(in crate::targets) fn check_family(
     kind: GridKind,
     tags: &TagSpec,
     edge_mm: f64,
@@ -115,7 +116,7 @@ pub(super) fn check_family(
 const HOLE_PART: f64 = 0.9;
 
 /// Why there is no room for a hole in tags of a family on tiles of a size.
-pub(super) fn no_room_for_hole(
+pub(in crate::targets) fn no_room_for_hole(
     family: &Family,
     edge_mm: f64,
     border_bits: f64,
@@ -136,7 +137,7 @@ pub(super) fn no_room_for_hole(
 }
 
 /// The closest spacing above that of `tags` with which `count` tags are enough, as a proposal.
-pub(super) fn wider_spacing(
+pub(in crate::targets) fn wider_spacing(
     tags: &TagSpec,
     available: u64,
     count: impl Fn(u32) -> u64,

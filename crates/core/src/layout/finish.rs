@@ -52,7 +52,7 @@ impl Finish {
     }
 
     /// Checks the names; returns the setting at fault and what is wrong with it.
-    pub(in crate::layout) fn check(&self) -> Result<(), (&'static str, String)> {
+    pub(super) fn check(&self) -> Result<(), (&'static str, String)> {
         for (setting, name) in self.spots() {
             let is_plain = |c: char| c.is_ascii_alphanumeric() || " _-.".contains(c);
             let is_name =
@@ -133,7 +133,7 @@ fn add_contour(sheet: &mut SheetLayout, margin_mm: f64) {
     if sheet.lines.iter().any(|line| line.kind == LineKind::Cut) {
         return;
     }
-    let inset = margin_mm.max(crate::layout::placing::arrangement::LEAST_MARGIN_MM) / 2.0;
+    let inset = margin_mm.max(super::placing::arrangement::LEAST_MARGIN_MM) / 2.0;
     let (right, upper) = (sheet.width_mm - inset, sheet.height_mm - inset);
     add_outline(sheet, rectangle([inset, inset, right, upper]));
 }

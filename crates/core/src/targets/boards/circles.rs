@@ -13,9 +13,10 @@
 use glam::{DMat3, DVec3};
 use serde::{Deserialize, Serialize};
 
-use super::length::format_mm;
-use super::{Corner, GridKind, Outline, Panel, PanelPose, TagsIn, TargetError};
+use crate::lattice::GridKind;
 use crate::quantity;
+use crate::targets::length::format_mm;
+use crate::targets::{Corner, Outline, Panel, PanelPose, TagsIn, TargetError};
 
 /// Range of circles along a side.
 const SIDES: std::ops::RangeInclusive<u32> = 2..=200;
@@ -119,7 +120,7 @@ impl CirclesSpec {
 }
 
 /// The panels that a spec asks for.
-pub(super) fn untied_panels(spec: &CirclesSpec) -> Result<Vec<Panel>, TargetError> {
+pub(in crate::targets) fn untied_panels(spec: &CirclesSpec) -> Result<Vec<Panel>, TargetError> {
     spec.check()?;
     Ok(vec![spec.panel()])
 }

@@ -1,0 +1,23 @@
+//! Flat targets: what is asked for of each kind, and where its corners and tags are.
+//!
+//! `board_spec` and `tag_spec` say what is asked for of boards of triangles and squares, and `board` makes their panels;
+//! `charuco`, `aprilgrid` and `circles` are the targets of other detectors, `tag_sheet` single tags: each has its
+//! specification and its panel in one file. `capacity` says what to do where a family has too few codes.
+
+pub(crate) mod aprilgrid;
+pub(crate) mod board;
+pub(crate) mod board_spec;
+pub(crate) mod capacity;
+pub(crate) mod charuco;
+pub(crate) mod circles;
+pub(crate) mod tag_sheet;
+pub(crate) mod tag_spec;
+
+pub use aprilgrid::AprilGridSpec;
+pub(crate) use board::tagged_tiles;
+pub use board::{board_vertices, zigzag_vertices};
+pub use board_spec::{BoardSpec, SIDES, least_untagged_corners};
+pub use charuco::CharucoSpec;
+pub use circles::CirclesSpec;
+pub use tag_sheet::TagSheetSpec;
+pub use tag_spec::{BORDER_BITS, MOST_ROWS, TagSpec};

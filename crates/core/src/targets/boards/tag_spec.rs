@@ -1,0 +1,205 @@
+//! What is asked for of the tags in a board, or on the faces of a solid.
+
+use serde::{Deserialize, Serialize};
+
+use crate::family::places;
+use crate::lattice::GridKind;
+use crate::lattice::Vertex;
+use crate::quantity;
+use crate::targets::{TagPlacement, TagsIn, TargetError};
+
+/// Most rows or columns of a board: more than the largest paper holds at the finest edge that
+/// anybody prints, and few enough that no number overflows.
+pub const MOST_ROWS: u32 = 500;
+
+/// Smallest hole in a tag, mm: for a thin pin.
+const LEAST_HOLE_MM: f64 = 0.5;
+
+/// Fewest tiles of a board of place codes: three by four, which tell their place also where some are hidden.
+pub(super) const LEAST_DENSE_TILES: u32 = 12;
+
+/// Least border of a square tag, bit-widths: that of an AprilTag.
+const LEAST_SQUARE_BORDER_BITS: f64 = 1.0;
+
+/// Range of a tag's border, bit-widths. The border separates the code from the white around the
+/// tile; with half a bit of it the detector no longer finds every corner of a clean print, from 0.6
+/// on it does.
+pub const BORDER_BITS: std::ops::RangeInclusive<f64> = 0.6..=10.0;
+
+/// Which tags a board carries, and where.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct TagSpec {
+    /// Family name, or path of a family file. Of [`places`] every tile has a tag, whose id follows from the board's and
+    /// its place.
+    pub family: String,
+    /// Id of the first tag; the others follow, by row, then column, board after board. 0 with place codes.
+    pub first_id: u32,
+    /// Every how many rows and columns there is a tag.
+    pub spacing: u32,
+    /// Width of the border, in widths of a bit, 0.6 to 10.
+    pub border_bits: f64,
+    /// Which squares of a checkerboard carry the tags.
+    #[serde(default, skip_serializing_if = "TagsIn::is_black")]
+    pub tags_in: TagsIn,
+    /// Diameter of a hole in the middle of each tag, mm, for a screw or a camera: bare paper on print, a cut for a laser. The
+    /// family leaves the cells there free.
+    #[serde(
+        default,
+        skip_serializing_if = "Option::is_none",
+        deserialize_with = "quantity::edge_mm::de"
+    )]
+    pub hole_mm: Option<f64>,
+}
+
+impl Default for TagSpec {
+    /// delTag25h7 from id 0, a tag in every third row and column, a border of 1.5 bits: a tag has
+    /// six plain tiles around each of its corners, and the border is that of published targets.
+    fn default() -> Self {
+        let family = "delTag25h7".to_owned();
+        Self {
+            family,
+            first_id: 0,
+            spacing: 3,
+            border_bits: 1.5,
+            tags_in: TagsIn::Black,
+            hole_mm: None,
+        }
+    }
+}
+
+impl TagSpec {
+    /// A place code in every tile of a deltille grid, with the usual border: corners are as precise as without codes from 2 px
+    /// a cell on.
+    pub fn dense() -> Self {
+        Self { family: places::NAME.to_owned(), spacing: 1, ..Self::default() }
+    }
+
+    /// The usual tags of a tiling: those above, or of the family that is asked for by its name.
+    pub fn usual(grid: GridKind, family: Option<&str>, tags_in: TagsIn) -> Self {
+        let usual = match grid {
+            GridKind::Checker => Self::for_squares(tags_in),
+            GridKind::Deltille if family == Some(places::NAME) => Self::dense(),
+            GridKind::Deltille => Self::default(),
+        };
+        let family = family.map_or(usual.family, str::to_owned);
+        Self { family, ..usual }
+    }
+
+    /// Whether every tile has a place code.
+    pub fn is_dense(&self) -> bool {
+        self.family == places::NAME
+    }
+
+    /// The tags in some tiles of the panel with an id, where those of a family begin with `first`.
+    pub(crate) fn placements(&self, panel: u32, first: u32, tiles: &[Vertex]) -> Vec<TagPlacement> {
+        let tiles = tiles.iter().zip(0..);
+        let of_tile = |(tile, i): (&Vertex, u32)| TagPlacement {
+            id: match self.is_dense() {
+                true => places::id(panel, *tile),
+                // No family has so many codes that ids overflow; a spec may ask for them.
+                false => first.saturating_add(i),
+            },
+            row: tile.row,
+            col: tile.col,
+        };
+        tiles.map(of_tile).collect()
+    }
+
+    /// Checks that there are place codes for panels with these ids, whose tiles lie in so many rows and columns.
+    pub(crate) fn check_places(
+        &self,
+        (setting, panels): (&'static str, std::ops::Range<u32>),
+        (size, rows, cols): (&'static str, u32, u32),
+    ) -> Result<(), TargetError> {
+        let last = places::BOARDS - 1;
+        if panels.end > places::BOARDS {
+            let problem = format!(
+                "boards {} to {} are needed, {} tells {last} as the last: lower it, or make fewer",
+                panels.start,
+                panels.end - 1,
+                places::NAME
+            );
+            return Err(TargetError::invalid(setting, problem));
+        }
+        if !places::are_different(rows, cols) {
+            let problem = format!(
+                "{rows} rows of {cols} tiles are more than {} tells apart, whose places come again after 256 edges: \
+                 make it smaller",
+                places::NAME
+            );
+            return Err(TargetError::invalid(size, problem));
+        }
+        let fixed = [
+            ("TagSpec::spacing", self.spacing, 1, "every tile has a place code"),
+            (
+                "TagSpec::first_id",
+                self.first_id,
+                0,
+                "the ids of place codes follow from the board's",
+            ),
+        ];
+        match fixed.into_iter().find(|(_, value, only, _)| value != only) {
+            Some((setting, value, only, why)) => {
+                let problem = format!("{value} is not {only}: {why}; leave it out");
+                Err(TargetError::invalid(setting, problem))
+            }
+            None => Ok(()),
+        }
+    }
+
+    /// Tags for a checkerboard: aprilTag36h11 in every second row and column, so that each corner
+    /// touches one tag at most.
+    ///
+    /// In black squares the border has two bits: with one, cells come so near to the corners that
+    /// these are found half as precisely (docs/measurements.md). In white squares it has the one bit
+    /// that every reader of AprilTags knows.
+    pub fn for_squares(tags_in: TagsIn) -> Self {
+        Self {
+            family: "aprilTag36h11".to_owned(),
+            spacing: 2,
+            border_bits: match tags_in {
+                TagsIn::Black => 2.0,
+                TagsIn::White => LEAST_SQUARE_BORDER_BITS,
+            },
+            tags_in,
+            ..Self::default()
+        }
+    }
+}
+
+impl TagSpec {
+    /// Checks every number by itself, of tags in tiles of a kind.
+    pub(crate) fn check(&self, grid: GridKind) -> Result<(), TargetError> {
+        if grid == GridKind::Deltille && self.tags_in == TagsIn::White {
+            let problem = "the tags of a deltille board are in its black tiles";
+            return Err(TargetError::invalid("TagSpec::tags_in", problem));
+        }
+        let least = LEAST_SQUARE_BORDER_BITS;
+        if grid == GridKind::Checker && self.border_bits < least {
+            let problem = format!(
+                "{} is too narrow, a square tag has a border of at least {least} bit-width",
+                self.border_bits
+            );
+            return Err(TargetError::invalid("TagSpec::border_bits", problem));
+        }
+        if !(1..=MOST_ROWS).contains(&self.spacing) {
+            let problem = format!("{} is not between 1 and {MOST_ROWS}", self.spacing);
+            return Err(TargetError::invalid("TagSpec::spacing", problem));
+        }
+        if !BORDER_BITS.contains(&self.border_bits) {
+            let problem = format!("{} is not between 0.6 and 10 bit-widths", self.border_bits);
+            return Err(TargetError::invalid("TagSpec::border_bits", problem));
+        }
+        let refused = |problem: &str| Err(TargetError::invalid("TagSpec::hole_mm", problem));
+        match self.hole_mm {
+            Some(_) if grid == GridKind::Checker => {
+                refused("square tags have no free cells: make a deltille board or solid")
+            }
+            Some(mm) if mm.is_nan() || mm < LEAST_HOLE_MM => {
+                refused(&format!("{mm} mm is less than {LEAST_HOLE_MM} mm"))
+            }
+            _ => Ok(()),
+        }
+    }
+}

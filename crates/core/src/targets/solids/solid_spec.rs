@@ -1,0 +1,305 @@
+//! What is asked for of a solid.
+
+use glam::DVec3;
+use serde::{Deserialize, Serialize};
+
+use crate::lattice::GridKind;
+use crate::targets::boards::board_spec::EDGE_MM;
+use crate::targets::length::format_mm;
+use crate::targets::{ClosedMesh, Polyhedron, SkeletonSpec, TagSpec, TagsIn, TargetError};
+
+/// Range of a solid's edge, mm.
+const SOLID_EDGE_MM: std::ops::RangeInclusive<f64> = 10.0..=5000.0;
+
+/// Range of tiles along a side of a face: with fewer than six a face has at most six corners,
+/// and the detector takes so few for no grid.
+pub const FACE_TILES: std::ops::RangeInclusive<u32> = 6..=200;
+
+/// Least margin of a face with white tiles on black, mm: it has the black around the tiles, and beyond that the numbers of
+/// the face.
+const LEAST_INVERTED_MARGIN_MM: f64 = 5.0;
+
+/// Usual margin of a face, mm: room to fold and glue; and of one with white tiles on black.
+const MARGIN_MM: f64 = 5.0;
+
+const INVERTED_MARGIN_MM: f64 = 8.0;
+
+/// So much of the margin of a face with white tiles is black.
+const RIM_PART: f64 = 0.4;
+
+/// Farthest a mesh may lie from its origin, mm: meshes and bodies are written in single precision,
+/// which at 100 m leaves 0.01 mm.
+const FARTHEST_MM: f64 = 1e5;
+
+/// Most triangles that the faces of a solid are divided into: meshes count their corners in 16 bits.
+const MOST_TRIANGLES: usize = 20_000;
+
+/// Most faces of a solid.
+const MOST_FACES: u32 = 10_000;
+
+/// A solid whose faces carry boards with tags: triangles of deltille tiles on triangular faces, checkerboards
+/// on rectangular ones.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SolidSpec {
+    /// The shape of the solid.
+    pub shape: SolidShape,
+    /// Length of the solid's edges, mm; of a cuboid or mesh their mean, to which it is scaled.
+    pub edge_mm: f64,
+    /// Number of black tiles along each side of a triangle, and of squares along the shortest side of all
+    /// rectangles, 6 to 200.
+    pub tiles: u32,
+    /// Blank between a face's edges and its tiles, mm.
+    pub margin_mm: f64,
+    /// Id of the first face's board; the others follow in the order of the faces.
+    pub board_id: u32,
+    /// The tags; `None` for bare tilings, whose faces are not told apart.
+    pub tags: Option<TagSpec>,
+    /// The tags of rectangular faces, where other faces have deltille tiles.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub square_tags: Option<TagSpec>,
+    /// Whether black and white are exchanged: white tiles on a black field, which takes a part of the margin.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub inverted: bool,
+    /// A frame that holds the faces as panels, if one is to be printed.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub skeleton: Option<SkeletonSpec>,
+}
+
+/// The solids; see [`Polyhedron`](crate::targets::Polyhedron) for the order of the faces of regular ones.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+#[non_exhaustive]
+pub enum SolidShape {
+    /// Four faces.
+    Tetrahedron,
+    /// Eight faces.
+    Octahedron,
+    /// Twenty faces.
+    Icosahedron,
+    /// Six square faces.
+    Cube,
+    /// Six rectangular faces: the sides along x, y and z, to be scaled to the mean edge.
+    Cuboid(DVec3),
+    /// Any other, by its faces.
+    Mesh(ClosedMesh),
+}
+
+impl SolidShape {
+    /// Its name.
+    pub fn name(&self) -> &'static str {
+        match self {
+            Self::Tetrahedron => "tetrahedron",
+            Self::Octahedron => "octahedron",
+            Self::Icosahedron => "icosahedron",
+            Self::Cube => "cube",
+            Self::Cuboid(_) => "cuboid",
+            Self::Mesh(_) => "mesh",
+        }
+    }
+}
+
+impl SolidSpec {
+    /// Shape and size in words.
+    pub fn size(&self) -> String {
+        match &self.shape {
+            SolidShape::Cuboid(sides) => {
+                let sides = *sides * (self.edge_mm / mean_side(*sides));
+                let [x, y, z] = sides.to_array().map(format_mm);
+                let [x, y] = [&x, &y].map(|side| side.trim_end_matches(" mm"));
+                format!("cuboid {x} × {y} × {z}")
+            }
+            shape => format!("{} edge {}", shape.name(), format_mm(self.edge_mm)),
+        }
+    }
+}
+
+impl SolidShape {
+    /// The tiling whose tags [`SolidSpec::tags`] are: squares where all faces are rectangles.
+    pub fn tag_tiling(&self) -> GridKind {
+        if self.tilings()[0] { GridKind::Deltille } else { GridKind::Checker }
+    }
+
+    /// Whether faces have deltille tiles, and whether faces have squares.
+    fn tilings(&self) -> [bool; 2] {
+        match self {
+            Self::Cube | Self::Cuboid(_) => [false, true],
+            Self::Mesh(mesh) => {
+                let (vertices_mm, faces) = (mesh.vertices().to_vec(), mesh.faces().to_vec());
+                let solid = Polyhedron { vertices_mm, faces };
+                let has = |kind| (0..solid.faces.len()).any(|face| solid.tiling(face) == kind);
+                [GridKind::Deltille, GridKind::Checker].map(has)
+            }
+            _ => [true, false],
+        }
+    }
+}
+
+impl SolidSpec {
+    /// Shortest edge, mm.
+    pub const LEAST_EDGE_MM: f64 = *SOLID_EDGE_MM.start();
+
+    /// Fewest tiles along a side of a face.
+    pub const FEWEST_TILES: u32 = *FACE_TILES.start();
+
+    /// Finest edge of a tile, mm: what [`BoardSpec`] allows.
+    pub const FINEST_TILE_MM: f64 = *EDGE_MM.start();
+
+    /// A solid of 150 mm edges, or a cuboid or mesh in its own size, with ten tiles a side (the tags of a
+    /// triangle then lie symmetrically), or eight squares, and 5 mm of blank along its edges, which leaves room to fold
+    /// and glue.
+    pub fn new(shape: SolidShape) -> Self {
+        let squares = || TagSpec::for_squares(TagsIn::Black);
+        let (tags, square_tags) = match shape.tilings() {
+            [false, _] => (Some(squares()), None),
+            [true, has_squares] => (Some(TagSpec::default()), has_squares.then(squares)),
+        };
+        let edge_mm = match &shape {
+            SolidShape::Mesh(mesh) => mesh.mean_edge(),
+            SolidShape::Cuboid(sides) => mean_side(*sides),
+            _ => 150.0,
+        };
+        // A square has room for more corners and tags than a triangle, so its tiles may be larger.
+        let tiles = if shape.tilings()[0] { 10 } else { 8 };
+        let (margin_mm, board_id, inverted, skeleton) = (MARGIN_MM, 0, false, None);
+        Self { shape, edge_mm, tiles, margin_mm, board_id, tags, square_tags, inverted, skeleton }
+    }
+
+    /// The margin that it has unless a skeleton needs more, mm.
+    pub(in crate::targets) fn usual_margin_mm(&self) -> f64 {
+        if self.inverted { INVERTED_MARGIN_MM } else { MARGIN_MM }
+    }
+
+    /// Width of the black around the tiles, mm; `None` where tiles are black on white.
+    pub(crate) fn rim_mm(&self) -> Option<f64> {
+        self.inverted.then_some(RIM_PART * self.margin_mm)
+    }
+
+    /// Width of the white along the edges of a face, mm.
+    pub(crate) fn white_margin_mm(&self) -> f64 {
+        self.margin_mm - self.rim_mm().unwrap_or_default()
+    }
+
+    /// The margin that leaves so much white along the edges, mm.
+    pub(in crate::targets) fn margin_around_mm(&self, white_mm: f64) -> f64 {
+        if self.inverted { white_mm / (1.0 - RIM_PART) } else { white_mm }
+    }
+
+    /// The tags of faces of a tiling.
+    pub(in crate::targets) fn tags_of(&self, kind: GridKind) -> Option<&TagSpec> {
+        match (kind, &self.square_tags) {
+            (GridKind::Checker, Some(tags)) => Some(tags),
+            _ => self.tags.as_ref(),
+        }
+    }
+
+    /// Checks every number by itself.
+    pub(crate) fn check(&self) -> Result<(), TargetError> {
+        if !SOLID_EDGE_MM.contains(&self.edge_mm) {
+            let edge = format_mm(self.edge_mm);
+            let problem = match &self.shape {
+                SolidShape::Mesh(_) => {
+                    format!(
+                        "the mean is {edge}, not between 10 mm and 5000 mm: set it, or scale the mesh to mm"
+                    )
+                }
+                _ => format!("{edge} is not between 10 mm and 5000 mm"),
+            };
+            return Err(TargetError::invalid("SolidSpec::edge_mm", problem));
+        }
+        if let SolidShape::Cuboid(sides) = &self.shape {
+            let scale = self.edge_mm / mean_side(*sides);
+            let wrong = |side: &f64| !(*side > 0.0 && SOLID_EDGE_MM.contains(&(side * scale)));
+            if let Some(side) = sides.to_array().into_iter().find(wrong) {
+                let side = format_mm(side * scale);
+                let problem = format!("a side of {side} is not between 10 mm and 5000 mm");
+                return Err(TargetError::invalid("SolidShape::Cuboid", problem));
+            }
+        }
+        if let SolidShape::Mesh(mesh) = &self.shape
+            && mesh.faces().len() > MOST_FACES as usize
+        {
+            let problem = format!("{} faces are more than {MOST_FACES}", mesh.faces().len());
+            return Err(TargetError::invalid("SolidShape::Mesh", problem));
+        }
+        if let SolidShape::Mesh(mesh) = &self.shape {
+            let triangles: usize = mesh.faces().iter().map(|face| face.len() - 2).sum();
+            if triangles > MOST_TRIANGLES {
+                let problem =
+                    format!("its faces are {triangles} triangles, more than {MOST_TRIANGLES}");
+                return Err(TargetError::invalid("SolidShape::Mesh", problem));
+            }
+        }
+        if let SolidShape::Mesh(mesh) = &self.shape {
+            let scale = self.edge_mm / mesh.mean_edge();
+            let far = |v: &DVec3| v.abs().max_element() * scale;
+            let farthest = mesh.vertices().iter().map(far).fold(0.0, f64::max);
+            if farthest > FARTHEST_MM {
+                let problem = format!(
+                    "it reaches {} from the origin, more than {}: move it nearer",
+                    format_mm(farthest),
+                    format_mm(FARTHEST_MM)
+                );
+                return Err(TargetError::invalid("SolidShape::Mesh", problem));
+            }
+        }
+        if !FACE_TILES.contains(&self.tiles) {
+            let problem = format!("{} is not between 6 and 200", self.tiles);
+            return Err(TargetError::invalid("SolidSpec::tiles", problem));
+        }
+        if !(0.0..=SOLID_EDGE_MM.end() / 4.0).contains(&self.margin_mm) {
+            let problem = format!("{} is no margin of a face", format_mm(self.margin_mm));
+            return Err(TargetError::invalid("SolidSpec::margin_mm", problem));
+        }
+        if self.board_id.checked_add(MOST_FACES).is_none() {
+            let problem = format!("{} leaves no ids for the faces after it", self.board_id);
+            return Err(TargetError::invalid("SolidSpec::board_id", problem));
+        }
+        if self.inverted && self.margin_mm < LEAST_INVERTED_MARGIN_MM {
+            let problem = format!(
+                "{} leaves no room for a black field around white tiles: take at least {}",
+                format_mm(self.margin_mm),
+                format_mm(LEAST_INVERTED_MARGIN_MM)
+            );
+            return Err(TargetError::invalid("SolidSpec::margin_mm", problem));
+        }
+        let Some(tags) = &self.tags else {
+            return match self.square_tags {
+                Some(_) => {
+                    let problem = "the other faces have no tags: leave it out";
+                    Err(TargetError::invalid("SolidSpec::square_tags", problem))
+                }
+                None => Ok(()),
+            };
+        };
+        if tags.is_dense() && self.shape.tag_tiling() == GridKind::Deltille {
+            let boards = self.board_id..self.board_id + self.polyhedron().faces.len() as u32;
+            // Faces of other shapes than triangles have up to twice as many rows.
+            let rows = if matches!(self.shape, SolidShape::Mesh(_)) { 2 } else { 1 } * self.tiles;
+            let size = ("SolidSpec::tiles", rows, rows);
+            tags.check_places(("SolidSpec::board_id", boards), size)?;
+        }
+        let kind = match (self.shape.tilings(), &self.square_tags) {
+            ([true, true], Some(tags)) => {
+                tags.check(GridKind::Checker)?;
+                GridKind::Deltille
+            }
+            ([true, false], None) => GridKind::Deltille,
+            ([false, _], None) => GridKind::Checker,
+            ([true, true], None) => {
+                let problem = "rectangular faces need square tags, the others have triangular ones";
+                return Err(TargetError::invalid("SolidSpec::square_tags", problem));
+            }
+            (_, Some(_)) => {
+                let problem = "all faces are of one kind and have one kind of tags: leave it out";
+                return Err(TargetError::invalid("SolidSpec::square_tags", problem));
+            }
+        };
+        tags.check(kind)
+    }
+}
+
+/// The mean side of a cuboid.
+pub(in crate::targets) fn mean_side(sides: DVec3) -> f64 {
+    sides.element_sum() / 3.0
+}
