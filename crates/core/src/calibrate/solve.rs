@@ -1,17 +1,19 @@
 //! From a calibration to its estimate: start, gross errors, bundle adjustment.
 
-use super::calibration::{Calibration, CameraViews, Intrinsics};
-use super::corner_map::CornerMap;
+use super::adjust::gross_errors::{Gross, Kept, WrongFrame, within_pictures};
+use super::adjust::reweighting::{Settled, settle, variance};
+use super::equations::minimise::{Minimum, Until, minimise};
 use super::error::CalibrationError;
-use super::estimate::{CameraEstimate, Estimate};
+use super::estimate::values::{CameraEstimate, Estimate};
 use super::excluded::{Excluded, Reason};
-use super::gross_errors::{Gross, Kept, WrongFrame, within_pictures};
-use super::minimise::{Minimum, Until, minimise};
-use super::panels;
-use super::problem::Problem;
-use super::reweighting::{Settled, settle, variance};
-use super::shape::{self, Shape};
-use super::start::{Frame, Start, enough};
+use super::input::calibration::{Calibration, CameraViews, Intrinsics};
+use super::problem::bundle::Problem;
+use super::problem::corner_map::CornerMap;
+use super::problem::panels;
+use super::problem::shape::{self, Shape};
+use super::start::alone::{self, enough};
+use super::start::frames::{Frame, Start};
+use super::start::together;
 use crate::camera::PROJECTION_PARAMETERS;
 
 /// Focal lengths and the principal point are not determined when a deviation is more than this part
@@ -99,7 +101,7 @@ impl Calibration {
             CameraViews { views, ..camera.clone() }
         });
         let own = self.of_cameras(cameras.collect());
-        let Start { mut problem, frames, mut excluded, delays, rotations } = Start::of(&own)?;
+        let Start { mut problem, frames, mut excluded, delays, rotations } = start(&own)?;
         problem.stop = self.stop.clone();
         let gross = Gross::of(problem).ok_or(CalibrationError::NoStart)?;
         own.check_frames(&gross)?;
@@ -271,6 +273,15 @@ impl Calibration {
             settled = settle(Kept { problem, ..gross.kept() }, self.weights, self.loss)?;
         }
         Ok(settled)
+    }
+}
+
+/// # Errors
+/// Where no start is found, or the views cannot determine what is sought.
+fn start(calibration: &Calibration) -> Result<Start, CalibrationError> {
+    match calibration.is_single() {
+        true => alone::start(calibration),
+        false => together::start(calibration),
     }
 }
 

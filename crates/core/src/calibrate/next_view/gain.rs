@@ -10,16 +10,16 @@
 //! ```
 //!
 //! θ are parameters of the camera, and of the board's shape where that is found too; ξ is a turn and a move of what
-//! the camera sees, by which a pose and the alignment of [`uncertainty`](super::super::uncertainty) are the same.
+//! the camera sees, by which a pose and the alignment of [`uncertainty`](crate::calibrate::uncertainty::projection) are the same.
 
 use glam::{DMat3, DVec2};
 use nalgebra::{DMatrix, DVector, Matrix3, Matrix6, SMatrix};
 
 use super::body::{Body, Seen};
-use crate::calibrate::estimate::{CameraEstimate, Estimate};
+use crate::calibrate::estimate::values::{CameraEstimate, Estimate};
 use crate::calibrate::model::Model;
-use crate::calibrate::shape::{self, Shape};
-use crate::calibrate::uncertainty::{by_motion, by_parameters, seen_at};
+use crate::calibrate::problem::shape::{self, Shape};
+use crate::calibrate::uncertainty::projection::{by_motion, by_parameters, seen_at};
 use crate::camera::{Camera, PROJECTION_PARAMETERS};
 
 /// Places along the longer side of the image by which projections are judged.

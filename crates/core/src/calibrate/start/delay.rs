@@ -6,9 +6,9 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use super::super::calibration::Calibration;
 use super::linked::{ByFrame, Seen};
 use super::symmetry::{Symmetries, agreed};
+use crate::calibrate::input::calibration::Calibration;
 use crate::statistics::median;
 
 /// Delays that are looked for, frames.
@@ -120,7 +120,7 @@ fn scatter_of_poses(
     });
     let relative: Vec<_> = relative.collect();
     let count = relative.len();
-    let moments: Vec<_> = super::evenly(&relative, MOST_MOMENTS).cloned().collect();
+    let moments: Vec<_> = super::first_camera::evenly(&relative, MOST_MOMENTS).cloned().collect();
     (count >= LEAST_MOMENTS).then(|| Some((agreed(&moments)?.spread_mm, count))).flatten()
 }
 

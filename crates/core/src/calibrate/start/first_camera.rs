@@ -4,10 +4,10 @@
 //! in the middle, the one is taken under which the views look most like views of planes. Half of the
 //! views may be wrong.
 
-use super::super::model::Model;
-use super::super::pose::planar_pose;
-use super::super::problem::Observation;
-use super::super::view::View;
+use super::pose::planar_pose;
+use crate::calibrate::input::view::View;
+use crate::calibrate::model::Model;
+use crate::calibrate::problem::bundle::Observation;
 use crate::camera::{BrownConrady, Camera, KannalaBrandt, Lens, Pose};
 use crate::statistics::median;
 

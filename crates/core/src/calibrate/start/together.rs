@@ -3,24 +3,24 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use super::super::calibration::{Calibration, CameraViews, Intrinsics};
-use super::super::error::CalibrationError;
-use super::super::estimate::Estimate;
-use super::super::excluded::Excluded;
-use super::super::loss::Loss;
-use super::super::minimise::{Until, minimise};
-use super::super::panel::PanelRef;
-use super::super::panels::{targets_unknown, unknowns};
-use super::super::problem::{Block, CameraUnknowns, Problem};
-use super::super::reweighting::scale;
 use super::delay::{delays, in_time};
+use super::frames::{Frame, Start};
 use super::linked::{ByFrame, Places, Seen};
 use super::symmetry::Symmetries;
-use super::{Frame, Start};
+use crate::calibrate::adjust::reweighting::scale;
+use crate::calibrate::equations::minimise::{Until, minimise};
+use crate::calibrate::error::CalibrationError;
+use crate::calibrate::estimate::values::Estimate;
+use crate::calibrate::excluded::Excluded;
+use crate::calibrate::input::calibration::{Calibration, CameraViews, Intrinsics};
+use crate::calibrate::input::loss::Loss;
+use crate::calibrate::input::panel::PanelRef;
+use crate::calibrate::problem::bundle::{Block, CameraUnknowns, Problem};
+use crate::calibrate::problem::panels::{targets_unknown, unknowns};
 use crate::camera::{Camera, Pose};
 use crate::statistics::median;
 
-pub(super) fn start(calibration: &Calibration) -> Result<Start, CalibrationError> {
+pub(in crate::calibrate) fn start(calibration: &Calibration) -> Result<Start, CalibrationError> {
     let cameras = &calibration.cameras;
     let mut excluded = Vec::new();
     let mut seen = ByFrame::new();

@@ -1,0 +1,4 @@
+//! Two calibrations of one camera.
+
+pub(in crate::calibrate) mod comparison;
+pub(in crate::calibrate) mod verdict;

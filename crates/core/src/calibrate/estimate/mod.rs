@@ -1,0 +1,7 @@
+//! The result.
+
+pub(in crate::calibrate) mod coverage;
+pub(in crate::calibrate) mod image_circle;
+pub(in crate::calibrate) mod lens_end;
+pub(in crate::calibrate) mod target_map;
+pub(in crate::calibrate) mod values;
