@@ -59,17 +59,20 @@ pub use estimate::values::{
     CameraEstimate, Corner, Estimate, FrameEstimate, Parameter, TargetEstimate, ViewEstimate,
 };
 pub use excluded::{Excluded, Reason};
-pub use input::calibration::{Calibration, CameraViews, Intrinsics, PanelPlace};
+pub use input::calibration::{Calibration, CameraViews, Intrinsics};
 pub use input::grid::UntaggedGrid;
 pub use input::loss::Loss;
+pub use input::observation::Observation;
+pub use input::observation::{Sighting, View};
+pub use input::panel::PanelPlace;
 pub use input::panel::PanelRef;
-pub use input::view::{Reference, Shown, Sighting, View, views};
+pub use input::reference::Reference;
+pub use input::views::{Shown, views};
+pub use input::weights::Weights;
 pub use model::{Model, ModelError};
 pub use next_view::guide::{Guide, Guided, NextView, ProposedCorner};
 pub use next_view::holding::{Held, Holding};
-pub use problem::bundle::Observation;
 pub use problem::shape::{BoardShape, COUNT as SHAPE_COEFFICIENTS, Shape};
-pub use problem::whitening::Weights;
 pub use start::symmetry::LabelRotation;
 pub use uncertainty::projection::{
     ObservedCovariance, ProjectionUncertainty, Source, UncertaintyMap,

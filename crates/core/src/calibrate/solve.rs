@@ -14,6 +14,7 @@ use super::problem::shape::{self, Shape};
 use super::start::alone::{self, enough};
 use super::start::frames::{Frame, Start};
 use super::start::together;
+use crate::calibrate::input::calibration::TargetPanels;
 use crate::camera::PROJECTION_PARAMETERS;
 
 /// Focal lengths and the principal point are not determined when a deviation is more than this part
@@ -72,6 +73,43 @@ impl Calibration {
         let held_out = test.map(|test| test.given(&estimate).adjusted()).transpose()?;
         let (held_out, calibrated_with) = (held_out.map(Box::new), self.identities.clone());
         Ok(Estimate { held_out, calibrated_with, ..estimate })
+    }
+
+    /// The same with nothing to be found but where the target was: all else is as an estimate has it.
+    fn given(&self, estimate: &Estimate) -> Self {
+        let cameras = self.cameras.iter().zip(&estimate.cameras).map(|(camera, found)| {
+            let mut views = camera.views.clone();
+            for sighting in views.iter_mut().flat_map(|view| &mut view.sightings) {
+                estimate.shape.iter().for_each(|found| sighting.bend(&found.shape));
+                estimate.map.iter().for_each(|map| sighting.correct(map));
+            }
+            CameraViews {
+                name: camera.name.clone(),
+                views,
+                intrinsics: found.camera.clone().into(),
+                camera_from_rig: Some(found.camera_from_rig),
+            }
+        });
+        let panels = estimate.panels.iter().map(|panel| panel.target_from_panel.into());
+        let panels = panels.collect();
+        let targets = self.targets.iter().zip(&estimate.targets).map(|(target, found)| {
+            TargetPanels { scene_from_target: Some(found.scene_from_target), ..target.clone() }
+        });
+        Self {
+            panels,
+            targets: targets.collect(),
+            identities: self.identities.clone(),
+            cameras: cameras.collect(),
+            stop: self.stop.clone(),
+            refine_panels: false,
+            board_shape: false,
+            measure_target: false,
+            distances_mm: Vec::new(),
+            order: self.order.clone(),
+            delays: Some(estimate.cameras.iter().map(|camera| camera.delay).collect()),
+            symmetries: self.symmetries.clone(),
+            ..*self
+        }
     }
 
     /// Refuses views of panels whose places are not given.

@@ -27,12 +27,12 @@ use super::view_consistency::Opinions;
 use crate::calibrate::equations::minimise::{Until, minimise};
 use crate::calibrate::error::CalibrationError;
 use crate::calibrate::input::loss::Loss;
+use crate::calibrate::input::observation::{LEAST_CORNERS, Sighting, View};
 use crate::calibrate::input::panel::PanelRef;
-use crate::calibrate::input::view::{LEAST_CORNERS, Sighting, View};
+use crate::calibrate::input::weights::Weights;
 use crate::calibrate::problem::bundle::{Block, CameraUnknowns, Problem};
-use crate::calibrate::problem::whitening::{Weights, Whitening};
-use crate::calibrate::start::pose::{estimate_pose, planar_pose};
-use crate::calibrate::start::together::middle;
+use crate::calibrate::problem::whitening::Whitening;
+use crate::calibrate::start::pose::{estimate_pose, middle, planar_pose};
 use crate::camera::Pose;
 use crate::statistics::median;
 

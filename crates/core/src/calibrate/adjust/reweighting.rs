@@ -12,9 +12,10 @@ use super::gross_errors::Kept;
 use crate::calibrate::equations::minimise::{Minimum, Until, minimise};
 use crate::calibrate::error::CalibrationError;
 use crate::calibrate::input::loss::Loss;
-use crate::calibrate::input::view::LEAST_CORNERS;
-use crate::calibrate::problem::bundle::{Block, Observation, Problem};
-use crate::calibrate::problem::whitening::{OUTLIER_SIGMA, Weights, Whitening};
+use crate::calibrate::input::observation::{LEAST_CORNERS, Observation};
+use crate::calibrate::input::weights::Weights;
+use crate::calibrate::problem::bundle::{Block, Problem};
+use crate::calibrate::problem::whitening::{OUTLIER_SIGMA, Whitening};
 
 /// Least number of rounds in which weights and solution are fitted to each other; the third changes
 /// no significant digit.

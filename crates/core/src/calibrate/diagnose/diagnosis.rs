@@ -9,9 +9,9 @@ use crate::calibrate::adjust::lack_of_fit::LackOfFit;
 use crate::calibrate::estimate::lens_end::LensEnd;
 use crate::calibrate::estimate::values::{CameraEstimate, Estimate};
 use crate::calibrate::input::calibration::Calibration;
+use crate::calibrate::input::order::in_order;
 use crate::calibrate::model::Model;
 use crate::calibrate::problem::shape::STRETCH;
-use crate::calibrate::start::delay::in_order;
 use crate::calibrate::start::symmetry::LabelRotation;
 use crate::camera::Camera;
 

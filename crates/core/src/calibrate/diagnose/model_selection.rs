@@ -10,10 +10,11 @@ use super::diagnosis::is_absurd;
 use crate::calibrate::adjust::lack_of_fit::{MATTERS, SIGNIFICANT, deviate_of_f};
 use crate::calibrate::estimate::values::Estimate;
 use crate::calibrate::input::calibration::{Calibration, CameraViews, Intrinsics};
-use crate::calibrate::input::view::View;
+use crate::calibrate::input::observation::View;
+use crate::calibrate::input::panel::PanelPlace;
+use crate::calibrate::input::sample::evenly;
 use crate::calibrate::model::Model;
 use crate::calibrate::problem::whitening::{MEDIAN_OF_CHI_SQUARED_2, OUTLIER_SIGMA};
-use crate::calibrate::start::first_camera::evenly;
 use crate::camera::{Camera, PROJECTION_PARAMETERS};
 use crate::statistics::median;
 
@@ -130,9 +131,7 @@ impl Calibration {
         let views = self.cameras[0].views.iter().enumerate();
         let views = views.map(|(index, view)| View { name: format!("{index:06}"), ..view.clone() });
         let panels = self.of_views(views.collect()).refine_panels(true).adjusted().ok()?.panels;
-        let stated = |place: &crate::calibrate::input::calibration::PanelPlace| {
-            place.target_from_panel.into()
-        };
+        let stated = |place: &PanelPlace| place.target_from_panel.into();
         let panels = panels.iter().map(stated).collect();
         Self { panels, ..self.clone() }.adjusted().ok()
     }

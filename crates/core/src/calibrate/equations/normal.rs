@@ -18,7 +18,8 @@ use nalgebra::{Cholesky, DMatrix, DVector, Matrix3, Matrix6, SMatrix, U6, Vector
 use rayon::prelude::*;
 
 use crate::calibrate::input::loss::Loss;
-use crate::calibrate::problem::bundle::{Block, Observation, Problem, moved};
+use crate::calibrate::input::observation::Observation;
+use crate::calibrate::problem::bundle::{Block, Problem, moved};
 use crate::calibrate::problem::corner_map::CornerMap;
 use crate::calibrate::problem::shape;
 use crate::calibrate::problem::whitening::Whitening;

@@ -2,6 +2,7 @@ use std::ops::Range;
 
 use glam::DVec3;
 
+use crate::calibrate::input::observation::Sighting;
 use crate::calibrate::input::panel::PanelRef;
 use crate::statistics::chi_squared_chance;
 use crate::targets::{MeasuredPlace, Target};
@@ -137,5 +138,14 @@ impl CornerOffset {
         let offset = nalgebra::Vector3::from(self.offset_mm.to_array());
         let Some(inverse) = covariance.try_inverse() else { return 1.0 };
         chi_squared_chance(offset.dot(&(inverse * offset)), 3)
+    }
+}
+
+impl Sighting {
+    /// Moves the corners to where a map has them; those that it does not have stay.
+    pub fn correct(&mut self, map: &TargetMap) {
+        for seen in &mut self.observations {
+            seen.panel_mm += map.offset_mm(self.panel, seen.row, seen.col);
+        }
     }
 }

@@ -6,17 +6,17 @@ use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
 use super::loss::Loss;
-use super::panel::PanelRef;
-use super::view::{Reference, Sighting, View};
+use super::observation::{Sighting, View};
+use super::order::in_order;
+use super::panel::{PanelPlace, PanelRef};
+use super::reference::Reference;
+use super::weights::Weights;
 use crate::calibrate::error::CalibrationError;
-use crate::calibrate::estimate::values::Estimate;
 use crate::calibrate::model::Model;
-use crate::calibrate::problem::whitening::Weights;
-use crate::calibrate::start::delay::in_order;
 use crate::calibrate::stop::Stop;
 use crate::camera::{Camera, Pose};
 use crate::lattice::LatticeMap;
-use crate::targets::{PanelPose, Target, TargetIdentity};
+use crate::targets::{Target, TargetIdentity};
 
 /// Cameras that are fixed to each other, their views of one rigid target or of several that are fixed to each
 /// other, and what of these is known.
@@ -103,28 +103,6 @@ pub enum Intrinsics {
         /// Which parameters are found, in the order of [`Camera::parameter_names`].
         free: Vec<bool>,
     },
-}
-
-/// The pose of a panel on its target.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct PanelPlace {
-    /// The pose, from the panel frame to the target frame, mm.
-    pub target_from_panel: Pose,
-    /// Covariance of a turn (rad) and a move (mm) along the target's axes, where it was measured;
-    /// `None` where it is as stated.
-    pub covariance: Option<[[f64; 6]; 6]>,
-}
-
-impl From<&PanelPose> for PanelPlace {
-    fn from(pose: &PanelPose) -> Self {
-        Self { target_from_panel: pose.to_pose(), covariance: pose.covariance }
-    }
-}
-
-impl From<Pose> for PanelPlace {
-    fn from(target_from_panel: Pose) -> Self {
-        Self { target_from_panel, covariance: None }
-    }
 }
 
 impl From<Model> for Intrinsics {
@@ -444,42 +422,5 @@ impl Calibration {
             Self { hold_out: None, order, ..self.of_cameras(cameras.collect()) }
         };
         Ok((part(false), Some(part(true))))
-    }
-
-    /// The same with nothing to be found but where the target was: all else is as an estimate has it.
-    pub(in crate::calibrate) fn given(&self, estimate: &Estimate) -> Self {
-        let cameras = self.cameras.iter().zip(&estimate.cameras).map(|(camera, found)| {
-            let mut views = camera.views.clone();
-            for sighting in views.iter_mut().flat_map(|view| &mut view.sightings) {
-                estimate.shape.iter().for_each(|found| sighting.bend(&found.shape));
-                estimate.map.iter().for_each(|map| sighting.correct(map));
-            }
-            CameraViews {
-                name: camera.name.clone(),
-                views,
-                intrinsics: found.camera.clone().into(),
-                camera_from_rig: Some(found.camera_from_rig),
-            }
-        });
-        let panels = estimate.panels.iter().map(|panel| panel.target_from_panel.into());
-        let panels = panels.collect();
-        let targets = self.targets.iter().zip(&estimate.targets).map(|(target, found)| {
-            TargetPanels { scene_from_target: Some(found.scene_from_target), ..target.clone() }
-        });
-        Self {
-            panels,
-            targets: targets.collect(),
-            identities: self.identities.clone(),
-            cameras: cameras.collect(),
-            stop: self.stop.clone(),
-            refine_panels: false,
-            board_shape: false,
-            measure_target: false,
-            distances_mm: Vec::new(),
-            order: self.order.clone(),
-            delays: Some(estimate.cameras.iter().map(|camera| camera.delay).collect()),
-            symmetries: self.symmetries.clone(),
-            ..*self
-        }
     }
 }

@@ -1,3 +1,5 @@
+//! An untagged board that no file describes.
+
 use std::collections::BTreeSet;
 
 use glam::DVec3;
@@ -8,7 +10,9 @@ use crate::targets::{
     BoardSpec, Target, TargetError, TargetIdentity, TargetSpec, board_vertices, symmetries,
 };
 
-use super::view::ASSUME_TARGET;
+/// What to do about detections of another target.
+pub(super) const ASSUME_TARGET: &str = "give the description that it was detected with, or set \
+                                        `Detection::assume_targets` to assume this one";
 
 /// An untagged board that no file describes. Its labels may differ between views by a motion of the
 /// lattice, which the pose of the view takes up.

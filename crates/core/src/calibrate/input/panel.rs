@@ -1,6 +1,11 @@
+//! Panels of a target: which one, and where it is.
+
 use std::fmt;
 
 use serde::{Serialize, Serializer};
+
+use crate::camera::Pose;
+use crate::targets::PanelPose;
 
 /// One of the panels of what was photographed.
 ///
@@ -41,5 +46,27 @@ impl fmt::Display for PanelRef {
 impl Serialize for PanelRef {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         self.id.serialize(serializer)
+    }
+}
+
+/// The pose of a panel on its target.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PanelPlace {
+    /// The pose, from the panel frame to the target frame, mm.
+    pub target_from_panel: Pose,
+    /// Covariance of a turn (rad) and a move (mm) along the target's axes, where it was measured;
+    /// `None` where it is as stated.
+    pub covariance: Option<[[f64; 6]; 6]>,
+}
+
+impl From<&PanelPose> for PanelPlace {
+    fn from(pose: &PanelPose) -> Self {
+        Self { target_from_panel: pose.to_pose(), covariance: pose.covariance }
+    }
+}
+
+impl From<Pose> for PanelPlace {
+    fn from(target_from_panel: Pose) -> Self {
+        Self { target_from_panel, covariance: None }
     }
 }

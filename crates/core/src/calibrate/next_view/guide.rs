@@ -21,8 +21,9 @@ use super::place::Placing;
 use crate::calibrate::error::CalibrationError;
 use crate::calibrate::estimate::values::Estimate;
 use crate::calibrate::input::calibration::{Calibration, Intrinsics};
+use crate::calibrate::input::observation::View;
 use crate::calibrate::input::panel::PanelRef;
-use crate::calibrate::input::view::{Reference, View};
+use crate::calibrate::input::reference::Reference;
 use crate::camera::{Camera, Lens, Pose};
 use crate::targets::Target;
 

@@ -5,8 +5,8 @@ use std::collections::BTreeMap;
 use glam::{DVec2, DVec3};
 
 use super::guide::NextView;
+use crate::calibrate::input::observation::{Sighting, View};
 use crate::calibrate::input::panel::PanelRef;
-use crate::calibrate::input::view::{Sighting, View};
 use crate::calibrate::start::pose::estimate_pose;
 use crate::camera::Pose;
 use crate::polygon::{area, clip, hull};

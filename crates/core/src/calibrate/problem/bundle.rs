@@ -4,26 +4,11 @@ use nalgebra::{Matrix6, Vector6};
 use super::corner_map::CornerMap;
 use super::roughness::Roughness;
 use super::shape::Shape;
+use crate::calibrate::input::observation::{LEAST_CORNERS, Observation};
 use crate::calibrate::input::panel::PanelRef;
-use crate::calibrate::input::view::LEAST_CORNERS;
 use crate::calibrate::model::without_gauge;
 use crate::calibrate::stop::Stop;
 use crate::camera::{Camera, Pose};
-
-/// A corner of a panel that a camera detected.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Observation {
-    /// Lattice row on its panel.
-    pub row: i32,
-    /// Lattice column on its panel.
-    pub col: i32,
-    /// Position in the panel frame, mm.
-    pub panel_mm: DVec3,
-    /// Detected position, px.
-    pub pixel: DVec2,
-    /// Covariance xx, xy, yy of the detected position, px²; `None` where it is not known.
-    pub cov: Option<[f64; 3]>,
-}
 
 /// A camera and what of it is unknown.
 #[derive(Clone, Debug, PartialEq)]

@@ -10,7 +10,8 @@ use std::collections::BTreeMap;
 use glam::DVec3;
 use nalgebra::{DMatrix, Matrix3};
 
-use super::bundle::{Observation, Problem};
+use super::bundle::Problem;
+use crate::calibrate::input::observation::Observation;
 use crate::calibrate::input::panel::PanelRef;
 use crate::statistics::median;
 

@@ -1,5 +1,7 @@
 use glam::DVec3;
 
+use crate::calibrate::input::observation::Sighting;
+
 /// Coefficients of a shape.
 pub const COUNT: usize = 9;
 
@@ -85,5 +87,14 @@ impl Shape {
     pub(in crate::calibrate) fn offset(&self, at: DVec3) -> DVec3 {
         let moved = self.directions(at).into_iter().zip(self.coefficients_mm);
         moved.map(|(direction, mm)| direction * mm).sum()
+    }
+}
+
+impl Sighting {
+    /// Moves the corners to where a sheet of this shape has them.
+    pub fn bend(&mut self, shape: &Shape) {
+        for seen in &mut self.observations {
+            seen.panel_mm += shape.offset(seen.panel_mm);
+        }
     }
 }

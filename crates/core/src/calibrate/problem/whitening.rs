@@ -3,6 +3,7 @@
 use glam::DVec2;
 
 use super::bundle::Problem;
+use crate::calibrate::input::weights::Weights;
 use crate::statistics::median;
 
 /// The median of a squared distance in the plane whose coordinates have variance 1: 2 ln 2.
@@ -18,19 +19,6 @@ const LEAST_SIGMA: f64 = 1e-6;
 /// A corner is an outlier beyond so many standard deviations: of a million corners with normal
 /// errors four are.
 pub(in crate::calibrate) const OUTLIER_SIGMA: f64 = 5.0;
-
-/// What is known of the corners' precision.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-#[non_exhaustive]
-pub enum Weights {
-    /// All corners alike.
-    Equal,
-    /// By their covariances, and a common deviation beside them: a covariance tells what the noise
-    /// of the image does, not what the print, the paper and the lens do, which is the same for all.
-    /// The common deviation is found from the residuals. Without covariances all corners are alike.
-    #[default]
-    Covariance,
-}
 
 /// For each corner the lower triangle a, b, c of W, with WᵀW = Σ⁻¹.
 #[derive(Clone, Debug)]

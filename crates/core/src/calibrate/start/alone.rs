@@ -13,7 +13,7 @@ use crate::calibrate::error::CalibrationError;
 use crate::calibrate::excluded::Reason;
 use crate::calibrate::input::calibration::{Calibration, CameraViews, Intrinsics};
 use crate::calibrate::input::loss::Loss;
-use crate::calibrate::input::view::View;
+use crate::calibrate::input::observation::View;
 use crate::calibrate::model::Model;
 use crate::calibrate::problem::bundle::{CameraUnknowns, Problem, TargetUnknowns};
 use crate::calibrate::problem::roughness::Roughness;

@@ -14,8 +14,7 @@
 
 use std::collections::BTreeMap;
 
-use crate::calibrate::input::view::{LEAST_CORNERS, Sighting, View};
-use crate::calibrate::problem::bundle::Observation;
+use crate::calibrate::input::observation::{LEAST_CORNERS, Observation, Sighting, View};
 use crate::statistics::median;
 
 /// Greatest deviation of the middle corner from the mean of its neighbours, as a fraction of their

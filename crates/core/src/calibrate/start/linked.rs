@@ -9,7 +9,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use super::motion::{Moment, placed_by_motion};
-use super::together::middle;
+use super::pose::middle;
 use crate::calibrate::error::{CalibrationError, TooPlain};
 use crate::calibrate::input::calibration::Calibration;
 use crate::camera::Pose;

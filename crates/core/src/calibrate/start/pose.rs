@@ -6,11 +6,12 @@ use nalgebra::{Matrix3, SMatrix};
 use crate::calibrate::adjust::reweighting::scale;
 use crate::calibrate::equations::minimise::{Until, minimise};
 use crate::calibrate::input::loss::Loss;
-use crate::calibrate::input::view::Sighting;
+use crate::calibrate::input::observation::{Observation, Sighting};
+use crate::calibrate::input::weights::Weights;
 use crate::calibrate::problem::bundle::{
-    Block, CameraUnknowns, Observation, PanelUnknowns, Problem, TargetUnknowns,
+    Block, CameraUnknowns, PanelUnknowns, Problem, TargetUnknowns,
 };
-use crate::calibrate::problem::whitening::{Weights, Whitening};
+use crate::calibrate::problem::whitening::Whitening;
 use crate::camera::{Camera, Pose};
 use crate::statistics::median;
 
@@ -208,4 +209,20 @@ pub(in crate::calibrate) fn blocks(
         panel: sighting.panel,
         observations: sighting.observations.clone(),
     })
+}
+
+/// The pose that lies in the middle of others: its median distance from them is the least. A turn
+/// counts by how far it moves a point as far away as the translations reach.
+pub(in crate::calibrate) fn middle(poses: &[Pose]) -> Pose {
+    let arm = median(poses.iter().map(|pose| pose.translation.length()).collect())
+        .unwrap_or(0.0)
+        .max(1.0);
+    let apart = |a: &Pose, b: &Pose| {
+        let turn = a.rotation.angle_between(b.rotation);
+        (a.translation - b.translation).length() + arm * turn
+    };
+    let spread =
+        |pose: &Pose| median(poses.iter().map(|other| apart(pose, other)).collect()).unwrap_or(0.0);
+    let of_all = poses.iter().map(|pose| (*pose, spread(pose)));
+    of_all.min_by(|a, b| a.1.total_cmp(&b.1)).map_or(Pose::IDENTITY, |(pose, _)| pose)
 }

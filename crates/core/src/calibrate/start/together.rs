@@ -18,7 +18,6 @@ use crate::calibrate::input::panel::PanelRef;
 use crate::calibrate::problem::bundle::{Block, CameraUnknowns, Problem};
 use crate::calibrate::problem::panels::{targets_unknown, unknowns};
 use crate::camera::{Camera, Pose};
-use crate::statistics::median;
 
 pub(in crate::calibrate) fn start(calibration: &Calibration) -> Result<Start, CalibrationError> {
     let cameras = &calibration.cameras;
@@ -142,20 +141,4 @@ fn by_frame(
         }
     }
     seen
-}
-
-/// The pose that lies in the middle of others: its median distance from them is the least. A turn
-/// counts by how far it moves a point as far away as the translations reach.
-pub(in crate::calibrate) fn middle(poses: &[Pose]) -> Pose {
-    let arm = median(poses.iter().map(|pose| pose.translation.length()).collect())
-        .unwrap_or(0.0)
-        .max(1.0);
-    let apart = |a: &Pose, b: &Pose| {
-        let turn = a.rotation.angle_between(b.rotation);
-        (a.translation - b.translation).length() + arm * turn
-    };
-    let spread =
-        |pose: &Pose| median(poses.iter().map(|other| apart(pose, other)).collect()).unwrap_or(0.0);
-    let of_all = poses.iter().map(|pose| (*pose, spread(pose)));
-    of_all.min_by(|a, b| a.1.total_cmp(&b.1)).map_or(Pose::IDENTITY, |(pose, _)| pose)
 }

@@ -16,7 +16,7 @@ use nalgebra::{DMatrix, DVector};
 
 use super::projection::by_motion;
 use crate::calibrate::input::loss::Loss;
-use crate::calibrate::input::view::LEAST_CORNERS;
+use crate::calibrate::input::observation::LEAST_CORNERS;
 use crate::calibrate::problem::bundle::Problem;
 use crate::calibrate::problem::whitening::Whitening;
 use crate::camera::Lens;

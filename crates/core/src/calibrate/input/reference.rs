@@ -1,31 +1,16 @@
-use std::collections::hash_map::Entry;
-use std::collections::{BTreeMap, HashMap};
+//! What was photographed, and how detections are compared with it: identity, panels, corners and tags.
 
-use glam::{DQuat, DVec2, DVec3};
+use std::collections::BTreeMap;
 
-use super::calibration::PanelPlace;
-use super::grid::UntaggedGrid;
-use super::panel::PanelRef;
-use crate::calibrate::error::CalibrationError;
-use crate::calibrate::estimate::target_map::TargetMap;
-use crate::calibrate::excluded::{Excluded, Reason};
-use crate::calibrate::problem::bundle::Observation;
-use crate::calibrate::problem::shape::Shape;
+use glam::DVec3;
+
+use super::grid::{ASSUME_TARGET, UntaggedGrid};
+use super::observation::{Observation, Sighting, View};
+use super::panel::{PanelPlace, PanelRef};
 use crate::camera::Pose;
 use crate::detect::{Detection, Grid};
 use crate::lattice::LatticeMap;
 use crate::targets::{Panel, Target, TargetIdentity};
-
-/// Corners that a panel needs in a view, so that a few wrong ones show.
-pub(in crate::calibrate) const LEAST_CORNERS: usize = 6;
-
-/// Corners of a mirrored picture turn the wrong way round, but for wrong ones: by so much, at least, of all of
-/// them more do than do not.
-const MIRRORED_MOST: f64 = 0.5;
-
-/// And by so many deviations: places anywhere turn either way, of a few all may turn the wrong one. By chance
-/// as many do once in a thousand pictures that show nothing else.
-const MIRRORED_SURE: f64 = 3.09;
 
 /// What is wrong with a board of the other tiling.
 const OTHER_KIND: &str =
@@ -37,10 +22,6 @@ const OTHER_TARGET: &str = "; the target does not belong to this detection";
 /// What is wrong with detections of one target where there are several.
 const OF_ONE_TARGET: &str =
     "it does not say which target its corners belong to: detect again with all targets at once";
-
-/// What to do about detections of another target.
-pub(in crate::calibrate) const ASSUME_TARGET: &str = "give the description that it was detected with, or set \
-                                        `Detection::assume_targets` to assume this one";
 
 /// Why labels of a grid without panel are not on the target.
 const CUT_OFF: &str = "its rows and columns are not those of the target: it is another board, or a part of one without tags, \
@@ -55,74 +36,6 @@ pub enum Reference<'a> {
     Scene(&'a [Target]),
     /// An untagged board.
     Grid(UntaggedGrid),
-}
-
-/// What one picture shows of one rigid target.
-#[derive(Clone, Debug, PartialEq)]
-pub struct View {
-    /// Name of the view, such as that of the detection's file; views of several cameras with the same name belong to
-    /// one frame.
-    pub name: String,
-    /// File name of the picture.
-    pub image: String,
-    /// Width and height of the picture, px.
-    pub size_px: [u32; 2],
-    /// The panels that were found.
-    pub sightings: Vec<Sighting>,
-}
-
-/// A panel in a picture.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Sighting {
-    /// The panel.
-    pub panel: PanelRef,
-    /// Its detected corners.
-    pub observations: Vec<Observation>,
-}
-
-impl View {
-    /// How many corners it shows.
-    pub fn corner_count(&self) -> usize {
-        self.sightings.iter().map(|sighting| sighting.observations.len()).sum()
-    }
-
-    /// The view as one that does not fit as a whole.
-    pub(in crate::calibrate) fn excluded(&self, reason: Reason) -> Excluded {
-        Excluded {
-            camera: None,
-            view: self.name.clone(),
-            image: self.image.clone(),
-            panel: None,
-            corners: self.corner_count(),
-            reason,
-        }
-    }
-}
-
-impl Sighting {
-    /// Moves the corners to where a sheet of this shape has them.
-    pub fn bend(&mut self, shape: &Shape) {
-        for seen in &mut self.observations {
-            seen.panel_mm += shape.offset(seen.panel_mm);
-        }
-    }
-
-    /// Moves the corners to where a map has them; those that it does not have stay.
-    pub fn correct(&mut self, map: &TargetMap) {
-        for seen in &mut self.observations {
-            seen.panel_mm += map.offset_mm(self.panel, seen.row, seen.col);
-        }
-    }
-
-    /// Moves the corners to where a print has them that is stretched across and up its sheet;
-    /// the panel is turned by `angle_rad` on it.
-    pub fn stretch(&mut self, [across, up]: [f64; 2], angle_rad: f64) {
-        let turn = DQuat::from_rotation_z(angle_rad);
-        for seen in &mut self.observations {
-            let on_sheet = turn * seen.panel_mm * DVec3::new(across, up, 1.0);
-            seen.panel_mm = turn.conjugate() * on_sheet;
-        }
-    }
 }
 
 impl Reference<'_> {
@@ -236,7 +149,7 @@ impl Reference<'_> {
     }
 
     /// Id of a panel; `None` on an untagged board.
-    fn panel_id(&self, panel: PanelRef) -> Option<u32> {
+    pub(super) fn panel_id(&self, panel: PanelRef) -> Option<u32> {
         match self {
             Self::Grid(_) => None,
             Self::Target(_) | Self::Scene(_) => Some(panel.id()),
@@ -244,7 +157,7 @@ impl Reference<'_> {
     }
 
     /// What a detection shows of the panels, or the panel that is wrong in it and why; `identities` are those of the targets.
-    fn sightings(
+    pub(super) fn sightings(
         &self,
         detection: &Detection,
         identities: &[TargetIdentity],
@@ -345,146 +258,6 @@ fn is_named(target: &Target, name: &str) -> bool {
     of_print(&target.name) == of_print(name)
 }
 
-/// The views of detections.
-#[derive(Clone, Debug, PartialEq)]
-#[non_exhaustive]
-pub struct Shown {
-    /// One for each picture, or for each board in it where several lie about.
-    pub views: Vec<View>,
-    /// Positions of the detections that show nothing.
-    pub empty: Vec<usize>,
-    /// Positions of the detections that do not belong to the target, or are of the same picture as another, and what is
-    /// wrong with them.
-    pub left_out: Vec<(usize, Excluded)>,
-}
-
-/// The views of all detections, each with its name; an error where most of those that show
-/// something do not belong to the target.
-///
-/// ```
-/// use deltille_core::calibrate::{Reference, views};
-/// use deltille_core::camera::{Camera, Pose};
-/// use deltille_core::detect::Detector;
-/// use deltille_core::synth::{Light, scene_of_target};
-/// use deltille_core::targets::{BoardSpec, Target};
-/// use glam::DVec3;
-///
-/// let board = Target::new("desk", BoardSpec::deltille(4, 5, 20.0))?;
-/// let eye = DVec3::new(50.0, -60.0, 200.0);
-/// let pose = Pose::looking_at(eye, board.panels[0].middle_mm(), DVec3::Y);
-/// let scene = scene_of_target(&board, board.family()?.as_ref())?;
-/// let image = scene.render(&Camera::pinhole(640, 480, 1.0), &pose, &Light::default());
-/// let found = Detector::new(&board)?.detect(&image.map(|grey| (255.0 * grey) as u8), "desk.png");
-/// let shown = views(&[("desk".to_owned(), found)], &Reference::Target(&board))?;
-/// assert_eq!(shown.views[0].corner_count(), 20);
-/// # Ok::<(), Box<dyn std::error::Error>>(())
-/// ```
-///
-/// # Errors
-/// Where pictures have different sizes, or most that show something are not of the target.
-pub fn views(
-    detections: &[(String, Detection)],
-    reference: &Reference,
-) -> Result<Shown, CalibrationError> {
-    let mut views = Vec::new();
-    let mut empty = Vec::new();
-    let mut left_out = Vec::new();
-    let mut first_wrong = None;
-    let mut wrong = 0;
-    let mut copies = 0;
-    let mut seen = HashMap::new();
-    let identities = reference.identities();
-    for (index, (name, detection)) in detections.iter().enumerate() {
-        let size_px = [detection.width, detection.height];
-        if let Some((first, other)) = detections.first()
-            && size_px != [other.width, other.height]
-        {
-            return Err(CalibrationError::MixedSizes {
-                first: first.clone(),
-                first_px: [other.width, other.height],
-                other: name.clone(),
-                other_px: size_px,
-            });
-        }
-        let excluded = |panel, reason| Excluded {
-            camera: None,
-            view: name.clone(),
-            image: detection.image.clone(),
-            panel,
-            corners: detection.grids.iter().map(|grid| grid.corners.len()).sum(),
-            reason,
-        };
-        if let Some(of) = copied(detection, name, &mut seen) {
-            left_out.push((index, excluded(None, Reason::Copy { of })));
-            copies += 1;
-            continue;
-        }
-        match sightings(detection, reference, &identities) {
-            Err((panel, problem)) => {
-                left_out.push((index, excluded(panel, Reason::Foreign(problem.clone()))));
-                wrong += 1;
-                let view = name.clone();
-                first_wrong.get_or_insert(CalibrationError::WrongDetection { view, problem });
-            }
-            Ok(sightings) if sightings.is_empty() => empty.push(index),
-            Ok(sightings) if reference.is_loose() => {
-                views.extend(sightings.into_iter().map(|sighting| View {
-                    name: format!("{name} board {}", sighting.panel),
-                    image: detection.image.clone(),
-                    size_px,
-                    sightings: vec![sighting],
-                }));
-            }
-            Ok(sightings) => {
-                let (name, image) = (name.clone(), detection.image.clone());
-                views.push(View { name, image, size_px, sightings });
-            }
-        }
-    }
-    let all = detections.len() - empty.len() - copies;
-    match first_wrong {
-        Some(first) if 2 * wrong > all => Err(match all {
-            1 => first,
-            _ => CalibrationError::MostWrong { first: Box::new(first), wrong, all },
-        }),
-        _ => Ok(Shown { views, empty, left_out }),
-    }
-}
-
-/// The name of the detection before, if any, that has the same corners to the last bit: of the same picture.
-fn copied<'a>(
-    detection: &'a Detection,
-    name: &'a str,
-    seen: &mut HashMap<[u64; 2], (&'a str, &'a Detection)>,
-) -> Option<String> {
-    let first = detection.grids.iter().find_map(|grid| grid.corners.first())?;
-    match seen.entry([first.x, first.y].map(f64::to_bits)) {
-        Entry::Vacant(place) => {
-            place.insert((name, detection));
-            None
-        }
-        Entry::Occupied(before) => {
-            let (of, before) = *before.get();
-            (before.grids == detection.grids).then(|| of.to_owned())
-        }
-    }
-}
-
-/// What a detection shows of the panels, or the panel that is wrong in it and why.
-fn sightings(
-    detection: &Detection,
-    reference: &Reference,
-    identities: &[TargetIdentity],
-) -> Result<Vec<Sighting>, (Option<u32>, String)> {
-    let mut sightings = reference.sightings(detection, identities)?;
-    sightings.retain(|sighting| sighting.observations.len() >= LEAST_CORNERS);
-    match (is_mirrored(&sightings), sightings.as_slice()) {
-        (true, [only]) => Err((reference.panel_id(only.panel), Reason::Mirrored.to_string())),
-        (true, _) => Err((None, Reason::Mirrored.to_string())),
-        (false, _) => Ok(sightings),
-    }
-}
-
 /// The corners of a grid on its panel, which are counted from `first` on; `None` where it was not labelled and the
 /// target has several.
 fn on_target(target: &Target, first: usize, grid: &Grid) -> Result<Option<Sighting>, String> {
@@ -578,68 +351,4 @@ fn observations(grid: &Grid, at: impl Fn(i32, i32) -> DVec3) -> Vec<Observation>
         cov: corner.cov,
     });
     seen.collect()
-}
-
-/// Whether the corners with two neighbours are mirrored, nearly all of the picture: of one in which two fifths
-/// of the corners are anywhere two fifths of these are mirrored too, and a panel of a few may be by chance.
-fn is_mirrored(sightings: &[Sighting]) -> bool {
-    let turns: Vec<f64> = sightings.iter().flat_map(turns).collect();
-    let (count, more) = (turns.len() as f64, turns.iter().sum::<f64>());
-    more > MIRRORED_MOST * count && more > MIRRORED_SURE * count.sqrt()
-}
-
-/// Which way corners turn to their neighbours in column and row: 1 where they are mirrored. In a picture, y
-/// down, rows and columns that run as on the print turn clockwise.
-fn turns(sighting: &Sighting) -> Vec<f64> {
-    let places: BTreeMap<(i32, i32), DVec2> =
-        sighting.observations.iter().map(|o| ((o.row, o.col), o.pixel)).collect();
-    let turn = |(&(row, col), &here): (&(i32, i32), &DVec2)| {
-        let (right, up) = (places.get(&(row, col + 1))?, places.get(&(row + 1, col))?);
-        Some((right - here).perp_dot(up - here).signum())
-    };
-    places.iter().filter_map(turn).collect()
-}
-
-#[cfg(test)]
-mod tests {
-    use rand::{Rng, SeedableRng};
-
-    use super::*;
-
-    /// A board of `rows` × 8 corners from above, of which a part are anywhere in the picture.
-    fn board(rows: i32, part_anywhere: f64, is_flipped: bool, seed: u64) -> Sighting {
-        let mut random = rand_chacha::ChaCha8Rng::seed_from_u64(seed);
-        let places = (0..rows).flat_map(|row| (0..8).map(move |col| (row, col)));
-        let observations = places.map(|(row, col)| {
-            let (x, y) = (100.0 * f64::from(col), 800.0 - 100.0 * f64::from(row));
-
-            let pixel = match random.random_bool(part_anywhere) {
-                true => {
-                    DVec2::new(random.random_range(0.0..800.0), random.random_range(0.0..800.0))
-                }
-                false if is_flipped => DVec2::new(800.0 - x, y),
-                false => DVec2::new(x, y),
-            };
-            Observation { row, col, panel_mm: DVec3::new(x, -y, 0.0), pixel, cov: None }
-        });
-        Sighting { panel: PanelRef::new(0, 0), observations: observations.collect() }
-    }
-
-    #[test]
-    fn a_mirror_is_told_from_wrong_places() {
-        for seed in 0..100 {
-            assert!(!is_mirrored(&[board(6, 0.4, false, seed)]), "seed {seed}");
-            assert!(is_mirrored(&[board(6, 0.05, true, seed)]), "seed {seed}");
-        }
-    }
-
-    /// A panel of a few corners, of which most are wrong, beside one that is not mirrored, and by itself.
-    #[test]
-    fn a_few_wrong_corners_are_no_mirror() {
-        for seed in 0..100 {
-            let few = board(2, 0.8, false, seed);
-            assert!(!is_mirrored(&[few.clone(), board(6, 0.2, false, seed)]), "seed {seed}");
-            assert!(!is_mirrored(&[few]), "seed {seed}");
-        }
-    }
 }
