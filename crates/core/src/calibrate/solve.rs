@@ -1,6 +1,6 @@
 //! From a calibration to its estimate: start, gross errors, bundle adjustment.
 
-use super::adjust::gross_errors::{Gross, Kept, WrongFrame, within_pictures};
+use super::adjust::gross_errors::{Gross, WrongFrame, within_pictures};
 use super::adjust::reweighting::{Settled, settle, variance};
 use super::equations::minimise::{Minimum, Until, minimise};
 use super::error::CalibrationError;
@@ -14,6 +14,7 @@ use super::problem::shape::{self, Shape};
 use super::start::alone::{self, enough};
 use super::start::frames::{Frame, Start};
 use super::start::together;
+use crate::calibrate::adjust::reweighting::Kept;
 use crate::calibrate::input::calibration::TargetPanels;
 use crate::camera::PROJECTION_PARAMETERS;
 
@@ -143,7 +144,7 @@ impl Calibration {
         problem.stop = self.stop.clone();
         let gross = Gross::of(problem).ok_or(CalibrationError::NoStart)?;
         own.check_frames(&gross)?;
-        let prepare = |kept: &mut Kept| panels::hold(kept, &own);
+        let prepare = |kept: &mut Kept| panels::hold(&mut kept.problem, &kept.left_out, &own);
         let (gross, settled) = gross.settled(own.weights, own.loss, prepare)?;
         let of_frames = gross.frames.iter();
         excluded.extend(of_frames.map(|(&frame, why)| {
@@ -294,7 +295,7 @@ impl Calibration {
     /// Finds the place of every corner of the target too.
     fn measured(&self, gross: &Gross, settled: Settled) -> Result<Settled, CalibrationError> {
         let mut problem = settled.problem.clone();
-        let map = CornerMap::flat(&problem);
+        let map = CornerMap::flat(&problem.blocks);
         problem.map = Some(map);
         let mut settled = settle(Kept { problem, ..gross.kept() }, self.weights, self.loss)?;
         for _ in 0..PRIOR_ROUNDS {

@@ -22,7 +22,7 @@ use glam::{DVec2, DVec3};
 
 use super::finding::{Count, Finding, Moved, Shared, shared_outliers};
 use super::lack_of_fit::lack_of_fit;
-use super::reweighting::{Settled, deviations, residuals, scale, settle, with_gross_errors};
+use super::reweighting::{Kept, Settled, settle, with_gross_errors};
 use super::view_consistency::Opinions;
 use crate::calibrate::equations::minimise::{Until, minimise};
 use crate::calibrate::error::CalibrationError;
@@ -30,8 +30,9 @@ use crate::calibrate::input::loss::Loss;
 use crate::calibrate::input::observation::{LEAST_CORNERS, Sighting, View};
 use crate::calibrate::input::panel::PanelRef;
 use crate::calibrate::input::weights::Weights;
-use crate::calibrate::problem::bundle::{Block, CameraUnknowns, Problem};
-use crate::calibrate::problem::whitening::Whitening;
+use crate::calibrate::problem::bundle::Problem;
+use crate::calibrate::problem::unknowns::{Block, CameraUnknowns};
+use crate::calibrate::problem::whitening::{Whitening, deviations, residuals, scale};
 use crate::calibrate::start::pose::{estimate_pose, middle, planar_pose};
 use crate::camera::Pose;
 use crate::statistics::median;
@@ -84,18 +85,6 @@ pub(in crate::calibrate) struct Gross {
     off_px: Vec<f64>,
     /// See [`Kept::some_stand_out`].
     some_stand_out: bool,
-}
-
-/// The parts of a problem that belong together.
-#[derive(Clone, Debug)]
-pub(in crate::calibrate) struct Kept {
-    pub problem: Problem,
-    /// Blocks that take no part.
-    pub left_out: Vec<bool>,
-    /// Whether corners with gross errors stand out from the start. They must then have no influence
-    /// even in the first round: if two fifths of the corners are displaced alike, they bias the
-    /// estimate so much that they no longer stand out.
-    pub some_stand_out: bool,
 }
 
 /// The estimate on which most corners agree.

@@ -8,14 +8,14 @@ use std::collections::BTreeMap;
 
 use glam::DVec2;
 
-use super::gross_errors::Kept;
 use crate::calibrate::equations::minimise::{Minimum, Until, minimise};
 use crate::calibrate::error::CalibrationError;
 use crate::calibrate::input::loss::Loss;
 use crate::calibrate::input::observation::{LEAST_CORNERS, Observation};
 use crate::calibrate::input::weights::Weights;
-use crate::calibrate::problem::bundle::{Block, Problem};
-use crate::calibrate::problem::whitening::{OUTLIER_SIGMA, Whitening};
+use crate::calibrate::problem::bundle::Problem;
+use crate::calibrate::problem::unknowns::Block;
+use crate::calibrate::problem::whitening::{OUTLIER_SIGMA, Whitening, deviations, residuals};
 
 /// Least number of rounds in which weights and solution are fitted to each other; the third changes
 /// no significant digit.
@@ -43,15 +43,16 @@ const SMOOTH: f64 = 0.5;
 const FALLS_OFF: f64 = 0.05;
 const LEAST_SMOOTH_SIGMA: f64 = 3.0;
 
-/// Residuals (observed minus predicted positions), px, for each block; empty for a block with a
-/// corner that its camera cannot image, which problems with valid initial values do not have.
-pub(in crate::calibrate) fn residuals(problem: &Problem) -> Vec<Vec<DVec2>> {
-    problem.blocks.iter().map(|block| problem.residuals(block).unwrap_or_default()).collect()
-}
-
-/// Whitening with equal weights for all corners, and the standard deviation of their coordinates.
-pub(in crate::calibrate) fn scale(problem: &Problem) -> Whitening {
-    Whitening::fit(problem, Weights::Equal, &residuals(problem))
+/// The parts of a problem that belong together.
+#[derive(Clone, Debug)]
+pub(in crate::calibrate) struct Kept {
+    pub problem: Problem,
+    /// Blocks that take no part.
+    pub left_out: Vec<bool>,
+    /// Whether corners with gross errors stand out from the start. They must then have no influence
+    /// even in the first round: if two fifths of the corners are displaced alike, they bias the
+    /// estimate so much that they no longer stand out.
+    pub some_stand_out: bool,
 }
 
 /// A consistent solution of weights, set of corners that count, and unknowns.
@@ -208,19 +209,6 @@ fn gross_limit(off: &[f64], sigma: f64) -> f64 {
         }
     }
     f64::MAX
-}
-
-/// Length of the whitened residual of each corner; infinite where its camera cannot image it.
-pub(in crate::calibrate) fn deviations(problem: &Problem, whitening: &Whitening) -> Vec<Vec<f64>> {
-    let weights = whitening.of(problem).blocks;
-    let of_block = |(block, weights): (&Block, &Vec<[f64; 3]>)| {
-        let off = block.observations.iter().zip(weights).map(|(seen, &w)| {
-            let off = Whitening::apply(w, problem.residual(block, seen)?);
-            Some(off.x.hypot(off.y))
-        });
-        off.map(|off| off.unwrap_or(f64::INFINITY)).collect()
-    };
-    problem.blocks.iter().zip(&weights).map(of_block).collect()
 }
 
 /// The variance factor by which the inverse of the normal equations is multiplied to give the

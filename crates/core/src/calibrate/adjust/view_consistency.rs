@@ -19,8 +19,9 @@ use rayon::prelude::*;
 
 use super::lack_of_fit::deviate_of_f;
 use super::reweighting::Settled;
+use crate::calibrate::equations::layout::Layout;
 use crate::calibrate::equations::local_share::LocalShare;
-use crate::calibrate::equations::normal::{Layout, Normal, Reduced};
+use crate::calibrate::equations::normal::{Normal, Reduced};
 use crate::calibrate::input::loss::Loss;
 use crate::calibrate::problem::bundle::Problem;
 use crate::statistics::median;

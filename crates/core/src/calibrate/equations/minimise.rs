@@ -1,4 +1,7 @@
-use super::normal::{Layout, Normal};
+//! Levenberg–Marquardt: from a problem's values to the next minimum of the cost.
+
+use super::layout::Layout;
+use super::normal::Normal;
 use crate::calibrate::input::loss::Loss;
 use crate::calibrate::problem::bundle::Problem;
 use crate::calibrate::problem::whitening::Whitening;

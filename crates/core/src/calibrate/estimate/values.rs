@@ -9,9 +9,9 @@ use super::lens_end::LensEnd;
 use super::target_map::{CornerOffset, TargetMap};
 use crate::calibrate::adjust::finding::Finding;
 use crate::calibrate::adjust::lack_of_fit::{LackOfFit, lack_of_fit};
-use crate::calibrate::adjust::reweighting::{Settled, deviations, variance};
+use crate::calibrate::adjust::reweighting::{Settled, variance};
+use crate::calibrate::equations::covariances::Covariances;
 use crate::calibrate::equations::minimise::Minimum;
-use crate::calibrate::equations::normal::Covariances;
 use crate::calibrate::error::CalibrationError;
 use crate::calibrate::excluded::Excluded;
 use crate::calibrate::input::calibration::{Calibration, CameraViews};
@@ -23,6 +23,7 @@ use crate::calibrate::next_view::gain::KnownSoFar;
 use crate::calibrate::problem::corner_map::CornerMap;
 use crate::calibrate::problem::roughness::Roughness;
 use crate::calibrate::problem::shape::{BoardShape, COUNT as SHAPE_COEFFICIENTS, Shape};
+use crate::calibrate::problem::whitening::deviations;
 use crate::calibrate::start::frames::Frame;
 use crate::calibrate::start::symmetry::LabelRotation;
 use crate::calibrate::uncertainty::agreement::{Observed, observed};
@@ -668,7 +669,8 @@ fn target_map(
     let covariances = map.without_gauge(covariances, settled.whitening.sigma, problem);
     let weights = weights(map, settled, loss);
     let few = weights.iter().filter(|of| of.1 > 0 && rests_on_few(of)).count();
-    let corners = map.corners.iter().zip(&map.offsets_mm).zip(covariances).zip(map.views(problem));
+    let corners =
+        map.corners.iter().zip(&map.offsets_mm).zip(covariances).zip(map.views(&problem.blocks));
     let all = corners.zip(&weights).enumerate();
     let measured = all.filter(|(_, (_, of))| !rests_on_few(of));
     let corners = measured.map(|(index, ((((corner, &offset_mm), covariance), views), _))| {

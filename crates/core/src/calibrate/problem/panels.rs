@@ -6,8 +6,8 @@
 
 use std::collections::BTreeSet;
 
-use super::bundle::{Block, PanelUnknowns, Prior, TargetUnknowns};
-use crate::calibrate::adjust::gross_errors::Kept;
+use super::bundle::Problem;
+use super::unknowns::{Block, PanelUnknowns, Prior, TargetUnknowns};
 use crate::calibrate::input::calibration::Calibration;
 use crate::camera::Pose;
 
@@ -53,18 +53,22 @@ pub(in crate::calibrate) fn targets_unknown(
 
 /// Holds a panel of those that take part, and a target. Where frames went, a panel may hang together with no
 /// other, or another be held.
-pub(in crate::calibrate) fn hold(kept: &mut Kept, calibration: &Calibration) {
-    let of_blocks = kept.problem.blocks.iter().zip(&kept.left_out);
+pub(in crate::calibrate) fn hold(
+    problem: &mut Problem,
+    left_out: &[bool],
+    calibration: &Calibration,
+) {
+    let of_blocks = problem.blocks.iter().zip(left_out);
     let taking_part = of_blocks.filter(|(_, out)| !**out).map(|(block, _)| block.clone());
     let taking_part: Vec<Block> = taking_part.collect();
     let unknowns = unknowns(&taking_part, calibration);
-    for (panel, unknown) in kept.problem.panels.iter_mut().zip(unknowns) {
+    for (panel, unknown) in problem.panels.iter_mut().zip(unknowns) {
         if panel.pose_free != unknown.pose_free {
             *panel = unknown;
         }
     }
-    let places: Vec<Pose> = kept.problem.targets.iter().map(|t| t.scene_from_target).collect();
-    kept.problem.targets = targets_unknown(&taking_part, calibration, &places);
+    let places: Vec<Pose> = problem.targets.iter().map(|t| t.scene_from_target).collect();
+    problem.targets = targets_unknown(&taking_part, calibration, &places);
 }
 
 /// The panel of a target to be held: the one seen most of those that no measurement moves, which an earlier

@@ -3,6 +3,7 @@
 use glam::DVec2;
 
 use super::bundle::Problem;
+use super::unknowns::Block;
 use crate::calibrate::input::weights::Weights;
 use crate::statistics::median;
 
@@ -117,7 +118,7 @@ const LEAST_FREE: f64 = 0.25;
 fn covariances(problem: &Problem) -> Option<Vec<Vec<[f64; 3]>>> {
     let all = || problem.blocks.iter().flat_map(|block| &block.observations);
     let largest = all().filter_map(|o| o.cov).map(|[xx, _, yy]| xx.max(yy)).fold(0.0, f64::max);
-    let of = |block: &super::bundle::Block| {
+    let of = |block: &Block| {
         block.observations.iter().map(|o| o.cov.unwrap_or([largest, 0.0, largest])).collect()
     };
     (largest > 0.0).then(|| problem.blocks.iter().map(of).collect())
@@ -141,4 +142,28 @@ fn triangle([xx, xy, yy]: [f64; 3], common: f64) -> [f64; 3] {
     let m = xy / l;
     let n = (yy + common - m * m).sqrt();
     [1.0 / l, -m / (l * n), 1.0 / n]
+}
+
+/// Residuals (observed minus predicted positions), px, for each block; empty for a block with a
+/// corner that its camera cannot image, which problems with valid initial values do not have.
+pub(in crate::calibrate) fn residuals(problem: &Problem) -> Vec<Vec<DVec2>> {
+    problem.blocks.iter().map(|block| problem.residuals(block).unwrap_or_default()).collect()
+}
+
+/// Whitening with equal weights for all corners, and the standard deviation of their coordinates.
+pub(in crate::calibrate) fn scale(problem: &Problem) -> Whitening {
+    Whitening::fit(problem, Weights::Equal, &residuals(problem))
+}
+
+/// Length of the whitened residual of each corner; infinite where its camera cannot image it.
+pub(in crate::calibrate) fn deviations(problem: &Problem, whitening: &Whitening) -> Vec<Vec<f64>> {
+    let weights = whitening.of(problem).blocks;
+    let of_block = |(block, weights): (&Block, &Vec<[f64; 3]>)| {
+        let off = block.observations.iter().zip(weights).map(|(seen, &w)| {
+            let off = Whitening::apply(w, problem.residual(block, seen)?);
+            Some(off.x.hypot(off.y))
+        });
+        off.map(|off| off.unwrap_or(f64::INFINITY)).collect()
+    };
+    problem.blocks.iter().zip(&weights).map(of_block).collect()
 }

@@ -7,7 +7,6 @@ use super::first_camera::first_camera;
 use super::frames::{Frame, Start};
 use super::pose::{blocks, estimate_pose, fixed, median_off_px};
 use super::splined::splined;
-use crate::calibrate::adjust::reweighting::scale;
 use crate::calibrate::equations::minimise::{Until, minimise};
 use crate::calibrate::error::CalibrationError;
 use crate::calibrate::excluded::Reason;
@@ -15,8 +14,10 @@ use crate::calibrate::input::calibration::{Calibration, CameraViews, Intrinsics}
 use crate::calibrate::input::loss::Loss;
 use crate::calibrate::input::observation::View;
 use crate::calibrate::model::Model;
-use crate::calibrate::problem::bundle::{CameraUnknowns, Problem, TargetUnknowns};
+use crate::calibrate::problem::bundle::Problem;
 use crate::calibrate::problem::roughness::Roughness;
+use crate::calibrate::problem::unknowns::{CameraUnknowns, TargetUnknowns};
+use crate::calibrate::problem::whitening::scale;
 use crate::camera::{Camera, Lens, Pose};
 use crate::statistics::median;
 

@@ -3,15 +3,13 @@
 use glam::{DMat3, DQuat, DVec3};
 use nalgebra::{Matrix3, SMatrix};
 
-use crate::calibrate::adjust::reweighting::scale;
 use crate::calibrate::equations::minimise::{Until, minimise};
 use crate::calibrate::input::loss::Loss;
 use crate::calibrate::input::observation::{Observation, Sighting};
 use crate::calibrate::input::weights::Weights;
-use crate::calibrate::problem::bundle::{
-    Block, CameraUnknowns, PanelUnknowns, Problem, TargetUnknowns,
-};
-use crate::calibrate::problem::whitening::Whitening;
+use crate::calibrate::problem::bundle::Problem;
+use crate::calibrate::problem::unknowns::{Block, CameraUnknowns, PanelUnknowns, TargetUnknowns};
+use crate::calibrate::problem::whitening::{Whitening, scale};
 use crate::camera::{Camera, Pose};
 use crate::statistics::median;
 

@@ -7,7 +7,6 @@ use super::delay::{delays, in_time};
 use super::frames::{Frame, Start};
 use super::linked::{ByFrame, Places, Seen};
 use super::symmetry::Symmetries;
-use crate::calibrate::adjust::reweighting::scale;
 use crate::calibrate::equations::minimise::{Until, minimise};
 use crate::calibrate::error::CalibrationError;
 use crate::calibrate::estimate::values::Estimate;
@@ -15,8 +14,10 @@ use crate::calibrate::excluded::Excluded;
 use crate::calibrate::input::calibration::{Calibration, CameraViews, Intrinsics};
 use crate::calibrate::input::loss::Loss;
 use crate::calibrate::input::panel::PanelRef;
-use crate::calibrate::problem::bundle::{Block, CameraUnknowns, Problem};
+use crate::calibrate::problem::bundle::Problem;
 use crate::calibrate::problem::panels::{targets_unknown, unknowns};
+use crate::calibrate::problem::unknowns::{Block, CameraUnknowns};
+use crate::calibrate::problem::whitening::scale;
 use crate::camera::{Camera, Pose};
 
 pub(in crate::calibrate) fn start(calibration: &Calibration) -> Result<Start, CalibrationError> {

@@ -24,9 +24,11 @@
 use nalgebra::{DMatrix, DVector, Matrix6};
 use rayon::prelude::*;
 
+use crate::calibrate::equations::block::Local;
+use crate::calibrate::equations::covariances::Covariances;
+use crate::calibrate::equations::frame::OfFrame;
 use crate::calibrate::equations::local_share::LocalShare;
 use crate::calibrate::equations::minimise::Minimum;
-use crate::calibrate::equations::normal::{Covariances, Local, OfFrame};
 use crate::calibrate::input::loss::Loss;
 use crate::calibrate::problem::corner_map::CornerMap;
 use crate::calibrate::problem::whitening::Whitening;

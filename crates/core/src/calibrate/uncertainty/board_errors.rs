@@ -15,8 +15,10 @@ use glam::DVec3;
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
+use crate::calibrate::equations::block::Local;
+use crate::calibrate::equations::covariances::Covariances;
+use crate::calibrate::equations::frame::OfFrame;
 use crate::calibrate::equations::minimise::Minimum;
-use crate::calibrate::equations::normal::{Covariances, Local, OfFrame};
 use crate::calibrate::input::loss::Loss;
 use crate::calibrate::problem::corner_map::CornerMap;
 use crate::calibrate::problem::whitening::Whitening;
@@ -46,7 +48,7 @@ pub(in crate::calibrate) fn board_errors(
     if problem.map.is_some() || layout.shared == 0 {
         return None;
     }
-    let map = CornerMap::flat(problem);
+    let map = CornerMap::flat(&problem.blocks);
     let accuracy_mm = accuracy(&map, accuracy_mm)?;
     let mut problem = problem.clone();
     let sheets = sheets(&map, &SHEET);
