@@ -22,6 +22,7 @@
 //! and τ (mm).
 
 mod adjust;
+mod adjusted;
 mod automatic;
 mod compare;
 mod diagnose;
@@ -55,6 +56,7 @@ pub use estimate::coverage::Coverage;
 pub use estimate::image_circle::ImageCircle;
 pub use estimate::lens_end::LensEnd;
 pub use estimate::target_map::{CornerOffset, LEAST_TO_MEASURE, TargetMap};
+pub use estimate::uncertainty_map::UncertaintyMap;
 pub use estimate::values::{
     CameraEstimate, Corner, Estimate, FrameEstimate, Parameter, TargetEstimate, ViewEstimate,
 };
@@ -74,6 +76,4 @@ pub use next_view::guide::{Guide, Guided, NextView, ProposedCorner};
 pub use next_view::holding::{Held, Holding};
 pub use problem::shape::{BoardShape, COUNT as SHAPE_COEFFICIENTS, Shape};
 pub use start::symmetry::LabelRotation;
-pub use uncertainty::projection::{
-    ObservedCovariance, ProjectionUncertainty, Source, UncertaintyMap,
-};
+pub use uncertainty::projection::{ObservedCovariance, ProjectionUncertainty, Source};

@@ -330,7 +330,7 @@ impl Grid {
     ) -> impl Fn(usize) -> bool + 'a {
         let counts = |of: &CameraEstimate| {
             let mut counts: BTreeMap<[i64; 2], usize> = BTreeMap::new();
-            for (pixel, count) in Coverage::of(of).places(of) {
+            for (pixel, count) in Coverage::of(of).places(of.size_px()) {
                 let [x, y] = self.place(pixel);
                 let around = (-1..=1).flat_map(|dx| (-1..=1).map(move |dy| [x + dx, y + dy]));
                 around.for_each(|place| *counts.entry(place).or_default() += count as usize);

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeSet;
 
-use super::model_selection::{Instead, Remedy, is_explained};
+use super::model_selection::{Alone, FOREIGN_PART, Instead, Remedy, is_absurd, is_explained};
 use super::one_state::{BoardStretch, CameraChange, RollingShutter, State};
 use crate::calibrate::adjust::finding::{Finding, Shared};
 use crate::calibrate::adjust::lack_of_fit::LackOfFit;
@@ -18,11 +18,6 @@ use crate::camera::Camera;
 /// Corners are found to a few hundredths of a pixel; a camera that leaves more than this does not
 /// have the lens of the model.
 const POOR_RMS_PX: f64 = 1.0;
-
-/// A known camera that leaves more than this part of the image's width did not take the pictures: poses
-/// take up most of what focal lengths and principal point are off by, and so much is left by another
-/// lens, zoom or crop only.
-pub(in crate::calibrate) const FOREIGN_PART: f64 = 0.005;
 
 /// The part of its views that a calibration may leave out.
 const MOST_LEFT_OUT: f64 = 0.2;
@@ -271,17 +266,6 @@ impl Calibration {
         });
         alone.collect()
     }
-
-    /// A camera by itself, with panels where they were found, and what its views say.
-    pub(in crate::calibrate) fn and_alone(&self, camera: usize, found: &Estimate) -> Alone {
-        if self.is_single() {
-            return Some((self.clone(), found.clone()));
-        }
-        self.cameras.get(camera)?;
-        let alone = self.alone(camera, &found.panels);
-        let found = alone.adjusted().ok()?;
-        Some((alone, found))
-    }
 }
 
 impl Estimate {
@@ -291,9 +275,6 @@ impl Estimate {
         said(self, &vec![None; self.cameras.len()])
     }
 }
-
-/// A camera by itself, and what its views say.
-type Alone = Option<(Calibration, Estimate)>;
 
 fn said(found: &Estimate, alone: &[Alone]) -> Vec<Diagnosis> {
     let cameras = || found.cameras.iter().enumerate();
@@ -359,11 +340,6 @@ fn states(found: &Estimate) -> Vec<Diagnosis> {
 /// Whether a state is what leaves patterns in the residuals.
 fn leaves_patterns(state: &Diagnosis) -> bool {
     matches!(state, Diagnosis::RollingShutter { .. } | Diagnosis::StretchedBoard { .. })
-}
-
-/// Whether a camera leaves so much that it cannot be that of the pictures.
-pub(in crate::calibrate) fn is_absurd(camera: &CameraEstimate) -> bool {
-    camera.inlier_rms_px() > FOREIGN_PART * f64::from(camera.camera.width)
 }
 
 /// Whether too many views of cameras that were to be found took no part.

@@ -6,9 +6,8 @@
 
 use std::collections::BTreeSet;
 
-use super::diagnosis::is_absurd;
 use crate::calibrate::adjust::lack_of_fit::{MATTERS, SIGNIFICANT, deviate_of_f};
-use crate::calibrate::estimate::values::Estimate;
+use crate::calibrate::estimate::values::{CameraEstimate, Estimate};
 use crate::calibrate::input::calibration::{Calibration, CameraViews, Intrinsics};
 use crate::calibrate::input::observation::View;
 use crate::calibrate::input::panel::PanelPlace;
@@ -29,6 +28,11 @@ const AS_GOOD: f64 = 0.9;
 /// Number of views in the sample, evenly over the sequence: a lack of fit that matters shows in so
 /// many, and a trial must not take longer than the calibration.
 const TRIAL_VIEWS: usize = 12;
+
+/// A known camera that leaves more than this part of the image's width did not take the pictures: poses
+/// take up most of what focal lengths and principal point are off by, and so much is left by another
+/// lens, zoom or crop only.
+pub(in crate::calibrate) const FOREIGN_PART: f64 = 0.005;
 
 /// A change of assumptions that makes the residuals of a calibration significantly smaller.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -55,6 +59,9 @@ pub enum Instead {
     /// The intrinsics of the camera, which had been given.
     Camera,
 }
+
+/// A camera by itself, and what its views say.
+pub(super) type Alone = Option<(Calibration, Estimate)>;
 
 impl Calibration {
     /// This calibration of one camera with other views.
@@ -151,6 +158,17 @@ impl Calibration {
         }
     }
 
+    /// A camera by itself, with panels where they were found, and what its views say.
+    pub(in crate::calibrate) fn and_alone(&self, camera: usize, found: &Estimate) -> Alone {
+        if self.is_single() {
+            return Some((self.clone(), found.clone()));
+        }
+        self.cameras.get(camera)?;
+        let alone = self.alone(camera, &found.panels);
+        let found = alone.adjusted().ok()?;
+        Some((alone, found))
+    }
+
     /// The smallest lens model, among those with a subset of the parameters, that fits camera
     /// `camera` as well as the model of `found` by an F test; `None` when all parameters are
     /// needed, or the intrinsics were given.
@@ -177,6 +195,11 @@ impl Calibration {
         }
         sufficient
     }
+}
+
+/// Whether a camera leaves so much that it cannot be that of the pictures.
+pub(in crate::calibrate) fn is_absurd(camera: &CameraEstimate) -> bool {
+    camera.inlier_rms_px() > FOREIGN_PART * f64::from(camera.camera.width)
 }
 
 /// Whether the noise of detections explains the residuals.

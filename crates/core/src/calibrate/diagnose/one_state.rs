@@ -14,7 +14,7 @@
 
 use crate::calibrate::problem::whitening::OUTLIER_SIGMA;
 use crate::calibrate::uncertainty::state_equations::{
-    Candidate, Column, Effect, Fit, StateEquations,
+    Candidate, Column, Effect, Fit, StateEquations, significance,
 };
 use crate::camera::Camera;
 use crate::statistics::f_chance;
@@ -198,14 +198,6 @@ fn base(equations: &StateEquations) -> Vec<Column> {
         columns.extend(Candidate::SHEET.map(|candidate| equations.column(candidate)));
     }
     columns
-}
-
-/// How often noise makes as much of an effect.
-pub(in crate::calibrate) fn significance(effect: Effect) -> f64 {
-    match effect.freedom >= 1.0 {
-        true => f_chance((effect.value / effect.sd).powi(2), 1.0, effect.freedom),
-        false => 1.0,
-    }
 }
 
 /// A change at a view.

@@ -1,7 +1,7 @@
 //! Diagnoses in words, for a terminal, a page and a file.
 
-use super::diagnosis::{Diagnosis, FOREIGN_PART};
-use super::model_selection::{Instead, Remedy};
+use super::diagnosis::Diagnosis;
+use super::model_selection::{FOREIGN_PART, Instead, Remedy};
 use super::one_state::{BoardStretch, CameraChange, ChangedIntrinsic, RollingShutter};
 use crate::calibrate::adjust::finding::{Finding, Moved, Shared};
 use crate::calibrate::adjust::lack_of_fit::LackOfFit;

@@ -9,31 +9,44 @@ use super::linked::{ByFrame, Places, Seen};
 use super::symmetry::Symmetries;
 use crate::calibrate::equations::minimise::{Until, minimise};
 use crate::calibrate::error::CalibrationError;
-use crate::calibrate::estimate::values::Estimate;
 use crate::calibrate::excluded::Excluded;
 use crate::calibrate::input::calibration::{Calibration, CameraViews, Intrinsics};
 use crate::calibrate::input::loss::Loss;
 use crate::calibrate::input::panel::PanelRef;
 use crate::calibrate::problem::bundle::Problem;
 use crate::calibrate::problem::panels::{targets_unknown, unknowns};
+use crate::calibrate::problem::roughness::Roughness;
 use crate::calibrate::problem::unknowns::{Block, CameraUnknowns};
 use crate::calibrate::problem::whitening::scale;
 use crate::camera::{Camera, Pose};
 
-pub(in crate::calibrate) fn start(calibration: &Calibration) -> Result<Start, CalibrationError> {
+/// A camera by itself.
+pub(in crate::calibrate) struct Alone {
+    pub camera: Camera,
+    /// What is expected of the knots of a spline.
+    pub roughness: Option<Roughness>,
+    /// The pose of the target in each view, by its name.
+    pub poses: BTreeMap<String, Pose>,
+    /// Views that took no part.
+    pub excluded: Vec<Excluded>,
+}
+
+/// `by_itself` solves a calibration of one camera.
+pub(in crate::calibrate) fn start(
+    calibration: &Calibration,
+    by_itself: impl Fn(&Calibration) -> Result<Alone, CalibrationError>,
+) -> Result<Start, CalibrationError> {
     let cameras = &calibration.cameras;
     let mut excluded = Vec::new();
     let mut seen = ByFrame::new();
     let mut found = Vec::with_capacity(cameras.len());
     for (index, camera) in cameras.iter().enumerate() {
-        let alone = alone(calibration, index)?;
+        let alone = alone(calibration, index, &by_itself)?;
         let name = Some(camera.name.clone());
         let of_camera = alone.excluded.into_iter();
         excluded.extend(of_camera.map(|view| (0, Excluded { camera: name.clone(), ..view })));
-        let poses: BTreeMap<String, Pose> =
-            alone.cameras[0].views.iter().map(|view| (view.name.clone(), view.pose)).collect();
-        seen.push(by_frame(calibration, camera, &poses));
-        found.extend(alone.cameras.into_iter().map(|alone| (alone.camera, alone.roughness)));
+        seen.push(by_frame(calibration, camera, &alone.poses));
+        found.push((alone.camera, alone.roughness));
     }
     let symmetries = Symmetries::of(calibration);
     let known = calibration.delays.clone();
@@ -102,13 +115,17 @@ pub(in crate::calibrate) fn start(calibration: &Calibration) -> Result<Start, Ca
 }
 
 /// A camera by itself: as it is known, or as its views have it.
-fn alone(calibration: &Calibration, index: usize) -> Result<Estimate, CalibrationError> {
+fn alone(
+    calibration: &Calibration,
+    index: usize,
+    by_itself: impl Fn(&Calibration) -> Result<Alone, CalibrationError>,
+) -> Result<Alone, CalibrationError> {
     let camera = &calibration.cameras[index];
     if camera.views.is_empty() && !matches!(camera.intrinsics, Intrinsics::Known(_)) {
         return Err(CalibrationError::NotSeen { camera: camera.name.clone() });
     }
     let alone = calibration.alone(index, &calibration.panels).board_shape(false);
-    alone.adjusted().map_err(|error| CalibrationError::OfCamera {
+    by_itself(&alone).map_err(|error| CalibrationError::OfCamera {
         camera: camera.name.clone(),
         error: Box::new(error),
     })

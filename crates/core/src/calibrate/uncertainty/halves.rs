@@ -7,8 +7,7 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::state_equations::{Candidate, StateEquations};
-use crate::calibrate::diagnose::one_state::significance;
+use super::state_equations::{Candidate, StateEquations, significance};
 use crate::camera::Camera;
 use crate::statistics::f_chance;
 

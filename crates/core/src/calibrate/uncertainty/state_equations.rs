@@ -20,6 +20,7 @@ use crate::calibrate::input::observation::LEAST_CORNERS;
 use crate::calibrate::problem::bundle::Problem;
 use crate::calibrate::problem::whitening::Whitening;
 use crate::camera::Lens;
+use crate::statistics::f_chance;
 
 /// Columns beside those of the camera.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -117,6 +118,14 @@ pub(in crate::calibrate) struct Effect {
     pub sd: f64,
     /// Degrees of freedom of the deviation.
     pub freedom: f64,
+}
+
+/// How often noise makes as much of an effect.
+pub(in crate::calibrate) fn significance(effect: Effect) -> f64 {
+    match effect.freedom >= 1.0 {
+        true => f_chance((effect.value / effect.sd).powi(2), 1.0, effect.freedom),
+        false => 1.0,
+    }
 }
 
 impl StateEquations {
