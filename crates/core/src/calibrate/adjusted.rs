@@ -1,15 +1,15 @@
 //! From views to an estimate: start, gross errors, adjustment, added unknowns, uncertainties.
 
+use super::adjust::gross_errors::{Gross, WrongFrame, within_pictures};
+use super::adjust::reweighting::Kept;
 use super::error::CalibrationError;
+use super::estimate::values::{CameraEstimate, Estimate};
 use super::excluded::{Excluded, Reason};
+use super::input::calibration::{Calibration, CameraViews, Intrinsics};
 use super::problem::panels;
 use super::start::alone::{self, enough};
+use super::start::frames::{Frame, Start};
 use super::start::together::{self, Alone};
-use crate::calibrate::adjust::gross_errors::{Gross, WrongFrame, within_pictures};
-use crate::calibrate::adjust::reweighting::Kept;
-use crate::calibrate::estimate::values::{CameraEstimate, Estimate};
-use crate::calibrate::input::calibration::{Calibration, CameraViews, Intrinsics};
-use crate::calibrate::start::frames::{Frame, Start};
 use crate::camera::PROJECTION_PARAMETERS;
 
 /// Focal lengths and the principal point are not determined when a deviation is more than this part

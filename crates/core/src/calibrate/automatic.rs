@@ -10,10 +10,10 @@ use std::collections::BTreeMap;
 use super::error::CalibrationError;
 use super::estimate::values::{CameraEstimate, Estimate, ViewEstimate};
 use super::input::calibration::{Calibration, CameraViews};
+use super::input::observation::View;
+use super::input::sample::evenly;
 use super::model::Model;
 use super::problem::whitening::{MEDIAN_OF_CHI_SQUARED_2, OUTLIER_SIGMA};
-use crate::calibrate::input::observation::View;
-use crate::calibrate::input::sample::evenly;
 use crate::statistics::median;
 
 /// Models that are tried, those with fewer parameters first.

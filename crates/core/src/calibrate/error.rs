@@ -1,3 +1,5 @@
+//! Why a calibration fails, in sentences.
+
 use std::fmt;
 
 /// How a rig moved too plainly to place cameras that do not see the same target.

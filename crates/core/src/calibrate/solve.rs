@@ -1,9 +1,8 @@
 //! From a calibration to its estimate: with frames held out, and cameras that do not belong named in errors.
 
 use super::error::CalibrationError;
-use super::input::calibration::{Calibration, CameraViews};
-use crate::calibrate::estimate::values::Estimate;
-use crate::calibrate::input::calibration::TargetPanels;
+use super::estimate::values::Estimate;
+use super::input::calibration::{Calibration, CameraViews, TargetPanels};
 
 impl Calibration {
     /// Finds the cameras, where they are to each other, where the target was, and what else was asked for.

@@ -1,3 +1,5 @@
+//! A flag by which somebody else ends a calibration.
+
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 

@@ -1,3 +1,5 @@
+//! What outliers have in common: a panel, a view, a place in the image.
+
 use std::collections::{BTreeMap, BTreeSet};
 
 use glam::DVec2;

@@ -1,3 +1,5 @@
+//! Whether two calibrations are of the same camera, in one word.
+
 use super::comparison::{CameraMotion, Comparison};
 
 /// Differences up to this are rounding: what a pixel shows is found by iteration, to about 10⁻⁹ px.

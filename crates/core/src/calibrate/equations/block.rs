@@ -10,9 +10,9 @@ use crate::calibrate::input::loss::Loss;
 use crate::calibrate::input::observation::Observation;
 use crate::calibrate::problem::bundle::Problem;
 use crate::calibrate::problem::shape;
-use crate::calibrate::problem::unknowns::Block;
+use crate::calibrate::problem::unknowns::{Block, CameraUnknowns};
 use crate::calibrate::problem::whitening::Whitening;
-use crate::camera::{Lens, MAX_PARAMETERS, MOST_TOUCHED, PROJECTION_PARAMETERS, Projection};
+use crate::camera::{Lens, MAX_PARAMETERS, MOST_TOUCHED, PROJECTION_PARAMETERS, Pose, Projection};
 
 /// Most columns that a corner depends on: parameters and poses of a camera, a panel, a target and a frame, and a shape.
 const LONGEST_ROW: usize = MOST_OF_LENS + 24 + shape::COUNT;
@@ -94,6 +94,114 @@ pub(in crate::calibrate) struct OfCorner {
     pub right: Vector3<f64>,
 }
 
+/// Hands the derivatives by a pose to `push`: for y = exp(ω) a + t + τ a derivative j by y is a × j by ω, and j by τ.
+fn pose(arm: DVec3, by: DVec3, push: &mut impl FnMut(f64)) {
+    arm.cross(by).to_array().into_iter().chain(by.to_array()).for_each(push);
+}
+
+/// The frames between the panel of a block and its camera, and which links between them are unknown.
+struct Chain<'a> {
+    problem: &'a Problem,
+    block: &'a Block,
+    camera: &'a CameraUnknowns,
+    rig_from_scene: &'a Pose,
+    scene_from_target: &'a Pose,
+    target_from_panel: &'a Pose,
+    rig_from_camera: DMat3,
+    scene_from_rig: DMat3,
+    target_from_scene: DMat3,
+    /// First columns of what is unknown of the camera's pose, the panel's, the target's, and of the shape.
+    of_camera: Option<usize>,
+    of_panel: Option<usize>,
+    of_target: Option<usize>,
+    of_shape: Option<usize>,
+}
+
+/// A corner from its panel to its pixel: before each translation.
+struct Along {
+    turned_panel: DVec3,
+    turned_target: DVec3,
+    turned_scene: DVec3,
+    turned_rig: DVec3,
+    at: Projection,
+}
+
+impl<'a> Chain<'a> {
+    fn of(problem: &'a Problem, layout: &Layout, block: &'a Block) -> Self {
+        let camera = &problem.cameras[block.camera];
+        let (rig, panel) = (&problem.frames[block.frame], &problem.panels[block.panel.index()]);
+        let target = &problem.targets[panel.target].scene_from_target;
+        Self {
+            problem,
+            block,
+            camera,
+            rig_from_scene: rig,
+            scene_from_target: target,
+            target_from_panel: &panel.target_from_panel,
+            rig_from_camera: DMat3::from_quat(camera.camera_from_rig.rotation.conjugate()),
+            scene_from_rig: DMat3::from_quat(rig.rotation.conjugate()),
+            target_from_scene: DMat3::from_quat(target.rotation.conjugate()),
+            of_camera: layout.cameras[block.camera],
+            of_panel: layout.panels[block.panel.index()],
+            of_target: layout.targets[panel.target],
+            of_shape: layout.shape,
+        }
+    }
+
+    /// The columns of the unknown links and of the shape.
+    fn columns(&self) -> impl Iterator<Item = usize> + use<> {
+        let poses = self.of_camera.into_iter().chain(self.of_panel).chain(self.of_target);
+        let poses = poses.flat_map(|first| first..first + 6);
+        poses.chain(self.of_shape.into_iter().flat_map(|first| first..first + shape::COUNT))
+    }
+
+    /// `None` where the corner is out of its camera's reach.
+    fn along(&self, seen: &Observation) -> Option<Along> {
+        let Self { problem, block, camera, .. } = *self;
+        let turned_panel = self.target_from_panel.rotation * problem.panel_point(block, seen);
+        let in_target = turned_panel + self.target_from_panel.translation;
+        let turned_target = self.scene_from_target.rotation * in_target;
+        let in_scene = turned_target + self.scene_from_target.translation;
+        let turned_scene = self.rig_from_scene.rotation * in_scene;
+        let in_rig = turned_scene + self.rig_from_scene.translation;
+        let turned_rig = camera.camera_from_rig.rotation * in_rig;
+        let in_camera = turned_rig + camera.camera_from_rig.translation;
+        let at = camera.camera.project_with_derivatives(in_camera)?;
+        Some(Along { turned_panel, turned_target, turned_scene, turned_rig, at })
+    }
+
+    /// Hands the derivatives of coordinate `i` by the unknown links, the shape (which `bends` the corner along these
+    /// directions) and the frame's pose to `push`; returns that by the place of the corner on its panel.
+    fn derivatives(
+        &self,
+        along: &Along,
+        i: usize,
+        bends: Option<&[DVec3; shape::COUNT]>,
+        push: &mut impl FnMut(f64),
+    ) -> DVec3 {
+        // For y = exp(ω) a + t + τ a derivative j by y is a × j by ω, and j by τ.
+        let by_camera = DVec3::from(along.at.by_point[i]);
+        let by_rig = self.rig_from_camera * by_camera;
+        if self.of_camera.is_some() {
+            pose(along.turned_rig, by_camera, push);
+        }
+        let by_scene = self.scene_from_rig * by_rig;
+        let by_target = self.target_from_scene * by_scene;
+        if self.of_panel.is_some() {
+            pose(along.turned_panel, by_target, push);
+        }
+        if self.of_target.is_some() {
+            pose(along.turned_target, by_scene, push);
+        }
+        let by_place = self.target_from_panel.rotation.conjugate() * by_target;
+        if let Some(bends) = bends {
+            bends.iter().for_each(|&bend| push(by_place.dot(bend)));
+        }
+        pose(along.turned_scene, by_rig, push);
+        by_place
+    }
+}
+
 impl Local {
     pub(in crate::calibrate) fn of(
         problem: &Problem,
@@ -103,39 +211,17 @@ impl Local {
         loss: Loss,
         sigma: f64,
     ) -> Option<Self> {
-        let camera = &problem.cameras[block.camera];
-        let (rig, panel) = (&problem.frames[block.frame], &problem.panels[block.panel.index()]);
-        let target = &problem.targets[panel.target].scene_from_target;
-        let rig_from_camera = DMat3::from_quat(camera.camera_from_rig.rotation.conjugate());
-        let scene_from_rig = DMat3::from_quat(rig.rotation.conjugate());
-        let target_from_scene = DMat3::from_quat(target.rotation.conjugate());
+        let chain = Chain::of(problem, layout, block);
         let free = &layout.parameters[block.camera];
-        let of_camera = layout.cameras[block.camera];
-        let (of_panel, of_target) =
-            (layout.panels[block.panel.index()], layout.targets[panel.target]);
-        let poses = of_camera.into_iter().chain(of_panel).chain(of_target);
-        let poses = poses.flat_map(|first| first..first + 6);
-        let of_shape = layout.shape.into_iter().flat_map(|first| first..first + shape::COUNT);
-        let poses = poses.chain(of_shape);
-        let chain = |seen: &Observation| {
-            let turned_panel = panel.target_from_panel.rotation * problem.panel_point(block, seen);
-            let turned_target =
-                target.rotation * (turned_panel + panel.target_from_panel.translation);
-            let turned_scene = rig.rotation * (turned_target + target.translation);
-            let in_rig = turned_scene + rig.translation;
-            let turned_rig = camera.camera_from_rig.rotation * in_rig;
-            let in_camera = turned_rig + camera.camera_from_rig.translation;
-            let at = camera.camera.project_with_derivatives(in_camera)?;
-            Some((turned_panel, turned_target, turned_scene, turned_rig, at))
-        };
-        let support = match camera.camera.lens {
+        let support = match chain.camera.camera.lens {
             Lens::Spline(_) if !free.is_empty() => {
-                let seen = block.observations.iter().map(|seen| Some(chain(seen)?.4));
+                let seen = block.observations.iter().map(|seen| Some(chain.along(seen)?.at));
                 let seen = seen.collect::<Option<Vec<Projection>>>()?;
-                Support::of(free, &seen, camera.free.len())
+                Support::of(free, &seen, chain.camera.free.len())
             }
             _ => None,
         };
+        let poses = chain.columns();
         let columns: Vec<usize> = match &support {
             Some(support) => support.touched.iter().copied().chain(poses).collect(),
             None => free.iter().map(|&(_, column)| column).chain(poses).collect(),
@@ -150,10 +236,11 @@ impl Local {
         for (seen, &w) in block.observations.iter().zip(whitening) {
             let bends = problem.shape.map(|shape| shape.directions(seen.panel_mm));
             let mapped = problem.map.as_ref().map(|map| map.index(block.panel, seen));
-            let (turned_panel, turned_target, turned_scene, turned_rig, at) = chain(seen)?;
+            let along = chain.along(seen)?;
+            let at = &along.at;
             let mut by_place = [DVec3::ZERO; 2];
             if let Some(support) = &support {
-                support.places(&at, n, &mut places);
+                support.places(at, n, &mut places);
             }
             for (i, row) in rows.iter_mut().enumerate() {
                 let mut next = 0;
@@ -162,38 +249,14 @@ impl Local {
                     next += 1;
                 };
                 match &support {
-                    Some(support) => support.derivatives(&at, i, &mut push),
+                    Some(support) => support.derivatives(at, i, &mut push),
                     None => {
                         for &(parameter, _) in free {
                             push(at.by_parameters[parameter][i]);
                         }
                     }
                 }
-                // For y = exp(ω) a + t + τ a derivative j by y is a × j by ω, and j by τ.
-                let mut pose = |arm: DVec3, by: DVec3| {
-                    arm.cross(by).to_array().into_iter().chain(by.to_array()).for_each(&mut push);
-                };
-                let by_camera = DVec3::from(at.by_point[i]);
-                let by_rig = rig_from_camera * by_camera;
-                if of_camera.is_some() {
-                    pose(turned_rig, by_camera);
-                }
-                let by_scene = scene_from_rig * by_rig;
-                let by_target = target_from_scene * by_scene;
-                if of_panel.is_some() {
-                    pose(turned_panel, by_target);
-                }
-                if of_target.is_some() {
-                    pose(turned_target, by_scene);
-                }
-                by_place[i] = panel.target_from_panel.rotation.conjugate() * by_target;
-                if let Some(bends) = bends {
-                    bends.iter().for_each(|&bend| push(by_place[i].dot(bend)));
-                }
-                let mut pose = |arm: DVec3, by: DVec3| {
-                    arm.cross(by).to_array().into_iter().chain(by.to_array()).for_each(&mut push);
-                };
-                pose(turned_scene, by_rig);
+                by_place[i] = chain.derivatives(&along, i, bends.as_ref(), &mut push);
             }
             let residual = seen.pixel - at.pixel;
             let count = if support.is_some() { places.len() } else { n };

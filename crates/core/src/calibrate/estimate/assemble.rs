@@ -18,6 +18,7 @@ use crate::calibrate::input::calibration::{Calibration, CameraViews};
 use crate::calibrate::input::loss::Loss;
 use crate::calibrate::input::order::in_order;
 use crate::calibrate::input::panel::{PanelPlace, PanelRef};
+use crate::calibrate::problem::bundle::Problem;
 use crate::calibrate::problem::corner_map::CornerMap;
 use crate::calibrate::problem::shape::{BoardShape, Shape};
 use crate::calibrate::problem::whitening::deviations;
@@ -48,19 +49,7 @@ impl Estimate {
         let Minimum { problem, normal, layout, steps } = minimum;
         let open = |parameters: String| CalibrationError::Undetermined { parameters };
         let found = normal.covariances(layout).ok_or_else(|| open("the poses".to_owned()))?;
-        let is_open = |first: Option<usize>| {
-            first.is_some_and(|first| (first..first + 6).any(|i| found.loose.contains(&i)))
-        };
-        let of_cameras = cameras.iter().zip(&layout.cameras).filter(|(_, first)| is_open(**first));
-        let of_cameras = of_cameras.map(|(camera, _)| format!("the pose of {}", camera.name));
-        let panels: BTreeSet<PanelRef> = problem.blocks.iter().map(|block| block.panel).collect();
-        let of_panels = panels.into_iter().filter(|panel| is_open(layout.panels[panel.index()]));
-        let of_panels = of_panels.map(|panel| format!("the pose of panel {panel}"));
-        let of_targets = calibration.targets.iter().zip(&layout.targets);
-        let of_targets = of_targets.filter(|(_, first)| is_open(**first));
-        let of_targets =
-            of_targets.map(|(target, _)| format!("the pose of target {}", target.name));
-        let poses: Vec<String> = of_cameras.chain(of_panels).chain(of_targets).collect();
+        let poses = open_poses(calibration, minimum, &found);
         if !poses.is_empty() {
             return Err(open(poses.join(", ")));
         }
@@ -91,17 +80,6 @@ impl Estimate {
             camera
         });
         let cameras: Vec<CameraEstimate> = cameras.collect();
-        let of_frames = problem.frames.iter().zip(&found.frames).zip(frames).enumerate();
-        let of_frames = of_frames.map(|(index, ((pose, own), frame))| {
-            let views = cameras.iter().flat_map(|camera| &camera.views);
-            let views = views.filter(|view| view.frame == index);
-            FrameEstimate {
-                name: frame.name.clone(),
-                rig_from_target: *pose,
-                pose_sd: std::array::from_fn(|i| (own[(i, i)] * variance).sqrt()),
-                rms_px: rms_px(views.flat_map(|view| &view.corners)),
-            }
-        });
         let panels = problem.panels.iter().zip(&layout.panels).map(|(panel, first)| PanelPlace {
             target_from_panel: panel.target_from_panel,
             covariance: first.map(|first| {
@@ -117,7 +95,7 @@ impl Estimate {
                 .map(|first| std::array::from_fn(|i| covariance[(first + i, first + i)].sqrt())),
         });
         Ok(Self {
-            frames: of_frames.collect(),
+            frames: frame_estimates(&cameras, frames, problem, &found, variance),
             targets: targets.collect(),
             panels: panels.collect(),
             shape: board_shape(minimum, &covariance, f_ratio),
@@ -135,6 +113,24 @@ impl Estimate {
     }
 }
 
+/// The poses of cameras, panels and targets that the views leave open, in words.
+fn open_poses(calibration: &Calibration, minimum: &Minimum, found: &Covariances) -> Vec<String> {
+    let Minimum { problem, layout, .. } = minimum;
+    let is_open = |first: Option<usize>| {
+        first.is_some_and(|first| (first..first + 6).any(|i| found.loose.contains(&i)))
+    };
+    let of_cameras =
+        calibration.cameras.iter().zip(&layout.cameras).filter(|(_, first)| is_open(**first));
+    let of_cameras = of_cameras.map(|(camera, _)| format!("the pose of {}", camera.name));
+    let panels: BTreeSet<PanelRef> = problem.blocks.iter().map(|block| block.panel).collect();
+    let of_panels = panels.into_iter().filter(|panel| is_open(layout.panels[panel.index()]));
+    let of_panels = of_panels.map(|panel| format!("the pose of panel {panel}"));
+    let of_targets = calibration.targets.iter().zip(&layout.targets);
+    let of_targets = of_targets.filter(|(_, first)| is_open(**first));
+    let of_targets = of_targets.map(|(target, _)| format!("the pose of target {}", target.name));
+    of_cameras.chain(of_panels).chain(of_targets).collect()
+}
+
 /// What the views of each camera say of its state, in the natural order of their names.
 fn states(frames: &[&Frame], settled: &Settled, loss: Loss) -> Vec<Option<StateEquations>> {
     let Settled { minimum, whitening, .. } = settled;
@@ -146,6 +142,27 @@ fn states(frames: &[&Frame], settled: &Settled, loss: Loss) -> Vec<Option<StateE
     let cameras = 0..minimum.problem.cameras.len();
     let of = |camera| StateEquations::of(&minimum.problem, whitening, loss, camera, &order);
     cameras.map(of).collect()
+}
+
+fn frame_estimates(
+    cameras: &[CameraEstimate],
+    frames: &[&Frame],
+    problem: &Problem,
+    found: &Covariances,
+    variance: f64,
+) -> Vec<FrameEstimate> {
+    let of_frames = problem.frames.iter().zip(&found.frames).zip(frames).enumerate();
+    let of_frames = of_frames.map(|(index, ((pose, own), frame))| {
+        let views = cameras.iter().flat_map(|camera| &camera.views);
+        let views = views.filter(|view| view.frame == index);
+        FrameEstimate {
+            name: frame.name.clone(),
+            rig_from_target: *pose,
+            pose_sd: std::array::from_fn(|i| (own[(i, i)] * variance).sqrt()),
+            rms_px: rms_px(views.flat_map(|view| &view.corners)),
+        }
+    });
+    of_frames.collect()
 }
 
 /// The views of every camera, with all corners that are within its reach.

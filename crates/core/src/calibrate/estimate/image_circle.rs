@@ -1,3 +1,5 @@
+//! The image circle of a fisheye, from the corners that were seen.
+
 use std::f64::consts::TAU;
 
 use glam::DVec2;

@@ -1,3 +1,5 @@
+//! Where the curve of a lens turns back or runs away within the image.
+
 use std::fmt;
 
 use glam::DVec2;

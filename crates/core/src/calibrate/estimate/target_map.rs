@@ -1,3 +1,5 @@
+//! Measured places of the corners of a target, with covariances.
+
 use std::ops::Range;
 
 use glam::DVec3;

@@ -1,3 +1,5 @@
+//! Robust loss: how a residual counts.
+
 /// Residuals count in full up to this many standard deviations. Of normally distributed corners
 /// 1.1 % lie beyond it, so that little is lost on data without outliers.
 const SCALE_SIGMA: f64 = 3.0;

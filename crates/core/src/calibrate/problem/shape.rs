@@ -1,3 +1,5 @@
+//! The shape of a board's sheet as a deviation from a plane.
+
 use glam::DVec3;
 
 use crate::calibrate::input::observation::Sighting;

@@ -54,22 +54,8 @@ pub(in crate::calibrate) fn start(
     in_time(calibration, &delays, &mut seen);
     let rotations = symmetries.agree(calibration, &mut seen);
     let places = Places::of(calibration, &seen)?;
-    let names: BTreeSet<&str> =
-        seen.iter().flat_map(|of_camera| of_camera.keys().map(String::as_str)).collect();
-    let (mut problem, mut frames) = (Problem::default(), Vec::new());
-    for (place, name) in names.into_iter().enumerate() {
-        let of_frame = seen.iter().enumerate();
-        let of_frame: Vec<(usize, &Seen)> = of_frame
-            .flat_map(|(camera, seen)| {
-                seen.get(name).into_iter().flatten().map(move |s| (camera, s))
-            })
-            .collect();
-        problem.frames.extend(places.rig_from_scene(&of_frame));
-        let mut views: Vec<(usize, usize)> =
-            of_frame.iter().map(|(camera, seen)| (*camera, seen.view)).collect();
-        views.dedup();
-        frames.push(Frame { name: name.to_owned(), place, views });
-    }
+    let mut problem = Problem::default();
+    let frames = frames(&seen, &places, &mut problem);
     let mut blocks = Vec::new();
     for (index, camera) in cameras.iter().enumerate() {
         for (frame, of_frame) in frames.iter().enumerate() {
@@ -112,6 +98,27 @@ pub(in crate::calibrate) fn start(
     let first = minimise(problem, &whitening, Loss::Cauchy, Until::Rough)
         .ok_or(CalibrationError::NoStart)?;
     Ok(Start { problem: first.problem, frames, excluded, delays, rotations })
+}
+
+/// The frames by their names, whose poses are added to the problem.
+fn frames(seen: &ByFrame, places: &Places, problem: &mut Problem) -> Vec<Frame> {
+    let names: BTreeSet<&str> =
+        seen.iter().flat_map(|of_camera| of_camera.keys().map(String::as_str)).collect();
+    let mut frames = Vec::new();
+    for (place, name) in names.into_iter().enumerate() {
+        let of_frame = seen.iter().enumerate();
+        let of_frame: Vec<(usize, &Seen)> = of_frame
+            .flat_map(|(camera, seen)| {
+                seen.get(name).into_iter().flatten().map(move |s| (camera, s))
+            })
+            .collect();
+        problem.frames.extend(places.rig_from_scene(&of_frame));
+        let mut views: Vec<(usize, usize)> =
+            of_frame.iter().map(|(camera, seen)| (*camera, seen.view)).collect();
+        views.dedup();
+        frames.push(Frame { name: name.to_owned(), place, views });
+    }
+    frames
 }
 
 /// A camera by itself: as it is known, or as its views have it.

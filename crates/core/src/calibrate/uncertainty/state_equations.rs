@@ -401,20 +401,8 @@ impl Equations<'_> {
                     for (column, &parameter) in free.iter().enumerate() {
                         row[column] = at.by_parameter(parameter)[i];
                     }
-                    let axis = |of: usize| f64::from(u8::from(of == i));
-                    let candidates: [f64; CANDIDATES] = [
-                        off[i],
-                        axis(0),
-                        axis(1),
-                        ramp * by_point[i].x,
-                        ramp * by_point[i].y,
-                        ramp * by_point[i].z,
-                        reach * (uv.x * by_place[i].x - uv.y * by_place[i].y),
-                        reach * (uv.y * by_place[i].x + uv.x * by_place[i].y),
-                        uv.x * uv.x * by_place[i].z,
-                        uv.x * uv.y * by_place[i].z,
-                        uv.y * uv.y * by_place[i].z,
-                    ];
+                    let sheet = by_sheet(uv, by_place[i], reach);
+                    let candidates = by_candidates(i, off[i], ramp * by_point[i], sheet);
                     candidates.iter().enumerate().for_each(|(k, value)| row[p + k] = *value);
                     row[p + CANDIDATES] = residual[i];
                     (0..6).for_each(|k| row[p + CANDIDATES + 1 + k] = motion[(i, k)]);
@@ -448,6 +436,26 @@ impl Equations<'_> {
             log_distance: log_distance / f64::from(count as u32),
         })
     }
+}
+
+/// Derivatives of a coordinate by how the sheet is stretched, sheared and bent, in the order of [`Candidate::SHEET`], from
+/// that by the place of the corner; `uv` is its place from the middle of the sheet in parts of `reach`, mm.
+fn by_sheet(uv: DVec3, by_place: DVec3, reach: f64) -> [f64; 5] {
+    [
+        reach * (uv.x * by_place.x - uv.y * by_place.y),
+        reach * (uv.y * by_place.x + uv.x * by_place.y),
+        uv.x * uv.x * by_place.z,
+        uv.x * uv.y * by_place.z,
+        uv.y * uv.y * by_place.z,
+    ]
+}
+
+/// Derivatives of coordinate `i` of a pixel by all candidates. `off` is its offset from the principal point, `shutter` the
+/// derivatives by a shift of the point while rows are read.
+fn by_candidates(i: usize, off: f64, shutter: DVec3, sheet: [f64; 5]) -> [f64; CANDIDATES] {
+    let axis = |of: usize| f64::from(u8::from(of == i));
+    let [stretch, shear, bend_x, twist, bend_y] = sheet;
+    [off, axis(0), axis(1), shutter.x, shutter.y, shutter.z, stretch, shear, bend_x, twist, bend_y]
 }
 
 /// A Gram matrix without its last unknowns.
