@@ -106,7 +106,7 @@ type Cell = (usize, [i32; 2]);
 
 /// Outliers and corners.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub(in crate::calibrate) struct Count {
+pub(super) struct Count {
     pub outliers: usize,
     pub corners: usize,
 }
@@ -122,7 +122,7 @@ impl Count {
     }
 
     /// Whether most of these are outliers, and few of the others of all.
-    pub(in crate::calibrate) fn stands_out(self, all: Count) -> bool {
+    pub(super) fn stands_out(self, all: Count) -> bool {
         let others =
             Count { outliers: all.outliers - self.outliers, corners: all.corners - self.corners };
         self.exceeds(others)
@@ -132,7 +132,7 @@ impl Count {
     }
 
     /// Whether these are outliers more often than others, by more than chance.
-    pub(in crate::calibrate) fn exceeds(self, others: Count) -> bool {
+    pub(super) fn exceeds(self, others: Count) -> bool {
         let (count, chance) = (self.corners as f64, others.share());
         let more = count * (self.share() - chance);
         self.outliers >= LEAST_OUTLIERS
@@ -141,7 +141,7 @@ impl Count {
 }
 
 /// What the outliers of a problem share, of what took part; `names` are those of the frames.
-pub(in crate::calibrate) fn shared_outliers(
+pub(super) fn shared_outliers(
     problem: &Problem,
     outliers: &[Vec<bool>],
     left_out: &[bool],

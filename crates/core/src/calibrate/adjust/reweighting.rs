@@ -73,7 +73,7 @@ pub(in crate::calibrate) struct Settled {
 ///
 /// # Errors
 /// When the normal equations cannot be formed or solved from the initial values.
-pub(in crate::calibrate) fn settle(
+pub(super) fn settle(
     kept: Kept,
     weights: Weights,
     loss: Loss,
@@ -129,7 +129,7 @@ pub(in crate::calibrate) fn settle(
 
 /// Marks the corners with gross errors, for each block. Every frame keeps at least its nearest
 /// corners, as many as a pose needs.
-pub(in crate::calibrate) fn with_gross_errors(
+pub(super) fn with_gross_errors(
     problem: &Problem,
     left_out: &[bool],
     whitening: &Whitening,

@@ -80,7 +80,7 @@ impl Pull {
 }
 
 /// Result of the test over all frames.
-pub(in crate::calibrate) struct Opinions {
+pub(super) struct Opinions {
     /// Whether most frames agree on the cameras.
     pub agree: bool,
     /// The frame that contradicts the cameras of all others most significantly, if any, and the

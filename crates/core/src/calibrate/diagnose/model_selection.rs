@@ -32,7 +32,7 @@ const TRIAL_VIEWS: usize = 12;
 /// A known camera that leaves more than this part of the image's width did not take the pictures: poses
 /// take up most of what focal lengths and principal point are off by, and so much is left by another
 /// lens, zoom or crop only.
-pub(in crate::calibrate) const FOREIGN_PART: f64 = 0.005;
+pub(super) const FOREIGN_PART: f64 = 0.005;
 
 /// A change of assumptions that makes the residuals of a calibration significantly smaller.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -90,7 +90,7 @@ impl Calibration {
     /// The alternative that explains the residuals of a calibration of one camera better,
     /// significantly and by an amount that matters; `None` where the noise of detections explains
     /// them, or no alternative does.
-    pub(in crate::calibrate) fn remedy(&self, found: &Estimate) -> Option<Remedy> {
+    pub(super) fn remedy(&self, found: &Estimate) -> Option<Remedy> {
         if is_explained(found) {
             return None;
         }
@@ -159,7 +159,7 @@ impl Calibration {
     }
 
     /// A camera by itself, with panels where they were found, and what its views say.
-    pub(in crate::calibrate) fn and_alone(&self, camera: usize, found: &Estimate) -> Alone {
+    pub(super) fn and_alone(&self, camera: usize, found: &Estimate) -> Alone {
         if self.is_single() {
             return Some((self.clone(), found.clone()));
         }
@@ -181,7 +181,7 @@ impl Calibration {
     ///
     /// With q parameters less the sum of squares grows by F q variances of a residual; by chance F
     /// is about 1.
-    pub(in crate::calibrate) fn sufficient(&self, found: &Estimate) -> Option<Model> {
+    pub(super) fn sufficient(&self, found: &Estimate) -> Option<Model> {
         let (trial, of_trial) = self.trial(found)?;
         let mut sufficient = None;
         let mut next = self.cameras[0].intrinsics.model()?.smaller();
@@ -198,12 +198,12 @@ impl Calibration {
 }
 
 /// Whether a camera leaves so much that it cannot be that of the pictures.
-pub(in crate::calibrate) fn is_absurd(camera: &CameraEstimate) -> bool {
+pub(super) fn is_absurd(camera: &CameraEstimate) -> bool {
     camera.inlier_rms_px() > FOREIGN_PART * f64::from(camera.camera.width)
 }
 
 /// Whether the noise of detections explains the residuals.
-pub(in crate::calibrate) fn is_explained(found: &Estimate) -> bool {
+pub(super) fn is_explained(found: &Estimate) -> bool {
     let of_noise = |common: f64| 1.0 - (common / found.inlier_rms_px()).powi(2);
     found.common_px.is_some_and(|common| of_noise(common) > EXPLAINED)
 }

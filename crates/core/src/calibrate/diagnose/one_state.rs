@@ -140,7 +140,7 @@ pub struct BoardStretch {
 
 /// What the views of a camera show.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub(in crate::calibrate) struct State {
+pub(super) struct State {
     pub change: Option<CameraChange>,
     pub shutter: Option<RollingShutter>,
     pub stretch: Option<BoardStretch>,

@@ -44,10 +44,7 @@ impl UntaggedGrid {
     }
 
     /// Refuses a grid that was detected as a target with tiles of another size.
-    pub(in crate::calibrate) fn check_target(
-        &self,
-        seen: Option<&TargetIdentity>,
-    ) -> Result<(), String> {
+    pub(super) fn check_target(&self, seen: Option<&TargetIdentity>) -> Result<(), String> {
         match seen {
             Some(seen) if seen.edge_mm != [self.edge_mm; 2] => Err(format!(
                 "it was detected as {seen}, but `UntaggedGrid::edge_mm` is {} mm: {ASSUME_TARGET}",
@@ -83,14 +80,14 @@ impl UntaggedGrid {
 
     /// The rotations of its labels that no picture shows, see
     /// [`Panel::label_symmetries`](crate::targets::Panel::label_symmetries); none where its size is not known.
-    pub(in crate::calibrate) fn label_symmetries(&self) -> Vec<LatticeMap> {
+    pub(super) fn label_symmetries(&self) -> Vec<LatticeMap> {
         self.size.map_or(Vec::new(), |[rows, cols]| {
             symmetries(self.kind, board_vertices(self.kind, rows, cols))
         })
     }
 
     /// Whether labels reach to all four ends of its rows and columns.
-    pub(in crate::calibrate) fn is_spanned_by(&self, labels: &BTreeSet<(i32, i32)>) -> bool {
+    pub(super) fn is_spanned_by(&self, labels: &BTreeSet<(i32, i32)>) -> bool {
         let ends = |labels: &BTreeSet<(i32, i32)>| {
             let rows = labels.iter().map(|(row, _)| *row);
             let cols = labels.iter().map(|(_, col)| *col);

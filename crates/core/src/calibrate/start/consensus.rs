@@ -35,7 +35,7 @@ const LONGEST_TRIPLE: f64 = 4.0;
 
 /// The view with only the corners of each sighting that agree, and only the sightings that have
 /// some; the view unchanged where none has, as on panels of a few corners.
-pub(in crate::calibrate) fn agreeing(view: &View) -> View {
+pub(super) fn agreeing(view: &View) -> View {
     let of_sighting = |sighting: &Sighting| {
         let agree = largest_agreement(&sighting.observations)?;
         let observations = agree.into_iter().map(|index| sighting.observations[index]);

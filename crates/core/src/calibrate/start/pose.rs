@@ -54,7 +54,7 @@ pub(in crate::calibrate) fn estimate_pose(
 }
 
 /// The median error of the corners of panels, px; infinite where most are out of the camera's reach.
-pub(in crate::calibrate) fn median_off_px(
+pub(super) fn median_off_px(
     camera: &Camera,
     panels: &[Pose],
     sightings: &[Sighting],

@@ -26,10 +26,10 @@ use crate::calibrate::problem::whitening::Whitening;
 /// Standard deviation of a corner of a printed board, mm. Office printers stretch a sheet by 0.05 to 0.2 %, by a
 /// different amount across and along the feed: 0.05 to 0.2 mm at 100 mm from the middle. The sheet of the
 /// robot-hand photographs (20 mm edges, 200 mm across) is off by 0.07 mm a coordinate.
-pub(in crate::calibrate) const PRINTED_MM: f64 = 0.1;
+const PRINTED_MM: f64 = 0.1;
 
 /// The same in edges for small boards, which are not made by office printers.
-pub(in crate::calibrate) const PRINTED_EDGES: f64 = 0.005;
+const PRINTED_EDGES: f64 = 0.005;
 
 /// Frames whose equations are in memory at the same time.
 const FRAMES_AT_A_TIME: usize = 64;

@@ -53,7 +53,7 @@ const CANDIDATES: usize = 11;
 
 impl Candidate {
     /// What of a camera may change.
-    pub(in crate::calibrate) const CAMERA: [Self; 3] = [Self::Focal, Self::CentreX, Self::CentreY];
+    const CAMERA: [Self; 3] = [Self::Focal, Self::CentreX, Self::CentreY];
 
     /// Displacements while the shutter passes the image.
     pub(in crate::calibrate) const SHUTTER: [Self; 3] =
@@ -169,12 +169,12 @@ impl StateEquations {
     }
 
     /// How many unknowns the camera has.
-    pub(in crate::calibrate) fn parameter_count(&self) -> usize {
+    pub(super) fn parameter_count(&self) -> usize {
         self.free.len()
     }
 
     /// Whether the first two of them are the focal lengths.
-    pub(in crate::calibrate) fn is_focal_free(&self) -> bool {
+    pub(super) fn is_focal_free(&self) -> bool {
         self.free.starts_with(&[0, 1])
     }
 
@@ -291,7 +291,7 @@ impl Fit {
     }
 
     /// The variance of an unknown from noise.
-    pub(in crate::calibrate) fn noise_variance(&self, index: usize) -> f64 {
+    pub(super) fn noise_variance(&self, index: usize) -> f64 {
         self.inverse[(index, index)] * self.variance()
     }
 
