@@ -151,11 +151,9 @@ fn start(calibration: &Calibration) -> Result<Start, CalibrationError> {
 /// The estimate of a calibration of one camera, as the start of several needs it.
 fn by_itself(calibration: &Calibration) -> Result<Alone, CalibrationError> {
     let Estimate { cameras, excluded, .. } = calibration.adjusted()?;
-    let found = cameras.into_iter().map(|found| {
-        let views = found.views.into_iter().map(|view| (view.name, view.pose));
-        (found.camera, found.roughness, views.collect())
-    });
-    let (camera, roughness, poses) = found.last().ok_or(CalibrationError::NoStart)?;
+    let only = cameras.into_iter().next().ok_or(CalibrationError::NoStart)?;
+    let CameraEstimate { camera, roughness, views, .. } = only;
+    let poses = views.into_iter().map(|view| (view.name, view.pose)).collect();
     Ok(Alone { camera, roughness, poses, excluded })
 }
 

@@ -1,10 +1,20 @@
 //! From detections to calibrated cameras.
 //!
-//! ```text
-//!   detections ─ view ─→ views ─ Calibration ─ start ─→ problem ─ gross errors ─ reweighting ─→ Estimate
-//!     target ──┘          (what is known)  (first cameras, poses)    (bundle adjustment)           │
-//!                                                                        diagnoses, in words  ←────┘
-//! ```
+//! Comes in: detections with their names, a target, and what is known of the cameras. Goes out: an [`Estimate`] with
+//! uncertainties, and each [`Diagnosis`] of it in words. Data meets the chapters in this order:
+//!
+//! 1. `input` compares detections with the target, and holds what is known and what is asked for: a [`Calibration`].
+//! 2. `problem` has the unknowns, observations and residuals of a bundle adjustment, their weights and their priors.
+//! 3. `equations` forms the normal equations, eliminates the poses of frames, and walks to the minimum.
+//! 4. `start` finds the first cameras and poses, without any guess.
+//! 5. `adjust` excludes gross errors, reweights, and adds unknowns such as the shape of a board.
+//! 6. `uncertainty` has the covariances: from noise, from the scatter between frames, from errors of the board.
+//! 7. `estimate` is the result as values, assembled from all of these.
+//! 8. `diagnose` says what is wrong with an estimate, what that comes from, and what helps.
+//!
+//! `adjusted` runs 4 to 7 on all views. `solve` is around it and holds frames out, `automatic` chooses a model by `solve`,
+//! `located` asks where a target is. `compare` and `next_view` read estimates. Everything may import `model` (of lenses),
+//! `error`, `excluded` and `stop`; otherwise a module imports from chapters above it in this list, never in a circle.
 //!
 //! A pixel is predicted through a chain of frames,
 //!

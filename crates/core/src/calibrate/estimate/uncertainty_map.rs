@@ -79,7 +79,7 @@ impl CameraEstimate {
     }
 
     /// How sure it is over its image of points at infinity, and at the distances of
-    /// [`ProjectionUncertainty::distances_mm`]: as far as these are known, from noise and observed.
+    /// [`ProjectionUncertainty::distances_mm`](crate::calibrate::ProjectionUncertainty::distances_mm): as far as these are known, from noise and observed.
     pub fn uncertainty_maps(&self) -> Vec<UncertaintyMap> {
         let distances = self.projection.iter().flat_map(|known| &known.distances_mm);
         let distances = std::iter::once(None).chain(distances.map(|&mm| Some(mm)));

@@ -251,7 +251,7 @@ impl Calibration {
         Self { board_shape, ..self }
     }
 
-    /// Whether the place of every corner of the target is found, too, see [`Estimate::map`].
+    /// Whether the place of every corner of the target is found, too, see [`Estimate::map`](crate::calibrate::Estimate::map).
     #[must_use]
     pub fn measure_target(self, measure_target: bool) -> Self {
         Self { measure_target, ..self }
@@ -267,7 +267,7 @@ impl Calibration {
     }
 
     /// Keeps every n-th frame (the n-th, the 2n-th, …) out of the calibration; only the poses in these are
-    /// found, see [`Estimate::held_out`].
+    /// found, see [`Estimate::held_out`](crate::calibrate::Estimate::held_out).
     #[must_use]
     pub fn hold_out(self, hold_out: Option<usize>) -> Self {
         Self { hold_out, ..self }

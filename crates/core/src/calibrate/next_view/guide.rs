@@ -8,7 +8,7 @@
 //! ```
 //!
 //! Nothing here opens a file or asks a clock: estimates go in, and a pose with its outline, figures and a sentence
-//! comes out. Whether somebody holds the board there is told by [`Holding`].
+//! comes out. Whether somebody holds the board there is told by [`Holding`](super::holding::Holding).
 
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 

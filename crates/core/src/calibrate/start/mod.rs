@@ -1,12 +1,13 @@
 //! Where a bundle adjustment starts: cameras, and where they and the target were, without any guess.
 //!
-//! ```text
-//!   each camera by itself ─→ camera_from_target in its own views
-//!   pictures of all cameras ─→ by how many frames each is late
-//!   two cameras, one frame ─→ camera_from_camera: the middle one of all such frames
-//!   a camera and a target of its own ─→ both, from how the rig moves
-//!   from camera 0 on to all others ─→ camera_from_rig, scene_from_target, rig_from_scene(frame)
-//! ```
+//! Comes in: a calibration. Goes out: a problem with values near those that are sought ([`frames::Start`]).
+//!
+//! 1. `consensus` takes corners that fit to their neighbours; `first_camera` finds a camera under which these are planes.
+//! 2. `pose` finds the pose of a target in one picture; `splined` is a spline that images as another lens does.
+//! 3. `alone` does all that for one camera.
+//! 4. `together` has every camera alone first, then: `delay` (by how many frames each is late), `symmetry` (labels of a board
+//!    that looks the same after a rotation), `linked` (poses between cameras and targets that share frames), and `motion`
+//!    (those that share none, from how the rig moves).
 
 pub(in crate::calibrate) mod alone;
 pub(in crate::calibrate) mod consensus;

@@ -1,5 +1,13 @@
 //! Several cameras, or one with panels that are not where they are stated to be: each camera by itself, laid
 //! together.
+//!
+//! ```text
+//!   each camera by itself ─→ camera_from_target in its own views
+//!   pictures of all cameras ─→ by how many frames each is late
+//!   two cameras, one frame ─→ camera_from_camera: the middle one of all such frames
+//!   a camera and a target of its own ─→ both, from how the rig moves
+//!   from camera 0 on to all others ─→ camera_from_rig, scene_from_target, rig_from_scene(frame)
+//! ```
 
 use std::collections::{BTreeMap, BTreeSet};
 
