@@ -117,13 +117,13 @@ struct Chain<'a> {
     of_shape: Option<usize>,
 }
 
-/// A corner from its panel to its pixel: before each translation.
+/// A corner on its way from the panel to the camera: before each translation, and in the end.
 struct Along {
     turned_panel: DVec3,
     turned_target: DVec3,
     turned_scene: DVec3,
     turned_rig: DVec3,
-    at: Projection,
+    in_camera: DVec3,
 }
 
 impl<'a> Chain<'a> {
@@ -155,8 +155,8 @@ impl<'a> Chain<'a> {
         poses.chain(self.of_shape.into_iter().flat_map(|first| first..first + shape::COUNT))
     }
 
-    /// `None` where the corner is out of its camera's reach.
-    fn along(&self, seen: &Observation) -> Option<Along> {
+    #[inline]
+    fn along(&self, seen: &Observation) -> Along {
         let Self { problem, block, camera, .. } = *self;
         let turned_panel = self.target_from_panel.rotation * problem.panel_point(block, seen);
         let in_target = turned_panel + self.target_from_panel.translation;
@@ -166,21 +166,25 @@ impl<'a> Chain<'a> {
         let in_rig = turned_scene + self.rig_from_scene.translation;
         let turned_rig = camera.camera_from_rig.rotation * in_rig;
         let in_camera = turned_rig + camera.camera_from_rig.translation;
-        let at = camera.camera.project_with_derivatives(in_camera)?;
-        Some(Along { turned_panel, turned_target, turned_scene, turned_rig, at })
+        Along { turned_panel, turned_target, turned_scene, turned_rig, in_camera }
     }
 
-    /// Hands the derivatives of coordinate `i` by the unknown links, the shape (which `bends` the corner along these
-    /// directions) and the frame's pose to `push`; returns that by the place of the corner on its panel.
+    /// The pixel of a corner; `None` where it is out of the camera's reach.
+    fn project(&self, along: &Along) -> Option<Projection> {
+        self.camera.camera.project_with_derivatives(along.in_camera)
+    }
+
+    /// Hands the derivatives of a coordinate by the unknown links, the shape (which `bends` the corner along these
+    /// directions) and the frame's pose to `push`, from that by the point before the camera; returns that by the place of the
+    /// corner on its panel.
     fn derivatives(
         &self,
         along: &Along,
-        i: usize,
+        by_camera: DVec3,
         bends: Option<&[DVec3; shape::COUNT]>,
         push: &mut impl FnMut(f64),
     ) -> DVec3 {
         // For y = exp(ω) a + t + τ a derivative j by y is a × j by ω, and j by τ.
-        let by_camera = DVec3::from(along.at.by_point[i]);
         let by_rig = self.rig_from_camera * by_camera;
         if self.of_camera.is_some() {
             pose(along.turned_rig, by_camera, push);
@@ -215,7 +219,7 @@ impl Local {
         let free = &layout.parameters[block.camera];
         let support = match chain.camera.camera.lens {
             Lens::Spline(_) if !free.is_empty() => {
-                let seen = block.observations.iter().map(|seen| Some(chain.along(seen)?.at));
+                let seen = block.observations.iter().map(|seen| chain.project(&chain.along(seen)));
                 let seen = seen.collect::<Option<Vec<Projection>>>()?;
                 Support::of(free, &seen, chain.camera.free.len())
             }
@@ -236,11 +240,11 @@ impl Local {
         for (seen, &w) in block.observations.iter().zip(whitening) {
             let bends = problem.shape.map(|shape| shape.directions(seen.panel_mm));
             let mapped = problem.map.as_ref().map(|map| map.index(block.panel, seen));
-            let along = chain.along(seen)?;
-            let at = &along.at;
+            let along = chain.along(seen);
+            let at = chain.project(&along)?;
             let mut by_place = [DVec3::ZERO; 2];
             if let Some(support) = &support {
-                support.places(at, n, &mut places);
+                support.places(&at, n, &mut places);
             }
             for (i, row) in rows.iter_mut().enumerate() {
                 let mut next = 0;
@@ -249,14 +253,15 @@ impl Local {
                     next += 1;
                 };
                 match &support {
-                    Some(support) => support.derivatives(at, i, &mut push),
+                    Some(support) => support.derivatives(&at, i, &mut push),
                     None => {
                         for &(parameter, _) in free {
                             push(at.by_parameters[parameter][i]);
                         }
                     }
                 }
-                by_place[i] = chain.derivatives(&along, i, bends.as_ref(), &mut push);
+                let by_camera = DVec3::from(at.by_point[i]);
+                by_place[i] = chain.derivatives(&along, by_camera, bends.as_ref(), &mut push);
             }
             let residual = seen.pixel - at.pixel;
             let count = if support.is_some() { places.len() } else { n };

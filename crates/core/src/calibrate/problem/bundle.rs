@@ -33,6 +33,7 @@ pub(in crate::calibrate) struct Problem {
 
 impl Problem {
     /// Where the target of a panel is in the scene.
+    #[inline]
     pub fn scene_from_target(&self, panel: PanelRef) -> Pose {
         self.targets[self.panels[panel.index()].target].scene_from_target
     }
@@ -50,6 +51,7 @@ impl Problem {
     }
 
     /// Where a corner is in the frame of its panel, mm.
+    #[inline]
     pub fn panel_point(&self, block: &Block, seen: &Observation) -> DVec3 {
         let bent = self.shape.map_or(DVec3::ZERO, |shape| shape.offset(seen.panel_mm));
         let moved = self.map.as_ref().map_or(DVec3::ZERO, |map| map.offset(block.panel, seen));
@@ -57,6 +59,7 @@ impl Problem {
     }
 
     /// Where a corner is in the frame of the camera that saw it, mm.
+    #[inline]
     pub fn camera_point(&self, block: &Block, observation: &Observation) -> DVec3 {
         let at = self.panel_point(block, observation);
         let target = self.panels[block.panel.index()].target_from_panel.apply(at);
