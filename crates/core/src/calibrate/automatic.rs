@@ -7,13 +7,13 @@
 
 use std::collections::BTreeMap;
 
-use super::calibration::{Calibration, CameraViews};
 use super::error::CalibrationError;
-use super::estimate::{CameraEstimate, Estimate, ViewEstimate};
+use super::estimate::values::{CameraEstimate, Estimate, ViewEstimate};
+use super::input::calibration::{Calibration, CameraViews};
+use super::input::observation::View;
+use super::input::sample::evenly;
 use super::model::Model;
-use super::start::evenly;
-use super::view::View;
-use super::weights::{MEDIAN_OF_CHI_SQUARED_2, OUTLIER_SIGMA};
+use super::problem::whitening::{MEDIAN_OF_CHI_SQUARED_2, OUTLIER_SIGMA};
 use crate::statistics::median;
 
 /// Models that are tried, those with fewer parameters first.

@@ -1,3 +1,5 @@
+//! Why a calibration fails, in sentences.
+
 use std::fmt;
 
 /// How a rig moved too plainly to place cameras that do not see the same target.
@@ -206,7 +208,7 @@ pub enum CalibrationError {
          the one that was photographed"
     )]
     NoStart,
-    /// Somebody has ended it, see [`Calibration::stopped_by`](super::Calibration::stopped_by).
+    /// Somebody has ended it, see [`Calibration::stopped_by`](crate::calibrate::Calibration::stopped_by).
     #[error("interrupted before it was solved")]
     Stopped,
     /// The views leave parameters open.

@@ -1,3 +1,5 @@
+//! Views, frames and panels that take no part, and why.
+
 use std::fmt;
 
 use serde::{Serialize, Serializer};

@@ -1,10 +1,10 @@
 //! Where a target is in a picture of a known camera.
 
-use super::calibration::Calibration;
-use super::diagnosis::Diagnosis;
+use super::diagnose::diagnosis::Diagnosis;
+use super::diagnose::words::Words;
 use super::error::CalibrationError;
-use super::estimate::Estimate;
-use super::words::Words;
+use super::estimate::values::Estimate;
+use super::input::calibration::Calibration;
 use crate::detect::Detection;
 
 impl Calibration {

@@ -1,10 +1,20 @@
 //! From detections to calibrated cameras.
 //!
-//! ```text
-//!   detections ─ view ─→ views ─ Calibration ─ start ─→ problem ─ gross errors ─ reweighting ─→ Estimate
-//!     target ──┘          (what is known)  (first cameras, poses)    (bundle adjustment)           │
-//!                                                                        diagnoses, in words  ←────┘
-//! ```
+//! Comes in: detections with their names, a target, and what is known of the cameras. Goes out: an [`Estimate`] with
+//! uncertainties, and each [`Diagnosis`] of it in words. Data meets the chapters in this order:
+//!
+//! 1. `input` compares detections with the target, and holds what is known and what is asked for: a [`Calibration`].
+//! 2. `problem` has the unknowns, observations and residuals of a bundle adjustment, their weights and their priors.
+//! 3. `equations` forms the normal equations, eliminates the poses of frames, and walks to the minimum.
+//! 4. `start` finds the first cameras and poses, without any guess.
+//! 5. `adjust` excludes gross errors, reweights, and adds unknowns such as the shape of a board.
+//! 6. `uncertainty` has the covariances: from noise, from the scatter between frames, from errors of the board.
+//! 7. `estimate` is the result as values, assembled from all of these.
+//! 8. `diagnose` says what is wrong with an estimate, what that comes from, and what helps.
+//!
+//! `adjusted` runs 4 to 7 on all views. `solve` is around it and holds frames out, `automatic` chooses a model by `solve`,
+//! `located` asks where a target is. `compare` and `next_view` read estimates. Everything may import `model` (of lenses),
+//! `error`, `excluded` and `stop`; otherwise a module imports from chapters above it in this list, never in a circle.
 //!
 //! A pixel is predicted through a chain of frames,
 //!
@@ -21,82 +31,59 @@
 //! pose leads to, and the translation grows by τ. Standard deviations of poses are those of ω (rad)
 //! and τ (mm).
 
-mod agreement;
+mod adjust;
+mod adjusted;
 mod automatic;
-mod board_errors;
-mod calibration;
-mod comparison;
-mod consensus;
-mod corner_map;
-mod coverage;
-mod diagnosis;
+mod compare;
+mod diagnose;
+mod equations;
 mod error;
 mod estimate;
 mod excluded;
-mod finding;
-mod grid;
-mod gross_errors;
-mod halves;
-mod image_circle;
-mod lack_of_fit;
-mod lens_end;
-mod local_share;
+mod input;
 mod located;
-mod loss;
-mod minimise;
 mod model;
-mod model_selection;
 mod next_view;
-mod normal;
-mod one_state;
-mod panel;
-mod panels;
-mod pose;
 mod problem;
-mod reweighting;
-mod roughness;
-mod shape;
 mod solve;
 mod start;
-mod state_equations;
 mod stop;
-mod target_map;
 mod uncertainty;
-mod verdict;
-mod view;
-mod view_consistency;
-mod weights;
-mod words;
 
+pub use adjust::finding::{Finding, Moved, Shared};
+pub use adjust::lack_of_fit::LackOfFit;
 pub use automatic::Candidate;
-pub use calibration::{Calibration, CameraViews, Intrinsics, PanelPlace};
-pub use comparison::{
+pub use compare::comparison::{
     CameraMotion, Comparison, ComparisonError, Difference, Region, compare_boards,
 };
-pub use coverage::Coverage;
-pub use diagnosis::Diagnosis;
+pub use compare::verdict::Verdict;
+pub use diagnose::diagnosis::Diagnosis;
+pub use diagnose::model_selection::{Instead, Remedy};
+pub use diagnose::one_state::{BoardStretch, CameraChange, ChangedIntrinsic, RollingShutter};
+pub use diagnose::words::Words;
 pub use error::{CalibrationError, TooPlain};
-pub use estimate::{
+pub use estimate::coverage::Coverage;
+pub use estimate::image_circle::ImageCircle;
+pub use estimate::lens_end::LensEnd;
+pub use estimate::target_map::{CornerOffset, LEAST_TO_MEASURE, TargetMap};
+pub use estimate::uncertainty_map::UncertaintyMap;
+pub use estimate::values::{
     CameraEstimate, Corner, Estimate, FrameEstimate, Parameter, TargetEstimate, ViewEstimate,
 };
 pub use excluded::{Excluded, Reason};
-pub use finding::{Finding, Moved, Shared};
-pub use grid::UntaggedGrid;
-pub use image_circle::ImageCircle;
-pub use lack_of_fit::LackOfFit;
-pub use lens_end::LensEnd;
-pub use loss::Loss;
+pub use input::calibration::{Calibration, CameraViews, Intrinsics};
+pub use input::grid::UntaggedGrid;
+pub use input::loss::Loss;
+pub use input::observation::Observation;
+pub use input::observation::{Sighting, View};
+pub use input::panel::PanelPlace;
+pub use input::panel::PanelRef;
+pub use input::reference::Reference;
+pub use input::views::{Shown, views};
+pub use input::weights::Weights;
 pub use model::{Model, ModelError};
-pub use model_selection::{Instead, Remedy};
-pub use next_view::{Guide, Guided, Held, Holding, NextView, ProposedCorner};
-pub use one_state::{BoardStretch, CameraChange, ChangedIntrinsic, RollingShutter};
-pub use panel::PanelRef;
-pub use problem::Observation;
-pub use shape::{BoardShape, COUNT as SHAPE_COEFFICIENTS, Shape};
-pub use start::LabelRotation;
-pub use target_map::{CornerOffset, LEAST_TO_MEASURE, TargetMap};
-pub use uncertainty::{ObservedCovariance, ProjectionUncertainty, Source, UncertaintyMap};
-pub use verdict::Verdict;
-pub use view::{Reference, Shown, Sighting, View, views};
-pub use weights::Weights;
-pub use words::Words;
+pub use next_view::guide::{Guide, Guided, NextView, ProposedCorner};
+pub use next_view::holding::{Held, Holding};
+pub use problem::shape::{BoardShape, COUNT as SHAPE_COEFFICIENTS, Shape};
+pub use start::symmetry::LabelRotation;
+pub use uncertainty::projection::{ObservedCovariance, ProjectionUncertainty, Source};

@@ -1,3 +1,5 @@
+//! Models of lenses: names, where their search starts, which parameters are free, smaller and richer ones.
+
 use std::f64::consts::FRAC_PI_2;
 use std::fmt;
 use std::str::FromStr;

@@ -1,7 +1,9 @@
+//! A flag by which somebody else ends a calibration.
+
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-/// A flag by which somebody else ends a calibration, see [`Calibration::stopped_by`](super::Calibration::stopped_by).
+/// A flag by which somebody else ends a calibration, see [`Calibration::stopped_by`](crate::calibrate::Calibration::stopped_by).
 ///
 /// It says nothing of what is calibrated: any two are equal.
 #[derive(Clone, Debug, Default)]

@@ -2,7 +2,7 @@
 
 use glam::{DMat3, DVec2, DVec3};
 
-use crate::calibrate::panel::PanelRef;
+use crate::calibrate::input::panel::PanelRef;
 use crate::camera::{Camera, Pose, Projection};
 use crate::polygon::hull;
 use crate::targets::{Panel, Target};

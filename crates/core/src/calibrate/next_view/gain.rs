@@ -10,16 +10,17 @@
 //! ```
 //!
 //! θ are parameters of the camera, and of the board's shape where that is found too; ξ is a turn and a move of what
-//! the camera sees, by which a pose and the alignment of [`uncertainty`](super::super::uncertainty) are the same.
+//! the camera sees, by which a pose and the alignment of [`uncertainty`](crate::calibrate::uncertainty::projection) are the same.
 
 use glam::{DMat3, DVec2};
 use nalgebra::{DMatrix, DVector, Matrix3, Matrix6, SMatrix};
 
 use super::body::{Body, Seen};
-use crate::calibrate::estimate::{CameraEstimate, Estimate};
+use crate::calibrate::estimate::values::{CameraEstimate, Estimate};
 use crate::calibrate::model::Model;
-use crate::calibrate::shape::{self, Shape};
-use crate::calibrate::uncertainty::{by_motion, by_parameters, seen_at};
+use crate::calibrate::problem::shape::{self, Shape};
+use crate::calibrate::uncertainty::known_so_far::KnownSoFar;
+use crate::calibrate::uncertainty::projection::{by_motion, by_parameters, seen_at};
 use crate::camera::{Camera, PROJECTION_PARAMETERS};
 
 /// Places along the longer side of the image by which projections are judged.
@@ -233,15 +234,6 @@ fn places(camera: &Camera) -> impl Iterator<Item = DVec2> + use<> {
         let at = DVec2::new((place % columns) as f64, (place / columns) as f64) + 0.5;
         at * size / parts - 0.5
     })
-}
-
-/// What corners say of the unknowns of one camera, and of the shape of the board.
-#[derive(Clone, Debug, PartialEq)]
-pub(in crate::calibrate) struct KnownSoFar {
-    /// Inverse covariance of the parameters that were found, then of the shape.
-    pub information: DMatrix<f64>,
-    /// Variance of a coordinate of a corner, px², the median.
-    pub corner_variance_px2: f64,
 }
 
 /// The camera that is most likely with what is expected of a lens beforehand, and the deviation that is expected of

@@ -4,10 +4,10 @@ use std::collections::BTreeMap;
 
 use glam::{DVec2, DVec3};
 
-use super::NextView;
-use crate::calibrate::panel::PanelRef;
-use crate::calibrate::pose::estimate_pose;
-use crate::calibrate::view::{Sighting, View};
+use super::guide::NextView;
+use crate::calibrate::input::observation::{Sighting, View};
+use crate::calibrate::input::panel::PanelRef;
+use crate::calibrate::start::pose::estimate_pose;
 use crate::camera::Pose;
 use crate::polygon::{area, clip, hull};
 use crate::statistics::median;

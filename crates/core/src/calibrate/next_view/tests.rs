@@ -1,12 +1,14 @@
+use std::f64::consts::{FRAC_PI_2, PI};
+
 use glam::{DQuat, DVec2, DVec3};
 
-use super::*;
-use crate::calibrate::problem::Observation;
-use crate::calibrate::view::Sighting;
-use crate::calibrate::{Model, Source, UncertaintyMap};
-use crate::camera::BrownConrady;
+use crate::calibrate::{
+    Calibration, Guide, Guided, Held, Holding, Model, NextView, Observation, PanelRef,
+    ProposedCorner, Reference, Sighting, Source, UncertaintyMap, View,
+};
+use crate::camera::{BrownConrady, Camera, Lens, Pose};
 use crate::lattice::GridKind;
-use crate::targets::{BoardSpec, SolidShape, SolidSpec, TargetSpec};
+use crate::targets::{BoardSpec, SolidShape, SolidSpec, Target, TargetSpec};
 
 fn board() -> Target {
     Target::new("board", BoardSpec::deltille(8, 10, 20.0)).unwrap()

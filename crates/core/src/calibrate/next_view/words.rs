@@ -3,7 +3,7 @@
 use std::f64::consts::{FRAC_PI_2, FRAC_PI_4, TAU};
 use std::fmt;
 
-use super::NextView;
+use super::guide::NextView;
 
 /// Names of the eight directions of an image, from right towards below: what is there, and a side of the board.
 const PARTS: [&str; 8] = [

@@ -2,21 +2,22 @@
 
 use glam::DVec3;
 
-use super::super::calibration::{Calibration, CameraViews, Intrinsics};
-use super::super::consensus::agreeing;
-use super::super::error::CalibrationError;
-use super::super::excluded::Reason;
-use super::super::loss::Loss;
-use super::super::minimise::{Until, minimise};
-use super::super::model::Model;
-use super::super::pose::{blocks, estimate_pose, fixed, median_off_px};
-use super::super::problem::{CameraUnknowns, Problem, TargetUnknowns};
-use super::super::reweighting::scale;
-use super::super::roughness::Roughness;
-use super::super::view::View;
+use super::consensus::agreeing;
 use super::first_camera::first_camera;
+use super::frames::{Frame, Start};
+use super::pose::{blocks, estimate_pose, fixed, median_off_px};
 use super::splined::splined;
-use super::{Frame, Start};
+use crate::calibrate::equations::minimise::{Until, minimise};
+use crate::calibrate::error::CalibrationError;
+use crate::calibrate::excluded::Reason;
+use crate::calibrate::input::calibration::{Calibration, CameraViews, Intrinsics};
+use crate::calibrate::input::loss::Loss;
+use crate::calibrate::input::observation::View;
+use crate::calibrate::model::Model;
+use crate::calibrate::problem::bundle::Problem;
+use crate::calibrate::problem::roughness::Roughness;
+use crate::calibrate::problem::unknowns::{CameraUnknowns, TargetUnknowns};
+use crate::calibrate::problem::whitening::scale;
 use crate::camera::{Camera, Lens, Pose};
 use crate::statistics::median;
 
@@ -31,7 +32,7 @@ const FORERUNNERS: [Model; 2] = [Model::KannalaBrandt(4), Model::Radtan5];
 /// pixel on a board of 500 px already looks like a tilt of one degree.
 const PARALLEL_RAD: f64 = 0.05;
 
-pub(super) fn start(calibration: &Calibration) -> Result<Start, CalibrationError> {
+pub(in crate::calibrate) fn start(calibration: &Calibration) -> Result<Start, CalibrationError> {
     let CameraViews { views, intrinsics, .. } = &calibration.cameras[0];
     let panels = calibration.panel_poses();
     let search = match intrinsics {

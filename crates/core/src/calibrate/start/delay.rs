@@ -4,11 +4,12 @@
 //! compared; and turns from one moment to another are as large for every camera, whatever target it sees. So the
 //! delay is sought by which the one, or where no target is common the other, scatters least.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 
-use super::super::calibration::Calibration;
 use super::linked::{ByFrame, Seen};
 use super::symmetry::{Symmetries, agreed};
+use crate::calibrate::input::calibration::Calibration;
+use crate::calibrate::input::sample::evenly;
 use crate::statistics::median;
 
 /// Delays that are looked for, frames.
@@ -120,7 +121,7 @@ fn scatter_of_poses(
     });
     let relative: Vec<_> = relative.collect();
     let count = relative.len();
-    let moments: Vec<_> = super::evenly(&relative, MOST_MOMENTS).cloned().collect();
+    let moments: Vec<_> = evenly(&relative, MOST_MOMENTS).cloned().collect();
     (count >= LEAST_MOMENTS).then(|| Some((agreed(&moments)?.spread_mm, count))).flatten()
 }
 
@@ -172,39 +173,9 @@ pub(super) fn in_time(calibration: &Calibration, delays: &[i32], seen: &mut ByFr
     }
 }
 
-/// Names with numbers in the order in which one counts: 2 before 10.
-pub(in crate::calibrate) fn in_order(names: BTreeSet<&str>) -> Vec<String> {
-    let mut names: Vec<&str> = names.into_iter().collect();
-    names.sort_by_cached_key(|name| parts(name));
-    names.into_iter().map(str::to_owned).collect()
-}
-
-/// Text and numbers by turns, numbers as their length without zeros in front, and their digits.
-fn parts(name: &str) -> Vec<(String, usize, String)> {
-    let mut parts = Vec::new();
-    let mut rest = name;
-    while !rest.is_empty() {
-        let digits = rest.find(|c: char| c.is_ascii_digit()).unwrap_or(rest.len());
-        let (text, from_number) = rest.split_at(digits);
-        let end = from_number.find(|c: char| !c.is_ascii_digit()).unwrap_or(from_number.len());
-        let (number, after) = from_number.split_at(end);
-        let number = number.trim_start_matches('0');
-        parts.push((text.to_owned(), number.len(), number.to_owned()));
-        rest = after;
-    }
-    parts
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn frames_are_counted() {
-        let names = ["a10", "a9", "a100", "b1", "a010x"];
-        let order = in_order(names.into_iter().collect());
-        assert_eq!(order, ["a9", "a10", "a010x", "a100", "b1"]);
-    }
 
     #[test]
     fn most_cameras_are_in_time() {

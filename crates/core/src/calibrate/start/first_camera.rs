@@ -4,10 +4,10 @@
 //! in the middle, the one is taken under which the views look most like views of planes. Half of the
 //! views may be wrong.
 
-use super::super::model::Model;
-use super::super::pose::planar_pose;
-use super::super::problem::Observation;
-use super::super::view::View;
+use super::pose::planar_pose;
+use crate::calibrate::input::observation::{Observation, View};
+use crate::calibrate::input::sample::evenly;
+use crate::calibrate::model::Model;
 use crate::camera::{BrownConrady, Camera, KannalaBrandt, Lens, Pose};
 use crate::statistics::median;
 
@@ -64,10 +64,4 @@ fn squared_px(camera: &Camera, pose: &Pose, seen: &Observation) -> f64 {
 fn largest_panel(view: &View) -> Option<Vec<Observation>> {
     let largest = view.sightings.iter().max_by_key(|sighting| sighting.observations.len())?;
     Some(evenly(&largest.observations, MOST_CORNERS).copied().collect())
-}
-
-/// At most so many of the items, evenly over their sequence.
-pub(in crate::calibrate) fn evenly<T>(items: &[T], most: usize) -> impl Iterator<Item = &T> {
-    let count = items.len().min(most);
-    (0..count).map(move |i| &items[i * items.len() / count])
 }

@@ -12,7 +12,7 @@
 use glam::{DMat3, DQuat, DVec3};
 use nalgebra::{Matrix3, Matrix6, SMatrix, Vector6};
 
-use super::super::error::TooPlain;
+use crate::calibrate::error::TooPlain;
 use crate::camera::Pose;
 use crate::statistics::median;
 

@@ -3,7 +3,7 @@
 use glam::DVec2;
 use nalgebra::{DMatrix, DVector};
 
-use super::super::roughness::{Roughness, differences};
+use crate::calibrate::problem::roughness::{Roughness, differences};
 use crate::camera::{
     Camera, Lens, PROJECTION_PARAMETERS, Spline, SplineGrid, stereographic_direction,
 };

@@ -19,10 +19,10 @@ use std::f64::consts::FRAC_PI_4;
 
 use glam::{DQuat, DVec3};
 
-use super::super::calibration::Calibration;
-use super::super::problem::Observation;
-use super::evenly;
 use super::linked::{ByFrame, LEAST_SHARED, Seen};
+use crate::calibrate::input::calibration::Calibration;
+use crate::calibrate::input::observation::Observation;
+use crate::calibrate::input::sample::evenly;
 use crate::camera::Pose;
 use crate::lattice::{LatticeMap, Vertex};
 use crate::statistics::median;

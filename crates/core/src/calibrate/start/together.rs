@@ -1,39 +1,60 @@
 //! Several cameras, or one with panels that are not where they are stated to be: each camera by itself, laid
 //! together.
+//!
+//! ```text
+//!   each camera by itself ─→ camera_from_target in its own views
+//!   pictures of all cameras ─→ by how many frames each is late
+//!   two cameras, one frame ─→ camera_from_camera: the middle one of all such frames
+//!   a camera and a target of its own ─→ both, from how the rig moves
+//!   from camera 0 on to all others ─→ camera_from_rig, scene_from_target, rig_from_scene(frame)
+//! ```
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use super::super::calibration::{Calibration, CameraViews, Intrinsics};
-use super::super::error::CalibrationError;
-use super::super::estimate::Estimate;
-use super::super::excluded::Excluded;
-use super::super::loss::Loss;
-use super::super::minimise::{Until, minimise};
-use super::super::panel::PanelRef;
-use super::super::panels::{targets_unknown, unknowns};
-use super::super::problem::{Block, CameraUnknowns, Problem};
-use super::super::reweighting::scale;
 use super::delay::{delays, in_time};
+use super::frames::{Frame, Start};
 use super::linked::{ByFrame, Places, Seen};
 use super::symmetry::Symmetries;
-use super::{Frame, Start};
+use crate::calibrate::equations::minimise::{Until, minimise};
+use crate::calibrate::error::CalibrationError;
+use crate::calibrate::excluded::Excluded;
+use crate::calibrate::input::calibration::{Calibration, CameraViews, Intrinsics};
+use crate::calibrate::input::loss::Loss;
+use crate::calibrate::input::panel::PanelRef;
+use crate::calibrate::problem::bundle::Problem;
+use crate::calibrate::problem::panels::{targets_unknown, unknowns};
+use crate::calibrate::problem::roughness::Roughness;
+use crate::calibrate::problem::unknowns::{Block, CameraUnknowns};
+use crate::calibrate::problem::whitening::scale;
 use crate::camera::{Camera, Pose};
-use crate::statistics::median;
 
-pub(super) fn start(calibration: &Calibration) -> Result<Start, CalibrationError> {
+/// A camera by itself.
+pub(in crate::calibrate) struct Alone {
+    pub camera: Camera,
+    /// What is expected of the knots of a spline.
+    pub roughness: Option<Roughness>,
+    /// The pose of the target in each view, by its name.
+    pub poses: BTreeMap<String, Pose>,
+    /// Views that took no part.
+    pub excluded: Vec<Excluded>,
+}
+
+/// `by_itself` solves a calibration of one camera.
+pub(in crate::calibrate) fn start(
+    calibration: &Calibration,
+    by_itself: impl Fn(&Calibration) -> Result<Alone, CalibrationError>,
+) -> Result<Start, CalibrationError> {
     let cameras = &calibration.cameras;
     let mut excluded = Vec::new();
     let mut seen = ByFrame::new();
     let mut found = Vec::with_capacity(cameras.len());
     for (index, camera) in cameras.iter().enumerate() {
-        let alone = alone(calibration, index)?;
+        let alone = alone(calibration, index, &by_itself)?;
         let name = Some(camera.name.clone());
         let of_camera = alone.excluded.into_iter();
         excluded.extend(of_camera.map(|view| (0, Excluded { camera: name.clone(), ..view })));
-        let poses: BTreeMap<String, Pose> =
-            alone.cameras[0].views.iter().map(|view| (view.name.clone(), view.pose)).collect();
-        seen.push(by_frame(calibration, camera, &poses));
-        found.extend(alone.cameras.into_iter().map(|alone| (alone.camera, alone.roughness)));
+        seen.push(by_frame(calibration, camera, &alone.poses));
+        found.push((alone.camera, alone.roughness));
     }
     let symmetries = Symmetries::of(calibration);
     let known = calibration.delays.clone();
@@ -41,22 +62,8 @@ pub(super) fn start(calibration: &Calibration) -> Result<Start, CalibrationError
     in_time(calibration, &delays, &mut seen);
     let rotations = symmetries.agree(calibration, &mut seen);
     let places = Places::of(calibration, &seen)?;
-    let names: BTreeSet<&str> =
-        seen.iter().flat_map(|of_camera| of_camera.keys().map(String::as_str)).collect();
-    let (mut problem, mut frames) = (Problem::default(), Vec::new());
-    for (place, name) in names.into_iter().enumerate() {
-        let of_frame = seen.iter().enumerate();
-        let of_frame: Vec<(usize, &Seen)> = of_frame
-            .flat_map(|(camera, seen)| {
-                seen.get(name).into_iter().flatten().map(move |s| (camera, s))
-            })
-            .collect();
-        problem.frames.extend(places.rig_from_scene(&of_frame));
-        let mut views: Vec<(usize, usize)> =
-            of_frame.iter().map(|(camera, seen)| (*camera, seen.view)).collect();
-        views.dedup();
-        frames.push(Frame { name: name.to_owned(), place, views });
-    }
+    let mut problem = Problem::default();
+    let frames = frames(&seen, &places, &mut problem);
     let mut blocks = Vec::new();
     for (index, camera) in cameras.iter().enumerate() {
         for (frame, of_frame) in frames.iter().enumerate() {
@@ -101,14 +108,39 @@ pub(super) fn start(calibration: &Calibration) -> Result<Start, CalibrationError
     Ok(Start { problem: first.problem, frames, excluded, delays, rotations })
 }
 
+/// The frames by their names, whose poses are added to the problem.
+fn frames(seen: &ByFrame, places: &Places, problem: &mut Problem) -> Vec<Frame> {
+    let names: BTreeSet<&str> =
+        seen.iter().flat_map(|of_camera| of_camera.keys().map(String::as_str)).collect();
+    let mut frames = Vec::new();
+    for (place, name) in names.into_iter().enumerate() {
+        let of_frame = seen.iter().enumerate();
+        let of_frame: Vec<(usize, &Seen)> = of_frame
+            .flat_map(|(camera, seen)| {
+                seen.get(name).into_iter().flatten().map(move |s| (camera, s))
+            })
+            .collect();
+        problem.frames.extend(places.rig_from_scene(&of_frame));
+        let mut views: Vec<(usize, usize)> =
+            of_frame.iter().map(|(camera, seen)| (*camera, seen.view)).collect();
+        views.dedup();
+        frames.push(Frame { name: name.to_owned(), place, views });
+    }
+    frames
+}
+
 /// A camera by itself: as it is known, or as its views have it.
-fn alone(calibration: &Calibration, index: usize) -> Result<Estimate, CalibrationError> {
+fn alone(
+    calibration: &Calibration,
+    index: usize,
+    by_itself: impl Fn(&Calibration) -> Result<Alone, CalibrationError>,
+) -> Result<Alone, CalibrationError> {
     let camera = &calibration.cameras[index];
     if camera.views.is_empty() && !matches!(camera.intrinsics, Intrinsics::Known(_)) {
         return Err(CalibrationError::NotSeen { camera: camera.name.clone() });
     }
     let alone = calibration.alone(index, &calibration.panels).board_shape(false);
-    alone.adjusted().map_err(|error| CalibrationError::OfCamera {
+    by_itself(&alone).map_err(|error| CalibrationError::OfCamera {
         camera: camera.name.clone(),
         error: Box::new(error),
     })
@@ -142,20 +174,4 @@ fn by_frame(
         }
     }
     seen
-}
-
-/// The pose that lies in the middle of others: its median distance from them is the least. A turn
-/// counts by how far it moves a point as far away as the translations reach.
-pub(in crate::calibrate) fn middle(poses: &[Pose]) -> Pose {
-    let arm = median(poses.iter().map(|pose| pose.translation.length()).collect())
-        .unwrap_or(0.0)
-        .max(1.0);
-    let apart = |a: &Pose, b: &Pose| {
-        let turn = a.rotation.angle_between(b.rotation);
-        (a.translation - b.translation).length() + arm * turn
-    };
-    let spread =
-        |pose: &Pose| median(poses.iter().map(|other| apart(pose, other)).collect()).unwrap_or(0.0);
-    let of_all = poses.iter().map(|pose| (*pose, spread(pose)));
-    of_all.min_by(|a, b| a.1.total_cmp(&b.1)).map_or(Pose::IDENTITY, |(pose, _)| pose)
 }

@@ -1,0 +1,103 @@
+//! Unknowns that are added to an adjustment: how smooth splines are, the shape of a board, offsets of corners.
+
+use super::gross_errors::Gross;
+use super::reweighting::{Kept, Settled, settle, variance};
+use crate::calibrate::equations::minimise::{Minimum, Until, minimise};
+use crate::calibrate::error::CalibrationError;
+use crate::calibrate::input::calibration::Calibration;
+use crate::calibrate::problem::bundle::Problem;
+use crate::calibrate::problem::corner_map::CornerMap;
+use crate::calibrate::problem::shape::{self, Shape};
+
+/// An expectation is found when it changes by less than this part.
+const SAME_PRIOR: f64 = 0.05;
+
+/// Rounds in which offsets and what is expected of them are fitted to one another.
+const PRIOR_ROUNDS: usize = 10;
+
+/// The same of the knots of a spline, whose rounds are shorter.
+const KNOT_ROUNDS: usize = 15;
+
+/// A size of second differences is found when it changes by less than this part.
+const SAME_SIZE: f64 = 0.1;
+
+impl Calibration {
+    /// With splines as smooth as the corners have them.
+    pub(in crate::calibrate) fn smoothed(
+        &self,
+        gross: &Gross,
+        settled: Settled,
+    ) -> Result<Settled, CalibrationError> {
+        let has_splines = |problem: &Problem| problem.cameras.iter().any(|c| c.roughness.is_some());
+        if !has_splines(&settled.problem) {
+            return Ok(settled);
+        }
+        let Settled { minimum, whitening, problem: all, .. } = settled;
+        let (mut minimum, mut rounds) = (minimum, 0);
+        loop {
+            let Minimum { problem, normal, layout, .. } = &minimum;
+            let covariance = normal.covariance_of_kept().ok_or(CalibrationError::NoStart)?;
+            let (mut next, mut change): (_, f64) = (problem.clone(), 0.0);
+            for (camera, parameters) in next.cameras.iter_mut().zip(&layout.parameters) {
+                let Some(now) = &camera.roughness else { continue };
+                let found = now.fitted(&camera.camera, parameters, whitening.sigma, &covariance);
+                change = change.max(now.change(&found));
+                camera.roughness = Some(found);
+            }
+            rounds += 1;
+            if change < SAME_SIZE || rounds > KNOT_ROUNDS {
+                break;
+            }
+            minimum = minimise(next, &whitening, self.loss, Until::Rough)
+                .ok_or(CalibrationError::NoStart)?;
+        }
+        let problem = all.at(&minimum.problem);
+        settle(Kept { problem, ..gross.kept() }, self.weights, self.loss)
+    }
+
+    /// Finds the shape of the sheet too, and the F ratio of what that explains.
+    pub(in crate::calibrate) fn bent(
+        &self,
+        gross: &Gross,
+        settled: Settled,
+    ) -> Result<(Settled, f64), CalibrationError> {
+        let flat = settled.minimum.normal.cost;
+        let mut problem = settled.minimum.problem;
+        let observations = problem.blocks.iter().flat_map(|block| &block.observations);
+        problem.shape = Some(Shape::flat(observations.map(|seen| seen.panel_mm)));
+        // Compared under the same weights.
+        let bent = minimise(problem, &settled.whitening, self.loss, Until::Fine)
+            .ok_or(CalibrationError::NoStart)?;
+        let variance = variance(&bent, &settled.whitening, self.loss);
+        let f_ratio = (flat - bent.normal.cost) / shape::COUNT as f64 / variance;
+        let problem = settled.problem.at(&bent.problem);
+        let settled = settle(Kept { problem, ..gross.kept() }, self.weights, self.loss)?;
+        Ok((settled, f_ratio))
+    }
+
+    /// Finds the place of every corner of the target too.
+    pub(in crate::calibrate) fn measured(
+        &self,
+        gross: &Gross,
+        settled: Settled,
+    ) -> Result<Settled, CalibrationError> {
+        let mut problem = settled.problem.clone();
+        let map = CornerMap::flat(&problem.blocks);
+        problem.map = Some(map);
+        let mut settled = settle(Kept { problem, ..gross.kept() }, self.weights, self.loss)?;
+        for _ in 0..PRIOR_ROUNDS {
+            let Minimum { problem, normal, layout, .. } = &settled.minimum;
+            let Some(map) = &problem.map else { break };
+            let found = normal.covariances(layout).ok_or(CalibrationError::NoStart)?;
+            let fitted = map.fitted_prior(&found.corners, settled.whitening.sigma);
+            let change = (fitted.0 - map.prior_mm).abs() / map.prior_mm;
+            if change.max_element() < SAME_PRIOR {
+                break;
+            }
+            let mut problem = settled.problem.clone();
+            problem.map = Some(map.clone().expecting(fitted));
+            settled = settle(Kept { problem, ..gross.kept() }, self.weights, self.loss)?;
+        }
+        Ok(settled)
+    }
+}

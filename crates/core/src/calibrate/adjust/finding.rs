@@ -1,0 +1,208 @@
+//! What outliers have in common: a panel, a view, a place in the image.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use glam::DVec2;
+
+use crate::calibrate::input::panel::PanelRef;
+use crate::calibrate::problem::bundle::Problem;
+
+/// Gross errors of corners that have something in common.
+#[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
+pub struct Finding {
+    /// What they have in common.
+    pub shared: Shared,
+    /// How many of these corners are outliers.
+    pub outliers: usize,
+    /// How many corners have it in common.
+    pub corners: usize,
+    /// Whether all of them were left out of the calibration.
+    pub left_out: bool,
+}
+
+/// What outliers have in common.
+#[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
+pub enum Shared {
+    /// They lie far beyond the picture that they were seen in.
+    Beyond {
+        /// Index of the camera.
+        camera: usize,
+        /// Name of the view.
+        view: String,
+    },
+    /// A panel of the target, wherever it was seen.
+    Panel {
+        /// Which one.
+        panel: PanelRef,
+        /// Where it is instead, if that explains them.
+        moved: Option<Moved>,
+    },
+    /// A panel in one picture.
+    PanelInView {
+        /// Which one.
+        panel: PanelRef,
+        /// Index of the camera.
+        camera: usize,
+        /// Name of the view.
+        view: String,
+        /// The median error of its corners, px.
+        off_px: f64,
+    },
+    /// A picture.
+    View {
+        /// Index of the camera.
+        camera: usize,
+        /// Name of the view.
+        view: String,
+    },
+    /// A part of the image, in several views.
+    Region {
+        /// Index of the camera.
+        camera: usize,
+        /// Its upper left, px.
+        from_px: DVec2,
+        /// Its lower right, px.
+        to_px: DVec2,
+    },
+    /// A camera of a rig.
+    Camera {
+        /// Index of the camera.
+        camera: usize,
+    },
+}
+
+/// How far a panel is from its stated pose.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
+pub struct Moved {
+    /// Distance of its middle from the stated position, mm.
+    pub by_mm: f64,
+    /// Angle between its orientation and the stated one, rad.
+    pub turned_rad: f64,
+}
+
+/// Outliers are a finding from so many on: fewer may meet by chance.
+const LEAST_OUTLIERS: usize = 6;
+
+/// From this part on most of what is seen there is wrong.
+const MOST: f64 = 0.5;
+
+/// And elsewhere at most this part of that, so that it is wrong there.
+const ELSEWHERE: f64 = 0.5;
+
+/// And so many deviations more than elsewhere, as counts scatter: of a million groups hardly one by chance.
+const SIGNIFICANT: f64 = 5.0;
+
+/// Cells of the image along its longer side in which outliers are counted.
+const CELLS: f64 = 8.0;
+
+/// Views of which a part of the image shows outliers, if it is the image's fault.
+const LEAST_VIEWS: usize = 3;
+
+/// A camera, and a cell of its image.
+type Cell = (usize, [i32; 2]);
+
+/// Outliers and corners.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(super) struct Count {
+    pub outliers: usize,
+    pub corners: usize,
+}
+
+impl Count {
+    pub(in crate::calibrate) fn add(&mut self, outlier: bool) {
+        self.corners += 1;
+        self.outliers += usize::from(outlier);
+    }
+
+    pub(in crate::calibrate) fn share(self) -> f64 {
+        self.outliers as f64 / self.corners.max(1) as f64
+    }
+
+    /// Whether most of these are outliers, and few of the others of all.
+    pub(super) fn stands_out(self, all: Count) -> bool {
+        let others =
+            Count { outliers: all.outliers - self.outliers, corners: all.corners - self.corners };
+        self.exceeds(others)
+            && self.share() >= MOST
+            && others.corners > 0
+            && others.share() <= ELSEWHERE * self.share()
+    }
+
+    /// Whether these are outliers more often than others, by more than chance.
+    pub(super) fn exceeds(self, others: Count) -> bool {
+        let (count, chance) = (self.corners as f64, others.share());
+        let more = count * (self.share() - chance);
+        self.outliers >= LEAST_OUTLIERS
+            && more > SIGNIFICANT * (count * chance * (1.0 - chance)).sqrt()
+    }
+}
+
+/// What the outliers of a problem share, of what took part; `names` are those of the frames.
+pub(super) fn shared_outliers(
+    problem: &Problem,
+    outliers: &[Vec<bool>],
+    left_out: &[bool],
+    names: impl Fn(usize) -> String,
+) -> Vec<Finding> {
+    let mut all = Count::default();
+    let mut cameras: BTreeMap<usize, Count> = BTreeMap::new();
+    let mut views: BTreeMap<(usize, usize), Count> = BTreeMap::new();
+    let mut cells: BTreeMap<Cell, (Count, BTreeSet<usize>)> = BTreeMap::new();
+    let taking_part = problem.blocks.iter().zip(outliers).zip(left_out);
+    for ((block, outliers), _) in taking_part.filter(|(_, left_out)| !**left_out) {
+        let camera = &problem.cameras[block.camera].camera;
+        let cell_px = f64::from(camera.width.max(camera.height)) / CELLS;
+        for (corner, &outlier) in block.observations.iter().zip(outliers) {
+            all.add(outlier);
+            cameras.entry(block.camera).or_default().add(outlier);
+            views.entry((block.camera, block.frame)).or_default().add(outlier);
+            // Where it should have been seen: wrong places are anywhere.
+            let Some(off) = problem.residual(block, corner) else { continue };
+            let cell = ((corner.pixel - off) / cell_px).floor().as_ivec2().to_array();
+            let (count, of_views) = cells.entry((block.camera, cell)).or_default();
+            count.add(outlier);
+            if outlier {
+                of_views.insert(block.frame);
+            }
+        }
+    }
+    let finding = |shared: Shared, count: Count| Finding {
+        shared,
+        outliers: count.outliers,
+        corners: count.corners,
+        left_out: false,
+    };
+    cameras.retain(|_, count| count.stands_out(all));
+    let mut found: Vec<Finding> =
+        cameras.iter().map(|(&camera, &count)| finding(Shared::Camera { camera }, count)).collect();
+    for (&(camera, frame), &count) in views.iter().filter(|(_, count)| count.stands_out(all)) {
+        if !cameras.contains_key(&camera) {
+            found.push(finding(Shared::View { camera, view: names(frame) }, count));
+        }
+    }
+    // The cells of a camera that stand out, as one rectangle.
+    let mut regions: BTreeMap<usize, (Count, [i32; 2], [i32; 2])> = BTreeMap::new();
+    for (&(camera, cell), (count, of_views)) in &cells {
+        let is_of_image = of_views.len() >= LEAST_VIEWS && !cameras.contains_key(&camera);
+        if is_of_image && count.stands_out(all) {
+            let (sum, from, to) = regions.entry(camera).or_insert((Count::default(), cell, cell));
+            sum.outliers += count.outliers;
+            sum.corners += count.corners;
+            *from = [0, 1].map(|i| from[i].min(cell[i]));
+            *to = [0, 1].map(|i| to[i].max(cell[i]));
+        }
+    }
+    for (camera, (count, from, to)) in regions {
+        let Some(unknowns) = problem.cameras.get(camera) else { continue };
+        let (width, height) = (unknowns.camera.width, unknowns.camera.height);
+        let cell_px = f64::from(width.max(height)) / CELLS;
+        let size = DVec2::new(width.into(), height.into());
+        let from_px = DVec2::from(from.map(|cell| f64::from(cell.max(0)))) * cell_px;
+        let to_px = (DVec2::from(to.map(|cell| f64::from(cell + 1))) * cell_px).min(size);
+        found.push(finding(Shared::Region { camera, from_px, to_px }, count));
+    }
+    found
+}

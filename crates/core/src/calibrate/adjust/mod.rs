@@ -1,0 +1,16 @@
+//! Adjustment of the observations that belong together.
+//!
+//! Comes in: a problem near its minimum. Goes out: a minimum whose weights and excluded corners are consistent with its residuals
+//! ([`reweighting::Settled`]), and what outliers have in common.
+//!
+//! 1. `reweighting` estimates weights, the set of corners that count, and unknowns in turn.
+//! 2. `lack_of_fit` finds patterns in residuals, `view_consistency` frames that contradict the camera of all others.
+//! 3. `gross_errors` excludes panels, views, and panels in views by these; `finding` is what is told of them.
+//! 4. `added_unknowns` goes on with more: smoothness of a spline, shape of the board, offsets of corners.
+
+pub(in crate::calibrate) mod added_unknowns;
+pub(in crate::calibrate) mod finding;
+pub(in crate::calibrate) mod gross_errors;
+pub(in crate::calibrate) mod lack_of_fit;
+pub(in crate::calibrate) mod reweighting;
+pub(in crate::calibrate) mod view_consistency;

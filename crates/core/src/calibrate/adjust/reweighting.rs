@@ -1,0 +1,251 @@
+//! Iteratively reweighted adjustment: the weights of corners, the set of corners that count, and
+//! the unknowns are estimated in turn until they are consistent.
+//!
+//! Robust losses are M-estimators. Corners with gross errors, beyond a gap in the distribution of
+//! residuals, are excluded; smooth deviations, as an unsuitable lens model leaves, are not.
+
+use std::collections::BTreeMap;
+
+use glam::DVec2;
+
+use crate::calibrate::equations::minimise::{Minimum, Until, minimise};
+use crate::calibrate::error::CalibrationError;
+use crate::calibrate::input::loss::Loss;
+use crate::calibrate::input::observation::{LEAST_CORNERS, Observation};
+use crate::calibrate::input::weights::Weights;
+use crate::calibrate::problem::bundle::Problem;
+use crate::calibrate::problem::unknowns::Block;
+use crate::calibrate::problem::whitening::{OUTLIER_SIGMA, Whitening, deviations, residuals};
+
+/// Least number of rounds in which weights and solution are fitted to each other; the third changes
+/// no significant digit.
+const WEIGHT_ROUNDS: usize = 3;
+
+/// Most rounds until the set of corners that count is stable; a corner at the limit may change
+/// sides for ever.
+const MOST_ROUNDS: usize = 12;
+
+/// Least size of a gross error, in deviations. Beyond [`OUTLIER_SIGMA`] a corner is called an
+/// outlier.
+const GROSS_SIGMA: f64 = 2.0 * OUTLIER_SIGMA;
+
+/// Gross errors are separated from the other corners by a gap: between half the limit and the limit
+/// lie at most this fraction of the number of corners beyond it. A lens that the model does not
+/// represent well leaves a tail of residuals at its rim instead, with more corners nearer than
+/// farther; excluding the rim would make the fit there ever worse.
+const IN_THE_GAP: f64 = 0.25;
+
+/// Lens model errors are smooth: of the neighbours of corners that are far off, more than the
+/// fraction `SMOOTH` are off towards the same side, by more than the fraction `FALLS_OFF` as much
+/// and by more than `LEAST_SMOOTH_SIGMA` deviations. Wrong positions are smooth nowhere; where
+/// labels or corners are displaced alike, only the displaced corners are such neighbours.
+const SMOOTH: f64 = 0.5;
+const FALLS_OFF: f64 = 0.05;
+const LEAST_SMOOTH_SIGMA: f64 = 3.0;
+
+/// The parts of a problem that belong together.
+#[derive(Clone, Debug)]
+pub(in crate::calibrate) struct Kept {
+    pub problem: Problem,
+    /// Blocks that take no part.
+    pub left_out: Vec<bool>,
+    /// Whether corners with gross errors stand out from the start. They must then have no influence
+    /// even in the first round: if two fifths of the corners are displaced alike, they bias the
+    /// estimate so much that they no longer stand out.
+    pub some_stand_out: bool,
+}
+
+/// A consistent solution of weights, set of corners that count, and unknowns.
+pub(in crate::calibrate) struct Settled {
+    /// The minimum over the corners that count.
+    pub minimum: Minimum,
+    /// The whitening of the corners that count.
+    pub whitening: Whitening,
+    /// The same unknowns with all corners.
+    pub problem: Problem,
+    /// For each block, which of all its corners are outliers: farther off than by chance.
+    pub outliers: Vec<Vec<bool>>,
+}
+
+/// Minimises with weights that are consistent with the residuals at the minimum. Corners with gross
+/// errors, and blocks that are left out, do not take part, so that deviations are those of the
+/// corners that do; with [`Loss::Squared`] every corner takes part.
+///
+/// # Errors
+/// When the normal equations cannot be formed or solved from the initial values.
+pub(super) fn settle(
+    kept: Kept,
+    weights: Weights,
+    loss: Loss,
+) -> Result<Settled, CalibrationError> {
+    let Kept { problem, left_out, some_stand_out } = kept;
+    let start = || CalibrationError::NoStart;
+    let all_of = |keep: bool| move |block: &Block| vec![keep; block.observations.len()];
+    let none: Vec<Vec<bool>> = problem.blocks.iter().map(all_of(false)).collect();
+    let counting = |problem: &Problem, gross: &[Vec<bool>]| {
+        let kept = gross.iter().zip(&left_out);
+        let kept = kept.map(|(of_block, out)| of_block.iter().map(|far| !far && !out).collect());
+        problem.with_corners(&kept.collect::<Vec<_>>())
+    };
+    let mut all = problem;
+    let mut gross = none.clone();
+    if some_stand_out && loss != Loss::Squared {
+        let whitening = Whitening::fit(&all, weights, &residuals(&all));
+        gross = with_gross_errors(&all, &left_out, &whitening);
+    }
+    let mut part = counting(&all, &gross);
+    let mut whitening = Whitening::fit(&part, weights, &residuals(&part));
+    // In the first round all corners count except those that stand out, so that a lens is judged
+    // with its rim. With equal weights and squared loss, reweighting changes nothing.
+    let rounds = match whitening.common_px.is_some() || loss != Loss::Squared {
+        true => MOST_ROUNDS,
+        false => 0,
+    };
+    for round in 1..rounds {
+        part = minimise(part, &whitening, loss, Until::Rough).ok_or_else(start)?.problem;
+        all = all.at(&part);
+        whitening = Whitening::fit(&part, weights, &residuals(&part));
+        let now = match loss {
+            Loss::Squared => none.clone(),
+            Loss::Huber | Loss::Cauchy => with_gross_errors(&all, &left_out, &whitening),
+        };
+        let is_same = now == gross;
+        if !is_same {
+            gross = now;
+            part = counting(&all, &gross);
+            whitening = Whitening::fit(&part, weights, &residuals(&part));
+        }
+        if is_same && round + 1 >= WEIGHT_ROUNDS {
+            break;
+        }
+    }
+    let minimum = minimise(part, &whitening, loss, Until::Fine).ok_or_else(start)?;
+    let problem = all.at(&minimum.problem);
+    let limit = whitening.outlier_limit();
+    let of_block = |off: Vec<f64>| off.into_iter().map(|off| off > limit).collect();
+    let outliers = deviations(&problem, &whitening).into_iter().map(of_block).collect();
+    Ok(Settled { minimum, whitening, problem, outliers })
+}
+
+/// Marks the corners with gross errors, for each block. Every frame keeps at least its nearest
+/// corners, as many as a pose needs.
+pub(super) fn with_gross_errors(
+    problem: &Problem,
+    left_out: &[bool],
+    whitening: &Whitening,
+) -> Vec<Vec<bool>> {
+    let off = deviations(problem, whitening);
+    let mut of_frames = vec![Vec::new(); problem.frames.len()];
+    let of_blocks = problem.blocks.iter().zip(&off).zip(left_out);
+    for ((block, off), _) in of_blocks.filter(|(_, left_out)| !**left_out) {
+        of_frames[block.frame].extend_from_slice(off);
+    }
+    let limit = gross_limit(&of_frames.concat(), whitening.sigma);
+    let limits = of_frames.into_iter().map(|mut off| {
+        off.sort_by(f64::total_cmp);
+        let needed = off.get(LEAST_CORNERS.min(off.len()).saturating_sub(1)).copied();
+        needed.filter(|off| off.is_finite()).unwrap_or_default().max(limit)
+    });
+    let limits: Vec<f64> = limits.collect();
+    let of_blocks = problem.blocks.iter().zip(&off);
+    let mut gross: Vec<Vec<bool>> = of_blocks
+        .map(|(block, off)| off.iter().map(|off| *off > limits[block.frame]).collect())
+        .collect();
+    let least = LEAST_SMOOTH_SIGMA * whitening.sigma;
+    let of_blocks = problem.blocks.iter().zip(&gross).zip(&off).zip(left_out);
+    let smooth: Vec<Vec<[usize; 2]>> = of_blocks
+        .map(|(((block, gross), off), out)| match *out || !gross.contains(&true) {
+            true => Vec::new(),
+            false => smooth_neighbours(problem, block, gross, |corner| off[corner] > least),
+        })
+        .collect();
+    let all = smooth.iter().flatten();
+    let [alike, count] = all.fold([0, 0], |sum, of| [sum[0] + of[0], sum[1] + of[1]]);
+    if alike as f64 > SMOOTH * count as f64 {
+        gross.iter_mut().for_each(|gross| gross.fill(false));
+    }
+    gross
+}
+
+/// For every corner with a gross error: the number of neighbours that are off towards the same side
+/// by a comparable amount, and the number of neighbours. Zero for all other corners.
+fn smooth_neighbours(
+    problem: &Problem,
+    block: &Block,
+    gross: &[bool],
+    is_off: impl Fn(usize) -> bool,
+) -> Vec<[usize; 2]> {
+    let off: Vec<Option<DVec2>> =
+        block.observations.iter().map(|seen| problem.residual(block, seen)).collect();
+    let places: BTreeMap<(i32, i32), usize> =
+        block.observations.iter().enumerate().map(|(i, seen)| ((seen.row, seen.col), i)).collect();
+    let of_corner = |(index, seen): (usize, &Observation)| {
+        let (true, Some(own)) = (gross[index], off[index]) else { return [0, 0] };
+        let steps = [(0, 1), (1, 0), (1, -1), (0, -1), (-1, 0), (-1, 1)];
+        let neighbours = steps.iter().filter_map(|(rows, cols)| {
+            let &neighbour = places.get(&(seen.row + rows, seen.col + cols))?;
+            Some((neighbour, off[neighbour]?))
+        });
+        neighbours.fold([0, 0], |[alike, count], (neighbour, other)| {
+            let along = own.dot(other) / own.length_squared();
+            [alike + usize::from(along > FALLS_OFF && is_off(neighbour)), count + 1]
+        })
+    };
+    block.observations.iter().enumerate().map(of_corner).collect()
+}
+
+/// The whitened residual from which errors are gross: the first gap; `f64::MAX` without one.
+fn gross_limit(off: &[f64], sigma: f64) -> f64 {
+    let beyond = |limit: f64| off.iter().filter(|&&off| off > limit).count() as f64;
+    let mut limit = GROSS_SIGMA * sigma;
+    while beyond(limit) > 0.0 {
+        if beyond(limit / 2.0) - beyond(limit) <= IN_THE_GAP * beyond(limit) {
+            return limit;
+        }
+        limit *= 2.0;
+        // Corners that a camera cannot image are off by an infinite amount.
+        if limit.is_infinite() {
+            break;
+        }
+    }
+    f64::MAX
+}
+
+/// The variance factor by which the inverse of the normal equations is multiplied to give the
+/// covariance; for a robust loss by the asymptotic formula of an M-estimator (Huber & Ronchetti
+/// 2009, 7.6),
+///
+/// ```text
+///     σ² = Σψ² / (2N − p) · mean w / (mean ψ′)²
+/// ```
+///
+/// with the influence ψ = w e of each coordinate. Where every corner counts in full, this is the
+/// sum of squares divided by the degrees of freedom.
+pub(in crate::calibrate) fn variance(minimum: &Minimum, whitening: &Whitening, loss: Loss) -> f64 {
+    let Minimum { problem, normal, layout, .. } = minimum;
+    // Priors on corner offsets add as many observations as there are unknowns.
+    let expected = problem.cameras.iter().filter_map(|camera| camera.roughness.as_ref());
+    // The prior on second differences of knots adds as many as its rank.
+    let unknowns = layout.shared + 6 * problem.frames.len()
+        - expected.map(|roughness| roughness.rank()).sum::<usize>();
+    let freedom = (2 * problem.count()).saturating_sub(unknowns).max(1) as f64;
+    if loss == Loss::Squared {
+        return normal.cost / freedom;
+    }
+    // Priors on poses and offsets contribute to the cost, too.
+    let (mut cost, mut pull, mut weight, mut slope) = (0.0, 0.0, 0.0, 0.0);
+    for (block, weights) in problem.blocks.iter().zip(&whitening.blocks) {
+        for (seen, &w) in block.observations.iter().zip(weights) {
+            let Some(off) = problem.residual(block, seen) else { continue };
+            let squared = Whitening::apply(w, off).length_squared();
+            let influence = loss.influence(squared, whitening.sigma);
+            cost += loss.of(squared, whitening.sigma).0;
+            pull += influence.squared;
+            weight += influence.weight;
+            slope += influence.slope;
+        }
+    }
+    let count = problem.count().max(1) as f64;
+    let beside = normal.cost - cost;
+    (pull + beside) / freedom * (weight / count) / (slope / count).powi(2)
+}

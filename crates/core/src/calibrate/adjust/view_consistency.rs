@@ -1,0 +1,182 @@
+//! Consistency of views: which views contradict the camera of all others because zoom, focus or
+//! crop changed.
+//!
+//! At the minimum the gradients of all views with respect to the camera sum to zero. With S = Σ Sᵥ
+//! the reduced normal equations (Schur complement), the gradient s of a view has by chance the
+//! covariance Sᵥ − Sᵥ S⁻¹ Sᵥ, so that the statistic
+//!
+//! ```text
+//!     T = sᵀ (Sᵥ − Sᵥ S⁻¹ Sᵥ)⁺ s
+//! ```
+//!
+//! is χ² distributed with as many degrees of freedom as the view determines of the camera. This is
+//! the Chow test (Chow 1960) of whether the camera of this view is that of all others. A stranger
+//! increases the statistic of all views until it is removed; lack of fit of the model increases it
+//! in any case, and then no single view is to blame.
+
+use nalgebra::{DMatrix, DVector};
+use rayon::prelude::*;
+
+use super::lack_of_fit::deviate_of_f;
+use super::reweighting::Settled;
+use crate::calibrate::equations::layout::Layout;
+use crate::calibrate::equations::local_share::LocalShare;
+use crate::calibrate::equations::normal::{Normal, Reduced};
+use crate::calibrate::input::loss::Loss;
+use crate::calibrate::problem::bundle::Problem;
+use crate::statistics::median;
+
+/// Least number of views for the test: three remain without the tested one.
+const LEAST_VIEWS: usize = 4;
+
+/// A direction of the camera parameters is undetermined when all views together tell less than the
+/// fraction `OPEN` of what they tell in the best one, and is not tested when the view, or all
+/// others, contribute less than `LEAST_PART` of it.
+const OPEN: f64 = 1e-9;
+const LEAST_PART: f64 = 1e-3;
+
+/// Views mostly agree when the median of T, divided by its degrees of freedom, is below this: 0.9
+/// is usual.
+const AGREEING: f64 = 1.5;
+
+/// Significance from which a view is a stranger, in standard deviations relative to the scatter of
+/// all views: chance exceeds it hardly once in a million views.
+const SIGNIFICANT: f64 = 5.0;
+
+/// A stranger also has to shift the camera by this many of its standard deviations.
+const HARMFUL: f64 = 1.0;
+
+/// Efficiency of the median relative to the mean, for squares.
+const EFFICIENCY: f64 = 0.64;
+
+/// The test of one view against all others.
+#[derive(Clone, Copy, Debug)]
+struct Pull {
+    /// T divided by its degrees of freedom, in units of the variance of residuals.
+    strange: f64,
+    freedom: f64,
+    /// Shift of the camera without the view, in its standard deviations.
+    moves: f64,
+}
+
+impl Pull {
+    /// From pairs of the fraction of a direction that the view contributes, and the component of
+    /// its gradient along it.
+    fn of(directions: impl Iterator<Item = (f64, f64)>, variance: f64) -> Self {
+        let mut found = Self { strange: 0.0, freedom: 0.0, moves: 0.0 };
+        for (part, along) in directions {
+            let others = 1.0 - part;
+            if part > LEAST_PART && others > LEAST_PART {
+                let along = along.powi(2) / variance;
+                found.strange += along / (part * others);
+                found.moves += along / (others * others);
+                found.freedom += 1.0;
+            }
+        }
+        found.strange /= found.freedom.max(1.0);
+        found.moves = found.moves.sqrt();
+        found
+    }
+}
+
+/// Result of the test over all frames.
+pub(super) struct Opinions {
+    /// Whether most frames agree on the cameras.
+    pub agree: bool,
+    /// The frame that contradicts the cameras of all others most significantly, if any, and the
+    /// shift of the cameras that it causes, in standard deviations.
+    pub stranger: Option<(usize, f64)>,
+}
+
+impl Opinions {
+    /// Tests all frames at a minimum; `None` where cameras are known or frames are too few.
+    pub fn of(settled: &Settled, loss: Loss) -> Option<Self> {
+        let pulls = pulls(settled, loss)?;
+        let told = pulls.iter().flatten().filter(|pull| pull.freedom > 0.0);
+        let told: Vec<Pull> = told.copied().collect();
+        if told.len() < LEAST_VIEWS {
+            return None;
+        }
+        let usual = median(told.iter().map(|pull| pull.strange).collect()).unwrap_or(0.0);
+        let all: f64 = told.iter().map(|pull| pull.freedom).sum();
+        let deviations = |pull: &Pull| {
+            let others = EFFICIENCY * (all - pull.freedom);
+            deviate_of_f(pull.strange / usual.max(1.0), pull.freedom, others)
+        };
+        let of_frames =
+            pulls.iter().enumerate().filter_map(|(frame, pull)| Some((frame, (*pull)?)));
+        let strange =
+            of_frames.filter(|(_, pull)| pull.moves > HARMFUL && deviations(pull) > SIGNIFICANT);
+        let most = strange.max_by(|a, b| deviations(&a.1).total_cmp(&deviations(&b.1)));
+        let stranger = most.map(|(frame, pull)| (frame, pull.moves));
+        Some(Self { agree: usual <= AGREEING, stranger })
+    }
+}
+
+/// The test of each frame; `None` for a frame that determines nothing by itself.
+fn pulls(settled: &Settled, loss: Loss) -> Option<Vec<Option<Pull>>> {
+    let problem = &settled.minimum.problem;
+    if problem.cameras.iter().any(|camera| camera.roughness.is_some()) {
+        return pulls_of_some(settled, loss);
+    }
+    let all = settled.minimum.normal.reduced(0.0)?.matrix;
+    let whiten = whitener(&all)?;
+    let variance = settled.whitening.sigma.powi(2);
+    let of_frame = |frame: usize| {
+        let (matrix, right) = reduced_of(problem, settled, loss, frame)?;
+        let pull = &whiten * right;
+        let eigen = (&whiten * matrix * whiten.transpose()).symmetric_eigen();
+        let along = eigen.eigenvectors.column_iter().map(|direction| direction.dot(&pull));
+        Some(Pull::of(eigen.eigenvalues.iter().copied().zip(along), variance))
+    };
+    Some((0..problem.frames.len()).into_par_iter().map(of_frame).collect())
+}
+
+/// The same for cameras with a spline, of whose knots a frame determines only some.
+fn pulls_of_some(settled: &Settled, loss: Loss) -> Option<Vec<Option<Pull>>> {
+    let problem = &settled.minimum.problem;
+    let all = settled.minimum.normal.covariance_of_kept()?;
+    let variance = settled.whitening.sigma.powi(2);
+    let of_frame = |frame: usize| {
+        let (matrix, right) = reduced_of(problem, settled, loss, frame)?;
+        let share = LocalShare::of(&matrix, &all)?;
+        let along = share.along(&right);
+        Some(Pull::of(share.parts.iter().copied().zip(along.iter().copied()), variance))
+    };
+    Some((0..problem.frames.len()).into_par_iter().map(of_frame).collect())
+}
+
+/// The reduced normal equations (Schur complement) of a frame by itself, without priors: matrix and
+/// right side.
+fn reduced_of(
+    problem: &Problem,
+    settled: &Settled,
+    loss: Loss,
+    frame: usize,
+) -> Option<(DMatrix<f64>, DVector<f64>)> {
+    let mut part = problem.with_frames(|other| other == frame);
+    part.cameras.iter_mut().for_each(|camera| camera.forget_expected());
+    let whitening = settled.whitening.of(&part);
+    let found = Normal::of(&part, &Layout::of(&part), &whitening, loss)?.reduced(0.0);
+    let found = found.map(|Reduced { matrix, right, .. }| (matrix, right));
+    found.filter(|(matrix, right)| matrix.iter().chain(right).all(|v| v.is_finite()))
+}
+
+/// The whitening matrix W of S, with W S Wᵀ = 1 over the directions that S determines; `None` where
+/// there are none.
+fn whitener(matrix: &DMatrix<f64>) -> Option<DMatrix<f64>> {
+    let n = matrix.nrows();
+    if n == 0 || !matrix.iter().all(|v| v.is_finite()) {
+        return None;
+    }
+    let scale = DVector::from_fn(n, |i, _| matrix[(i, i)].max(f64::MIN_POSITIVE).sqrt().recip());
+    let scaled = DMatrix::from_fn(n, n, |i, j| matrix[(i, j)] * scale[i] * scale[j]);
+    let eigen = scaled.symmetric_eigen();
+    let least = OPEN * eigen.eigenvalues.max().max(f64::MIN_POSITIVE);
+    let known: Vec<usize> = (0..n).filter(|&i| eigen.eigenvalues[i] > least).collect();
+    let whiten = DMatrix::from_fn(known.len(), n, |row, column| {
+        let i = known[row];
+        eigen.eigenvectors[(column, i)] * scale[column] / eigen.eigenvalues[i].sqrt()
+    });
+    (!known.is_empty()).then_some(whiten)
+}

@@ -1,0 +1,173 @@
+//! From views to an estimate: start, gross errors, adjustment, added unknowns, uncertainties.
+
+use super::adjust::gross_errors::{Gross, WrongFrame, within_pictures};
+use super::adjust::reweighting::Kept;
+use super::error::CalibrationError;
+use super::estimate::values::{CameraEstimate, Estimate};
+use super::excluded::{Excluded, Reason};
+use super::input::calibration::{Calibration, CameraViews, Intrinsics};
+use super::problem::panels;
+use super::start::alone::{self, enough};
+use super::start::frames::{Frame, Start};
+use super::start::together::{self, Alone};
+use crate::camera::PROJECTION_PARAMETERS;
+
+/// Focal lengths and the principal point are not determined when a deviation is more than this part
+/// of the focal length: equations that are linear near the solution, as deviations are computed from,
+/// are then off by as much as they say, and the deviation means nothing.
+const LOOSE_FOCAL: f64 = 0.1;
+
+impl Calibration {
+    /// The estimate from all views: start, gross errors, adjustment, added unknowns, uncertainties.
+    pub(super) fn adjusted(&self) -> Result<Estimate, CalibrationError> {
+        if self.board_shape && self.panels.len() > 1 {
+            return Err(CalibrationError::ShapeOfMany { panels: self.panels.len() });
+        }
+        self.check_panels()?;
+        if self.stop.is_raised() {
+            return Err(CalibrationError::Stopped);
+        }
+        let mut findings = Vec::new();
+        let cameras = self.cameras.iter().enumerate().map(|(index, camera)| {
+            let (views, beyond) = within_pictures(&camera.views, index);
+            findings.extend(beyond);
+            CameraViews { views, ..camera.clone() }
+        });
+        let own = self.of_cameras(cameras.collect());
+        let Start { mut problem, frames, mut excluded, delays, rotations } = start(&own)?;
+        problem.stop = self.stop.clone();
+        let gross = Gross::of(problem).ok_or(CalibrationError::NoStart)?;
+        own.check_frames(&gross)?;
+        let prepare = |kept: &mut Kept| panels::hold(&mut kept.problem, &kept.left_out, &own);
+        let (gross, settled) = gross.settled(own.weights, own.loss, prepare)?;
+        let of_frames = gross.frames.iter();
+        excluded.extend(of_frames.map(|(&frame, why)| {
+            (frames[frame].place, own.without_frame(&frames[frame], &gross, frame, why))
+        }));
+        excluded.sort_by_key(|(place, _)| *place);
+        let settled = own.smoothed(&gross, settled)?;
+        let (settled, f_ratio) = match own.board_shape {
+            true => own.bent(&gross, settled)?,
+            false => (settled, 0.0),
+        };
+        let settled = match own.measure_target {
+            true => own.measured(&gross, settled)?,
+            false => settled,
+        };
+        findings.extend(gross.findings(&settled, |frame| frames[frame].name.clone()));
+        let kept: Vec<&Frame> = gross.belonging().map(|frame| &frames[frame]).collect();
+        let mut estimate = Estimate::new(&own, &kept, &settled, f_ratio)?;
+        let of_cameras = estimate.cameras.iter_mut().zip(delays);
+        for ((camera, delay), rotation) in of_cameras.zip(rotations) {
+            (camera.delay, camera.label_rotation) = (delay, rotation);
+        }
+        if let ([camera], [CameraViews { intrinsics: Intrinsics::Unknown(_), .. }]) =
+            (estimate.cameras.as_slice(), own.cameras.as_slice())
+        {
+            check_focal(camera)?;
+        }
+        let excluded = excluded.into_iter().map(|(_, out)| out).collect();
+        Ok(Estimate { excluded, findings, ..estimate })
+    }
+
+    /// Refuses views of panels whose places are not given.
+    fn check_panels(&self) -> Result<(), CalibrationError> {
+        let views = self.cameras.iter().flat_map(|camera| &camera.views);
+        let mut seen = views.flat_map(|view| view.sightings.iter().map(move |of| (view, of.panel)));
+        let Some((view, panel)) = seen.find(|(_, panel)| panel.index() >= self.panels.len()) else {
+            return Ok(());
+        };
+        let problem = format!("panel {panel} is none of those whose places are given");
+        Err(CalibrationError::WrongDetection { view: view.name.clone(), problem })
+    }
+
+    /// Refuses views of which too few belong together.
+    fn check_frames(&self, gross: &Gross) -> Result<(), CalibrationError> {
+        let (wrong, all) = (gross.frames.len(), gross.problem.frames.len());
+        match self.cameras.as_slice() {
+            [only] if only.intrinsics.free().contains(&true) => {
+                enough(all - wrong, only.views.len())
+            }
+            [_] => Ok(()),
+            // Cameras whose places are known can only be held against the frames.
+            cameras if gross.problem.cameras.iter().any(|camera| camera.pose_free) => {
+                if 2 * wrong <= all {
+                    return Ok(());
+                }
+                let of_camera = |camera: usize| {
+                    let is_off = |why: &&WrongFrame| matches!(why, WrongFrame::Off { camera: c, .. } if *c == camera);
+                    gross.frames.values().filter(is_off).count()
+                };
+                let most = (0..cameras.len()).max_by_key(|&camera| of_camera(camera));
+                let camera = cameras[most.unwrap_or_default()].name.clone();
+                Err(CalibrationError::NotRigid { camera, wrong, all })
+            }
+            _ => Ok(()),
+        }
+    }
+
+    /// What is told of a frame that does not belong.
+    fn without_frame(
+        &self,
+        frame: &Frame,
+        gross: &Gross,
+        index: usize,
+        why: &WrongFrame,
+    ) -> Excluded {
+        let is_rig = self.cameras.len() > 1;
+        let reason = match *why {
+            WrongFrame::Off { camera, off_px } if is_rig => {
+                Reason::AnotherMoment { camera: self.cameras[camera].name.clone(), off_px }
+            }
+            WrongFrame::Off { off_px, .. } => Reason::Off { off_px, usual_px: gross.usual_px },
+            WrongFrame::Mirrored => Reason::Mirrored,
+            WrongFrame::Stranger { deviations } => Reason::Stranger { is_rig, deviations },
+            WrongFrame::OnlyWrongPanels => Reason::OnlyWrongPanels,
+        };
+        if let (false, [(camera, view)]) = (is_rig, frame.views.as_slice()) {
+            return self.cameras[*camera].views[*view].excluded(reason);
+        }
+        let of_frame = gross.problem.blocks.iter().filter(|block| block.frame == index);
+        Excluded {
+            camera: None,
+            view: frame.name.clone(),
+            image: String::new(),
+            panel: None,
+            corners: of_frame.map(|block| block.observations.len()).sum(),
+            reason,
+        }
+    }
+}
+
+/// # Errors
+/// Where no start is found, or the views cannot determine what is sought.
+fn start(calibration: &Calibration) -> Result<Start, CalibrationError> {
+    match calibration.is_single() {
+        true => alone::start(calibration),
+        false => together::start(calibration, by_itself),
+    }
+}
+
+/// The estimate of a calibration of one camera, as the start of several needs it.
+fn by_itself(calibration: &Calibration) -> Result<Alone, CalibrationError> {
+    let Estimate { cameras, excluded, .. } = calibration.adjusted()?;
+    let only = cameras.into_iter().next().ok_or(CalibrationError::NoStart)?;
+    let CameraEstimate { camera, roughness, views, .. } = only;
+    let poses = views.into_iter().map(|view| (view.name, view.pose)).collect();
+    Ok(Alone { camera, roughness, poses, excluded })
+}
+
+/// Refuses a camera that the views leave open. Parameters of the lens that cannot be told apart are
+/// no reason: within the image they make the same camera.
+fn check_focal(found: &CameraEstimate) -> Result<(), CalibrationError> {
+    let of_every_lens = &found.parameters[..PROJECTION_PARAMETERS.len()];
+    let loose = of_every_lens.iter().filter(|p| {
+        let focal = if p.name.starts_with('f') { p.value } else { found.camera.focal_px.x };
+        found.ill_conditioned.contains(&p.name) || p.sd.is_some_and(|sd| sd > LOOSE_FOCAL * focal)
+    });
+    let loose: Vec<&str> = loose.map(|p| p.name.as_str()).collect();
+    match loose.is_empty() {
+        true => Ok(()),
+        false => Err(CalibrationError::Undetermined { parameters: loose.join(", ") }),
+    }
+}

@@ -1,0 +1,541 @@
+//! Two calibrations of one camera: whether they project alike.
+//!
+//! What a pixel of the one shows is projected by the other, after the motion that makes them differ least: a
+//! principal point that is off and a camera that is turned are one and the same to every user of a picture. What
+//! is left is compared with what the covariances of both allow for,
+//!
+//! ```text
+//!     d = (I − P) (J_B δθ_B − J_A δθ_A)        P: what the motion explains
+//!     |d|² / Σᵢ (λᵢ + ε²)                       λᵢ: variances of d in independent directions
+//! ```
+//!
+//! d over all places of the region, and ε what no calibration is better known than. So what is tested is the
+//! ratio of the two numbers that are reported. How covariances of few frames divide between directions is
+//! known too roughly for a test of each.
+//!
+//! Both calibrations are taken to be of one board: what its errors do to both alike is no difference.
+
+use std::collections::BTreeMap;
+
+use glam::{DQuat, DVec2, DVec3};
+use nalgebra::{DMatrix, DVector};
+
+use crate::calibrate::estimate::coverage::Coverage;
+use crate::calibrate::estimate::values::{CameraEstimate, Estimate};
+use crate::calibrate::uncertainty::projection::{
+    INFINITY_MM, ObservedCovariance, Source, by_motion, by_parameters, seen_at,
+};
+use crate::camera::Pose;
+use crate::identity::{check_result_of, check_same_board};
+use crate::statistics::{chi_squared_chance, f_chance};
+
+/// Places along the longer side of the image.
+const PLACES: usize = 40;
+
+/// A camera saw a place where so many corners were on it and on those around it: one or two by themselves at the
+/// border of an image tell little of it.
+const AROUND: usize = 5;
+
+/// Steps until the motion fits, and the change below which it does.
+const MOST_STEPS: usize = 50;
+const SAME_PX: f64 = 1e-9;
+
+/// No calibration is known better than this, px: neither lens nor sensor is what its model says.
+const LEAST_SD_PX: f64 = 1e-3;
+
+/// Chance makes two calibrations of a camera that has not changed differ this seldom.
+const SELDOM: f64 = 1e-3;
+
+/// Where two cameras are compared.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub enum Region {
+    /// Where both saw corners; everywhere where that is not known.
+    #[default]
+    Seen,
+    /// The whole image.
+    Image,
+    /// Between two pixels.
+    Within(DVec2, DVec2),
+}
+
+/// How two cameras differ; by default of no place.
+#[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
+pub struct Comparison {
+    /// How far the points are by which they were compared; `None` of points at infinity.
+    pub distance_mm: Option<f64>,
+    /// Places along a row of the image.
+    pub columns: usize,
+    /// Row by row how the second camera differs; `None` beyond one of the lenses.
+    pub places: Vec<Option<Difference>>,
+    /// What the second camera sees is this motion of what the first one sees: a turn, and a move of points that
+    /// are not at infinity.
+    pub second_from_first: Pose,
+    /// Root mean square difference of a coordinate in the region, px.
+    pub rms_px: f64,
+    /// The same as the uncertainties of both have it; `None` where they are not known.
+    pub expected_px: Option<f64>,
+    /// How often chance makes them differ as much where the camera is the same.
+    pub chance: Option<f64>,
+    /// Whether the uncertainty of the first, and of the second, is not known.
+    pub lacks_uncertainty: [bool; 2],
+}
+
+/// How the second camera differs at a pixel of the first.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Difference {
+    /// The pixel of the first camera.
+    pub pixel: DVec2,
+    /// By how much that of the second differs, px.
+    pub by: DVec2,
+    /// Its deviation as the uncertainties of both have it, of a coordinate, px.
+    pub sd_px: Option<f64>,
+    /// Whether it is in the region.
+    pub is_compared: bool,
+}
+
+/// Why two cameras cannot be compared.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum ComparisonError {
+    /// Images of different size.
+    #[error(
+        "images of {first:?} and {second:?} px are not of one camera: give two calibrations of the same camera and size"
+    )]
+    Sizes {
+        /// Of the first.
+        first: [u32; 2],
+        /// Of the second.
+        second: [u32; 2],
+    },
+    /// No part of the image that both cover.
+    #[error(
+        "too little of the image was seen by both, or lies in the region: take `Region::Image`, or a larger part"
+    )]
+    Nothing,
+}
+
+impl Default for Comparison {
+    fn default() -> Self {
+        Self {
+            distance_mm: None,
+            columns: 0,
+            places: Vec::new(),
+            second_from_first: Pose::IDENTITY,
+            rms_px: 0.0,
+            expected_px: None,
+            chance: None,
+            lacks_uncertainty: [false; 2],
+        }
+    }
+}
+
+/// Prepares two calibrations for comparisons. Those of one board share its errors, which then do not count; those of
+/// different boards do not. `what` names the two in messages; with `assume_target` they are compared whatever they were made
+/// with.
+///
+/// # Errors
+/// Where they were made with boards of the same tags at different sizes, so that at most one of them is right.
+pub fn compare_boards(
+    what: [&str; 2],
+    [first, second]: [&mut Estimate; 2],
+    assume_target: bool,
+) -> Result<(), String> {
+    let boards = [first.calibrated_with.as_slice(), second.calibrated_with.as_slice()];
+    if !assume_target {
+        check_same_board(what, boards).map_err(|problem| {
+            problem
+                + "; calibrate both with its description, or set `compare_boards::assume_target` to compare them as they are"
+        })?;
+    }
+    if check_result_of(boards[0], boards[1]).is_err() {
+        let cameras = first.cameras.iter_mut().chain(&mut second.cameras);
+        let known = cameras.filter_map(|camera| camera.projection.as_mut());
+        known.filter_map(|known| known.observed.as_mut()).for_each(|known| known.of_board = None);
+    }
+    Ok(())
+}
+
+impl Comparison {
+    /// Compares two cameras by points at a distance, or at infinity.
+    ///
+    /// # Errors
+    /// Where images are of different size, or no part of it is compared.
+    pub fn of(
+        first: &CameraEstimate,
+        second: &CameraEstimate,
+        distance_mm: Option<f64>,
+        region: Region,
+    ) -> Result<Self, ComparisonError> {
+        let size = |of: &CameraEstimate| [of.camera.width, of.camera.height];
+        if size(first) != size(second) {
+            return Err(ComparisonError::Sizes { first: size(first), second: size(second) });
+        }
+        let grid = Grid::new(size(first));
+        let compared = grid.compared(first, second, region);
+        let places: Vec<Option<Place>> = (0..grid.columns * grid.rows)
+            .map(|index| {
+                let pixel = grid.pixel(index);
+                let point = seen_at(&first.camera, pixel, distance_mm)?;
+                let is_compared = compared(index);
+                second.camera.project(point).map(|_| Place { pixel, point, is_compared })
+            })
+            .collect();
+        let used: Vec<&Place> = places.iter().flatten().filter(|place| place.is_compared).collect();
+        if used.len() < LEAST_PLACES {
+            return Err(ComparisonError::Nothing);
+        }
+        let motion = aligned(second, &used, distance_mm);
+        let known = Known::of(first, second, &used, &motion, distance_mm);
+        let differences = places.iter().map(|place| {
+            let Place { pixel, point, is_compared } = *place.as_ref()?;
+            let by = second.camera.project(motion.apply(point))? - pixel;
+            let sd_px = known.as_ref().and_then(|known| known.sd_px(first, second, &motion, point));
+            Some(Difference { pixel, by, sd_px, is_compared })
+        });
+        let differences: Vec<Option<Difference>> = differences.collect();
+        let inside = || differences.iter().flatten().filter(|place| place.is_compared);
+        let squares: f64 = inside().map(|place| place.by.length_squared()).sum();
+        let second_from_first = match distance_mm {
+            Some(_) => motion,
+            None => Pose { translation: DVec3::ZERO, ..motion },
+        };
+        Ok(Self {
+            distance_mm,
+            columns: grid.columns,
+            rms_px: (squares / (2.0 * inside().count() as f64)).sqrt(),
+            expected_px: known.as_ref().map(|known| known.expected_px),
+            chance: known.as_ref().map(|known| known.chance),
+            places: differences,
+            second_from_first,
+            lacks_uncertainty: [first, second].map(|of| half_of(of).is_none()),
+        })
+    }
+
+    /// The places that were compared.
+    pub fn compared(&self) -> impl Iterator<Item = &Difference> {
+        self.places.iter().flatten().filter(|place| place.is_compared)
+    }
+
+    /// The largest difference of a place that was compared, px.
+    pub fn largest_px(&self) -> f64 {
+        self.compared().map(|place| place.by.length()).fold(0.0, f64::max)
+    }
+
+    /// Whether the cameras differ by more than their uncertainties explain; `None` where these are not known.
+    pub fn is_significant(&self) -> Option<bool> {
+        self.chance.map(|chance| chance < SELDOM)
+    }
+}
+
+/// How a camera of a rig is elsewhere than before, seen from another one.
+#[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
+pub struct CameraMotion {
+    /// The camera from which it is seen.
+    pub from: String,
+    /// The camera.
+    pub to: String,
+    /// By how much it is turned, rad, along its axes.
+    pub turn_rad: DVec3,
+    /// By how much it is elsewhere, mm, along its axes.
+    pub moved_mm: DVec3,
+    /// How often chance makes as large a motion where nothing has moved; `None` where deviations are not known.
+    pub chance: Option<f64>,
+}
+
+impl CameraMotion {
+    /// The motions of the cameras of a rig, from the first that both calibrations have as the rig's frame, else from
+    /// their first; `pairs` are the same cameras in both.
+    pub fn of_rig(pairs: &[(&CameraEstimate, &CameraEstimate)]) -> Vec<Self> {
+        let is_rig = |(a, b): &&(&CameraEstimate, &CameraEstimate)| {
+            [a, b].iter().all(|camera| camera.pose_sd.is_none())
+        };
+        let Some(&(first, second)) = pairs.iter().find(is_rig).or(pairs.first()) else {
+            return Vec::new();
+        };
+        let is_frame = is_rig(&&(first, second));
+        let others = pairs.iter().filter(|(camera, _)| camera.name != first.name);
+        let motion = |&(a, b): &(&CameraEstimate, &CameraEstimate)| {
+            let before = a.camera_from_rig.after(&first.camera_from_rig.inverse());
+            let after = b.camera_from_rig.after(&second.camera_from_rig.inverse());
+            let [turn_rad, moved_mm] = after.off(&before);
+            let deviations = |of: &CameraEstimate| of.observed_pose_sd.or(of.pose_sd);
+            let known = deviations(a).zip(deviations(b)).filter(|_| is_frame);
+            let off = turn_rad.to_array().into_iter().chain(moved_mm.to_array());
+            let chance = known.map(|(a, b)| {
+                // However the six are correlated, the largest is as rare as this.
+                let largest = off.zip(a.iter().zip(b)).map(|(off, (a, b))| off.abs() / a.hypot(b));
+                let largest = largest.fold(0.0, f64::max);
+                (6.0 * libm::erfc(largest / std::f64::consts::SQRT_2)).min(1.0)
+            });
+            let (from, to) = (first.name.clone(), a.name.clone());
+            Self { from, to, turn_rad, moved_mm, chance }
+        };
+        others.map(motion).collect()
+    }
+
+    /// Whether the camera moved by more than the deviations explain; `None` where these are not known.
+    pub fn is_significant(&self) -> Option<bool> {
+        self.chance.map(|chance| chance < SELDOM)
+    }
+}
+
+/// A motion has six unknowns.
+const LEAST_PLACES: usize = 6;
+
+/// A place of the image, and what the first camera sees there.
+struct Place {
+    pixel: DVec2,
+    point: DVec3,
+    is_compared: bool,
+}
+
+/// Places over an image.
+struct Grid {
+    size: DVec2,
+    columns: usize,
+    rows: usize,
+}
+
+impl Grid {
+    fn new(size: [u32; 2]) -> Self {
+        let size = DVec2::from(size.map(f64::from));
+        let parts = (size * PLACES as f64 / size.max_element()).round().max(DVec2::ONE);
+        Self { size, columns: parts.x as usize, rows: parts.y as usize }
+    }
+
+    fn parts(&self) -> DVec2 {
+        DVec2::new(self.columns as f64, self.rows as f64)
+    }
+
+    /// The middle of a place.
+    fn pixel(&self, index: usize) -> DVec2 {
+        let at = DVec2::new((index % self.columns) as f64, (index / self.columns) as f64) + 0.5;
+        at * self.size / self.parts() - 0.5
+    }
+
+    /// The place, column and row, of a pixel.
+    fn place(&self, pixel: DVec2) -> [i64; 2] {
+        let at = (pixel + 0.5) / self.size * self.parts();
+        [at.x.floor() as i64, at.y.floor() as i64]
+    }
+
+    /// Which places are compared.
+    fn compared<'a>(
+        &'a self,
+        first: &CameraEstimate,
+        second: &CameraEstimate,
+        region: Region,
+    ) -> impl Fn(usize) -> bool + 'a {
+        let counts = |of: &CameraEstimate| {
+            let mut counts: BTreeMap<[i64; 2], usize> = BTreeMap::new();
+            for (pixel, count) in Coverage::of(of).places(of.size_px()) {
+                let [x, y] = self.place(pixel);
+                let around = (-1..=1).flat_map(|dx| (-1..=1).map(move |dy| [x + dx, y + dy]));
+                around.for_each(|place| *counts.entry(place).or_default() += count as usize);
+            }
+            counts
+        };
+        let seen = [counts(first), counts(second)];
+        move |index| match region {
+            Region::Image => true,
+            Region::Within(low, high) => {
+                let pixel = self.pixel(index);
+                pixel.cmpge(low).all() && pixel.cmple(high).all()
+            }
+            Region::Seen => {
+                let place = self.place(self.pixel(index));
+                let has_enough = |counts: &BTreeMap<_, usize>| {
+                    counts.is_empty() || counts.get(&place).is_some_and(|&count| count >= AROUND)
+                };
+                seen.iter().all(has_enough)
+            }
+        }
+    }
+}
+
+/// The motion after which the second camera sees points nearest to where the first one does.
+fn aligned(second: &CameraEstimate, places: &[&Place], distance_mm: Option<f64>) -> Pose {
+    let unknowns = unknowns(distance_mm);
+    let mut motion = Pose::IDENTITY;
+    for _ in 0..MOST_STEPS {
+        let mut matrix = DMatrix::zeros(unknowns, unknowns);
+        let mut right = DVector::zeros(unknowns);
+        for place in places {
+            let point = motion.apply(place.point);
+            let Some(at) = second.camera.project_with_derivatives(point) else { continue };
+            let rows = by_motion(&at, point).columns(0, unknowns).into_owned();
+            let off = place.pixel - at.pixel;
+            matrix += rows.tr_mul(&rows);
+            right += rows.tr_mul(&nalgebra::Vector2::new(off.x, off.y));
+        }
+        let Some(inverse) = pseudo_inverse(&matrix) else { break };
+        let step = inverse * right;
+        let part = |first: usize| match first < unknowns {
+            true => DVec3::new(step[first], step[first + 1], step[first + 2]),
+            false => DVec3::ZERO,
+        };
+        let turn = DQuat::from_scaled_axis(part(0));
+        motion = Pose { rotation: turn, translation: part(3) }.after(&motion);
+        motion.rotation = motion.rotation.normalize();
+        let moved = part(3).length() / distance_mm.unwrap_or(INFINITY_MM);
+        if (part(0).length() + moved) * second.camera.focal_px.max_element() < SAME_PX {
+            break;
+        }
+    }
+    motion
+}
+
+/// A turn, and a move of points that are not at infinity.
+fn unknowns(distance_mm: Option<f64>) -> usize {
+    if distance_mm.is_some() { 6 } else { 3 }
+}
+
+/// The inverse where a matrix has one; of what it leaves open nothing.
+fn pseudo_inverse(matrix: &DMatrix<f64>) -> Option<DMatrix<f64>> {
+    let n = matrix.nrows();
+    let scale = DVector::from_fn(n, |i, _| matrix[(i, i)].max(f64::MIN_POSITIVE).sqrt().recip());
+    let scaled = DMatrix::from_fn(n, n, |i, j| matrix[(i, j)] * scale[i] * scale[j]);
+    let inverse = scaled.pseudo_inverse(SINGULAR).ok()?;
+    Some(DMatrix::from_fn(n, n, |i, j| inverse[(i, j)] * scale[i] * scale[j]))
+}
+
+/// Of matrices with a unit diagonal what is below this is rounding.
+const SINGULAR: f64 = 1e-12;
+
+/// What the uncertainties of two cameras say of their difference.
+struct Known {
+    expected_px: f64,
+    chance: f64,
+    /// Square roots of the covariances of both cameras' parameters.
+    halves: [DMatrix<f64>; 2],
+    /// The motion that goes with each of their columns.
+    motions: DMatrix<f64>,
+    unknowns: usize,
+}
+
+impl Known {
+    /// `None` where they are not known of one of the two.
+    fn of(
+        first: &CameraEstimate,
+        second: &CameraEstimate,
+        places: &[&Place],
+        motion: &Pose,
+        distance_mm: Option<f64>,
+    ) -> Option<Self> {
+        let halves = [half_of(first)?, half_of(second)?];
+        let unknowns = unknowns(distance_mm);
+        let count = halves.iter().map(DMatrix::ncols).sum();
+        let mut known = Self {
+            expected_px: 0.0,
+            chance: 1.0,
+            halves,
+            motions: DMatrix::zeros(unknowns, count),
+            unknowns,
+        };
+        let rows = places.iter().filter_map(|place| {
+            let of_motion = known.by_motion(second, motion, place.point)?;
+            let changes = known.changes(first, second, motion, place.point)?;
+            let by = second.camera.project(motion.apply(place.point))? - place.pixel;
+            Some((of_motion, changes, by))
+        });
+        let rows: Vec<_> = rows.collect();
+        let (mut matrix, mut right) =
+            (DMatrix::zeros(unknowns, unknowns), DMatrix::zeros(unknowns, count));
+        for (of_motion, changes, _) in &rows {
+            matrix += of_motion.tr_mul(of_motion);
+            right += of_motion.tr_mul(changes);
+        }
+        known.motions = -pseudo_inverse(&matrix)? * right;
+        // The differences over all places are G x with x of variance 1.
+        let (mut gram, mut square) = (DMatrix::zeros(count, count), 0.0);
+        for (of_motion, changes, by) in &rows {
+            let changes = changes + of_motion * &known.motions;
+            gram += changes.tr_mul(&changes);
+            square += by.length_squared();
+        }
+        let coordinates = 2.0 * rows.len() as f64;
+        known.expected_px = (gram.trace() / coordinates).sqrt();
+        let mean = gram.trace() + coordinates * LEAST_SD_PX.powi(2);
+        let freedom = [first, second].map(CameraEstimate::observed_freedom);
+        known.chance = chance_of(square, mean, gram.norm_squared(), freedom);
+        Some(known)
+    }
+
+    fn by_motion(
+        &self,
+        second: &CameraEstimate,
+        motion: &Pose,
+        point: DVec3,
+    ) -> Option<DMatrix<f64>> {
+        let point = motion.apply(point);
+        let at = second.camera.project_with_derivatives(point)?;
+        let rows = by_motion(&at, point);
+        Some(DMatrix::from_fn(2, self.unknowns, |i, j| rows[(i, j)]))
+    }
+
+    /// How the difference at a point changes with each deviation of the first and of the second camera.
+    fn changes(
+        &self,
+        first: &CameraEstimate,
+        second: &CameraEstimate,
+        motion: &Pose,
+        point: DVec3,
+    ) -> Option<DMatrix<f64>> {
+        let of_first = first.camera.project_with_derivatives(point)?;
+        let of_second = second.camera.project_with_derivatives(motion.apply(point))?;
+        let of_first = -by_parameters(&of_first, &first.free()) * &self.halves[0];
+        let of_second = by_parameters(&of_second, &second.free()) * &self.halves[1];
+        let columns = of_first.column_iter().chain(of_second.column_iter());
+        let columns: Vec<_> = columns.map(|column| column.into_owned()).collect();
+        Some(DMatrix::from_fn(2, columns.len(), |i, j| columns[j][i]))
+    }
+
+    /// The deviation of a coordinate of the difference at a point.
+    fn sd_px(
+        &self,
+        first: &CameraEstimate,
+        second: &CameraEstimate,
+        motion: &Pose,
+        point: DVec3,
+    ) -> Option<f64> {
+        let changes = self.changes(first, second, motion, point)?
+            + self.by_motion(second, motion, point)? * &self.motions;
+        Some((changes.norm_squared() / 2.0).sqrt())
+    }
+}
+
+/// The probability of a sum of squares as large as `found` or larger, of which `mean` is expected and whose
+/// variances have squares that sum up to `spread`: by the χ² of the same mean and variance (Satterthwaite
+/// 1946); where covariances are known as from so many squares only, by the F distribution.
+fn chance_of(found: f64, mean: f64, spread: f64, known: [Option<f64>; 2]) -> f64 {
+    if mean <= 0.0 || spread <= 0.0 {
+        return 1.0;
+    }
+    let freedom = (mean * mean / spread).round().max(1.0);
+    match known.into_iter().flatten().reduce(f64::min) {
+        Some(known) => f_chance(found / mean, freedom, known),
+        None => chi_squared_chance(found * freedom / mean, freedom as usize),
+    }
+}
+
+impl CameraEstimate {
+    fn observed_freedom(&self) -> Option<f64> {
+        Some(self.projection.as_ref()?.observed.as_ref()?.freedom)
+    }
+}
+
+/// A square root of the covariance of a camera's parameters: that which is observed, without errors of the board,
+/// else that from noise.
+fn half_of(camera: &CameraEstimate) -> Option<DMatrix<f64>> {
+    let observed = camera.projection.as_ref().and_then(|known| known.observed.as_ref());
+    let observed = observed.map(ObservedCovariance::without_board);
+    let covariance = observed.or_else(|| camera.covariance_from(Source::Noise).cloned())?;
+    let n = covariance.nrows();
+    let sd = DVector::from_fn(n, |i, _| covariance[(i, i)].sqrt());
+    let scaled = DMatrix::from_fn(n, n, |i, j| covariance[(i, j)] / sd[i] / sd[j]);
+    let eigen = scaled.symmetric_eigen();
+    let roots = eigen.eigenvalues.map(|value| value.max(0.0).sqrt());
+    Some(DMatrix::from_diagonal(&sd) * eigen.eigenvectors * DMatrix::from_diagonal(&roots))
+}

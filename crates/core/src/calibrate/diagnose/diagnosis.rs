@@ -1,0 +1,429 @@
+//! What is to be said about an estimate: what is wrong with it, what that comes from, and what helps.
+
+use std::collections::BTreeSet;
+
+use super::model_selection::{Alone, FOREIGN_PART, Instead, Remedy, is_absurd, is_explained};
+use super::one_state::{BoardStretch, CameraChange, RollingShutter, State};
+use crate::calibrate::adjust::finding::{Finding, Shared};
+use crate::calibrate::adjust::lack_of_fit::LackOfFit;
+use crate::calibrate::estimate::lens_end::LensEnd;
+use crate::calibrate::estimate::values::{CameraEstimate, Estimate};
+use crate::calibrate::input::calibration::Calibration;
+use crate::calibrate::input::order::in_order;
+use crate::calibrate::model::Model;
+use crate::calibrate::problem::shape::STRETCH;
+use crate::calibrate::start::symmetry::LabelRotation;
+use crate::camera::Camera;
+
+/// Corners are found to a few hundredths of a pixel; a camera that leaves more than this does not
+/// have the lens of the model.
+const POOR_RMS_PX: f64 = 1.0;
+
+/// The part of its views that a calibration may leave out.
+const MOST_LEFT_OUT: f64 = 0.2;
+
+/// Focal lengths that differ by so many deviations are those of two minima; one that leaves so many times as much as
+/// the best is none to be taken for it.
+const APART_SIGMA: f64 = 10.0;
+const NEARLY: f64 = 1.5;
+
+/// What is to be said about an estimate. Cameras are indices.
+#[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
+pub enum Diagnosis {
+    /// A camera that was given did not take its pictures; nothing of the estimate is of use.
+    ForeignCamera {
+        /// The camera.
+        camera: usize,
+        /// What it leaves, outliers left out, px.
+        rms_px: f64,
+    },
+    /// A camera that was found leaves so much that nothing of the estimate is of use.
+    AbsurdFit {
+        /// The camera.
+        camera: usize,
+        /// What it leaves, outliers left out, px.
+        rms_px: f64,
+    },
+    /// More than a fifth of the views, of a rig of the frames, took no part: what was found is that of the others only.
+    ManyLeftOut {
+        /// How many took no part.
+        left_out: usize,
+        /// Of how many.
+        all: usize,
+    },
+    /// Another camera of the same model explains the views as well, or nearly.
+    OtherMinimum {
+        /// The camera.
+        camera: usize,
+        /// The other one.
+        other: Camera,
+        /// What that leaves, outliers left out, px.
+        rms_px: f64,
+    },
+    /// A camera whose pictures show what the others saw some frames before; they were put to the right moments.
+    Late {
+        /// The camera.
+        camera: usize,
+        /// By how many frames; negative where it was ahead of the others.
+        frames: i32,
+    },
+    /// The board looks the same after a rotation, and the labels of a camera of a rig were rotated so that the cameras
+    /// agree on where it is, or both labellings fit.
+    LabelsRotated {
+        /// The camera.
+        camera: usize,
+        /// By how much, in how many frames, and whether that is sure.
+        rotation: LabelRotation,
+    },
+    /// The shape of a board, or its corners, were to be found, and it looks the same after a rotation, so that views may
+    /// show it either way round.
+    LabelsOpen {
+        /// The least such rotation, degrees.
+        degrees: u32,
+    },
+    /// The views do not show one camera: from some view on its focal length or principal point is another one.
+    ChangedCamera {
+        /// The camera.
+        camera: usize,
+        /// What changed, and when.
+        change: CameraChange,
+    },
+    /// Rows were read one after the other while board or camera moved.
+    RollingShutter {
+        /// The camera.
+        camera: usize,
+        /// By how much rows are displaced.
+        shutter: RollingShutter,
+    },
+    /// The board is longer in one direction than in the other, against its description.
+    StretchedBoard {
+        /// The camera by whose views that was found.
+        camera: usize,
+        /// By how much.
+        stretch: BoardStretch,
+    },
+    /// The lens turns back or runs away within the image.
+    LensEnds {
+        /// The camera.
+        camera: usize,
+        /// Where.
+        end: LensEnd,
+    },
+    /// Corners are wrong together.
+    GrossErrors(Finding),
+    /// Something that was taken for given explains the residuals when it is found.
+    Remedied {
+        /// The camera by whose views that was found.
+        camera: usize,
+        /// What, and by how much.
+        remedy: Remedy,
+    },
+    /// Residuals are not noise, and nothing that was tried explains them.
+    LackOfFit(LackOfFit),
+    /// Residuals are large.
+    PoorFit {
+        /// The camera.
+        camera: usize,
+        /// What is left, outliers left out, px.
+        rms_px: f64,
+    },
+    /// Parameters that the views cannot tell apart.
+    IllConditioned {
+        /// The camera.
+        camera: usize,
+        /// Their names.
+        parameters: Vec<String>,
+        /// A smaller model that holds the lens as well, if there is one.
+        sufficient: Option<Model>,
+    },
+}
+
+impl Diagnosis {
+    /// Whether what was found is not to be used as it is.
+    pub fn is_failure(&self) -> bool {
+        matches!(
+            self,
+            Self::ForeignCamera { .. }
+                | Self::AbsurdFit { .. }
+                | Self::ManyLeftOut { .. }
+                | Self::ChangedCamera { .. }
+        )
+    }
+
+    /// The camera whose lens is not that of the model by this, so that no view is to blame for its residuals.
+    pub fn misfit_of(&self) -> Option<usize> {
+        match *self {
+            Self::AbsurdFit { camera, .. }
+            | Self::PoorFit { camera, .. }
+            | Self::LackOfFit(LackOfFit::Lens { camera, .. }) => Some(camera),
+            Self::Remedied { camera, remedy: Remedy { instead: Instead::Model(_), .. } } => {
+                Some(camera)
+            }
+            _ => None,
+        }
+    }
+
+    /// The camera of whose state this is, and what is left where it is allowed for, px.
+    fn of_state(&self) -> Option<(usize, f64)> {
+        match self {
+            Self::ChangedCamera { camera, change } => Some((*camera, change.left_px)),
+            Self::RollingShutter { camera, shutter } => Some((*camera, shutter.left_px)),
+            Self::StretchedBoard { camera, stretch } => Some((*camera, stretch.left_px)),
+            _ => None,
+        }
+    }
+
+    /// Whether this explains the residuals of its camera at least as well as a remedy does.
+    fn explains(&self, (camera, remedy): &(usize, Remedy)) -> bool {
+        let is_shape =
+            matches!(self, Self::StretchedBoard { .. }) && remedy.instead == Instead::Shape;
+        let is_better = |(of, left_px)| of == *camera && (is_shape || left_px <= remedy.to_px);
+        self.of_state().is_some_and(is_better)
+    }
+}
+
+impl Calibration {
+    /// What is to be said about what [`solve`](Self::solve) found, what matters most first. Where residuals
+    /// are not noise, other models, the shape of the board, and the places of panels are tried, on a part of
+    /// the views.
+    pub fn diagnose(&self, found: &Estimate) -> Vec<Diagnosis> {
+        // What was solved was split before.
+        let own = self.split().map_or_else(|_| self.clone(), |(own, _)| own);
+        let alone = own.each_alone(found);
+        let mut said = said(found, &alone);
+        if own.is_single() {
+            said.iter_mut().for_each(|said| own.refine(found, said));
+        }
+        said.extend(own.open_labels());
+        if let (true, Some((other, rms_px))) = (own.is_single(), own.other_minimum(found)) {
+            said.push(Diagnosis::OtherMinimum { camera: 0, other, rms_px });
+        }
+        said
+    }
+
+    /// Where what was to be found of the board depends on which way round it was seen.
+    fn open_labels(&self) -> Option<Diagnosis> {
+        let is_of_place = self.board_shape || self.measure_target;
+        let maps = self.symmetries.iter().flatten().filter(|_| is_of_place);
+        let degrees = maps.map(|map| map.angle_rad().to_degrees().round() as u32).min()?;
+        Some(Diagnosis::LabelsOpen { degrees })
+    }
+
+    /// Replaces what one step says of a change or a stretch by what a calibration finds that allows for it.
+    fn refine(&self, found: &Estimate, said: &mut Diagnosis) {
+        match said {
+            Diagnosis::ChangedCamera { change, .. } => {
+                let order =
+                    in_order(found.frames.iter().map(|frame| frame.name.as_str()).collect());
+                let (before, after) = order
+                    .split_at(order.iter().position(|name| *name == change.from_view).unwrap_or(0));
+                let value_px = [before, after].map(|names| {
+                    let views = self.cameras[0].views.iter();
+                    let views = views.filter(|view| names.contains(&view.name)).cloned().collect();
+                    let found = self.of_views(views).adjusted().ok()?;
+                    Some(change.intrinsic.of(&found.cameras[0].camera))
+                });
+                if let [Some(before), Some(after)] = value_px {
+                    change.value_px = [before, after];
+                }
+            }
+            Diagnosis::StretchedBoard { stretch, .. } if self.panels.len() == 1 => {
+                let bent = self.clone().board_shape(true).adjusted().ok();
+                if let Some(shape) = bent.and_then(|bent| bent.shape).map(|bent| bent.shape) {
+                    let part = shape.coefficients_mm[STRETCH] / shape.reach_mm;
+                    stretch.ratio = (1.0 + part) / (1.0 - part);
+                }
+            }
+            _ => {}
+        }
+    }
+
+    /// A camera of another valley that leaves not much more, where a model has several.
+    fn other_minimum(&self, found: &Estimate) -> Option<(Camera, f64)> {
+        let model = self.cameras[0].intrinsics.model()?;
+        let own = found.cameras.first()?;
+        let starts = 0..model.starts().len();
+        let others = starts.filter(|_| model.starts().len() > 1).filter_map(|start| {
+            let other = Self { start: Some(start), ..self.clone() }.adjusted().ok()?;
+            let is_whole = other.frames.len() == found.frames.len();
+            let sd = own.parameters.first()?.sd?.max(other.cameras[0].parameters.first()?.sd?);
+            let off = other.cameras[0].camera.focal_px.x - own.camera.focal_px.x;
+            let rms_px = other.inlier_rms_px();
+            let is_other = off.abs() > APART_SIGMA * sd && rms_px < NEARLY * found.inlier_rms_px();
+            (is_whole && is_other).then(|| (other.cameras[0].camera.clone(), rms_px))
+        });
+        others.min_by(|(_, one), (_, other)| one.total_cmp(other))
+    }
+
+    /// Every camera by itself, and what its views say; `None` where they say nothing, or where there is nothing
+    /// to ask.
+    fn each_alone(&self, found: &Estimate) -> Vec<Alone> {
+        let is_good = is_explained(found);
+        let alone = found.cameras.iter().enumerate().map(|(index, camera)| {
+            let has_question = !is_good || !camera.ill_conditioned.is_empty();
+            has_question.then(|| self.and_alone(index, found)).flatten()
+        });
+        alone.collect()
+    }
+}
+
+impl Estimate {
+    /// What is to be said about it as far as it tells that by itself, without trying anything else; see
+    /// [`Calibration::diagnose`].
+    pub fn inspect(&self) -> Vec<Diagnosis> {
+        said(self, &vec![None; self.cameras.len()])
+    }
+}
+
+fn said(found: &Estimate, alone: &[Alone]) -> Vec<Diagnosis> {
+    let cameras = || found.cameras.iter().enumerate();
+    let foreign = cameras().filter(|(_, camera)| {
+        let is_known = camera.model.is_none() && camera.found().next().is_none();
+        is_known && camera.inlier_rms_px() > FOREIGN_PART * f64::from(camera.camera.width)
+    });
+    let foreign =
+        foreign.map(|(camera, of)| Diagnosis::ForeignCamera { camera, rms_px: of.inlier_rms_px() });
+    let absurd = cameras().filter(|(_, camera)| camera.model.is_some() && is_absurd(camera));
+    let absurd =
+        absurd.map(|(camera, of)| Diagnosis::AbsurdFit { camera, rms_px: of.inlier_rms_px() });
+    let ends = cameras()
+        .filter_map(|(camera, of)| Some(Diagnosis::LensEnds { camera, end: of.lens_end()? }));
+    let late = cameras().filter(|(_, of)| of.delay != 0);
+    let late = late.map(|(camera, of)| Diagnosis::Late { camera, frames: of.delay });
+    let rotated = cameras().filter_map(|(camera, of)| {
+        Some(Diagnosis::LabelsRotated { camera, rotation: of.label_rotation? })
+    });
+    let late = late.chain(rotated);
+    let gross = found.findings.iter().cloned().map(Diagnosis::GrossErrors);
+    let open = cameras().zip(alone).filter(|((_, of), _)| !of.ill_conditioned.is_empty());
+    let open = open.map(|((camera, of), alone)| Diagnosis::IllConditioned {
+        camera,
+        parameters: of.ill_conditioned.clone(),
+        sufficient: alone.as_ref().and_then(|(alone, found)| alone.sufficient(found)),
+    });
+    let mut states = states(found);
+    let causes = causes(found, alone, &mut states);
+    let failures: Vec<Diagnosis> = foreign.chain(absurd).chain(many_left_out(found)).collect();
+    // Where the lens is not that of the model, photographs are not to blame.
+    let misfits: BTreeSet<usize> =
+        failures.iter().chain(&causes).filter_map(Diagnosis::misfit_of).collect();
+    let is_of_view = |said: &Diagnosis| match said {
+        Diagnosis::GrossErrors(Finding {
+            shared: Shared::View { camera, .. }, left_out, ..
+        }) => misfits.contains(camera) && !left_out,
+        _ => false,
+    };
+    let gross = gross.filter(|said| !is_of_view(said));
+    let before = failures.into_iter().chain(late).chain(states);
+    before.chain(ends).chain(gross).chain(causes).chain(open).collect()
+}
+
+/// What the views of each camera show that is not one camera in one state, or not the board that is described.
+fn states(found: &Estimate) -> Vec<Diagnosis> {
+    let of_camera = |(camera, of): (usize, &CameraEstimate)| {
+        let equations = found.states.get(camera)?.as_ref()?;
+        let State { change, shutter, stretch } =
+            State::of(equations, &of.camera, |frame| found.frames[frame].name.clone());
+        let change = change.map(|change| Diagnosis::ChangedCamera { camera, change });
+        let shutter = shutter.map(|shutter| Diagnosis::RollingShutter { camera, shutter });
+        let stretch = stretch.map(|stretch| Diagnosis::StretchedBoard { camera, stretch });
+        let said = change.into_iter().chain(shutter).chain(stretch);
+        // What still leaves an absurd fit explains nothing.
+        let most_px = FOREIGN_PART * f64::from(of.camera.width);
+        let explains = |said: &Diagnosis| said.of_state().is_some_and(|(_, px)| px < most_px);
+        Some(said.filter(explains).collect::<Vec<_>>())
+    };
+    found.cameras.iter().enumerate().filter_map(of_camera).flatten().collect()
+}
+
+/// Whether a state is what leaves patterns in the residuals.
+fn leaves_patterns(state: &Diagnosis) -> bool {
+    matches!(state, Diagnosis::RollingShutter { .. } | Diagnosis::StretchedBoard { .. })
+}
+
+/// Whether too many views of cameras that were to be found took no part.
+fn many_left_out(found: &Estimate) -> Option<Diagnosis> {
+    let frames: BTreeSet<&str> = found.frames.iter().map(|frame| frame.name.as_str()).collect();
+    let whole = found.excluded.iter().filter(|out| out.panel.is_none());
+    let is_rig = found.cameras.len() > 1;
+    let left_out = match is_rig {
+        true => {
+            let names: BTreeSet<&str> = whole.map(|out| out.view.as_str()).collect();
+            names.difference(&frames).count()
+        }
+        false => whole.count(),
+    };
+    let all = found.frames.len() + left_out;
+    let is_sought = found.cameras.iter().any(|camera| camera.model.is_some());
+    let is_many = left_out as f64 > MOST_LEFT_OUT * all as f64;
+    (is_sought && is_many).then_some(Diagnosis::ManyLeftOut { left_out, all })
+}
+
+/// Why residuals are not noise, and which of the states explain them better than any remedy does.
+fn causes(found: &Estimate, alone: &[Alone], states: &mut Vec<Diagnosis>) -> Vec<Diagnosis> {
+    let remedies = alone.iter().enumerate().filter_map(|(camera, alone)| {
+        let (alone, found) = alone.as_ref()?;
+        Some((camera, alone.remedy(found)?))
+    });
+    let mut remedies: Vec<(usize, Remedy)> = remedies.collect();
+    let of = |instead: Instead| move |(_, remedy): &(usize, Remedy)| remedy.instead == instead;
+    // A wrong camera moves everything else with it.
+    if remedies.iter().any(of(Instead::Camera)) {
+        remedies.retain(of(Instead::Camera));
+    }
+    let is_of_model = |(_, remedy): &&(usize, Remedy)| matches!(remedy.instead, Instead::Model(_));
+    states.retain(|state| {
+        let is_worse = |of: &(usize, Remedy)| {
+            state.of_state().is_some_and(|(camera, px)| camera == of.0 && px > of.1.to_px)
+        };
+        !remedies.iter().filter(is_of_model).any(is_worse)
+    });
+    remedies.retain(|remedy| !states.iter().any(|state| state.explains(remedy)));
+    // There is one board, and one target.
+    let mut told = Vec::new();
+    remedies.retain(|(_, Remedy { instead, .. })| {
+        let is_shared = matches!(instead, Instead::Shape | Instead::Panels);
+        let is_first = !told.contains(instead);
+        told.push(*instead);
+        is_first || !is_shared
+    });
+    let is_of_target = |misfit: &&LackOfFit| matches!(misfit, LackOfFit::Target { .. });
+    let of_target: Vec<&LackOfFit> = found.lack_of_fit.iter().filter(is_of_target).collect();
+    // Where panels are moved their corners tell most of it.
+    let panels = remedies.iter().any(of(Instead::Panels)) && !of_target.is_empty();
+    if panels {
+        remedies.retain(|remedy| !of(Instead::Panels)(remedy));
+    }
+    let told: Vec<&LackOfFit> = match (panels, remedies.is_empty()) {
+        (true, _) => of_target,
+        (false, true) if states.iter().any(leaves_patterns) => Vec::new(),
+        (false, true) => found.lack_of_fit.iter().collect(),
+        (false, false) => Vec::new(),
+    };
+    let is_named = |camera: usize| {
+        let poor_px = found.cameras[camera].inlier_rms_px();
+        // A target that leaves most of the error bends the cameras, too.
+        let is_cause = |misfit: &&LackOfFit| match **misfit {
+            LackOfFit::Lens { camera: of, .. } => of == camera,
+            LackOfFit::Target { rms_px, .. } => rms_px > 0.5 * poor_px,
+        };
+        // Of a single camera anything is.
+        let is_single = found.cameras.len() == 1 && !(told.is_empty() && remedies.is_empty());
+        let is_of_state = |state: &Diagnosis| state.of_state().is_some_and(|(of, _)| of == camera);
+        is_single
+            || states.iter().any(is_of_state)
+            || remedies.iter().any(|(of, _)| *of == camera)
+            || told.iter().any(is_cause)
+    };
+    let is_poor = |(index, camera): &(usize, &CameraEstimate)| {
+        camera.inlier_rms_px() > POOR_RMS_PX && !is_absurd(camera) && !is_named(*index)
+    };
+    let poor = found.cameras.iter().enumerate().filter(is_poor);
+    let poor: Vec<Diagnosis> = poor
+        .map(|(camera, of)| Diagnosis::PoorFit { camera, rms_px: of.inlier_rms_px() })
+        .collect();
+    let remedied = remedies.iter().map(|&(camera, remedy)| Diagnosis::Remedied { camera, remedy });
+    let told = told.into_iter().copied().map(Diagnosis::LackOfFit);
+    remedied.chain(told).chain(poor).collect()
+}

@@ -1,0 +1,280 @@
+//! Model selection: which assumption of a calibration explains its lack of fit (lens model, flat
+//! board, panel poses, known camera), and which smaller lens model suffices.
+//!
+//! Each alternative is fitted to a sample of the views and compared by an F test; an alternative
+//! has to be significant and large enough to matter.
+
+use std::collections::BTreeSet;
+
+use crate::calibrate::adjust::lack_of_fit::{MATTERS, SIGNIFICANT, deviate_of_f};
+use crate::calibrate::estimate::values::{CameraEstimate, Estimate};
+use crate::calibrate::input::calibration::{Calibration, CameraViews, Intrinsics};
+use crate::calibrate::input::observation::View;
+use crate::calibrate::input::panel::PanelPlace;
+use crate::calibrate::input::sample::evenly;
+use crate::calibrate::model::Model;
+use crate::calibrate::problem::whitening::{MEDIAN_OF_CHI_SQUARED_2, OUTLIER_SIGMA};
+use crate::camera::{Camera, PROJECTION_PARAMETERS};
+use crate::statistics::median;
+
+/// Where the noise of detections explains at least this fraction of the squares of the residuals,
+/// nothing is sought: the rest does not matter.
+const EXPLAINED: f64 = 1.0 / (1.0 + MATTERS * MATTERS);
+
+/// A remedy counts as equal to the best from this fraction of its gain on: squares of a thousand
+/// corners are known to a few per cent.
+const AS_GOOD: f64 = 0.9;
+
+/// Number of views in the sample, evenly over the sequence: a lack of fit that matters shows in so
+/// many, and a trial must not take longer than the calibration.
+const TRIAL_VIEWS: usize = 12;
+
+/// A known camera that leaves more than this part of the image's width did not take the pictures: poses
+/// take up most of what focal lengths and principal point are off by, and so much is left by another
+/// lens, zoom or crop only.
+pub(super) const FOREIGN_PART: f64 = 0.005;
+
+/// A change of assumptions that makes the residuals of a calibration significantly smaller.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
+pub struct Remedy {
+    /// The quantity that was estimated and had been taken for given.
+    pub instead: Instead,
+    /// RMS residual of a coordinate without the remedy, outliers excluded, px.
+    pub from_px: f64,
+    /// RMS residual of a coordinate with the remedy, outliers excluded, px.
+    pub to_px: f64,
+}
+
+/// The quantity to estimate instead of taking it for given.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum Instead {
+    /// The lens, with this richer model.
+    Model(Model),
+    /// The deviation of the board from a plane.
+    Shape,
+    /// The poses of the panels on the target.
+    Panels,
+    /// The intrinsics of the camera, which had been given.
+    Camera,
+}
+
+/// A camera by itself, and what its views say.
+pub(super) type Alone = Option<(Calibration, Estimate)>;
+
+impl Calibration {
+    /// This calibration of one camera with other views.
+    pub(in crate::calibrate) fn of_views(&self, views: Vec<View>) -> Self {
+        self.of_cameras(vec![CameraViews { views, ..self.cameras[0].clone() }])
+    }
+
+    /// This calibration of one camera with other intrinsics.
+    fn of_intrinsics(&self, intrinsics: impl Into<Intrinsics>) -> Self {
+        let intrinsics = intrinsics.into();
+        self.of_cameras(vec![CameraViews { intrinsics, ..self.cameras[0].clone() }])
+    }
+
+    /// A sample of the views of a calibration of one camera, on which alternatives are tried, and
+    /// its estimate.
+    fn trial(&self, found: &Estimate) -> Option<(Self, Estimate)> {
+        let views = &self.cameras[0].views;
+        let sample = self.of_views(evenly(views, TRIAL_VIEWS).cloned().collect());
+        let of_sample = match sample.cameras[0].views.len() < views.len() {
+            true => sample.adjusted().ok()?,
+            false => found.clone(),
+        };
+        Some((sample, of_sample))
+    }
+
+    /// The alternative that explains the residuals of a calibration of one camera better,
+    /// significantly and by an amount that matters; `None` where the noise of detections explains
+    /// them, or no alternative does.
+    pub(super) fn remedy(&self, found: &Estimate) -> Option<Remedy> {
+        if is_explained(found) {
+            return None;
+        }
+        match &self.cameras[0].intrinsics {
+            Intrinsics::Unknown(model) => self.remedy_of_found(*model, found),
+            Intrinsics::Known(camera) => self.remedy_of_known(camera, found),
+            Intrinsics::Near { .. } => None,
+        }
+    }
+
+    fn remedy_of_found(&self, model: Model, found: &Estimate) -> Option<Remedy> {
+        let (trial, tried_on) = self.trial(found)?;
+        let models = model
+            .richer()
+            .iter()
+            .map(|&model| (Instead::Model(model), trial.of_intrinsics(model).adjusted().ok()));
+        // A board cannot be bent so far that nothing fits.
+        let bends = self.panels.len() == 1 && !self.board_shape && !is_absurd(&found.cameras[0]);
+        let shape =
+            bends.then(|| (Instead::Shape, trial.clone().board_shape(true).adjusted().ok()));
+        let shows_several = trial.cameras[0].views.iter().any(|view| view.sightings.len() > 1);
+        let places = shows_several.then(|| (Instead::Panels, trial.with_panels_found()));
+        let tried = shape.into_iter().chain(models).chain(places);
+        let tried = tried.filter_map(|(instead, other)| Some((instead, other?)));
+        let from_px = found.inlier_rms_px();
+        let best = best(&tried_on, tried).filter(|remedy| remedy.to_px < from_px)?;
+        Some(Remedy { from_px, ..best })
+    }
+
+    /// The same where the camera was given: whether the camera is another one, or the board is
+    /// bent.
+    fn remedy_of_known(&self, camera: &Camera, found: &Estimate) -> Option<Remedy> {
+        let values = camera.parameters().into_iter().enumerate();
+        let of_lens = |(i, value): (usize, f64)| i < PROJECTION_PARAMETERS.len() || value != 0.0;
+        let near = Intrinsics::Near { camera: camera.clone(), free: values.map(of_lens).collect() };
+        let bent = (self.panels.len() == 1).then(|| self.clone().board_shape(true).adjusted().ok());
+        let bent = bent.flatten().map(|other| (Instead::Shape, other));
+        let other = self.of_intrinsics(near).board_shape(false).adjusted().ok();
+        best(found, bent.into_iter().chain(other.map(|other| (Instead::Camera, other))))
+    }
+
+    /// The estimate with the poses of the panels as the views determine them.
+    fn with_panels_found(&self) -> Option<Estimate> {
+        // Each view becomes a frame of its own, whatever its name.
+        let views = self.cameras[0].views.iter().enumerate();
+        let views = views.map(|(index, view)| View { name: format!("{index:06}"), ..view.clone() });
+        let panels = self.of_views(views.collect()).refine_panels(true).adjusted().ok()?.panels;
+        let stated = |place: &PanelPlace| place.target_from_panel.into();
+        let panels = panels.iter().map(stated).collect();
+        Self { panels, ..self.clone() }.adjusted().ok()
+    }
+
+    /// Indices of the cameras of a rig that were given and are contradicted by their own pictures:
+    /// other cameras, or changed since. Empty for a single camera.
+    pub(in crate::calibrate) fn foreign_cameras(&self) -> Vec<usize> {
+        let is_foreign = |&index: &usize| {
+            let alone = self.alone(index, &self.panels);
+            let is_known = matches!(self.cameras[index].intrinsics, Intrinsics::Known(_));
+            let remedy = || alone.remedy(&alone.adjusted().ok()?);
+            is_known && remedy().is_some_and(|remedy| remedy.instead == Instead::Camera)
+        };
+        match self.cameras.len() {
+            1 => Vec::new(),
+            count => (0..count).filter(is_foreign).collect(),
+        }
+    }
+
+    /// A camera by itself, with panels where they were found, and what its views say.
+    pub(super) fn and_alone(&self, camera: usize, found: &Estimate) -> Alone {
+        if self.is_single() {
+            return Some((self.clone(), found.clone()));
+        }
+        self.cameras.get(camera)?;
+        let alone = self.alone(camera, &found.panels);
+        let found = alone.adjusted().ok()?;
+        Some((alone, found))
+    }
+
+    /// The smallest lens model, among those with a subset of the parameters, that fits camera
+    /// `camera` as well as the model of `found` by an F test; `None` when all parameters are
+    /// needed, or the intrinsics were given.
+    pub fn sufficient_model(&self, camera: usize, found: &Estimate) -> Option<Model> {
+        let (alone, found) = self.and_alone(camera, found)?;
+        alone.sufficient(&found)
+    }
+
+    /// The same for a calibration of one camera.
+    ///
+    /// With q parameters less the sum of squares grows by F q variances of a residual; by chance F
+    /// is about 1.
+    pub(super) fn sufficient(&self, found: &Estimate) -> Option<Model> {
+        let (trial, of_trial) = self.trial(found)?;
+        let mut sufficient = None;
+        let mut next = self.cameras[0].intrinsics.model()?.smaller();
+        while let Some(model) = next {
+            let smaller = trial.of_intrinsics(model).adjusted();
+            if !smaller.is_ok_and(|smaller| holds_as_well(&smaller, &of_trial)) {
+                break;
+            }
+            sufficient = Some(model);
+            next = model.smaller();
+        }
+        sufficient
+    }
+}
+
+/// Whether a camera leaves so much that it cannot be that of the pictures.
+pub(super) fn is_absurd(camera: &CameraEstimate) -> bool {
+    camera.inlier_rms_px() > FOREIGN_PART * f64::from(camera.camera.width)
+}
+
+/// Whether the noise of detections explains the residuals.
+pub(super) fn is_explained(found: &Estimate) -> bool {
+    let of_noise = |common: f64| 1.0 - (common / found.inlier_rms_px()).powi(2);
+    found.common_px.is_some_and(|common| of_noise(common) > EXPLAINED)
+}
+
+fn best(found: &Estimate, tried: impl Iterator<Item = (Instead, Estimate)>) -> Option<Remedy> {
+    let from_px = found.inlier_rms_px();
+    let better = tried.filter_map(|(instead, other)| {
+        let gain = gain(found, &other, instead)?;
+        Some((gain, Remedy { instead, from_px, to_px: other.inlier_rms_px() }))
+    });
+    let better: Vec<_> = better.collect();
+    let most = better.iter().map(|(gain, _)| *gain).fold(0.0, f64::max);
+    // Alternatives with fewer parameters come first.
+    better.into_iter().find(|(gain, _)| *gain > AS_GOOD * most).map(|(_, remedy)| remedy)
+}
+
+/// The factor by which the mean square residual shrinks; `None` where that is not significant or
+/// does not matter. Outliers of the better fit count as a residual at the outlier limit in both, so
+/// that neither wild corners nor calling more corners wild is a gain.
+fn gain(found: &Estimate, other: &Estimate, instead: Instead) -> Option<f64> {
+    let squares = |estimate: &Estimate| -> Vec<f64> {
+        estimate.corners().map(|corner| corner.residual.length_squared()).collect()
+    };
+    let variance = median(squares(other)).unwrap_or(0.0) / MEDIAN_OF_CHI_SQUARED_2;
+    let most = OUTLIER_SIGMA * OUTLIER_SIGMA * variance;
+    let mean = |estimate: &Estimate| {
+        let squares = squares(estimate);
+        squares.iter().map(|square| square.min(most)).sum::<f64>() / squares.len() as f64
+    };
+    let of_panels = match instead {
+        Instead::Panels => 6.0 * (panel_count(other) - 1.0),
+        Instead::Model(_) | Instead::Shape | Instead::Camera => 0.0,
+    };
+    let unknowns = |estimate: &Estimate| estimate.unknown_count() as f64;
+    let frames = |estimate: &Estimate| estimate.frames.len();
+    let gain = mean(found) / mean(other);
+    let more = (unknowns(other) + of_panels - unknowns(found)).max(1.0);
+    let freedom = (2 * other.corner_count()) as f64
+        - unknowns(other)
+        - of_panels
+        - 6.0 * frames(other) as f64;
+    let is_sure = deviate_of_f((gain - 1.0) * freedom / more, more, freedom) > SIGNIFICANT;
+    let is_of_all = frames(other) >= frames(found);
+    let is_smaller = other.inlier_rms_px() < found.inlier_rms_px();
+    (is_of_all && is_sure && is_smaller && gain > 1.0 + MATTERS * MATTERS).then_some(gain)
+}
+
+/// Number of panels that were seen.
+fn panel_count(estimate: &Estimate) -> f64 {
+    estimate.corners().map(|corner| corner.panel.index()).collect::<BTreeSet<usize>>().len() as f64
+}
+
+fn holds_as_well(smaller: &Estimate, found: &Estimate) -> bool {
+    let names = |estimate: &Estimate| -> Vec<String> {
+        estimate.frames.iter().map(|frame| frame.name.clone()).collect()
+    };
+    if names(smaller) != names(found) {
+        return false;
+    }
+    let (mut own, mut other, mut count) = (0.0, 0.0, 0.0);
+    for (a, b) in found.corners().zip(smaller.corners()) {
+        // An outlier of the smaller model may be its lack of fit.
+        if !a.outlier {
+            own += a.residual.length_squared();
+            other += b.residual.length_squared();
+            count += 2.0;
+        }
+    }
+    let parameters = |estimate: &Estimate| estimate.cameras[0].found().count() as f64;
+    let less = parameters(found) - parameters(smaller);
+    let freedom = count - parameters(found) - 6.0 * found.frames.len() as f64;
+    let f_ratio = (other - own).max(0.0) / less / (own / freedom);
+    deviate_of_f(f_ratio, less, freedom) < SIGNIFICANT
+}

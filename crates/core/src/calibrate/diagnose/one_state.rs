@@ -1,0 +1,302 @@
+//! Whether the views show one camera in one state, and the board that is described.
+//!
+//! ```text
+//!   change     views 1 … k | k + 1 … n     a focal length or principal point for each group; every k is tried
+//!   shutter    a displacement of the board in every view while the rows are read
+//!   stretch    x and y of the board in another ratio than described
+//! ```
+//!
+//! Each is a score test on [`StateEquations`]. Deviations are those of the scatter between views, so that
+//! errors of the model and of the board, which differ from view to view, do not pass for a change. Stretch, shear and
+//! bend of the board are unknowns of each test: a bent board that is seen from one side first and from the other
+//! later is no change of the camera. Nor is what a drift, or the tilt and the distance of the board, explain as well: many
+//! sequences go from frontal to oblique views.
+
+use crate::calibrate::problem::whitening::OUTLIER_SIGMA;
+use crate::calibrate::uncertainty::state_equations::{
+    Candidate, Column, Effect, Fit, StateEquations, significance,
+};
+use crate::camera::Camera;
+use crate::statistics::f_chance;
+
+/// Probability of each of the three diagnoses for views in which nothing is wrong, 1 % for all; that of a change is
+/// for all positions together.
+const SIGNIFICANT: f64 = 0.01 / 3.0;
+
+/// Least number of views before and after a change: two and one to test them.
+const LEAST_VIEWS: usize = 3;
+
+/// A displacement during the shutter is claimed where it explains all but this part of the squares, so that the
+/// residual halves. A lens of another model and a bent board have most of their pattern in other directions.
+const MOST_LEFT: f64 = 0.25;
+
+/// Least displacement at the edge of the image by a change, in standard deviations of a corner: that of an outlier.
+/// A smaller one, as of a lens that warms up, is within what deviations allow for, see [`crate::calibrate::uncertainty::halves`].
+const LEAST_CHANGE: f64 = OUTLIER_SIGMA;
+
+/// Least stretch of a board that is another board, or a print that was fitted to its page: printers feed paper with
+/// errors of some tenths of a per cent.
+const LEAST_STRETCH: f64 = 0.005;
+
+/// A view shows a displacement by itself where the sum of three squares exceeds this: once in a thousand views.
+const OF_VIEW: f64 = 16.27;
+
+/// What of a camera changes from one view to the next: zoom and focus change the focal length; stabilised lenses and shifted
+/// ones move the principal point.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum ChangedIntrinsic {
+    /// The focal length.
+    Focal,
+    /// The principal point in x.
+    CentreX,
+    /// The principal point in y.
+    CentreY,
+}
+
+impl ChangedIntrinsic {
+    const ALL: [Self; 3] = [Self::Focal, Self::CentreX, Self::CentreY];
+
+    /// Its value, px; the focal length in x.
+    pub(in crate::calibrate) fn of(self, camera: &Camera) -> f64 {
+        match self {
+            Self::Focal => camera.focal_px.x,
+            Self::CentreX => camera.centre_px.x,
+            Self::CentreY => camera.centre_px.y,
+        }
+    }
+
+    /// Its index among the parameters of a camera.
+    fn parameter(self) -> usize {
+        match self {
+            Self::Focal => 0,
+            Self::CentreX => 2,
+            Self::CentreY => 3,
+        }
+    }
+
+    fn candidate(self) -> Candidate {
+        match self {
+            Self::Focal => Candidate::Focal,
+            Self::CentreX => Candidate::CentreX,
+            Self::CentreY => Candidate::CentreY,
+        }
+    }
+}
+
+/// The camera differs between the first views and the others.
+#[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
+pub struct CameraChange {
+    /// What changed.
+    pub intrinsic: ChangedIntrinsic,
+    /// Name of the first view after the change.
+    pub from_view: String,
+    /// How many views there are before and after it.
+    pub views: [usize; 2],
+    /// The intrinsic before and after the change, px; focal lengths in x.
+    pub value_px: [f64; 2],
+    /// Standard deviation of their difference, px.
+    pub sd_px: f64,
+    /// Probability of a difference as significant as this at any view of an unchanged camera.
+    pub significance: f64,
+    /// RMS residual of a coordinate that is left where the change is allowed for, px.
+    pub left_px: f64,
+}
+
+impl CameraChange {
+    /// The values before and after, px, if it is this intrinsic that changed.
+    pub fn of(&self, intrinsic: ChangedIntrinsic) -> Option<[f64; 2]> {
+        (self.intrinsic == intrinsic).then_some(self.value_px)
+    }
+}
+
+/// Rows are displaced against each other as a rolling shutter does while the board moves.
+#[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
+pub struct RollingShutter {
+    /// Displacement between the first and the last row of the image, px; the root mean square over the views.
+    pub shear_px: f64,
+    /// How many views show it by themselves.
+    pub views: usize,
+    /// Probability of residuals that agree as well with such displacements by noise.
+    pub significance: f64,
+    /// RMS residual of a coordinate that is left where displacements are allowed for, px.
+    pub left_px: f64,
+}
+
+/// The board is longer in one direction than in the other, against its description.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
+pub struct BoardStretch {
+    /// Length along x over length along y, in units of what is described; less than 1 where y is longer.
+    pub ratio: f64,
+    /// Standard deviation of the ratio.
+    pub sd: f64,
+    /// Probability of a ratio as significant as this for a board as described.
+    pub significance: f64,
+    /// RMS residual of a coordinate that is left where it is allowed for, px.
+    pub left_px: f64,
+}
+
+/// What the views of a camera show.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(super) struct State {
+    pub change: Option<CameraChange>,
+    pub shutter: Option<RollingShutter>,
+    pub stretch: Option<BoardStretch>,
+}
+
+impl State {
+    /// Tests the views of a camera; `name` gives the name of a frame.
+    pub(in crate::calibrate) fn of(
+        equations: &StateEquations,
+        camera: &Camera,
+        name: impl Fn(usize) -> String,
+    ) -> Self {
+        let stretch = stretch(equations);
+        let step = step(equations);
+        let change = step.as_ref().and_then(|step| {
+            let &Step { intrinsic, first, effect, significance, ref fit } = step;
+            let left_px = equations.px() * fit.variance().sqrt();
+            // A relative change of the focal length, or px; and px at the edge of the image.
+            let (scale, at_edge) = match intrinsic {
+                ChangedIntrinsic::Focal => (camera.focal_px.x, f64::from(camera.width) / 2.0),
+                ChangedIntrinsic::CentreX | ChangedIntrinsic::CentreY => (1.0, 1.0),
+            };
+            if at_edge * effect.value.abs() < LEAST_CHANGE * left_px {
+                return None;
+            }
+            // Of the first group the camera is that of the fit.
+            let unit = (intrinsic.candidate(), scale);
+            let before =
+                intrinsic.of(camera) + equations.change_px(fit, intrinsic.parameter(), unit);
+            Some(CameraChange {
+                intrinsic,
+                from_view: name(equations.views.get(first)?.frame),
+                views: [first, equations.count() - first],
+                value_px: [before, before + scale * effect.value],
+                sd_px: scale * effect.sd,
+                significance,
+                left_px,
+            })
+        });
+        // What one step leaves of a stretch may pass for a shutter, and what shutters do together for a stretch.
+        let shutter = shutter(equations, step.as_ref());
+        let (stretch, shutter) = match (stretch, shutter) {
+            (Some((stretch, true)), Some(_)) => (Some(stretch), None),
+            (Some((_, false)), Some(shutter)) => (None, Some(shutter)),
+            (stretch, shutter) => (stretch.map(|(stretch, _)| stretch), shutter),
+        };
+        Self { change, shutter, stretch }
+    }
+}
+
+/// Columns of the camera and of the board.
+fn base(equations: &StateEquations) -> Vec<Column> {
+    let mut columns = equations.camera();
+    if equations.is_of_one_panel {
+        columns.extend(Candidate::SHEET.map(|candidate| equations.column(candidate)));
+    }
+    columns
+}
+
+/// A change at a view.
+struct Step {
+    intrinsic: ChangedIntrinsic,
+    first: usize,
+    effect: Effect,
+    significance: f64,
+    fit: Fit,
+}
+
+impl Step {
+    fn column(intrinsic: ChangedIntrinsic, first: usize, equations: &StateEquations) -> Column {
+        equations.weighted(intrinsic.candidate(), after(first, equations.count()))
+    }
+}
+
+pub(in crate::calibrate) fn after(first: usize, count: usize) -> Vec<f64> {
+    (0..count).map(|view| f64::from(u8::from(view >= first))).collect()
+}
+
+/// The most significant change, where it is significant.
+fn step(equations: &StateEquations) -> Option<Step> {
+    let count = equations.count();
+    let places = LEAST_VIEWS..(count + 1).saturating_sub(LEAST_VIEWS);
+    let tried = (places.len() * ChangedIntrinsic::ALL.len()) as f64;
+    let all = places.flat_map(|first| ChangedIntrinsic::ALL.map(|intrinsic| (intrinsic, first)));
+    let of = |(intrinsic, first): (ChangedIntrinsic, usize)| {
+        let mut columns = base(equations);
+        columns.push(Step::column(intrinsic, first, equations));
+        let fit = equations.fit(&columns)?;
+        // Each group has its mean.
+        let effect = fit.effect(columns.len() - 1, 2.0)?;
+        let significance = (tried * significance(effect)).min(1.0);
+        Some(Step { intrinsic, first, effect, significance, fit })
+    };
+    let best = all.filter_map(of).min_by(|a, b| a.significance.total_cmp(&b.significance))?;
+    let smooth = smooth(best.intrinsic, equations)?;
+    (best.significance < SIGNIFICANT && best.fit.left < smooth.left).then_some(best)
+}
+
+/// The fit of an intrinsic that drifts from the first view to the last, and follows the tilt and the distance of the board. A
+/// lens that warms up drifts; what a model or a map of the board leaves follows tilt and distance.
+fn smooth(intrinsic: ChangedIntrinsic, equations: &StateEquations) -> Option<Fit> {
+    let views = equations.views.iter().enumerate();
+    let of_view = views.map(|(i, view)| [i as f64, view.obliquity, view.log_distance]);
+    let of_view: Vec<[f64; 3]> = of_view.collect();
+    let mut columns = base(equations);
+    columns.extend((0..3).map(|of| {
+        let weights = of_view.iter().map(|values| values[of]).collect();
+        equations.weighted(intrinsic.candidate(), weights)
+    }));
+    equations.fit(&columns)
+}
+
+fn shutter(equations: &StateEquations, changed: Option<&Step>) -> Option<RollingShutter> {
+    let columns = || {
+        let step = changed.map(|step| Step::column(step.intrinsic, step.first, equations));
+        base(equations).into_iter().chain(step).collect::<Vec<Column>>()
+    };
+    let plain = equations.fit(&columns())?;
+    let moving = equations.fit_with_each(&columns(), &Candidate::SHUTTER)?;
+    let unknowns = (Candidate::SHUTTER.len() * equations.count()) as f64;
+    if moving.freedom <= 0.0 {
+        return None;
+    }
+    let f_ratio = (plain.left - moving.left) / unknowns / moving.variance();
+    let significance = f_chance(f_ratio, unknowns, moving.freedom);
+    if significance > SIGNIFICANT || moving.variance() > MOST_LEFT * plain.variance() {
+        return None;
+    }
+    let moves = equations.each(&columns(), &moving, &Candidate::SHUTTER)?;
+    let shears = equations
+        .views
+        .iter()
+        .zip(&moves)
+        .map(|(view, (by_mm, _))| (view.px_per_mm * by_mm[0].hypot(by_mm[1])).powi(2));
+    let shear_px = (shears.sum::<f64>() / moves.len().max(1) as f64).sqrt();
+    let of_view = |(_, squares): &&(Vec<f64>, f64)| *squares > OF_VIEW * moving.variance();
+    let views = moves.iter().filter(of_view).count();
+    let left_px = equations.px() * moving.variance().sqrt();
+    Some(RollingShutter { shear_px, views, significance, left_px })
+}
+
+/// The stretch, and whether the board's columns explain most of the squares.
+fn stretch(equations: &StateEquations) -> Option<(BoardStretch, bool)> {
+    if !equations.is_of_one_panel || equations.count() < LEAST_VIEWS {
+        return None;
+    }
+    let columns = base(equations);
+    let fit = equations.fit(&columns)?;
+    // The stretch is the first of the board's columns.
+    let effect = fit.effect(columns.len() - Candidate::SHEET.len(), 1.0)?;
+    let significance = significance(effect);
+    let ratio = (1.0 + effect.value) / (1.0 - effect.value);
+    let is_large = (ratio - 1.0).abs() > LEAST_STRETCH;
+    let plain = equations.fit(&equations.camera())?;
+    let is_most = fit.variance() < MOST_LEFT * plain.variance();
+    let left_px = equations.px() * fit.variance().sqrt();
+    let found = BoardStretch { ratio, sd: 2.0 * effect.sd, significance, left_px };
+    (significance < SIGNIFICANT && is_large).then_some((found, is_most))
+}

@@ -1,0 +1,178 @@
+//! The inverse of the normal equations: covariances of all unknowns, and which of them are open.
+
+use std::collections::BTreeSet;
+
+use nalgebra::{DMatrix, DVector, Matrix3, Matrix6, SMatrix};
+
+use super::layout::Layout;
+use super::normal::{Normal, Part, Reduced};
+
+/// The covariance of all unknowns for residuals of variance 1: of the shared ones, of each frame's pose, and
+/// of each corner's offset.
+pub(in crate::calibrate) struct Covariances {
+    pub shared: DMatrix<f64>,
+    /// Of all that are kept.
+    pub kept: DMatrix<f64>,
+    /// A square root of that of the shared unknowns.
+    pub root: Root,
+    pub frames: Vec<Matrix6<f64>>,
+    pub corners: Vec<Matrix3<f64>>,
+    /// The columns that nothing tells apart beyond what rounding leaves; their variances are the
+    /// least that they can be.
+    pub loose: Vec<usize>,
+    /// The columns whose deviation is [`TIED`] times what it were if all other shared ones were known.
+    pub tied: Vec<usize>,
+}
+
+/// A square root L of a covariance, LLᵀ, and its inverse, both from the equations, so that what is well determined is
+/// exact beside what is not.
+pub(in crate::calibrate) struct Root {
+    pub half: DMatrix<f64>,
+    pub inverse: DMatrix<f64>,
+}
+
+/// The inverse of equations, and the columns that they leave open, and tie to others.
+struct Inverse {
+    matrix: DMatrix<f64>,
+    root: Root,
+    loose: Vec<usize>,
+    tied: Vec<usize>,
+}
+
+/// The blocks on the diagonal from a row on.
+fn blocks<const K: usize>(matrix: &DMatrix<f64>, first: usize) -> Vec<SMatrix<f64, K, K>> {
+    let block = |i: usize| matrix.fixed_view::<K, K>(i, i).into_owned();
+    (first..matrix.nrows()).step_by(K).map(block).collect()
+}
+
+fn fixed<const K: usize>(matrix: &DMatrix<f64>) -> SMatrix<f64, K, K> {
+    matrix.fixed_view::<K, K>(0, 0).into_owned()
+}
+
+/// Eigenvalues of the reduced equations, scaled by the diagonal that they would have if poses were
+/// known, mean nothing below this: elimination leaves a few dozen times the precision of numbers.
+const SINGULAR: f64 = 1e-14;
+
+/// An unknown takes part in a direction if it moves by this part of what the one does that moves
+/// most.
+const INVOLVED: f64 = 0.3;
+
+/// From here on the number of a parameter means nothing by itself. What fits as well is then a valley a
+/// thousand times as long as it is wide; deviations are those of a straight one, and a bend by a
+/// thousandth of its length leads out of that. Terms of a polynomial stay below while there are few.
+const TIED: f64 = 1000.0;
+
+impl Normal {
+    /// The inverse of the equations; `None` where a frame's pose is open by itself.
+    pub(in crate::calibrate) fn covariances(&self, layout: &Layout) -> Option<Covariances> {
+        let Reduced { matrix, inverses, .. } = self.reduced(0.0)?;
+        let Inverse { matrix: kept, root, loose, tied } = self.invert(matrix)?;
+        let of_part = |(part, inverse): (&Part, DMatrix<f64>)| {
+            let through = &part.b * &inverse;
+            inverse + through.tr_mul(&(&kept * &through))
+        };
+        let parts: Vec<_> = self.parts.iter().zip(inverses).map(of_part).collect();
+        let (frames, corners) = match (layout.frames, layout.corners) {
+            (Some(first), _) => (blocks(&kept, first), parts.iter().map(fixed).collect()),
+            (None, Some(first)) => (parts.iter().map(fixed).collect(), blocks(&kept, first)),
+            (None, None) => (parts.iter().map(fixed).collect(), Vec::new()),
+        };
+        let shared = kept.view((0, 0), (self.shared, self.shared)).into_owned();
+        Some(Covariances { shared, kept, root, frames, corners, loose, tied })
+    }
+
+    /// The covariance of what is kept for residuals of variance 1; `None` where something is open.
+    pub(in crate::calibrate) fn covariance_of_kept(&self) -> Option<DMatrix<f64>> {
+        let matrix = self.reduced(0.0)?.matrix;
+        let n = matrix.nrows();
+        let scale = DVector::from_fn(n, |i, _| 1.0 / matrix[(i, i)].max(f64::MIN_POSITIVE).sqrt());
+        let scaled = DMatrix::from_fn(n, n, |i, j| matrix[(i, j)] * scale[i] * scale[j]);
+        let inverse = scaled.cholesky()?.inverse();
+        Some(DMatrix::from_fn(n, n, |i, j| inverse[(i, j)] * scale[i] * scale[j]))
+    }
+
+    /// The solution of the equations for a right side of shared unknowns and corners' offsets, in this
+    /// order, which is zero for the poses of frames. `None` where a corner is open by itself.
+    pub(in crate::calibrate) fn solve_without_frames(
+        &self,
+        layout: &Layout,
+        found: &Covariances,
+        right: &DVector<f64>,
+    ) -> Option<DVector<f64>> {
+        if layout.corners.is_some() {
+            return Some(&found.kept * right);
+        }
+        let mut of_kept = DVector::zeros(layout.count);
+        of_kept.rows_mut(0, self.shared).copy_from(&right.rows(0, self.shared));
+        let mut of_parts = Vec::with_capacity(self.parts.len());
+        for (index, part) in self.parts.iter().enumerate() {
+            let whole = part.c.clone().cholesky()?;
+            let own = right.rows(self.shared + 3 * index, 3).into_owned();
+            of_kept -= &part.b * whole.solve(&own);
+            of_parts.push((whole, own));
+        }
+        let kept = &found.kept * of_kept;
+        let mut solution = DVector::zeros(right.len());
+        solution.rows_mut(0, self.shared).copy_from(&kept.rows(0, self.shared));
+        for (index, (part, (whole, own))) in self.parts.iter().zip(of_parts).enumerate() {
+            let own = whole.solve(&(own - part.b.tr_mul(&kept)));
+            solution.rows_mut(self.shared + 3 * index, 3).copy_from(&own);
+        }
+        Some(solution)
+    }
+
+    /// The inverse of the reduced equations; the root is that of what all frames share, which alone may be open.
+    fn invert(&self, reduced: DMatrix<f64>) -> Option<Inverse> {
+        let (n, shared) = (reduced.nrows(), self.shared);
+        let others = n - shared;
+        if others == 0 {
+            return Some(self.invert_shared(reduced));
+        }
+        let own = reduced.view((shared, shared), (others, others)).into_owned();
+        let own = own.cholesky()?.inverse();
+        let across = reduced.view((shared, 0), (others, shared));
+        let through = &own * across;
+        let of_shared = reduced.view((0, 0), (shared, shared)) - across.tr_mul(&through);
+        let found = self.invert_shared(of_shared);
+        let of_shared = &found.matrix;
+        let carried = &through * of_shared;
+        let mut inverse = DMatrix::zeros(n, n);
+        inverse.view_mut((0, 0), (shared, shared)).copy_from(of_shared);
+        inverse.view_mut((shared, 0), (others, shared)).copy_from(&-&carried);
+        inverse.view_mut((0, shared), (shared, others)).copy_from(&-carried.transpose());
+        let own = own + carried * through.transpose();
+        inverse.view_mut((shared, shared), (others, others)).copy_from(&own);
+        Some(Inverse { matrix: inverse, ..found })
+    }
+
+    /// The inverse of the equations of what all frames share.
+    fn invert_shared(&self, reduced: DMatrix<f64>) -> Inverse {
+        let n = reduced.nrows();
+        if n == 0 {
+            let root = Root { half: reduced.clone(), inverse: reduced.clone() };
+            return Inverse { matrix: reduced, root, loose: Vec::new(), tied: Vec::new() };
+        }
+        let scale = DVector::from_fn(n, |i, _| 1.0 / self.a[(i, i)].max(f64::MIN_POSITIVE).sqrt());
+        let scaled = DMatrix::from_fn(n, n, |i, j| reduced[(i, j)] * scale[i] * scale[j]);
+        let eigen = scaled.clone().symmetric_eigen();
+        let mut inverse = DMatrix::zeros(n, n);
+        let mut loose = BTreeSet::new();
+        for (&value, direction) in eigen.eigenvalues.iter().zip(eigen.eigenvectors.column_iter()) {
+            if value <= SINGULAR {
+                let most = direction.amax();
+                loose.extend((0..n).filter(|&i| direction[i].abs() >= INVOLVED * most));
+            }
+            inverse += direction * direction.transpose() / value.max(SINGULAR);
+        }
+        let is_tied = |&i: &usize| inverse[(i, i)] * scaled[(i, i)] > TIED * TIED;
+        let tied = (0..n).filter(is_tied).collect();
+        let inverse = DMatrix::from_fn(n, n, |i, j| inverse[(i, j)] * scale[i] * scale[j]);
+        let roots = eigen.eigenvalues.map(|value| value.max(SINGULAR).sqrt());
+        let turn = &eigen.eigenvectors;
+        let root = Root {
+            half: DMatrix::from_fn(n, n, |i, j| scale[i] * turn[(i, j)] / roots[j]),
+            inverse: DMatrix::from_fn(n, n, |i, j| roots[i] * turn[(j, i)] / scale[j]),
+        };
+        Inverse { matrix: inverse, root, loose: loose.into_iter().collect(), tied }
+    }
+}

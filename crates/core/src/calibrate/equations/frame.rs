@@ -1,0 +1,119 @@
+//! Normal equations of one frame, its pose eliminated.
+
+use std::collections::BTreeMap;
+
+use nalgebra::{Cholesky, DMatrix, DVector, Matrix6, U6, Vector6};
+
+use super::block::Local;
+
+/// The normal equations of one frame for the shared unknowns followed by the offsets of all corners, its pose
+/// eliminated.
+pub(in crate::calibrate) struct OfFrame {
+    locals: Vec<Local>,
+    /// Number of shared unknowns.
+    shared: usize,
+    /// Those of the pose.
+    pose: Cholesky<f64, U6>,
+}
+
+impl OfFrame {
+    /// From the blocks of the frame. `None` where the pose is open.
+    pub fn of(locals: Vec<Local>, shared: usize) -> Option<Self> {
+        let mut pose = Matrix6::<f64>::zeros();
+        for local in &locals {
+            for i in 0..6 {
+                let own = local.row(local.columns.len() + i)[local.columns.len()..].iter();
+                own.enumerate().for_each(|(j, value)| pose[(i, j)] += value);
+            }
+        }
+        pose.fill_upper_triangle_with_lower_triangle();
+        Some(Self { locals, shared, pose: pose.cholesky()? })
+    }
+
+    /// The right side of n unknowns. The pose is at its optimum, so that nothing is left of its own.
+    pub fn right(&self, n: usize) -> DVector<f64> {
+        let mut right = DVector::zeros(n);
+        for local in &self.locals {
+            local.columns.iter().zip(&local.right).for_each(|(&row, value)| right[row] += value);
+            for corner in &local.corners {
+                let mut own = right.fixed_rows_mut::<3>(self.shared + 3 * corner.index);
+                own += corner.right;
+            }
+        }
+        right
+    }
+
+    /// Calls `each` for every unknown that the frame touches, with what is between it and the pose; for some more
+    /// than once, with what is to be summed.
+    fn with_pose(&self, mut each: impl FnMut(usize, Vector6<f64>)) {
+        for local in &self.locals {
+            let of_shared = local.columns.len();
+            for (i, &column) in local.columns.iter().enumerate() {
+                each(column, Vector6::from_fn(|pose, _| local.row(of_shared + pose)[i]));
+            }
+            for corner in &local.corners {
+                for k in 0..3 {
+                    let across = Vector6::from_fn(|pose, _| corner.cross[of_shared + pose][k]);
+                    each(self.shared + 3 * corner.index + k, across);
+                }
+            }
+        }
+    }
+
+    /// The product of the matrix with a vector of all unknowns.
+    pub fn times(&self, vector: &DVector<f64>) -> DVector<f64> {
+        let mut product = DVector::zeros(vector.len());
+        for local in &self.locals {
+            for (i, &row) in local.columns.iter().enumerate() {
+                for (&column, value) in local.columns.iter().zip(local.row(i)) {
+                    product[row] += value * vector[column];
+                    if column != row {
+                        product[column] += value * vector[row];
+                    }
+                }
+            }
+            for corner in &local.corners {
+                let first = self.shared + 3 * corner.index;
+                let own = corner.own * vector.fixed_rows::<3>(first);
+                (0..3).for_each(|k| product[first + k] += own[k]);
+                for (&column, values) in local.columns.iter().zip(&corner.cross) {
+                    for (k, value) in values.iter().enumerate() {
+                        product[first + k] += value * vector[column];
+                        product[column] += value * vector[first + k];
+                    }
+                }
+            }
+        }
+        let mut pose = Vector6::zeros();
+        self.with_pose(|unknown, across| pose += across * vector[unknown]);
+        let pose = self.pose.solve(&pose);
+        self.with_pose(|unknown, across| product[unknown] -= across.dot(&pose));
+        product
+    }
+
+    /// Adds what is between the shared unknowns (rows) and the offsets of all corners (columns).
+    pub fn add_across(&self, across: &mut DMatrix<f64>) {
+        for local in &self.locals {
+            for corner in &local.corners {
+                for (&row, values) in local.columns.iter().zip(&corner.cross) {
+                    for (k, value) in values.iter().enumerate() {
+                        across[(row, 3 * corner.index + k)] += value;
+                    }
+                }
+            }
+        }
+        let mut of_shared: BTreeMap<usize, Vector6<f64>> = BTreeMap::new();
+        self.with_pose(|unknown, with_pose| {
+            if unknown < self.shared {
+                *of_shared.entry(unknown).or_default() += with_pose;
+            }
+        });
+        let of_shared: Vec<_> =
+            of_shared.iter().map(|(&row, of)| (row, self.pose.solve(of))).collect();
+        self.with_pose(|unknown, with_pose| {
+            if let Some(column) = unknown.checked_sub(self.shared) {
+                of_shared.iter().for_each(|(row, of)| across[(*row, column)] -= of.dot(&with_pose));
+            }
+        });
+    }
+}

@@ -1,0 +1,81 @@
+//! Which column of the normal equations belongs to which unknown.
+
+use nalgebra::{DVector, SMatrix, Vector3, Vector6};
+
+use crate::calibrate::problem::bundle::Problem;
+use crate::calibrate::problem::shape;
+
+/// Which column of the unknowns that are kept belongs to what.
+#[derive(Clone, Debug, PartialEq)]
+pub(in crate::calibrate) struct Layout {
+    /// For each camera the parameters that are unknown, and their columns.
+    pub parameters: Vec<Vec<(usize, usize)>>,
+    /// First of the six columns of a camera's pose.
+    pub cameras: Vec<Option<usize>>,
+    /// First of the six columns of a panel's pose.
+    pub panels: Vec<Option<usize>>,
+    /// First of the six columns of a target's pose.
+    pub targets: Vec<Option<usize>>,
+    /// First of the columns of the sheet's shape.
+    pub shape: Option<usize>,
+    /// Number of columns of what all frames share: all of the above.
+    pub shared: usize,
+    /// First of the columns of the frames' poses; `None` where they are eliminated.
+    pub frames: Option<usize>,
+    /// First of the columns of the corners' offsets; `None` where they are eliminated, or known.
+    pub corners: Option<usize>,
+    /// Number of columns.
+    pub count: usize,
+}
+
+impl Layout {
+    pub(in crate::calibrate) fn of(problem: &Problem) -> Self {
+        let mut count = 0;
+        let mut take = |columns: usize| {
+            count += columns;
+            count - columns
+        };
+        let mut parameters = Vec::new();
+        let mut cameras = Vec::new();
+        for camera in &problem.cameras {
+            let free = (0..camera.free.len()).filter(|&i| camera.free[i]);
+            parameters.push(free.map(|i| (i, take(1))).collect());
+            cameras.push(camera.pose_free.then(|| take(6)));
+        }
+        let panels = problem.panels.iter().map(|p| p.pose_free.then(|| take(6))).collect();
+        let targets = problem.targets.iter().map(|t| t.pose_free.then(|| take(6))).collect();
+        let shape = problem.shape.map(|_| take(shape::COUNT));
+        let shared = take(0);
+        let of_frames = 6 * problem.frames.len();
+        let of_corners = problem.map.as_ref().map(|map| 3 * map.len());
+        let (frames, corners) = match of_corners {
+            None => (None, None),
+            Some(of_corners) if of_corners <= of_frames => (None, Some(take(of_corners))),
+            Some(_) => (Some(take(of_frames)), None),
+        };
+        Self { parameters, cameras, panels, targets, shape, shared, frames, corners, count }
+    }
+}
+
+impl Layout {
+    /// What belongs to frames and to corners of a vector over what is kept, and of those over parts.
+    pub(super) fn split(
+        &self,
+        kept: &DVector<f64>,
+        parts: &[impl std::borrow::Borrow<DVector<f64>>],
+    ) -> (Vec<Vector6<f64>>, Vec<Vector3<f64>>) {
+        fn rows<const K: usize>(kept: &DVector<f64>, first: usize) -> Vec<SMatrix<f64, K, 1>> {
+            kept.as_slice()[first..].chunks_exact(K).map(SMatrix::from_column_slice).collect()
+        }
+        fn each<const K: usize>(
+            parts: &[impl std::borrow::Borrow<DVector<f64>>],
+        ) -> Vec<SMatrix<f64, K, 1>> {
+            parts.iter().map(|part| SMatrix::from_column_slice(part.borrow().as_slice())).collect()
+        }
+        match (self.frames, self.corners) {
+            (Some(first), _) => (rows(kept, first), each(parts)),
+            (None, Some(first)) => (each(parts), rows(kept, first)),
+            (None, None) => (each(parts), Vec::new()),
+        }
+    }
+}

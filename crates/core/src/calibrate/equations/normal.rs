@@ -1,0 +1,494 @@
+//! Normal equations of a problem, with the poses of the frames eliminated.
+//!
+//! ```text
+//!     ⎡ A   B ⎤ ⎡ kept  ⎤   ⎡ a ⎤      A: cameras and panels, dense
+//!     ⎣ Bᵀ  C ⎦ ⎣ parts ⎦ = ⎣ c ⎦      C: a 6 × 6 block for each frame
+//!
+//!     (A − Σ B C⁻¹ Bᵀ) kept = a − Σ B C⁻¹ c,     part = C⁻¹ (c − Bᵀ kept)
+//! ```
+//!
+//! Where corners of the target are unknown too, no frame has an unknown in common with another frame but
+//! through them, nor a corner with another corner but through frames: of the two the one that has more
+//! unknowns is eliminated, and the other is kept.
+
+use nalgebra::{DMatrix, DVector, Matrix6, Vector6};
+use rayon::prelude::*;
+
+use super::block::{Local, OfCorner};
+use super::layout::Layout;
+use super::step::Step;
+use crate::calibrate::input::loss::Loss;
+use crate::calibrate::problem::bundle::Problem;
+use crate::calibrate::problem::corner_map::CornerMap;
+use crate::calibrate::problem::whitening::Whitening;
+
+/// The equations of unknowns that are eliminated: a frame, or a corner.
+#[derive(Clone, Debug)]
+pub(super) struct Part {
+    pub b: DMatrix<f64>,
+    pub c: DMatrix<f64>,
+    pub right: DVector<f64>,
+}
+
+/// The normal equations at a point, and what the residuals cost there.
+#[derive(Clone, Debug)]
+pub(in crate::calibrate) struct Normal {
+    pub cost: f64,
+    /// Columns of what all frames share, the first.
+    pub(super) shared: usize,
+    pub(super) a: DMatrix<f64>,
+    right: DVector<f64>,
+    /// Frames, or corners.
+    pub(super) parts: Vec<Part>,
+}
+
+impl Normal {
+    /// `None` where a corner is out of its camera's reach.
+    pub(in crate::calibrate) fn of(
+        problem: &Problem,
+        layout: &Layout,
+        whitening: &Whitening,
+        loss: Loss,
+    ) -> Option<Self> {
+        let n = layout.count;
+        let part = |size: usize| Part {
+            b: DMatrix::zeros(n, size),
+            c: DMatrix::zeros(size, size),
+            right: DVector::zeros(size),
+        };
+        let mut normal = Self {
+            cost: 0.0,
+            shared: layout.shared,
+            a: DMatrix::zeros(n, n),
+            right: DVector::zeros(n),
+            parts: match (layout.frames, &problem.map) {
+                (Some(_), Some(map)) => vec![part(3); map.len()],
+                _ => vec![part(6); problem.frames.len()],
+            },
+        };
+        let blocks: Vec<_> = problem.blocks.iter().zip(&whitening.blocks).collect();
+        for some in blocks.chunks(BLOCKS_AT_A_TIME) {
+            let locals = some.par_iter().map(|(block, whitening_of)| {
+                Local::of(problem, layout, block, whitening_of, loss, whitening.sigma)
+            });
+            // Summed in the order of the blocks, however many threads there are.
+            let locals = locals.collect::<Vec<Option<Local>>>();
+            for ((block, _), local) in some.iter().zip(locals) {
+                normal.add(layout, &local?, block.frame);
+            }
+        }
+        if let Some(map) = &problem.map {
+            normal.add_map(map, layout, whitening.sigma);
+        }
+        normal.a.fill_upper_triangle_with_lower_triangle();
+        for (panel, first) in problem.panels.iter().zip(&layout.panels) {
+            if let (Some(prior), Some(first)) = (&panel.prior, *first) {
+                normal.add_prior(prior.off(&panel.target_from_panel), first, whitening.sigma);
+            }
+        }
+        for (camera, parameters) in problem.cameras.iter().zip(&layout.parameters) {
+            if let Some(roughness) = &camera.roughness {
+                let (matrix, right) = (&mut normal.a, &mut normal.right);
+                normal.cost +=
+                    roughness.add(&camera.camera, parameters, whitening.sigma, matrix, right);
+            }
+        }
+        normal.cost.is_finite().then_some(normal)
+    }
+
+    /// Adds what is known of a pose beforehand; `sigma` is the deviation of a whitened coordinate,
+    /// the unit in which costs are counted.
+    fn add_prior(
+        &mut self,
+        (off, information): (Vector6<f64>, Matrix6<f64>),
+        first: usize,
+        sigma: f64,
+    ) {
+        let information = information * (sigma * sigma);
+        let pull = information * off;
+        self.cost += off.dot(&pull);
+        for i in 0..6 {
+            for j in 0..6 {
+                self.a[(first + i, first + j)] += information[(i, j)];
+            }
+            self.right[first + i] -= pull[i];
+        }
+    }
+
+    /// Adds what is expected of the corners' offsets.
+    fn add_map(&mut self, map: &CornerMap, layout: &Layout, sigma: f64) {
+        let weights = map.prior_mm.map(|sd| (sigma / sd).powi(2));
+        for (index, offset) in map.offsets_mm.iter().enumerate() {
+            for k in 0..3 {
+                let pull = weights[k] * offset[k];
+                self.cost += offset[k] * pull;
+                match layout.corners {
+                    Some(first) => {
+                        let column = first + 3 * index + k;
+                        self.a[(column, column)] += weights[k];
+                        self.right[column] -= pull;
+                    }
+                    None => {
+                        self.parts[index].c[(k, k)] += weights[k];
+                        self.parts[index].right[k] -= pull;
+                    }
+                }
+            }
+        }
+    }
+
+    /// Adds a block, to the lower triangle of what is kept only: its columns ascend, and its last six are
+    /// those of the frame's pose.
+    fn add(&mut self, layout: &Layout, local: &Local, frame: usize) {
+        self.cost += local.cost;
+        let shared = local.columns.len();
+        for (i, &row) in local.columns.iter().enumerate() {
+            for (&column, value) in local.columns.iter().zip(local.row(i)) {
+                self.a[(row, column)] += value;
+            }
+            self.right[row] += local.right[i];
+        }
+        for i in 0..6 {
+            let (of_shared, of_frame) = local.row(shared + i).split_at(shared);
+            let right = local.right[shared + i];
+            if let Some(first) = layout.frames {
+                let first = first + 6 * frame;
+                for (&column, value) in local.columns.iter().zip(of_shared) {
+                    self.a[(first + i, column)] += value;
+                }
+                for (j, value) in of_frame.iter().enumerate() {
+                    self.a[(first + i, first + j)] += value;
+                }
+                self.right[first + i] += right;
+                continue;
+            }
+            let part = &mut self.parts[frame];
+            for (&row, value) in local.columns.iter().zip(of_shared) {
+                part.b[(row, i)] += value;
+            }
+            for (j, value) in of_frame.iter().enumerate() {
+                part.c[(i, j)] += value;
+                if j < i {
+                    part.c[(j, i)] += value;
+                }
+            }
+            part.right[i] += right;
+        }
+        local.corners.iter().for_each(|corner| self.add_corner(layout, local, corner, frame));
+    }
+
+    /// Adds what a block says of a corner's offset.
+    fn add_corner(&mut self, layout: &Layout, local: &Local, corner: &OfCorner, frame: usize) {
+        let (of_shared, of_frame) = corner.cross.split_at(local.columns.len());
+        for k in 0..3 {
+            if let Some(first) = layout.corners {
+                let row = first + 3 * corner.index + k;
+                for (&column, values) in local.columns.iter().zip(of_shared) {
+                    self.a[(row, column)] += values[k];
+                }
+                for (i, values) in of_frame.iter().enumerate() {
+                    self.parts[frame].b[(row, i)] += values[k];
+                }
+                for l in 0..=k {
+                    self.a[(row, first + 3 * corner.index + l)] += corner.own[(k, l)];
+                }
+                self.right[row] += corner.right[k];
+            } else if let Some(first) = layout.frames {
+                let part = &mut self.parts[corner.index];
+                let of_frame =
+                    of_frame.iter().enumerate().map(|(i, of)| (first + 6 * frame + i, of));
+                let of_shared = local.columns.iter().copied().zip(of_shared);
+                for (row, values) in of_shared.chain(of_frame) {
+                    part.b[(row, k)] += values[k];
+                }
+                for l in 0..3 {
+                    part.c[(k, l)] += corner.own[(k, l)];
+                }
+                part.right[k] += corner.right[k];
+            }
+        }
+    }
+
+    /// The step of Levenberg and Marquardt: diagonals grow by the factor 1 + `damping`. `None`
+    /// where the equations have no unique solution.
+    pub(in crate::calibrate) fn step(&self, layout: &Layout, damping: f64) -> Option<Step> {
+        let Reduced { matrix, right, inverses } = self.reduced(damping)?;
+        let kept = solve_scaled(matrix, right)?;
+        let parts = self.parts.iter().zip(inverses);
+        let parts = parts.map(|(part, inverse)| inverse * (&part.right - part.b.tr_mul(&kept)));
+        let (frames, corners) = layout.split(&kept, &parts.collect::<Vec<_>>());
+        let shared = kept.rows(0, self.shared).into_owned();
+        let step = Step { shared, frames, corners };
+        kept.iter().all(|v| v.is_finite()).then_some(step)
+    }
+
+    /// By how much the cost falls along a step if the equations hold.
+    pub(in crate::calibrate) fn predicted(&self, layout: &Layout, step: &Step) -> f64 {
+        let parts = self.parts.iter().map(|part| &part.right).collect::<Vec<_>>();
+        let (frames, corners) = layout.split(&self.right, &parts);
+        let of_frames = frames.iter().zip(&step.frames).map(|(right, step)| right.dot(step));
+        let of_corners = corners.iter().zip(&step.corners).map(|(right, step)| right.dot(step));
+        let shared = self.right.rows(0, self.shared).dot(&step.shared);
+        shared + of_frames.chain(of_corners).sum::<f64>()
+    }
+
+    /// What is left of the equations when parts are eliminated. `None` where a frame's pose is open by itself.
+    pub(in crate::calibrate) fn reduced(&self, damping: f64) -> Option<Reduced> {
+        let grown = |diagonal: f64| diagonal * (1.0 + damping);
+        let (mut matrix, mut right) = (self.a.clone(), self.right.clone());
+        (0..matrix.nrows()).for_each(|i| matrix[(i, i)] = grown(matrix[(i, i)]));
+        let mut inverses = Vec::with_capacity(self.parts.len());
+        for parts in self.parts.chunks(PARTS_AT_A_TIME) {
+            let columns = parts.iter().map(|part| part.c.nrows()).sum();
+            let mut through = DMatrix::zeros(matrix.nrows(), columns);
+            let mut across = DMatrix::zeros(columns, matrix.nrows());
+            let mut first = 0;
+            for Part { b, c, right: of_part } in parts {
+                let mut c = c.clone();
+                (0..c.nrows()).for_each(|i| c[(i, i)] = grown(c[(i, i)]));
+                let inverse = c.cholesky()?.inverse();
+                let through_part = b * &inverse;
+                right -= &through_part * of_part;
+                through.columns_mut(first, b.ncols()).copy_from(&through_part);
+                across.rows_mut(first, b.ncols()).tr_copy_from(b);
+                first += b.ncols();
+                inverses.push(inverse);
+            }
+            matrix.gemm(-1.0, &through, &across, 1.0);
+        }
+        Some(Reduced { matrix, right, inverses })
+    }
+}
+
+/// What is left of equations, S and s of S kept = s, and the inverses by which parts were eliminated.
+pub(in crate::calibrate) struct Reduced {
+    pub matrix: DMatrix<f64>,
+    pub right: DVector<f64>,
+    pub(super) inverses: Vec<DMatrix<f64>>,
+}
+
+/// Parts whose share of the reduced equations is taken away at a time: as one product of matrices.
+const PARTS_AT_A_TIME: usize = 64;
+
+/// Solves symmetric equations after scaling their diagonal to 1.
+fn solve_scaled(matrix: DMatrix<f64>, right: DVector<f64>) -> Option<DVector<f64>> {
+    let n = matrix.nrows();
+    if n == 0 {
+        return Some(right);
+    }
+    let scale = DVector::from_fn(n, |i, _| 1.0 / matrix[(i, i)].max(f64::MIN_POSITIVE).sqrt());
+    let scaled = DMatrix::from_fn(n, n, |i, j| matrix[(i, j)] * scale[i] * scale[j]);
+    let solution = scaled.cholesky()?.solve(&right.component_mul(&scale));
+    Some(solution.component_mul(&scale))
+}
+
+/// Blocks whose equations are held at a time: enough for every thread, little for the memory.
+const BLOCKS_AT_A_TIME: usize = 256;
+
+#[cfg(test)]
+mod tests {
+    use rand::{Rng, SeedableRng};
+    use rand_chacha::ChaCha8Rng;
+
+    use super::*;
+    use crate::calibrate::input::observation::Observation;
+    use crate::calibrate::problem::unknowns::Block;
+    use crate::calibrate::problem::unknowns::{
+        CameraUnknowns, PanelUnknowns, Prior, TargetUnknowns,
+    };
+    use crate::calibrate::{PanelRef, Shape};
+    use crate::camera::{Camera, Pose};
+    use glam::DVec2;
+    use glam::DVec3;
+    use nalgebra::Vector3;
+
+    #[derive(Clone, Copy, PartialEq)]
+    enum Kind {
+        Rig,
+        Scene,
+        Bent,
+        Map { frames: usize },
+    }
+
+    /// Two cameras and two panels in three frames, every link open that may be, seen with noise; the same with a target
+    /// for each panel; or one camera and a panel that is bent, or whose corners are anywhere.
+    fn problem(kind: Kind) -> Problem {
+        let mut rng = ChaCha8Rng::seed_from_u64(7);
+        let count = if matches!(kind, Kind::Rig | Kind::Scene) { 2 } else { 1 };
+        let beside = |x: f64| Pose { translation: DVec3::new(x, 3.0, -2.0), ..Pose::IDENTITY };
+        let cameras = (0..count).map(|i| {
+            let camera = Camera::pinhole(640 + 80 * i, 480, 1.0);
+            let free = vec![true; camera.parameters().len()];
+            let free = free.iter().enumerate().map(|(i, _)| i < 6).collect();
+            let camera_from_rig = beside(-60.0 * f64::from(i));
+            CameraUnknowns {
+                camera_from_rig,
+                pose_free: i > 0,
+                ..CameraUnknowns::alone(camera, free)
+            }
+        });
+        let mut covariance = [[0.0; 6]; 6];
+        (0..6).for_each(|i| covariance[i][i] = if i < 3 { 1e-6 } else { 1e-2 });
+        let panels = (0..count).map(|i| {
+            let target_from_panel = beside(70.0 * f64::from(i));
+            let prior = Prior::new(beside(70.0 * f64::from(i) + 0.05), covariance);
+            let prior = prior.filter(|_| i > 0);
+            let target = if kind == Kind::Scene { i as usize } else { 0 };
+            PanelUnknowns { target, target_from_panel, pose_free: i > 0, prior }
+        });
+        let turned = Pose::looking_at(DVec3::new(3.0, 7.0, 90.0), DVec3::ONE, DVec3::Y);
+        let other = TargetUnknowns { scene_from_target: turned, pose_free: true };
+        let targets = match kind {
+            Kind::Scene => vec![TargetUnknowns::SCENE, other],
+            _ => vec![TargetUnknowns::SCENE],
+        };
+        let moments = match kind {
+            Kind::Map { frames } => frames,
+            Kind::Rig | Kind::Scene | Kind::Bent => 3,
+        };
+        let frames = (0..moments).map(|i| {
+            let (sin, cos) = (2.4 * i as f64).sin_cos();
+            let eye = DVec3::new(50.0 * cos, 50.0 * sin, 300.0);
+            Pose::looking_at(eye, DVec3::new(30.0, 20.0, 0.0), DVec3::Y)
+        });
+        let shape = (kind == Kind::Bent).then(|| Shape {
+            middle_mm: DVec3::new(30.0, 20.0, 0.0),
+            reach_mm: 40.0,
+            coefficients_mm: std::array::from_fn(|i| 0.1 * i as f64),
+        });
+        let mut problem = Problem {
+            cameras: cameras.collect(),
+            frames: frames.collect(),
+            targets,
+            panels: panels.collect(),
+            shape,
+            ..Problem::default()
+        };
+        for frame in 0..moments {
+            for (camera, panel) in (0..count).flat_map(|c| (0..count).map(move |p| (c, p))) {
+                let seen = (0..20).map(|k| Observation {
+                    row: k / 5,
+                    col: k % 5,
+                    panel_mm: DVec3::new(12.0 * f64::from(k % 5), 11.0 * f64::from(k / 5), 0.0),
+                    pixel: DVec2::ZERO,
+                    cov: None,
+                });
+                let panel = PanelRef::new(panel as usize, panel);
+                let block =
+                    Block { camera: camera as usize, frame, panel, observations: seen.collect() };
+                let residuals = problem.residuals(&block).expect("all corners are in sight");
+                let mut block = block;
+                for (seen, residual) in block.observations.iter_mut().zip(residuals) {
+                    let noise = [0; 2].map(|_| rng.random_range(-0.5..0.5));
+                    seen.pixel = DVec2::from(noise) - residual;
+                }
+                problem.blocks.push(block);
+            }
+        }
+        if let Kind::Map { .. } = kind {
+            let mut map = CornerMap::flat(&problem.blocks);
+            for offset in &mut map.offsets_mm {
+                *offset = DVec3::from([0; 3].map(|_| rng.random_range(-0.1..0.1)));
+            }
+            problem.map = Some(map);
+        }
+        problem
+    }
+
+    fn whitening(problem: &Problem) -> Whitening {
+        let of = |block: &Block| {
+            (0..block.observations.len()).map(|k| [2.0, 0.1 * (k % 7) as f64, 1.5]).collect()
+        };
+        Whitening { blocks: problem.blocks.iter().map(of).collect(), common_px: None, sigma: 0.8 }
+    }
+
+    /// All residuals, whitened: those of the corners, and what is off from what was known beforehand.
+    fn residuals(problem: &Problem, whitening: &Whitening) -> DVector<f64> {
+        let mut all = Vec::new();
+        for (block, weights) in problem.blocks.iter().zip(&whitening.blocks) {
+            for (residual, &w) in problem.residuals(block).unwrap().into_iter().zip(weights) {
+                all.extend(Whitening::apply(w, residual).to_array());
+            }
+        }
+        for panel in &problem.panels {
+            if let Some(prior) = &panel.prior {
+                let (off, information) = prior.off(&panel.target_from_panel);
+                let half = (information * whitening.sigma.powi(2)).cholesky().unwrap().l();
+                all.extend((half.transpose() * -off).iter());
+            }
+        }
+        if let Some(map) = &problem.map {
+            let offsets = map.offsets_mm.iter();
+            all.extend(offsets.flat_map(|&mm| (mm / map.prior_mm * whitening.sigma).to_array()));
+        }
+        DVector::from_vec(all)
+    }
+
+    fn step(layout: &Layout, frames: usize, values: &DVector<f64>) -> Step {
+        let (shared, others) = values.as_slice().split_at(layout.shared);
+        let (frames, corners) = others.split_at(6 * frames);
+        let frames = frames.chunks_exact(6).map(Vector6::from_column_slice).collect();
+        let corners = corners.chunks_exact(3).map(Vector3::from_column_slice).collect();
+        Step { shared: DVector::from_column_slice(shared), frames, corners }
+    }
+
+    /// Eliminating frames or corners changes nothing, and every derivative is that of the residuals: cost, step and
+    /// covariances are those of the whole equations, made from differences.
+    #[test]
+    fn equations_are_those_of_the_residuals_differences() {
+        // Of few frames corners are eliminated, of many frames.
+        let maps = [5, 12].map(|frames| Kind::Map { frames });
+        for kind in [Kind::Rig, Kind::Scene, Kind::Bent].into_iter().chain(maps) {
+            let problem = problem(kind);
+            let (layout, whitening) = (Layout::of(&problem), whitening(&problem));
+            let normal = Normal::of(&problem, &layout, &whitening, Loss::Squared).unwrap();
+            let here = residuals(&problem, &whitening);
+            let of_corners = problem.map.as_ref().map_or(0, |map| 3 * map.len());
+            let frames = problem.frames.len();
+            let count = layout.shared + 6 * frames + of_corners;
+            let column = |i: usize| {
+                // A ten-millionth of a pixel, about, whatever the unit.
+                let unit = DVector::from_fn(count, |j, _| f64::from(u8::from(i == j)));
+                let at = |by: f64| {
+                    residuals(
+                        &problem.after(&layout, &step(&layout, frames, &(&unit * by))),
+                        &whitening,
+                    )
+                };
+                let size = 1e-4 / (at(1e-6) - &here).norm().max(1e-9) * 1e-6;
+                (at(size) - at(-size)) / (2.0 * size)
+            };
+            let columns: Vec<DVector<f64>> = (0..count).map(column).collect();
+            let jacobian = DMatrix::from_columns(&columns);
+            let whole = jacobian.tr_mul(&jacobian);
+            let scale = DVector::from_fn(count, |i, _| whole[(i, i)].sqrt());
+            let scaled = DMatrix::from_fn(count, count, |i, j| whole[(i, j)] / scale[i] / scale[j]);
+            let inverse = scaled.cholesky().expect("nothing is open").inverse();
+            let right = jacobian.tr_mul(&-&here).component_div(&scale);
+            let expected = (&inverse * right).component_div(&scale);
+
+            assert!((normal.cost - here.norm_squared()).abs() < 1e-9 * normal.cost);
+            let found = normal.step(&layout, 0.0).unwrap();
+            let frames = found.frames.iter().flat_map(|frame| frame.iter());
+            let corners = found.corners.iter().flat_map(|corner| corner.iter());
+            let found = found.shared.iter().chain(frames).chain(corners).copied();
+            let found = DVector::from_iterator(count, found);
+            for i in 0..count {
+                let deviation = inverse[(i, i)].sqrt() / scale[i];
+                let off = (found[i] - expected[i]).abs();
+                assert!(off < 1e-4 * deviation, "unknown {i}: {off} of {deviation}");
+            }
+            let covariances = normal.covariances(&layout).unwrap();
+            assert!(covariances.loose.is_empty());
+            for i in 0..count {
+                let shared = covariances.shared.diagonal();
+                let frames = covariances.frames.iter().flat_map(|c| c.diagonal().data.0[0]);
+                let corners = covariances.corners.iter().flat_map(|c| c.diagonal().data.0[0]);
+                let all = shared.iter().copied().chain(frames).chain(corners);
+                let found = all.collect::<Vec<f64>>()[i];
+                let ratio = found / inverse[(i, i)] * scale[i] * scale[i];
+                assert!((ratio - 1.0).abs() < 1e-3, "variance of unknown {i}: {ratio}");
+            }
+        }
+    }
+}

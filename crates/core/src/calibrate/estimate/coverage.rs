@@ -1,0 +1,55 @@
+//! How many corners a camera saw in each part of its image: what is left of them where they are not listed.
+
+use glam::DVec2;
+
+/// Cells along the longer side of the image.
+const CELLS: f64 = 40.0;
+
+/// Corners in each cell of an image, outliers left out.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Coverage {
+    columns: usize,
+    rows: usize,
+    counts: Vec<u32>,
+}
+
+impl Coverage {
+    /// Of counts row by row from the top; `None` where these are not one for each cell.
+    pub fn new(columns: usize, rows: usize, counts: Vec<u32>) -> Option<Self> {
+        let is_whole = columns.checked_mul(rows) == Some(counts.len());
+        is_whole.then_some(Self { columns, rows, counts })
+    }
+
+    /// Of corners at these places in an image of this size, px.
+    pub(super) fn counted(size: DVec2, corners: impl Iterator<Item = DVec2>) -> Self {
+        let cells = (size * CELLS / size.max_element()).round().max(DVec2::ONE);
+        let (columns, rows) = (cells.x as usize, cells.y as usize);
+        let mut counts = vec![0; columns * rows];
+        for at in corners.map(|pixel| (pixel + 0.5) / size * cells) {
+            let [column, row] = [(at.x.max(0.0), columns), (at.y.max(0.0), rows)]
+                .map(|(at, cells)| (at as usize).min(cells - 1));
+            counts[row * columns + column] += 1;
+        }
+        Self { columns, rows, counts }
+    }
+
+    /// Cells along a row, and rows.
+    pub fn cells(&self) -> [usize; 2] {
+        [self.columns, self.rows]
+    }
+
+    /// Corners in each cell, row by row from the top.
+    pub fn counts(&self) -> &[u32] {
+        &self.counts
+    }
+
+    /// The middle of each cell of an image of this size in which there are corners, px, and how many these are.
+    pub(in crate::calibrate) fn places(&self, size: DVec2) -> impl Iterator<Item = (DVec2, u32)> {
+        let step = size / DVec2::new(self.columns as f64, self.rows as f64);
+        let seen = self.counts.iter().enumerate().filter(|(_, count)| **count > 0);
+        seen.map(move |(index, &count)| {
+            let (row, column) = (index / self.columns, index % self.columns);
+            (step * (DVec2::new(column as f64, row as f64) + 0.5) - 0.5, count)
+        })
+    }
+}

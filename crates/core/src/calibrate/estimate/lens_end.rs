@@ -1,0 +1,66 @@
+//! Where the curve of a lens turns back or runs away within the image.
+
+use std::fmt;
+
+use glam::DVec2;
+
+use super::image_circle::ImageCircle;
+use crate::camera::Camera;
+
+/// A lens whose curve turns back or runs away within the image, as polynomials and quotients do where
+/// no corner holds them.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
+pub struct LensEnd {
+    /// Radius from the principal point up to which the lens is good, px.
+    pub steady_px: f64,
+    /// Radius of the outermost corner that was seen, px.
+    pub outermost_px: f64,
+    /// Radius of the image's farthest corner, px.
+    pub farthest_px: f64,
+}
+
+impl LensEnd {
+    /// The end of a camera's lens; `None` where it lies beyond the image, or beyond the image circle
+    /// that corners fill. `seen` are the places of all corners.
+    pub fn of(camera: &Camera, seen: &[DVec2]) -> Option<Self> {
+        let (steady_px, farthest_px) = (camera.steady_px()?, camera.farthest_px());
+        let rim_px = ImageCircle::filled(camera, seen).map_or(farthest_px, |c| c.radius_px);
+        let outermost_px = seen.iter().map(|&at| camera.radius_px(at)).fold(0.0, f64::max);
+        (steady_px < rim_px).then_some(Self { steady_px, outermost_px, farthest_px })
+    }
+}
+
+impl fmt::Display for LensEnd {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        write!(
+            f,
+            "the lens is good up to {:.0} px from the principal point, where its curve turns back or \
+             has a pole; the outermost corner was seen at {:.0} px, the image ends at {:.0} px: ",
+            self.steady_px, self.outermost_px, self.farthest_px
+        )?;
+        f.write_str(match self.outermost_px > self.steady_px {
+            true => "use no pixels near that radius, or choose another model",
+            false => "use no pixels beyond, bring corners there, or choose another model",
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::camera::{BrownConrady, Lens};
+
+    #[test]
+    fn a_fold_is_told_only_within_the_image() {
+        // r (1 − r²/3) turns back at 2/3 of the focal length.
+        let lens = BrownConrady { radial: [-1.0 / 3.0, 0.0, 0.0], ..BrownConrady::default() };
+        let camera = |focal| Camera::centred(1600, 1200, focal, Lens::BrownConrady(lens));
+        let seen = [DVec2::new(800.0, 600.0), DVec2::new(800.0, 100.0)];
+        assert_eq!(LensEnd::of(&camera(1600.0), &seen), None);
+        let end = LensEnd::of(&camera(900.0), &seen).unwrap();
+        assert!((end.steady_px - 600.0).abs() < 1e-6 && end.farthest_px == 1000.0, "{end:?}");
+        assert!((end.outermost_px - 499.5).abs() < 0.01, "{end:?}");
+        assert!(end.to_string().contains("600 px") && end.to_string().contains("1000 px"), "{end}");
+    }
+}

@@ -1,0 +1,129 @@
+//! How sure an estimated camera is of where it projects a point, over its image.
+
+use glam::DVec2;
+use nalgebra::DMatrix;
+
+use super::values::CameraEstimate;
+use crate::calibrate::uncertainty::projection::{Source, by_motion, by_parameters, seen_at};
+
+/// How sure a camera is over its image.
+#[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
+pub struct UncertaintyMap {
+    /// How far the points are; `None` of points at infinity.
+    pub distance_mm: Option<f64>,
+    /// Where the deviations come from.
+    pub source: Source,
+    /// Number of places along a row.
+    pub columns: usize,
+    /// Number of rows.
+    pub rows: usize,
+    /// Row by row the standard deviation of a projection along the worst direction, px; `None` beyond the lens.
+    pub sd_px: Vec<Option<f64>>,
+}
+
+/// Places along the longer side of an image.
+const PLACES: usize = 24;
+
+/// So many corners tell how sure a camera is where it saw any.
+const ENOUGH_CORNERS: usize = 1000;
+
+impl CameraEstimate {
+    /// The covariance of its parameters that were found, in their order; `None` where it is not known from there.
+    pub fn covariance_from(&self, source: Source) -> Option<&DMatrix<f64>> {
+        match source {
+            Source::Noise => (self.covariance.nrows() > 0).then_some(&self.covariance),
+            Source::Observed => Some(&self.projection.as_ref()?.observed.as_ref()?.covariance),
+        }
+    }
+
+    /// Covariance of where the camera projects what a pixel shows, px²; `None` beyond the lens, or where it is
+    /// not known. The point is so many mm away, or at infinity.
+    pub fn projection_covariance(
+        &self,
+        pixel: DVec2,
+        distance_mm: Option<f64>,
+        source: Source,
+    ) -> Option<[[f64; 2]; 2]> {
+        let covariance = self.covariance_from(source)?;
+        let point = seen_at(&self.camera, pixel, distance_mm)?;
+        let at = self.camera.project_with_derivatives(point)?;
+        let alignment = &self.projection.as_ref()?.alignment;
+        let mut by_motion = by_motion(&at, point);
+        if distance_mm.is_none() {
+            by_motion.fixed_columns_mut::<3>(3).fill(0.0);
+        }
+        let by_all = by_parameters(&at, &self.free()) + by_motion * alignment;
+        let found = &by_all * covariance * by_all.transpose();
+        Some([[found[(0, 0)], found[(0, 1)]], [found[(1, 0)], found[(1, 1)]]])
+    }
+
+    /// How sure it is over its image of points so many mm away, or at infinity. `None` where that is not known.
+    pub fn uncertainty_map(
+        &self,
+        distance_mm: Option<f64>,
+        source: Source,
+    ) -> Option<UncertaintyMap> {
+        self.covariance_from(source)?;
+        self.projection.as_ref()?;
+        let size = DVec2::new(f64::from(self.camera.width), f64::from(self.camera.height));
+        let parts = (size * PLACES as f64 / size.max_element()).round().max(DVec2::ONE);
+        let (columns, rows) = (parts.x as usize, parts.y as usize);
+        let sd = |place: usize| {
+            let at = DVec2::new((place % columns) as f64, (place / columns) as f64) + 0.5;
+            let pixel = at * size / parts - 0.5;
+            Some(worst(self.projection_covariance(pixel, distance_mm, source)?).sqrt())
+        };
+        let sd_px = (0..columns * rows).map(sd).collect();
+        Some(UncertaintyMap { distance_mm, source, columns, rows, sd_px })
+    }
+
+    /// How sure it is over its image of points at infinity, and at the distances of
+    /// [`ProjectionUncertainty::distances_mm`](crate::calibrate::ProjectionUncertainty::distances_mm): as far as these are known, from noise and observed.
+    pub fn uncertainty_maps(&self) -> Vec<UncertaintyMap> {
+        let distances = self.projection.iter().flat_map(|known| &known.distances_mm);
+        let distances = std::iter::once(None).chain(distances.map(|&mm| Some(mm)));
+        let both = distances.flat_map(|mm| [(mm, Source::Noise), (mm, Source::Observed)]);
+        both.filter_map(|(mm, source)| self.uncertainty_map(mm, source)).collect()
+    }
+
+    /// Standard deviation of a coordinate of a projection, px, the root of its mean square over where corners were
+    /// seen. `None` where it is not known.
+    pub fn projection_sd_px(&self, distance_mm: Option<f64>, source: Source) -> Option<f64> {
+        let every = self.corner_count().div_ceil(ENOUGH_CORNERS).max(1);
+        let corners = self.corners().step_by(every).map(|corner| (corner.pixel, 1));
+        let mut places: Vec<(DVec2, u32)> = corners.collect();
+        if let (true, Some(coverage)) = (places.is_empty(), &self.coverage) {
+            places = coverage.places(self.size_px()).collect();
+        }
+        let (mut sum, mut total) = (0.0, 0.0);
+        for (pixel, count) in places {
+            let found = self.projection_covariance(pixel, distance_mm, source);
+            let Some([[xx, _], [_, yy]]) = found else { continue };
+            sum += f64::from(count) * f64::midpoint(xx, yy);
+            total += f64::from(count);
+        }
+        (total > 0.0).then(|| (sum / total).sqrt())
+    }
+
+    /// Standard deviation of each of its parameters as the frames agree with each other; `None` of those that were
+    /// not found, or where it is not known.
+    pub fn observed_sd(&self) -> Vec<Option<f64>> {
+        let observed = self.covariance_from(Source::Observed);
+        let mut of_found = (0..).filter_map(|i| observed.map(|c| c[(i, i)].sqrt()));
+        let known = observed.is_some();
+        let parameters = self.parameters.iter();
+        parameters.map(|p| if known && p.sd.is_some() { of_found.next() } else { None }).collect()
+    }
+
+    /// Indices of the parameters that were found.
+    pub(in crate::calibrate) fn free(&self) -> Vec<usize> {
+        let parameters = self.parameters.iter().enumerate();
+        parameters.filter(|(_, p)| p.sd.is_some()).map(|(index, _)| index).collect()
+    }
+}
+
+/// The variance along the worst direction.
+fn worst([[xx, xy], [_, yy]]: [[f64; 2]; 2]) -> f64 {
+    (xx + yy) / 2.0 + ((xx - yy) / 2.0).hypot(xy)
+}

@@ -1,0 +1,102 @@
+//! An untagged board that no file describes.
+
+use std::collections::BTreeSet;
+
+use glam::DVec3;
+
+use crate::detect::Grid;
+use crate::lattice::{GridKind, LatticeMap};
+use crate::targets::{
+    BoardSpec, Target, TargetError, TargetIdentity, TargetSpec, board_vertices, symmetries,
+};
+
+/// What to do about detections of another target.
+pub(super) const ASSUME_TARGET: &str = "give the description that it was detected with, or set \
+                                        `Detection::assume_targets` to assume this one";
+
+/// An untagged board that no file describes. Its labels may differ between views by a motion of the
+/// lattice, which the pose of the view takes up.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct UntaggedGrid {
+    /// The tiling.
+    pub kind: GridKind,
+    /// Length of a tile's edge, mm.
+    pub edge_mm: f64,
+    /// Rows and columns of corners, where they are known.
+    pub size: Option<[u32; 2]>,
+}
+
+impl UntaggedGrid {
+    /// The board as a target; `None` where its size is not known.
+    ///
+    /// # Errors
+    /// Where no board is so small, or so large.
+    pub fn target(&self, name: &str) -> Option<Result<Target, TargetError>> {
+        let [rows, cols] = self.size?;
+        let plain = BoardSpec::new(self.kind, rows, cols, self.edge_mm);
+        let spec = BoardSpec { tags: None, ..plain };
+        Some(Target::build(name, &TargetSpec::Board(spec), None))
+    }
+
+    /// Where a corner is, mm.
+    pub(in crate::calibrate) fn place(&self, row: i32, col: i32) -> DVec3 {
+        self.edge_mm * self.kind.position(row.into(), col.into()).extend(0.0)
+    }
+
+    /// Refuses a grid that was detected as a target with tiles of another size.
+    pub(super) fn check_target(&self, seen: Option<&TargetIdentity>) -> Result<(), String> {
+        match seen {
+            Some(seen) if seen.edge_mm != [self.edge_mm; 2] => Err(format!(
+                "it was detected as {seen}, but `UntaggedGrid::edge_mm` is {} mm: {ASSUME_TARGET}",
+                self.edge_mm
+            )),
+            _ => Ok(()),
+        }
+    }
+
+    /// Whether a detected grid can be this board; what speaks against it.
+    pub(in crate::calibrate) fn check(&self, grid: &Grid) -> Result<(), String> {
+        let Some([rows, cols]) = self.size else { return Ok(()) };
+        let found = grid.corners.len();
+        let most = rows as usize * cols as usize;
+        if found > most {
+            return Err(format!("{found} corners are more than {rows} × {cols}"));
+        }
+        if found < most {
+            return Ok(());
+        }
+        let labels: BTreeSet<_> = grid.corners.iter().map(|c| (c.row, c.col)).collect();
+        if labels == self.labels(rows, cols) {
+            return Ok(());
+        }
+        Err(if labels == self.labels(cols, rows) {
+            format!(
+                "it has {cols} rows × {rows} columns: those of `UntaggedGrid::size` are exchanged"
+            )
+        } else {
+            format!("its rows and columns are not those of a board of {rows} × {cols} corners")
+        })
+    }
+
+    /// The rotations of its labels that no picture shows, see
+    /// [`Panel::label_symmetries`](crate::targets::Panel::label_symmetries); none where its size is not known.
+    pub(super) fn label_symmetries(&self) -> Vec<LatticeMap> {
+        self.size.map_or(Vec::new(), |[rows, cols]| {
+            symmetries(self.kind, board_vertices(self.kind, rows, cols))
+        })
+    }
+
+    /// Whether labels reach to all four ends of its rows and columns.
+    pub(super) fn is_spanned_by(&self, labels: &BTreeSet<(i32, i32)>) -> bool {
+        let ends = |labels: &BTreeSet<(i32, i32)>| {
+            let rows = labels.iter().map(|(row, _)| *row);
+            let cols = labels.iter().map(|(_, col)| *col);
+            (rows.clone().min(), rows.max(), cols.clone().min(), cols.max())
+        };
+        self.size.is_some_and(|[rows, cols]| ends(labels) == ends(&self.labels(rows, cols)))
+    }
+
+    fn labels(&self, rows: u32, cols: u32) -> BTreeSet<(i32, i32)> {
+        board_vertices(self.kind, rows, cols).into_iter().map(|v| (v.row, v.col)).collect()
+    }
+}

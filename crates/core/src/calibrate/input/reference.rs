@@ -1,0 +1,354 @@
+//! What was photographed, and how detections are compared with it: identity, panels, corners and tags.
+
+use std::collections::BTreeMap;
+
+use glam::DVec3;
+
+use super::grid::{ASSUME_TARGET, UntaggedGrid};
+use super::observation::{Observation, Sighting, View};
+use super::panel::{PanelPlace, PanelRef};
+use crate::camera::Pose;
+use crate::detect::{Detection, Grid};
+use crate::lattice::LatticeMap;
+use crate::targets::{Panel, Target, TargetIdentity};
+
+/// What is wrong with a board of the other tiling.
+const OTHER_KIND: &str =
+    "the board in it has the other tiling: give `UntaggedGrid::kind` that of the board";
+
+/// What follows from labels that are not on the target.
+const OTHER_TARGET: &str = "; the target does not belong to this detection";
+
+/// What is wrong with detections of one target where there are several.
+const OF_ONE_TARGET: &str =
+    "it does not say which target its corners belong to: detect again with all targets at once";
+
+/// Why labels of a grid without panel are not on the target.
+const CUT_OFF: &str = "its rows and columns are not those of the target: it is another board, or a part of one without tags, \
+                       whose rows and columns are known only where it is seen whole";
+
+/// What was photographed.
+#[derive(Clone, Copy, Debug)]
+pub enum Reference<'a> {
+    /// A target that its file describes.
+    Target(&'a Target),
+    /// Several targets that are fixed to each other; detections say which one a grid belongs to.
+    Scene(&'a [Target]),
+    /// An untagged board.
+    Grid(UntaggedGrid),
+}
+
+impl Reference<'_> {
+    /// Where its panels are on it.
+    pub fn panels(&self) -> Vec<PanelPlace> {
+        match self {
+            Self::Grid(_) => vec![Pose::IDENTITY.into()],
+            Self::Target(_) | Self::Scene(_) => {
+                let panels = self.targets().iter().flat_map(|target| &target.panels);
+                panels.map(|panel| (&panel.pose).into()).collect()
+            }
+        }
+    }
+
+    /// The rotations of each panel's labels that no picture shows, see [`Panel::label_symmetries`].
+    pub fn label_symmetries(&self) -> Vec<Vec<LatticeMap>> {
+        match self {
+            Self::Grid(grid) => vec![grid.label_symmetries()],
+            Self::Target(_) | Self::Scene(_) => {
+                let panels = self.targets().iter().flat_map(|target| &target.panels);
+                panels.map(Panel::label_symmetries).collect()
+            }
+        }
+    }
+
+    /// What a half turn or another rotation that no picture shows leaves open, as a sentence without capital and full
+    /// stop; `None` where labels are known.
+    pub fn label_ambiguity(&self) -> Option<String> {
+        let maps = self.label_symmetries();
+        let of_most = maps.iter().max_by_key(|maps| maps.len()).filter(|maps| !maps.is_empty())?;
+        let degrees = 360 / (of_most.len() + 1);
+        Some(format!(
+            "a board without tags that looks the same after a rotation by {degrees}° is labelled by how it lies in the \
+             image: which of its {} sides is the lower one is not known",
+            of_most.len() + 1
+        ))
+    }
+
+    /// What its file describes, or their files; none of an untagged board.
+    pub fn targets(&self) -> &[Target] {
+        match *self {
+            Self::Grid(_) => &[],
+            Self::Target(target) => std::slice::from_ref(target),
+            Self::Scene(targets) => targets,
+        }
+    }
+
+    /// Identities of the targets; of an untagged board that of the target it makes, where its size is known.
+    pub fn identities(&self) -> Vec<TargetIdentity> {
+        match self {
+            Self::Grid(grid) => {
+                let made = grid.target("board").and_then(Result::ok);
+                made.map(|target| target.identity()).into_iter().collect()
+            }
+            Self::Target(_) | Self::Scene(_) => {
+                self.targets().iter().map(Target::identity).collect()
+            }
+        }
+    }
+
+    /// The panel with an id, which is 0 on an untagged board, of the target of a name where there are several.
+    pub fn panel(&self, target: Option<&str>, id: u32) -> Option<PanelRef> {
+        if let Self::Grid(_) = self {
+            return (id == PanelRef::ONLY.id()).then_some(PanelRef::ONLY);
+        }
+        let mut first = 0;
+        for of_scene in self.targets() {
+            let is_it = target.is_none_or(|name| is_named(of_scene, name));
+            let index = of_scene.panels.iter().position(|panel| is_it && panel.id == id);
+            if let Some(index) = index {
+                return Some(PanelRef::new(first + index, id));
+            }
+            first += of_scene.panels.len();
+        }
+        None
+    }
+
+    /// Whether the labels of a view are those of the target: tags tell them, or that the board is seen
+    /// whole.
+    pub fn is_sure_of(&self, view: &View) -> bool {
+        if let Self::Grid(grid) = self {
+            let whole = grid.size.map(|[rows, cols]| rows as usize * cols as usize);
+            return whole.is_some_and(|count| view.corner_count() >= count);
+        }
+        let mut first = 0;
+        self.targets().iter().all(|target| {
+            let of_target = first..first + target.panels.len();
+            first = of_target.end;
+            let seen = view.sightings.iter().filter(|s| of_target.contains(&s.panel.index()));
+            let seen: usize = seen.map(|sighting| sighting.observations.len()).sum();
+            let is_tagged = target.panels.iter().all(|panel| !panel.tags.is_empty());
+            let is_absent = seen == 0 && self.targets().len() > 1;
+            let whole: usize = target.panels.iter().map(|panel| panel.corners.len()).sum();
+            is_tagged || is_absent || seen >= whole
+        })
+    }
+
+    /// Whether it is known but for a [symmetry](Self::label_symmetries) which corner of a board is which: always of
+    /// targets; of an untagged board whose rows and columns are given, where the view reaches from its first to its last.
+    pub fn labels_are_of_board(&self, view: &View) -> bool {
+        let Self::Grid(grid) = self else { return true };
+        view.sightings.iter().all(|sighting| {
+            let labels = sighting.observations.iter().map(|seen| (seen.row, seen.col));
+            grid.is_spanned_by(&labels.collect())
+        })
+    }
+
+    /// Whether its panels are boards that lie about, each for itself.
+    pub fn is_loose(&self) -> bool {
+        self.targets().iter().any(|target| target.is_loose())
+    }
+
+    /// Id of a panel; `None` on an untagged board.
+    pub(super) fn panel_id(&self, panel: PanelRef) -> Option<u32> {
+        match self {
+            Self::Grid(_) => None,
+            Self::Target(_) | Self::Scene(_) => Some(panel.id()),
+        }
+    }
+
+    /// What a detection shows of the panels, or the panel that is wrong in it and why; `identities` are those of the targets.
+    pub(super) fn sightings(
+        &self,
+        detection: &Detection,
+        identities: &[TargetIdentity],
+    ) -> Result<Vec<Sighting>, (Option<u32>, String)> {
+        match self {
+            Self::Grid(board) => {
+                let of_kind = detection.grids.iter().filter(|grid| grid.kind == board.kind);
+                let Some(grid) = of_kind.max_by_key(|grid| grid.corners.len()) else {
+                    return match detection.grids.first() {
+                        Some(_) => Err((None, OTHER_KIND.to_owned())),
+                        None => Ok(Vec::new()),
+                    };
+                };
+                let check = board.check_target(detection.target_of(grid));
+                check.and_then(|()| board.check(grid)).map_err(|problem| (None, problem))?;
+                let at = |row, col| board.place(row, col);
+                Ok(vec![Sighting { panel: PanelRef::ONLY, observations: observations(grid, at) }])
+            }
+            Self::Target(_) | Self::Scene(_) => {
+                let grids = detection.grids.iter();
+                let found = grids.filter_map(|grid| {
+                    let seen = detection.target_of(grid);
+                    let index = self.target_of(grid, seen, identities);
+                    let on_it = |index: Option<usize>| match index {
+                        Some(index) => self.on_target(index, grid),
+                        None => Ok(None),
+                    };
+                    index.and_then(on_it).map_err(|problem| (grid.panel, problem)).transpose()
+                });
+                found.collect()
+            }
+        }
+    }
+}
+
+impl Reference<'_> {
+    /// Compares the labels of a grid of a detection with what is on the target: its identity, panel, corners and tags.
+    ///
+    /// # Errors
+    /// A sentence that says what is not on it.
+    pub fn check_labels(&self, detection: &Detection, grid: &Grid) -> Result<(), String> {
+        let identities = self.identities();
+        match self.target_of(grid, detection.target_of(grid), &identities)? {
+            Some(index) => self.on_target(index, grid).map(drop),
+            None => Ok(()),
+        }
+    }
+
+    /// Index of the target that a grid belongs to: by the identity of the target that it was labelled with, where the
+    /// detection has that, else by its name. `None` where it is none of these targets.
+    fn target_of(
+        &self,
+        grid: &Grid,
+        seen: Option<&TargetIdentity>,
+        identities: &[TargetIdentity],
+    ) -> Result<Option<usize>, String> {
+        let targets = self.targets();
+        let Some(seen) = seen else {
+            return match &grid.target {
+                Some(name) => Ok(targets.iter().position(|target| is_named(target, name))),
+                None if targets.len() == 1 => Ok(Some(0)),
+                None if grid.panel.is_none() => Ok(None),
+                None => Err(OF_ONE_TARGET.to_owned()),
+            };
+        };
+        if let Some(index) = identities.iter().position(|own| own.is_same_print(seen)) {
+            return Ok(Some(index));
+        }
+        // Other targets in the same image are of no concern, unless they may be mistaken for these.
+        let confusable = identities.iter().find(|own| own.is_confusable(seen));
+        match confusable.or_else(|| identities.first().filter(|_| grid.target.is_none())) {
+            Some(own) => Err(format!(
+                "it was detected as {seen}, but the target given is {own}: {ASSUME_TARGET}"
+            )),
+            None => Ok(None),
+        }
+    }
+
+    /// The corners of a grid on the panel of a target; `None` where the grid was not labelled.
+    fn on_target(&self, index: usize, grid: &Grid) -> Result<Option<Sighting>, String> {
+        let targets = self.targets();
+        let first = targets[..index].iter().map(|target| target.panels.len()).sum();
+        on_target(&targets[index], first, grid)
+    }
+}
+
+/// Whether a target is that of a name: measured or with refined panels it is still the same.
+fn is_named(target: &Target, name: &str) -> bool {
+    let of_print = |name: &str| -> String {
+        let mut name = name;
+        while let Some(shorter) =
+            name.strip_suffix("-measured").or_else(|| name.strip_suffix("-refined"))
+        {
+            name = shorter;
+        }
+        name.to_owned()
+    };
+    of_print(&target.name) == of_print(name)
+}
+
+/// The corners of a grid on its panel, which are counted from `first` on; `None` where it was not labelled and the
+/// target has several.
+fn on_target(target: &Target, first: usize, grid: &Grid) -> Result<Option<Sighting>, String> {
+    let index = match grid.panel {
+        Some(id) => target.panels.iter().position(|panel| panel.id == id),
+        None if target.panels.len() == 1 && target.panels[0].tags.is_empty() => Some(0),
+        None => return Ok(None),
+    };
+    let Some(index) = index else {
+        let id = grid.panel.unwrap_or_default();
+        return Err(format!("panel {id} is not on the target {}{OTHER_TARGET}", target.name));
+    };
+    let panel = &target.panels[index];
+    check_panel(target, panel, grid).map_err(|problem| problem + OTHER_TARGET)?;
+    let from_target = panel.pose.to_pose().inverse();
+    let places: BTreeMap<(i32, i32), DVec3> = panel
+        .corners
+        .iter()
+        .map(|corner| {
+            let place = from_target.apply(corner.target_mm) + corner.offset_mm();
+            ((corner.row, corner.col), place)
+        })
+        .collect();
+    let mut found = Vec::new();
+    for corner in &grid.corners {
+        match places.get(&(corner.row, corner.col)) {
+            Some(&place) => found.push((corner.row, corner.col, place)),
+            None if grid.panel.is_none() && corner.id.is_none() => {
+                return Err(CUT_OFF.to_owned());
+            }
+            None => {
+                let swapped = places.contains_key(&(corner.col, corner.row));
+                let hint = if swapped { " (rows and columns exchanged?)" } else { "" };
+                return Err(format!(
+                    "{} has no corner in row {}, column {}{hint}{OTHER_TARGET}",
+                    target.name, corner.row, corner.col
+                ));
+            }
+        }
+    }
+    let at = |row, col| places[&(row, col)];
+    let panel = PanelRef::new(first + index, panel.id);
+    Ok(Some(Sighting { panel, observations: observations(grid, at) }))
+}
+
+/// Compares what a detection says of a panel with the target.
+fn check_panel(target: &Target, panel: &Panel, grid: &Grid) -> Result<(), String> {
+    if panel.kind != grid.kind {
+        return Err(format!("panel {} has another tiling on {}", panel.id, target.name));
+    }
+    for corner in &grid.corners {
+        let Some(id) = corner.id else { continue };
+        let of_target = panel.corners.iter().find(|of_target| of_target.id == id);
+        if let Some(of_target) = of_target
+            && (of_target.row, of_target.col) != (corner.row, corner.col)
+        {
+            let swapped = (of_target.col, of_target.row) == (corner.row, corner.col);
+            return Err(format!(
+                "corner {id} is in row {}, column {}, but on {} in row {}, column {}{}",
+                corner.row,
+                corner.col,
+                target.name,
+                of_target.row,
+                of_target.col,
+                if swapped { " (rows and columns exchanged?)" } else { "" }
+            ));
+        }
+        if of_target.is_none() {
+            return Err(format!("corner {id} is not on {}", target.name));
+        }
+    }
+    for tag in &grid.tags {
+        let same = panel.tags.iter().any(|t| (t.id, t.row, t.col) == (tag.id, tag.row, tag.col));
+        let family = target.family.as_ref().map(|family| &*family.of_tiling(panel.kind).name);
+        if !same || family != Some(tag.family.as_str()) {
+            return Err(format!(
+                "tag {} of {} in row {}, column {} is not on {}",
+                tag.id, tag.family, tag.row, tag.col, target.name
+            ));
+        }
+    }
+    Ok(())
+}
+
+fn observations(grid: &Grid, at: impl Fn(i32, i32) -> DVec3) -> Vec<Observation> {
+    let seen = grid.corners.iter().map(|corner| Observation {
+        row: corner.row,
+        col: corner.col,
+        panel_mm: at(corner.row, corner.col),
+        pixel: corner.position(),
+        cov: corner.cov,
+    });
+    seen.collect()
+}

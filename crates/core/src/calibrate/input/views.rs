@@ -1,0 +1,228 @@
+//! From named detections to views: sizes, copies of one picture, wrong labels and mirrored pictures.
+
+use std::collections::hash_map::Entry;
+use std::collections::{BTreeMap, HashMap};
+
+use glam::DVec2;
+
+use super::observation::{LEAST_CORNERS, Sighting, View};
+use super::reference::Reference;
+use crate::calibrate::error::CalibrationError;
+use crate::calibrate::excluded::{Excluded, Reason};
+use crate::detect::Detection;
+use crate::targets::TargetIdentity;
+
+/// Corners of a mirrored picture turn the wrong way round, but for wrong ones: by so much, at least, of all of
+/// them more do than do not.
+const MIRRORED_MOST: f64 = 0.5;
+
+/// And by so many deviations: places anywhere turn either way, of a few all may turn the wrong one. By chance
+/// as many do once in a thousand pictures that show nothing else.
+const MIRRORED_SURE: f64 = 3.09;
+
+/// The views of detections.
+#[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
+pub struct Shown {
+    /// One for each picture, or for each board in it where several lie about.
+    pub views: Vec<View>,
+    /// Positions of the detections that show nothing.
+    pub empty: Vec<usize>,
+    /// Positions of the detections that do not belong to the target, or are of the same picture as another, and what is
+    /// wrong with them.
+    pub left_out: Vec<(usize, Excluded)>,
+}
+
+/// The views of all detections, each with its name; an error where most of those that show
+/// something do not belong to the target.
+///
+/// ```
+/// use deltille_core::calibrate::{Reference, views};
+/// use deltille_core::camera::{Camera, Pose};
+/// use deltille_core::detect::Detector;
+/// use deltille_core::synth::{Light, scene_of_target};
+/// use deltille_core::targets::{BoardSpec, Target};
+/// use glam::DVec3;
+///
+/// let board = Target::new("desk", BoardSpec::deltille(4, 5, 20.0))?;
+/// let eye = DVec3::new(50.0, -60.0, 200.0);
+/// let pose = Pose::looking_at(eye, board.panels[0].middle_mm(), DVec3::Y);
+/// let scene = scene_of_target(&board, board.family()?.as_ref())?;
+/// let image = scene.render(&Camera::pinhole(640, 480, 1.0), &pose, &Light::default());
+/// let found = Detector::new(&board)?.detect(&image.map(|grey| (255.0 * grey) as u8), "desk.png");
+/// let shown = views(&[("desk".to_owned(), found)], &Reference::Target(&board))?;
+/// assert_eq!(shown.views[0].corner_count(), 20);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+///
+/// # Errors
+/// Where pictures have different sizes, or most that show something are not of the target.
+pub fn views(
+    detections: &[(String, Detection)],
+    reference: &Reference,
+) -> Result<Shown, CalibrationError> {
+    let mut views = Vec::new();
+    let mut empty = Vec::new();
+    let mut left_out = Vec::new();
+    let mut first_wrong = None;
+    let mut wrong = 0;
+    let mut copies = 0;
+    let mut seen = HashMap::new();
+    let identities = reference.identities();
+    for (index, (name, detection)) in detections.iter().enumerate() {
+        let size_px = [detection.width, detection.height];
+        if let Some((first, other)) = detections.first()
+            && size_px != [other.width, other.height]
+        {
+            return Err(CalibrationError::MixedSizes {
+                first: first.clone(),
+                first_px: [other.width, other.height],
+                other: name.clone(),
+                other_px: size_px,
+            });
+        }
+        let excluded = |panel, reason| Excluded {
+            camera: None,
+            view: name.clone(),
+            image: detection.image.clone(),
+            panel,
+            corners: detection.grids.iter().map(|grid| grid.corners.len()).sum(),
+            reason,
+        };
+        if let Some(of) = copied(detection, name, &mut seen) {
+            left_out.push((index, excluded(None, Reason::Copy { of })));
+            copies += 1;
+            continue;
+        }
+        match sightings(detection, reference, &identities) {
+            Err((panel, problem)) => {
+                left_out.push((index, excluded(panel, Reason::Foreign(problem.clone()))));
+                wrong += 1;
+                let view = name.clone();
+                first_wrong.get_or_insert(CalibrationError::WrongDetection { view, problem });
+            }
+            Ok(sightings) if sightings.is_empty() => empty.push(index),
+            Ok(sightings) if reference.is_loose() => {
+                views.extend(sightings.into_iter().map(|sighting| View {
+                    name: format!("{name} board {}", sighting.panel),
+                    image: detection.image.clone(),
+                    size_px,
+                    sightings: vec![sighting],
+                }));
+            }
+            Ok(sightings) => {
+                let (name, image) = (name.clone(), detection.image.clone());
+                views.push(View { name, image, size_px, sightings });
+            }
+        }
+    }
+    let all = detections.len() - empty.len() - copies;
+    match first_wrong {
+        Some(first) if 2 * wrong > all => Err(match all {
+            1 => first,
+            _ => CalibrationError::MostWrong { first: Box::new(first), wrong, all },
+        }),
+        _ => Ok(Shown { views, empty, left_out }),
+    }
+}
+
+/// The name of the detection before, if any, that has the same corners to the last bit: of the same picture.
+fn copied<'a>(
+    detection: &'a Detection,
+    name: &'a str,
+    seen: &mut HashMap<[u64; 2], (&'a str, &'a Detection)>,
+) -> Option<String> {
+    let first = detection.grids.iter().find_map(|grid| grid.corners.first())?;
+    match seen.entry([first.x, first.y].map(f64::to_bits)) {
+        Entry::Vacant(place) => {
+            place.insert((name, detection));
+            None
+        }
+        Entry::Occupied(before) => {
+            let (of, before) = *before.get();
+            (before.grids == detection.grids).then(|| of.to_owned())
+        }
+    }
+}
+
+/// What a detection shows of the panels, or the panel that is wrong in it and why.
+fn sightings(
+    detection: &Detection,
+    reference: &Reference,
+    identities: &[TargetIdentity],
+) -> Result<Vec<Sighting>, (Option<u32>, String)> {
+    let mut sightings = reference.sightings(detection, identities)?;
+    sightings.retain(|sighting| sighting.observations.len() >= LEAST_CORNERS);
+    match (is_mirrored(&sightings), sightings.as_slice()) {
+        (true, [only]) => Err((reference.panel_id(only.panel), Reason::Mirrored.to_string())),
+        (true, _) => Err((None, Reason::Mirrored.to_string())),
+        (false, _) => Ok(sightings),
+    }
+}
+
+/// Whether the corners with two neighbours are mirrored, nearly all of the picture: of one in which two fifths
+/// of the corners are anywhere two fifths of these are mirrored too, and a panel of a few may be by chance.
+fn is_mirrored(sightings: &[Sighting]) -> bool {
+    let turns: Vec<f64> = sightings.iter().flat_map(turns).collect();
+    let (count, more) = (turns.len() as f64, turns.iter().sum::<f64>());
+    more > MIRRORED_MOST * count && more > MIRRORED_SURE * count.sqrt()
+}
+
+/// Which way corners turn to their neighbours in column and row: 1 where they are mirrored. In a picture, y
+/// down, rows and columns that run as on the print turn clockwise.
+fn turns(sighting: &Sighting) -> Vec<f64> {
+    let places: BTreeMap<(i32, i32), DVec2> =
+        sighting.observations.iter().map(|o| ((o.row, o.col), o.pixel)).collect();
+    let turn = |(&(row, col), &here): (&(i32, i32), &DVec2)| {
+        let (right, up) = (places.get(&(row, col + 1))?, places.get(&(row + 1, col))?);
+        Some((right - here).perp_dot(up - here).signum())
+    };
+    places.iter().filter_map(turn).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use rand::{Rng, SeedableRng};
+
+    use super::*;
+    use crate::calibrate::input::observation::Observation;
+    use crate::calibrate::input::panel::PanelRef;
+    use glam::DVec3;
+
+    /// A board of `rows` × 8 corners from above, of which a part are anywhere in the picture.
+    fn board(rows: i32, part_anywhere: f64, is_flipped: bool, seed: u64) -> Sighting {
+        let mut random = rand_chacha::ChaCha8Rng::seed_from_u64(seed);
+        let places = (0..rows).flat_map(|row| (0..8).map(move |col| (row, col)));
+        let observations = places.map(|(row, col)| {
+            let (x, y) = (100.0 * f64::from(col), 800.0 - 100.0 * f64::from(row));
+
+            let pixel = match random.random_bool(part_anywhere) {
+                true => {
+                    DVec2::new(random.random_range(0.0..800.0), random.random_range(0.0..800.0))
+                }
+                false if is_flipped => DVec2::new(800.0 - x, y),
+                false => DVec2::new(x, y),
+            };
+            Observation { row, col, panel_mm: DVec3::new(x, -y, 0.0), pixel, cov: None }
+        });
+        Sighting { panel: PanelRef::new(0, 0), observations: observations.collect() }
+    }
+
+    #[test]
+    fn a_mirror_is_told_from_wrong_places() {
+        for seed in 0..100 {
+            assert!(!is_mirrored(&[board(6, 0.4, false, seed)]), "seed {seed}");
+            assert!(is_mirrored(&[board(6, 0.05, true, seed)]), "seed {seed}");
+        }
+    }
+
+    /// A panel of a few corners, of which most are wrong, beside one that is not mirrored, and by itself.
+    #[test]
+    fn a_few_wrong_corners_are_no_mirror() {
+        for seed in 0..100 {
+            let few = board(2, 0.8, false, seed);
+            assert!(!is_mirrored(&[few.clone(), board(6, 0.2, false, seed)]), "seed {seed}");
+            assert!(!is_mirrored(&[few]), "seed {seed}");
+        }
+    }
+}

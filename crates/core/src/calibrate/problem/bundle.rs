@@ -1,0 +1,168 @@
+//! The problem of a bundle adjustment: all unknowns and observations, residuals, and parts of it.
+
+use glam::{DVec2, DVec3};
+
+use super::corner_map::CornerMap;
+use super::shape::Shape;
+use super::unknowns::{Block, CameraUnknowns, PanelUnknowns, TargetUnknowns};
+use crate::calibrate::input::observation::{LEAST_CORNERS, Observation};
+use crate::calibrate::input::panel::PanelRef;
+use crate::calibrate::stop::Stop;
+use crate::camera::Pose;
+
+/// Unknowns and observations. The pose of every frame is unknown.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(in crate::calibrate) struct Problem {
+    /// Cameras.
+    pub cameras: Vec<CameraUnknowns>,
+    /// rig_from_scene, for each moment at which pictures were taken.
+    pub frames: Vec<Pose>,
+    /// Targets.
+    pub targets: Vec<TargetUnknowns>,
+    /// Panels of all targets.
+    pub panels: Vec<PanelUnknowns>,
+    /// Observations.
+    pub blocks: Vec<Block>,
+    /// How the panels' sheets differ from their plan, where that is unknown too; of one panel.
+    pub shape: Option<Shape>,
+    /// How the corners differ from their plan, each by itself, where that is unknown.
+    pub map: Option<CornerMap>,
+    /// Whether the work is to end.
+    pub stop: Stop,
+}
+
+impl Problem {
+    /// Where the target of a panel is in the scene.
+    #[inline]
+    pub fn scene_from_target(&self, panel: PanelRef) -> Pose {
+        self.targets[self.panels[panel.index()].target].scene_from_target
+    }
+
+    /// Where a panel is in the scene.
+    pub fn scene_from_panel(&self, panel: PanelRef) -> Pose {
+        self.scene_from_target(panel).after(&self.panels[panel.index()].target_from_panel)
+    }
+
+    /// Where all panels are in the scene.
+    pub fn panel_places(&self) -> impl Iterator<Item = Pose> {
+        self.panels.iter().map(|panel| {
+            self.targets[panel.target].scene_from_target.after(&panel.target_from_panel)
+        })
+    }
+
+    /// Where a corner is in the frame of its panel, mm.
+    #[inline]
+    pub fn panel_point(&self, block: &Block, seen: &Observation) -> DVec3 {
+        let bent = self.shape.map_or(DVec3::ZERO, |shape| shape.offset(seen.panel_mm));
+        let moved = self.map.as_ref().map_or(DVec3::ZERO, |map| map.offset(block.panel, seen));
+        seen.panel_mm + bent + moved
+    }
+
+    /// Where a corner is in the frame of the camera that saw it, mm.
+    #[inline]
+    pub fn camera_point(&self, block: &Block, observation: &Observation) -> DVec3 {
+        let at = self.panel_point(block, observation);
+        let target = self.panels[block.panel.index()].target_from_panel.apply(at);
+        let scene = self.scene_from_target(block.panel).apply(target);
+        let rig = self.frames[block.frame].apply(scene);
+        self.cameras[block.camera].camera_from_rig.apply(rig)
+    }
+
+    /// Seen less predicted positions of a block's corners, px; `None` where one is out of the
+    /// model's reach.
+    pub fn residuals(&self, block: &Block) -> Option<Vec<DVec2>> {
+        block.observations.iter().map(|seen| self.residual(block, seen)).collect()
+    }
+
+    /// Seen less predicted position of a corner, px; `None` where it is out of the model's reach.
+    pub(in crate::calibrate) fn residual(
+        &self,
+        block: &Block,
+        seen: &Observation,
+    ) -> Option<DVec2> {
+        let camera = &self.cameras[block.camera].camera;
+        let at = camera.project_with_derivatives(self.camera_point(block, seen))?;
+        Some(seen.pixel - at.pixel)
+    }
+
+    /// How many corners there are in all.
+    pub fn count(&self) -> usize {
+        self.blocks.iter().map(|block| block.observations.len()).sum()
+    }
+
+    /// The same with the frames for which `keep` holds, and their observations.
+    pub(in crate::calibrate) fn with_frames(&self, keep: impl Fn(usize) -> bool) -> Problem {
+        let mut places = vec![None; self.frames.len()];
+        let mut frames = Vec::new();
+        for (index, pose) in self.frames.iter().enumerate().filter(|&(index, _)| keep(index)) {
+            places[index] = Some(frames.len());
+            frames.push(*pose);
+        }
+        let blocks = self
+            .blocks
+            .iter()
+            .filter_map(|block| Some(Block { frame: places[block.frame]?, ..block.clone() }));
+        Problem { frames, blocks: blocks.collect(), ..self.unknowns() }
+    }
+}
+
+/// Some of a problem's observations, and the frames that have enough of them to be adjusted.
+pub(in crate::calibrate) struct Part {
+    pub problem: Problem,
+    /// Indices of its frames in the whole.
+    frames: Vec<usize>,
+}
+
+impl Problem {
+    /// The same with only the corners for which `kept` holds.
+    pub(in crate::calibrate) fn with_corners(&self, kept: &[Vec<bool>]) -> Problem {
+        let of_block = |(block, kept): (&Block, &Vec<bool>)| {
+            let kept = block.observations.iter().zip(kept).filter(|(_, kept)| **kept);
+            Block { observations: kept.map(|(seen, _)| *seen).collect(), ..*block }
+        };
+        let blocks = self.blocks.iter().zip(kept).map(of_block).collect();
+        Problem { blocks, ..self.unknowns() }
+    }
+
+    /// The blocks for which `kept` holds, and the frames that still have as many corners as a panel needs.
+    pub(in crate::calibrate) fn part(&self, kept: impl Fn(usize, &Block) -> bool) -> Part {
+        let kept: Vec<bool> =
+            self.blocks.iter().enumerate().map(|(index, block)| kept(index, block)).collect();
+        let mut corners = vec![0; self.frames.len()];
+        for (block, _) in self.blocks.iter().zip(&kept).filter(|(_, kept)| **kept) {
+            corners[block.frame] += block.observations.len();
+        }
+        let all = |block: &Block, kept: bool| vec![kept; block.observations.len()];
+        let kept: Vec<Vec<bool>> =
+            self.blocks.iter().zip(kept).map(|(block, kept)| all(block, kept)).collect();
+        let has_enough = |frame: usize| corners[frame] >= LEAST_CORNERS;
+        let mut problem = self.with_corners(&kept).with_frames(has_enough);
+        problem.blocks.retain(|block| !block.observations.is_empty());
+        Part { problem, frames: (0..self.frames.len()).filter(|&f| has_enough(f)).collect() }
+    }
+
+    /// Takes over what was found in a part.
+    pub(in crate::calibrate) fn take(&mut self, part: Part) {
+        let Part { problem, frames } = part;
+        for (frame, pose) in frames.into_iter().zip(problem.frames) {
+            self.frames[frame] = pose;
+        }
+        (self.cameras, self.panels) = (problem.cameras, problem.panels);
+        self.targets = problem.targets;
+        (self.shape, self.map) = (problem.shape, problem.map);
+    }
+
+    /// Its observations with what was found in a problem of the same unknowns.
+    pub(in crate::calibrate) fn at(&self, found: &Problem) -> Problem {
+        Problem { blocks: self.blocks.clone(), ..found.unknowns() }
+    }
+
+    /// The same without observations.
+    fn unknowns(&self) -> Problem {
+        let Problem { cameras, frames, targets, panels, shape, map, .. } = self;
+        let (cameras, frames, panels) = (cameras.clone(), frames.clone(), panels.clone());
+        let (targets, map, stop) = (targets.clone(), map.clone(), self.stop.clone());
+        let (blocks, shape) = (Vec::new(), *shape);
+        Problem { cameras, frames, targets, panels, blocks, shape, map, stop }
+    }
+}

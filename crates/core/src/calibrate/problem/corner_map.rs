@@ -1,0 +1,133 @@
+//! Offsets of single corners from their places in the plan of the target.
+//!
+//! The prior of an offset is normal, with one standard deviation in the plane of the panels and one
+//! out of it. Both are estimated from the data by maximising the marginal likelihood (empirical
+//! Bayes, MacKay 1992): with γ the number of offsets that the views determine better than the
+//! prior, σ² = Σ offset² / γ.
+
+use std::collections::BTreeMap;
+
+use glam::DVec3;
+use nalgebra::Matrix3;
+
+use super::unknowns::Block;
+use crate::calibrate::input::observation::Observation;
+use crate::calibrate::input::panel::PanelRef;
+use crate::statistics::median;
+
+/// First prior standard deviation, in edges: more than the error of any print.
+const FIRST_PRIOR: f64 = 0.01;
+
+/// Least prior standard deviation, mm: a hundredth of what the best print resolves.
+const LEAST_PRIOR_MM: f64 = 1e-4;
+
+/// A corner of a panel: index of the panel, row, column.
+type Label = (usize, i32, i32);
+
+/// Offsets of corners on their panels.
+#[derive(Clone, Debug, PartialEq)]
+pub(in crate::calibrate) struct CornerMap {
+    index: BTreeMap<Label, usize>,
+    /// The corners, ordered by label.
+    pub corners: Vec<MappedCorner>,
+    /// The offset of each corner from its place in the plan, in the frame of its panel, mm.
+    pub offsets_mm: Vec<DVec3>,
+    /// The prior standard deviation of an offset along x, y and z of the panel, mm.
+    pub prior_mm: DVec3,
+    /// The number of offsets that the views determine, γ; zero before that is known.
+    pub determined: f64,
+}
+
+/// A corner whose place is unknown.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(in crate::calibrate) struct MappedCorner {
+    pub panel: PanelRef,
+    pub row: i32,
+    pub col: i32,
+    /// Its place in the plan, in the frame of its panel, mm.
+    pub panel_mm: DVec3,
+}
+
+impl CornerMap {
+    /// All corners that blocks have observations of, with zero offsets and the first prior.
+    pub fn flat(blocks: &[Block]) -> Self {
+        let mut index = BTreeMap::new();
+        let mut corners: Vec<MappedCorner> = Vec::new();
+        for block in blocks {
+            for &Observation { row, col, panel_mm, .. } in &block.observations {
+                let at = *index.entry((block.panel.index(), row, col)).or_insert(corners.len());
+                if at == corners.len() {
+                    let panel = block.panel;
+                    corners.push(MappedCorner { panel, row, col, panel_mm });
+                }
+            }
+        }
+        // By label.
+        corners.sort_by_key(|corner| (corner.panel, corner.row, corner.col));
+        let labels = corners.iter().map(|corner| (corner.panel.index(), corner.row, corner.col));
+        let index = labels.enumerate().map(|(at, label)| (label, at)).collect();
+        let offsets_mm = vec![DVec3::ZERO; corners.len()];
+        let prior_mm = DVec3::splat(FIRST_PRIOR * nearest_mm(&corners));
+        Self { index, corners, offsets_mm, prior_mm, determined: 0.0 }
+    }
+
+    /// The same map with another prior, mm, and the number of offsets that the views determine.
+    pub fn expecting(self, (prior_mm, determined): (DVec3, f64)) -> Self {
+        Self { prior_mm, determined, ..self }
+    }
+
+    /// The distance of neighbours in a row, mm.
+    pub fn edge_mm(&self) -> f64 {
+        nearest_mm(&self.corners)
+    }
+
+    /// Number of corners.
+    pub fn len(&self) -> usize {
+        self.corners.len()
+    }
+
+    /// For each corner the number of blocks that observe it.
+    pub fn views(&self, blocks: &[Block]) -> Vec<usize> {
+        let mut views = vec![0; self.len()];
+        for block in blocks {
+            block.observations.iter().for_each(|seen| views[self.index(block.panel, seen)] += 1);
+        }
+        views
+    }
+
+    /// The index of a corner, which the map must have.
+    pub fn index(&self, panel: PanelRef, seen: &Observation) -> usize {
+        self.index[&(panel.index(), seen.row, seen.col)]
+    }
+
+    /// The offset of a corner, mm; zero for a corner that the map does not have.
+    pub fn offset(&self, panel: PanelRef, seen: &Observation) -> DVec3 {
+        let index = self.index.get(&(panel.index(), seen.row, seen.col));
+        index.map_or(DVec3::ZERO, |&index| self.offsets_mm[index])
+    }
+
+    /// The prior that maximises the marginal likelihood of the offsets, mm, and the number γ of offsets that
+    /// the views determine; `covariances` and `sigma` are as in [`Self::without_gauge`].
+    pub fn fitted_prior(&self, covariances: &[Matrix3<f64>], sigma: f64) -> (DVec3, f64) {
+        let of_axes = |axes: &[usize]| {
+            let (mut squares, mut determined) = (0.0, 0.0);
+            for (offset, covariance) in self.offsets_mm.iter().zip(covariances) {
+                for &k in axes {
+                    squares += offset[k] * offset[k];
+                    determined += 1.0 - covariance[(k, k)] * (sigma / self.prior_mm[k]).powi(2);
+                }
+            }
+            ((squares / determined.max(1.0)).sqrt().max(LEAST_PRIOR_MM), determined)
+        };
+        let [(plane, in_plane), (out, out_of_plane)] = [of_axes(&[0, 1]), of_axes(&[2])];
+        (DVec3::new(plane, plane, out), in_plane + out_of_plane)
+    }
+}
+
+/// The median distance of a corner to the next in its row, mm; 1 without such pairs.
+fn nearest_mm(corners: &[MappedCorner]) -> f64 {
+    let pairs = corners.iter().zip(corners.iter().skip(1));
+    let in_a_row = pairs.filter(|(a, b)| (a.panel, a.row, a.col + 1) == (b.panel, b.row, b.col));
+    let distances = in_a_row.map(|(a, b)| a.panel_mm.distance(b.panel_mm)).collect();
+    median(distances).unwrap_or(1.0)
+}

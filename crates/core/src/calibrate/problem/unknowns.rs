@@ -1,0 +1,106 @@
+//! Cameras, targets and panels with what of them is unknown, and the observations of a block.
+
+use nalgebra::{Matrix6, Vector6};
+
+use super::roughness::Roughness;
+use crate::calibrate::input::observation::Observation;
+use crate::calibrate::input::panel::PanelRef;
+use crate::calibrate::model::without_gauge;
+use crate::camera::{Camera, Pose};
+
+/// A camera and what of it is unknown.
+#[derive(Clone, Debug, PartialEq)]
+pub(in crate::calibrate) struct CameraUnknowns {
+    /// The camera.
+    pub camera: Camera,
+    /// Which of its parameters are unknown, in the order of [`Camera::parameter_names`].
+    pub free: Vec<bool>,
+    /// Where it is on the rig.
+    pub camera_from_rig: Pose,
+    /// Whether that is unknown; one camera must stay where it is.
+    pub pose_free: bool,
+    /// What is expected of the knots of a spline.
+    pub roughness: Option<Roughness>,
+}
+
+/// A target, whose panels move together.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(in crate::calibrate) struct TargetUnknowns {
+    /// Where it is in the scene.
+    pub scene_from_target: Pose,
+    /// Whether that is unknown; one target must stay where it is.
+    pub pose_free: bool,
+}
+
+/// A panel of a target.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(in crate::calibrate) struct PanelUnknowns {
+    /// Index of its target.
+    pub target: usize,
+    /// Where it is on the target.
+    pub target_from_panel: Pose,
+    /// Whether that is unknown; one panel must stay where it is.
+    pub pose_free: bool,
+    /// What is known of it beforehand.
+    pub prior: Option<Prior>,
+}
+
+/// A pose that was measured before.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(in crate::calibrate) struct Prior {
+    pose: Pose,
+    /// Inverse of the covariance of (ω, τ).
+    information: Matrix6<f64>,
+}
+
+impl Prior {
+    /// A measured pose; `None` where the covariance has no inverse.
+    pub fn new(pose: Pose, covariance: [[f64; 6]; 6]) -> Option<Self> {
+        let covariance = Matrix6::from_fn(|i, j| covariance[i][j]);
+        // Turns and moves have different units: their scale must not look like a lack of rank.
+        let scale = Vector6::from_fn(|i, _| covariance[(i, i)].sqrt().recip());
+        let scaled = Matrix6::from_fn(|i, j| covariance[(i, j)] * scale[i] * scale[j]);
+        let inverse = scaled.cholesky()?.inverse();
+        let information = Matrix6::from_fn(|i, j| inverse[(i, j)] * scale[i] * scale[j]);
+        information.iter().all(|v| v.is_finite()).then_some(Self { pose, information })
+    }
+
+    /// How far a pose is from the measured one, as (ω, τ), and the inverse covariance of that.
+    pub(in crate::calibrate) fn off(&self, pose: &Pose) -> (Vector6<f64>, Matrix6<f64>) {
+        let [turn, moved] = pose.off(&self.pose);
+        let off = Vector6::new(turn.x, turn.y, turn.z, moved.x, moved.y, moved.z);
+        (off, self.information)
+    }
+}
+
+/// What one camera saw of one panel in one frame.
+#[derive(Clone, Debug, PartialEq)]
+pub(in crate::calibrate) struct Block {
+    /// Index of the camera.
+    pub camera: usize,
+    /// Index of the frame.
+    pub frame: usize,
+    /// The panel.
+    pub panel: PanelRef,
+    /// The corners.
+    pub observations: Vec<Observation>,
+}
+
+impl CameraUnknowns {
+    /// A single camera, which is the rig.
+    pub fn alone(camera: Camera, free: Vec<bool>) -> Self {
+        let free = without_gauge(&camera.lens, free);
+        let roughness = Roughness::of(&camera, &free);
+        Self { camera, free, camera_from_rig: Pose::IDENTITY, pose_free: false, roughness }
+    }
+
+    /// Without what is expected of it.
+    pub(in crate::calibrate) fn forget_expected(&mut self) {
+        self.roughness = None;
+    }
+}
+
+impl TargetUnknowns {
+    /// The target that is the scene's frame.
+    pub const SCENE: Self = Self { scene_from_target: Pose::IDENTITY, pose_free: false };
+}

@@ -1,0 +1,169 @@
+//! How far each corner is to be trusted.
+
+use glam::DVec2;
+
+use super::bundle::Problem;
+use super::unknowns::Block;
+use crate::calibrate::input::weights::Weights;
+use crate::statistics::median;
+
+/// The median of a squared distance in the plane whose coordinates have variance 1: 2 ln 2.
+pub(in crate::calibrate) const MEDIAN_OF_CHI_SQUARED_2: f64 = 1.386_294_361_119_890_6;
+
+/// Halvings of the interval in which the common deviation is sought: to 1e-9 of its upper end.
+const HALVINGS: usize = 30;
+
+/// The least deviation that residuals are said to have: far below any corner's, so that exact data
+/// does not divide by zero.
+const LEAST_SIGMA: f64 = 1e-6;
+
+/// A corner is an outlier beyond so many standard deviations: of a million corners with normal
+/// errors four are.
+pub(in crate::calibrate) const OUTLIER_SIGMA: f64 = 5.0;
+
+/// For each corner the lower triangle a, b, c of W, with WᵀW = Σ⁻¹.
+#[derive(Clone, Debug)]
+pub(in crate::calibrate) struct Whitening {
+    pub blocks: Vec<Vec<[f64; 3]>>,
+    /// The common deviation beside the covariances, px; `None` where corners count alike.
+    pub common_px: Option<f64>,
+    /// Standard deviation of a whitened coordinate, by the median.
+    pub sigma: f64,
+}
+
+impl Whitening {
+    /// W r.
+    pub(in crate::calibrate) fn apply([a, b, c]: [f64; 3], DVec2 { x, y }: DVec2) -> DVec2 {
+        DVec2::new(a * x, b * x + c * y)
+    }
+
+    /// Whether a corner is farther off than corners are by chance.
+    pub(in crate::calibrate) fn is_outlier(&self, weight: [f64; 3], residual: DVec2) -> bool {
+        let off = Self::apply(weight, residual);
+        off.x.hypot(off.y) > self.outlier_limit()
+    }
+
+    /// The whitened distance beyond which a corner is an outlier.
+    pub(in crate::calibrate) fn outlier_limit(&self) -> f64 {
+        OUTLIER_SIGMA * self.sigma
+    }
+
+    /// Every corner alike.
+    fn equal(problem: &Problem, residuals: &[Vec<DVec2>]) -> Self {
+        let mut whitening = Self { blocks: alike(problem), common_px: None, sigma: 1.0 };
+        whitening.sigma = whitening.median_sigma(problem, residuals);
+        whitening
+    }
+
+    /// Weights that fit the residuals at hand.
+    pub(in crate::calibrate) fn fit(
+        problem: &Problem,
+        weights: Weights,
+        residuals: &[Vec<DVec2>],
+    ) -> Self {
+        let covariances = match weights {
+            Weights::Equal => None,
+            Weights::Covariance => covariances(problem),
+        };
+        let Some(covariances) = covariances else { return Self::equal(problem, residuals) };
+        let with = |common: f64| {
+            let blocks = triangles(&covariances, common);
+            let mut whitening = Self { blocks, common_px: Some(common), sigma: 1.0 };
+            whitening.sigma = whitening.median_sigma(problem, residuals);
+            whitening
+        };
+        let alone = with(0.0);
+        if alone.sigma <= 1.0 {
+            return alone;
+        }
+        // With the deviation of all residuals as the common one, sigma is below 1.
+        let (mut low, mut high) = (0.0, Self::equal(problem, residuals).sigma);
+        for _ in 0..HALVINGS {
+            let middle = 0.5 * (low + high);
+            *(if with(middle).sigma > 1.0 { &mut low } else { &mut high }) = middle;
+        }
+        with(high)
+    }
+
+    /// The same weights for other corners.
+    pub(in crate::calibrate) fn of(&self, problem: &Problem) -> Self {
+        let covariances = self.common_px.and_then(|common| Some((common, covariances(problem)?)));
+        let blocks = match covariances {
+            Some((common, covariances)) => triangles(&covariances, common),
+            None => alike(problem),
+        };
+        Self { blocks, ..*self }
+    }
+
+    fn median_sigma(&self, problem: &Problem, residuals: &[Vec<DVec2>]) -> f64 {
+        let whitened = self.blocks.iter().flatten().zip(residuals.iter().flatten());
+        let squares = whitened.map(|(&w, &r)| Self::apply(w, r).length_squared());
+        let square = median(squares.collect()).unwrap_or(0.0) / MEDIAN_OF_CHI_SQUARED_2;
+        (square / left_free(problem)).sqrt().max(LEAST_SIGMA)
+    }
+}
+
+/// The part of the residuals' squares that unknowns leave. Where corners are unknown too, few views leave little.
+fn left_free(problem: &Problem) -> f64 {
+    let Some(map) = &problem.map else { return 1.0 };
+    let unknowns = map.determined + 6.0 * problem.frames.len() as f64;
+    (1.0 - unknowns / (2.0 * problem.count().max(1) as f64)).max(LEAST_FREE)
+}
+
+/// Least part of the squares that is taken to be left: two views of a corner leave a quarter.
+const LEAST_FREE: f64 = 0.25;
+
+/// The covariances of all corners, `None` where no corner has one. A corner without one among
+/// others that have one was the hardest to refine: it gets the largest variance of all.
+fn covariances(problem: &Problem) -> Option<Vec<Vec<[f64; 3]>>> {
+    let all = || problem.blocks.iter().flat_map(|block| &block.observations);
+    let largest = all().filter_map(|o| o.cov).map(|[xx, _, yy]| xx.max(yy)).fold(0.0, f64::max);
+    let of = |block: &Block| {
+        block.observations.iter().map(|o| o.cov.unwrap_or([largest, 0.0, largest])).collect()
+    };
+    (largest > 0.0).then(|| problem.blocks.iter().map(of).collect())
+}
+
+/// W of corners that are all as precise.
+fn alike(problem: &Problem) -> Vec<Vec<[f64; 3]>> {
+    problem.blocks.iter().map(|block| vec![[1.0, 0.0, 1.0]; block.observations.len()]).collect()
+}
+
+/// W of covariances with a deviation beside them.
+fn triangles(covariances: &[Vec<[f64; 3]>], common: f64) -> Vec<Vec<[f64; 3]>> {
+    let whiten = |cov: &[f64; 3]| triangle(*cov, common * common);
+    covariances.iter().map(|block| block.iter().map(whiten).collect()).collect()
+}
+
+/// W of a covariance with `common` added to both variances.
+fn triangle([xx, xy, yy]: [f64; 3], common: f64) -> [f64; 3] {
+    // Σ = L Lᵀ with L = [[l, 0], [m, n]], W = L⁻¹.
+    let l = (xx + common).sqrt();
+    let m = xy / l;
+    let n = (yy + common - m * m).sqrt();
+    [1.0 / l, -m / (l * n), 1.0 / n]
+}
+
+/// Residuals (observed minus predicted positions), px, for each block; empty for a block with a
+/// corner that its camera cannot image, which problems with valid initial values do not have.
+pub(in crate::calibrate) fn residuals(problem: &Problem) -> Vec<Vec<DVec2>> {
+    problem.blocks.iter().map(|block| problem.residuals(block).unwrap_or_default()).collect()
+}
+
+/// Whitening with equal weights for all corners, and the standard deviation of their coordinates.
+pub(in crate::calibrate) fn scale(problem: &Problem) -> Whitening {
+    Whitening::fit(problem, Weights::Equal, &residuals(problem))
+}
+
+/// Length of the whitened residual of each corner; infinite where its camera cannot image it.
+pub(in crate::calibrate) fn deviations(problem: &Problem, whitening: &Whitening) -> Vec<Vec<f64>> {
+    let weights = whitening.of(problem).blocks;
+    let of_block = |(block, weights): (&Block, &Vec<[f64; 3]>)| {
+        let off = block.observations.iter().zip(weights).map(|(seen, &w)| {
+            let off = Whitening::apply(w, problem.residual(block, seen)?);
+            Some(off.x.hypot(off.y))
+        });
+        off.map(|off| off.unwrap_or(f64::INFINITY)).collect()
+    };
+    problem.blocks.iter().zip(&weights).map(of_block).collect()
+}

@@ -1,0 +1,175 @@
+//! What errors of the board do to the unknowns that all frames share.
+//!
+//! A corner that is not where the plan has it is so in every frame. The estimate moves, and no scatter between
+//! frames shows that. With R the normal equations between the shared unknowns and the corners' offsets b, the
+//! poses of the frames eliminated,
+//!
+//! ```text
+//!     δs = S⁻¹ R b,    covariance S⁻¹ R Σ_b Rᵀ S⁻¹
+//! ```
+//!
+//! Σ_b has two parts of equal size: offsets of single corners, and the sheet of each panel stretched, sheared,
+//! scaled and bent as a whole.
+
+use glam::DVec3;
+use nalgebra::{DMatrix, DVector};
+use rayon::prelude::*;
+
+use crate::calibrate::equations::block::Local;
+use crate::calibrate::equations::covariances::Covariances;
+use crate::calibrate::equations::frame::OfFrame;
+use crate::calibrate::equations::minimise::Minimum;
+use crate::calibrate::input::loss::Loss;
+use crate::calibrate::problem::corner_map::CornerMap;
+use crate::calibrate::problem::whitening::Whitening;
+
+/// Standard deviation of a corner of a printed board, mm. Office printers stretch a sheet by 0.05 to 0.2 %, by a
+/// different amount across and along the feed: 0.05 to 0.2 mm at 100 mm from the middle. The sheet of the
+/// robot-hand photographs (20 mm edges, 200 mm across) is off by 0.07 mm a coordinate.
+const PRINTED_MM: f64 = 0.1;
+
+/// The same in edges for small boards, which are not made by office printers.
+const PRINTED_EDGES: f64 = 0.005;
+
+/// Frames whose equations are in memory at the same time.
+const FRAMES_AT_A_TIME: usize = 64;
+
+/// The covariance of the shared unknowns from errors of the board; `accuracy_mm` is the standard deviation of a
+/// corner's coordinate, that of a printed board where it is not known. `None` where the corners are unknowns
+/// themselves, or exact.
+pub(in crate::calibrate) fn board_errors(
+    minimum: &Minimum,
+    whitening: &Whitening,
+    loss: Loss,
+    found: &Covariances,
+    accuracy_mm: Option<f64>,
+) -> Option<DMatrix<f64>> {
+    let Minimum { problem, layout, .. } = minimum;
+    if problem.map.is_some() || layout.shared == 0 {
+        return None;
+    }
+    let map = CornerMap::flat(&problem.blocks);
+    let accuracy_mm = accuracy(&map, accuracy_mm)?;
+    let mut problem = problem.clone();
+    let sheets = sheets(&map, &SHEET);
+    let mut across = DMatrix::zeros(layout.shared, 3 * map.len());
+    problem.map = Some(map);
+    let of_frame = |frame: usize| {
+        let blocks = problem.blocks.iter().zip(&whitening.blocks);
+        let blocks = blocks.filter(|(block, _)| block.frame == frame);
+        let locals = blocks.map(|(block, weights)| {
+            Local::of(&problem, layout, block, weights, loss, whitening.sigma)
+        });
+        OfFrame::of(locals.collect::<Option<Vec<Local>>>()?, layout.shared)
+    };
+    let frames: Vec<usize> = (0..problem.frames.len()).collect();
+    for some in frames.chunks(FRAMES_AT_A_TIME) {
+        let some: Vec<_> = some.par_iter().map(|&frame| of_frame(frame)).collect();
+        for frame in some {
+            frame?.add_across(&mut across);
+        }
+    }
+    let change = &found.shared * across;
+    let by_sheets = &change * sheets;
+    let covariance = &change * change.transpose() + &by_sheets * by_sheets.transpose();
+    Some(covariance * accuracy_mm.powi(2))
+}
+
+/// Standard deviation of a corner's coordinate, mm; `None` of an exact board.
+fn accuracy(map: &CornerMap, given_mm: Option<f64>) -> Option<f64> {
+    let printed = || PRINTED_MM.min(PRINTED_EDGES * map.edge_mm());
+    Some(given_mm.unwrap_or_else(printed)).filter(|mm| *mm > 0.0)
+}
+
+/// How the shared unknowns and the offsets of corners, in this order, are off where the corners are found too: columns
+/// whose products with themselves sum to the covariance.
+///
+/// The prior of the offsets is white, and draws a sheet that is distorted as a whole towards its plan where views
+/// do not determine it: with P the part of the prior in the normal equations H, by X a = H⁻¹ P M a, where the columns of M
+/// are ways in which a sheet differs from its plan, one standard deviation of a printed sheet each, and a is how much of
+/// each there is. Of many views that is nothing, of four it is most of what is wrong. The views say of a, with the offsets
+/// b that were found,
+///
+/// ```text
+///     C = (1 + Mᵀ P M − Mᵀ P X)⁻¹,    mean C Mᵀ P b
+/// ```
+///
+/// so that a board that is found to be exact is not taken for a printed sheet.
+pub(in crate::calibrate) fn drawn_to_plan(
+    minimum: &Minimum,
+    whitening: &Whitening,
+    found: &Covariances,
+    accuracy_mm: Option<f64>,
+) -> Option<DMatrix<f64>> {
+    let Minimum { problem, normal, layout, .. } = minimum;
+    let map = problem.map.as_ref()?;
+    let accuracy_mm = accuracy(map, accuracy_mm)?;
+    // A scale is not measured: distances take it up.
+    let sheets = sheets(map, &SHEET[1..]);
+    // P M, of which the normal equations have the square of sigma.
+    let pulls = DMatrix::from_fn(sheets.nrows(), sheets.ncols(), |i, mode| {
+        accuracy_mm * map.prior_mm[i % 3].powi(-2) * sheets[(i, mode)]
+    });
+    let off = pulls.column_iter().map(|pull| {
+        let mut right = DVector::zeros(layout.shared + pull.len());
+        right.rows_mut(layout.shared, pull.len()).copy_from(&(pull * whitening.sigma.powi(2)));
+        normal.solve_without_frames(layout, found, &right)
+    });
+    let off = off.collect::<Option<Vec<_>>>()?;
+    if off.is_empty() {
+        return None;
+    }
+    let off = DMatrix::from_columns(&off);
+    let of_corners = off.rows(layout.shared, sheets.nrows());
+    let said = pulls.tr_mul(&(&sheets * accuracy_mm - of_corners));
+    let precision = DMatrix::identity(off.ncols(), off.ncols()) + (&said + said.transpose()) * 0.5;
+    let covariance = precision.cholesky()?.inverse();
+    let offsets = map.offsets_mm.iter().flat_map(|offset| offset.to_array());
+    let found = DVector::from_iterator(sheets.nrows(), offsets);
+    let mean = &covariance * pulls.tr_mul(&found);
+    let root = (covariance + &mean * mean.transpose()).cholesky()?.l();
+    Some(off * root)
+}
+
+/// Displacements of a sheet as a whole, over the position from its middle: scaled, stretched, sheared, and bent.
+const SHEET: [fn(DVec3) -> DVec3; 6] = [
+    |at| DVec3::new(at.x, at.y, 0.0),
+    |at| DVec3::new(at.x, -at.y, 0.0),
+    |at| DVec3::new(at.y, at.x, 0.0),
+    |at| DVec3::new(0.0, 0.0, at.x * at.x),
+    |at| DVec3::new(0.0, 0.0, at.x * at.y),
+    |at| DVec3::new(0.0, 0.0, at.y * at.y),
+];
+
+/// Offsets of all corners, a column for each way in which the sheet of a panel differs from its plan. Those in the
+/// plane have together a mean square of 1 a coordinate, those out of it likewise.
+fn sheets(map: &CornerMap, fields: &[fn(DVec3) -> DVec3]) -> DMatrix<f64> {
+    let mut columns = Vec::new();
+    let mut first = 0;
+    // Corners are ordered by panel.
+    for of_panel in map.corners.chunk_by(|a, b| a.panel == b.panel) {
+        let count = of_panel.len() as f64;
+        let middle = of_panel.iter().map(|corner| corner.panel_mm).sum::<DVec3>() / count;
+        for field in fields {
+            let moved = of_panel.iter().map(|corner| field(corner.panel_mm - middle));
+            let mut moved: Vec<DVec3> = moved.collect();
+            // A move of the whole sheet is none of its errors.
+            let mean = moved.iter().sum::<DVec3>() / count;
+            moved.iter_mut().for_each(|offset| *offset -= mean);
+            let squares: DVec3 = moved.iter().map(|offset| *offset * *offset).sum();
+            let coordinates = if squares.z > 0.0 { count } else { 2.0 * count };
+            let size = (3.0 * squares.element_sum() / coordinates).sqrt();
+            if size > 0.0 {
+                let mut column = DVector::zeros(3 * map.len());
+                let values = moved.iter().flat_map(|offset| (*offset / size).to_array());
+                values.enumerate().for_each(|(i, value)| column[3 * first + i] = value);
+                columns.push(column);
+            }
+        }
+        first += of_panel.len();
+    }
+    match columns.is_empty() {
+        true => DMatrix::zeros(3 * map.len(), 0),
+        false => DMatrix::from_columns(&columns),
+    }
+}

@@ -1,0 +1,63 @@
+//! An observed covariance that is never below what halves of the views show.
+//!
+//! The scatter of single views averages out what changes slowly, or once: each view differs little from its
+//! neighbours. Two halves of the views, the first and the last, or the odd and the even ones, differ by δ then, and
+//! the camera of all by half of that from that of either. Where δ is significantly larger than the observed covariance
+//! says, δδᵀ/4 is added: the variance of a mean of two, as the two show it.
+
+use nalgebra::{DMatrix, DVector};
+
+use super::state_equations::{Candidate, StateEquations, significance};
+use crate::camera::Camera;
+use crate::statistics::f_chance;
+
+/// Probability that a covariance that is right is raised, for all parameters and both ways to split.
+const SIGNIFICANT: f64 = 0.01;
+
+/// Ways to split the views.
+const WAYS: usize = 2;
+
+/// Least number of views of a half.
+const LEAST_VIEWS: usize = 5;
+
+/// The covariance of a camera's parameters, raised where the halves call for it. `noise` is the one that follows
+/// from noise.
+pub(in crate::calibrate) fn raised(
+    equations: &StateEquations,
+    camera: &Camera,
+    observed: DMatrix<f64>,
+    noise: &DMatrix<f64>,
+) -> DMatrix<f64> {
+    let count = equations.count();
+    let n = observed.nrows();
+    if count < 2 * LEAST_VIEWS || equations.parameter_count() != n {
+        return observed;
+    }
+    let limit = SIGNIFICANT / (WAYS * (n + 1)) as f64;
+    let ways: [&dyn Fn(usize) -> bool; WAYS] = [&|view| 2 * view < count, &|view| view % 2 == 0];
+    // All parameters, each half by itself.
+    let apart = ways.iter().filter_map(|is_first| {
+        let first = equations.some(is_first).fit(&equations.camera())?;
+        let second = equations.some(|view| !is_first(view)).fit(&equations.camera())?;
+        let off: DVector<f64> = first.values() - second.values();
+        // The deviation of a half difference: as observed for all, and as much larger as noise has it for halves.
+        let of_halves = |i: usize| {
+            let half = first.noise_variance(i) + second.noise_variance(i);
+            (observed[(i, i)] * half / noise[(i, i)]).sqrt()
+        };
+        let chance = |i: usize| f_chance((off[i] / of_halves(i)).powi(2), 1.0, (count - 2) as f64);
+        ((0..n).map(chance).fold(1.0, f64::min) < limit).then_some(off)
+    });
+    // The focal lengths alone: halves that show the board differently tell more of them with one lens.
+    let focal = ways.iter().filter(|_| equations.is_focal_free()).filter_map(|is_first| {
+        let mut columns = equations.camera();
+        let weights = (0..count).map(|view| f64::from(u8::from(is_first(view)))).collect();
+        columns.push(equations.weighted(Candidate::Focal, weights));
+        let effect = equations.fit(&columns)?.effect(n, 2.0)?;
+        let focal_px = camera.focal_px.to_array();
+        let off = DVector::from_fn(n, |i, _| focal_px.get(i).map_or(0.0, |px| px * effect.value));
+        (significance(effect) < limit).then_some(off)
+    });
+    let differences: Vec<DVector<f64>> = apart.chain(focal).collect();
+    differences.iter().fold(observed, |sum, off| sum + off * off.transpose() / 4.0)
+}

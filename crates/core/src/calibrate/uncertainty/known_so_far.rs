@@ -1,0 +1,45 @@
+//! What corners say of the first camera and the board, by which views are proposed.
+
+use nalgebra::DMatrix;
+
+use crate::calibrate::adjust::reweighting::Settled;
+use crate::calibrate::equations::covariances::Covariances;
+use crate::calibrate::problem::shape::COUNT as SHAPE_COEFFICIENTS;
+use crate::statistics::median;
+
+/// What corners say of the unknowns of one camera, and of the shape of the board.
+#[derive(Clone, Debug, PartialEq)]
+pub(in crate::calibrate) struct KnownSoFar {
+    /// Inverse covariance of the parameters that were found, then of the shape.
+    pub information: DMatrix<f64>,
+    /// Variance of a coordinate of a corner, px², the median.
+    pub corner_variance_px2: f64,
+}
+
+/// What corners say of the first camera and of the board's shape, all else that is shared taken out.
+pub(in crate::calibrate) fn known_so_far(
+    settled: &Settled,
+    found: &Covariances,
+    variance: f64,
+) -> Option<KnownSoFar> {
+    let Settled { minimum, whitening, .. } = settled;
+    let layout = &minimum.layout;
+    let of_camera = layout.parameters.first()?.iter().map(|&(_, column)| column);
+    let of_shape = layout.shape.into_iter().flat_map(|first| first..first + SHAPE_COEFFICIENTS);
+    let columns: Vec<usize> = of_camera.chain(of_shape).collect();
+    let n = columns.len();
+    let information = match n == layout.shared {
+        true => found.root.inverse.tr_mul(&found.root.inverse),
+        false => {
+            let of = |i: usize, j: usize| found.shared[(columns[i], columns[j])];
+            let scale: Vec<f64> = (0..n).map(|i| of(i, i).sqrt().recip()).collect();
+            let own = DMatrix::from_fn(n, n, |i, j| of(i, j) * scale[i] * scale[j]);
+            let inverse = own.cholesky()?.inverse();
+            DMatrix::from_fn(n, n, |i, j| inverse[(i, j)] * scale[i] * scale[j])
+        }
+    };
+    // W is triangular: the determinant of WᵀW is the square of its diagonal's product.
+    let corners = whitening.blocks.iter().flatten().map(|[a, _, c]| 1.0 / (a * c));
+    let corner_variance_px2 = variance * median(corners.collect())?;
+    Some(KnownSoFar { information: information / variance, corner_variance_px2 })
+}

@@ -1,0 +1,485 @@
+//! What each view says of a camera and of changes that a calibration does not allow for, as linear equations.
+//!
+//! ```text
+//!   rows of a view:    residual = [ camera | candidates | pose ] · unknowns        whitened, weighted by the loss
+//!   Gram matrix:       [ camera | candidates | residual ]ᵀ[ … ], the pose of the view eliminated
+//! ```
+//!
+//! The candidates are what may differ between views (focal length, principal point), what a rolling shutter does
+//! while the board moves, and how the board may be stretched and bent. With these matrices any combination of
+//! columns is fitted by one Gauss–Newton step (a score test), without another bundle adjustment.
+
+use std::collections::BTreeSet;
+
+use glam::{DMat3, DVec3};
+use nalgebra::{DMatrix, DVector};
+
+use super::projection::by_motion;
+use crate::calibrate::input::loss::Loss;
+use crate::calibrate::input::observation::LEAST_CORNERS;
+use crate::calibrate::problem::bundle::Problem;
+use crate::calibrate::problem::whitening::Whitening;
+use crate::camera::Lens;
+use crate::statistics::f_chance;
+
+/// Columns beside those of the camera.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(in crate::calibrate) enum Candidate {
+    /// Relative change of both focal lengths.
+    Focal,
+    /// Change of the principal point in x, px.
+    CentreX,
+    /// Change of the principal point in y, px.
+    CentreY,
+    /// Displacement of the board along x of the camera while the shutter passes the image, mm.
+    ShutterX,
+    /// The same along y.
+    ShutterY,
+    /// The same along z.
+    ShutterZ,
+    /// Stretch of the board: x longer and y shorter by this part.
+    Stretch,
+    /// Shear of the board, by this part.
+    Shear,
+    /// Bend of the board along x, mm at a half diagonal.
+    BendX,
+    /// Twist of the board.
+    Twist,
+    /// Bend of the board along y.
+    BendY,
+}
+
+const CANDIDATES: usize = 11;
+
+impl Candidate {
+    /// What of a camera may change.
+    const CAMERA: [Self; 3] = [Self::Focal, Self::CentreX, Self::CentreY];
+
+    /// Displacements while the shutter passes the image.
+    pub(in crate::calibrate) const SHUTTER: [Self; 3] =
+        [Self::ShutterX, Self::ShutterY, Self::ShutterZ];
+
+    /// How a board may differ from its description.
+    pub(in crate::calibrate) const SHEET: [Self; 5] =
+        [Self::Stretch, Self::Shear, Self::BendX, Self::Twist, Self::BendY];
+}
+
+/// What a view says.
+#[derive(Clone, Debug, PartialEq)]
+pub(in crate::calibrate) struct ViewEquations {
+    /// Index of its frame.
+    pub frame: usize,
+    /// Gram matrix of the camera's columns, the candidates and the residual.
+    gram: DMatrix<f64>,
+    /// How many coordinates there are, less the pose.
+    pub freedom: f64,
+    /// How many px a whitened coordinate is worth.
+    px: f64,
+    /// Root mean square of how a pixel moves with the board, px/mm, along x, y and z.
+    pub px_per_mm: f64,
+    /// Mean squared sine of the angle between the line of sight and the normal of the board.
+    pub obliquity: f64,
+    /// Mean logarithm of the distance.
+    pub log_distance: f64,
+}
+
+/// What the views of a camera say, in their order.
+#[derive(Clone, Debug, PartialEq)]
+pub(in crate::calibrate) struct StateEquations {
+    pub views: Vec<ViewEquations>,
+    /// The parameters of the camera that have columns, by index.
+    free: Vec<usize>,
+    /// Whether all corners are those of one panel.
+    pub is_of_one_panel: bool,
+}
+
+/// A column with a weight for each view.
+pub(in crate::calibrate) struct Column {
+    index: usize,
+    weights: Option<Vec<f64>>,
+}
+
+/// A least squares fit of some columns to all views.
+pub(in crate::calibrate) struct Fit {
+    beta: DVector<f64>,
+    inverse: DMatrix<f64>,
+    parts: Vec<(DMatrix<f64>, DVector<f64>)>,
+    whole: DMatrix<f64>,
+    right: DVector<f64>,
+    /// The sum of squares that is left, and its degrees of freedom.
+    pub left: f64,
+    pub freedom: f64,
+}
+
+/// An unknown with its deviation, as the views agree with each other.
+#[derive(Clone, Copy, Debug)]
+pub(in crate::calibrate) struct Effect {
+    pub value: f64,
+    pub sd: f64,
+    /// Degrees of freedom of the deviation.
+    pub freedom: f64,
+}
+
+/// How often noise makes as much of an effect.
+pub(in crate::calibrate) fn significance(effect: Effect) -> f64 {
+    match effect.freedom >= 1.0 {
+        true => f_chance((effect.value / effect.sd).powi(2), 1.0, effect.freedom),
+        false => 1.0,
+    }
+}
+
+impl StateEquations {
+    /// What the views of a camera say at an estimate; `None` where nothing of it was found.
+    pub(in crate::calibrate) fn of(
+        problem: &Problem,
+        whitening: &Whitening,
+        loss: Loss,
+        camera: usize,
+        order: &[usize],
+    ) -> Option<Self> {
+        let unknowns = &problem.cameras[camera];
+        let free: Vec<usize> = (0..unknowns.free.len()).filter(|&i| unknowns.free[i]).collect();
+        if free.is_empty() {
+            return None;
+        }
+        // A spline is rigid here: its knots are known far better from all views than the differences of two groups.
+        let free = if matches!(unknowns.camera.lens, Lens::Spline(_)) { Vec::new() } else { free };
+        let of_camera = || problem.blocks.iter().filter(|block| block.camera == camera);
+        let panels: BTreeSet<usize> = of_camera().map(|block| block.panel.index()).collect();
+        let places = || of_camera().flat_map(|block| &block.observations).map(|seen| seen.panel_mm);
+        let middle = places().sum::<DVec3>() / places().count().max(1) as f64;
+        let reach = places().map(|at| at.distance(middle)).fold(f64::MIN_POSITIVE, f64::max);
+        let equations = Equations { problem, whitening, loss, camera, free, middle, reach };
+        let seen: BTreeSet<usize> = of_camera().map(|block| block.frame).collect();
+        let views = order.iter().copied().filter(|frame| seen.contains(frame));
+        let views = views.filter_map(|frame| equations.of_view(frame)).collect();
+        Some(Self { views, free: equations.free, is_of_one_panel: panels.len() == 1 })
+    }
+
+    /// The same of some of the views only, by index.
+    pub(in crate::calibrate) fn some(&self, is_kept: impl Fn(usize) -> bool) -> Self {
+        let views = self.views.iter().enumerate().filter(|&(index, _)| is_kept(index));
+        let views = views.map(|(_, view)| view.clone()).collect();
+        Self { views, free: self.free.clone(), ..*self }
+    }
+
+    /// How many views there are.
+    pub(in crate::calibrate) fn count(&self) -> usize {
+        self.views.len()
+    }
+
+    /// How many unknowns the camera has.
+    pub(super) fn parameter_count(&self) -> usize {
+        self.free.len()
+    }
+
+    /// Whether the first two of them are the focal lengths.
+    pub(super) fn is_focal_free(&self) -> bool {
+        self.free.starts_with(&[0, 1])
+    }
+
+    /// By how much a parameter changes in a fit whose first columns are those of the camera, px; of a rigid camera the
+    /// candidate in its place, whose unit is so many px.
+    pub(in crate::calibrate) fn change_px(
+        &self,
+        fit: &Fit,
+        parameter: usize,
+        (candidate, px): (Candidate, f64),
+    ) -> f64 {
+        if self.free.is_empty() {
+            let column = Candidate::CAMERA.iter().position(|&of| of == candidate);
+            return column.map_or(0.0, |column| px * fit.beta[column]);
+        }
+        let column = self.free.iter().position(|&free| free == parameter);
+        column.map_or(0.0, |column| fit.beta[column])
+    }
+
+    /// The columns of the camera.
+    pub(in crate::calibrate) fn camera(&self) -> Vec<Column> {
+        let own = 0..self.free.len();
+        match self.free.len() {
+            0 => Candidate::CAMERA.map(|candidate| self.column(candidate)).into(),
+            _ => own.map(|index| Column { index, weights: None }).collect(),
+        }
+    }
+
+    /// A candidate, the same in all views.
+    pub(in crate::calibrate) fn column(&self, candidate: Candidate) -> Column {
+        Column { index: self.free.len() + candidate as usize, weights: None }
+    }
+
+    /// A candidate times a weight for each view.
+    pub(in crate::calibrate) fn weighted(&self, candidate: Candidate, weights: Vec<f64>) -> Column {
+        Column { weights: Some(weights), ..self.column(candidate) }
+    }
+
+    /// The fit of some columns; `None` where they cannot be told apart.
+    pub(in crate::calibrate) fn fit(&self, columns: &[Column]) -> Option<Fit> {
+        self.fit_with_each(columns, &[])
+    }
+
+    /// The same with candidates that have a value of their own in every view.
+    pub(in crate::calibrate) fn fit_with_each(
+        &self,
+        columns: &[Column],
+        each: &[Candidate],
+    ) -> Option<Fit> {
+        let m = columns.len();
+        let mut parts = Vec::with_capacity(self.views.len());
+        let (mut whole, mut right) = (DMatrix::zeros(m, m), DVector::zeros(m));
+        let (mut left, mut freedom) = (0.0, -(m as f64));
+        for (index, view) in self.views.iter().enumerate() {
+            let gram = eliminated(self.chosen(index, columns, each), each.len())?;
+            let own = gram.view((0, 0), (m, m)).into_owned();
+            let pull = DVector::from_fn(m, |i, _| gram[(i, m)]);
+            whole += &own;
+            right += &pull;
+            left += gram[(m, m)];
+            freedom += view.freedom - each.len() as f64;
+            parts.push((own, pull));
+        }
+        let inverse = inverted(&whole)?;
+        let beta = &inverse * &right;
+        let left = left - beta.dot(&right);
+        Some(Fit { beta, inverse, parts, whole, right, left, freedom })
+    }
+
+    /// The values of candidates in each view of such a fit, and by how much they lower its sum of squares.
+    pub(in crate::calibrate) fn each(
+        &self,
+        columns: &[Column],
+        fit: &Fit,
+        each: &[Candidate],
+    ) -> Option<Vec<(Vec<f64>, f64)>> {
+        let (m, n) = (columns.len(), each.len());
+        let of_view = |index: usize| {
+            let gram = self.chosen(index, columns, each);
+            let own = gram.view((m + 1, m + 1), (n, n)).into_owned();
+            let pull = gram.view((m + 1, m), (n, 1)) - gram.view((m + 1, 0), (n, m)) * &fit.beta;
+            let values = inverted(&own)? * &pull;
+            let squares = values.dot(&pull);
+            Some((values.iter().copied().collect(), squares))
+        };
+        (0..self.views.len()).map(of_view).collect()
+    }
+
+    /// The Gram matrix of a view for some columns, the residual, and candidates.
+    fn chosen(&self, view: usize, columns: &[Column], each: &[Candidate]) -> DMatrix<f64> {
+        let gram = &self.views[view].gram;
+        let residual = gram.nrows() - 1;
+        let of_columns =
+            columns.iter().map(|c| (c.index, c.weights.as_ref().map_or(1.0, |w| w[view])));
+        let of_each = each.iter().map(|&of| (self.free.len() + of as usize, 1.0));
+        let chosen: Vec<(usize, f64)> =
+            of_columns.chain([(residual, 1.0)]).chain(of_each).collect();
+        DMatrix::from_fn(chosen.len(), chosen.len(), |i, j| {
+            chosen[i].1 * chosen[j].1 * gram[(chosen[i].0, chosen[j].0)]
+        })
+    }
+
+    /// How many px a whitened coordinate is worth.
+    pub(in crate::calibrate) fn px(&self) -> f64 {
+        let squares: f64 = self.views.iter().map(|view| view.px * view.px).sum();
+        (squares / self.views.len().max(1) as f64).sqrt()
+    }
+}
+
+impl Fit {
+    /// The unknowns.
+    pub(in crate::calibrate) fn values(&self) -> &DVector<f64> {
+        &self.beta
+    }
+
+    /// The variance of an unknown from noise.
+    pub(super) fn noise_variance(&self, index: usize) -> f64 {
+        self.inverse[(index, index)] * self.variance()
+    }
+
+    /// Variance of a whitened coordinate.
+    pub(in crate::calibrate) fn variance(&self) -> f64 {
+        self.left / self.freedom.max(1.0)
+    }
+
+    /// An unknown with its deviation: the mean of the variances from the delete-one jackknife over views and from
+    /// noise as much larger as views scatter more than it in all directions, and never less than that from noise.
+    ///
+    /// The degrees of freedom of the jackknife are those of Satterthwaite's formula for what the views contribute,
+    /// less `taken`; the mean has twice as many, as the other variance is known from all directions together.
+    pub(in crate::calibrate) fn effect(&self, index: usize, taken: f64) -> Option<Effect> {
+        let count = self.parts.len() as f64;
+        let (mut without, mut shares) = (Vec::with_capacity(self.parts.len()), Vec::new());
+        let along = self.inverse.column(index).into_owned();
+        for (own, pull) in &self.parts {
+            let inverse = inverted(&(&self.whole - own))?;
+            without.push((inverse.row(index) * (&self.right - pull))[(0, 0)]);
+            shares.push(along.dot(&(own * &along)));
+        }
+        let mean = without.iter().sum::<f64>() / count;
+        let squares: f64 = without.iter().map(|value| (value - mean).powi(2)).sum();
+        let of_views = (count - 1.0) / count * squares;
+        let of_noise = self.noise_variance(index);
+        let both = (0.5 * (of_views + self.scatter() * of_noise)).max(of_noise);
+        let (sum, squares) = shares.iter().fold((0.0, 0.0), |(a, b), s| (a + s, b + s * s));
+        let freedom = 2.0 * (sum * sum / squares - taken);
+        let (value, sd) = (self.beta[index], both.sqrt());
+        (sd > 0.0 && sd.is_finite()).then_some(Effect { value, sd, freedom })
+    }
+
+    /// How much larger the squares of what views pull at the unknowns are than noise has them: about 1 where
+    /// it is all there is.
+    fn scatter(&self) -> f64 {
+        let (mut squares, mut freedom) = (0.0, -(self.beta.len() as f64));
+        for (own, pull) in &self.parts {
+            let pull = pull - own * &self.beta;
+            let n = own.nrows();
+            let scale = DVector::from_fn(n, |i, _| match own[(i, i)] > 0.0 {
+                true => own[(i, i)].sqrt().recip(),
+                false => 0.0,
+            });
+            let eigen =
+                DMatrix::from_fn(n, n, |i, j| own[(i, j)] * scale[i] * scale[j]).symmetric_eigen();
+            let along = eigen.eigenvectors.tr_mul(&pull.component_mul(&scale));
+            let known =
+                eigen.eigenvalues.iter().zip(along.iter()).filter(|(value, _)| **value > OPEN);
+            for (value, along) in known {
+                squares += along * along / value;
+                freedom += 1.0;
+            }
+        }
+        squares / freedom.max(1.0) / self.variance()
+    }
+}
+
+/// A direction of which a view says less than this part of what it says of its coordinates is open to it.
+const OPEN: f64 = 1e-6;
+
+struct Equations<'a> {
+    problem: &'a Problem,
+    whitening: &'a Whitening,
+    loss: Loss,
+    camera: usize,
+    free: Vec<usize>,
+    middle: DVec3,
+    reach: f64,
+}
+
+impl Equations<'_> {
+    fn of_view(&self, frame: usize) -> Option<ViewEquations> {
+        let Self { problem, whitening, loss, camera, ref free, middle, reach } = *self;
+        let unknowns = &problem.cameras[camera];
+        let lens = &unknowns.camera;
+        let height = f64::from(lens.height);
+        let (p, n) = (free.len(), free.len() + CANDIDATES + 7);
+        let mut gram = DMatrix::zeros(n, n);
+        let (mut count, mut px, mut white, mut moves) = (0, 0.0, 0.0, 0.0);
+        let (mut obliquity, mut log_distance) = (0.0, 0.0);
+        let blocks = problem.blocks.iter().zip(&whitening.blocks);
+        let blocks = blocks.filter(|(block, _)| block.camera == camera && block.frame == frame);
+        for (block, weights) in blocks {
+            let panel = problem.scene_from_panel(block.panel);
+            let rotation =
+                unknowns.camera_from_rig.rotation * problem.frames[frame].rotation * panel.rotation;
+            let panel_from_camera = DMat3::from_quat(rotation.conjugate());
+            for (seen, &w) in block.observations.iter().zip(weights) {
+                let point = problem.camera_point(block, seen);
+                let Some(at) = lens.project_with_derivatives(point) else { continue };
+                let residual = seen.pixel - at.pixel;
+                if whitening.is_outlier(w, residual) {
+                    continue;
+                }
+                let whitened = Whitening::apply(w, residual);
+                let (_, weight) = loss.of(whitened.length_squared(), whitening.sigma);
+                // Mid-image rows are at the moment of the view.
+                let ramp = (seen.pixel.y + 0.5) / height - 0.5;
+                let by_point = at.by_point.map(DVec3::from);
+                let by_place = by_point.map(|by| panel_from_camera * by);
+                let uv = (seen.panel_mm - middle) / reach;
+                let off = at.pixel - lens.centre_px;
+                let motion = by_motion(&at, point);
+                let mut rows = [DVector::zeros(n), DVector::zeros(n)];
+                for (i, row) in rows.iter_mut().enumerate() {
+                    for (column, &parameter) in free.iter().enumerate() {
+                        row[column] = at.by_parameter(parameter)[i];
+                    }
+                    let sheet = by_sheet(uv, by_place[i], reach);
+                    let candidates = by_candidates(i, off[i], ramp * by_point[i], sheet);
+                    candidates.iter().enumerate().for_each(|(k, value)| row[p + k] = *value);
+                    row[p + CANDIDATES] = residual[i];
+                    (0..6).for_each(|k| row[p + CANDIDATES + 1 + k] = motion[(i, k)]);
+                    moves += by_point[i].truncate().length_squared();
+                }
+                let [a, b, c] = w.map(|v| v * weight.sqrt());
+                let [x, y] = rows;
+                let second = b * &x + c * &y;
+                let first = a * x;
+                gram.ger(1.0, &first, &first, 1.0);
+                gram.ger(1.0, &second, &second, 1.0);
+                let normal = rotation * DVec3::Z;
+                obliquity += 1.0 - normal.dot(point.normalize()).powi(2);
+                log_distance += point.length().ln();
+                count += 1;
+                px += residual.length_squared();
+                white += whitened.length_squared();
+            }
+        }
+        if count < LEAST_CORNERS {
+            return None;
+        }
+        let gram = eliminated(gram, 6)?;
+        Some(ViewEquations {
+            frame,
+            gram,
+            freedom: (2 * count - 6) as f64,
+            px: if white > 0.0 { (px / white).sqrt() } else { 0.0 },
+            px_per_mm: (moves / (4 * count) as f64).sqrt(),
+            obliquity: obliquity / f64::from(count as u32),
+            log_distance: log_distance / f64::from(count as u32),
+        })
+    }
+}
+
+/// Derivatives of a coordinate by how the sheet is stretched, sheared and bent, in the order of [`Candidate::SHEET`], from
+/// that by the place of the corner; `uv` is its place from the middle of the sheet in parts of `reach`, mm.
+fn by_sheet(uv: DVec3, by_place: DVec3, reach: f64) -> [f64; 5] {
+    [
+        reach * (uv.x * by_place.x - uv.y * by_place.y),
+        reach * (uv.y * by_place.x + uv.x * by_place.y),
+        uv.x * uv.x * by_place.z,
+        uv.x * uv.y * by_place.z,
+        uv.y * uv.y * by_place.z,
+    ]
+}
+
+/// Derivatives of coordinate `i` of a pixel by all candidates. `off` is its offset from the principal point, `shutter` the
+/// derivatives by a shift of the point while rows are read.
+fn by_candidates(i: usize, off: f64, shutter: DVec3, sheet: [f64; 5]) -> [f64; CANDIDATES] {
+    let axis = |of: usize| f64::from(u8::from(of == i));
+    let [stretch, shear, bend_x, twist, bend_y] = sheet;
+    [off, axis(0), axis(1), shutter.x, shutter.y, shutter.z, stretch, shear, bend_x, twist, bend_y]
+}
+
+/// A Gram matrix without its last unknowns.
+fn eliminated(gram: DMatrix<f64>, last: usize) -> Option<DMatrix<f64>> {
+    let n = gram.nrows() - last;
+    if last == 0 {
+        return Some(gram);
+    }
+    let own = gram.view((n, n), (last, last)).into_owned();
+    let across = gram.view((n, 0), (last, n)).into_owned();
+    let through = inverted(&own)? * &across;
+    Some(gram.view((0, 0), (n, n)) - across.tr_mul(&through))
+}
+
+/// The inverse of a symmetric matrix whose unknowns have different units.
+fn inverted(matrix: &DMatrix<f64>) -> Option<DMatrix<f64>> {
+    let n = matrix.nrows();
+    let scale = DVector::from_fn(n, |i, _| matrix[(i, i)].max(f64::MIN_POSITIVE).sqrt().recip());
+    let scaled = DMatrix::from_fn(n, n, |i, j| {
+        matrix[(i, j)] * scale[i] * scale[j] + if i == j { SINGULAR } else { 0.0 }
+    });
+    let inverse = scaled.cholesky()?.inverse();
+    Some(DMatrix::from_fn(n, n, |i, j| inverse[(i, j)] * scale[i] * scale[j]))
+}
+
+/// Added to a diagonal of 1: what is determined less than so is left where it is.
+const SINGULAR: f64 = 1e-11;
