@@ -1,6 +1,6 @@
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use super::FamilyError;
+use crate::family::FamilyError;
 
 /// How far a long search has come.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

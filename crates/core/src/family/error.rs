@@ -7,7 +7,7 @@ pub enum FamilyError {
     /// No shipped family and no file of this name.
     #[error(
         "no family is called `{name}`: give one of {}, or the path of a .json family file",
-        [super::shipped_names(), super::square_names(), vec![super::places::NAME]].concat().join(", ")
+        [crate::family::shipped_names(), crate::family::square_names(), vec![super::places::NAME]].concat().join(", ")
     )]
     Unknown {
         /// The name asked for.
@@ -20,7 +20,7 @@ pub enum FamilyError {
     #[error(
         "field `schema` is `{found}`, this version reads `{}`: generate the file anew with \
          `Family::to_json`",
-        super::SCHEMA
+        crate::family::SCHEMA
     )]
     Schema {
         /// The schema that the file names.

@@ -64,8 +64,8 @@ mod tests {
     use std::sync::atomic::{AtomicUsize, Ordering};
 
     use super::*;
-    use crate::family::best::{Best, Budget};
-    use crate::family::bounds::bounds;
+    use crate::family::check::bounds::bounds;
+    use crate::family::search::best::{Best, Budget};
     use crate::family::{Control, Decoder, Family, NaturalWords, Progress, Rules, certify};
 
     #[test]

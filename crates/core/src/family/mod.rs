@@ -21,72 +21,55 @@
 //! Families of square tags, the AprilTags of checkerboards, are read, decoded, drawn and certified like the
 //! others, with their four turns by 90°; they are not searched here.
 //!
+//! The chapters, in the order in which a family comes to be and is used:
+//!
+//! 1. `rules`, `free`: which words may be codes;
+//! 2. [`search`], [`algebra`]: codes by trial, and by construction; `control`: how a search is watched and stopped;
+//! 3. `check`: what is proved of a family, and how it compares with bounds and with pictures of the world;
+//! 4. `tables`: families as files, those that ship, those of other programs;
+//! 5. `decode`: from the cells of a photograph to a tag; [`places`]: the codes that tell a place.
+//!
+//! `kernels` has the loops in which searches and proofs spend their time.
+//!
 //! Limits: codes have 9, 16, 25, 36, 49 or 64 bits ([`crate::lattice::Dimension`]). Loading a family
 //! checks its form and fingerprint; the distance between its codes is proved by [`certify`], which
 //! costs the square of their number.
 
 pub mod algebra;
-mod aruco;
-pub mod best;
-pub mod bounds;
-mod certificate;
-mod confusion;
+mod check;
 mod control;
-mod decoder;
+mod decode;
 mod error;
-mod export;
-mod file;
 mod free;
-mod frontier;
-mod growth;
-mod hidden;
-mod import;
-mod independent;
-mod invariant_bounds;
-mod joint;
 mod kernels;
 mod krawtchouk;
-pub mod lexicode;
-mod natural;
 pub mod places;
-mod polish;
-mod published_bounds;
-mod reading;
-mod robust;
 mod rules;
 pub mod search;
-mod shipped;
-mod statistics;
-mod tagwords;
+mod tables;
+mod words;
 
 use std::collections::BTreeMap;
 
-pub use aruco::{dictionary, dictionary_names};
-pub use certificate::{Certificate, certify, certify_codes};
-pub use confusion::Confusion;
-pub use control::{Control, Progress};
-pub use decoder::{Decoded, Decoder};
-pub use error::FamilyError;
-pub use export::{ExportFormat, export};
-pub use file::check_name;
-pub use file::{Construction, SCHEMA};
-pub use free::FreeCells;
-pub use frontier::{RuleChoice, best_rule, rule_choices};
-pub use growth::Beginning;
-pub use hidden::{HiddenCells, Robust};
-pub use import::{ImportError, ImportSpec, import};
-pub use invariant_bounds::invariant_bound;
-pub use natural::{
-    ACCEPTED_FALSE_POSITIVES, NATURAL_FACTOR, NaturalWords, TRIANGLES_PER_MEGAPIXEL,
-    corrected_within,
+pub use check::{
+    ACCEPTED_FALSE_POSITIVES, Certificate, Confusion, HiddenCells, NATURAL_FACTOR, NaturalWords,
+    Reading, Robust, RuleChoice, TRIANGLES_PER_MEGAPIXEL, ball, best_rule, bounds, certify,
+    certify_codes, corrected_within, distance_histogram, false_positive_rates, invariant_bound,
+    rule_choices,
 };
-pub use published_bounds::{PublishedBounds, published_bounds};
-pub use reading::Reading;
+pub use control::{Control, Progress};
+pub use decode::{Decoded, Decoder, TagWords};
+pub use error::FamilyError;
+pub use free::FreeCells;
 pub use rules::{Rules, Screen};
-pub(crate) use shipped::shipped_name;
-pub use shipped::{ShippedFamily, shipped_families, shipped_names, smallest_shipped, square_names};
-pub use statistics::{ball, distance_histogram, false_positive_rates};
-pub use tagwords::TagWords;
+pub use search::{best, lexicode};
+pub(crate) use tables::shipped_name;
+pub use tables::{
+    Beginning, Construction, ExportFormat, ImportError, ImportSpec, PublishedBounds, SCHEMA,
+    ShippedFamily, check_name, dictionary, dictionary_names, export, import, published_bounds,
+    shipped_families, shipped_names, smallest_shipped, square_names,
+};
+use tables::{aruco, file, shipped};
 
 use crate::lattice::{Dimension, GridKind, TagCells};
 

@@ -1,7 +1,7 @@
 use serde::{Deserialize, Serialize};
 
-use super::kernels::any_nearer;
-use super::{FamilyError, FreeCells, Robust, TagWords};
+use crate::family::kernels::any_nearer;
+use crate::family::{FamilyError, FreeCells, Robust, TagWords};
 use crate::lattice::Dimension;
 
 /// What every single code of a family has to satisfy, besides its distance to the other codes.

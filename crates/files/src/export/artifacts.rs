@@ -1,11 +1,12 @@
 //! All that is made of a target, in memory, and sets of files written all or none.
 //!
 //! ```
-//! use deltille_core::targets::{BoardSpec, Target};
+//! use deltille_core::layout::Printing;
+//! use deltille_core::targets::BoardSpec;
 //! use deltille_files::export::artifacts::{Making, What, make};
 //!
-//! let board = Target::new("desk", BoardSpec::deltille(4, 5, 20.0))?;
-//! let files = make(&board, board.family()?.as_ref(), What::Svg, Making::default())?;
+//! let board = Printing::new("desk", BoardSpec::deltille(4, 5, 20.0))?;
+//! let files = make(&board, board.target.family()?.as_ref(), What::Svg, Making::default())?;
 //! assert_eq!(files[0].0, "desk.svg");
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```

@@ -83,10 +83,11 @@ pub fn write(artwork: &Artwork, path: &Path) -> Result<(), ExportError> {
 /// The bytes of one PDF file with all sheets; they are the same for the same artwork.
 ///
 /// ```
-/// use deltille_core::targets::{BoardSpec, Target};
+/// use deltille_core::layout::Printing;
+/// use deltille_core::targets::BoardSpec;
 /// use deltille_files::export::pdf;
 ///
-/// let board = Target::new("desk", BoardSpec::deltille(4, 5, 20.0))?;
+/// let board = Printing::new("desk", BoardSpec::deltille(4, 5, 20.0))?;
 /// assert!(pdf::to_bytes(&board.draw()?).starts_with(b"%PDF-1.6"));
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```

@@ -36,10 +36,11 @@ pub fn write(artwork: &Artwork, sheet: usize, path: &Path) -> Result<(), ExportE
 /// When the artwork has no such sheet.
 ///
 /// ```
-/// use deltille_core::targets::{BoardSpec, Target};
+/// use deltille_core::layout::Printing;
+/// use deltille_core::targets::BoardSpec;
 /// use deltille_files::export::svg;
 ///
-/// let board = Target::new("desk", BoardSpec::deltille(4, 5, 20.0))?;
+/// let board = Printing::new("desk", BoardSpec::deltille(4, 5, 20.0))?;
 /// assert!(svg::to_string(&board.draw()?, 0).contains("width=\"297mm\""));
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```

@@ -1,0 +1,67 @@
+//! How complex codes must be, as a choice: fewer differing pairs asked for give more codes, and more of what natural
+//! pictures show is taken for one of them.
+
+use super::natural::cumulated;
+use crate::family::{NaturalWords, TagWords};
+use crate::lattice::Dimension;
+
+/// What asking for so many differing pairs leaves of some codes.
+#[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
+pub struct RuleChoice {
+    /// Pairs of neighbouring cells that differ in every code, at least.
+    pub min_pairs: u32,
+    /// The share of all pairs that this is, as [`crate::family::Rules::min_complexity`] has it.
+    pub min_complexity: f64,
+    /// Codes that satisfy the rule.
+    pub codes: usize,
+    /// Natural false positives for 0, 1, … ⌊(h−1)/2⌋ corrected cells, as
+    /// [`crate::family::Family::natural_false_positive_rates`].
+    pub natural: Vec<f64>,
+}
+
+/// What each threshold leaves of `codes` of distance `distance`, the lowest first, each with fewer codes than the last.
+pub fn rule_choices(dimension: Dimension, distance: u32, codes: &[u64]) -> Vec<RuleChoice> {
+    let words = TagWords::new(dimension);
+    let most = distance.saturating_sub(1) / 2;
+    let by_pairs = NaturalWords::new(dimension).by_pairs(codes, most);
+    let choice = |&min_pairs: &u32| {
+        let left = by_pairs.range(min_pairs..).map(|(_, chances)| chances);
+        RuleChoice {
+            min_pairs,
+            min_complexity: f64::from(min_pairs) / f64::from(words.pairs()),
+            codes: codes.iter().filter(|&&code| words.differing_pairs(code) >= min_pairs).count(),
+            natural: cumulated(left, most),
+        }
+    };
+    by_pairs.keys().map(choice).collect()
+}
+
+/// Of some choices that with the most codes whose natural false positives with `corrected` cells corrected are at most
+/// `accepted`.
+pub fn best_rule(choices: &[RuleChoice], corrected: u32, accepted: f64) -> Option<&RuleChoice> {
+    let fits = |choice: &&RuleChoice| {
+        choice.natural.get(corrected as usize).is_some_and(|&rate| rate <= accepted)
+    };
+    choices.iter().filter(fits).max_by_key(|choice| choice.codes)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::family::Family;
+
+    /// The choice that is a family's own rule has its codes and its rates, and stricter rules have less of both.
+    #[test]
+    fn a_familys_own_rule_is_one_of_the_choices() {
+        let family = Family::shipped("d36h11").unwrap();
+        let choices = rule_choices(family.dimension(), family.distance(), family.codes());
+        let rates = family.natural_false_positive_rates().unwrap();
+        assert_eq!((choices[0].codes, choices[0].min_pairs), (family.len(), 23));
+        assert!(choices[0].natural.iter().zip(&rates).all(|(a, b)| (a / b - 1.0).abs() < 1e-9));
+        assert!(choices.is_sorted_by(|a, b| a.codes > b.codes && a.natural[5] > b.natural[5]));
+        let best = best_rule(&choices, 4, 1e-4).unwrap();
+        assert!(best.natural[4] <= 1e-4 && best.min_pairs > 23, "{best:?}");
+        assert_eq!(best_rule(&choices, 6, 1.0), None);
+    }
+}

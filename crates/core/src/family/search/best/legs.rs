@@ -1,0 +1,205 @@
+//! Long searches in legs: each is a search of its own that starts from the best so far, with random numbers of its own.
+//!
+//! Between two legs a search can be interrupted, and goes on from a [`Checkpoint`] later. A step of work is a leg, so
+//! that a search by work finds the same with and without a break. Of a time a leg is a tenth, a minute at least.
+
+use std::time::Duration;
+
+use serde::{Deserialize, Serialize};
+
+use super::{Best, Budget, Start};
+use crate::family::{Construction, Control, Family, FamilyError, Progress};
+
+/// What the legs of a search have found, to go on from there.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+#[non_exhaustive]
+pub struct Checkpoint {
+    /// Legs that are done.
+    pub legs_done: u32,
+    /// Seconds that were searched, where the budget is a time.
+    pub seconds: f64,
+    /// The best codes so far.
+    pub codes: Vec<u64>,
+    /// How these are made.
+    pub construction: Option<Construction>,
+}
+
+/// The shortest leg of a search by time.
+const SHORTEST: Duration = Duration::from_secs(60);
+
+impl Best {
+    /// Searches and makes a family of what was found, at least as large as what it starts from. Progress is
+    /// reported in thousandths. When it is cancelled, the search is over: the family is the best so far,
+    /// and only where nothing was found yet there is none.
+    ///
+    /// # Errors
+    /// Where the rules make no sense, or the search was cancelled before anything was found.
+    pub fn family(
+        &self,
+        name: &str,
+        start: Option<Start>,
+        control: Control,
+    ) -> Result<Family, FamilyError> {
+        self.resume(name, start, &mut Checkpoint::default(), &|_| (), control)
+    }
+
+    /// As [`Self::family`], from where a checkpoint stands; `save` is called after each leg. When it is cancelled, the
+    /// checkpoint of a search by work holds the legs that were finished, that of a search by time also what was found since.
+    ///
+    /// # Errors
+    /// As [`Self::family`], and where the checkpoint is not consistent.
+    pub fn resume(
+        &self,
+        name: &str,
+        start: Option<Start>,
+        checkpoint: &mut Checkpoint,
+        save: &dyn Fn(&Checkpoint),
+        control: Control,
+    ) -> Result<Family, FamilyError> {
+        self.rules.check(self.dimension.bits())?;
+        let screen = self.screen();
+        if let Some(Construction::Algebraic(construction)) = &checkpoint.construction {
+            // Whatever a file says that codes are.
+            checkpoint.codes = construction.codes(&screen)?;
+        } else if checkpoint.construction.is_none()
+            && let Some(start) = &start
+        {
+            checkpoint.codes = start.codes.clone();
+            checkpoint.construction = Some(Construction::Algebraic(start.construction.clone()));
+        }
+        while let Some((budget, share)) = self.next_leg(checkpoint) {
+            let seed = self.seed.wrapping_add(u64::from(checkpoint.legs_done) << 32);
+            let leg = Self { budget, seed, ..self.clone() };
+            let begin = match &checkpoint.construction {
+                Some(Construction::Algebraic(construction)) => Some(Start {
+                    family: name.to_owned(),
+                    codes: checkpoint.codes.clone(),
+                    construction: construction.clone(),
+                }),
+                _ => None,
+            };
+            let (known, before) = (checkpoint.codes.len(), self.done(checkpoint));
+            let report = |progress: Progress| {
+                let done = before + share * progress.done as f64 / progress.total as f64;
+                let codes =
+                    progress.codes.max(known).min(self.limit.map_or(usize::MAX, |n| n as usize));
+                control.tell((1000.0 * done.min(1.0)) as u64, 1000, codes);
+            };
+            let since = budget.now();
+            let found = leg.leg(&screen, begin.as_ref(), control.report(&report));
+            let found = match found {
+                Err(FamilyError::Cancelled) if known > 0 => None,
+                found => Some(found?),
+            };
+            let better = found.filter(|(codes, _)| codes.len() > known);
+            if control.is_cancelled() && matches!(self.budget, Budget::Work(_)) {
+                // How far an interrupted leg came depends on the moment.
+                return match better {
+                    Some((codes, construction)) => self.made(name, codes, construction),
+                    None => self.best_of(name, checkpoint),
+                };
+            }
+            checkpoint.legs_done += 1;
+            checkpoint.seconds += (budget.now() - since).as_secs_f64();
+            if let Some((codes, construction)) = better {
+                (checkpoint.codes, checkpoint.construction) = (codes, Some(construction));
+            }
+            save(checkpoint);
+            if control.is_cancelled() || checkpoint.codes.len() >= self.most() {
+                break;
+            }
+        }
+        self.best_of(name, checkpoint)
+    }
+
+    /// The budget of the next leg and its share of the whole; `None` at the end.
+    fn next_leg(&self, checkpoint: &Checkpoint) -> Option<(Budget, f64)> {
+        match self.budget {
+            Budget::Time(time, clock) => {
+                let left =
+                    time.saturating_sub(Duration::try_from_secs_f64(checkpoint.seconds).ok()?);
+                // What the end of a leg took longer is not made up for by a leg too short to find anything.
+                let over = checkpoint.legs_done > 0 && left < time.mul_f64(0.02).max(SHORTEST / 60);
+                let leg = SHORTEST.max(time / 10);
+                let leg = if left < leg.mul_f64(1.5) { left } else { leg };
+                let share = leg.as_secs_f64() / time.as_secs_f64().max(1e-3);
+                (!over).then_some((Budget::Time(leg, clock), share))
+            }
+            Budget::Work(steps) => {
+                let steps = steps.max(1);
+                (checkpoint.legs_done < steps).then(|| (Budget::Work(1), 1.0 / f64::from(steps)))
+            }
+        }
+    }
+
+    /// The share of the budget that is spent.
+    fn done(&self, checkpoint: &Checkpoint) -> f64 {
+        match self.budget {
+            Budget::Time(time, _) => checkpoint.seconds / time.as_secs_f64().max(1e-3),
+            Budget::Work(steps) => f64::from(checkpoint.legs_done) / f64::from(steps.max(1)),
+        }
+    }
+
+    fn best_of(&self, name: &str, checkpoint: &Checkpoint) -> Result<Family, FamilyError> {
+        match &checkpoint.construction {
+            Some(construction) => self.made(name, checkpoint.codes.clone(), construction.clone()),
+            None => Err(FamilyError::Cancelled),
+        }
+    }
+
+    fn made(
+        &self,
+        name: &str,
+        codes: Vec<u64>,
+        construction: Construction,
+    ) -> Result<Family, FamilyError> {
+        Family::new(name, self.dimension, self.distance, codes, self.rules.clone(), construction)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::atomic::{AtomicBool, Ordering};
+
+    use super::*;
+    use crate::lattice::Dimension;
+
+    #[test]
+    fn a_search_by_work_in_pieces_finds_what_it_finds_at_once() {
+        let search = Best::new(Dimension::from_bits(9).unwrap(), 4, Budget::Work(3)).seed(5);
+        let whole = search.family("d9h4", None, Control::default()).unwrap();
+
+        let mut checkpoint = Checkpoint::default();
+        for piece in 1..=3 {
+            let cancel = AtomicBool::new(false);
+            let control = Control { cancel: Some(&cancel), report: None };
+            let stop = |_: &Checkpoint| cancel.store(piece < 3, Ordering::Relaxed);
+            search.resume("d9h4", None, &mut checkpoint, &stop, control).unwrap();
+            assert_eq!(checkpoint.legs_done, piece);
+            // As a file would bring it back.
+            let text = serde_json::to_string(&checkpoint).unwrap();
+            checkpoint = serde_json::from_str(&text).unwrap();
+        }
+        let family = search.resume("d9h4", None, &mut checkpoint, &|_| (), Control::default());
+        assert_eq!(family.unwrap(), whole);
+    }
+
+    #[test]
+    fn what_is_searched_already_counts() {
+        let clock: crate::Clock = || Duration::ZERO;
+        let time = Budget::Time(Duration::from_secs(600), clock);
+        let search = Best::new(Dimension::from_bits(9).unwrap(), 4, time);
+        let left = |legs_done, seconds| {
+            let checkpoint = Checkpoint { legs_done, seconds, ..Checkpoint::default() };
+            search.next_leg(&checkpoint).map(|(budget, _)| match budget {
+                Budget::Time(time, _) => time.as_secs(),
+                Budget::Work(_) => panic!("a leg of a time is a time"),
+            })
+        };
+        assert_eq!(left(0, 0.0), Some(60));
+        assert_eq!(left(9, 530.0), Some(70));
+        assert_eq!(left(10, 599.0), None);
+        assert_eq!(left(1, f64::NAN), None);
+    }
+}

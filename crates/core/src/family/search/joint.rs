@@ -1,0 +1,145 @@
+//! Arrangements judged by what local search makes of them.
+//!
+//! How many words of a code pass the rules is half of an arrangement's worth: words that do not pass can be repaired,
+//! or exchanged, and how many of these can stand together differs between arrangements. So annealing goes on
+//! with the number of codes that a short local search ends with. Up to 16 bits it may exchange any words, whose
+//! conflicts are listed once; beyond, words that do not pass for words one cell away.
+
+use rand::{Rng, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+
+use super::independent::ConflictGraph;
+use crate::family::Screen;
+use crate::family::algebra::Arrangement;
+use crate::family::algebra::arrange::Arranger;
+use crate::family::algebra::cosets::CosetUnion;
+use crate::family::algebra::record::{arranged, has_free_centre};
+
+/// Words whose conflicts are all listed, up to so many bits.
+const LISTED_BITS: u32 = 16;
+
+/// All words that the rules admit, one of each orbit, and their conflicts.
+#[derive(Clone, Debug)]
+pub(in crate::family) struct AllWords {
+    words: Vec<u64>,
+    graph: ConflictGraph,
+}
+
+impl AllWords {
+    /// `None` where there are too many, or `halt` came first.
+    pub(in crate::family) fn new(
+        screen: &Screen,
+        halt: &(dyn Fn() -> bool + Sync),
+    ) -> Option<Self> {
+        let words = screen.words();
+        if words.dimension().bits() > LISTED_BITS {
+            return None;
+        }
+        let all = 0..=words.dimension().mask();
+        let all = all.filter(|&word| words.canonical(word) == word && screen.admits(word));
+        let all: Vec<u64> = all.collect();
+        let graph = ConflictGraph::of_words(screen, &all, halt);
+        (!halt()).then_some(Self { words: all, graph })
+    }
+
+    /// Codes that a local search finds from some of these words.
+    fn search(&self, screen: &Screen, codes: &[u64], seed: u64, steps: u64) -> Vec<u64> {
+        let index = |code: &u64| self.words.binary_search(&screen.words().canonical(*code)).ok();
+        let initial: Vec<u32> = codes.iter().filter_map(index).map(|i| i as u32).collect();
+        let found = self.graph.search(&initial, seed, steps, || false);
+        found.into_iter().map(|i| self.words[i as usize]).collect()
+    }
+}
+
+/// Annealing of one union of cosets.
+pub(in crate::family) struct Joint<'a> {
+    pub(in crate::family) screen: &'a Screen,
+    pub(in crate::family) union: &'a CosetUnion,
+    pub(in crate::family) arranger: &'a Arranger,
+    pub(in crate::family) all: Option<&'a AllWords>,
+}
+
+impl Joint<'_> {
+    /// The best arrangement found from `start`, and its codes.
+    pub(in crate::family) fn anneal(
+        &self,
+        start: &Arrangement,
+        seed: u64,
+        steps: u32,
+        halt: &(dyn Fn() -> bool + Sync),
+    ) -> (Arrangement, Vec<u64>) {
+        /// Codes that are given up at first and at the end, with a probability of 1/e.
+        const HOT: f64 = 3.0;
+        const COLD: f64 = 0.3;
+        /// Share of the words by which fewer may pass, by the quick judgement, than before.
+        const CLEARLY_WORSE: f64 = 0.03;
+        let mut random = ChaCha8Rng::seed_from_u64(seed);
+        let mut now = start.clone();
+        let mut codes = self.codes(&now, random.random());
+        let mut quick = self.arranger.judge(&now);
+        let slack = CLEARLY_WORSE * quick.max(100.0);
+        let mut best = (now.clone(), codes.clone());
+        for step in 0..steps {
+            if halt() {
+                break;
+            }
+            let mut next = self.arranger.changed(&now, &mut random);
+            if random.random_ratio(1, 3) {
+                next = self.arranger.changed(&next, &mut random);
+            }
+            let next_quick = self.arranger.judge(&next);
+            if next_quick < quick - slack && self.all.is_none() {
+                continue;
+            }
+            let next_codes = self.codes(&next, random.random());
+            let gain = next_codes.len() as f64 - codes.len() as f64;
+            let temperature = HOT * (COLD / HOT).powf(f64::from(step) / f64::from(steps));
+            if gain >= 0.0 || random.random::<f64>() < (gain / temperature).exp() {
+                (now, codes, quick) = (next, next_codes, next_quick);
+                if codes.len() > best.1.len() {
+                    best = (now.clone(), codes.clone());
+                }
+            }
+        }
+        best
+    }
+
+    /// The codes of an arrangement after a short local search.
+    fn codes(&self, arrangement: &Arrangement, seed: u64) -> Vec<u64> {
+        /// Moves where all words are candidates, and where repaired ones are.
+        const MOVES: [u64; 2] = [3_000, 20_000];
+        let mut codes = arranged(self.screen, self.union, arrangement);
+        if let Some(all) = self.all {
+            return all.search(self.screen, &codes, seed, MOVES[0]);
+        }
+        let repaired = self.repaired(arrangement, &codes);
+        let graph = ConflictGraph::of_words(self.screen, &repaired, || false);
+        let found = graph.search(&[], seed, MOVES[1], || false);
+        codes.extend(found.into_iter().map(|i| repaired[i as usize]));
+        codes
+    }
+
+    /// Admitted words one cell away from a word of the union that does not pass, and far enough from
+    /// all `codes` that do.
+    fn repaired(&self, arrangement: &Arrangement, codes: &[u64]) -> Vec<u64> {
+        let words = self.screen.words();
+        let dimension = words.dimension();
+        let bits = dimension.bits();
+        let centre = match has_free_centre(self.union) {
+            true => 1 << arrangement.bit_map(dimension)[bits as usize - 1],
+            false => 0,
+        };
+        let turned: Vec<u64> = codes.iter().flat_map(|&code| words.turns(code)).collect();
+        let passes = |word: u64| self.screen.admits(word) || self.screen.admits(word ^ centre);
+        let fits =
+            |word: &u64| self.screen.admits(*word) && self.screen.is_apart_from(*word, &turned);
+        let all = arrangement.apply(dimension, &self.union.orbits());
+        let failing = all.into_iter().filter(|&word| !passes(word));
+        let near = failing.flat_map(|word| (0..bits).map(move |bit| word ^ 1 << bit));
+        let near = near.flat_map(|word| [word, word ^ centre]).filter(fits);
+        let mut near: Vec<u64> = near.map(|word| words.canonical(word)).collect();
+        near.sort_unstable();
+        near.dedup();
+        near
+    }
+}

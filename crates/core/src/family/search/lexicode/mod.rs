@@ -1,0 +1,345 @@
+//! The published construction: a lexicode over an arithmetic progression of candidates.
+//!
+//! Candidates v(i) = start + i·step mod 2^b are taken in turn; one is kept when it satisfies the
+//! [`Rules`], is at least h from its own turns, and at least h from every turn of every code kept
+//! before (`docs/families.md`, “The published construction”). This is the AprilTag construction
+//! (Olson, "AprilTag: A robust and flexible visual fiducial system", ICRA 2011) with three turns in
+//! place of four.
+//!
+//! Of 2^36 candidates nearly all are excluded by codes found early. So only the first 2^27 are
+//! looked at in turn; then a sweep over all words finds the few that the codes so far leave open
+//! (see `sweep.rs`), and these are taken in the order of the candidates. The codes are the same,
+//! and come in the same order, as if every candidate had been looked at.
+
+mod sweep;
+
+use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
+
+use self::sweep::Sweep;
+use crate::family::{Construction, Control, Family, FamilyError, Rules, Screen, TagWords};
+use crate::lattice::Dimension;
+
+/// The step of the published families, a prime.
+pub const STEP: u64 = 982_451_653;
+
+/// Candidates in the first chunk; few, because there is nothing yet to filter them against.
+const FIRST_CHUNK: u64 = 1 << 10;
+/// Candidates in a chunk at most: a fraction of a second of work.
+const LARGEST_CHUNK: u64 = 1 << 21;
+
+/// Parameters of a lexicode.
+#[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
+pub struct Lexicode {
+    /// Dimension of the tags.
+    pub dimension: Dimension,
+    /// Least distance h between any two codes in any turn.
+    pub distance: u32,
+    /// Rules for single codes.
+    pub rules: Rules,
+    /// First candidate.
+    pub start: u64,
+    /// Difference of successive candidates; odd, so that all 2^b words are met.
+    pub step: u64,
+    /// Number of candidates tried.
+    pub candidates: u64,
+}
+
+impl Lexicode {
+    /// The parameters of the published family of these bits and distance; where none was
+    /// published, the same with `start` = `step` mod 2^b.
+    pub fn published(dimension: Dimension, distance: u32) -> Self {
+        let start = match (dimension.bits(), distance) {
+            (16, 5) => 0x24d6,
+            (25, 7) => 0x08f_50a7,
+            (25, 9) => 0x092_22e8,
+            (36, 9) => 0x0_751f_5357,
+            (36, 11) => 0x1_5f5d_7ed5,
+            _ => STEP & dimension.mask(),
+        };
+        Self {
+            dimension,
+            distance,
+            rules: Rules::published(distance),
+            start,
+            step: STEP,
+            candidates: dimension.mask().saturating_add(1),
+        }
+    }
+
+    /// With other rules for single codes.
+    #[must_use]
+    pub fn rules(self, rules: Rules) -> Self {
+        Self { rules, ..self }
+    }
+
+    /// Runs the search. Does not depend on the number of threads.
+    ///
+    /// # Errors
+    /// Where the rules make no sense, or the search was cancelled.
+    pub fn codes(&self, control: Control) -> Result<Vec<u64>, FamilyError> {
+        self.resume(&mut Checkpoint::default(), &|_| {}, control)
+    }
+
+    /// Runs the search from a checkpoint on, and hands out new ones as it goes on. The codes are
+    /// the same as without interruption.
+    ///
+    /// # Errors
+    /// Where the rules make no sense, the checkpoint is of another search, or this one was cancelled.
+    pub fn resume(
+        &self,
+        checkpoint: &mut Checkpoint,
+        save: &dyn Fn(&Checkpoint),
+        control: Control,
+    ) -> Result<Vec<u64>, FamilyError> {
+        self.rules.check(self.dimension.bits())?;
+        let screen = Screen::new(TagWords::new(self.dimension), self.distance, &self.rules);
+        let sweeps = Sweep::suits(self.dimension.bits())
+            && self.step % 2 == 1
+            && self.candidates > FIRST_CANDIDATES
+            && self.distance > LEAST_DISTANCE;
+        if sweeps && screen.is_robust() {
+            let problem = "too many words stay open for a lexicode of so many bits: use `best`";
+            return Err(FamilyError::field("robust", problem));
+        }
+        let first = if sweeps { FIRST_CANDIDATES } else { self.candidates };
+        let kept = self.in_turn(&screen, first, checkpoint, save, control)?;
+        if !sweeps {
+            return Ok(kept.codes);
+        }
+        self.sweep(&screen, &kept, checkpoint, save, control)?;
+        self.take_open(&screen, kept, &checkpoint.open, control)
+    }
+
+    /// Looks at the first `count` candidates one after the other.
+    fn in_turn<'a>(
+        &self,
+        screen: &'a Screen,
+        count: u64,
+        checkpoint: &mut Checkpoint,
+        save: &dyn Fn(&Checkpoint),
+        control: Control,
+    ) -> Result<Kept<'a>, FamilyError> {
+        let mut kept = Kept::of(checkpoint.codes.clone(), screen);
+        let (mut from, mut chunk) = (checkpoint.candidates_done, FIRST_CHUNK);
+        let mut saved = from;
+        while from < count {
+            let cancelled = control.is_cancelled();
+            if from > saved && (cancelled || from - saved >= CHECKPOINT_CANDIDATES) {
+                checkpoint.candidates_done = from;
+                checkpoint.codes.clone_from(&kept.codes);
+                save(checkpoint);
+                saved = from;
+            }
+            if cancelled {
+                return Err(FamilyError::Cancelled);
+            }
+            let to = (from + chunk).min(count);
+            // What earlier chunks forbid is sorted out in parallel, the rest is decided in order.
+            let known = kept.turned.len();
+            let left: Vec<u64> = (from..to)
+                .into_par_iter()
+                .map(|i| self.start.wrapping_add(i.wrapping_mul(self.step)) & self.dimension.mask())
+                .filter(|&v| screen.admits(v) && kept.allows(v, 0))
+                .collect();
+            for v in left {
+                if kept.allows(v, known) {
+                    kept.push(v);
+                }
+            }
+            control.tell(to, self.candidates, kept.codes.len());
+            (from, chunk) = (to, (2 * chunk).min(LARGEST_CHUNK));
+        }
+        if saved < count {
+            checkpoint.candidates_done = count;
+            checkpoint.codes.clone_from(&kept.codes);
+            save(checkpoint);
+        }
+        Ok(kept)
+    }
+
+    /// Finds all words that the codes so far leave open, part by part.
+    fn sweep(
+        &self,
+        screen: &Screen,
+        kept: &Kept<'_>,
+        checkpoint: &mut Checkpoint,
+        save: &dyn Fn(&Checkpoint),
+        control: Control,
+    ) -> Result<(), FamilyError> {
+        /// Parts done between two checkpoints.
+        const BATCH: usize = 8;
+        let sweep = Sweep::new(screen, &kept.turned);
+        while checkpoint.parts_done < sweep.parts() {
+            let to = (checkpoint.parts_done + BATCH).min(sweep.parts());
+            let found = sweep.run(checkpoint.parts_done..to, control);
+            checkpoint.open.extend(found?);
+            checkpoint.parts_done = to;
+            save(checkpoint);
+            let share = to as f64 / sweep.parts() as f64;
+            let done =
+                FIRST_CANDIDATES as f64 + share * (self.candidates - FIRST_CANDIDATES) as f64;
+            control.tell(done as u64, self.candidates, kept.codes.len());
+        }
+        Ok(())
+    }
+
+    /// Takes the open words in the order of the candidates.
+    fn take_open(
+        &self,
+        screen: &Screen,
+        mut kept: Kept<'_>,
+        open: &[u64],
+        control: Control,
+    ) -> Result<Vec<u64>, FamilyError> {
+        let mask = self.dimension.mask();
+        let inverse = inverse_of_odd(self.step);
+        let number = |word: u64| word.wrapping_sub(self.start).wrapping_mul(inverse) & mask;
+        // Of three turns the first among the candidates is looked at first; when it is not taken,
+        // the others are excluded by the same code.
+        let mut in_order: Vec<u64> = open
+            .par_iter()
+            .filter_map(|&word| screen.words().turns(word).map(number).into_iter().min())
+            .filter(|&number| number < self.candidates)
+            .collect();
+        in_order.par_sort_unstable();
+        in_order.dedup();
+        for chunk in in_order.chunks(LARGEST_CHUNK as usize / 64) {
+            control.check()?;
+            let known = kept.turned.len();
+            let left: Vec<u64> = chunk
+                .par_iter()
+                .map(|i| self.start.wrapping_add(i.wrapping_mul(self.step)) & mask)
+                .filter(|&v| kept.allows(v, 0))
+                .collect();
+            for v in left {
+                if kept.allows(v, known) {
+                    kept.push(v);
+                }
+            }
+            control.tell(self.candidates, self.candidates, kept.codes.len());
+        }
+        Ok(kept.codes)
+    }
+
+    /// Runs the search and makes a family of the codes.
+    ///
+    /// # Errors
+    /// Where the rules or the name make no sense, or the search was cancelled.
+    pub fn family(&self, name: &str, control: Control) -> Result<Family, FamilyError> {
+        self.family_of(name, self.codes(control)?)
+    }
+
+    /// Makes a family of the codes that a search has found.
+    ///
+    /// # Errors
+    /// Where the name speaks of other bits or another distance.
+    pub fn family_of(&self, name: &str, codes: Vec<u64>) -> Result<Family, FamilyError> {
+        let construction = Construction::Lexicode {
+            start: TagWords::new(self.dimension).hex(self.start),
+            step: self.step,
+            candidates: self.candidates,
+        };
+        Family::new(name, self.dimension, self.distance, codes, self.rules.clone(), construction)
+    }
+}
+
+/// Candidates looked at one by one before a sweep finds what is left.
+const FIRST_CANDIDATES: u64 = 1 << 27;
+
+/// At distances up to this the codes so far leave too many words open to list them.
+const LEAST_DISTANCE: u32 = 7;
+
+/// Candidates looked at between two checkpoints: some seconds of work, and some kilobytes of file.
+const CHECKPOINT_CANDIDATES: u64 = 1 << 23;
+
+/// How far a long search has come, to go on from there.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Checkpoint {
+    /// Candidates that were looked at in turn.
+    pub candidates_done: u64,
+    /// Codes among these.
+    pub codes: Vec<u64>,
+    /// Parts of the sweep that are done.
+    pub parts_done: usize,
+    /// Words found open in these parts.
+    pub open: Vec<u64>,
+}
+
+/// The inverse modulo 2^64, by Newton's iteration: each step doubles the number of right bits.
+fn inverse_of_odd(x: u64) -> u64 {
+    (0..5).fold(x, |y, _| y.wrapping_mul(2u64.wrapping_sub(x.wrapping_mul(y))))
+}
+
+/// Codes kept so far, with their turns side by side.
+struct Kept<'a> {
+    codes: Vec<u64>,
+    turned: Vec<u64>,
+    screen: &'a Screen,
+}
+
+impl<'a> Kept<'a> {
+    fn of(codes: Vec<u64>, screen: &'a Screen) -> Self {
+        let turned = codes.iter().flat_map(|&code| screen.words().turns(code)).collect();
+        Self { codes, turned, screen }
+    }
+
+    /// Whether `word` is far enough from the turned codes from number `from` on.
+    fn allows(&self, word: u64, from: usize) -> bool {
+        self.screen.is_apart_from(word, &self.turned[from..])
+    }
+
+    fn push(&mut self, word: u64) {
+        self.codes.push(word);
+        self.turned.extend(self.screen.words().turns(word));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use rand::{Rng, SeedableRng};
+    use rand_chacha::ChaCha8Rng;
+
+    use super::*;
+    use crate::family::algebra::{Arrangement, CycleSpace};
+
+    /// The sweep against the definition, on random words of one part of the tree.
+    #[test]
+    fn the_sweep_finds_the_words_that_no_code_excludes() {
+        let dimension = Dimension::from_bits(36).unwrap();
+        let screen = Screen::new(TagWords::new(dimension), 13, &Rules::published(13));
+        let mut search = Lexicode::published(dimension, 13);
+        search.candidates = 100;
+        let kept = Kept::of(search.codes(Control::default()).unwrap(), &screen);
+        let fine = |w: u64| screen.admits(w) && kept.allows(w, 0);
+        let sweep = Sweep::new(&screen, &kept.turned);
+        // The last part fixes the symbols 011 111 111.
+        let part = sweep.parts() - 1;
+        let mut open = sweep.run(part..part + 1, Control::default()).unwrap();
+        open.sort_unstable();
+        assert!(!open.is_empty() && open.iter().all(|&w| fine(w)));
+
+        let space = CycleSpace::of(dimension);
+        let plain = Arrangement::plain(space);
+        let mut random = ChaCha8Rng::seed_from_u64(5);
+        let mut met = 0;
+        for _ in 0..200_000 {
+            let word = 0b011_111_111u64 << 27 | random.random::<u64>() >> 37;
+            let tag = plain.apply(dimension, &[word])[0];
+            if fine(tag) {
+                met += 1;
+                assert!(open.binary_search(&screen.words().canonical(tag)).is_ok());
+            }
+        }
+        assert!(met > 100, "{met}");
+    }
+
+    #[test]
+    fn inverses_are_inverse() {
+        for x in [1, 3, STEP, u64::MAX] {
+            assert_eq!(inverse_of_odd(x).wrapping_mul(x), 1);
+        }
+    }
+}

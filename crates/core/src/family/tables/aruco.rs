@@ -1,0 +1,134 @@
+//! The predefined dictionaries of OpenCV's ArUco module, as families of square tags.
+//!
+//! The tables are in `families/aruco`, read out of OpenCV by a script beside them; the smaller dictionaries of
+//! a size are the first codes of the largest. What OpenCV calls AprilTags are AprilTag's codes turned by 180°.
+//!
+//! Limits: DICT_ARUCO_ORIGINAL is left out, as some of its markers are others turned; so is what was not tried.
+
+use crate::family::{Construction, Family, FamilyError, Rules, TagWords};
+use crate::lattice::{Dimension, GridKind};
+
+/// A predefined dictionary.
+struct Dictionary {
+    /// Its name in OpenCV.
+    name: &'static str,
+    /// Cells along a side of a marker.
+    side: u32,
+    /// Number of markers.
+    len: usize,
+    /// Cells in which any two markers differ, in any turn.
+    distance: u32,
+}
+
+const fn of(name: &'static str, side: u32, len: usize, distance: u32) -> Dictionary {
+    Dictionary { name, side, len, distance }
+}
+
+const DICTIONARIES: [Dictionary; 19] = [
+    of("DICT_4X4_50", 4, 50, 4),
+    of("DICT_4X4_100", 4, 100, 3),
+    of("DICT_4X4_250", 4, 250, 3),
+    of("DICT_4X4_1000", 4, 1000, 2),
+    of("DICT_5X5_50", 5, 50, 8),
+    of("DICT_5X5_100", 5, 100, 7),
+    of("DICT_5X5_250", 5, 250, 6),
+    of("DICT_5X5_1000", 5, 1000, 5),
+    of("DICT_6X6_50", 6, 50, 13),
+    of("DICT_6X6_100", 6, 100, 12),
+    of("DICT_6X6_250", 6, 250, 11),
+    of("DICT_6X6_1000", 6, 1000, 9),
+    of("DICT_7X7_50", 7, 50, 19),
+    of("DICT_7X7_100", 7, 100, 18),
+    of("DICT_7X7_250", 7, 250, 17),
+    of("DICT_7X7_1000", 7, 1000, 14),
+    of("DICT_APRILTAG_16h5", 4, 30, 5),
+    of("DICT_APRILTAG_25h9", 5, 35, 9),
+    of("DICT_APRILTAG_36h11", 6, 587, 11),
+];
+
+/// The names of the dictionaries, as OpenCV has them.
+pub fn dictionary_names() -> impl Iterator<Item = &'static str> {
+    DICTIONARIES.iter().map(|dictionary| dictionary.name)
+}
+
+/// A dictionary by its name, in any case, with or without `DICT_`: its name in OpenCV, and the dimension of its markers.
+pub fn dictionary(name: &str) -> Option<(&'static str, Dimension)> {
+    let found = find(name)?;
+    Some((found.name, Dimension::from_bits(found.side * found.side).ok()?))
+}
+
+fn find(name: &str) -> Option<&'static Dictionary> {
+    let short = |name: &str| {
+        let upper = name.to_ascii_uppercase();
+        upper.strip_prefix("DICT_").map(str::to_owned).unwrap_or(upper)
+    };
+    DICTIONARIES.iter().find(|dictionary| short(dictionary.name) == short(name))
+}
+
+/// The family of a dictionary, by its name; `None` where there is none of that name.
+pub(in crate::family) fn family(name: &str) -> Option<Result<Family, FamilyError>> {
+    let Dictionary { name, side, len, distance } = find(name)?;
+    Some(codes(name, *side, *len).and_then(|codes| {
+        let dimension = Dimension::from_bits(side * side)
+            .map_err(|error| FamilyError::field("bits", error.to_string()))?;
+        let source = format!("OpenCV, {name}, bits in rows; families/LICENSE-OpenCV.md");
+        let construction = Construction::Imported { source };
+        Family::of(name, GridKind::Checker, dimension, *distance, codes, Rules::NONE, construction)
+    }))
+}
+
+/// The codes of a dictionary.
+fn codes(name: &str, side: u32, len: usize) -> Result<Vec<u64>, FamilyError> {
+    if let Some(bits) = name.strip_prefix("DICT_APRILTAG_") {
+        let family = Family::shipped(&format!("aprilTag{bits}"))?;
+        let words = TagWords::of(family.kind(), family.dimension());
+        return Ok(family.codes().iter().map(|&code| words.turn(words.turn(code))).collect());
+    }
+    let table = match side {
+        4 => include_str!("../../../families/aruco/4x4.txt"),
+        5 => include_str!("../../../families/aruco/5x5.txt"),
+        6 => include_str!("../../../families/aruco/6x6.txt"),
+        _ => include_str!("../../../families/aruco/7x7.txt"),
+    };
+    let codes = table.lines().take(len).map(|code| u64::from_str_radix(code, 16));
+    codes.collect::<Result<_, _>>().map_err(|error| FamilyError::field("codes", error.to_string()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The smallest distance between any two words read off different markers or turns, by comparing all.
+    fn least_distance(family: &Family) -> u32 {
+        let words = TagWords::of(family.kind(), family.dimension());
+        let turns =
+            |code: u64| std::iter::successors(Some(code), |&word| Some(words.turn(word))).take(4);
+        let between = |(i, &code): (usize, &u64)| {
+            let others = family.codes()[..i].iter().flat_map(|&other| turns(other));
+            let least = others.chain(turns(code).skip(1)).map(|word| (code ^ word).count_ones());
+            least.min().unwrap()
+        };
+        family.codes().iter().enumerate().map(between).min().unwrap()
+    }
+
+    #[test]
+    fn dictionaries_have_the_distances_that_are_stated() {
+        for Dictionary { name, len, distance, .. } in &DICTIONARIES {
+            let family = Family::shipped(name).unwrap();
+            assert_eq!(family.len(), *len, "{name}");
+            assert_eq!(family.name(), *name);
+            assert_eq!(least_distance(&family), *distance, "{name}");
+            assert_eq!(Family::from_json(&family.to_json()).unwrap(), family, "{name}");
+        }
+    }
+
+    #[test]
+    fn names_are_those_of_opencv_in_any_case() {
+        for name in ["5x5_100", "DICT_5X5_100", "dict_5x5_100"] {
+            assert_eq!(dictionary(name).unwrap().0, "DICT_5X5_100");
+        }
+        for name in ["5x5", "DICT_ARUCO_ORIGINAL", "8x8_50", ""] {
+            assert!(dictionary(name).is_none(), "{name}");
+        }
+    }
+}

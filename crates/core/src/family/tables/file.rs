@@ -1,0 +1,264 @@
+//! The family file (`docs/formats.md`, “Family”): reading with every field checked, writing, fingerprint.
+
+use std::collections::BTreeMap;
+
+use serde::{Deserialize, Serialize};
+use sha2::{Digest, Sha256};
+
+use crate::Name;
+use crate::family::algebra::AlgebraicConstruction;
+use crate::family::words::parse_word;
+use crate::family::{
+    Beginning, Family, FamilyError, FreeCells, Rules, TagWords, false_positive_rates,
+};
+use crate::lattice::{Dimension, GridKind};
+
+/// Schema and version that this crate writes and reads.
+pub const SCHEMA: &str = "deltille/family/1";
+
+/// How the codes of a family were found.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(tag = "method", rename_all = "kebab-case", deny_unknown_fields)]
+#[non_exhaustive]
+pub enum Construction {
+    /// Candidates `start`, `start + step`, … modulo 2^bits are taken in turn, and each is kept that
+    /// satisfies the rules and is far enough from all kept before (`docs/families.md`, “The
+    /// published construction”).
+    Lexicode {
+        /// First candidate, hexadecimal.
+        start: String,
+        /// Difference of successive candidates.
+        step: u64,
+        /// Number of candidates tried.
+        candidates: u64,
+    },
+    /// A union of cosets of a linear code, arranged on the tag, with some codes exchanged
+    /// ([`crate::family::algebra`]).
+    Algebraic(AlgebraicConstruction),
+    /// Local search from nothing ([`crate::family::search::local::local`]); rerun with the same numbers it gives the same.
+    Search {
+        /// Seed of the random choices.
+        seed: u64,
+        /// Rounds of the search.
+        rounds: u32,
+        /// Moves in each round.
+        steps: u64,
+    },
+    /// Places on boards ([`crate::family::places`]).
+    Places,
+    /// Codes taken over from elsewhere.
+    Imported {
+        /// Where they come from.
+        source: String,
+    },
+}
+
+#[derive(Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct FamilyFile {
+    schema: String,
+    name: String,
+    /// The tiling whose tiles the tags fill.
+    #[serde(default, skip_serializing_if = "is_deltille")]
+    kind: GridKind,
+    bits: u32,
+    distance: u32,
+    fingerprint: String,
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    beginnings: Vec<Beginning>,
+    construction: Construction,
+    rules: Rules,
+    /// Pairs among the codes and their turns at each distance.
+    distance_histogram: BTreeMap<u32, u64>,
+    /// Index = number of corrected bits.
+    false_positive_rate: Vec<f64>,
+    codes: Vec<String>,
+}
+
+fn is_deltille(kind: &GridKind) -> bool {
+    *kind == GridKind::Deltille
+}
+
+pub(in crate::family) fn from_json(json: &str) -> Result<Family, FamilyError> {
+    // The schema is looked at first, so that a file of another version is called just that.
+    #[derive(Deserialize)]
+    struct Head {
+        schema: String,
+    }
+    let Head { schema } = serde_json::from_str(json)?;
+    if schema != SCHEMA {
+        return Err(FamilyError::Schema { found: schema });
+    }
+    let file: FamilyFile = serde_json::from_str(json)?;
+    if file.construction == Construction::Places {
+        // Its codes are computed and not listed.
+        let known = Family::places();
+        if (&file.name, &file.fingerprint) != (&known.name, &known.fingerprint) {
+            let problem = format!("place codes are those of {} alone", known.name);
+            return Err(FamilyError::field("construction", problem));
+        }
+        return Ok(known);
+    }
+    let dimension =
+        Dimension::from_bits(file.bits).map_err(|e| FamilyError::field("bits", e.to_string()))?;
+    let codes = file
+        .codes
+        .iter()
+        .enumerate()
+        .map(|(id, text)| parse_word(text).ok_or((id, text)))
+        .collect::<Result<Vec<u64>, _>>()
+        .map_err(|(id, text)| {
+            let problem = format!("`{text}` is not a hexadecimal word such as 0x08f50a7");
+            FamilyError::field(format!("codes[{id}]"), problem)
+        })?;
+    check_form(&file.name, file.kind, dimension, file.distance, &codes, &file.rules)?;
+    let free = file.rules.free;
+    let used = dimension.bits() - free.map_or(0, |free| free.mask(dimension).count_ones());
+    let rates = false_positive_rates(file.kind, used, file.distance, codes.len());
+    let same = |(stated, rate): (&f64, &f64)| (stated - rate).abs() <= 1e-9 * rate;
+    if rates.len() != file.false_positive_rate.len()
+        || !file.false_positive_rate.iter().zip(&rates).all(same)
+    {
+        let problem = format!("not that of {} such codes, {rates:?}", codes.len());
+        return Err(FamilyError::Claim { field: "false_positive_rate".to_owned(), problem });
+    }
+    let fingerprint = fingerprint(file.kind, dimension, file.distance, free, &codes);
+    if fingerprint != file.fingerprint {
+        let problem = format!(
+            "the file says {}, its codes give {fingerprint}: codes were altered, added or lost; \
+             fetch or generate the file anew",
+            file.fingerprint
+        );
+        return Err(FamilyError::Claim { field: "fingerprint".to_owned(), problem });
+    }
+    let family = Family {
+        name: file.name,
+        kind: file.kind,
+        dimension,
+        distance: file.distance,
+        codes,
+        rules: file.rules,
+        construction: file.construction,
+        histogram: file.distance_histogram,
+        fingerprint,
+        beginnings: Vec::new(),
+        squares: None,
+    };
+    family.with_beginnings(file.beginnings)
+}
+
+pub(in crate::family) fn to_json(family: &Family) -> String {
+    let words = TagWords::of(family.kind, family.dimension);
+    let listed = if family.is_of_places() { &[] } else { family.codes() };
+    let file = FamilyFile {
+        schema: SCHEMA.to_owned(),
+        name: family.name.clone(),
+        kind: family.kind,
+        bits: family.dimension.bits(),
+        distance: family.distance,
+        fingerprint: family.fingerprint.clone(),
+        beginnings: family.beginnings.clone(),
+        construction: family.construction.clone(),
+        rules: family.rules.clone(),
+        distance_histogram: family.histogram.clone(),
+        false_positive_rate: family.false_positive_rates(),
+        codes: listed.iter().map(|&code| words.hex(code)).collect(),
+    };
+    let mut json = serde_json::to_string_pretty(&file).expect("plain data has a JSON form");
+    json.push('\n');
+    json
+}
+
+/// Checks all that can be checked without comparing codes pair by pair.
+pub(in crate::family) fn check_form(
+    name: &str,
+    kind: GridKind,
+    dimension: Dimension,
+    distance: u32,
+    codes: &[u64],
+    rules: &Rules,
+) -> Result<(), FamilyError> {
+    let bits = dimension.bits();
+    Name::without_dots(name).map_err(|problem| FamilyError::field("name", problem))?;
+    if !(1..=bits).contains(&distance) {
+        let problem = format!("{distance} is not between 1 and the {bits} bits of a tag");
+        return Err(FamilyError::field("distance", problem));
+    }
+    check_name(name, dimension, distance)?;
+    rules.check(bits)?;
+    if kind == GridKind::Checker && !(rules.robust.is_empty() && rules.free.is_none()) {
+        let problem = "hidden and free cells are those of triangular tags";
+        return Err(FamilyError::field("rules", problem));
+    }
+    if codes.is_empty() {
+        return Err(FamilyError::field("codes", "there is no code"));
+    }
+    let words = TagWords::of(kind, dimension);
+    if let Some(id) = codes.iter().position(|&code| code > dimension.mask()) {
+        let problem = format!("{} has more than {bits} bits", words.hex(codes[id]));
+        return Err(FamilyError::field(format!("codes[{id}]"), problem));
+    }
+    let free = rules.free.map_or(0, |free| free.mask(dimension));
+    if let Some(id) = codes.iter().position(|&code| code & free != 0) {
+        let problem = format!("{} uses a cell that is free", words.hex(codes[id]));
+        return Err(FamilyError::Claim { field: format!("codes[{id}]"), problem });
+    }
+    let mut by_name: Vec<(u64, usize)> =
+        (0..codes.len()).map(|id| (words.canonical(codes[id]), id)).collect();
+    by_name.sort_unstable();
+    if let Some(pair) = by_name.windows(2).find(|pair| pair[0].0 == pair[1].0) {
+        let (first, second) = (pair[0].1, pair[1].1);
+        let problem = format!(
+            "{} is code {first} again, perhaps turned: remove one",
+            words.hex(codes[second])
+        );
+        return Err(FamilyError::Claim { field: format!("codes[{second}]"), problem });
+    }
+    Ok(())
+}
+
+/// A name such as d25h7 or delTag25h7 must not speak of other bits or another distance.
+///
+/// # Errors
+/// What the name says, and what is the case.
+pub fn check_name(name: &str, dimension: Dimension, distance: u32) -> Result<(), FamilyError> {
+    let rest = ["delTag", "aprilTag", "d"].iter().find_map(|prefix| name.strip_prefix(prefix));
+    let number = |text: &str| text.parse::<u32>().ok();
+    let said = rest.and_then(|rest| rest.split_once('h'));
+    let said = said.and_then(|(bits, distance)| Some((number(bits)?, number(distance)?)));
+    match said {
+        Some(said) if said != (dimension.bits(), distance) => {
+            let problem = format!(
+                "`{name}` speaks of {} bits and distance {}, the family has {} bits and distance \
+                 {distance}",
+                said.0,
+                said.1,
+                dimension.bits()
+            );
+            Err(FamilyError::Claim { field: "name".to_owned(), problem })
+        }
+        _ => Ok(()),
+    }
+}
+
+/// See [`Family::fingerprint`].
+pub(in crate::family) fn fingerprint(
+    kind: GridKind,
+    dimension: Dimension,
+    distance: u32,
+    free: Option<FreeCells>,
+    codes: &[u64],
+) -> String {
+    let words = TagWords::of(kind, dimension);
+    let mut hash = Sha256::new();
+    let kind = if kind == GridKind::Checker { "kind checker\n" } else { "" };
+    hash.update(format!("deltille/family\n{kind}bits {}\ndistance {distance}\n", dimension.bits()));
+    if let Some(free) = free {
+        hash.update(format!("free {}\n", free.name()));
+    }
+    for &code in codes {
+        hash.update(words.hex(code));
+        hash.update("\n");
+    }
+    hash.finalize()[..8].iter().map(|byte| format!("{byte:02x}")).collect()
+}
