@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::sync::Arc;
 
-use deltille::export::calibration::read_sheet;
+use deltille::export::sheet::read_sheet;
 use deltille::limits::Limits;
 use deltille::targets;
 use pyo3::prelude::*;

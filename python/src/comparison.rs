@@ -6,7 +6,7 @@ use deltille::calibrate::{
     self, CameraEstimate, CameraMotion, Diagnosis, Estimate, Reference, Region, Words,
     compare_boards, views,
 };
-use deltille::export::calibration::Sheet;
+use deltille::export::sheet::Sheet;
 use deltille::export::{comparison, pose};
 use deltille::glam::DVec2;
 use deltille::quantity::distance_mm;

@@ -10,7 +10,8 @@ use deltille::calibrate::{
 };
 use deltille::camera;
 use deltille::detect;
-use deltille::export::calibration::{Print, Residuals, Sheet};
+use deltille::export::calibration::{Print, Residuals};
+use deltille::export::sheet::Sheet;
 use deltille::export::{calibration, rig};
 use deltille::layout::Printing;
 use deltille::quantity::{board_accuracy_mm, distance_mm, edge_mm, print_scale};

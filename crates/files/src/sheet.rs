@@ -4,7 +4,7 @@ use deltille_core::calibrate::{PanelPlace, Reference, View};
 use deltille_core::layout::SheetLayout;
 use deltille_core::targets::{Target, TargetSpec};
 
-use crate::export::calibration::Sheet;
+use crate::export::sheet::Sheet;
 
 /// Why what is known of a sheet cannot be used.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]

@@ -5,7 +5,7 @@ use std::path::Path;
 use deltille::camera::Camera;
 use deltille::cli::deltille::settings::Settings;
 use deltille::export::dsc::{self, Dialect};
-use deltille::export::{calibration, csv, detection as detections, orpc, solid_mesh};
+use deltille::export::{calibration, csv, detection as detections, orpc, sheet, solid_mesh};
 use deltille::family::Family;
 use deltille::lattice::GridKind;
 use deltille::layout::Printing;
@@ -65,7 +65,7 @@ pub fn detection(file: File) -> bool {
 }
 
 pub fn sheet(file: File) -> bool {
-    let Some(Ok(sheet)) = file.text().map(|text| calibration::read_sheet(text, &[])) else {
+    let Some(Ok(sheet)) = file.text().map(|text| sheet::read_sheet(text, &[])) else {
         return false;
     };
     assert_finite(sheet.print_scale.into_iter().flatten());

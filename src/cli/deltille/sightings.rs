@@ -15,8 +15,9 @@ use crate::calibrate::{
 use crate::cli::output::tell;
 use crate::cli::values::whole;
 use crate::detect::{Detection, InkEstimate};
-use crate::export::calibration::{self, Print, Sheet};
+use crate::export::calibration::Print;
 use crate::export::detection;
+use crate::export::sheet::{self, Sheet};
 use crate::export::tables::folder;
 use crate::lattice::GridKind;
 use crate::layout::Printing;
@@ -198,7 +199,7 @@ impl SheetArgs {
         };
         let show = || format!("--shape: {}", path.display());
         let text = limits.read_text(path).context("--shape")?;
-        let sheet = calibration::read_sheet(&text, targets).with_context(show)?;
+        let sheet = sheet::read_sheet(&text, targets).with_context(show)?;
         Ok(Sheet { sheets, ..sheet })
     }
 }

@@ -6,13 +6,32 @@ use glam::DVec3;
 use nalgebra::DMatrix;
 use serde::Serialize;
 
-use super::calibration::Residuals;
 use super::motion::Motion;
 use deltille_core::calibrate::{
     BoardShape, CameraEstimate, ChangedIntrinsic, Coverage, Diagnosis, Estimate, Instead,
     LackOfFit, LensEnd, PanelRef, Source, TargetMap, ViewEstimate, Words,
 };
 use deltille_core::camera::{Lens, SplineGrid};
+use deltille_core::detect::InkEstimate;
+
+/// What is known of the print that was photographed, besides its plan.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Print {
+    /// Print scale, measured over stated length, across and up the sheet; `None` where it was not measured.
+    pub scale: Option<[f64; 2]>,
+    /// Ink spread estimated from the detections; `None` where it was not estimated.
+    pub ink: Option<InkEstimate>,
+}
+
+/// Whether a file lists the residual of every corner, which makes up nearly all of its length.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Residuals {
+    /// Views state their number of corners and the RMS residual only.
+    #[default]
+    LeftOut,
+    /// Views list all corners.
+    Listed,
+}
 
 /// The knot grid of a camera with a spline lens.
 pub(super) fn spline(camera: &CameraEstimate) -> Option<SplineGrid> {

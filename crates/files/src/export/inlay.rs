@@ -16,14 +16,12 @@ use rstar::primitives::GeomWithData;
 use rstar::{AABB, RTree};
 use spade::{ConstrainedDelaunayTriangulation, Point2, Triangulation};
 
-use super::mesh::{MeshError, Meshing};
+pub use super::meshing::{INLAY_MM, LEAST_INLAY_MM};
+use super::meshing::{MeshError, Meshing};
 use deltille_core::artwork::{Part, Shape, panel_shapes, subject};
 use deltille_core::family::Family;
 use deltille_core::polygon::rectangle;
 use deltille_core::targets::{Panel, Polyhedron, Target, TargetSpec};
-
-/// Depth of the inlay, mm, unless another is asked for: two layers of most printers.
-pub const INLAY_MM: f64 = 0.4;
 
 /// Points that are nearer than this are one, mm: the same corner, computed in two ways.
 const SAME_MM: f64 = 1e-6;
@@ -171,9 +169,6 @@ fn deepest(place: DVec3, planes: &[(DVec3, DVec3)], face: usize) -> f64 {
     });
     depths.fold(f64::INFINITY, f64::min)
 }
-
-/// Thinnest inlay, mm: thinner ones are no layer of any printer.
-pub const LEAST_INLAY_MM: f64 = 0.05;
 
 /// The place behind a point of the surface of a panel, in the target frame.
 fn below(panel: &Panel, point: DVec2, depth_mm: f64) -> DVec3 {

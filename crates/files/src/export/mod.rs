@@ -26,6 +26,8 @@ pub mod kind;
 pub mod laser_svg;
 #[cfg(feature = "meshes")]
 pub mod mesh;
+#[cfg(feature = "meshes")]
+mod meshing;
 mod motion;
 pub mod next_view;
 pub mod npy;
@@ -43,6 +45,7 @@ pub mod rig;
 pub mod saved;
 #[cfg(feature = "meshes")]
 pub mod scene;
+pub mod sheet;
 #[cfg(feature = "meshes")]
 pub mod solid_mesh;
 pub mod staging;

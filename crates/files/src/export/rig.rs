@@ -3,11 +3,10 @@
 
 use serde::Serialize;
 
-use super::calibration::{Print, Residuals};
 use super::estimate::{
-    CoverageRecord, DiagnosisRecord, MapRecord, ParameterRecord, ProjectionRecord, ShapeRecord,
-    ViewRecord, correlations, coverage, diagnoses, map, parameters, projection, shape, spline,
-    views,
+    CoverageRecord, DiagnosisRecord, MapRecord, ParameterRecord, Print, ProjectionRecord,
+    Residuals, ShapeRecord, ViewRecord, correlations, coverage, diagnoses, map, parameters,
+    projection, shape, spline, views,
 };
 use super::finding::{FindingRecord, records};
 use super::motion::Motion;

@@ -8,7 +8,7 @@
 
 use std::ops::Range;
 
-use super::mesh::{MAX_TEXTURE_PX, MeshError, Resolution, TEXELS_PER_BIT};
+use super::meshing::{MAX_TEXTURE_PX, MeshError, Resolution, TEXELS_PER_BIT};
 use deltille_core::artwork::Atlas;
 use deltille_core::polygon::area;
 use deltille_core::targets::{Face, Panel};
