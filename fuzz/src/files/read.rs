@@ -5,7 +5,7 @@ use std::path::Path;
 use deltille::camera::Camera;
 use deltille::cli::deltille::settings::Settings;
 use deltille::export::dsc::{self, Dialect};
-use deltille::export::{calibration, csv, detection as detections, orpc, sheet, solid_mesh};
+use deltille::export::{csv, detection as detections, orpc, sheet, solid_mesh};
 use deltille::family::Family;
 use deltille::lattice::GridKind;
 use deltille::layout::Printing;

@@ -15,15 +15,23 @@ use std::io;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
-use super::dsc::{self, Dialect, DscError};
-use super::inlay::InlaidBodies;
-use super::kind::Kind;
-use super::mesh::{MeshError, Meshing, TexturedMesh};
-use super::staging::Staging;
-use super::{
-    atomic, dxf, gltf, laser_file_name, laser_svg, obj, pdf, png, scene, sheet_file_name, stl, svg,
-    threemf,
-};
+use crate::export::corners::dsc::{self, Dialect, DscError};
+use crate::export::meshes::gltf;
+use crate::export::meshes::inlay::InlaidBodies;
+use crate::export::meshes::mesh::{MeshError, Meshing, TexturedMesh};
+use crate::export::meshes::obj;
+use crate::export::meshes::scene;
+use crate::export::meshes::stl;
+use crate::export::meshes::threemf;
+use crate::export::pages::dxf;
+use crate::export::pages::laser_svg;
+use crate::export::pages::pdf;
+use crate::export::pages::png;
+use crate::export::pages::svg;
+use crate::export::writing::atomic;
+use crate::export::writing::kind::Kind;
+use crate::export::writing::staging::Staging;
+use crate::export::{laser_file_name, sheet_file_name};
 use crate::limits::{Limits, ReadError};
 use crate::target_file;
 use deltille_core::artwork::{self, ArtworkError, CuttingError};
@@ -354,7 +362,7 @@ pub enum SetError {
     },
 }
 
-/// Writes files into a folder, all or none, see [`super::staging`], and returns where they are. A file that is there
+/// Writes files into a folder, all or none, see [`crate::export::writing::staging`], and returns where they are. A file that is there
 /// already is replaced where it is of the same kind, or with `overwrite`; the description of another board only with that.
 ///
 /// # Errors

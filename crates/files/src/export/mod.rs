@@ -1,5 +1,9 @@
 //! Artwork, targets and results to files and back, one module for each format.
 //!
+//! In the order in which they come to be: `pages` (artwork as PDF, SVG, PNG, and drawings for cutters), `meshes` (targets in
+//! space), `corners` (detections, lists of boards), `cameras` (calibrations and what follows from them); `writing` puts all of
+//! them on disk, and [`artifacts`] makes all that there is of a target.
+//!
 //! Writers of artwork take shapes in millimetres and only convert units and syntax; writers of
 //! targets and results return text. Files appear completely or not at all (see [`atomic`]), and
 //! sets of files together (see [`staging`]); [`kind`] recognises what an existing file is before it
@@ -7,68 +11,32 @@
 
 #[cfg(all(feature = "meshes", feature = "print"))]
 pub mod artifacts;
-pub mod atomic;
-pub mod calibration;
-pub mod camera;
-pub mod comparison;
-pub mod csv;
-pub mod detection;
-pub mod dsc;
-pub mod dxf;
-mod estimate;
-mod finding;
-#[cfg(feature = "meshes")]
-pub mod gltf;
-#[cfg(feature = "meshes")]
-pub mod inlay;
-pub mod kind;
-#[cfg(feature = "print")]
-pub mod laser_svg;
-#[cfg(feature = "meshes")]
-pub mod mesh;
-#[cfg(feature = "meshes")]
-mod meshing;
-mod motion;
-pub mod next_view;
-pub mod npy;
-#[cfg(feature = "meshes")]
-pub mod obj;
-pub mod orpc;
+mod cameras;
+mod corners;
+mod meshes;
+mod pages;
+mod writing;
+
+pub use cameras::{
+    calibration, camera, comparison, next_view, pose, rig, saved, sheet, truth, undistortion,
+};
 #[cfg(feature = "overlay")]
-pub mod overlay;
-#[cfg(feature = "print")]
-pub mod pdf;
-#[cfg(feature = "print")]
-pub mod png;
-pub mod pose;
-pub mod rig;
-pub mod saved;
-#[cfg(feature = "meshes")]
-pub mod scene;
-pub mod sheet;
-#[cfg(feature = "meshes")]
-pub mod solid_mesh;
-pub mod staging;
-pub mod stl;
-#[cfg(feature = "print")]
-mod supersample;
-#[cfg(feature = "print")]
-pub mod svg;
+pub use corners::overlay;
 #[cfg(feature = "parquet")]
-pub mod tables;
+pub use corners::tables;
+pub use corners::{csv, detection, dsc, npy, orpc, tp};
+pub use meshes::stl;
 #[cfg(feature = "meshes")]
-pub mod texture;
-#[cfg(feature = "meshes")]
-pub mod threemf;
-/// Board poses beside a `.dsc`.
-pub mod tp;
-pub mod truth;
-pub mod undistortion;
+pub use meshes::{gltf, inlay, mesh, obj, scene, solid_mesh, texture, threemf};
+pub use pages::dxf;
+#[cfg(feature = "print")]
+pub use pages::{laser_svg, pdf, png, svg};
+pub use writing::{atomic, kind, staging};
 
 use std::path::PathBuf;
 
 #[cfg(feature = "print")]
-pub use supersample::{Block, SUBPIXELS, render as supersample};
+pub use pages::supersample::{Block, SUBPIXELS, render as supersample};
 
 /// Why a file was not written.
 #[derive(Debug, thiserror::Error)]

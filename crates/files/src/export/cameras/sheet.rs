@@ -3,7 +3,8 @@
 use glam::DVec3;
 use serde::Deserialize;
 
-use super::{calibration, rig};
+use super::calibration;
+use super::rig;
 use deltille_core::calibrate::{SHAPE_COEFFICIENTS as COUNT, Shape};
 use deltille_core::json::{self, ReadError};
 use deltille_core::layout::SheetLayout;
@@ -59,7 +60,7 @@ struct SheetOfFile {
 
 /// A shape as calibration and rig files store it.
 #[derive(Deserialize)]
-pub(super) struct StoredShape {
+pub(in crate::export) struct StoredShape {
     #[serde(deserialize_with = "quantity::place_mm::de")]
     middle_mm: DVec3,
     #[serde(deserialize_with = "quantity::edge_mm::de")]
@@ -69,7 +70,7 @@ pub(super) struct StoredShape {
 }
 
 impl StoredShape {
-    pub(super) fn shape(self) -> Shape {
+    pub(in crate::export) fn shape(self) -> Shape {
         let Self { middle_mm, reach_mm, coefficients_mm } = self;
         Shape { middle_mm, reach_mm, coefficients_mm }
     }

@@ -270,7 +270,7 @@ struct SavedCorner {
 }
 
 #[derive(Deserialize)]
-pub(super) struct SavedPose {
+pub(in crate::export) struct SavedPose {
     #[serde(deserialize_with = "quantity::cosine::de")]
     rotation: [f64; 9],
     #[serde(deserialize_with = "quantity::figure::de")]
@@ -564,7 +564,7 @@ fn lens_of(names: &[&str], spline: Option<SplineGrid>) -> Option<Lens> {
 }
 
 impl SavedPose {
-    pub(super) fn pose(&self) -> Pose {
+    pub(in crate::export) fn pose(&self) -> Pose {
         let rotation = DMat3::from_cols_array(&self.rotation).transpose();
         Pose { rotation: DQuat::from_mat3(&rotation).normalize(), translation: self.translation_mm }
     }

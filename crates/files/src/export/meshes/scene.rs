@@ -5,9 +5,9 @@
 
 use glam::{DVec2, DVec3};
 
-use super::GENERATOR;
 use super::mesh::TexturedMesh;
 use super::obj::{numbered, part_name, texture_name};
+use crate::export::GENERATOR;
 
 /// Metres per millimetre, along each axis, as the formats have it.
 pub const SCALE: &str = "0.001 0.001 0.001";

@@ -6,8 +6,8 @@ use std::fmt::Write as _;
 use glam::DMat3;
 use serde::Serialize;
 
-use super::GENERATOR;
-use super::npy;
+use crate::export::GENERATOR;
+use crate::export::corners::npy;
 use deltille_core::camera::{PixelMap, Rectification, Undistortion};
 use deltille_core::json;
 

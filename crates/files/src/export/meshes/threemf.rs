@@ -11,8 +11,8 @@ use flate2::write::DeflateEncoder;
 use flate2::{Compression, Crc};
 use glam::DVec3;
 
-use super::GENERATOR;
 use super::inlay::{Body, InlaidBodies};
+use crate::export::GENERATOR;
 use deltille_core::artwork::subject;
 use deltille_core::targets::{ClosedMesh, ClosedMeshError, Target, triangles};
 

@@ -6,7 +6,7 @@ use deltille_core::calibrate::{Diagnosis, Estimate, Finding, PanelRef, Shared, W
 
 /// A finding as files store it; `panel` is an id, `camera` a name.
 #[derive(Debug, Default, Serialize)]
-pub(super) struct FindingRecord {
+pub(in crate::export) struct FindingRecord {
     kind: &'static str,
     #[serde(skip_serializing_if = "Option::is_none")]
     panel: Option<PanelRef>,
@@ -31,7 +31,10 @@ pub(super) struct FindingRecord {
 }
 
 /// The records of an estimate's findings.
-pub(super) fn records(estimate: &Estimate, print_scale: Option<[f64; 2]>) -> Vec<FindingRecord> {
+pub(in crate::export) fn records(
+    estimate: &Estimate,
+    print_scale: Option<[f64; 2]>,
+) -> Vec<FindingRecord> {
     let words = Words::new(estimate, print_scale);
     let record = |finding: &Finding| {
         let name = |camera: usize| estimate.camera_name(camera).map(str::to_owned);

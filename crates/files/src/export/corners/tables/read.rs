@@ -17,7 +17,7 @@ use serde_json::{Map, Value};
 use super::column::{self, Cell, Column, Kind};
 use super::write::kind_name;
 use super::{CORNERS_SCHEMA, PICTURES_SCHEMA, Picture, SCHEMA, TableError};
-use crate::export::detection;
+use crate::export::corners::detection;
 use crate::limits::{self, Broken, Kind as Limit, Limits};
 use deltille_core::detect::{Detection, Grid, GridCorner, InkEstimate, Reason, ToneEstimate};
 use deltille_core::lattice::GridKind;

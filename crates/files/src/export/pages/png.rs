@@ -6,7 +6,10 @@ use std::path::Path;
 use kurbo::{Affine, BezPath, PathEl, Point, Rect, Shape as _, Stroke, StrokeOpts};
 use tiny_skia::{FillRule, Mask, PathBuilder, Transform};
 
-use super::{Block, ExportError, GENERATOR, SUBPIXELS, atomic, kind, supersample};
+use super::supersample::render as supersample;
+use crate::export::writing::atomic;
+use crate::export::writing::kind;
+use crate::export::{Block, ExportError, GENERATOR, SUBPIXELS};
 use deltille_core::artwork::{Paint, Shape, Sheet};
 
 /// Most pixels of an image: 2 gigapixels, as of an A0 sheet at 1200 dpi.

@@ -8,9 +8,9 @@ use serde::Serialize;
 
 use super::motion::Motion;
 #[cfg(feature = "print")]
-use super::overlay::{self, Outlined, OverlayError};
+use crate::export::corners::overlay::{self, Outlined, OverlayError};
 #[cfg(feature = "print")]
-use super::svg::HEAD;
+use crate::export::pages::svg::HEAD;
 use deltille_core::calibrate::NextView;
 #[cfg(feature = "print")]
 use deltille_core::raster::AnyGray;

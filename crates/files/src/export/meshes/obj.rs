@@ -6,8 +6,8 @@ use std::ops::Range;
 
 use glam::{DVec2, DVec3};
 
-use super::GENERATOR;
 use super::mesh::TexturedMesh;
+use crate::export::GENERATOR;
 use crate::limits;
 use deltille_core::targets::{ClosedMesh, ClosedMeshError, is_coordinate};
 
@@ -134,6 +134,11 @@ pub fn texture_name(name: &str, texture: usize, count: usize) -> String {
 }
 
 /// A word for one of so many, counted from 0, with its number where there are several.
-pub(super) fn numbered(word: String, between: &str, index: usize, count: usize) -> String {
+pub(in crate::export) fn numbered(
+    word: String,
+    between: &str,
+    index: usize,
+    count: usize,
+) -> String {
     if count == 1 { word } else { format!("{word}{between}{}", index + 1) }
 }

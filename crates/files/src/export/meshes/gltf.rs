@@ -6,9 +6,9 @@ use std::path::Path;
 
 use serde_json::{Value, json};
 
-use super::atomic;
 use super::mesh::TexturedMesh;
 use super::obj::{material_name, numbered};
+use crate::export::writing::atomic;
 
 /// Component type `f32`. Like the constants below, a number of the glTF 2.0 specification.
 pub const FLOAT: u32 = 5126;

@@ -11,7 +11,7 @@ use tiny_skia::{
     Transform,
 };
 
-use super::kind::signed_png;
+use crate::export::writing::kind::signed_png;
 use deltille_core::artwork::text;
 use deltille_core::detect::{Detection, Grid};
 use deltille_core::lattice::{GridKind, Vertex};
@@ -66,7 +66,7 @@ pub fn png(image: &AnyGray, detection: &Detection) -> Result<Vec<u8>, OverlayErr
 
 /// The PNG file of an image of a size, px, black where no photograph is given, with outlines and places drawn in by lines
 /// so wide, px.
-pub(super) fn outlined(
+pub(in crate::export) fn outlined(
     image: Option<&AnyGray>,
     [width, height]: [u32; 2],
     drawn: Option<&Outlined>,
@@ -89,7 +89,7 @@ pub(super) fn outlined(
 }
 
 /// Polygons, filled faintly, a line of twice their outlines' width, and dots, px.
-pub(super) struct Outlined<'a> {
+pub(in crate::export) struct Outlined<'a> {
     pub polygons: &'a [Vec<DVec2>],
     pub line: Vec<DVec2>,
     pub dots: Vec<DVec2>,

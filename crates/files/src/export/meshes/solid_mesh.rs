@@ -146,8 +146,8 @@ fn indices(property: &Property) -> Option<Vec<usize>> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::stl;
     use super::*;
+    use crate::export::meshes::stl;
 
     /// A cube with its sides in two triangles each.
     fn cube() -> Vec<[DVec3; 3]> {

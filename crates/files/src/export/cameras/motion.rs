@@ -7,7 +7,7 @@ use deltille_core::camera::Pose;
 
 /// A pose with its standard deviations, as files store it.
 #[derive(Serialize)]
-pub(super) struct Motion {
+pub(in crate::export) struct Motion {
     /// Row-major.
     rotation: [f64; 9],
     translation_mm: DVec3,
@@ -20,7 +20,7 @@ pub(super) struct Motion {
 }
 
 impl Motion {
-    pub(super) fn new(pose: &Pose, sd: Option<[f64; 6]>) -> Self {
+    pub(in crate::export) fn new(pose: &Pose, sd: Option<[f64; 6]>) -> Self {
         Self {
             rotation: DMat3::from_quat(pose.rotation).transpose().to_cols_array(),
             translation_mm: pose.translation,

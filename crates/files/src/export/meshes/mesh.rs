@@ -7,7 +7,8 @@ pub use super::meshing::{
     PLATE_MM, Resolution, TEXELS_PER_BIT,
 };
 use super::texture::{Finest, Picture, Surface, pictures};
-use super::{GENERATOR, png};
+use crate::export::GENERATOR;
+use crate::export::pages::png;
 use deltille_core::family::Family;
 use deltille_core::lattice::GridKind;
 use deltille_core::polygon::rectangle;

@@ -133,12 +133,12 @@ fn temporary_file(folder: &Path) -> io::Result<(tempfile::NamedTempFile, Unfinis
 }
 
 /// A temporary file or folder, registered while it is written so that [`abandon`] can remove it.
-pub(super) struct Unfinished(PathBuf);
+pub(in crate::export) struct Unfinished(PathBuf);
 
 impl Unfinished {
     /// Creates and registers a temporary file or folder. Another process that cleans up may remove
     /// it before it is locked; then it is created again.
-    pub(super) fn begin<T>(
+    pub(in crate::export) fn begin<T>(
         mut make: impl FnMut() -> io::Result<(T, PathBuf)>,
     ) -> io::Result<(T, Self)> {
         let mut unfinished = unfinished();
@@ -164,7 +164,7 @@ fn unfinished() -> MutexGuard<'static, Vec<PathBuf>> {
 }
 
 /// Keeps [`abandon`] waiting while the result lives.
-pub(super) fn moving() -> MutexGuard<'static, ()> {
+pub(in crate::export) fn moving() -> MutexGuard<'static, ()> {
     MOVING.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
@@ -181,7 +181,7 @@ pub fn abandon() -> impl Sized {
 }
 
 /// Removes a file or folder; where that fails, the next run will.
-pub(super) fn remove(path: &Path) {
+pub(in crate::export) fn remove(path: &Path) {
     let _ = match path.is_dir() {
         true => std::fs::remove_dir_all(path),
         false => std::fs::remove_file(path),
@@ -189,31 +189,33 @@ pub(super) fn remove(path: &Path) {
 }
 
 /// Creates a locked temporary folder.
-pub(super) fn temporary_folder(folder: &Path) -> io::Result<(tempfile::TempDir, Option<File>)> {
+pub(in crate::export) fn temporary_folder(
+    folder: &Path,
+) -> io::Result<(tempfile::TempDir, Option<File>)> {
     let made = tempfile::Builder::new().prefix(PREFIX).rand_bytes(RANDOM).tempdir_in(folder)?;
     let lock = lock(made.path());
     Ok((made, lock))
 }
 
 /// Whether a name is that of a temporary file or folder.
-pub(super) fn is_temporary(name: &str) -> bool {
+pub(in crate::export) fn is_temporary(name: &str) -> bool {
     let random = name.strip_prefix(PREFIX);
     random.is_some_and(|r| r.len() == RANDOM && r.bytes().all(|b| b.is_ascii_alphanumeric()))
 }
 
 /// Waits for the lock of a file or folder, held until the result is dropped; `None` where the
 /// system does not support it.
-pub(super) fn lock(path: &Path) -> Option<File> {
+pub(in crate::export) fn lock(path: &Path) -> Option<File> {
     File::open(path).ok().filter(|file| file.lock().is_ok())
 }
 
 /// Takes the lock of a file or folder unless a living process holds it.
-pub(super) fn lock_of_left(path: &Path) -> Option<File> {
+pub(in crate::export) fn lock_of_left(path: &Path) -> Option<File> {
     File::open(path).ok().filter(|file| file.try_lock().is_ok())
 }
 
 /// Flushes the directory entries of a folder to the disk, where the system supports it.
-pub(super) fn sync_folder(folder: &Path) {
+pub(in crate::export) fn sync_folder(folder: &Path) {
     let _ = File::open(folder).and_then(|folder| folder.sync_all());
 }
 

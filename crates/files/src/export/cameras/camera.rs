@@ -10,7 +10,7 @@ use std::fmt::Write as _;
 use glam::{DMat3, DMat4};
 use serde_json::json;
 
-use super::GENERATOR;
+use crate::export::GENERATOR;
 use deltille_core::camera::{Camera, Lens, Pose, SplineGrid};
 use deltille_core::name;
 

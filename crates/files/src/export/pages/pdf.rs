@@ -14,7 +14,8 @@ use lopdf::xref::XrefType;
 use lopdf::{Dictionary, Document, Object, Stream, StringFormat, dictionary};
 use sha2::{Digest, Sha256};
 
-use super::{ExportError, GENERATOR, atomic};
+use crate::export::writing::atomic;
+use crate::export::{ExportError, GENERATOR};
 use deltille_core::artwork::{Artwork, Paint, Part, Sheet};
 use deltille_core::layout::{Finish, LineKind};
 

@@ -34,7 +34,7 @@ pub enum Residuals {
 }
 
 /// The knot grid of a camera with a spline lens.
-pub(super) fn spline(camera: &CameraEstimate) -> Option<SplineGrid> {
+pub(in crate::export) fn spline(camera: &CameraEstimate) -> Option<SplineGrid> {
     match &camera.camera.lens {
         Lens::Spline(spline) => Some(spline.grid()),
         _ => None,
@@ -42,7 +42,7 @@ pub(super) fn spline(camera: &CameraEstimate) -> Option<SplineGrid> {
 }
 
 #[derive(Serialize)]
-pub(super) struct ParameterRecord<'a> {
+pub(in crate::export) struct ParameterRecord<'a> {
     name: &'a str,
     value: f64,
     sd: Option<f64>,
@@ -52,7 +52,7 @@ pub(super) struct ParameterRecord<'a> {
 
 /// Uncertainty of the projections of a camera.
 #[derive(Serialize)]
-pub(super) struct ProjectionRecord {
+pub(in crate::export) struct ProjectionRecord {
     /// For a rotation (rad) and a translation (mm) along each axis, its derivative by each
     /// estimated parameter.
     alignment: Vec<Vec<f64>>,
@@ -79,7 +79,7 @@ struct UncertaintyRecord {
 }
 
 #[derive(Serialize)]
-pub(super) struct ViewRecord<'a> {
+pub(in crate::export) struct ViewRecord<'a> {
     name: &'a str,
     /// The frame of the view, where its name differs.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -96,7 +96,7 @@ pub(super) struct ViewRecord<'a> {
 
 /// Number of corners in each cell of the image, row by row.
 #[derive(Serialize)]
-pub(super) struct CoverageRecord {
+pub(in crate::export) struct CoverageRecord {
     columns: usize,
     rows: usize,
     corners: Vec<u32>,
@@ -119,7 +119,7 @@ struct CornerRecord<'a> {
 }
 
 #[derive(Serialize)]
-pub(super) struct ShapeRecord {
+pub(in crate::export) struct ShapeRecord {
     middle_mm: DVec3,
     reach_mm: f64,
     /// b₁ … b₇, a₁, a₂ of [`deltille_core::calibrate::Shape`].
@@ -133,7 +133,7 @@ pub(super) struct ShapeRecord {
 
 /// A diagnosis of an estimate that is not a finding, with the figures behind its text.
 #[derive(Debug, Default, Serialize)]
-pub(super) struct DiagnosisRecord<'a> {
+pub(in crate::export) struct DiagnosisRecord<'a> {
     kind: &'static str,
     #[serde(skip_serializing_if = "Option::is_none")]
     camera: Option<&'a str>,
@@ -199,7 +199,7 @@ pub(super) struct DiagnosisRecord<'a> {
     text: String,
 }
 
-pub(super) fn parameters(camera: &CameraEstimate) -> Vec<ParameterRecord<'_>> {
+pub(in crate::export) fn parameters(camera: &CameraEstimate) -> Vec<ParameterRecord<'_>> {
     let parameters = camera.parameters.iter().zip(camera.observed_sd());
     parameters
         .map(|(p, observed_sd)| ParameterRecord {
@@ -215,7 +215,7 @@ fn lower_triangle(matrix: &DMatrix<f64>) -> Vec<Vec<f64>> {
     (0..matrix.nrows()).map(|i| (0..=i).map(|j| matrix[(i, j)]).collect()).collect()
 }
 
-pub(super) fn projection(camera: &CameraEstimate) -> Option<ProjectionRecord> {
+pub(in crate::export) fn projection(camera: &CameraEstimate) -> Option<ProjectionRecord> {
     let known = camera.projection.as_ref()?;
     let (rows, columns) = known.alignment.shape();
     let row = |i: usize| (0..columns).map(|j| known.alignment[(i, j)]).collect();
@@ -259,18 +259,18 @@ fn correlations_of(covariance: &DMatrix<f64>, are_many: bool) -> Vec<Vec<f64>> {
     (0..c.nrows()).map(|i| (0..c.nrows()).map(|j| of(i, j)).collect()).collect()
 }
 
-pub(super) fn correlations(camera: &CameraEstimate) -> Vec<Vec<f64>> {
+pub(in crate::export) fn correlations(camera: &CameraEstimate) -> Vec<Vec<f64>> {
     correlations_of(&camera.covariance, spline(camera).is_some())
 }
 
-pub(super) fn coverage(camera: &CameraEstimate) -> CoverageRecord {
+pub(in crate::export) fn coverage(camera: &CameraEstimate) -> CoverageRecord {
     let of = Coverage::of(camera);
     let [columns, rows] = of.cells();
     CoverageRecord { columns, rows, corners: of.counts().to_vec() }
 }
 
 /// The views of a camera; poses have standard deviations for a single camera.
-pub(super) fn views<'a>(
+pub(in crate::export) fn views<'a>(
     estimate: &'a Estimate,
     camera: &'a CameraEstimate,
     residuals: Residuals,
@@ -305,7 +305,7 @@ pub(super) fn views<'a>(
     camera.views.iter().map(record).collect()
 }
 
-pub(super) fn shape(found: BoardShape) -> ShapeRecord {
+pub(in crate::export) fn shape(found: BoardShape) -> ShapeRecord {
     ShapeRecord {
         middle_mm: found.shape.middle_mm,
         reach_mm: found.shape.reach_mm,
@@ -320,7 +320,7 @@ pub(super) fn shape(found: BoardShape) -> ShapeRecord {
 
 /// The measured offsets of the corners of a target.
 #[derive(Serialize)]
-pub(super) struct MapRecord<'a> {
+pub(in crate::export) struct MapRecord<'a> {
     expected_mm: [f64; 2],
     rms_mm: [f64; 2],
     significant: usize,
@@ -341,7 +341,7 @@ struct OffsetRecord<'a> {
 }
 
 /// The record of the measured corners of a target.
-pub(super) fn map<'a>(estimate: &'a Estimate, found: &'a TargetMap) -> MapRecord<'a> {
+pub(in crate::export) fn map<'a>(estimate: &'a Estimate, found: &'a TargetMap) -> MapRecord<'a> {
     let corners = found.corners().iter().map(|corner| OffsetRecord {
         target: estimate.target_name(corner.panel),
         panel: corner.panel,
@@ -370,7 +370,7 @@ pub fn is_failure(kind: &str) -> bool {
 }
 
 /// The diagnoses that are not findings, which files list separately.
-pub(super) fn diagnoses<'a>(
+pub(in crate::export) fn diagnoses<'a>(
     estimate: &'a Estimate,
     diagnoses: &'a [Diagnosis],
     print_scale: Option<[f64; 2]>,

@@ -188,7 +188,7 @@ pub fn read(text: &str) -> Result<Detection, DetectionFileError> {
 }
 
 /// Refuses corners that stand twice or whose covariance is none.
-pub(super) fn check_corners(grids: &[Grid]) -> Result<(), DetectionFileError> {
+pub(in crate::export) fn check_corners(grids: &[Grid]) -> Result<(), DetectionFileError> {
     // A repeated corner would count twice. A panel may be seen in several grids.
     let (mut places, mut firsts) = (BTreeSet::new(), BTreeMap::new());
     for (grid, of_grid) in grids.iter().enumerate() {

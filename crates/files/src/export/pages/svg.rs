@@ -7,7 +7,8 @@ use ::svg::Document;
 use ::svg::node::element::{Description, Group, Path as PathElement, Rectangle, Title};
 use kurbo::{Affine, BezPath, PathEl, Point};
 
-use super::{ExportError, atomic};
+use crate::export::ExportError;
+use crate::export::writing::atomic;
 use deltille_core::artwork::{Artwork, Paint, Part, Shape};
 
 /// Decimals of a coordinate: to a tenth of a micrometre.
@@ -91,7 +92,7 @@ fn name(part: Part) -> String {
 }
 
 /// The data of a path.
-pub(super) fn data(path: &BezPath) -> String {
+pub(in crate::export) fn data(path: &BezPath) -> String {
     let mut data = String::new();
     let p = |p: Point| format!("{} {}", number(p.x), number(p.y));
     for element in path.elements() {
@@ -108,7 +109,7 @@ pub(super) fn data(path: &BezPath) -> String {
 }
 
 /// A number without trailing zeros.
-pub(super) fn number(value: f64) -> String {
+pub(in crate::export) fn number(value: f64) -> String {
     let fixed = format!("{value:.DECIMALS$}");
     match fixed.trim_end_matches('0').trim_end_matches('.') {
         "-0" => "0".to_owned(),

@@ -286,7 +286,7 @@ fn line(record: &Record) -> Result<CutPath, DxfError> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::export::dxf::text;
+    use crate::export::pages::dxf::text;
 
     fn drawing() -> CutDrawing {
         let path =

@@ -18,7 +18,7 @@ pub const MAX_TEXTURES: u32 = 64;
 
 /// What carries boards: the faces of a solid, or the sides of a plate.
 #[derive(Clone, Copy)]
-pub(super) enum Surface<'a> {
+pub(in crate::export) enum Surface<'a> {
     Faces(&'a [Face]),
     Plate(&'a [Panel]),
 }
@@ -48,14 +48,14 @@ impl Surface<'_> {
 }
 
 /// Some faces, by their numbers, and how they lie on their texture.
-pub(super) struct Picture {
+pub(in crate::export) struct Picture {
     pub faces: Range<usize>,
     pub atlas: Atlas,
 }
 
 /// The smallest thing on a surface, which must be sharp.
 #[derive(Clone, Copy)]
-pub(super) struct Finest {
+pub(in crate::export) struct Finest {
     /// What it is called.
     pub name: &'static str,
     /// Its edge, mm.
@@ -70,7 +70,7 @@ pub(super) struct Finest {
 ///
 /// # Errors
 /// When there are fewer faces than textures, or a texture would be too large, or too coarse.
-pub(super) fn pictures(
+pub(in crate::export) fn pictures(
     surface: Surface,
     count: u32,
     resolution: Resolution,

@@ -14,7 +14,7 @@ use std::fs::File;
 use std::io::{self, Read, Seek, SeekFrom};
 use std::path::Path;
 
-use super::dsc;
+use crate::export::corners::dsc;
 use deltille_core::json;
 use deltille_core::words::cut;
 
@@ -73,7 +73,7 @@ impl Kind {
             let Png { software, is_to_scale } = Png::of(content);
             let is_own = software.is_some_and(|by| by.starts_with(b"deltille "));
             signed(if is_to_scale && is_own { "PNG to scale" } else { "PNG" }, is_own)
-        } else if content.starts_with(super::npy::MAGIC) {
+        } else if content.starts_with(crate::export::corners::npy::MAGIC) {
             Self::words("an array of NumPy")
         } else if content.starts_with(PARQUET) {
             // The file ends with what describes it, which ends with the name of its writer.
@@ -261,7 +261,7 @@ pub fn signed_png(mut png: Vec<u8>) -> Vec<u8> {
     let mut chunk = b"tEXt".to_vec();
     chunk.extend(SOFTWARE.bytes());
     chunk.push(0);
-    chunk.extend(super::GENERATOR.bytes());
+    chunk.extend(crate::export::GENERATOR.bytes());
     let mut sum = flate2::Crc::new();
     sum.update(&chunk);
     let length = (chunk.len() as u32 - 4).to_be_bytes();

@@ -1,0 +1,19 @@
+//! Calibrations, and what follows from them.
+//!
+//! [`calibration`] and [`rig`] write estimates by the records of `estimate`, `finding` and `motion`; [`saved`] reads them back,
+//! [`sheet`] what they say of the print. [`camera`] has the formats of other programs; [`comparison`], [`pose`], [`next_view`],
+//! [`undistortion`] and [`truth`] are results of other commands.
+
+pub mod calibration;
+pub mod camera;
+pub mod comparison;
+pub mod estimate;
+pub mod finding;
+pub mod motion;
+pub mod next_view;
+pub mod pose;
+pub mod rig;
+pub mod saved;
+pub mod sheet;
+pub mod truth;
+pub mod undistortion;

@@ -1,0 +1,15 @@
+//! What was found in photographs, and lists of boards.
+//!
+//! [`detection`] is the JSON of a detection, [`csv`], [`orpc`] and `tables` have the same for others, `overlay` shows it over the
+//! photograph; [`dsc`] and [`tp`] list boards and their poses, [`npy`] arrays.
+
+pub mod csv;
+pub mod detection;
+pub mod dsc;
+pub mod npy;
+pub mod orpc;
+#[cfg(feature = "overlay")]
+pub mod overlay;
+#[cfg(feature = "parquet")]
+pub mod tables;
+pub mod tp;
