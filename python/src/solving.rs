@@ -355,7 +355,7 @@ pub fn solve(
     mut how: How,
 ) -> PyResult<Solved> {
     let seen = Arc::new(seen);
-    let mut all = Vec::new();
+    let (mut all, mut named) = (Vec::new(), Vec::new());
     let (mut left_out, mut ink, mut panels) = (Vec::new(), Vec::new(), Vec::new());
     let is_named = cameras.len() > 1;
     {
@@ -380,6 +380,7 @@ pub fn solve(
             if how.assume_target {
                 assume(&mut camera.detections, reference.targets());
             }
+            named.extend(camera.detections.iter().flat_map(|(_, found)| found.targets.clone()));
             let shown = views(&camera.detections, &reference).raise(errors::calibration)?;
             let mut of_camera: Vec<View> = shown.views;
             let name = is_named.then(|| camera.name.clone());
@@ -402,6 +403,7 @@ pub fn solve(
     let of = seen.clone();
     let solved = interruptible(py, move |stop| {
         let mut calibration = Calibration::of(&of.reference(), panels)
+            .named_by(named)
             .loss(how.loss)
             .weights(how.weights)
             .board_shape(how.board_shape)

@@ -127,7 +127,7 @@ pub fn check_same_board(
     let mut pairs = of_first.iter().flat_map(|one| of_second.iter().map(move |other| (one, other)));
     match pairs.find(|(one, other)| one.is_confusable(other)) {
         Some((one, other)) => Err(format!(
-            "{first} was made with {one}, {second} with {other}: rows, columns and tags are the same, the positions of the corners are not, so that  at most one of them is the board that was photographed"
+            "{first} was made with {one}, {second} with {other}: rows, columns and tags are the same, the positions of the corners are not, so that at most one of them is the board that was photographed"
         )),
         None => Ok(()),
     }

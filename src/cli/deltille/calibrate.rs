@@ -104,10 +104,10 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let measure = args.solve.measures_target();
     let Sightings { calibration, views, target, empty, left_out, print, unnamed } =
         args.sightings.read(measure)?;
-    if let (Some(known), Some(target), false) =
-        (&args.fixed_intrinsics, &target, args.sightings.assumes_target())
-    {
-        camera_file::check_targets(known, &known_with, std::slice::from_ref(&target.target))?;
+    if let (Some(known), Some(printing)) = (&args.fixed_intrinsics, &target) {
+        let targets = std::slice::from_ref(&printing.target);
+        let is_assumed = args.sightings.assumes_target();
+        camera_file::check_or_note(known, &known_with, targets, is_assumed)?;
     }
     for picture in &empty {
         tell!("{}: no board, left out", picture.display());
@@ -172,7 +172,7 @@ impl Args {
     /// What is known of the camera, and the targets that it was calibrated with.
     fn intrinsics(&self) -> anyhow::Result<(Intrinsics, Vec<TargetIdentity>)> {
         if let Some(path) = &self.fixed_intrinsics {
-            let known = camera_file::read_with_targets("--fixed-intrinsics", path)?;
+            let known = camera_file::read_to_keep("--fixed-intrinsics", path)?;
             return Ok((Intrinsics::Known(known.camera), known.calibrated_with));
         }
         let sought = self.model.map(|model| Intrinsics::Unknown(model.richest()));
@@ -189,7 +189,16 @@ impl Args {
         json: &str,
     ) -> (Vec<File>, Vec<FormatError>) {
         let (mut files, mut refused) = (Vec::new(), Vec::new());
+        let has_failed = !saved::failures(json).is_empty();
         for format in &self.format {
+            if has_failed && *format != Format::Own {
+                // No other program would read the reason.
+                tell!(
+                    "warning: --format {}: not written, as the calibration failed",
+                    format.name()
+                );
+                continue;
+            }
             match format.texts(stem, camera, calibrated_with, views, json) {
                 Ok(texts) => {
                     files.extend(texts.into_iter().map(|(name, text)| text_file(name, text)))
@@ -202,6 +211,11 @@ impl Args {
 }
 
 impl Format {
+    /// What the option calls it.
+    fn name(self) -> String {
+        self.to_possible_value().map_or(String::new(), |value| value.get_name().to_owned())
+    }
+
     /// The names and texts of its files.
     fn texts(
         self,

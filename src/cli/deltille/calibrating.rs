@@ -276,10 +276,14 @@ impl Calibrated {
 
     /// Exit code 1 where what was found is not to be used as it is.
     pub fn exit_code(&self) -> ExitCode {
-        match self.diagnoses.iter().any(Diagnosis::is_failure) {
+        match self.has_failed() {
             true => ExitCode::from(FAILED),
             false => ExitCode::SUCCESS,
         }
+    }
+
+    fn has_failed(&self) -> bool {
+        self.diagnoses.iter().any(Diagnosis::is_failure)
     }
 
     /// The measured target and its picture, `<stem>-measured.json` and `.svg`; none where it was not measured.
@@ -287,6 +291,10 @@ impl Calibrated {
         let Some((map, printing)) = self.estimate.map.as_ref().zip(printing) else {
             return Vec::new();
         };
+        if self.has_failed() {
+            tell!("warning: --measure-target: no target is written, as the calibration failed");
+            return Vec::new();
+        }
         let file = |end: &str, text: String| text_file(format!("{stem}-measured.{end}"), text);
         let measured = Printing { target: map.on(&printing.target), ..printing.clone() };
         vec![file("json", measured.to_json()), file("svg", target_map_svg(map))]

@@ -36,6 +36,29 @@ pub fn check_targets(
     })
 }
 
+/// The same, or with `is_assumed` a note where it would be refused.
+pub fn check_or_note(
+    path: &Path,
+    calibrated_with: &[TargetIdentity],
+    targets: &[Target],
+    is_assumed: bool,
+) -> anyhow::Result<()> {
+    match check_targets(path, calibrated_with, targets) {
+        Err(_) if is_assumed => {
+            let [seen, own] =
+                [calibrated_with.first().cloned(), targets.first().map(Target::identity)].map(
+                    |identity| identity.map_or(String::new(), |identity| identity.to_string()),
+                );
+            tell!(
+                "note: --assume-target: {} was made with {seen}, taken for {own}",
+                path.display()
+            );
+            Ok(())
+        }
+        checked => checked,
+    }
+}
+
 /// Warns where the calibration whose text this is has failed, and says why it has.
 pub fn warn_if_failed(path: &Path, text: &str) -> Option<String> {
     let failure = saved::failures(text).into_iter().next();
@@ -49,7 +72,20 @@ fn warn_of(path: &Path, failure: Option<&str>) {
     }
 }
 
-/// Reads a camera file for these targets, see [`check_targets`]; with `is_assumed` it may be any camera's.
+/// Reads a camera to be kept as it is in another calibration: refused where its own calibration failed.
+pub fn read_to_keep(option: &str, path: &Path) -> anyhow::Result<CameraFile> {
+    let file = camera_file::read_with_targets(path).context(option.to_owned())?;
+    match &file.failed {
+        Some(failed) => Err(anyhow!(
+            "{option}: {}: its calibration failed: {}; calibrate the camera again",
+            path.display(),
+            shown(failed)
+        )),
+        None => Ok(file),
+    }
+}
+
+/// Reads a camera file for these targets, see [`check_targets`]; with `is_assumed` it may be any camera's, which is noted.
 pub fn read_for(
     option: &str,
     path: &Path,
@@ -57,8 +93,6 @@ pub fn read_for(
     is_assumed: bool,
 ) -> anyhow::Result<Camera> {
     let CameraFile { camera, calibrated_with, .. } = read_with_targets(option, path)?;
-    if !is_assumed {
-        check_targets(path, &calibrated_with, targets)?;
-    }
+    check_or_note(path, &calibrated_with, targets, is_assumed)?;
     Ok(camera)
 }

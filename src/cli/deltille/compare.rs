@@ -14,11 +14,12 @@ use crate::calibrate::{
     CameraEstimate, CameraMotion, Comparison, Estimate, Region, Verdict, compare_boards,
 };
 use crate::camera::Pose;
-use crate::cli::output::{self, Overwrite};
+use crate::cli::output::{self, Overwrite, tell};
 use crate::cli::run::{FAILED, UNDECIDED};
 use crate::export::{comparison, saved};
 use crate::limits::Limits;
 use crate::report::comparison_svg;
+use crate::targets::check_same_board;
 use crate::words::{counted, p_value, shown};
 
 /// Arguments of `deltille compare`.
@@ -74,6 +75,14 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let path = path.transpose()?;
     let (mut first, mut second) = (read("FIRST", &args.first)?, read("SECOND", &args.second)?);
     let [one, other] = [&args.first, &args.second].map(|path| path.display().to_string());
+    if args.assume_target
+        && check_same_board([&one, &other], [&first.calibrated_with, &second.calibrated_with])
+            .is_err()
+    {
+        tell!(
+            "note: --assume-target: {one} and {other} were made with different boards, compared as they are"
+        );
+    }
     compare_boards([&one, &other], [&mut first, &mut second], args.assume_target)
         .map_err(|problem| anyhow!(problem))?;
     let pairs = pairs([&one, &other], [&first.cameras, &second.cameras])?;
@@ -226,7 +235,7 @@ fn told(camera: &CameraEstimate, found: &Comparison, tolerance: f64) -> String {
             let advice = match found.lacks_uncertainty {
                 [false, false] => "give a larger --region",
                 _ => {
-                    "give the .json of `deltille calibrate` or `rig`, which has them unless the camera was kept fixed"
+                    "give the .json of `deltille calibrate` or `rig`, which has them unless the camera was kept fixed or the calibration failed"
                 }
             };
             format!(

@@ -199,8 +199,13 @@ impl Args {
     /// What is known of a camera.
     fn intrinsics(&self, name: &str, targets: &[Target]) -> anyhow::Result<Intrinsics> {
         let known = of_name(&self.known, name)
-            .map(|path| camera_file::read_for("--known", path, targets, self.assume_target));
-        let known = known.transpose()?.map(Intrinsics::Known);
+            .map(|path| camera_file::read_to_keep("--known", path).map(|file| (path, file)));
+        let known = known.transpose()?;
+        if let Some((path, file)) = &known {
+            let of_file = &file.calibrated_with;
+            camera_file::check_or_note(path, of_file, targets, self.assume_target)?;
+        }
+        let known = known.map(|(_, file)| Intrinsics::Known(file.camera));
         Ok(known.unwrap_or(Intrinsics::Unknown(self.model.richest())))
     }
 
@@ -235,6 +240,15 @@ impl Args {
             let failed = failed.clone().filter(|_| !is_known);
             let yaml = CameraFile { camera, calibrated_with, failed }.to_yaml();
             files.push(text_file(format!("{name}.yaml"), yaml));
+        }
+        if failed.is_some() {
+            // No other file would carry the reason.
+            if !self.format.is_empty() || self.refine_target || found.map.is_some() {
+                tell!(
+                    "warning: only rig.json and the cameras are written, as the calibration failed"
+                );
+            }
+            return Ok((files, refused));
         }
         for format in &self.format {
             match format.files(cameras, found) {

@@ -7,7 +7,7 @@ use anyhow::{Context, anyhow, bail, ensure};
 use clap::ValueEnum;
 
 use super::limits::FileLimits;
-use super::{tables, target_file};
+use super::{camera_file, tables, target_file};
 use crate::SheetUseError;
 use crate::calibrate::{
     Calibration, Excluded, PanelPlace, Reason, Reference, Shown, UntaggedGrid, View, views,
@@ -176,7 +176,8 @@ impl SightingsArgs {
         let panels = panels(&reference, &sheet)?;
         let print = Print { scale: sheet.print_scale, ink };
         let unnamed = unnamed(&detections, &reference).filter(|_| !self.assume_target);
-        let calibration = Calibration::of(&reference, panels);
+        let named = detections.iter().flat_map(|(_, found)| found.targets.clone());
+        let calibration = Calibration::of(&reference, panels).named_by(named);
         let target = target.or(board.map(Printing::from));
         Ok(Sightings { calibration, target, views, empty, left_out, print, unnamed })
     }
@@ -199,6 +200,7 @@ impl SheetArgs {
         };
         let show = || format!("--shape: {}", path.display());
         let text = limits.read_text(path).context("--shape")?;
+        camera_file::warn_if_failed(path, &text);
         let sheet = sheet::read_sheet(&text, targets).with_context(show)?;
         Ok(Sheet { sheets, ..sheet })
     }

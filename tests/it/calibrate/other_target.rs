@@ -187,3 +187,31 @@ fn an_edited_description_is_refused() {
     let said = refused(deltille(at, "calibrate seen --target mixed.json --model radtan -o wrong"));
     assert!(said.contains("field `fingerprint`: it is"), "{said}");
 }
+
+/// Boards that are given by tiling and edge are those that detections name.
+#[test]
+fn untagged_boards_keep_the_name_of_detections() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    for edge in [20, 25] {
+        let made = format!(
+            "board --rows 7 --cols 8 --edge {edge}mm --untagged --name u{edge} --no-verify"
+        );
+        deltille(at, &made).success();
+    }
+    fs::write(at.join("lens.yaml"), Camera::pinhole(640, 480, 1.0).to_yaml()).unwrap();
+    for (i, eye) in ["60,-100,320", "260,120,280", "-120,160,300", "130,280,300"].iter().enumerate()
+    {
+        deltille(at, &format!("render u20.json --camera lens.yaml --eye {eye} -o view-{i}.png"))
+            .success();
+    }
+    deltille(at, "detect --target u20.json view-0.png view-1.png view-2.png view-3.png -o seen")
+        .success();
+    deltille(at, "calibrate seen --grid deltille --edge 20mm --model radtan -o camera.yaml");
+    is_refused(at, "pose view-0.png --target u25.json --camera camera.yaml");
+    let said = refused(deltille(
+        at,
+        "calibrate seen --grid deltille --edge 20mm --rows 7 --cols 9 --model radtan -o other.yaml",
+    ));
+    assert!(said.contains("56 corners") && said.contains("63 corners"), "{said}");
+}

@@ -61,6 +61,13 @@ fn a_view_keeps_what_is_known_of_the_calibration_of_its_camera() {
     let said = deltille(folder.path(), "undistort --camera camera.yaml -o new").success();
     let said = String::from_utf8_lossy(&said.get_output().stderr).into_owned();
     assert!(said.contains("camera.yaml: the calibration failed: it left 90 px"), "{said}");
+    let refused = deltille(
+        folder.path(),
+        "calibrate none --grid checker --edge 20mm --fixed-intrinsics camera.yaml",
+    )
+    .code(2);
+    let said = String::from_utf8_lossy(&refused.get_output().stderr).into_owned();
+    assert!(said.contains("its calibration failed: it left 90 px"), "{said}");
     let view = read(folder.path().join("new/camera-undistorted.yaml"));
     assert_eq!((view.calibrated_with, view.failed), (file.calibrated_with, file.failed));
 }

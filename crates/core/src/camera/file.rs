@@ -70,6 +70,12 @@ pub enum CameraFileError {
     },
 }
 
+/// What the first line of a file ends with whose last line is [`END`].
+const COMPLETE: &str = "camera, ends with ...";
+
+/// The end of a YAML document.
+const END: &str = "...";
+
 #[derive(Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Own {
@@ -213,6 +219,12 @@ impl CameraFile {
     /// Where it is no YAML, a field is missing or out of its range, or the model is none of those here.
     pub fn from_yaml(text: &str) -> Result<Self, CameraFileError> {
         check_size(text).map_err(CameraFileError::Yaml)?;
+        // A file cut off at the end of a line is a camera of fewer terms.
+        let is_marked = text.lines().next().is_some_and(|first| first.ends_with(COMPLETE));
+        if is_marked && text.lines().next_back() != Some(END) {
+            let what = format!("its last line is not `{END}`: the file was cut off");
+            return Err(CameraFileError::Yaml(what));
+        }
         // OpenCV writes a version directive and a tag that no other reader of YAML knows.
         let foreign = text.contains("camera_matrix");
         let own = if foreign { from_foreign(text)? } else { parse(text)? };
@@ -285,7 +297,7 @@ impl CameraFile {
             failed: self.failed.clone(),
         };
         let yaml = serde_yaml_ng::to_string(&own).expect("plain data has a YAML form");
-        format!("# deltille {}, camera\n{yaml}", env!("CARGO_PKG_VERSION"))
+        format!("# deltille {}, {COMPLETE}\n{yaml}{END}\n", env!("CARGO_PKG_VERSION"))
     }
 }
 
@@ -347,6 +359,17 @@ fn from_foreign(text: &str) -> Result<Own, CameraFileError> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_file_that_was_cut_off_is_refused() {
+        let text = Camera::pinhole(640, 480, 1.0).to_yaml();
+        assert!(Camera::from_yaml(&text).is_ok());
+        let lines: Vec<&str> = text.lines().collect();
+        for count in 1..lines.len() {
+            let cut = lines[..count].join("\n");
+            assert!(Camera::from_yaml(&cut).is_err(), "{cut}");
+        }
+    }
 
     #[test]
     fn every_model_is_written_and_read() {

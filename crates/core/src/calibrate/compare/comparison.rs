@@ -100,7 +100,7 @@ pub struct Difference {
 pub enum ComparisonError {
     /// Images of different size.
     #[error(
-        "images of {first:?} and {second:?} px are not of one camera: give two calibrations of the same camera and size"
+        "images of {} × {} px and of {} × {} px are not of one camera: give two calibrations of the same camera and size", first[0], first[1], second[0], second[1]
     )]
     Sizes {
         /// Of the first.

@@ -182,7 +182,8 @@ impl<'a> Words<'a> {
             Shared::PanelInView { panel, camera, view, off_px } => {
                 let who = of(camera, format!("view {view}, panel {panel}"));
                 format!(
-                    "{who}: its corners are off by {off_px:.1} px where the view's others fit: wrong labels"
+                    "{who}: its corners are off by {off_px:.1} px where the view's others fit: wrong labels, or \
+                     it or another board has another size than its description states"
                 )
             }
             Shared::View { camera, view } => {
@@ -242,8 +243,8 @@ impl<'a> Words<'a> {
                     Some(name) => (
                         format!("target {name}"),
                         format!(
-                            "its board has another size or other labels than its description states, is not \
-                             flat or not printed as stated: measure its edges, or leave {name} out"
+                            "its board, or that of another target, has another size or other labels than its \
+                             description states, is not flat or not printed as stated: measure an edge of each"
                         ),
                     ),
                     None if self.is_solid() => {

@@ -266,6 +266,20 @@ impl Calibration {
         Self { board_accuracy_mm, ..self }
     }
 
+    /// With the targets that detections name ([`Detection::targets`](crate::detect::Detection)), where nothing else is known of
+    /// what was photographed than its tiles, see [`Estimate::calibrated_with`].
+    #[must_use]
+    pub fn named_by(mut self, targets: impl IntoIterator<Item = TargetIdentity>) -> Self {
+        if self.identities.is_empty() {
+            for target in targets {
+                if !self.identities.contains(&target) {
+                    self.identities.push(target);
+                }
+            }
+        }
+        self
+    }
+
     /// Keeps every n-th frame (the n-th, the 2n-th, …) out of the calibration; only the poses in these are
     /// found, see [`Estimate::held_out`](crate::calibrate::Estimate::held_out).
     #[must_use]

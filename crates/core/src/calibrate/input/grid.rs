@@ -43,13 +43,19 @@ impl UntaggedGrid {
         self.edge_mm * self.kind.position(row.into(), col.into()).extend(0.0)
     }
 
-    /// Refuses a grid that was detected as a target with tiles of another size.
+    /// Refuses a grid that was detected as a target with tiles of another size, or more or fewer corners.
     pub(super) fn check_target(&self, seen: Option<&TargetIdentity>) -> Result<(), String> {
         match seen {
             Some(seen) if seen.edge_mm != [self.edge_mm; 2] => Err(format!(
                 "it was detected as {seen}, but `UntaggedGrid::edge_mm` is {} mm: {ASSUME_TARGET}",
                 self.edge_mm
             )),
+            Some(seen) if self.size.is_some_and(|[rows, cols]| rows * cols != seen.corners) => {
+                Err(format!(
+                    "it was detected as {seen}, but `UntaggedGrid::size` has {} corners: {ASSUME_TARGET}",
+                    self.size.map_or(0, |[rows, cols]| rows * cols)
+                ))
+            }
             _ => Ok(()),
         }
     }
