@@ -524,7 +524,7 @@ impl Asked {
             Ok(shown) => shown.views,
             Err(error) => return Ok(nowhere(errors::told(&error))),
         };
-        sheet.put_on(Some(&target), &mut views).raise(errors::calibration)?;
+        sheet.put_on(Some(target), &mut views).raise(errors::calibration)?;
         let panels = sheet.panels(&reference).raise(errors::calibration)?;
         let camera = self.camera.0.clone();
         let calibration = calibrate::Calibration::new(panels).camera("", views, camera);

@@ -108,13 +108,13 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         (None, None) => bail!("give --target FILE, or --grid for an untagged board"),
     };
     let target = &printing.target;
-    let family = target_file::family(&target, args.family.as_deref())?;
+    let family = target_file::family(target, args.family.as_deref())?;
     ensure!(
         args.folder.is_dir(),
         "{}: is no folder: name the one that fills",
         args.folder.display()
     );
-    let reference = Reference::Target(&target);
+    let reference = Reference::Target(target);
     ensure!(
         !reference.is_loose(),
         "--target: {} are boards that lie about: give the file of one of them",
@@ -122,10 +122,10 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     );
     let sheet = args.sheet.read(&limits, &[target.identity()], std::slice::from_ref(&printing))?;
     let panels = sightings::panels(&reference, &sheet)?;
-    let detector = Detector::for_targets(&[(&target, family.as_ref())], DetectorConfig::default());
+    let detector = Detector::for_targets(&[(target, family.as_ref())], DetectorConfig::default());
     let detector = detector.context("--target")?;
     let near = args.camera.as_deref().map(|path| {
-        camera_file::read_for("--camera", path, std::slice::from_ref(&target), args.assume_target)
+        camera_file::read_for("--camera", path, std::slice::from_ref(target), args.assume_target)
     });
     let near = near.transpose()?;
     let (intrinsics, size) = args.intrinsics(near)?;
@@ -142,11 +142,11 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     interrupt::stands("what was written last is whole");
     let session = Watch {
         guide: match size {
-            Some(size) => Some(args.guide(&target, size, &intrinsics)?),
+            Some(size) => Some(args.guide(target, size, &intrinsics)?),
             None => None,
         },
         args,
-        target: &target,
+        target,
         detector,
         sheet,
         panels,

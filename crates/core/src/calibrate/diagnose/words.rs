@@ -242,10 +242,9 @@ impl<'a> Words<'a> {
                 let (where_, cause) = match board {
                     Some(name) => (
                         format!("target {name}"),
-                        format!(
-                            "its board, or that of another target, has another size or other labels than its \
-                             description states, is not flat or not printed as stated: measure an edge of each"
-                        ),
+                        "its board, or that of another target, has another size or other labels than its \
+                         description states, is not flat or not printed as stated: measure an edge of each"
+                            .to_owned(),
                     ),
                     None if self.is_solid() => {
                         ("the target".to_owned(), self.moved_panels(Some(panel)))

@@ -267,7 +267,7 @@ impl Calibration {
     }
 
     /// With the targets that detections name ([`Detection::targets`](crate::detect::Detection)), where nothing else is known of
-    /// what was photographed than its tiles, see [`Estimate::calibrated_with`].
+    /// what was photographed than its tiles, see [`Estimate::calibrated_with`](crate::calibrate::Estimate).
     #[must_use]
     pub fn named_by(mut self, targets: impl IntoIterator<Item = TargetIdentity>) -> Self {
         if self.identities.is_empty() {

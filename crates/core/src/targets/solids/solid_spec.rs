@@ -142,7 +142,7 @@ impl SolidSpec {
     /// Fewest tiles along a side of a face.
     pub const FEWEST_TILES: u32 = *FACE_TILES.start();
 
-    /// Finest edge of a tile, mm: what [`BoardSpec`] allows.
+    /// Finest edge of a tile, mm: what [`BoardSpec`](crate::targets::BoardSpec) allows.
     pub const FINEST_TILE_MM: f64 = *EDGE_MM.start();
 
     /// A solid of 150 mm edges, or a cuboid or mesh in its own size, with ten tiles a side (the tags of a
