@@ -6,9 +6,7 @@
 use std::time::Duration;
 
 use criterion::{Criterion, criterion_group, criterion_main};
-use deltille::artwork;
 use deltille::camera::{Camera, Pose};
-use deltille::clock;
 use deltille::detect::{Detector, DetectorConfig, Refinement};
 use deltille::family::Family;
 use deltille::lattice::GridKind;
@@ -16,6 +14,7 @@ use deltille::layout::{PaperSpec, Printing};
 use deltille::raster::Gray;
 use deltille::synth::{Light, scene_of_sheet};
 use deltille::targets::{BoardSpec, TagSpec, Target, TargetSpec};
+use deltille::{artwork, clock};
 use glam::DVec3;
 
 /// A board of 10 × 11 corners with tags, seen at 35°.

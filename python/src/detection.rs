@@ -15,12 +15,10 @@ use pyo3::exceptions::PyTypeError;
 use pyo3::prelude::*;
 use serde::{Deserialize, Serialize};
 
-use crate::arrays;
 use crate::camera::save_text;
 use crate::errors::{self, Raise, RaiseFile, raised};
-use crate::families;
-use crate::pickles;
 use crate::targets::Target;
+use crate::{arrays, families, pickles};
 
 /// Why a picture, or a grid in it, has no labels.
 #[pyclass(frozen, module = "deltille", eq)]

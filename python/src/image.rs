@@ -6,8 +6,10 @@ use deltille::limits::Limits;
 use deltille::photograph::grey_of_colours;
 use deltille::raster::{Gray, ImageView, Intensity, View};
 use numpy::ndarray::{ArrayView2, ArrayView3};
-use numpy::{Element, PyArray2, PyArray3, PyArrayDescrMethods, PyArrayMethods, PyUntypedArray};
-use numpy::{PyReadonlyArray2, PyUntypedArrayMethods, dtype};
+use numpy::{
+    Element, PyArray2, PyArray3, PyArrayDescrMethods, PyArrayMethods, PyReadonlyArray2,
+    PyUntypedArray, PyUntypedArrayMethods, dtype,
+};
 use pyo3::prelude::*;
 
 use crate::arrays::shape_in_words;

@@ -8,14 +8,12 @@ use deltille::calibrate::{
     Calibration, CalibrationError, Candidate, Diagnosis, Estimate, Excluded, Intrinsics, Loss,
     Model, PanelPlace, Reference, UntaggedGrid, View, Weights, Words, views,
 };
-use deltille::camera;
-use deltille::detect;
 use deltille::export::calibration::{Print, Residuals};
 use deltille::export::sheet::Sheet;
 use deltille::export::{calibration, rig};
 use deltille::layout::Printing;
 use deltille::quantity::{board_accuracy_mm, distance_mm, edge_mm, print_scale};
-use deltille::targets;
+use deltille::{camera, detect, targets};
 use pyo3::prelude::*;
 use serde_json::Value;
 

@@ -15,16 +15,15 @@ use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict};
 use serde::{Deserialize, Serialize};
 
-use crate::arrays;
 use crate::boards::{Board, Checkerboard};
 use crate::errors::{self, Raise, RaiseFile, raised, unlocked};
 use crate::families::{Family, FamilyChoice};
 use crate::interrupt::interruptible;
 use crate::making::{Formats, Keywords};
 use crate::other_detectors::{AprilGrid, Charuco, Circles};
-use crate::pickles;
 use crate::solids::{Cube, Cuboid, Icosahedron, Octahedron, Solid, Tetrahedron};
 use crate::verdict::{Proof, Verdict};
+use crate::{arrays, pickles};
 
 /// What is printed, photographed and found: panels with corners and tags, in millimetres.
 ///

@@ -10,14 +10,12 @@ use numpy::{PyArray1, PyArray2};
 use pyo3::prelude::*;
 use serde::{Deserialize, Serialize};
 
-use crate::arrays;
 use crate::calibrated_camera::Part;
 use crate::calibration::pickled;
 use crate::detection::record;
-use crate::errors;
-use crate::pickles;
 use crate::pose::Pose;
 use crate::solving::Solved;
+use crate::{arrays, errors, pickles};
 
 /// Something that is said of a calibration, with what to do about it.
 #[pyclass(frozen, module = "deltille", eq)]

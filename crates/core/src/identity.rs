@@ -5,9 +5,8 @@ use std::str::FromStr;
 
 use serde::{Deserialize, Serialize};
 
-use crate::Name;
-use crate::quantity;
 use crate::words::counted;
+use crate::{Name, quantity};
 
 /// The fingerprint of a target: 64 bits of a SHA-256 hash, written as 16 hexadecimal digits.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]

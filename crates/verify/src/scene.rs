@@ -3,9 +3,8 @@
 
 use std::path::Path;
 
-use super::construct;
 use super::reader::Reader;
-use super::{Format, Verdict, Verifier, VerifyError};
+use super::{Format, Verdict, Verifier, VerifyError, construct};
 
 /// Compares a `.sdf`, `.urdf` or MuJoCo's `.xml`, and the mesh that it shows, with the target.
 pub(super) fn verify(

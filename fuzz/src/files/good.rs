@@ -3,19 +3,20 @@
 use std::io::Cursor;
 use std::sync::LazyLock;
 
-use deltille::artwork;
 use deltille::detect::{Detector, DetectorConfig};
 use deltille::export::dsc::{self, Dialect};
 use deltille::export::inlay::InlaidBodies;
 use deltille::export::mesh::{Meshing, TexturedMesh};
-use deltille::export::{detection, dxf, gltf, laser_svg, obj as obj_writer, pdf as pdf_writer};
-use deltille::export::{png, stl as stl_writer, svg as svg_writer, threemf};
+use deltille::export::{
+    detection, dxf, gltf, laser_svg, obj as obj_writer, pdf as pdf_writer, png, stl as stl_writer,
+    svg as svg_writer, threemf,
+};
 use deltille::family::Family;
 use deltille::lattice::GridKind;
 use deltille::layout::{PaperSpec, Printing};
-use deltille::photograph;
 use deltille::raster::{AnyGray, Gray};
 use deltille::targets::{BoardSpec, SolidShape, SolidSpec, TargetSpec};
+use deltille::{artwork, photograph};
 use image::{DynamicImage, GrayImage, ImageFormat};
 use tempfile::TempDir;
 

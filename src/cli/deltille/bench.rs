@@ -12,9 +12,8 @@ use crate::cli::interrupt;
 use crate::cli::output::say;
 use crate::cli::run::Interrupted;
 use crate::cli::values::whole;
-use crate::clock;
-use crate::photograph;
 use crate::statistics::quantile;
+use crate::{clock, photograph};
 
 /// Arguments of `deltille bench`.
 #[derive(clap::Args)]

@@ -9,11 +9,10 @@ use std::sync::Mutex;
 use anyhow::{Context, anyhow, bail, ensure};
 
 use super::calibrating::distance;
-use super::camera_file;
 use super::files::{File, Staged, bytes_file, check_places, same_file, sample_of, text_file};
 use super::images::{self, Images, Stems};
-use super::in_flight;
 use super::limits::ImageLimits;
+use super::{camera_file, in_flight};
 use crate::calibrate::Estimate;
 use crate::camera::{Camera, CameraFile, Field, PixelMap, Rectification, Undistortion};
 use crate::cli::output::{self, Overwrite, say};

@@ -3,9 +3,8 @@
 use glam::DVec2;
 use serde::{Deserialize, Serialize};
 
-use crate::angles;
 use crate::layout::{Label, LogoPlacement};
-use crate::quantity;
+use crate::{angles, quantity};
 
 /// One printed page: its size, where panels lie on it, and its check bars.
 ///

@@ -6,11 +6,7 @@
 use super::error::{Problem, problem};
 use super::identity::fingerprint;
 use crate::family::shipped_name;
-use crate::targets::boards::aprilgrid;
-use crate::targets::boards::board;
-use crate::targets::boards::charuco;
-use crate::targets::boards::circles;
-use crate::targets::boards::tag_sheet;
+use crate::targets::boards::{aprilgrid, board, charuco, circles, tag_sheet};
 use crate::targets::solids::solid;
 use crate::targets::{
     Corner, FamilyRef, Fingerprint, Panel, PanelPose, TagPlacement, Target, TargetSpec,

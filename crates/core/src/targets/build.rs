@@ -1,10 +1,6 @@
 use crate::family::{Family, FamilyError, places};
-use crate::targets::boards::aprilgrid;
-use crate::targets::boards::board;
 use crate::targets::boards::capacity::Setting;
-use crate::targets::boards::charuco;
-use crate::targets::boards::circles;
-use crate::targets::boards::tag_sheet;
+use crate::targets::boards::{aprilgrid, board, charuco, circles, tag_sheet};
 use crate::targets::solids::solid;
 use crate::targets::{FamilyRef, Name, Target, TargetError, TargetSpec};
 

@@ -6,8 +6,7 @@ use glam::{DVec2, DVec3};
 
 use serde::{Deserialize, Serialize};
 
-use crate::lattice::GridKind;
-use crate::lattice::{Tile, Vertex};
+use crate::lattice::{GridKind, Tile, Vertex};
 use crate::polygon::{grown, hull, rectangle};
 use crate::quantity;
 use crate::targets::PanelPose;

@@ -5,10 +5,9 @@ use kurbo::{Affine, BezPath, Cap, Join, PathEl, Point, Rect, Shape, StrokeOpts};
 use usvg::tiny_skia_path::PathSegment;
 use usvg::{ClipPath, Color, Fill, Group, Node, Paint, PaintOrder, Path, Stroke, Transform, Tree};
 
-use super::LogoError;
 use super::area::{Area, Tone};
-use super::crossings;
 use super::elements::{named, unnamed};
+use super::{LogoError, crossings};
 
 /// How far straight lines may be from the curves that they replace, in heights of what is black: 1.2 µm of 12 mm.
 const FLATNESS: f64 = 1e-4;

@@ -1,8 +1,7 @@
 //! Plots of residuals and of the uncertainty of projections, over the image, the target and the
 //! views.
 
-use super::page;
-use super::{Survey, board_residuals, field, plots};
+use super::{Survey, board_residuals, field, page, plots};
 use deltille_core::calibrate::{CameraEstimate, Estimate, Source};
 
 /// Residuals over the image, the target, the radius and the views, and the coverage of the image.

@@ -3,8 +3,7 @@
 use serde_json::{Value, json};
 
 use super::edit::{append, swap};
-use super::png;
-use super::{Case, Damage, cases};
+use super::{Case, Damage, cases, png};
 use crate::common::glb::Parts;
 
 /// Changes the JSON.

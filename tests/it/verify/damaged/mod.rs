@@ -23,8 +23,10 @@ use deltille::artwork;
 use deltille::export::artifacts::{Making, What, make};
 use deltille::export::dsc::{self, Dialect};
 use deltille::export::mesh::{Meshing, TexturedMesh};
-use deltille::export::{dxf, gltf, obj as obj_writer, pdf as pdf_writer, png as png_writer};
-use deltille::export::{stl as stl_writer, svg as svg_writer};
+use deltille::export::{
+    dxf, gltf, obj as obj_writer, pdf as pdf_writer, png as png_writer, stl as stl_writer,
+    svg as svg_writer,
+};
 use deltille::family::Family;
 use deltille::lattice::GridKind;
 use deltille::layout::{PaperSpec, Printing};

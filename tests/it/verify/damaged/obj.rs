@@ -1,8 +1,7 @@
 //! Damaged OBJ with its material and texture.
 
 use super::edit::{append, before, line, swap, text};
-use super::png;
-use super::{Case, Damage, cases};
+use super::{Case, Damage, cases, png};
 
 /// Puts a line before the faces.
 fn statement(line: &str) -> Damage {

@@ -4,8 +4,7 @@ use serde_json::{Value, json};
 
 use super::edit::{append, before, swap, text};
 use super::glb::json;
-use super::png;
-use super::{Case, Damage, cases};
+use super::{Case, Damage, cases, png};
 
 /// Exchanges two words everywhere in a text.
 fn exchange(one: &'static str, other: &'static str) -> Damage {

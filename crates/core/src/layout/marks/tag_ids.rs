@@ -5,8 +5,7 @@ use std::collections::BTreeSet;
 use glam::DVec2;
 
 use crate::family::places;
-use crate::lattice::GridKind;
-use crate::lattice::{Tile, Vertex};
+use crate::lattice::{GridKind, Tile, Vertex};
 use crate::layout::{Label, Placement, SheetLayout, SheetText};
 use crate::targets::length::format_mm;
 use crate::targets::{Panel, TagPlacement, TagsIn, Target, TargetError};

@@ -16,8 +16,7 @@ use glam::DVec2;
 use super::arrangement::{
     ADVANCE_CAPS, Arrangement, Footprint, check_margin, label, label_of_one, on_page,
 };
-use crate::lattice::GridKind;
-use crate::lattice::ROW_HEIGHT;
+use crate::lattice::{GridKind, ROW_HEIGHT};
 use crate::layout::marks::logo::{LogoPlacement, LogoSize};
 use crate::layout::paper::PaperSpec;
 use crate::layout::{Label, LineKind, Placement, SheetLayout, SheetLine, SheetText};

@@ -13,8 +13,7 @@ use serde::{Deserialize, Serialize};
 use super::capacity::{Setting, check_ids};
 use super::tag_spec::BORDER_BITS;
 use crate::family::Family;
-use crate::lattice::GridKind;
-use crate::lattice::Vertex;
+use crate::lattice::{GridKind, Vertex};
 use crate::quantity;
 use crate::targets::length::format_mm;
 use crate::targets::{

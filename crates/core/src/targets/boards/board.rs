@@ -6,8 +6,7 @@ use glam::{DMat3, DVec2, DVec3};
 
 use super::capacity::{Setting, check_family, wider_spacing};
 use crate::family::Family;
-use crate::lattice::GridKind;
-use crate::lattice::{ROW_HEIGHT, Vertex};
+use crate::lattice::{GridKind, ROW_HEIGHT, Vertex};
 use crate::targets::{
     BoardSpec, Corner, FamilyRef, Outline, Panel, PanelPose, TagSpec, TagsIn, TargetError,
 };

@@ -16,8 +16,7 @@ use serde::{Deserialize, Serialize};
 
 use super::capacity::{Setting, check_ids};
 use crate::family::{Family, dictionary, dictionary_names};
-use crate::lattice::GridKind;
-use crate::lattice::{Dimension, TagCells, Vertex};
+use crate::lattice::{Dimension, GridKind, TagCells, Vertex};
 use crate::quantity;
 use crate::targets::length::format_mm;
 use crate::targets::{

@@ -3,8 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use crate::family::places;
-use crate::lattice::GridKind;
-use crate::lattice::Vertex;
+use crate::lattice::{GridKind, Vertex};
 use crate::quantity;
 use crate::targets::{TagPlacement, TagsIn, TargetError};
 

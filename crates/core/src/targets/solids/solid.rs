@@ -6,8 +6,7 @@ use glam::DVec3;
 
 use super::solid_spec::mean_side;
 use crate::family::Family;
-use crate::lattice::GridKind;
-use crate::lattice::Vertex;
+use crate::lattice::{GridKind, Vertex};
 use crate::targets::boards::board::tagged_tiles;
 use crate::targets::boards::capacity::{Setting, check_family, wider_spacing};
 use crate::targets::boards::tag_spec::MOST_ROWS;

@@ -8,9 +8,8 @@ use glam::{DMat3, DQuat, DVec2, DVec3};
 use nalgebra::DMatrix;
 use serde::Deserialize;
 
-use super::calibration;
-use super::rig;
 use super::sheet::StoredShape;
+use super::{calibration, rig};
 use deltille_core::calibrate::{
     BoardShape, CameraEstimate, Corner, CornerOffset, Coverage, Estimate, Excluded, FrameEstimate,
     Model, ObservedCovariance, PanelRef, Parameter, ProjectionUncertainty, Reason, Reference,

@@ -3,8 +3,7 @@
 use glam::DVec3;
 use serde::Deserialize;
 
-use super::calibration;
-use super::rig;
+use super::{calibration, rig};
 use deltille_core::calibrate::{SHAPE_COEFFICIENTS as COUNT, Shape};
 use deltille_core::json::{self, ReadError};
 use deltille_core::layout::SheetLayout;

@@ -7,8 +7,7 @@ use kurbo::{Affine, BezPath, PathEl, Point, Rect, Shape as _, Stroke, StrokeOpts
 use tiny_skia::{FillRule, Mask, PathBuilder, Transform};
 
 use super::supersample::render as supersample;
-use crate::export::writing::atomic;
-use crate::export::writing::kind;
+use crate::export::writing::{atomic, kind};
 use crate::export::{Block, ExportError, GENERATOR, SUBPIXELS};
 use deltille_core::artwork::{Paint, Shape, Sheet};
 

@@ -18,9 +18,8 @@ use crate::layout::placing::face_sheet::edge_numbers;
 use crate::layout::placing::poster::{MOST_PAGES, Poster};
 use crate::layout::{Label, LineKind, Placement, SheetLayout, SheetLine, SheetText};
 use crate::polygon;
-use crate::targets::identity;
 use crate::targets::length::format_mm;
-use crate::targets::{Face, FamilyRef, Panel, Polyhedron, SolidSpec, TargetError};
+use crate::targets::{Face, FamilyRef, Panel, Polyhedron, SolidSpec, TargetError, identity};
 
 /// Faces that rise or fall from one plane by less than this are not folded, radians (a tenth of a
 /// degree): no hand makes so slight a fold, and the neighbours hold the paper in its place.

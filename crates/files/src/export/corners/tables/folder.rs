@@ -2,9 +2,8 @@
 
 use std::collections::BTreeSet;
 use std::ffi::OsStr;
-use std::fs;
-use std::io;
 use std::path::{Path, PathBuf};
+use std::{fs, io};
 
 use super::{CORNERS, Contents, EXTENSION, PICTURES, Read, Reader, TableError};
 use crate::limits::{Limits, ReadError};
