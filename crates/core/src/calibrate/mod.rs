@@ -14,7 +14,7 @@
 //!
 //! `adjusted` runs 4 to 7 on all views. `solve` is around it and holds frames out, `automatic` chooses a model by `solve`,
 //! `located` asks where a target is. `compare` and `next_view` read estimates. Everything may import `model` (of lenses),
-//! `error`, `excluded` and `stop`; otherwise a module imports from chapters above it in this list, never in a circle.
+//! `error` (why there is no estimate), `excluded` (views that took no part, and why) and `cancel`; otherwise a module imports from chapters above it in this list, never in a circle.
 //!
 //! A pixel is predicted through a chain of frames,
 //!
@@ -34,6 +34,7 @@
 mod adjust;
 mod adjusted;
 mod automatic;
+mod cancel;
 mod compare;
 mod diagnose;
 mod equations;
@@ -47,7 +48,6 @@ mod next_view;
 mod problem;
 mod solve;
 mod start;
-mod stop;
 mod uncertainty;
 
 pub use adjust::finding::{Finding, Moved, Shared};

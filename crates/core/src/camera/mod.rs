@@ -3,7 +3,8 @@
 //!
 //! The camera frame is right-handed: x right, y down, z forward, the origin at the centre of
 //! projection (of a lens that is not central, where its pupil is on the axis). Pixel centres lie at
-//! integer coordinates. Each model has a file of its own with its formula and its derivatives.
+//! integer coordinates. Each model has a file of its own with its formula and its derivatives; which of its
+//! parameters a calibration finds, and from where it starts, is in [`calibrate::Model`](crate::calibrate::Model).
 
 mod brown_conrady;
 mod double_sphere;

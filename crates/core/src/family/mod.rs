@@ -41,13 +41,13 @@ mod control;
 mod decode;
 mod error;
 mod free;
+mod hex;
 mod kernels;
 mod krawtchouk;
 pub mod places;
 mod rules;
 pub mod search;
 mod tables;
-mod words;
 
 use std::collections::BTreeMap;
 

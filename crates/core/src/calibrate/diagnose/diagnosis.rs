@@ -52,6 +52,14 @@ pub enum Diagnosis {
         /// Of how many.
         all: usize,
     },
+    /// More than a fifth of the corners were left out with their panels, in views of which other panels were kept: what was found
+    /// is that of the others only.
+    ManyPanelsLeftOut {
+        /// How many corners.
+        left_out: usize,
+        /// Of how many.
+        all: usize,
+    },
     /// Another camera of the same model explains the views as well, or nearly.
     OtherMinimum {
         /// The camera.
@@ -147,6 +155,7 @@ impl Diagnosis {
             Self::ForeignCamera { .. }
                 | Self::AbsurdFit { .. }
                 | Self::ManyLeftOut { .. }
+                | Self::ManyPanelsLeftOut { .. }
                 | Self::ChangedCamera { .. }
         )
     }
@@ -304,7 +313,11 @@ fn said(found: &Estimate, alone: &[Alone]) -> Vec<Diagnosis> {
     });
     let mut states = states(found);
     let causes = causes(found, alone, &mut states);
-    let failures: Vec<Diagnosis> = foreign.chain(absurd).chain(many_left_out(found)).collect();
+    let failures: Vec<Diagnosis> = foreign
+        .chain(absurd)
+        .chain(many_left_out(found))
+        .chain(many_panels_left_out(found))
+        .collect();
     // Where the lens is not that of the model, photographs are not to blame.
     let misfits: BTreeSet<usize> =
         failures.iter().chain(&causes).filter_map(Diagnosis::misfit_of).collect();
@@ -358,6 +371,16 @@ fn many_left_out(found: &Estimate) -> Option<Diagnosis> {
     let is_sought = found.cameras.iter().any(|camera| camera.model.is_some());
     let is_many = left_out as f64 > MOST_LEFT_OUT * all as f64;
     (is_sought && is_many).then_some(Diagnosis::ManyLeftOut { left_out, all })
+}
+
+/// Whether too many corners took no part with their panels, as where one of several boards has another size than stated.
+fn many_panels_left_out(found: &Estimate) -> Option<Diagnosis> {
+    let of_panels = found.excluded.iter().filter(|out| out.panel.is_some());
+    let left_out: usize = of_panels.map(|out| out.corners).sum();
+    let kept: usize = found.cameras.iter().map(CameraEstimate::corner_count).sum();
+    let all = kept + left_out;
+    let is_many = left_out as f64 > MOST_LEFT_OUT * all as f64;
+    is_many.then_some(Diagnosis::ManyPanelsLeftOut { left_out, all })
 }
 
 /// Why residuals are not noise, and which of the states explain them better than any remedy does.

@@ -51,6 +51,11 @@ impl<'a> Words<'a> {
                 does_not_fit(self.model(*camera), *rms_px),
             ),
             Diagnosis::ManyLeftOut { left_out, all } => self.many_left_out(*left_out, *all),
+            Diagnosis::ManyPanelsLeftOut { left_out, all } => format!(
+                "{left_out} of {all} corners were left out with their panels, more than a fifth: what was found is that \
+                 of the others only; a board has another size or other labels than its description states: measure an \
+                 edge of each"
+            ),
             Diagnosis::OtherMinimum { camera, other, rms_px } => self.other_minimum(*camera, other, *rms_px),
             Diagnosis::Late { camera, frames } => self.late(*camera, *frames),
             Diagnosis::LabelsRotated { camera, rotation } => self.labels_rotated(*camera, rotation),

@@ -4,7 +4,8 @@
 //!
 //! 1. `layout` gives every unknown its column.
 //! 2. `block` has the equations of one panel in one picture; `frame` those of a frame, its pose eliminated.
-//! 3. `normal` sums blocks and eliminates the poses of frames, or the offsets of corners; `step` is what is solved.
+//! 3. `normal` sums blocks and eliminates the poses of frames, or the offsets of corners; and solves for a step;
+//!    `step` is that change of all unknowns.
 //! 4. `minimise` walks to the minimum (Levenberg–Marquardt).
 //! 5. `covariances` inverts the equations; `local_share` is what one frame tells of the unknowns that all share.
 

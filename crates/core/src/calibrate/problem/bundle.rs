@@ -5,9 +5,9 @@ use glam::{DVec2, DVec3};
 use super::corner_map::CornerMap;
 use super::shape::Shape;
 use super::unknowns::{Block, CameraUnknowns, PanelUnknowns, TargetUnknowns};
+use crate::calibrate::cancel::Stop;
 use crate::calibrate::input::observation::{LEAST_CORNERS, Observation};
 use crate::calibrate::input::panel::PanelRef;
-use crate::calibrate::stop::Stop;
 use crate::camera::Pose;
 
 /// Unknowns and observations. The pose of every frame is unknown.

@@ -8,7 +8,7 @@ use super::cosets::CosetUnion;
 use super::ranked::Ranked;
 use super::weights::weights;
 use super::{Arrangement, CycleSpace, Placing, Span};
-use crate::family::words::parse_word;
+use crate::family::hex::parse_word;
 use crate::family::{FamilyError, Screen};
 use crate::lattice::Dimension;
 

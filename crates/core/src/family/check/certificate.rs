@@ -1,8 +1,8 @@
 use std::collections::BTreeMap;
 
 use super::hidden::least_seen;
+use crate::family::hex::parse_word;
 use crate::family::search::lexicode::Lexicode;
-use crate::family::words::parse_word;
 use crate::family::{
     Confusion, Construction, Control, Family, PAIRS_COUNTED, Robust, Screen, TagWords,
     distance_histogram,

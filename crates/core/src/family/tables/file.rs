@@ -7,7 +7,7 @@ use sha2::{Digest, Sha256};
 
 use crate::Name;
 use crate::family::algebra::AlgebraicConstruction;
-use crate::family::words::parse_word;
+use crate::family::hex::parse_word;
 use crate::family::{
     Beginning, Family, FamilyError, FreeCells, Rules, TagWords, false_positive_rates,
 };

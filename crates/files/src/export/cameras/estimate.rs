@@ -361,7 +361,8 @@ pub(in crate::export) fn map<'a>(estimate: &'a Estimate, found: &'a TargetMap) -
 }
 
 /// Kinds of diagnoses in files after which a calibration is not to be used as it is.
-const FAILURES: [&str; 4] = ["foreign_camera", "absurd_fit", "many_left_out", "changed_camera"];
+const FAILURES: [&str; 5] =
+    ["foreign_camera", "absurd_fit", "many_left_out", "many_panels_left_out", "changed_camera"];
 
 /// Whether a diagnosis of this kind in a file says that the calibration is not to be used as it is,
 /// as [`Diagnosis::is_failure`] does.
@@ -395,6 +396,12 @@ pub(in crate::export) fn diagnoses<'a>(
             },
             Diagnosis::ManyLeftOut { left_out, all } => DiagnosisRecord {
                 kind: "many_left_out",
+                left_out: Some(*left_out),
+                all: Some(*all),
+                ..text
+            },
+            Diagnosis::ManyPanelsLeftOut { left_out, all } => DiagnosisRecord {
+                kind: "many_panels_left_out",
                 left_out: Some(*left_out),
                 all: Some(*all),
                 ..text
@@ -518,6 +525,7 @@ mod tests {
             Diagnosis::ForeignCamera { camera: 0, rms_px: 100.0 },
             Diagnosis::AbsurdFit { camera: 0, rms_px: 100.0 },
             Diagnosis::ManyLeftOut { left_out: 5, all: 8 },
+            Diagnosis::ManyPanelsLeftOut { left_out: 5, all: 8 },
             Diagnosis::PoorFit { camera: 0, rms_px: 2.0 },
             Diagnosis::Late { camera: 0, frames: 1 },
         ];

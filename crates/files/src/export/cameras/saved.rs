@@ -6,7 +6,8 @@
 
 use glam::{DMat3, DQuat, DVec2, DVec3};
 use nalgebra::DMatrix;
-use serde::Deserialize;
+use serde::de::Error;
+use serde::{Deserialize, Deserializer};
 
 use super::sheet::StoredShape;
 use super::{calibration, rig};
@@ -268,9 +269,24 @@ struct SavedCorner {
     outlier: bool,
 }
 
+/// How far the rows of a rotation may be from orthonormal: what six digits leave.
+const ROTATION_SLACK: f64 = 1e-5;
+
+/// A rotation matrix, row by row.
+fn rotation<'de, D: Deserializer<'de>>(source: D) -> Result<[f64; 9], D::Error> {
+    let rows: [f64; 9] = quantity::cosine::de(source)?;
+    let matrix = DMat3::from_cols_array(&rows);
+    let off = matrix * matrix.transpose() - DMat3::IDENTITY;
+    let most = off.to_cols_array().into_iter().map(f64::abs).fold(0.0, f64::max);
+    match most <= ROTATION_SLACK && matrix.determinant() > 0.0 {
+        true => Ok(rows),
+        false => Err(D::Error::custom("it is not a rotation")),
+    }
+}
+
 #[derive(Deserialize)]
 pub(in crate::export) struct SavedPose {
-    #[serde(deserialize_with = "quantity::cosine::de")]
+    #[serde(deserialize_with = "rotation")]
     rotation: [f64; 9],
     #[serde(deserialize_with = "quantity::figure::de")]
     translation_mm: DVec3,

@@ -31,8 +31,8 @@ use crate::family::algebra::ranked::Ranked;
 use crate::family::algebra::record::{has_free_centre, stride_of};
 use crate::family::algebra::{AlgebraicConstruction, Arrangement, CycleSpace, Span, bch, residue};
 use crate::family::check::bounds::bounds_of_cells;
+use crate::family::hex::parse_word;
 use crate::family::tables::shipped::shipped_names;
-use crate::family::words::parse_word;
 use crate::family::{
     Construction, Control, Family, FamilyError, Progress, Rules, Screen, TagWords,
 };

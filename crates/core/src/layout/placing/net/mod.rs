@@ -17,6 +17,9 @@
 //! in several pieces of whole faces, nested on as few pages as will do; tabs and numbers then lead from
 //! one to the other. With [`SolidSheets::SeamedNet`](crate::layout::SolidSheets::SeamedNet) a net that is larger
 //! than the paper stays in one piece, over several pages that are joined first.
+//!
+//! `unfold` lays the faces of a solid in the plane, `tabs` adds what is glued, `nest` packs pieces on pages, and `sheet` makes the
+//! sheets of all of them; `plane` moves outlines, `hinge` says how faces hang together, for a picture of the folding.
 
 mod hinge;
 mod nest;

@@ -1,4 +1,4 @@
-//! Words of cells as text.
+//! Words of cells as hexadecimal numbers.
 
 /// A word written 0x….
 pub(super) fn parse_word(text: &str) -> Option<u64> {
