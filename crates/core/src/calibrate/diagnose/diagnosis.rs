@@ -1,6 +1,6 @@
 //! What is to be said about an estimate: what is wrong with it, what that comes from, and what helps.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 
 use super::model_selection::{Alone, FOREIGN_PART, Instead, Remedy, is_absurd, is_explained};
 use super::one_state::{BoardStretch, CameraChange, RollingShutter, State};
@@ -10,6 +10,7 @@ use crate::calibrate::estimate::lens_end::LensEnd;
 use crate::calibrate::estimate::values::{CameraEstimate, Estimate};
 use crate::calibrate::input::calibration::Calibration;
 use crate::calibrate::input::order::in_order;
+use crate::calibrate::input::panel::PanelRef;
 use crate::calibrate::model::Model;
 use crate::calibrate::problem::shape::STRETCH;
 use crate::calibrate::start::symmetry::LabelRotation;
@@ -375,10 +376,23 @@ fn many_left_out(found: &Estimate) -> Option<Diagnosis> {
 
 /// Whether too many corners took no part with their panels, as where one of several boards has another size than stated.
 fn many_panels_left_out(found: &Estimate) -> Option<Diagnosis> {
-    let of_panels = found.excluded.iter().filter(|out| out.panel.is_some());
-    let left_out: usize = of_panels.map(|out| out.corners).sum();
-    let kept: usize = found.cameras.iter().map(CameraEstimate::corner_count).sum();
-    let all = kept + left_out;
+    let excluded = found.excluded.iter().filter(|out| out.panel.is_some());
+    let excluded: usize = excluded.map(|out| out.corners).sum();
+    let (mut outliers, mut all) = (0, excluded);
+    for view in found.cameras.iter().flat_map(|camera| &camera.views) {
+        let mut of_panels: BTreeMap<PanelRef, (usize, usize)> = BTreeMap::new();
+        for corner in &view.corners {
+            let (seen, out) = of_panels.entry(corner.panel).or_default();
+            (*seen, *out) = (*seen + 1, *out + usize::from(corner.outlier));
+        }
+        all += view.corners.len();
+        // A few may fit by chance.
+        let is_whole = |(seen, out): &&(usize, usize)| 10 * out >= 9 * seen;
+        // Of one panel alone the view would have been left out.
+        let several = of_panels.values().filter(|_| of_panels.len() > 1);
+        outliers += several.filter(is_whole).map(|(seen, _)| seen).sum::<usize>();
+    }
+    let left_out = excluded + outliers;
     let is_many = left_out as f64 > MOST_LEFT_OUT * all as f64;
     is_many.then_some(Diagnosis::ManyPanelsLeftOut { left_out, all })
 }
