@@ -61,27 +61,27 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     };
     let family = Some(family::resolve(&spec.family).context("--family")?);
     let family = family.as_ref();
-    let target =
+    let printing =
         args.printing.build("aprilgrid", &TargetSpec::AprilGrid(spec.clone()), family, is_made)?;
-    let mut files = args.printing.files(&target, family, is_made)?;
-    let (meshes, texture) = args.meshes.files(&target.target, family)?;
+    let mut files = args.printing.files(&printing, family, is_made)?;
+    let (meshes, texture) = args.meshes.files(&printing.target, family)?;
     files.extend(meshes);
     match spec.to_kalibr_yaml() {
-        Some(yaml) => files.push(text_file(format!("{}.yaml", target.target.name), yaml)),
+        Some(yaml) => files.push(text_file(format!("{}.yaml", printing.target.name), yaml)),
         None => tell!(
             "no {}.yaml is written: Kalibr reads tags of aprilTag36h11 with a border of 2 bits only",
-            target.target.name
+            printing.target.name
         ),
     }
     let [columns, rows] = spec.tags;
     let last = spec.first_id + spec.count() - 1;
     let summary = format!(
         "{}: {columns} × {rows} tags, edge {} mm, gaps {} mm, {}{}{texture}",
-        target.target.name,
+        printing.target.name,
         spec.tag_mm,
         (spec.gap * spec.tag_mm * 1e3).round() / 1e3,
         tag_range(family.map_or("", |family| family.name()), spec.first_id, last),
-        page(&target)
+        page(&printing)
     );
-    args.printing.delivery.deliver(&target, family, &files, &summary)
+    args.printing.delivery.deliver(&printing, family, &files, &summary)
 }

@@ -189,9 +189,13 @@ impl Args {
         json: &str,
     ) -> (Vec<File>, Vec<FormatError>) {
         let (mut files, mut refused) = (Vec::new(), Vec::new());
-        let has_failed = !saved::failures(json).is_empty();
+        let file = CameraFile {
+            camera: camera.clone(),
+            calibrated_with: calibrated_with.to_vec(),
+            failed: saved::failures(json).into_iter().next(),
+        };
         for format in &self.format {
-            if has_failed && *format != Format::Own {
+            if file.failed.is_some() && *format != Format::Own {
                 // No other program would read the reason.
                 tell!(
                     "warning: --format {}: not written, as the calibration failed",
@@ -199,7 +203,7 @@ impl Args {
                 );
                 continue;
             }
-            match format.texts(stem, camera, calibrated_with, views, json) {
+            match format.texts(stem, &file, views, json) {
                 Ok(texts) => {
                     files.extend(texts.into_iter().map(|(name, text)| text_file(name, text)))
                 }
@@ -220,18 +224,15 @@ impl Format {
     fn texts(
         self,
         stem: &str,
-        camera: &Camera,
-        calibrated_with: &[TargetIdentity],
+        file: &CameraFile,
         views: &[(&str, Pose)],
         json: &str,
     ) -> Result<Vec<(String, String)>, FormatError> {
+        let camera = &file.camera;
         let named = |end: &str, text: String| (format!("{stem}{end}"), text);
         Ok(match self {
             Self::Own => {
-                let (camera, calibrated_with) = (camera.clone(), calibrated_with.to_vec());
-                let failed = saved::failures(json).into_iter().next();
-                let yaml = CameraFile { camera, calibrated_with, failed }.to_yaml();
-                vec![named(".yaml", yaml), named(".json", json.to_owned())]
+                vec![named(".yaml", file.to_yaml()), named(".json", json.to_owned())]
             }
             Self::Opencv => vec![named("-opencv.yaml", opencv(camera)?)],
             Self::Ros => vec![named("-ros.yaml", ros(camera, stem)?)],

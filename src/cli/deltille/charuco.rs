@@ -60,20 +60,20 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     };
     let family = Family::shipped(&spec.dictionary).ok();
     let family = family.as_ref();
-    let target =
+    let printing =
         args.printing.build("charuco", &TargetSpec::Charuco(spec.clone()), family, is_made)?;
-    let mut files = args.printing.files(&target, family, is_made)?;
-    let (meshes, texture) = args.meshes.files(&target.target, family)?;
+    let mut files = args.printing.files(&printing, family, is_made)?;
+    let (meshes, texture) = args.meshes.files(&printing.target, family)?;
     files.extend(meshes);
     let last = spec.first_id + spec.markers() - 1;
     let [columns, rows] = spec.squares;
     let summary = format!(
         "{}: {columns} × {rows} squares, edge {} mm, markers {} mm, {}{}{texture}",
-        target.target.name,
+        printing.target.name,
         spec.square_mm,
         spec.marker_mm,
         tag_range(&spec.dictionary, spec.first_id, last),
-        page(&target)
+        page(&printing)
     );
-    args.printing.delivery.deliver(&target, family, &files, &summary)
+    args.printing.delivery.deliver(&printing, family, &files, &summary)
 }

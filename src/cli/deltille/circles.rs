@@ -39,16 +39,17 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         board_id: args.board_id,
         ..usual
     };
-    let target = args.printing.build("circles", &TargetSpec::Circles(spec.clone()), None, false)?;
-    let files = args.printing.files(&target, None, false)?;
+    let printing =
+        args.printing.build("circles", &TargetSpec::Circles(spec.clone()), None, false)?;
+    let files = args.printing.files(&printing, None, false)?;
     let summary = format!(
         "{}: {} × {} circles, spacing {} mm, diameter {} mm{}",
-        target.target.name,
+        printing.target.name,
         spec.circles[0],
         spec.circles[1],
         spec.spacing_mm,
         spec.diameter_mm,
-        page(&target)
+        page(&printing)
     );
-    args.printing.delivery.deliver(&target, None, &files, &summary)
+    args.printing.delivery.deliver(&printing, None, &files, &summary)
 }

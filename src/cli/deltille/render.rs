@@ -77,13 +77,10 @@ pub struct Args {
 /// Takes a picture of a target and writes it with its truth.
 pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let limits = args.limits.limits();
-    let target = target_file::read(&args.target, &limits)?;
-    let family = target_file::family(&target.target, args.family.as_deref())?;
-    if !target.target.is_one_scene() {
-        bail!(
-            "{} has several loose boards: render targets of one board, or solids",
-            target.target.name
-        );
+    let target = target_file::read(&args.target, &limits)?.target;
+    let family = target_file::family(&target, args.family.as_deref())?;
+    if !target.is_one_scene() {
+        bail!("{} has several loose boards: render targets of one board, or solids", target.name);
     }
     let camera = camera_file::read("--camera", &args.camera)?;
     limits.check_pixels(camera.width, camera.height).with_context(|| {
@@ -95,16 +92,16 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         .noise(args.noise / 100.0)
         .gradient(args.gradient.into())
         .seed(args.seed);
-    let corners = || target.target.panels.iter().flat_map(|panel| &panel.corners);
+    let corners = || target.panels.iter().flat_map(|panel| &panel.corners);
     let middle = corners().map(|c| c.target_mm).sum::<DVec3>();
     let pose = args.camera_from_target(middle / corners().count() as f64)?;
 
-    let scene = scene_of_target(&target.target, family.as_ref())?;
+    let scene = scene_of_target(&target, family.as_ref())?;
     let image = scene.render(&camera, &pose, &light);
     let seen = scene.truth(&camera, &pose, 0.0).corners;
-    let path = output::file(&args.output, &format!("{}-view", target.target.name), "png")?;
+    let path = output::file(&args.output, &format!("{}-view", target.name), "png")?;
     let name = path.file_name().unwrap_or_default().to_string_lossy();
-    let truth = truth::write(&name, &target.target.name, &pose, &light, &seen);
+    let truth = truth::write(&name, &target.name, &pose, &light, &seen);
     let picture = match args.bits {
         8 => picture(&camera, image.pixels().iter().map(|v| (v * 255.0 + 0.5) as u8)),
         _ => picture(&camera, image.pixels().iter().map(|v| (v * 65535.0 + 0.5) as u16)),
@@ -118,7 +115,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     say!("{}: {} corners in view", path.display(), seen.len());
     if seen.is_empty() {
         // In the frames of OpenCV's boards z points into the board.
-        let first = target.target.panels.first();
+        let first = target.panels.first();
         let is_away = first.is_some_and(|panel| panel.pose.matrix().z_axis.z < 0.0);
         let side = if is_away { "z < 0" } else { "z > 0" };
         tell!(

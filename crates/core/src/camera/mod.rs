@@ -30,7 +30,7 @@ pub use extended_unified::ExtendedUnified;
 pub use file::{CameraFile, CameraFileError};
 pub use kannala_brandt::KannalaBrandt;
 pub use lens::{Imaged, Lens, MAX_LENS_PARAMETERS, Ray};
-pub use pose::Pose;
+pub use pose::{Pose, is_rotation};
 pub use pupil::Pupil;
 pub use rectification::{Rectification, RectificationError};
 pub use spline::{Knots, Spline, SplineGrid, SplineGridError};

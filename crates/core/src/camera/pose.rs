@@ -74,6 +74,17 @@ impl Pose {
     }
 }
 
+/// How far the rotation of a pose may be from orthonormal: what six written digits leave.
+const ROTATION_SLACK: f64 = 1e-5;
+
+/// Whether a matrix, row by row, is a rotation: orthonormal and not a mirror image, up to what written digits leave.
+pub fn is_rotation(rows: &[f64; 9]) -> bool {
+    let matrix = DMat3::from_cols_array(rows);
+    let off = matrix * matrix.transpose() - DMat3::IDENTITY;
+    let most = off.to_cols_array().into_iter().map(f64::abs).fold(0.0, f64::max);
+    most <= ROTATION_SLACK && matrix.determinant() >= 0.0
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -7,6 +7,7 @@ use serde::{Deserialize, Serialize};
 
 use super::against_spec;
 use super::error::{Problem, problem};
+use crate::camera::is_rotation;
 use crate::json::{self, ReadError};
 use crate::lattice::{GridKind, Vertex};
 use crate::quantity;
@@ -27,9 +28,6 @@ const MEASURED_SLACK_EDGES: f64 = 0.5;
 /// How far its target position may be from that by its panel's pose, in edges: what six written digits of a
 /// rotation leave on a panel of a thousand edges.
 const POSE_SLACK_EDGES: f64 = 0.001;
-
-/// How far the rotation of a pose may be from orthonormal: what six written digits leave.
-const ROTATION_SLACK: f64 = 1e-5;
 
 /// How far the correlations of a covariance may be from symmetric, and from positive semidefinite: what
 /// rounding leaves.
@@ -317,9 +315,7 @@ fn check_panel(panel: &Panel, field: &str) -> Result<(), Problem> {
 }
 
 fn check_rotation(rotation: &[f64; 9], field: &str) -> Result<(), Problem> {
-    let r = nalgebra::Matrix3::from_row_slice(rotation);
-    let off = (r * r.transpose() - nalgebra::Matrix3::identity()).amax();
-    if off > ROTATION_SLACK || r.determinant() < 0.0 {
+    if !is_rotation(rotation) {
         return problem(format!("{field}.pose.rotation"), "it is not a rotation");
     }
     Ok(())

@@ -16,7 +16,7 @@ use deltille_core::calibrate::{
     Model, ObservedCovariance, PanelRef, Parameter, ProjectionUncertainty, Reason, Reference,
     SHAPE_COEFFICIENTS as COUNT, TargetEstimate, TargetMap, ViewEstimate,
 };
-use deltille_core::camera::{Camera, Lens, Pose, Spline, SplineGrid};
+use deltille_core::camera::{Camera, Lens, Pose, Spline, SplineGrid, is_rotation};
 use deltille_core::json::{self, ReadError};
 use deltille_core::quantity;
 use deltille_core::targets::{Target, TargetIdentity, check_result_of};
@@ -269,16 +269,10 @@ struct SavedCorner {
     outlier: bool,
 }
 
-/// How far the rows of a rotation may be from orthonormal: what six digits leave.
-const ROTATION_SLACK: f64 = 1e-5;
-
 /// A rotation matrix, row by row.
 fn rotation<'de, D: Deserializer<'de>>(source: D) -> Result<[f64; 9], D::Error> {
     let rows: [f64; 9] = quantity::cosine::de(source)?;
-    let matrix = DMat3::from_cols_array(&rows);
-    let off = matrix * matrix.transpose() - DMat3::IDENTITY;
-    let most = off.to_cols_array().into_iter().map(f64::abs).fold(0.0, f64::max);
-    match most <= ROTATION_SLACK && matrix.determinant() > 0.0 {
+    match is_rotation(&rows) {
         true => Ok(rows),
         false => Err(D::Error::custom("it is not a rotation")),
     }
