@@ -9,7 +9,7 @@ use std::path::PathBuf;
 
 use deltille::artwork;
 use deltille::export::svg;
-use deltille::family::best::{Best, Budget};
+use deltille::family::search::best::{Best, Budget};
 use deltille::family::{Control, certify};
 use deltille::lattice::Dimension;
 use deltille::layout::{PaperSpec, Printing};

@@ -9,7 +9,7 @@ fn main() {
     println!("cargo::rerun-if-env-changed=DELTILLE_DATA");
     println!("cargo::rerun-if-env-changed=DELTILLE_PYTHON");
     println!("cargo::rerun-if-changed=build.rs");
-    let beside = || Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/data");
+    let beside = || Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/data");
     let root = var_os("DELTILLE_DATA").map_or_else(beside, PathBuf::from);
     let path = var_os("PATH").unwrap_or_default();
     let is_program =

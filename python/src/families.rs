@@ -7,7 +7,7 @@ use std::sync::{Arc, Mutex, OnceLock};
 use std::time::Duration;
 
 use deltille::clock;
-use deltille::family::best::{Best, Budget};
+use deltille::family::search::best::{Best, Budget};
 use deltille::family::{self, Control, Decoder, FamilyError, Progress};
 use deltille::lattice::{Dimension, GridKind};
 use numpy::{PyArray1, PyArrayLike1};

@@ -2,7 +2,7 @@
 
 use std::ffi::OsString;
 
-use deltille::cli::{deltag, deltille as program, run};
+use deltille_cli::{deltag, deltille as program, run};
 use pyo3::prelude::*;
 
 /// Runs a program with its arguments, the first being its name, and ends the process with its exit code.

@@ -13,7 +13,7 @@ from deltille import _core
 
 def test_every_setting_that_the_library_names_has_a_keyword(root):
     """The words of the command line are held against the library by a test of its own."""
-    wording = (root / "src/cli/wording.rs").read_text()
+    wording = (root / "crates/cli/src/wording.rs").read_text()
     named = set(re.findall(r'^    named\("([^"]+)"', wording, re.M))
     assert named and named == {setting for setting, _ in _core._keywords()}
 

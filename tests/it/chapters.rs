@@ -19,7 +19,7 @@ const CHAPTERS: [[&str; 2]; 6] = [
 
 #[test]
 fn modules_do_not_import_in_a_circle() {
-    let crates = Path::new(env!("CARGO_MANIFEST_DIR")).join("crates");
+    let crates = Path::new(crate::common::REPOSITORY).join("crates");
     for [name, chapter] in CHAPTERS {
         let source = crates.join(name).join("src");
         let mut texts = BTreeMap::new();

@@ -10,7 +10,7 @@ use super::problem::panels;
 use super::start::alone::{self, enough};
 use super::start::frames::{Frame, Start};
 use super::start::together::{self, Alone};
-use crate::camera::PROJECTION_PARAMETERS;
+use deltille_core::camera::PROJECTION_PARAMETERS;
 
 /// Focal lengths and the principal point are not determined when a deviation is more than this part
 /// of the focal length: equations that are linear near the solution, as deviations are computed from,

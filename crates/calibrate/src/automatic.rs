@@ -14,7 +14,7 @@ use super::input::observation::View;
 use super::input::sample::evenly;
 use super::model::Model;
 use super::problem::whitening::{MEDIAN_OF_CHI_SQUARED_2, OUTLIER_SIGMA};
-use crate::statistics::median;
+use deltille_core::statistics::median;
 
 /// Models that are tried, those with fewer parameters first.
 const TRIED: [Model; 10] = [

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-/// A flag by which somebody else ends a calibration, see [`Calibration::stopped_by`](crate::calibrate::Calibration::stopped_by).
+/// A flag by which somebody else ends a calibration, see [`Calibration::stopped_by`](crate::Calibration::stopped_by).
 ///
 /// It says nothing of what is calibrated: any two are equal.
 #[derive(Clone, Debug, Default)]
@@ -31,7 +31,7 @@ impl PartialEq for Stop {
 mod tests {
     use super::super::{Calibration, CalibrationError, Model};
     use super::*;
-    use crate::camera::Pose;
+    use deltille_core::camera::Pose;
 
     #[test]
     fn a_calibration_ends_when_it_is_told_to() {

@@ -208,7 +208,7 @@ pub enum CalibrationError {
          the one that was photographed"
     )]
     NoStart,
-    /// Somebody has ended it, see [`Calibration::stopped_by`](crate::calibrate::Calibration::stopped_by).
+    /// Somebody has ended it, see [`Calibration::stopped_by`](crate::Calibration::stopped_by).
     #[error("interrupted before it was solved")]
     Stopped,
     /// The views leave parameters open.

@@ -5,7 +5,7 @@ use super::diagnose::words::Words;
 use super::error::CalibrationError;
 use super::estimate::values::Estimate;
 use super::input::calibration::Calibration;
-use crate::detect::Detection;
+use deltille_core::detection::Detection;
 
 impl Calibration {
     /// [`Self::solve`] for one picture of a known camera: the pose of the target in it, or a sentence that says why

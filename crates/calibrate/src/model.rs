@@ -6,7 +6,7 @@ use std::str::FromStr;
 
 use glam::DVec2;
 
-use crate::camera::{
+use deltille_core::camera::{
     BrownConrady, DoubleSphere, ExtendedUnified, KannalaBrandt, Lens, MAX_LENS_PARAMETERS,
     PROJECTION_PARAMETERS, Pupil, Spline, SplineGrid,
 };

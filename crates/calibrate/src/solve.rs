@@ -10,7 +10,7 @@ impl Calibration {
     /// Of a known camera that is the pose of the target:
     ///
     /// ```
-    /// use deltille_core::calibrate::{Calibration, Observation, PanelRef, Sighting, View};
+    /// use deltille_calibrate::{Calibration, Observation, PanelRef, Sighting, View};
     /// use deltille_core::camera::{Camera, Pose};
     /// use glam::DVec3;
     ///
@@ -29,7 +29,7 @@ impl Calibration {
     /// let estimate = Calibration::new([Pose::IDENTITY]).camera("c", vec![view], camera).solve()?;
     /// let [turn, step] = estimate.frames[0].rig_from_target.off(&truth);
     /// assert!(turn.length() < 1e-6 && step.length() < 1e-4);
-    /// # Ok::<(), deltille_core::calibrate::CalibrationError>(())
+    /// # Ok::<(), deltille_calibrate::CalibrationError>(())
     /// ```
     ///
     /// # Errors

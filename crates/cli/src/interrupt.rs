@@ -6,9 +6,9 @@ use std::sync::atomic::{AtomicBool, AtomicU8, Ordering};
 use std::sync::{Mutex, PoisonError};
 use std::time::Duration;
 
-use crate::cli::output::tell;
-use crate::export::atomic;
-use crate::words::shown;
+use crate::output::tell;
+use deltille::export::atomic;
+use deltille::words::shown;
 
 /// How long work may take to come to its own end after the signal; then it is left as it stands.
 const PATIENCE: Duration = Duration::from_millis(300);

@@ -1,5 +1,7 @@
 //! The programs: arguments, progress, messages and exit codes. No algorithm lives here.
 
+#![allow(clippy::missing_errors_doc, reason = "errors of programs are sentences for people")]
+
 pub mod deltag;
 pub mod deltille;
 pub mod interrupt;

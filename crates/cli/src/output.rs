@@ -5,11 +5,11 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, bail, ensure};
 
-use crate::cli::wording::in_options;
-use crate::export::kind::Kind;
-use crate::export::{atomic, staging};
-use crate::limits::{Limits, ReadError};
-use crate::words::shown;
+use crate::wording::in_options;
+use deltille::export::kind::Kind;
+use deltille::export::{atomic, staging};
+use deltille::limits::{Limits, ReadError};
+use deltille::words::shown;
 
 /// The file that `-o` means: itself when it ends in the extension, else `<stem>.<extension>` in
 /// that folder. A path that ends in another extension is no folder, unless it is there as one.
@@ -73,7 +73,7 @@ pub(crate) fn line(text: &str) -> String {
 /// Prints a [`line`], and returns from the function where that fails.
 macro_rules! say {
     ($($argument:tt)*) => {
-        $crate::cli::output::print(&$crate::cli::output::line(&format!($($argument)*)))?
+        $crate::output::print(&$crate::output::line(&format!($($argument)*)))?
     };
 }
 pub(crate) use say;
@@ -84,7 +84,7 @@ macro_rules! tell {
         // Nobody may be left to read it.
         let _ = ::std::io::Write::write_all(
             &mut ::std::io::stderr(),
-            $crate::cli::output::line(&format!($($argument)*)).as_bytes(),
+            $crate::output::line(&format!($($argument)*)).as_bytes(),
         );
     }};
 }

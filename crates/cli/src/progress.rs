@@ -7,9 +7,9 @@ use std::time::{Duration, Instant};
 
 use indicatif::{ProgressBar, ProgressStyle};
 
-use crate::cli::output::tell;
-use crate::family::Progress;
-use crate::words::counted;
+use crate::output::tell;
+use deltille::family::Progress;
+use deltille::words::counted;
 
 /// A bar with position and estimate, for `total` units of work called `unit`; silent where standard
 /// error is not a terminal.

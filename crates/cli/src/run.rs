@@ -8,9 +8,9 @@ use anyhow::Context;
 use clap::Parser;
 use clap::error::{ContextKind, ContextValue, ErrorKind};
 
-use crate::cli::output::tell;
-use crate::cli::{interrupt, wording};
-use crate::words::{cut, shown, with_short_quotes};
+use crate::output::tell;
+use crate::{interrupt, wording};
+use deltille::words::{cut, shown, with_short_quotes};
 
 /// Exit code for bad input of every kind.
 pub const BAD_INPUT: u8 = 2;

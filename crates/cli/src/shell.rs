@@ -6,8 +6,8 @@ use std::process::ExitCode;
 use anyhow::Context;
 use clap::{Command, CommandFactory};
 
-use crate::cli::output::{self, Overwrite, print, say};
-use crate::words::counted;
+use crate::output::{self, Overwrite, print, say};
+use deltille::words::counted;
 
 /// At the end of the help of `deltille completions`.
 pub const COMPLETIONS: &str = "Examples:

@@ -4,7 +4,7 @@ use std::fmt::Display;
 use std::ops::RangeInclusive;
 use std::str::FromStr;
 
-use crate::Name;
+use deltille::Name;
 
 /// A whole number of a range. The ends of the number's own type go unsaid.
 pub fn whole<T>(range: RangeInclusive<T>) -> impl Fn(&str) -> Result<T, String> + Clone
@@ -81,7 +81,7 @@ impl Ids {
     const MOST: usize = 10_000_000;
 
     /// Refuses ids that a family does not have.
-    pub fn check(&self, family: &crate::family::Family) -> anyhow::Result<()> {
+    pub fn check(&self, family: &deltille::family::Family) -> anyhow::Result<()> {
         match self.0.iter().find(|&&id| family.code(id).is_none()) {
             None => Ok(()),
             Some(id) => anyhow::bail!(

@@ -1,17 +1,13 @@
 //! Settings of a detector, and the least that it looks for in any image.
 
-use super::detection::ink::Ink;
-use super::detection::tone::Tone;
 use super::refine::refiner::Refinement;
-
-/// The median edge of a grid that no tag vouches for is no shorter than this, px. Blur leaves nothing
-/// of smaller tiles but their fundamental wave, and that is the same for squares, dots and threads.
-pub(super) const MIN_UNTAGGED_EDGE_PX: f64 = 7.0;
+use deltille_core::detection::{Ink, Tone};
 
 /// Settings of a detector.
 ///
 /// ```
-/// use deltille_core::detect::{DetectorConfig, Tone};
+/// use deltille_detect::DetectorConfig;
+/// use deltille_core::detection::Tone;
 ///
 /// let config = DetectorConfig::default().tone(Tone::Linear).max_bit_errors(Some(1));
 /// ```

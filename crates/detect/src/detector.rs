@@ -3,32 +3,32 @@
 use std::collections::BTreeMap;
 use std::time::Duration;
 
-use super::config::{DetectorConfig, MIN_UNTAGGED_EDGE_PX};
+use super::config::DetectorConfig;
 use super::labels::why;
 use super::levels::{MIN_LEVEL_SIDE, PYRAMID_LEVELS, levels_of};
 use super::scene::{SceneError, check_detectable, check_distinct};
 use super::tiling::{CHECKER, DELTILLE, kind, step};
-use crate::Clock;
-use crate::detect::corners::saddles::{SaddleFinder, too_many};
-use crate::detect::detection::ink::{Ink, InkEstimate};
-use crate::detect::detection::reason::{Reason, ReasonKind};
-use crate::detect::detection::values::{Detection, Grid};
-use crate::detect::grid::beyond::go_on;
-use crate::detect::grid::foreshortened::foreshortened_grids;
-use crate::detect::grid::grow::grids;
-use crate::detect::grid::saddle_grid::SaddleGrid;
-use crate::detect::grid::tile_shape::is_of_squares;
-use crate::detect::labels::assignment::{FoundGrid, Labels, MOST_CORNERS, report_once};
-use crate::detect::labels::evidence::Budget;
-use crate::detect::refine::clearance::TagAreas;
-use crate::detect::refine::corner_model::CornerFitter;
-use crate::detect::refine::optics::Optics;
-use crate::detect::refine::refine_grid::{is_sampled, sharp_level};
-use crate::detect::refine::refiner::Refiner;
-use crate::family::{Family, FamilyError};
-use crate::lattice::GridKind;
-use crate::raster::{FileNotes, Gray, ImageView, PYRAMID_FULL_SCALE, Pyramid};
-use crate::targets::{Target, TargetIdentity, least_untagged_corners};
+use crate::corners::saddles::{SaddleFinder, too_many};
+use crate::grid::beyond::go_on;
+use crate::grid::foreshortened::foreshortened_grids;
+use crate::grid::grow::grids;
+use crate::grid::saddle_grid::SaddleGrid;
+use crate::grid::tile_shape::is_of_squares;
+use crate::labels::assignment::{FoundGrid, Labels, MOST_CORNERS, report_once};
+use crate::labels::evidence::Budget;
+use crate::refine::clearance::TagAreas;
+use crate::refine::corner_model::CornerFitter;
+use crate::refine::optics::Optics;
+use crate::refine::refine_grid::{is_sampled, sharp_level};
+use crate::refine::refiner::Refiner;
+use deltille_core::Clock;
+use deltille_core::detection::{
+    Detection, Grid, Ink, InkEstimate, MIN_UNTAGGED_EDGE_PX, Reason, ReasonKind,
+};
+use deltille_core::family::{Family, FamilyError};
+use deltille_core::lattice::GridKind;
+use deltille_core::raster::{Gray, ImageView, PYRAMID_FULL_SCALE, Pyramid};
+use deltille_core::targets::{Target, TargetIdentity, least_untagged_corners};
 
 /// Nor is its blur a larger part of the edge. It leaves less than a tenth of the next wave, and in the
 /// wave by itself the model reads a blur of 0.25 of the edge, of three waves 0.155.
@@ -77,7 +77,7 @@ struct Found {
 /// Finds grids in images and labels their corners.
 ///
 /// ```
-/// use deltille_core::detect::{Detector, DetectorConfig};
+/// use deltille_detect::{Detector, DetectorConfig};
 /// use deltille_core::raster::Gray;
 /// use deltille_core::lattice::GridKind;
 ///
@@ -127,7 +127,7 @@ impl Detector {
     /// Where it is not; give the family to [`Self::for_target`] then.
     ///
     /// ```
-    /// use deltille_core::detect::Detector;
+    /// use deltille_detect::Detector;
     /// use deltille_core::raster::Gray;
     /// use deltille_core::targets::{BoardSpec, Target};
     ///
@@ -188,7 +188,7 @@ impl Detector {
     /// Where two targets cannot be told apart.
     ///
     /// ```
-    /// use deltille_core::detect::{Detector, DetectorConfig};
+    /// use deltille_detect::{Detector, DetectorConfig};
     /// use deltille_core::targets::{BoardSpec, Target};
     ///
     /// let [mut front, mut back] = [BoardSpec::deltille(10, 11, 20.0), BoardSpec::deltille(10, 11, 20.0)];
@@ -265,9 +265,10 @@ impl Detector {
         let of_other = |other: Box<Self>| match (edge_mm, other.edge_mm) {
             // As far on tiles of another size.
             (Some(edge_mm), Some(other_mm)) => {
-                let edges = |part: f64| part * edge_mm / other_mm;
-                let (part, deviation) = (edges(ink.edges), edges(ink.edges_deviation));
-                let ink = InkEstimate { edges: part, edges_deviation: deviation, ..ink };
+                let mut ink = ink;
+                for edges in [&mut ink.edges, &mut ink.edges_deviation] {
+                    *edges = *edges * edge_mm / other_mm;
+                }
                 Box::new(other.with_ink(ink))
             }
             _ => other,
@@ -302,11 +303,12 @@ impl Detector {
             Finder::Deltille(finder) => self.detect_with(finder, image, name),
             Finder::Checker(finder) => self.detect_with(finder, image, name),
         };
-        let found = match &self.other {
+        let mut found = match &self.other {
             Some(other) => both(found, other.detect_view(image, name)),
             None => found,
         };
-        Detection { targets: self.targets.clone(), ..found }
+        found.targets = self.targets.clone();
+        found
     }
 
     fn detect_with<const N: usize>(
@@ -328,7 +330,9 @@ impl Detector {
             vec![left_out.first().cloned().unwrap_or_else(nothing)]
         } else if self.labels.are_wanted() && grids.iter().all(|(_, reason)| reason.is_some()) {
             let of_grid = |(i, (_, reason)): (usize, &(Grid, Option<Reason>))| {
-                Some(Reason { grid: Some(i), ..reason.clone()? })
+                let mut reason = reason.clone()?;
+                reason.grid = Some(i);
+                Some(reason)
             };
             grids.iter().enumerate().filter_map(of_grid).take(MOST_REASONS).collect()
         } else {
@@ -340,21 +344,17 @@ impl Detector {
         reasons.extend(
             left_out.into_iter().filter(|reason| !grids.is_empty() && is_of_others(reason)),
         );
-        Detection {
-            image: name.to_owned(),
-            width: image.width() as u32,
-            height: image.height() as u32,
-            file: FileNotes::default(),
-            targets: Vec::new(),
-            grids: grids.into_iter().map(|(grid, _)| grid).collect(),
-            tone: optics.tone,
-            ink: self.ink.or_else(|| {
-                let ink = optics.ink_found?;
-                Some(self.edge_mm.map_or(ink, |edge_mm| ink.on_print(edge_mm)))
-            }),
-            reasons,
-            timing_ms: timing.laps,
-        }
+        let size = [image.width() as u32, image.height() as u32];
+        let grids = grids.into_iter().map(|(grid, _)| grid).collect();
+        let mut found = Detection::new(name, size, grids);
+        found.tone = optics.tone;
+        found.ink = self.ink.or_else(|| {
+            let ink = optics.ink_found?;
+            Some(self.edge_mm.map_or(ink, |edge_mm| ink.on_print(edge_mm)))
+        });
+        found.reasons = reasons;
+        found.timing_ms = timing.laps;
+        found
     }
 
     /// The board, where one alone is looked for, if a coarser level of the pyramid shows all of it and nothing else

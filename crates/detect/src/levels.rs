@@ -1,6 +1,6 @@
 //! How many levels the pyramid of an image has.
 
-use crate::raster::ImageView;
+use deltille_core::raster::ImageView;
 
 /// Most levels of the pyramid that every image has: the coarsest sees four times the blur that the finest can.
 pub(super) const PYRAMID_LEVELS: usize = 3;

@@ -11,16 +11,15 @@ use super::config::DetectorConfig;
 use super::detector::Detector;
 use super::levels::{MIN_LEVEL_SIDE, levels_of};
 use super::tiling::{CHECKER, DELTILLE, kind};
-use crate::detect::corners::saddles::SaddleFinder;
-use crate::detect::grid::grow::grids;
-use crate::detect::grid::saddle_grid::SaddleGrid;
-use crate::detect::labels::evidence::panel_from_grid;
-use crate::detect::labels::tags::{Read, TagPlace, TagReader};
-use crate::family::{Decoder, Family};
-use crate::lattice::{GridKind, LatticeMap, Tile, Vertex};
-use crate::layout::{PaperSpec, usual_edge_mm};
-use crate::raster::{ImageView, Pyramid};
-use crate::targets::{
+use crate::corners::saddles::SaddleFinder;
+use crate::grid::grow::grids;
+use crate::grid::saddle_grid::SaddleGrid;
+use crate::labels::evidence::panel_from_grid;
+use crate::labels::tags::{Read, TagPlace, TagReader};
+use deltille_core::family::{Decoder, Family};
+use deltille_core::lattice::{GridKind, LatticeMap, Tile, Vertex};
+use deltille_core::raster::{ImageView, Pyramid};
+use deltille_core::targets::{
     BoardSpec, SolidShape, SolidSpec, TagSpec, TagsIn, Target, TargetSpec, board_vertices,
     tagged_tiles,
 };
@@ -63,7 +62,7 @@ pub struct Recognised {
 /// are made where nothing else is asked for.
 ///
 /// ```
-/// use deltille_core::detect::Recogniser;
+/// use deltille_detect::Recogniser;
 /// use deltille_core::family::Family;
 /// use deltille_core::raster::Gray;
 ///
@@ -293,8 +292,7 @@ impl Sighting<'_> {
             }
         }
         let (_, spec) = best?;
-        let edge_mm = usual_edge_mm(&spec, &PaperSpec::default());
-        Some(BoardSpec { edge_mm, ..spec })
+        Some(BoardSpec { edge_mm: BoardSpec::USUAL_EDGE_MM, ..spec })
     }
 
     /// Most corners in a row.
@@ -359,10 +357,10 @@ mod tests {
     use glam::DVec3;
 
     use super::*;
-    use crate::camera::{Camera, Pose};
-    use crate::family::shipped_families;
-    use crate::raster::Gray;
-    use crate::synth::{Light, scene_of_target};
+    use deltille_core::camera::{Camera, Pose};
+    use deltille_core::family::shipped_families;
+    use deltille_core::raster::Gray;
+    use deltille_layout::synth::{Light, scene_of_target};
 
     /// A picture of a target from an eye that looks at a place of it, mm.
     fn picture(target: &Target, eye: [f64; 3], at: [f64; 3]) -> Gray<f32> {

@@ -2,9 +2,9 @@
 
 use std::collections::BTreeSet;
 
-use crate::family::places;
-use crate::lattice::GridKind;
-use crate::targets::Target;
+use deltille_core::family::places;
+use deltille_core::lattice::GridKind;
+use deltille_core::targets::Target;
 
 /// Why targets cannot be looked for together. Messages say what to do about it.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]

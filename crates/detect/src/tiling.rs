@@ -7,7 +7,7 @@
 //!        4 ╱ 5                3          corner to corner of a checkerboard the colours alternate
 //! ```
 
-use crate::lattice::{GridKind, Vertex};
+use deltille_core::lattice::{GridKind, Vertex};
 
 /// Rays at a corner of a deltille grid.
 pub const DELTILLE: usize = 6;

@@ -1,8 +1,8 @@
 //! What is known of the printed sheet beforehand, put on views before they are calibrated.
 
-use deltille_core::calibrate::{PanelPlace, Reference, View};
-use deltille_core::layout::SheetLayout;
+use deltille_calibrate::{PanelPlace, Reference, View};
 use deltille_core::targets::{Target, TargetSpec};
+use deltille_layout::SheetLayout;
 
 use crate::export::sheet::Sheet;
 

@@ -4,8 +4,8 @@ use std::path::{Path, PathBuf};
 
 use deltille_core::family::{Family, PAIRS_COUNTED, certify_codes};
 use deltille_core::lattice::GridKind;
-use deltille_core::layout::Printing;
 use deltille_core::targets::{FamilyRef, OtherFamily, Target, TargetFileError, TargetIdentity};
+use deltille_layout::Printing;
 
 use crate::export::dsc::{self, DscError};
 use crate::export::staging;

@@ -6,8 +6,8 @@
 
 use nalgebra::{DMatrix, Matrix2};
 
-use crate::detect::{SLOPE_PRIOR, Tone};
-use crate::synth::SimulatedCorner;
+use deltille::detect::{SLOPE_PRIOR, Tone};
+use deltille::synth::SimulatedCorner;
 
 /// Step of the difference quotients, in the parameters' units; errors are of its square.
 const STEP: f64 = 1e-3;

@@ -16,11 +16,11 @@ use rand_distr::{Distribution, Normal};
 use rayon::prelude::*;
 
 use super::bound;
-use crate::detect::{RefineStatus, Refinement, Refiner, Tone};
-use crate::lattice::GridKind;
-use crate::raster::Gray;
-use crate::statistics::quantile;
-use crate::synth::SimulatedCorner;
+use deltille::detect::{RefineStatus, Refinement, Refiner, Tone};
+use deltille::lattice::GridKind;
+use deltille::raster::Gray;
+use deltille::statistics::quantile;
+use deltille::synth::SimulatedCorner;
 
 /// Side of the window that all methods read, px: the reference's 11×11 fit on smoothed pixels.
 pub const WINDOW_PX: usize = 21;

@@ -22,17 +22,17 @@ use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 use rayon::prelude::*;
 
-use crate::artwork::ArtworkError;
-use crate::calibrate::{
+use deltille::artwork::ArtworkError;
+use deltille::calibrate::{
     Calibration, CalibrationError, CameraEstimate, Comparison, Estimate, Guide, Guided, Model,
     NextView, Observation, PanelRef, Reference, Region, Sighting, Source, View, views,
 };
-use crate::camera::{BrownConrady, Camera, KannalaBrandt, Lens, Pose};
-use crate::detect::Detector;
-use crate::family::FamilyError;
-use crate::statistics::median;
-use crate::synth::{Light, Scene, scene_of_target};
-use crate::targets::{BoardSpec, Target, TargetError};
+use deltille::camera::{BrownConrady, Camera, KannalaBrandt, Lens, Pose};
+use deltille::detect::Detector;
+use deltille::family::FamilyError;
+use deltille::statistics::median;
+use deltille::synth::{Light, Scene, scene_of_target};
+use deltille::targets::{BoardSpec, Target, TargetError};
 
 /// The board: 9 rows of 12 corners, 20 mm, about A4.
 const BOARD: (u32, u32, f64) = (9, 12, 20.0);

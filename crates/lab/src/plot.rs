@@ -7,10 +7,10 @@ use glam::DVec2;
 use kurbo::Affine;
 
 use super::corners::{METHODS, Method, Row, Sweep, name};
-use crate::artwork::text;
-use crate::export::GENERATOR;
-use crate::export::kind::signed_png;
-use crate::lattice::GridKind;
+use deltille::artwork::text;
+use deltille::export::GENERATOR;
+use deltille::export::kind::signed_png;
+use deltille::lattice::GridKind;
 
 /// Size of a panel's axes and the room around it, in user units.
 const PANEL: DVec2 = DVec2::new(300.0, 230.0);

@@ -19,14 +19,14 @@ use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 use rayon::prelude::*;
 
-use crate::artwork::ArtworkError;
-use crate::calibrate::{Calibration, CalibrationError, Estimate, Model, Reference, views};
-use crate::camera::{BrownConrady, Camera, Lens, Pose};
-use crate::detect::{Detection, Detector, DetectorConfig};
-use crate::family::{Family, FamilyError};
-use crate::lattice::GridKind;
-use crate::synth::{Light, Scene, scene_of_target};
-use crate::targets::{
+use deltille::artwork::ArtworkError;
+use deltille::calibrate::{Calibration, CalibrationError, Estimate, Model, Reference, views};
+use deltille::camera::{BrownConrady, Camera, Lens, Pose};
+use deltille::detect::{Detection, Detector, DetectorConfig};
+use deltille::family::{Family, FamilyError};
+use deltille::lattice::GridKind;
+use deltille::synth::{Light, Scene, scene_of_target};
+use deltille::targets::{
     BoardSpec, ListFormat, ListedSpec, PanelPose, SolidShape, SolidSpec, Target, TargetError,
     TargetSpec,
 };

@@ -22,11 +22,11 @@ use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 use rayon::prelude::*;
 
-use crate::calibrate::{
+use deltille::calibrate::{
     Calibration, ChangedIntrinsic, Diagnosis, Estimate, Model, Observation, PanelRef, Sighting,
     View,
 };
-use crate::camera::{BrownConrady, Camera, DoubleSphere, KannalaBrandt, Lens, Pose};
+use deltille::camera::{BrownConrady, Camera, DoubleSphere, KannalaBrandt, Lens, Pose};
 
 /// Size of the pictures, px.
 const SIZE_PX: [u32; 2] = [1280, 960];

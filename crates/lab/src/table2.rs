@@ -5,13 +5,13 @@ use std::path::Path;
 
 use rayon::prelude::*;
 
-use crate::calibrate::{
+use deltille::calibrate::{
     Calibration, CalibrationError, Estimate, Loss, Model, Reference, UntaggedGrid, View, Weights,
     views,
 };
-use crate::detect::{Detector, DetectorConfig, Refinement};
-use crate::lattice::GridKind;
-use crate::photograph::{self, ImageError};
+use deltille::detect::{Detector, DetectorConfig, Refinement};
+use deltille::lattice::GridKind;
+use deltille::photograph::{self, ImageError};
 
 /// Rows and columns of the board of the paper's sequence, and its edges.
 const SIZE: [u32; 2] = [10, 11];

@@ -4,9 +4,9 @@
 use glam::DVec2;
 use serde::{Deserialize, Serialize};
 
-use crate::layout::{LineKind, Printing, SheetLayout, SheetLine};
-use crate::polygon::rectangle;
-use crate::targets::TargetError;
+use crate::{LineKind, Printing, SheetLayout, SheetLine};
+use deltille_core::polygon::rectangle;
+use deltille_core::targets::TargetError;
 
 /// Width of the line to cut along, mm: the quarter of a point that print shops ask for.
 const CONTOUR_MM: f64 = 0.1;
@@ -83,7 +83,7 @@ impl Printing {
     /// mirrored.
     ///
     /// ```
-    /// use deltille_core::layout::{Finish, Printing};
+    /// use deltille_layout::{Finish, Printing};
     /// use deltille_core::targets::BoardSpec;
     ///
     /// let finish = Finish { mirrored: true, ..Finish::default() };
@@ -152,7 +152,7 @@ fn add_outline(sheet: &mut SheetLayout, corners: [DVec2; 4]) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::targets::BoardSpec;
+    use deltille_core::targets::BoardSpec;
 
     #[test]
     fn names_of_inks_are_told_from_other_words() {

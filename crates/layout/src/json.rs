@@ -4,10 +4,11 @@ use std::collections::BTreeSet;
 
 use glam::DVec2;
 
-use crate::layout::{Printing, SheetLayout};
-use crate::targets::TargetFileError;
-use crate::targets::error::{Problem, problem};
-use crate::targets::json::{self, Printed};
+use crate::{Printing, SheetLayout};
+use deltille_core::targets::TargetFileError;
+use deltille_core::targets::json;
+use deltille_core::targets::json::Printed;
+use deltille_core::targets::{Problem, problem};
 
 /// Longest side of a sheet, mm: more than any paper, and than the net of any solid that is made.
 const LONGEST_SHEET_MM: f64 = 20_000.0;
@@ -28,7 +29,7 @@ impl Printing {
     /// The text of the target file, a corner a line.
     ///
     /// ```
-    /// use deltille_core::layout::Printing;
+    /// use deltille_layout::Printing;
     /// use deltille_core::targets::{SolidShape, SolidSpec};
     ///
     /// let solid = Printing::new("ico", SolidSpec::new(SolidShape::Icosahedron))?;
@@ -104,10 +105,10 @@ mod tests {
     use proptest::prelude::*;
 
     use super::*;
-    use crate::family::Family;
-    use crate::lattice::GridKind;
-    use crate::layout::PaperSpec;
-    use crate::targets::{BoardSpec, TagSpec, Target, TargetSpec};
+    use crate::PaperSpec;
+    use deltille_core::family::Family;
+    use deltille_core::lattice::GridKind;
+    use deltille_core::targets::{BoardSpec, TagSpec, Target, TargetSpec};
 
     fn board(rows: u32, cols: u32, edge_mm: f64, tagged: bool, boards: u32) -> Printing {
         let tags = tagged.then(TagSpec::default);

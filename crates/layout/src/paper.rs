@@ -3,8 +3,8 @@ use std::str::FromStr;
 
 use glam::DVec2;
 
-use crate::layout::Logo;
-use crate::targets::length::{format_mm, parse_length_mm};
+use crate::Logo;
+use deltille_core::targets::{format_mm, parse_length_mm};
 
 /// Sizes with a name: short and long side, mm (ISO 216; ANSI A and B, US legal).
 const NAMED: [(&str, [f64; 2]); 9] = [

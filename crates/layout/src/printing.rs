@@ -3,16 +3,18 @@
 use std::borrow::Cow;
 
 use super::paper::{PaperSpec, SolidSheets};
-use crate::angles::turn_of;
-use crate::family::Family;
-use crate::layout::marks::{logo, tag_ids};
-use crate::layout::placing::arrangement::{arrange, label};
-use crate::layout::placing::poster::Poster;
-use crate::layout::placing::{face_sheet, guide, net, packed, single_panel, tag_sheet};
-use crate::layout::{Finish, LineKind, Logo, Placement, SheetLayout, SheetLine};
-use crate::polygon::rectangle;
-use crate::targets::build::shipped_family;
-use crate::targets::{BoardSpec, FamilyRef, Panel, Target, TargetError, TargetSpec, identity};
+use crate::marks::{logo, tag_ids};
+use crate::placing::arrangement::{arrange, label};
+use crate::placing::poster::Poster;
+use crate::placing::{face_sheet, guide, net, packed, single_panel, tag_sheet};
+use crate::{Finish, LineKind, Logo, Placement, SheetLayout, SheetLine};
+use deltille_core::angles::turn_of;
+use deltille_core::family::Family;
+use deltille_core::polygon::rectangle;
+use deltille_core::targets::shipped_family;
+use deltille_core::targets::{
+    BoardSpec, FamilyRef, Panel, Target, TargetError, TargetSpec, fingerprint,
+};
 
 /// A target, and the sheets that it is printed on.
 #[derive(Clone, Debug, PartialEq)]
@@ -42,7 +44,7 @@ impl Printing {
     /// few codes, or nothing up to A0 takes the target.
     ///
     /// ```
-    /// use deltille_core::layout::Printing;
+    /// use deltille_layout::Printing;
     /// use deltille_core::targets::BoardSpec;
     ///
     /// let desk = Printing::new("desk", BoardSpec::deltille(10, 11, 20.0))?;
@@ -169,7 +171,7 @@ fn board_sheets(
         }
         return packed::sheets(name, board, panels, family, paper);
     }
-    let target = identity::fingerprint(panels, family);
+    let target = fingerprint(panels, family);
     let words = |panel: &Panel| label(name, board, std::slice::from_ref(panel), family, target);
     match arrange(board, paper) {
         Ok(arrangement) => {
@@ -232,9 +234,8 @@ fn poster(
 /// The edge of a board's tiles where none is asked for, mm: that of the published board, which fits A4 with 10 × 11 corners;
 /// on a certain paper the largest in whole millimetres that fits. Where nothing fits, making the board says so.
 pub fn usual_edge_mm(spec: &BoardSpec, paper: &PaperSpec) -> f64 {
-    const USUAL_MM: f64 = 20.0;
     let fitting = paper.size.as_ref().and_then(|_| largest_edge_mm(spec, paper));
-    fitting.unwrap_or(USUAL_MM)
+    fitting.unwrap_or(BoardSpec::USUAL_EDGE_MM)
 }
 
 /// The largest edge in whole millimetres with which a board fits on paper, if one of 5 mm does.

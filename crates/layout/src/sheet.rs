@@ -3,8 +3,8 @@
 use glam::DVec2;
 use serde::{Deserialize, Serialize};
 
-use crate::layout::{Label, LogoPlacement};
-use crate::{angles, quantity};
+use crate::{Label, LogoPlacement};
+use deltille_core::{angles, quantity};
 
 /// One printed page: its size, where panels lie on it, and its check bars.
 ///

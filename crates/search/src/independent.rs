@@ -10,22 +10,19 @@ use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
 
-use crate::family::Screen;
-use crate::family::kernels::nearer;
+use deltille_core::family::Screen;
+use deltille_core::family::nearer;
 
 /// Which vertices exclude each other; lists in one array.
 #[derive(Clone, Debug)]
-pub(in crate::family) struct ConflictGraph {
+pub struct ConflictGraph {
     starts: Vec<usize>,
     lists: Vec<u32>,
 }
 
 impl ConflictGraph {
     /// The graph of `n` vertices with the given neighbours of each, a symmetric relation.
-    pub(in crate::family) fn new(
-        n: usize,
-        neighbours: impl Fn(usize) -> Vec<u32> + Sync + Send,
-    ) -> Self {
+    pub fn new(n: usize, neighbours: impl Fn(usize) -> Vec<u32> + Sync + Send) -> Self {
         let rows: Vec<Vec<u32>> = (0..n).into_par_iter().map(neighbours).collect();
         let mut starts = vec![0];
         starts.extend(rows.iter().scan(0, |sum, row| {
@@ -37,11 +34,7 @@ impl ConflictGraph {
 
     /// Which words are too near to each other, in any turn. Where `halt` came first some
     /// conflicts are missing.
-    pub(in crate::family) fn of_words(
-        screen: &Screen,
-        pool: &[u64],
-        halt: impl Fn() -> bool + Sync + Send,
-    ) -> Self {
+    pub fn of_words(screen: &Screen, pool: &[u64], halt: impl Fn() -> bool + Sync + Send) -> Self {
         let turned: Vec<u64> = pool.iter().flat_map(|&w| screen.words().turns(w)).collect();
         Self::new(pool.len(), |i| {
             if halt() {
@@ -68,7 +61,7 @@ impl ConflictGraph {
 
     /// A large independent set, grown from `initial` (itself independent). Stops after `steps`
     /// moves or when `stop` says so, which is asked now and then.
-    pub(in crate::family) fn search(
+    pub fn search(
         &self,
         initial: &[u32],
         seed: u64,

@@ -9,28 +9,25 @@ use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
 use super::independent::ConflictGraph;
-use crate::family::Screen;
-use crate::family::algebra::Arrangement;
-use crate::family::algebra::arrange::Arranger;
-use crate::family::algebra::cosets::CosetUnion;
-use crate::family::algebra::record::{arranged, has_free_centre};
+use crate::algebra::arrange::Arranger;
+use deltille_core::family::Screen;
+use deltille_core::family::algebra::Arrangement;
+use deltille_core::family::algebra::CosetUnion;
+use deltille_core::family::algebra::{arranged, has_free_centre};
 
 /// Words whose conflicts are all listed, up to so many bits.
 const LISTED_BITS: u32 = 16;
 
 /// All words that the rules admit, one of each orbit, and their conflicts.
 #[derive(Clone, Debug)]
-pub(in crate::family) struct AllWords {
+pub struct AllWords {
     words: Vec<u64>,
     graph: ConflictGraph,
 }
 
 impl AllWords {
     /// `None` where there are too many, or `halt` came first.
-    pub(in crate::family) fn new(
-        screen: &Screen,
-        halt: &(dyn Fn() -> bool + Sync),
-    ) -> Option<Self> {
+    pub fn new(screen: &Screen, halt: &(dyn Fn() -> bool + Sync)) -> Option<Self> {
         let words = screen.words();
         if words.dimension().bits() > LISTED_BITS {
             return None;
@@ -52,16 +49,16 @@ impl AllWords {
 }
 
 /// Annealing of one union of cosets.
-pub(in crate::family) struct Joint<'a> {
-    pub(in crate::family) screen: &'a Screen,
-    pub(in crate::family) union: &'a CosetUnion,
-    pub(in crate::family) arranger: &'a Arranger,
-    pub(in crate::family) all: Option<&'a AllWords>,
+pub struct Joint<'a> {
+    pub screen: &'a Screen,
+    pub union: &'a CosetUnion,
+    pub arranger: &'a Arranger,
+    pub all: Option<&'a AllWords>,
 }
 
 impl Joint<'_> {
     /// The best arrangement found from `start`, and its codes.
-    pub(in crate::family) fn anneal(
+    pub fn anneal(
         &self,
         start: &Arrangement,
         seed: u64,

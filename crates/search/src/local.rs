@@ -6,7 +6,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::polish::{Effort, MAX_BITS, round};
-use crate::family::{Construction, Control, FamilyError, Screen};
+use deltille_core::family::{Construction, Control, FamilyError, Screen};
 
 /// Parameters of a local search.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -107,8 +107,8 @@ mod tests {
     use std::sync::atomic::{AtomicBool, Ordering};
 
     use super::*;
-    use crate::family::{Rules, TagWords};
-    use crate::lattice::Dimension;
+    use deltille_core::family::{Rules, TagWords};
+    use deltille_core::lattice::Dimension;
 
     #[test]
     fn a_search_that_was_interrupted_finds_the_same() {
@@ -118,7 +118,7 @@ mod tests {
         let whole = search.codes(&screen, Control::default()).unwrap();
 
         let cancel = AtomicBool::new(false);
-        let control = Control { cancel: Some(&cancel), report: None };
+        let control = Control::default().cancel(&cancel);
         let mut checkpoint = Checkpoint::default();
         let stop = |c: &Checkpoint| {
             cancel.store(c.rounds_done == 2, Ordering::Relaxed);

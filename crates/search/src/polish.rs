@@ -9,28 +9,28 @@ use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
 use super::independent::ConflictGraph;
-use crate::family::{Control, Screen};
+use deltille_core::family::{Control, Screen};
 
 /// Words are counted in a table of all of them up to this size.
-pub(in crate::family) const MAX_BITS: u32 = 25;
+pub const MAX_BITS: u32 = 25;
 
 /// Candidates taken into one round: their conflicts must fit in memory.
 const POOL: usize = 24_000;
 
 /// How long and from where to search.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(in crate::family) struct Effort {
-    pub(in crate::family) seed: u64,
-    pub(in crate::family) rounds: u32,
+pub struct Effort {
+    pub seed: u64,
+    pub rounds: u32,
     /// Moves of the local search in a round.
-    pub(in crate::family) steps: u64,
+    pub steps: u64,
     /// So many codes are enough.
-    pub(in crate::family) most: usize,
+    pub most: usize,
 }
 
 /// A family at least as large as `codes`, which has to be valid. Every code of the result is
 /// admitted by the screen and its distance from all others holds.
-pub(in crate::family) fn polish(
+pub fn polish(
     screen: &Screen,
     codes: Vec<u64>,
     effort: Effort,
@@ -54,7 +54,7 @@ pub(in crate::family) fn polish(
 
 /// One round. It has random numbers of its own, so that the rounds after it do not depend on
 /// whether the search was interrupted in between.
-pub(in crate::family) fn round(
+pub fn round(
     screen: &Screen,
     codes: &[u64],
     effort: Effort,

@@ -4,8 +4,8 @@
 //! independent-set problem, solved by local search ([`super::independent`]).
 
 use super::independent::ConflictGraph;
-use crate::family::algebra::AlgebraicConstruction;
-use crate::family::{FamilyError, Screen};
+use deltille_core::family::algebra::AlgebraicConstruction;
+use deltille_core::family::{FamilyError, Screen};
 
 /// Words that are looked at, at most: their conflicts must fit in memory.
 const MOST_WORDS: usize = 30_000;
@@ -15,7 +15,7 @@ const STEPS: u64 = 4_000_000;
 
 /// A construction that lists more of its words, and the codes that it lists. What it lists by itself is taken in order,
 /// which is seldom the best.
-pub(in crate::family) fn with_the_most_codes(
+pub fn with_the_most_codes(
     screen: &Screen,
     construction: AlgebraicConstruction,
     codes: Vec<u64>,
@@ -44,11 +44,13 @@ pub(in crate::family) fn with_the_most_codes(
 
 #[cfg(test)]
 mod tests {
-    use crate::family::search::best::{Best, Budget};
-    use crate::family::search::lexicode::Lexicode;
-    use crate::family::search::local::Search;
-    use crate::family::{Construction, Control, Family, Robust, Rules, Screen, TagWords, certify};
-    use crate::lattice::Dimension;
+    use crate::best::{Best, Budget};
+    use crate::local::Search;
+    use deltille_core::family::lexicode::Lexicode;
+    use deltille_core::family::{
+        Construction, Control, Family, Robust, Rules, Screen, TagWords, certify,
+    };
+    use deltille_core::lattice::Dimension;
 
     fn rules(distance: u32, robust: &str) -> Rules {
         let robust: Vec<Robust> = vec![robust.parse().unwrap()];

@@ -8,8 +8,8 @@ use rayon::prelude::*;
 
 use super::document::Page;
 use super::{Finding, PageFinding};
-use deltille_core::layout::{SheetLayout, SheetPage};
 use deltille_core::raster::Gray;
+use deltille_layout::{SheetLayout, SheetPage};
 
 /// Pages differ where the ink of a pixel does by more than this: an edge that lies 0.05 mm off at
 /// 300 dpi changes a pixel by 0.6, the pixels of two pages lying between each other by up to 0.5.

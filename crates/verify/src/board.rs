@@ -11,12 +11,13 @@ use super::fit::AffineMap;
 use super::fold::Seen;
 use super::tiles::PlacedPanel;
 use super::{Finding, SheetVerdict, TOLERANCE_MM, Verifier, detector_config};
-use deltille_core::detect::{Detection, Detector, GridCorner};
-use deltille_core::layout::SheetLayout;
+use deltille_core::detection::{Detection, GridCorner};
 use deltille_core::polygon;
 use deltille_core::raster::{Gray, ImageView, Intensity};
 use deltille_core::targets::{Corner, Panel};
 use deltille_core::words::counted;
+use deltille_detect::Detector;
+use deltille_layout::SheetLayout;
 
 /// An unlabelled corner is taken for a stated one within this many edges of it: less than half the
 /// way to the next.

@@ -9,8 +9,9 @@ use serde::Serialize;
 use super::construct::ConstructFinding;
 use super::reader::Reader;
 use super::{CutVerdict, DocumentError, Finding, Format, Verdict, Verifier, VerifyError};
-use deltille_core::artwork::{self, CutDrawing, CutLayer, CutPath};
 use deltille_files::export::dxf::{self, DxfError};
+use deltille_layout::artwork;
+use deltille_layout::artwork::{CutDrawing, CutLayer, CutPath};
 
 /// Largest deviation of a point, mm: a hundredth of the accuracy of a cutter.
 const CUT_TOLERANCE_MM: f64 = 0.001;

@@ -5,10 +5,10 @@ use glam::{DVec2, DVec3};
 
 use super::document::Page;
 use super::model::{Model, Triangle};
-use deltille_core::layout::Placement;
 use deltille_core::polygon;
 use deltille_core::raster::Gray;
 use deltille_core::targets::Panel;
+use deltille_layout::Placement;
 
 /// Greatest distance of the triangles of a face from the plane of its panel, and of their corners from its outline, mm.
 const IN_PLANE_MM: f64 = 0.25;

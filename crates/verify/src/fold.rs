@@ -19,10 +19,10 @@ use kurbo::Shape as _;
 use serde::Serialize;
 
 use super::{Finding, FoldVerdict, SheetVerdict};
-use deltille_core::artwork;
-use deltille_core::layout::{Label, Printing, SheetLayout};
 use deltille_core::targets::TargetSpec;
 use deltille_core::words::counted;
+use deltille_layout::artwork;
+use deltille_layout::{Label, Printing, SheetLayout};
 
 /// Largest distance of a folded corner, or of an end of an edge, from its stated position, mm: that
 /// of meshes, see [`MESH_TOLERANCE_MM`](super::MESH_TOLERANCE_MM).

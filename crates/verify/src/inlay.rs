@@ -19,13 +19,13 @@ use super::{
     DocumentError, Finding, Format, InlayVerdict, Page, SheetVerdict, Verdict, Verifier, body,
     construct,
 };
-use deltille_core::layout::{Placement, SheetLayout};
 use deltille_core::polygon;
 use deltille_core::polygon::rectangle;
 use deltille_core::raster::{Coverage, Gray};
 use deltille_core::targets::{Panel, TargetSpec};
 use deltille_files::export::inlay::Body;
 use deltille_files::export::threemf;
+use deltille_layout::{Placement, SheetLayout};
 
 /// Tolerance of coordinates, mm: they are written as decimals, with nine digits after the point.
 const SLACK_MM: f64 = 1e-5;

@@ -19,11 +19,12 @@ use super::{
     CutVerdict, Document, DocumentError, Finding, Format, PRINT_PX_PER_MM, PageFinding,
     SheetVerdict, Verdict, Verifier, VerifyError, file_name,
 };
-use deltille_core::artwork::{self, CutDrawing, CutLayer, CuttingError, LaserBoard};
 use deltille_core::raster::Coverage;
 use deltille_core::targets::Target;
 use deltille_files::export::dxf::{self, DxfError};
 use deltille_files::export::{laser_file_name, laser_svg};
+use deltille_layout::artwork;
+use deltille_layout::artwork::{CutDrawing, CutLayer, CuttingError, LaserBoard};
 
 /// Kerfs nearer to a round one than this are that, mm: coordinates are written with four digits.
 const KERF_STEP_MM: f64 = 1e-4;

@@ -84,13 +84,14 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use glam::DVec2;
 
-use deltille_core::artwork::CuttingError;
-use deltille_core::detect::{Detector, DetectorConfig, Ink, Tone};
+use deltille_core::detection::{Ink, Tone};
 use deltille_core::family::Family;
-use deltille_core::layout::{Printing, SheetLayout, SheetPage};
 use deltille_core::targets::{OtherFamily, Target};
+use deltille_detect::{Detector, DetectorConfig};
 use deltille_files::export::sheet_file_name;
 use deltille_files::limits::{Guard, Limits};
+use deltille_layout::artwork::CuttingError;
+use deltille_layout::{Printing, SheetLayout, SheetPage};
 use fit::AffineMap;
 use fold::Seen;
 use reader::Reader;
@@ -216,9 +217,9 @@ pub enum VerifyError {
 /// missing or cannot be read at all.
 ///
 /// ```
-/// use deltille_core::artwork;
+/// use deltille_layout::artwork;
 /// use deltille_core::lattice::GridKind;
-/// use deltille_core::layout::{PaperSpec, Printing};
+/// use deltille_layout::{PaperSpec, Printing};
 /// use deltille_core::targets::{BoardSpec, TargetSpec};
 /// use deltille_files::export::svg;
 /// use deltille_verify::{Artifact, verify};

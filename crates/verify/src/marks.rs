@@ -18,13 +18,14 @@ use super::document::{MAX_INK_ERROR, Page};
 use super::tile_table::TileTable;
 use super::tiles::{EDGE_PX, PROBES, PlacedPanel};
 use super::{Finding, SheetVerdict};
-use deltille_core::artwork;
-use deltille_core::layout::{
-    CHECK_BAR_STROKE_MM, Label, LineKind, Logo, LogoPlacement, SheetLayout, SheetText,
-};
-use deltille_core::polygon::{self, rectangle};
+use deltille_core::polygon;
+use deltille_core::polygon::rectangle;
 use deltille_core::raster::{Coverage, Gray};
 use deltille_core::targets::Corner;
+use deltille_layout::artwork;
+use deltille_layout::{
+    CHECK_BAR_STROKE_MM, Label, LineKind, Logo, LogoPlacement, SheetLayout, SheetText,
+};
 
 /// Ink of a mark and of its outline, each the mean of 3 × 3 pixels, may differ by this. An edge
 /// that lies 0.02 mm off at 300 dpi changes a mean by 0.08, a missing stroke by more than 0.5.

@@ -19,7 +19,7 @@ use super::texels::{self, Texels};
 use super::tiles::{Pattern, PlacedPanel, TagLooks, expected};
 use super::{FaceVerdict, Finding, Format, Verdict, Verifier};
 use deltille_core::camera::{Camera, Pose};
-use deltille_core::detect::Detection;
+use deltille_core::detection::Detection;
 use deltille_core::lattice::Vertex;
 use deltille_core::polygon::rectangle;
 use deltille_core::raster::Gray;
@@ -324,7 +324,7 @@ fn check_face(verifier: &Verifier, model: &Model, panel: &Panel) -> FaceVerdict 
     };
     verdict.tags_exact = panel.tags.len() - panel.tags.iter().filter(is_read).count();
     for tag in panel.tags.iter().filter(is_read) {
-        let same = |found: &&deltille_core::detect::DecodedTag| {
+        let same = |found: &&deltille_core::detection::DecodedTag| {
             (found.id, found.row, found.col) == (tag.id, tag.row, tag.col)
         };
         let errors = own().flat_map(|grid| &grid.tags).find(same).map(|found| found.errors);

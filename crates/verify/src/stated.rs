@@ -10,8 +10,8 @@ use super::board::BoardFinding;
 use super::tiles::{PlacedPanel, TileFinding};
 use super::{Finding, SheetVerdict, TOLERANCE_MM, Verifier};
 use crate::document::Page;
-use deltille_core::layout::SheetLayout;
 use deltille_core::targets::Corner;
+use deltille_layout::SheetLayout;
 
 /// Whether all panels of a page are such, if it has any.
 pub(super) fn is_for(placed: &[PlacedPanel]) -> bool {

@@ -16,9 +16,9 @@ use super::marks;
 use super::tile_table::TileTable;
 use deltille_core::family::{Decoder, Family};
 use deltille_core::lattice::{Cell, GridKind, TagCells, Tile, Vertex};
-use deltille_core::layout::{Placement, SheetLayout, SheetText};
 use deltille_core::statistics::median;
 use deltille_core::targets::{Panel, TagPlacement};
+use deltille_layout::{Placement, SheetLayout, SheetText};
 
 /// Pixels nearer than this to a change of colour are ignored, px: the half diagonal of a pixel
 /// (0.71), over which an edge is smeared, 0.02 mm at 300 dpi (0.24), and some blur.

@@ -3,7 +3,6 @@
 use std::path::Path;
 
 use deltille::camera::Camera;
-use deltille::cli::deltille::settings::Settings;
 use deltille::export::dsc::{self, Dialect};
 use deltille::export::{csv, detection as detections, orpc, sheet, solid_mesh};
 use deltille::family::Family;
@@ -12,6 +11,7 @@ use deltille::layout::Printing;
 use deltille::limits::Limits;
 use deltille::photograph;
 use deltille::verify::Verifier;
+use deltille_cli::deltille::settings::Settings;
 use glam::{DVec2, DVec3};
 
 use super::good::{BOARD, FAMILY, SOLID};

@@ -3,7 +3,7 @@
 
 use std::sync::atomic::AtomicBool;
 
-use deltille::experiment::states::{Run, Scene, run};
+use deltille_lab::states::{Run, Scene, run};
 
 fn runs(scenes: &[(Scene, usize)]) -> Vec<Run> {
     run(scenes, 5, &AtomicBool::new(false), &|| ()).unwrap()

@@ -11,8 +11,11 @@ pub mod view;
 
 use std::path::{Path, PathBuf};
 
+/// The folder of the repository.
+pub const REPOSITORY: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../..");
+
 /// A folder of the photographs and published artifacts. Tests that use it are ignored where `build.rs` has not found it.
 pub fn data(folder: &str) -> PathBuf {
-    let beside = || Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/data");
+    let beside = || Path::new(REPOSITORY).join("../shared/data");
     std::env::var_os("DELTILLE_DATA").map_or_else(beside, PathBuf::from).join(folder)
 }

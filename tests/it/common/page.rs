@@ -86,7 +86,7 @@ impl Page {
     #[track_caller]
     pub fn is(self, name: &str) {
         let mut settings = insta::Settings::new();
-        settings.set_snapshot_path(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/snapshots"));
+        settings.set_snapshot_path(Path::new(super::REPOSITORY).join("tests/snapshots"));
         settings.set_prepend_module_to_snapshot(false);
         settings.set_omit_expression(true);
         settings.bind(|| insta::assert_snapshot!(name, self.0.trim_start()));

@@ -57,7 +57,7 @@ fn all_corners_of_a_photograph_of_either_tiling() {
         ("fisheye-0200", GridKind::Checker, (8, 11), squares_are_consistent),
     ] {
         let path =
-            Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("tests/photographs/{name}.png"));
+            Path::new(crate::common::REPOSITORY).join(format!("tests/photographs/{name}.png"));
         let detector = Detector::for_grid(kind, Some(size), DetectorConfig::default());
         let detection = detector.detect(&photograph::read(&path).unwrap(), name);
         let [grid] = &detection.grids[..] else {

@@ -35,7 +35,7 @@ fn a_search_starts_from_what_ships() {
         assert!(output.status.success(), "{args}");
     }
     page.is("deltag-gen-family-starts");
-    let shipped = Path::new(env!("CARGO_MANIFEST_DIR")).join("families/d25h7.json");
+    let shipped = Path::new(crate::common::REPOSITORY).join("families/d25h7.json");
     assert!(std::fs::read(at.join("d25h7.json")).unwrap() == std::fs::read(shipped).unwrap());
 }
 
@@ -71,7 +71,7 @@ fn the_published_lexicode_is_written_as_shipped() {
         .arg(folder.path())
         .assert()
         .success();
-    let shipped = Path::new(env!("CARGO_MANIFEST_DIR")).join("families/delTag16h5.json");
+    let shipped = Path::new(crate::common::REPOSITORY).join("families/delTag16h5.json");
     assert_eq!(
         std::fs::read_to_string(folder.path().join("delTag16h5.json")).unwrap(),
         std::fs::read_to_string(shipped).unwrap()
@@ -83,7 +83,7 @@ fn the_published_lexicode_is_written_as_shipped() {
 fn what_is_wrong_with_a_family_is_told() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
-    let shipped = Path::new(env!("CARGO_MANIFEST_DIR")).join("families/delTag16h5.json");
+    let shipped = Path::new(crate::common::REPOSITORY).join("families/delTag16h5.json");
     let good = std::fs::read_to_string(shipped).unwrap();
     let mut page = Page::default();
     let mut check = |title: &str, text: String, codes: [i32; 2]| {
@@ -313,7 +313,7 @@ fn exports_list_every_code() {
 /// A folder with exports of 64-bit codes, which fill a machine word, under a name that is no identifier.
 fn exports() -> tempfile::TempDir {
     let folder = tempfile::tempdir().unwrap();
-    let shipped = Path::new(env!("CARGO_MANIFEST_DIR")).join("families/d64h12.json");
+    let shipped = Path::new(crate::common::REPOSITORY).join("families/d64h12.json");
     let text = std::fs::read_to_string(shipped).unwrap();
     let named = text.replace("\"name\": \"d64h12\"", "\"name\": \"4-tags\"");
     std::fs::write(folder.path().join("family.json"), named).unwrap();

@@ -7,7 +7,7 @@ use deltille::family::{Family, TagWords, certify};
 use deltille::lattice::Dimension;
 
 fn read(path: &str) -> String {
-    std::fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join(path)).unwrap()
+    std::fs::read_to_string(Path::new(crate::common::REPOSITORY).join(path)).unwrap()
 }
 
 fn found(name: &str) -> Family {

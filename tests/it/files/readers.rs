@@ -26,7 +26,7 @@ fn good_files_are_read() {
 
 #[test]
 fn files_of_the_corpus_do_no_harm() {
-    let corpus = Path::new(env!("CARGO_MANIFEST_DIR")).join("fuzz/corpus");
+    let corpus = Path::new(crate::common::REPOSITORY).join("fuzz/corpus");
     let mut harms = Vec::new();
     for folder in fs::read_dir(corpus).unwrap().map(|entry| entry.unwrap().path()) {
         let reader = READERS.iter().find(|reader| folder.ends_with(reader.name)).unwrap();

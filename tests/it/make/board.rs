@@ -170,7 +170,7 @@ fn a_note_goes_with_every_board_that_is_cut_out() {
 
 #[test]
 fn every_sample_template_makes_a_board() {
-    let templates = Path::new(env!("CARGO_MANIFEST_DIR")).join("templates");
+    let templates = Path::new(crate::common::REPOSITORY).join("templates");
     let folder = tempfile::tempdir().unwrap();
     for name in names(&templates).iter().filter(|name| name.ends_with(".toml")) {
         let mut command = deltille(folder.path());

@@ -3,16 +3,17 @@
 use crate::common::command::deltille;
 use crate::common::page::Page;
 use deltille::camera::{BrownConrady, Camera, Lens, Pose};
-use deltille::detect::{Detector, DetectorConfig, Reach, Situation};
-use deltille::experiment::photographs::background::Studio;
-use deltille::experiment::photographs::page::PrintedPage;
-use deltille::experiment::photographs::photograph::take;
-use deltille::experiment::photographs::scene::Scene;
+use deltille::detect::{Detector, DetectorConfig};
 use deltille::family::Family;
 use deltille::lattice::GridKind;
 use deltille::layout::{PaperSpec, Printing};
+use deltille::layout::{Reach, Situation};
 use deltille::synth::{Light, scene_of_target};
 use deltille::targets::{BoardSpec, TagSpec, Target, TargetSpec};
+use deltille_lab::photographs::background::Studio;
+use deltille_lab::photographs::page::PrintedPage;
+use deltille_lab::photographs::photograph::take;
+use deltille_lab::photographs::scene::Scene;
 use glam::DVec3;
 
 #[test]

@@ -71,7 +71,7 @@ fn two_sides_of_a_board_lie_behind_each_other() {
 fn a_board_with_two_sides_is_one_target_for_poses() {
     let folder = tempfile::tempdir().unwrap();
     deltille(folder.path(), "board --rows 6 --cols 7 --edge 25mm --two-sided 4mm --pdf").success();
-    let camera = Path::new(env!("CARGO_MANIFEST_DIR")).join("templates/camera.yaml");
+    let camera = Path::new(crate::common::REPOSITORY).join("templates/camera.yaml");
     std::fs::copy(camera, folder.path().join("camera.yaml")).unwrap();
     for (name, eye) in [("front", "60,-60,420"), ("back", "150,160,-420")] {
         let render =
@@ -114,7 +114,7 @@ fn a_template_makes_a_solid_again_and_options_win_over_it() {
 #[test]
 fn every_kind_of_target_carries_a_logo() {
     let folder = tempfile::tempdir().unwrap();
-    let logo = Path::new(env!("CARGO_MANIFEST_DIR")).join("docs/gallery/logo.svg");
+    let logo = Path::new(crate::common::REPOSITORY).join("docs/gallery/logo.svg");
     std::fs::copy(logo, folder.path().join("logo.svg")).unwrap();
     for args in [
         "board --rows 6 --cols 7 --edge 30mm --paper A3 --logo-height 15mm --pdf --svg --png",

@@ -1,14 +1,14 @@
 //! Settings to targets and their files.
 
-use deltille_core::detect::Reach;
 use deltille_core::family::Family;
 use deltille_core::lattice::GridKind;
-use deltille_core::layout::{DEFAULT_MARGIN_MM, PaperSpec, Printing, SolidSheets, usual_edge_mm};
 use deltille_core::targets::{
     BoardSpec, ClosedMesh, SkeletonSpec, SolidShape, SolidSpec, TagSpec, TagsIn, TargetSpec,
 };
 use deltille_files::export::artifacts::{Making, What, make};
 use deltille_files::export::obj;
+use deltille_layout::Reach;
+use deltille_layout::{DEFAULT_MARGIN_MM, PaperSpec, Printing, SolidSheets, usual_edge_mm};
 use js_sys::{Array, Uint8Array};
 use serde::Deserialize;
 use wasm_bindgen::prelude::*;

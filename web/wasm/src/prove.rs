@@ -1,7 +1,7 @@
 //! Files read back and compared with their target.
 
 use deltille_core::family::Family;
-use deltille_core::layout::Printing;
+use deltille_layout::Printing;
 use deltille_verify::{Artifact, Verifier};
 use js_sys::Uint8Array;
 use wasm_bindgen::prelude::*;

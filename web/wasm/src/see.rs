@@ -1,10 +1,11 @@
 //! Grey values, and frames of a webcam, to corners.
 
-use deltille_core::detect::{Detection, Detector, DetectorConfig, InkEstimate, Watch};
+use deltille_core::detection::{Detection, InkEstimate, Watch};
 use deltille_core::family::Family;
 use deltille_core::lattice::GridKind;
 use deltille_core::raster::{AnyGray, FileNotes, Gray, grey_of_colours};
 use deltille_core::targets::{OtherFamily, Target};
+use deltille_detect::{Detector, DetectorConfig};
 use deltille_files::export::{csv, detection, orpc};
 use wasm_bindgen::prelude::*;
 
@@ -173,7 +174,7 @@ impl Found {
 
 /// Recognises targets by their tags.
 #[wasm_bindgen]
-pub struct Recogniser(deltille_core::detect::Recogniser);
+pub struct Recogniser(deltille_detect::Recogniser);
 
 #[wasm_bindgen]
 impl Recogniser {
@@ -185,7 +186,7 @@ impl Recogniser {
     pub fn new(families: Vec<String>) -> Result<Self, JsError> {
         let read = families.iter().map(|file| Family::from_json(file));
         let families = read.collect::<Result<Vec<_>, _>>().raise()?;
-        Ok(Self(deltille_core::detect::Recogniser::new(families)))
+        Ok(Self(deltille_detect::Recogniser::new(families)))
     }
 
     /// The target that a picture shows, as JSON: its description, the tags that were read, how many corners it has and how

@@ -1,10 +1,10 @@
 //! Corners to a camera and its page.
 
-use deltille_core::calibrate::{
+use deltille_calibrate::{
     self, Calibration, Held, Holding, Intrinsics, Model, NextView, Reference, View, Words, views,
 };
 use deltille_core::camera::{CameraFile, Pose};
-use deltille_core::detect::{Detection, InkEstimate};
+use deltille_core::detection::{Detection, InkEstimate};
 use deltille_core::targets::Target;
 use deltille_files::export::calibration::{Print, Residuals};
 use deltille_files::export::{calibration, camera, detection, next_view, saved};
@@ -65,7 +65,7 @@ impl Solved {
             "rms_px": found.rms_px, "views": found.views.len(), "corners": found.corner_count(),
             "names": found.camera.parameter_names(), "values": found.camera.parameters(),
             "sd": found.parameters.iter().map(|parameter| parameter.sd).collect::<Vec<_>>(),
-            "projection_sd_px": found.projection_sd_px(None, deltille_core::calibrate::Source::Noise),
+            "projection_sd_px": found.projection_sd_px(None, deltille_calibrate::Source::Noise),
         });
         let json = calibration::write(&estimate, &diagnoses, print, Residuals::LeftOut)
             .map(|json| named(&json))
@@ -146,7 +146,7 @@ pub fn survey(
     };
     // Of too few pictures, or too much alike, by the camera that is assumed before anything is known.
     let estimate = solve(model.into()).or_else(|| {
-        let assumed = calibrate::Guide::new(&target, size_px, model)?.next(0, None).camera;
+        let assumed = deltille_calibrate::Guide::new(&target, size_px, model)?.next(0, None).camera;
         solve(Intrinsics::Known(assumed))
     });
     let Some(camera) = estimate.as_ref().and_then(|estimate| estimate.cameras.first()) else {
@@ -176,7 +176,7 @@ fn places(reference: &Reference) -> impl Iterator<Item = Pose> {
 #[wasm_bindgen]
 pub struct Guide {
     target: Target,
-    guide: calibrate::Guide,
+    guide: deltille_calibrate::Guide,
     views: Vec<View>,
     refused: Vec<NextView>,
     next: NextView,
@@ -193,7 +193,7 @@ impl Guide {
     pub fn new(target: &str, width: u32, height: u32, model: &str) -> Result<Self, JsError> {
         let target = Target::from_json(target).raise()?;
         let model: Model = model.parse().raise()?;
-        let guide = calibrate::Guide::new(&target, [width, height], model)
+        let guide = deltille_calibrate::Guide::new(&target, [width, height], model)
             .ok_or_else(|| JsError::new("no pictures are proposed for this target and model"))?;
         let next = guide.next(0, None);
         let holding = Holding::new(&next, places(&Reference::Target(&target)));

@@ -2,12 +2,13 @@
 
 use super::gross_errors::Gross;
 use super::reweighting::{Kept, Settled, settle, variance};
-use crate::calibrate::equations::minimise::{Minimum, Until, minimise};
-use crate::calibrate::error::CalibrationError;
-use crate::calibrate::input::calibration::Calibration;
-use crate::calibrate::problem::bundle::Problem;
-use crate::calibrate::problem::corner_map::CornerMap;
-use crate::calibrate::problem::shape::{self, Shape};
+use crate::equations::minimise::{Minimum, Until, minimise};
+use crate::error::CalibrationError;
+use crate::input::calibration::Calibration;
+use crate::problem::bundle::Problem;
+use crate::problem::corner_map::CornerMap;
+use crate::problem::shape;
+use crate::problem::shape::Shape;
 
 /// An expectation is found when it changes by less than this part.
 const SAME_PRIOR: f64 = 0.05;
@@ -23,7 +24,7 @@ const SAME_SIZE: f64 = 0.1;
 
 impl Calibration {
     /// With splines as smooth as the corners have them.
-    pub(in crate::calibrate) fn smoothed(
+    pub(crate) fn smoothed(
         &self,
         gross: &Gross,
         settled: Settled,
@@ -56,7 +57,7 @@ impl Calibration {
     }
 
     /// Finds the shape of the sheet too, and the F ratio of what that explains.
-    pub(in crate::calibrate) fn bent(
+    pub(crate) fn bent(
         &self,
         gross: &Gross,
         settled: Settled,
@@ -76,7 +77,7 @@ impl Calibration {
     }
 
     /// Finds the place of every corner of the target too.
-    pub(in crate::calibrate) fn measured(
+    pub(crate) fn measured(
         &self,
         gross: &Gross,
         settled: Settled,

@@ -4,8 +4,8 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use glam::DVec2;
 
-use crate::calibrate::input::panel::PanelRef;
-use crate::calibrate::problem::bundle::Problem;
+use crate::input::panel::PanelRef;
+use crate::problem::bundle::Problem;
 
 /// Gross errors of corners that have something in common.
 #[derive(Clone, Debug, PartialEq)]
@@ -112,12 +112,12 @@ pub(super) struct Count {
 }
 
 impl Count {
-    pub(in crate::calibrate) fn add(&mut self, outlier: bool) {
+    pub(crate) fn add(&mut self, outlier: bool) {
         self.corners += 1;
         self.outliers += usize::from(outlier);
     }
 
-    pub(in crate::calibrate) fn share(self) -> f64 {
+    pub(crate) fn share(self) -> f64 {
         self.outliers as f64 / self.corners.max(1) as f64
     }
 

@@ -24,18 +24,18 @@ use super::finding::{Count, Finding, Moved, Shared, shared_outliers};
 use super::lack_of_fit::lack_of_fit;
 use super::reweighting::{Kept, Settled, settle, with_gross_errors};
 use super::view_consistency::Opinions;
-use crate::calibrate::equations::minimise::{Until, minimise};
-use crate::calibrate::error::CalibrationError;
-use crate::calibrate::input::loss::Loss;
-use crate::calibrate::input::observation::{LEAST_CORNERS, Sighting, View};
-use crate::calibrate::input::panel::PanelRef;
-use crate::calibrate::input::weights::Weights;
-use crate::calibrate::problem::bundle::Problem;
-use crate::calibrate::problem::unknowns::{Block, CameraUnknowns};
-use crate::calibrate::problem::whitening::{Whitening, deviations, residuals, scale};
-use crate::calibrate::start::pose::{estimate_pose, middle, planar_pose};
-use crate::camera::Pose;
-use crate::statistics::median;
+use crate::equations::minimise::{Until, minimise};
+use crate::error::CalibrationError;
+use crate::input::loss::Loss;
+use crate::input::observation::{LEAST_CORNERS, Sighting, View};
+use crate::input::panel::PanelRef;
+use crate::input::weights::Weights;
+use crate::problem::bundle::Problem;
+use crate::problem::unknowns::{Block, CameraUnknowns};
+use crate::problem::whitening::{Whitening, deviations, residuals, scale};
+use crate::start::pose::{estimate_pose, middle, planar_pose};
+use deltille_core::camera::Pose;
+use deltille_core::statistics::median;
 
 /// Scale of the loss during the reduction, as a fraction of the usual one: 1.5 deviations. A wider
 /// loss comes to rest between two groups of corners.
@@ -71,7 +71,7 @@ const WRONG_RATIO: f64 = 10.0;
 const WRONG_PX: f64 = 1.0;
 
 /// A problem at the estimate on which most of its corners agree, and the parts that contradict it.
-pub(in crate::calibrate) struct Gross {
+pub(crate) struct Gross {
     pub problem: Problem,
     /// Blocks that take no part.
     pub left_out: Vec<bool>,
@@ -102,7 +102,7 @@ const FEW: usize = 10;
 
 /// Why a frame is excluded.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(in crate::calibrate) enum WrongFrame {
+pub(crate) enum WrongFrame {
     /// The corners of one camera have this median error, px.
     Off { camera: usize, off_px: f64 },
     /// Its corners are seen as in a mirror.
@@ -117,7 +117,7 @@ pub(in crate::calibrate) enum WrongFrame {
 impl Gross {
     /// Estimates where most corners of a problem agree, and finds the parts that do not; `None`
     /// where nothing can be adjusted.
-    pub(in crate::calibrate) fn of(problem: Problem) -> Option<Self> {
+    pub(crate) fn of(problem: Problem) -> Option<Self> {
         agree(problem).map(|(walked, panels)| Self::without(walked, panels))
     }
 
@@ -172,7 +172,7 @@ impl Gross {
     ///
     /// # Errors
     /// When nothing can be adjusted.
-    pub(in crate::calibrate) fn settled(
+    pub(crate) fn settled(
         mut self,
         weights: Weights,
         loss: Loss,
@@ -229,7 +229,7 @@ impl Gross {
     }
 
     /// The frames that are not excluded.
-    pub(in crate::calibrate) fn belonging(&self) -> impl Iterator<Item = usize> {
+    pub(crate) fn belonging(&self) -> impl Iterator<Item = usize> {
         (0..self.problem.frames.len()).filter(|frame| !self.frames.contains_key(frame))
     }
 
@@ -251,7 +251,7 @@ impl Gross {
     }
 
     /// The problem without its excluded frames.
-    pub(in crate::calibrate) fn kept(&self) -> Kept {
+    pub(crate) fn kept(&self) -> Kept {
         let belongs = |frame: usize| !self.frames.contains_key(&frame);
         let of_blocks = self.problem.blocks.iter().zip(&self.left_out);
         let left_out = of_blocks.filter(|(block, _)| belongs(block.frame)).map(|(_, out)| *out);
@@ -261,7 +261,7 @@ impl Gross {
 
     /// Findings: what the outliers have in common. `names` gives the name of a frame by its index
     /// in the original problem.
-    pub(in crate::calibrate) fn findings(
+    pub(crate) fn findings(
         &self,
         settled: &Settled,
         names: impl Fn(usize) -> String,
@@ -525,10 +525,7 @@ fn moved(settled: &Settled, panel: PanelRef) -> Option<Moved> {
 
 /// The views of a camera without the corners that lie far outside their pictures, and a finding for
 /// each view that had such corners. Views with too few corners left are omitted.
-pub(in crate::calibrate) fn within_pictures(
-    views: &[View],
-    camera: usize,
-) -> (Vec<View>, Vec<Finding>) {
+pub(crate) fn within_pictures(views: &[View], camera: usize) -> (Vec<View>, Vec<Finding>) {
     let mut found = Vec::new();
     let of_view = |view: &View| {
         let size = DVec2::from(view.size_px.map(f64::from));

@@ -15,21 +15,21 @@ use std::collections::BTreeMap;
 use glam::{DMat3, DVec2, DVec3};
 use nalgebra::{DMatrix, DVector, SymmetricEigen};
 
-use crate::calibrate::input::panel::PanelRef;
-use crate::calibrate::problem::bundle::Problem;
-use crate::calibrate::problem::whitening::Whitening;
+use crate::input::panel::PanelRef;
+use crate::problem::bundle::Problem;
+use crate::problem::whitening::Whitening;
 
 /// Cells of the image along its longer side: the rings that a wrong polynomial leaves between the
 /// middle and the rim are a few, and a cell is well within one of them.
 const CELLS: f64 = 16.0;
 
 /// A normal deviate is larger once in a thousand times.
-pub(in crate::calibrate) const SIGNIFICANT: f64 = 3.09;
+pub(crate) const SIGNIFICANT: f64 = 3.09;
 
 /// A pattern matters from this part of the remaining noise on. Deviations take every residual for
 /// independent; a pattern is the same in all views, so that it does not average out, and with half of the
 /// noise it outweighs what the noise leaves of a parameter as soon as a few corners bear on it.
-pub(in crate::calibrate) const MATTERS: f64 = 0.5;
+pub(crate) const MATTERS: f64 = 0.5;
 
 /// Of many panels one must be displaced by more: of a million hardly one is by chance.
 const SIGNIFICANT_PANEL: f64 = 5.0;
@@ -105,10 +105,7 @@ struct Explained {
 
 /// The patterns of a problem's residuals, the strongest first. Each is taken out before weaker ones are
 /// looked for: corners of the board and places in the image go together where all views are alike.
-pub(in crate::calibrate) fn lack_of_fit(
-    problem: &Problem,
-    whitening: &Whitening,
-) -> Vec<LackOfFit> {
+pub(crate) fn lack_of_fit(problem: &Problem, whitening: &Whitening) -> Vec<LackOfFit> {
     let (mut seen, px) = seen(problem, whitening);
     let mut open: Vec<Source> = (0..problem.cameras.len()).map(Source::Lens).collect();
     open.extend([Source::Target, Source::Panels]);
@@ -368,7 +365,7 @@ impl Explained {
 
 /// The normal deviate as rare as a value of the F distribution, by Paulson's cube roots; no
 /// number where there is no freedom.
-pub(in crate::calibrate) fn deviate_of_f(f_ratio: f64, unknowns: f64, freedom: f64) -> f64 {
+pub(crate) fn deviate_of_f(f_ratio: f64, unknowns: f64, freedom: f64) -> f64 {
     let (a, b) = (2.0 / (9.0 * unknowns), 2.0 / (9.0 * freedom));
     let root = f_ratio.cbrt();
     ((1.0 - b) * root - (1.0 - a)) / (b * root * root + a).sqrt()

@@ -8,9 +8,9 @@
 //! 3. `gross_errors` excludes panels, views, and panels in views by these; `finding` is what is told of them.
 //! 4. `added_unknowns` goes on with more: smoothness of a spline, shape of the board, offsets of corners.
 
-pub(in crate::calibrate) mod added_unknowns;
-pub(in crate::calibrate) mod finding;
-pub(in crate::calibrate) mod gross_errors;
-pub(in crate::calibrate) mod lack_of_fit;
-pub(in crate::calibrate) mod reweighting;
-pub(in crate::calibrate) mod view_consistency;
+pub(crate) mod added_unknowns;
+pub(crate) mod finding;
+pub(crate) mod gross_errors;
+pub(crate) mod lack_of_fit;
+pub(crate) mod reweighting;
+pub(crate) mod view_consistency;

@@ -8,14 +8,14 @@ use std::collections::BTreeMap;
 
 use glam::DVec2;
 
-use crate::calibrate::equations::minimise::{Minimum, Until, minimise};
-use crate::calibrate::error::CalibrationError;
-use crate::calibrate::input::loss::Loss;
-use crate::calibrate::input::observation::{LEAST_CORNERS, Observation};
-use crate::calibrate::input::weights::Weights;
-use crate::calibrate::problem::bundle::Problem;
-use crate::calibrate::problem::unknowns::Block;
-use crate::calibrate::problem::whitening::{OUTLIER_SIGMA, Whitening, deviations, residuals};
+use crate::equations::minimise::{Minimum, Until, minimise};
+use crate::error::CalibrationError;
+use crate::input::loss::Loss;
+use crate::input::observation::{LEAST_CORNERS, Observation};
+use crate::input::weights::Weights;
+use crate::problem::bundle::Problem;
+use crate::problem::unknowns::Block;
+use crate::problem::whitening::{OUTLIER_SIGMA, Whitening, deviations, residuals};
 
 /// Least number of rounds in which weights and solution are fitted to each other; the third changes
 /// no significant digit.
@@ -45,7 +45,7 @@ const LEAST_SMOOTH_SIGMA: f64 = 3.0;
 
 /// The parts of a problem that belong together.
 #[derive(Clone, Debug)]
-pub(in crate::calibrate) struct Kept {
+pub(crate) struct Kept {
     pub problem: Problem,
     /// Blocks that take no part.
     pub left_out: Vec<bool>,
@@ -56,7 +56,7 @@ pub(in crate::calibrate) struct Kept {
 }
 
 /// A consistent solution of weights, set of corners that count, and unknowns.
-pub(in crate::calibrate) struct Settled {
+pub(crate) struct Settled {
     /// The minimum over the corners that count.
     pub minimum: Minimum,
     /// The whitening of the corners that count.
@@ -221,7 +221,7 @@ fn gross_limit(off: &[f64], sigma: f64) -> f64 {
 ///
 /// with the influence ψ = w e of each coordinate. Where every corner counts in full, this is the
 /// sum of squares divided by the degrees of freedom.
-pub(in crate::calibrate) fn variance(minimum: &Minimum, whitening: &Whitening, loss: Loss) -> f64 {
+pub(crate) fn variance(minimum: &Minimum, whitening: &Whitening, loss: Loss) -> f64 {
     let Minimum { problem, normal, layout, .. } = minimum;
     // Priors on corner offsets add as many observations as there are unknowns.
     let expected = problem.cameras.iter().filter_map(|camera| camera.roughness.as_ref());

@@ -19,12 +19,12 @@ use rayon::prelude::*;
 
 use super::lack_of_fit::deviate_of_f;
 use super::reweighting::Settled;
-use crate::calibrate::equations::layout::Layout;
-use crate::calibrate::equations::local_share::LocalShare;
-use crate::calibrate::equations::normal::{Normal, Reduced};
-use crate::calibrate::input::loss::Loss;
-use crate::calibrate::problem::bundle::Problem;
-use crate::statistics::median;
+use crate::equations::layout::Layout;
+use crate::equations::local_share::LocalShare;
+use crate::equations::normal::{Normal, Reduced};
+use crate::input::loss::Loss;
+use crate::problem::bundle::Problem;
+use deltille_core::statistics::median;
 
 /// Least number of views for the test: three remain without the tested one.
 const LEAST_VIEWS: usize = 4;

@@ -20,14 +20,14 @@ use std::collections::BTreeMap;
 use glam::{DQuat, DVec2, DVec3};
 use nalgebra::{DMatrix, DVector};
 
-use crate::calibrate::estimate::coverage::Coverage;
-use crate::calibrate::estimate::values::{CameraEstimate, Estimate};
-use crate::calibrate::uncertainty::projection::{
+use crate::estimate::coverage::Coverage;
+use crate::estimate::values::{CameraEstimate, Estimate};
+use crate::uncertainty::projection::{
     INFINITY_MM, ObservedCovariance, Source, by_motion, by_parameters, seen_at,
 };
-use crate::camera::Pose;
-use crate::identity::{check_result_of, check_same_board};
-use crate::statistics::{chi_squared_chance, f_chance};
+use deltille_core::camera::Pose;
+use deltille_core::statistics::{chi_squared_chance, f_chance};
+use deltille_core::targets::{check_result_of, check_same_board};
 
 /// Places along the longer side of the image.
 const PLACES: usize = 40;

@@ -4,17 +4,17 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use super::model_selection::{Alone, FOREIGN_PART, Instead, Remedy, is_absurd, is_explained};
 use super::one_state::{BoardStretch, CameraChange, RollingShutter, State};
-use crate::calibrate::adjust::finding::{Finding, Shared};
-use crate::calibrate::adjust::lack_of_fit::LackOfFit;
-use crate::calibrate::estimate::lens_end::LensEnd;
-use crate::calibrate::estimate::values::{CameraEstimate, Estimate};
-use crate::calibrate::input::calibration::Calibration;
-use crate::calibrate::input::order::in_order;
-use crate::calibrate::input::panel::PanelRef;
-use crate::calibrate::model::Model;
-use crate::calibrate::problem::shape::STRETCH;
-use crate::calibrate::start::symmetry::LabelRotation;
-use crate::camera::Camera;
+use crate::adjust::finding::{Finding, Shared};
+use crate::adjust::lack_of_fit::LackOfFit;
+use crate::estimate::lens_end::LensEnd;
+use crate::estimate::values::{CameraEstimate, Estimate};
+use crate::input::calibration::Calibration;
+use crate::input::order::in_order;
+use crate::input::panel::PanelRef;
+use crate::model::Model;
+use crate::problem::shape::STRETCH;
+use crate::start::symmetry::LabelRotation;
+use deltille_core::camera::Camera;
 
 /// Corners are found to a few hundredths of a pixel; a camera that leaves more than this does not
 /// have the lens of the model.

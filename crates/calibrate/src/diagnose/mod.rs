@@ -7,7 +7,7 @@
 //! 3. `diagnosis` says what is wrong, what it comes from, and what helps.
 //! 4. `words` says it in sentences.
 
-pub(in crate::calibrate) mod diagnosis;
-pub(in crate::calibrate) mod model_selection;
-pub(in crate::calibrate) mod one_state;
-pub(in crate::calibrate) mod words;
+pub(crate) mod diagnosis;
+pub(crate) mod model_selection;
+pub(crate) mod one_state;
+pub(crate) mod words;

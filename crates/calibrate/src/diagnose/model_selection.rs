@@ -6,16 +6,16 @@
 
 use std::collections::BTreeSet;
 
-use crate::calibrate::adjust::lack_of_fit::{MATTERS, SIGNIFICANT, deviate_of_f};
-use crate::calibrate::estimate::values::{CameraEstimate, Estimate};
-use crate::calibrate::input::calibration::{Calibration, CameraViews, Intrinsics};
-use crate::calibrate::input::observation::View;
-use crate::calibrate::input::panel::PanelPlace;
-use crate::calibrate::input::sample::evenly;
-use crate::calibrate::model::Model;
-use crate::calibrate::problem::whitening::{MEDIAN_OF_CHI_SQUARED_2, OUTLIER_SIGMA};
-use crate::camera::{Camera, PROJECTION_PARAMETERS};
-use crate::statistics::median;
+use crate::adjust::lack_of_fit::{MATTERS, SIGNIFICANT, deviate_of_f};
+use crate::estimate::values::{CameraEstimate, Estimate};
+use crate::input::calibration::{Calibration, CameraViews, Intrinsics};
+use crate::input::observation::View;
+use crate::input::panel::PanelPlace;
+use crate::input::sample::evenly;
+use crate::model::Model;
+use crate::problem::whitening::{MEDIAN_OF_CHI_SQUARED_2, OUTLIER_SIGMA};
+use deltille_core::camera::{Camera, PROJECTION_PARAMETERS};
+use deltille_core::statistics::median;
 
 /// Where the noise of detections explains at least this fraction of the squares of the residuals,
 /// nothing is sought: the rest does not matter.
@@ -65,7 +65,7 @@ pub(super) type Alone = Option<(Calibration, Estimate)>;
 
 impl Calibration {
     /// This calibration of one camera with other views.
-    pub(in crate::calibrate) fn of_views(&self, views: Vec<View>) -> Self {
+    pub(crate) fn of_views(&self, views: Vec<View>) -> Self {
         self.of_cameras(vec![CameraViews { views, ..self.cameras[0].clone() }])
     }
 
@@ -145,7 +145,7 @@ impl Calibration {
 
     /// Indices of the cameras of a rig that were given and are contradicted by their own pictures:
     /// other cameras, or changed since. Empty for a single camera.
-    pub(in crate::calibrate) fn foreign_cameras(&self) -> Vec<usize> {
+    pub(crate) fn foreign_cameras(&self) -> Vec<usize> {
         let is_foreign = |&index: &usize| {
             let alone = self.alone(index, &self.panels);
             let is_known = matches!(self.cameras[index].intrinsics, Intrinsics::Known(_));

@@ -12,12 +12,12 @@
 //! later is no change of the camera. Nor is what a drift, or the tilt and the distance of the board, explain as well: many
 //! sequences go from frontal to oblique views.
 
-use crate::calibrate::problem::whitening::OUTLIER_SIGMA;
-use crate::calibrate::uncertainty::state_equations::{
+use crate::problem::whitening::OUTLIER_SIGMA;
+use crate::uncertainty::state_equations::{
     Candidate, Column, Effect, Fit, StateEquations, significance,
 };
-use crate::camera::Camera;
-use crate::statistics::f_chance;
+use deltille_core::camera::Camera;
+use deltille_core::statistics::f_chance;
 
 /// Probability of each of the three diagnoses for views in which nothing is wrong, 1 % for all; that of a change is
 /// for all positions together.
@@ -31,7 +31,7 @@ const LEAST_VIEWS: usize = 3;
 const MOST_LEFT: f64 = 0.25;
 
 /// Least displacement at the edge of the image by a change, in standard deviations of a corner: that of an outlier.
-/// A smaller one, as of a lens that warms up, is within what deviations allow for, see [`crate::calibrate::uncertainty::halves`].
+/// A smaller one, as of a lens that warms up, is within what deviations allow for, see [`crate::uncertainty::halves`].
 const LEAST_CHANGE: f64 = OUTLIER_SIGMA;
 
 /// Least stretch of a board that is another board, or a print that was fitted to its page: printers feed paper with
@@ -57,7 +57,7 @@ impl ChangedIntrinsic {
     const ALL: [Self; 3] = [Self::Focal, Self::CentreX, Self::CentreY];
 
     /// Its value, px; the focal length in x.
-    pub(in crate::calibrate) fn of(self, camera: &Camera) -> f64 {
+    pub(crate) fn of(self, camera: &Camera) -> f64 {
         match self {
             Self::Focal => camera.focal_px.x,
             Self::CentreX => camera.centre_px.x,
@@ -148,7 +148,7 @@ pub(super) struct State {
 
 impl State {
     /// Tests the views of a camera; `name` gives the name of a frame.
-    pub(in crate::calibrate) fn of(
+    pub(crate) fn of(
         equations: &StateEquations,
         camera: &Camera,
         name: impl Fn(usize) -> String,
@@ -215,7 +215,7 @@ impl Step {
     }
 }
 
-pub(in crate::calibrate) fn after(first: usize, count: usize) -> Vec<f64> {
+pub(crate) fn after(first: usize, count: usize) -> Vec<f64> {
     (0..count).map(|view| f64::from(u8::from(view >= first))).collect()
 }
 

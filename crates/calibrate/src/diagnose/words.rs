@@ -3,15 +3,15 @@
 use super::diagnosis::Diagnosis;
 use super::model_selection::{FOREIGN_PART, Instead, Remedy};
 use super::one_state::{BoardStretch, CameraChange, ChangedIntrinsic, RollingShutter};
-use crate::calibrate::adjust::finding::{Finding, Moved, Shared};
-use crate::calibrate::adjust::lack_of_fit::LackOfFit;
-use crate::calibrate::estimate::target_map::LEAST_TO_MEASURE;
-use crate::calibrate::estimate::values::Estimate;
-use crate::calibrate::input::panel::PanelRef;
-use crate::calibrate::model::Model;
-use crate::calibrate::start::symmetry::LabelRotation;
-use crate::camera::Camera;
-use crate::words::{counted, p_value, places};
+use crate::adjust::finding::{Finding, Moved, Shared};
+use crate::adjust::lack_of_fit::LackOfFit;
+use crate::estimate::target_map::LEAST_TO_MEASURE;
+use crate::estimate::values::Estimate;
+use crate::input::panel::PanelRef;
+use crate::model::Model;
+use crate::start::symmetry::LabelRotation;
+use deltille_core::camera::Camera;
+use deltille_core::words::{counted, p_value, places};
 
 /// A panel that is turned by less looks only moved.
 const TURNED_DEG: f64 = 0.05;

@@ -6,13 +6,15 @@ use glam::{DMat3, DVec2, DVec3};
 use nalgebra::{Matrix3, Vector3};
 
 use super::layout::Layout;
-use crate::calibrate::input::loss::Loss;
-use crate::calibrate::input::observation::Observation;
-use crate::calibrate::problem::bundle::Problem;
-use crate::calibrate::problem::shape;
-use crate::calibrate::problem::unknowns::{Block, CameraUnknowns};
-use crate::calibrate::problem::whitening::Whitening;
-use crate::camera::{Lens, MAX_PARAMETERS, MOST_TOUCHED, PROJECTION_PARAMETERS, Pose, Projection};
+use crate::input::loss::Loss;
+use crate::input::observation::Observation;
+use crate::problem::bundle::Problem;
+use crate::problem::shape;
+use crate::problem::unknowns::{Block, CameraUnknowns};
+use crate::problem::whitening::Whitening;
+use deltille_core::camera::{
+    Lens, MAX_PARAMETERS, MOST_TOUCHED, PROJECTION_PARAMETERS, Pose, Projection,
+};
 
 /// Most columns that a corner depends on: parameters and poses of a camera, a panel, a target and a frame, and a shape.
 const LONGEST_ROW: usize = MOST_OF_LENS + 24 + shape::COUNT;
@@ -73,7 +75,7 @@ impl Support {
 }
 
 /// The normal equations of one block, with only the columns that it has.
-pub(in crate::calibrate) struct Local {
+pub(crate) struct Local {
     pub cost: f64,
     /// Shared columns; those of the frame's pose follow.
     pub columns: Vec<usize>,
@@ -85,7 +87,7 @@ pub(in crate::calibrate) struct Local {
 }
 
 /// What a corner in a block says of its own offset.
-pub(in crate::calibrate) struct OfCorner {
+pub(crate) struct OfCorner {
     /// Its place in the map.
     pub index: usize,
     /// For each column of the block.
@@ -207,7 +209,7 @@ impl<'a> Chain<'a> {
 }
 
 impl Local {
-    pub(in crate::calibrate) fn of(
+    pub(crate) fn of(
         problem: &Problem,
         layout: &Layout,
         block: &Block,
@@ -282,7 +284,7 @@ impl Local {
     }
 
     /// A row of the lower triangle, up to the diagonal.
-    pub(in crate::calibrate) fn row(&self, i: usize) -> &[f64] {
+    pub(crate) fn row(&self, i: usize) -> &[f64] {
         &self.matrix[i * (i + 1) / 2..][..=i]
     }
 

@@ -9,7 +9,7 @@ use super::normal::{Normal, Part, Reduced};
 
 /// The covariance of all unknowns for residuals of variance 1: of the shared ones, of each frame's pose, and
 /// of each corner's offset.
-pub(in crate::calibrate) struct Covariances {
+pub(crate) struct Covariances {
     pub shared: DMatrix<f64>,
     /// Of all that are kept.
     pub kept: DMatrix<f64>,
@@ -26,7 +26,7 @@ pub(in crate::calibrate) struct Covariances {
 
 /// A square root L of a covariance, LLᵀ, and its inverse, both from the equations, so that what is well determined is
 /// exact beside what is not.
-pub(in crate::calibrate) struct Root {
+pub(crate) struct Root {
     pub half: DMatrix<f64>,
     pub inverse: DMatrix<f64>,
 }
@@ -64,7 +64,7 @@ const TIED: f64 = 1000.0;
 
 impl Normal {
     /// The inverse of the equations; `None` where a frame's pose is open by itself.
-    pub(in crate::calibrate) fn covariances(&self, layout: &Layout) -> Option<Covariances> {
+    pub(crate) fn covariances(&self, layout: &Layout) -> Option<Covariances> {
         let Reduced { matrix, inverses, .. } = self.reduced(0.0)?;
         let Inverse { matrix: kept, root, loose, tied } = self.invert(matrix)?;
         let of_part = |(part, inverse): (&Part, DMatrix<f64>)| {
@@ -82,7 +82,7 @@ impl Normal {
     }
 
     /// The covariance of what is kept for residuals of variance 1; `None` where something is open.
-    pub(in crate::calibrate) fn covariance_of_kept(&self) -> Option<DMatrix<f64>> {
+    pub(crate) fn covariance_of_kept(&self) -> Option<DMatrix<f64>> {
         let matrix = self.reduced(0.0)?.matrix;
         let n = matrix.nrows();
         let scale = DVector::from_fn(n, |i, _| 1.0 / matrix[(i, i)].max(f64::MIN_POSITIVE).sqrt());
@@ -93,7 +93,7 @@ impl Normal {
 
     /// The solution of the equations for a right side of shared unknowns and corners' offsets, in this
     /// order, which is zero for the poses of frames. `None` where a corner is open by itself.
-    pub(in crate::calibrate) fn solve_without_frames(
+    pub(crate) fn solve_without_frames(
         &self,
         layout: &Layout,
         found: &Covariances,

@@ -8,7 +8,7 @@ use super::block::Local;
 
 /// The normal equations of one frame for the shared unknowns followed by the offsets of all corners, its pose
 /// eliminated.
-pub(in crate::calibrate) struct OfFrame {
+pub(crate) struct OfFrame {
     locals: Vec<Local>,
     /// Number of shared unknowns.
     shared: usize,

@@ -2,12 +2,12 @@
 
 use nalgebra::{DVector, SMatrix, Vector3, Vector6};
 
-use crate::calibrate::problem::bundle::Problem;
-use crate::calibrate::problem::shape;
+use crate::problem::bundle::Problem;
+use crate::problem::shape;
 
 /// Which column of the unknowns that are kept belongs to what.
 #[derive(Clone, Debug, PartialEq)]
-pub(in crate::calibrate) struct Layout {
+pub(crate) struct Layout {
     /// For each camera the parameters that are unknown, and their columns.
     pub parameters: Vec<Vec<(usize, usize)>>,
     /// First of the six columns of a camera's pose.
@@ -29,7 +29,7 @@ pub(in crate::calibrate) struct Layout {
 }
 
 impl Layout {
-    pub(in crate::calibrate) fn of(problem: &Problem) -> Self {
+    pub(crate) fn of(problem: &Problem) -> Self {
         let mut count = 0;
         let mut take = |columns: usize| {
             count += columns;

@@ -14,7 +14,7 @@
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
 /// The eigenvalues and eigenvectors of a frame's contribution.
-pub(in crate::calibrate) struct LocalShare {
+pub(crate) struct LocalShare {
     touched: Vec<usize>,
     /// Standard deviations of the touched unknowns; `root` is the Cholesky factor of their
     /// correlations.

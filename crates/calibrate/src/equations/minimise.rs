@@ -2,9 +2,9 @@
 
 use super::layout::Layout;
 use super::normal::Normal;
-use crate::calibrate::input::loss::Loss;
-use crate::calibrate::problem::bundle::Problem;
-use crate::calibrate::problem::whitening::Whitening;
+use crate::input::loss::Loss;
+use crate::problem::bundle::Problem;
+use crate::problem::whitening::Whitening;
 
 /// Accepted steps at most; problems that have a minimum take ten to forty.
 const MOST_STEPS: usize = 200;
@@ -21,7 +21,7 @@ const MOST_DAMPING: f64 = 1e12;
 /// unknown by more than δ of its standard deviations, however many corners there are; below that the
 /// search ends.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(in crate::calibrate) enum Until {
+pub(crate) enum Until {
     /// Good enough to go on with more unknowns or other weights: what is left is small beside noise.
     Rough,
     /// Good enough to be told: three digits of the deviations, and more of the values.
@@ -39,7 +39,7 @@ impl Until {
 }
 
 /// Where the search ended.
-pub(in crate::calibrate) struct Minimum {
+pub(crate) struct Minimum {
     pub problem: Problem,
     pub normal: Normal,
     pub layout: Layout,
@@ -48,7 +48,7 @@ pub(in crate::calibrate) struct Minimum {
 
 /// Walks from the problem's values to the next minimum of the cost (Levenberg–Marquardt); `None`
 /// where a corner is out of its camera's reach at the start, or the work is to end.
-pub(in crate::calibrate) fn minimise(
+pub(crate) fn minimise(
     problem: Problem,
     whitening: &Whitening,
     loss: Loss,

@@ -9,11 +9,11 @@
 //! 4. `minimise` walks to the minimum (Levenberg–Marquardt).
 //! 5. `covariances` inverts the equations; `local_share` is what one frame tells of the unknowns that all share.
 
-pub(in crate::calibrate) mod block;
-pub(in crate::calibrate) mod covariances;
-pub(in crate::calibrate) mod frame;
-pub(in crate::calibrate) mod layout;
-pub(in crate::calibrate) mod local_share;
-pub(in crate::calibrate) mod minimise;
-pub(in crate::calibrate) mod normal;
-pub(in crate::calibrate) mod step;
+pub(crate) mod block;
+pub(crate) mod covariances;
+pub(crate) mod frame;
+pub(crate) mod layout;
+pub(crate) mod local_share;
+pub(crate) mod minimise;
+pub(crate) mod normal;
+pub(crate) mod step;

@@ -17,10 +17,10 @@ use rayon::prelude::*;
 use super::block::{Local, OfCorner};
 use super::layout::Layout;
 use super::step::Step;
-use crate::calibrate::input::loss::Loss;
-use crate::calibrate::problem::bundle::Problem;
-use crate::calibrate::problem::corner_map::CornerMap;
-use crate::calibrate::problem::whitening::Whitening;
+use crate::input::loss::Loss;
+use crate::problem::bundle::Problem;
+use crate::problem::corner_map::CornerMap;
+use crate::problem::whitening::Whitening;
 
 /// The equations of unknowns that are eliminated: a frame, or a corner.
 #[derive(Clone, Debug)]
@@ -32,7 +32,7 @@ pub(super) struct Part {
 
 /// The normal equations at a point, and what the residuals cost there.
 #[derive(Clone, Debug)]
-pub(in crate::calibrate) struct Normal {
+pub(crate) struct Normal {
     pub cost: f64,
     /// Columns of what all frames share, the first.
     pub(super) shared: usize,
@@ -44,7 +44,7 @@ pub(in crate::calibrate) struct Normal {
 
 impl Normal {
     /// `None` where a corner is out of its camera's reach.
-    pub(in crate::calibrate) fn of(
+    pub(crate) fn of(
         problem: &Problem,
         layout: &Layout,
         whitening: &Whitening,
@@ -211,7 +211,7 @@ impl Normal {
 
     /// The step of Levenberg and Marquardt: diagonals grow by the factor 1 + `damping`. `None`
     /// where the equations have no unique solution.
-    pub(in crate::calibrate) fn step(&self, layout: &Layout, damping: f64) -> Option<Step> {
+    pub(crate) fn step(&self, layout: &Layout, damping: f64) -> Option<Step> {
         let Reduced { matrix, right, inverses } = self.reduced(damping)?;
         let kept = solve_scaled(matrix, right)?;
         let parts = self.parts.iter().zip(inverses);
@@ -223,7 +223,7 @@ impl Normal {
     }
 
     /// By how much the cost falls along a step if the equations hold.
-    pub(in crate::calibrate) fn predicted(&self, layout: &Layout, step: &Step) -> f64 {
+    pub(crate) fn predicted(&self, layout: &Layout, step: &Step) -> f64 {
         let parts = self.parts.iter().map(|part| &part.right).collect::<Vec<_>>();
         let (frames, corners) = layout.split(&self.right, &parts);
         let of_frames = frames.iter().zip(&step.frames).map(|(right, step)| right.dot(step));
@@ -233,7 +233,7 @@ impl Normal {
     }
 
     /// What is left of the equations when parts are eliminated. `None` where a frame's pose is open by itself.
-    pub(in crate::calibrate) fn reduced(&self, damping: f64) -> Option<Reduced> {
+    pub(crate) fn reduced(&self, damping: f64) -> Option<Reduced> {
         let grown = |diagonal: f64| diagonal * (1.0 + damping);
         let (mut matrix, mut right) = (self.a.clone(), self.right.clone());
         (0..matrix.nrows()).for_each(|i| matrix[(i, i)] = grown(matrix[(i, i)]));
@@ -261,7 +261,7 @@ impl Normal {
 }
 
 /// What is left of equations, S and s of S kept = s, and the inverses by which parts were eliminated.
-pub(in crate::calibrate) struct Reduced {
+pub(crate) struct Reduced {
     pub matrix: DMatrix<f64>,
     pub right: DVector<f64>,
     pub(super) inverses: Vec<DMatrix<f64>>,
@@ -291,13 +291,11 @@ mod tests {
     use rand_chacha::ChaCha8Rng;
 
     use super::*;
-    use crate::calibrate::input::observation::Observation;
-    use crate::calibrate::problem::unknowns::Block;
-    use crate::calibrate::problem::unknowns::{
-        CameraUnknowns, PanelUnknowns, Prior, TargetUnknowns,
-    };
-    use crate::calibrate::{PanelRef, Shape};
-    use crate::camera::{Camera, Pose};
+    use crate::input::observation::Observation;
+    use crate::problem::unknowns::Block;
+    use crate::problem::unknowns::{CameraUnknowns, PanelUnknowns, Prior, TargetUnknowns};
+    use crate::{PanelRef, Shape};
+    use deltille_core::camera::{Camera, Pose};
     use glam::DVec2;
     use glam::DVec3;
     use nalgebra::Vector3;

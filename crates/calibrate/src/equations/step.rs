@@ -4,11 +4,11 @@ use glam::DVec3;
 use nalgebra::{DVector, Vector3, Vector6};
 
 use super::layout::Layout;
-use crate::calibrate::problem::bundle::Problem;
-use crate::camera::Pose;
+use crate::problem::bundle::Problem;
+use deltille_core::camera::Pose;
 
 /// A step of all unknowns.
-pub(in crate::calibrate) struct Step {
+pub(crate) struct Step {
     pub shared: DVector<f64>,
     pub frames: Vec<Vector6<f64>>,
     pub corners: Vec<Vector3<f64>>,
@@ -16,7 +16,7 @@ pub(in crate::calibrate) struct Step {
 
 impl Problem {
     /// The problem after a step.
-    pub(in crate::calibrate) fn after(&self, layout: &Layout, step: &Step) -> Problem {
+    pub(crate) fn after(&self, layout: &Layout, step: &Step) -> Problem {
         let mut problem = self.clone();
         for (i, camera) in problem.cameras.iter_mut().enumerate() {
             let mut values = camera.camera.parameters();

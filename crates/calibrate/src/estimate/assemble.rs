@@ -9,27 +9,27 @@ use super::values::{
     CameraEstimate, Corner, Estimate, FrameEstimate, Parameter, TargetEstimate, ViewEstimate,
     rms_px,
 };
-use crate::calibrate::adjust::lack_of_fit::lack_of_fit;
-use crate::calibrate::adjust::reweighting::{Settled, variance};
-use crate::calibrate::equations::covariances::Covariances;
-use crate::calibrate::equations::minimise::Minimum;
-use crate::calibrate::error::CalibrationError;
-use crate::calibrate::input::calibration::{Calibration, CameraViews};
-use crate::calibrate::input::loss::Loss;
-use crate::calibrate::input::order::in_order;
-use crate::calibrate::input::panel::{PanelPlace, PanelRef};
-use crate::calibrate::problem::bundle::Problem;
-use crate::calibrate::problem::corner_map::CornerMap;
-use crate::calibrate::problem::shape::{BoardShape, Shape};
-use crate::calibrate::problem::whitening::deviations;
-use crate::calibrate::start::frames::Frame;
-use crate::calibrate::uncertainty::agreement::{Observed, observed};
-use crate::calibrate::uncertainty::board_errors::{board_errors, drawn_to_plan};
-use crate::calibrate::uncertainty::halves;
-use crate::calibrate::uncertainty::known_so_far::known_so_far;
-use crate::calibrate::uncertainty::projection::{ObservedCovariance, ProjectionUncertainty};
-use crate::calibrate::uncertainty::state_equations::StateEquations;
-use crate::camera::PROJECTION_PARAMETERS;
+use crate::adjust::lack_of_fit::lack_of_fit;
+use crate::adjust::reweighting::{Settled, variance};
+use crate::equations::covariances::Covariances;
+use crate::equations::minimise::Minimum;
+use crate::error::CalibrationError;
+use crate::input::calibration::{Calibration, CameraViews};
+use crate::input::loss::Loss;
+use crate::input::order::in_order;
+use crate::input::panel::{PanelPlace, PanelRef};
+use crate::problem::bundle::Problem;
+use crate::problem::corner_map::CornerMap;
+use crate::problem::shape::{BoardShape, Shape};
+use crate::problem::whitening::deviations;
+use crate::start::frames::Frame;
+use crate::uncertainty::agreement::{Observed, observed};
+use crate::uncertainty::board_errors::{board_errors, drawn_to_plan};
+use crate::uncertainty::halves;
+use crate::uncertainty::known_so_far::known_so_far;
+use crate::uncertainty::projection::{ObservedCovariance, ProjectionUncertainty};
+use crate::uncertainty::state_equations::StateEquations;
+use deltille_core::camera::PROJECTION_PARAMETERS;
 
 impl Estimate {
     /// What was settled on; `frames` are those of the settled problem, and `f_ratio` is that of the
@@ -37,7 +37,7 @@ impl Estimate {
     ///
     /// # Errors
     /// Where views leave the pose of a frame, a camera or a panel open.
-    pub(in crate::calibrate) fn new(
+    pub(crate) fn new(
         calibration: &Calibration,
         frames: &[&Frame],
         settled: &Settled,

@@ -44,7 +44,7 @@ impl Coverage {
     }
 
     /// The middle of each cell of an image of this size in which there are corners, px, and how many these are.
-    pub(in crate::calibrate) fn places(&self, size: DVec2) -> impl Iterator<Item = (DVec2, u32)> {
+    pub(crate) fn places(&self, size: DVec2) -> impl Iterator<Item = (DVec2, u32)> {
         let step = size / DVec2::new(self.columns as f64, self.rows as f64);
         let seen = self.counts.iter().enumerate().filter(|(_, count)| **count > 0);
         seen.map(move |(index, &count)| {

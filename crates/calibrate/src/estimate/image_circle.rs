@@ -4,7 +4,7 @@ use std::f64::consts::TAU;
 
 use glam::DVec2;
 
-use crate::camera::Camera;
+use deltille_core::camera::Camera;
 
 /// The image circle of a fisheye.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -41,7 +41,7 @@ impl ImageCircle {
 
     /// The circle that corners fill: it reaches the nearest side and leaves the corners of the image
     /// empty.
-    pub(in crate::calibrate) fn filled(camera: &Camera, seen: &[DVec2]) -> Option<Self> {
+    pub(crate) fn filled(camera: &Camera, seen: &[DVec2]) -> Option<Self> {
         if camera.lens.is_perspective() {
             return None;
         }
@@ -88,7 +88,7 @@ fn seen_towards(camera: &Camera, corner: DVec2) -> Option<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::camera::{BrownConrady, KannalaBrandt, Lens};
+    use deltille_core::camera::{BrownConrady, KannalaBrandt, Lens};
 
     #[test]
     fn a_fisheye_has_a_circle_where_corners_fill_one_or_the_lens_ends() {

@@ -5,7 +5,7 @@ use std::fmt;
 use glam::DVec2;
 
 use super::image_circle::ImageCircle;
-use crate::camera::Camera;
+use deltille_core::camera::Camera;
 
 /// A lens whose curve turns back or runs away within the image, as polynomials and quotients do where
 /// no corner holds them.
@@ -49,7 +49,7 @@ impl fmt::Display for LensEnd {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::camera::{BrownConrady, Lens};
+    use deltille_core::camera::{BrownConrady, Lens};
 
     #[test]
     fn a_fold_is_told_only_within_the_image() {

@@ -8,10 +8,10 @@
 //! 3. `uncertainty_map` is how sure a camera is over its image.
 //! 4. `assemble` makes the estimate.
 
-pub(in crate::calibrate) mod assemble;
-pub(in crate::calibrate) mod coverage;
-pub(in crate::calibrate) mod image_circle;
-pub(in crate::calibrate) mod lens_end;
-pub(in crate::calibrate) mod target_map;
-pub(in crate::calibrate) mod uncertainty_map;
-pub(in crate::calibrate) mod values;
+pub(crate) mod assemble;
+pub(crate) mod coverage;
+pub(crate) mod image_circle;
+pub(crate) mod lens_end;
+pub(crate) mod target_map;
+pub(crate) mod uncertainty_map;
+pub(crate) mod values;

@@ -4,10 +4,10 @@ use std::ops::Range;
 
 use glam::DVec3;
 
-use crate::calibrate::input::observation::Sighting;
-use crate::calibrate::input::panel::PanelRef;
-use crate::statistics::chi_squared_chance;
-use crate::targets::{MeasuredPlace, Target};
+use crate::input::observation::Sighting;
+use crate::input::panel::PanelRef;
+use deltille_core::statistics::chi_squared_chance;
+use deltille_core::targets::{MeasuredPlace, Target};
 
 /// Where the corners of a target are, as the views have it.
 ///
@@ -88,7 +88,7 @@ impl TargetMap {
     }
 
     /// The map of these panels, as if there were no others.
-    pub(in crate::calibrate) fn of_panels(&self, panels: &Range<usize>) -> Self {
+    pub(crate) fn of_panels(&self, panels: &Range<usize>) -> Self {
         let own = self.corners.iter().filter(|corner| panels.contains(&corner.panel.index()));
         let own = own.map(|corner| {
             let panel = PanelRef::new(corner.panel.index() - panels.start, corner.panel.id());

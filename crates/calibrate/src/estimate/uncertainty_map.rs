@@ -4,7 +4,7 @@ use glam::DVec2;
 use nalgebra::DMatrix;
 
 use super::values::CameraEstimate;
-use crate::calibrate::uncertainty::projection::{Source, by_motion, by_parameters, seen_at};
+use crate::uncertainty::projection::{Source, by_motion, by_parameters, seen_at};
 
 /// How sure a camera is over its image.
 #[derive(Clone, Debug, PartialEq)]
@@ -79,7 +79,7 @@ impl CameraEstimate {
     }
 
     /// How sure it is over its image of points at infinity, and at the distances of
-    /// [`ProjectionUncertainty::distances_mm`](crate::calibrate::ProjectionUncertainty::distances_mm): as far as these are known, from noise and observed.
+    /// [`ProjectionUncertainty::distances_mm`](crate::ProjectionUncertainty::distances_mm): as far as these are known, from noise and observed.
     pub fn uncertainty_maps(&self) -> Vec<UncertaintyMap> {
         let distances = self.projection.iter().flat_map(|known| &known.distances_mm);
         let distances = std::iter::once(None).chain(distances.map(|&mm| Some(mm)));
@@ -117,7 +117,7 @@ impl CameraEstimate {
     }
 
     /// Indices of the parameters that were found.
-    pub(in crate::calibrate) fn free(&self) -> Vec<usize> {
+    pub(crate) fn free(&self) -> Vec<usize> {
         let parameters = self.parameters.iter().enumerate();
         parameters.filter(|(_, p)| p.sd.is_some()).map(|(index, _)| index).collect()
     }

@@ -9,20 +9,20 @@ use nalgebra::DMatrix;
 use super::coverage::Coverage;
 use super::lens_end::LensEnd;
 use super::target_map::TargetMap;
-use crate::calibrate::adjust::finding::Finding;
-use crate::calibrate::adjust::lack_of_fit::LackOfFit;
-use crate::calibrate::excluded::Excluded;
-use crate::calibrate::input::panel::{PanelPlace, PanelRef};
-use crate::calibrate::model::Model;
-use crate::calibrate::problem::roughness::Roughness;
-use crate::calibrate::problem::shape::BoardShape;
-use crate::calibrate::start::symmetry::LabelRotation;
-use crate::calibrate::uncertainty::known_so_far::KnownSoFar;
-use crate::calibrate::uncertainty::projection::ProjectionUncertainty;
-use crate::calibrate::uncertainty::state_equations::StateEquations;
-use crate::camera::{Camera, Pose};
-use crate::statistics::median;
-use crate::targets::{Name, PanelPose, Target, TargetIdentity};
+use crate::adjust::finding::Finding;
+use crate::adjust::lack_of_fit::LackOfFit;
+use crate::excluded::Excluded;
+use crate::input::panel::{PanelPlace, PanelRef};
+use crate::model::Model;
+use crate::problem::roughness::Roughness;
+use crate::problem::shape::BoardShape;
+use crate::start::symmetry::LabelRotation;
+use crate::uncertainty::known_so_far::KnownSoFar;
+use crate::uncertainty::projection::ProjectionUncertainty;
+use crate::uncertainty::state_equations::StateEquations;
+use deltille_core::camera::{Camera, Pose};
+use deltille_core::statistics::median;
+use deltille_core::targets::{Name, PanelPose, Target, TargetIdentity};
 
 /// The result of a calibration: cameras, their poses and those of the target, with uncertainties.
 ///
@@ -65,9 +65,9 @@ pub struct Estimate {
     /// Number of iterations of the last bundle adjustment.
     pub steps: usize,
     /// What the corners say of the first camera and the board's shape, by which views are proposed.
-    pub(in crate::calibrate) known: Option<KnownSoFar>,
+    pub(crate) known: Option<KnownSoFar>,
     /// What the views of each camera say of its state.
-    pub(in crate::calibrate) states: Vec<Option<StateEquations>>,
+    pub(crate) states: Vec<Option<StateEquations>>,
 }
 
 /// The estimate of one camera.
@@ -110,7 +110,7 @@ pub struct CameraEstimate {
     /// Root mean square error of a coordinate over all its views, px.
     pub rms_px: f64,
     /// What was expected of the knots of a spline that was found.
-    pub(in crate::calibrate) roughness: Option<Roughness>,
+    pub(crate) roughness: Option<Roughness>,
 }
 
 /// Where a target is.
@@ -182,7 +182,7 @@ pub struct Corner {
     pub pixel: DVec2,
     /// Residual: detected less predicted position, px.
     pub residual: DVec2,
-    /// Whether the residual is larger than chance explains, see [`Loss`](crate::calibrate::Loss).
+    /// Whether the residual is larger than chance explains, see [`Loss`](crate::Loss).
     pub outlier: bool,
 }
 
@@ -268,7 +268,7 @@ impl Estimate {
     }
 
     /// How many unknowns were found beside the poses of the frames.
-    pub(in crate::calibrate) fn unknown_count(&self) -> usize {
+    pub(crate) fn unknown_count(&self) -> usize {
         let of_panels = self.panels.iter().filter(|panel| panel.covariance.is_some()).count();
         let of_cameras = self
             .cameras
@@ -312,7 +312,7 @@ impl CameraEstimate {
     }
 
     /// Width and height of its image, px.
-    pub(in crate::calibrate) fn size_px(&self) -> DVec2 {
+    pub(crate) fn size_px(&self) -> DVec2 {
         DVec2::new(self.camera.width.into(), self.camera.height.into()).max(DVec2::ONE)
     }
 

@@ -11,12 +11,12 @@ use super::order::in_order;
 use super::panel::{PanelPlace, PanelRef};
 use super::reference::Reference;
 use super::weights::Weights;
-use crate::calibrate::cancel::Stop;
-use crate::calibrate::error::CalibrationError;
-use crate::calibrate::model::Model;
-use crate::camera::{Camera, Pose};
-use crate::lattice::LatticeMap;
-use crate::targets::{Target, TargetIdentity};
+use crate::cancel::Stop;
+use crate::error::CalibrationError;
+use crate::model::Model;
+use deltille_core::camera::{Camera, Pose};
+use deltille_core::lattice::LatticeMap;
+use deltille_core::targets::{Target, TargetIdentity};
 
 /// Cameras that are fixed to each other, their views of one rigid target or of several that are fixed to each
 /// other, and what of these is known.
@@ -27,7 +27,7 @@ use crate::targets::{Target, TargetIdentity};
 /// there are several targets, see [`of_targets`](Self::of_targets), it is found where they are to each other.
 ///
 /// ```
-/// # use deltille_core::calibrate::{Calibration, CalibrationError, Estimate, Model, PanelPlace, View};
+/// # use deltille_calibrate::{Calibration, CalibrationError, Estimate, Model, PanelPlace, View};
 /// # fn calibrated(panels: Vec<PanelPlace>, left: Vec<View>, right: Vec<View>) -> Result<Estimate, CalibrationError> {
 /// Calibration::new(panels)
 ///     .camera("left", left, Model::Radtan)
@@ -39,35 +39,35 @@ use crate::targets::{Target, TargetIdentity};
 #[derive(Clone, Debug, PartialEq)]
 pub struct Calibration {
     /// Those of all targets, one after the other.
-    pub(in crate::calibrate) panels: Vec<PanelPlace>,
-    pub(in crate::calibrate) targets: Vec<TargetPanels>,
+    pub(crate) panels: Vec<PanelPlace>,
+    pub(crate) targets: Vec<TargetPanels>,
     /// Identities of the targets, where those are described.
-    pub(in crate::calibrate) identities: Vec<TargetIdentity>,
-    pub(in crate::calibrate) cameras: Vec<CameraViews>,
-    pub(in crate::calibrate) loss: Loss,
-    pub(in crate::calibrate) weights: Weights,
-    pub(in crate::calibrate) refine_panels: bool,
-    pub(in crate::calibrate) board_shape: bool,
-    pub(in crate::calibrate) measure_target: bool,
+    pub(crate) identities: Vec<TargetIdentity>,
+    pub(crate) cameras: Vec<CameraViews>,
+    pub(crate) loss: Loss,
+    pub(crate) weights: Weights,
+    pub(crate) refine_panels: bool,
+    pub(crate) board_shape: bool,
+    pub(crate) measure_target: bool,
     /// Standard deviation of a corner of the board from its plan, mm; that of a print where it is not known.
-    pub(in crate::calibrate) board_accuracy_mm: Option<f64>,
-    pub(in crate::calibrate) hold_out: Option<usize>,
-    pub(in crate::calibrate) distances_mm: Vec<f64>,
+    pub(crate) board_accuracy_mm: Option<f64>,
+    pub(crate) hold_out: Option<usize>,
+    pub(crate) distances_mm: Vec<f64>,
     /// Which of the model's starts is taken; the best where none is said.
-    pub(in crate::calibrate) start: Option<usize>,
+    pub(crate) start: Option<usize>,
     /// Names of all frames in their order, where only a part of them is here.
-    pub(in crate::calibrate) order: Vec<String>,
+    pub(crate) order: Vec<String>,
     /// By how many frames each camera is late, where that is known.
-    pub(in crate::calibrate) delays: Option<Vec<i32>>,
+    pub(crate) delays: Option<Vec<i32>>,
     /// Rotations of the labels of each panel that no picture shows; may be shorter than there are panels.
-    pub(in crate::calibrate) symmetries: Vec<Vec<LatticeMap>>,
+    pub(crate) symmetries: Vec<Vec<LatticeMap>>,
     /// Whether the work is to end.
-    pub(in crate::calibrate) stop: Stop,
+    pub(crate) stop: Stop,
 }
 
 /// A target of the scene: panels that move together.
 #[derive(Clone, Debug, PartialEq)]
-pub(in crate::calibrate) struct TargetPanels {
+pub(crate) struct TargetPanels {
     pub name: String,
     /// Its panels among all.
     pub panels: Range<usize>,
@@ -127,7 +127,7 @@ impl Intrinsics {
     }
 
     /// Which parameters are found.
-    pub(in crate::calibrate) fn free(&self) -> Vec<bool> {
+    pub(crate) fn free(&self) -> Vec<bool> {
         match self {
             Self::Unknown(model) => model.free(),
             Self::Known(camera) => vec![false; camera.parameters().len()],
@@ -146,14 +146,14 @@ impl CameraViews {
 
 impl Calibration {
     /// A calibration with a target of these panels, see
-    /// [`Reference::panels`](crate::calibrate::Reference::panels), without any camera yet.
+    /// [`Reference::panels`](crate::Reference::panels), without any camera yet.
     pub fn new(panels: impl IntoIterator<Item = impl Into<PanelPlace>>) -> Self {
         let panels = panels.into_iter().map(Into::into).collect();
         Self::of_targets([(String::new(), panels)])
     }
 
     /// A calibration with several targets, of these names and panels, that are fixed to each other, nobody knows
-    /// how. [`PanelRef::index`](crate::calibrate::PanelRef::index) counts the panels of all targets, one target after the
+    /// how. [`PanelRef::index`](crate::PanelRef::index) counts the panels of all targets, one target after the
     /// other. The scene's frame is that of the first target.
     ///
     /// Two cameras need not see the same target: where each sees one of its own, the cameras and the targets are
@@ -251,7 +251,7 @@ impl Calibration {
         Self { board_shape, ..self }
     }
 
-    /// Whether the place of every corner of the target is found, too, see [`Estimate::map`](crate::calibrate::Estimate::map).
+    /// Whether the place of every corner of the target is found, too, see [`Estimate::map`](crate::Estimate::map).
     #[must_use]
     pub fn measure_target(self, measure_target: bool) -> Self {
         Self { measure_target, ..self }
@@ -266,8 +266,8 @@ impl Calibration {
         Self { board_accuracy_mm, ..self }
     }
 
-    /// With the targets that detections name ([`Detection::targets`](crate::detect::Detection)), where nothing else is known of
-    /// what was photographed than its tiles, see [`Estimate::calibrated_with`](crate::calibrate::Estimate).
+    /// With the targets that detections name ([`Detection::targets`](deltille_core::detection::Detection)), where nothing else is known of
+    /// what was photographed than its tiles, see [`Estimate::calibrated_with`](crate::Estimate).
     #[must_use]
     pub fn named_by(mut self, targets: impl IntoIterator<Item = TargetIdentity>) -> Self {
         if self.identities.is_empty() {
@@ -281,7 +281,7 @@ impl Calibration {
     }
 
     /// Keeps every n-th frame (the n-th, the 2n-th, …) out of the calibration; only the poses in these are
-    /// found, see [`Estimate::held_out`](crate::calibrate::Estimate::held_out).
+    /// found, see [`Estimate::held_out`](crate::Estimate::held_out).
     #[must_use]
     pub fn hold_out(self, hold_out: Option<usize>) -> Self {
         Self { hold_out, ..self }
@@ -312,22 +312,22 @@ impl Calibration {
     }
 
     /// Index of the target of a panel.
-    pub(in crate::calibrate) fn target_of(&self, panel: PanelRef) -> usize {
+    pub(crate) fn target_of(&self, panel: PanelRef) -> usize {
         self.targets.partition_point(|target| target.panels.end <= panel.index())
     }
 
     /// Target_from_panel of every panel.
-    pub(in crate::calibrate) fn panel_poses(&self) -> Vec<Pose> {
+    pub(crate) fn panel_poses(&self) -> Vec<Pose> {
         self.panels.iter().map(|panel| panel.target_from_panel).collect()
     }
 
     /// Whether it is one camera with a target that is taken as it is stated.
-    pub(in crate::calibrate) fn is_single(&self) -> bool {
+    pub(crate) fn is_single(&self) -> bool {
         self.cameras.len() == 1 && self.targets.len() == 1 && !self.refine_panels
     }
 
     /// The same with other cameras.
-    pub(in crate::calibrate) fn of_cameras(&self, cameras: Vec<CameraViews>) -> Self {
+    pub(crate) fn of_cameras(&self, cameras: Vec<CameraViews>) -> Self {
         let (panels, targets) = (self.panels.clone(), self.targets.clone());
         let identities = self.identities.clone();
         let (distances_mm, order) = (self.distances_mm.clone(), self.order.clone());
@@ -348,7 +348,7 @@ impl Calibration {
     }
 
     /// One of its cameras by itself, with panels at these places. What it saw of each target is a view of its own.
-    pub(in crate::calibrate) fn alone(&self, camera: usize, panels: &[PanelPlace]) -> Self {
+    pub(crate) fn alone(&self, camera: usize, panels: &[PanelPlace]) -> Self {
         let mut camera = self.cameras[camera].clone();
         if self.targets.len() > 1 {
             camera.views = camera.views.iter().flat_map(|view| self.by_target(view)).collect();
@@ -373,7 +373,7 @@ impl Calibration {
     }
 
     /// What a view shows of each target, by itself.
-    pub(in crate::calibrate) fn by_target(&self, view: &View) -> Vec<View> {
+    pub(crate) fn by_target(&self, view: &View) -> Vec<View> {
         let of_target = |(index, target): (usize, &TargetPanels)| {
             let is_of = |sighting: &&Sighting| self.target_of(sighting.panel) == index;
             let sightings: Vec<Sighting> = view.sightings.iter().filter(is_of).cloned().collect();
@@ -384,7 +384,7 @@ impl Calibration {
     }
 
     /// What a view of one of several targets is called.
-    pub(in crate::calibrate) fn name_on(&self, view: &str, target: &TargetPanels) -> String {
+    pub(crate) fn name_on(&self, view: &str, target: &TargetPanels) -> String {
         match self.targets.len() {
             1 => view.to_owned(),
             _ => format!("{view}, target {}", target.name),
@@ -392,7 +392,7 @@ impl Calibration {
     }
 
     /// Names of all frames in the order of their numbers, also of those that are held out.
-    pub(in crate::calibrate) fn moments(&self) -> Vec<String> {
+    pub(crate) fn moments(&self) -> Vec<String> {
         match self.order.as_slice() {
             [] => {
                 let views = self.cameras.iter().flat_map(|camera| &camera.views);
@@ -406,7 +406,7 @@ impl Calibration {
     ///
     /// # Errors
     /// Where there are too few to hold one out.
-    pub(in crate::calibrate) fn split(&self) -> Result<(Self, Option<Self>), CalibrationError> {
+    pub(crate) fn split(&self) -> Result<(Self, Option<Self>), CalibrationError> {
         let Some(every) = self.hold_out else { return Ok((self.clone(), None)) };
         let views = self.cameras.iter().flat_map(|camera| &camera.views);
         let names: BTreeSet<&str> = views.map(|view| view.name.as_str()).collect();

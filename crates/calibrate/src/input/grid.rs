@@ -4,9 +4,9 @@ use std::collections::BTreeSet;
 
 use glam::DVec3;
 
-use crate::detect::Grid;
-use crate::lattice::{GridKind, LatticeMap};
-use crate::targets::{
+use deltille_core::detection::Grid;
+use deltille_core::lattice::{GridKind, LatticeMap};
+use deltille_core::targets::{
     BoardSpec, Target, TargetError, TargetIdentity, TargetSpec, board_vertices, symmetries,
 };
 
@@ -39,7 +39,7 @@ impl UntaggedGrid {
     }
 
     /// Where a corner is, mm.
-    pub(in crate::calibrate) fn place(&self, row: i32, col: i32) -> DVec3 {
+    pub(crate) fn place(&self, row: i32, col: i32) -> DVec3 {
         self.edge_mm * self.kind.position(row.into(), col.into()).extend(0.0)
     }
 
@@ -61,7 +61,7 @@ impl UntaggedGrid {
     }
 
     /// Whether a detected grid can be this board; what speaks against it.
-    pub(in crate::calibrate) fn check(&self, grid: &Grid) -> Result<(), String> {
+    pub(crate) fn check(&self, grid: &Grid) -> Result<(), String> {
         let Some([rows, cols]) = self.size else { return Ok(()) };
         let found = grid.corners.len();
         let most = rows as usize * cols as usize;
@@ -85,7 +85,7 @@ impl UntaggedGrid {
     }
 
     /// The rotations of its labels that no picture shows, see
-    /// [`Panel::label_symmetries`](crate::targets::Panel::label_symmetries); none where its size is not known.
+    /// [`Panel::label_symmetries`](deltille_core::targets::Panel::label_symmetries); none where its size is not known.
     pub(super) fn label_symmetries(&self) -> Vec<LatticeMap> {
         self.size.map_or(Vec::new(), |[rows, cols]| {
             symmetries(self.kind, board_vertices(self.kind, rows, cols))

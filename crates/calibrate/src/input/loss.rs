@@ -22,7 +22,7 @@ pub enum Loss {
 }
 
 /// How a corner pulls at what explains it, for an estimate's covariance.
-pub(in crate::calibrate) struct Influence {
+pub(crate) struct Influence {
     /// Its weight in the normal equations.
     pub weight: f64,
     /// The square of its pull.
@@ -34,7 +34,7 @@ pub(in crate::calibrate) struct Influence {
 impl Loss {
     /// What a squared distance costs, and the weight of its normal equations, where a standard
     /// deviation is `sigma`.
-    pub(in crate::calibrate) fn of(self, squared: f64, sigma: f64) -> (f64, f64) {
+    pub(crate) fn of(self, squared: f64, sigma: f64) -> (f64, f64) {
         let c = SCALE_SIGMA * sigma;
         match self {
             Self::Huber if squared > c * c => {
@@ -49,7 +49,7 @@ impl Loss {
         }
     }
     /// The pull w e of a corner at a squared distance.
-    pub(in crate::calibrate) fn influence(self, squared: f64, sigma: f64) -> Influence {
+    pub(crate) fn influence(self, squared: f64, sigma: f64) -> Influence {
         let (_, weight) = self.of(squared, sigma);
         let relative = squared / (SCALE_SIGMA * sigma).powi(2);
         // Half the divergence of the pull: w + e w′ / 2.

@@ -10,13 +10,13 @@
 //!
 //! `order` sorts names of frames by their numbers, `sample` takes some of many.
 
-pub(in crate::calibrate) mod calibration;
-pub(in crate::calibrate) mod grid;
-pub(in crate::calibrate) mod loss;
-pub(in crate::calibrate) mod observation;
-pub(in crate::calibrate) mod order;
-pub(in crate::calibrate) mod panel;
-pub(in crate::calibrate) mod reference;
-pub(in crate::calibrate) mod sample;
-pub(in crate::calibrate) mod views;
-pub(in crate::calibrate) mod weights;
+pub(crate) mod calibration;
+pub(crate) mod grid;
+pub(crate) mod loss;
+pub(crate) mod observation;
+pub(crate) mod order;
+pub(crate) mod panel;
+pub(crate) mod reference;
+pub(crate) mod sample;
+pub(crate) mod views;
+pub(crate) mod weights;

@@ -3,10 +3,10 @@
 use glam::{DQuat, DVec2, DVec3};
 
 use super::panel::PanelRef;
-use crate::calibrate::excluded::{Excluded, Reason};
+use crate::excluded::{Excluded, Reason};
 
 /// Corners that a panel needs in a view, so that a few wrong ones show.
-pub(in crate::calibrate) const LEAST_CORNERS: usize = 6;
+pub(crate) const LEAST_CORNERS: usize = 6;
 
 /// A corner of a panel that a camera detected.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -53,7 +53,7 @@ impl View {
     }
 
     /// The view as one that does not fit as a whole.
-    pub(in crate::calibrate) fn excluded(&self, reason: Reason) -> Excluded {
+    pub(crate) fn excluded(&self, reason: Reason) -> Excluded {
         Excluded {
             camera: None,
             view: self.name.clone(),

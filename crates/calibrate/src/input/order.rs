@@ -3,7 +3,7 @@
 use std::collections::BTreeSet;
 
 /// Names with numbers in the order in which one counts: 2 before 10.
-pub(in crate::calibrate) fn in_order(names: BTreeSet<&str>) -> Vec<String> {
+pub(crate) fn in_order(names: BTreeSet<&str>) -> Vec<String> {
     let mut names: Vec<&str> = names.into_iter().collect();
     names.sort_by_cached_key(|name| parts(name));
     names.into_iter().map(str::to_owned).collect()

@@ -4,8 +4,8 @@ use std::fmt;
 
 use serde::{Serialize, Serializer};
 
-use crate::camera::Pose;
-use crate::targets::PanelPose;
+use deltille_core::camera::Pose;
+use deltille_core::targets::PanelPose;
 
 /// One of the panels of what was photographed.
 ///

@@ -7,10 +7,10 @@ use glam::DVec3;
 use super::grid::{ASSUME_TARGET, UntaggedGrid};
 use super::observation::{Observation, Sighting, View};
 use super::panel::{PanelPlace, PanelRef};
-use crate::camera::Pose;
-use crate::detect::{Detection, Grid};
-use crate::lattice::LatticeMap;
-use crate::targets::{Panel, Target, TargetIdentity};
+use deltille_core::camera::Pose;
+use deltille_core::detection::{Detection, Grid};
+use deltille_core::lattice::LatticeMap;
+use deltille_core::targets::{Panel, Target, TargetIdentity};
 
 /// What is wrong with a board of the other tiling.
 const OTHER_KIND: &str =

@@ -7,10 +7,10 @@ use glam::DVec2;
 
 use super::observation::{LEAST_CORNERS, Sighting, View};
 use super::reference::Reference;
-use crate::calibrate::error::CalibrationError;
-use crate::calibrate::excluded::{Excluded, Reason};
-use crate::detect::Detection;
-use crate::targets::TargetIdentity;
+use crate::error::CalibrationError;
+use crate::excluded::{Excluded, Reason};
+use deltille_core::detection::Detection;
+use deltille_core::targets::TargetIdentity;
 
 /// Corners of a mirrored picture turn the wrong way round, but for wrong ones: by so much, at least, of all of
 /// them more do than do not.
@@ -37,10 +37,10 @@ pub struct Shown {
 /// something do not belong to the target.
 ///
 /// ```
-/// use deltille_core::calibrate::{Reference, views};
+/// use deltille_calibrate::{Reference, views};
 /// use deltille_core::camera::{Camera, Pose};
-/// use deltille_core::detect::Detector;
-/// use deltille_core::synth::{Light, scene_of_target};
+/// use deltille_detect::Detector;
+/// use deltille_layout::synth::{Light, scene_of_target};
 /// use deltille_core::targets::{BoardSpec, Target};
 /// use glam::DVec3;
 ///
@@ -185,8 +185,8 @@ mod tests {
     use rand::{Rng, SeedableRng};
 
     use super::*;
-    use crate::calibrate::input::observation::Observation;
-    use crate::calibrate::input::panel::PanelRef;
+    use crate::input::observation::Observation;
+    use crate::input::panel::PanelRef;
     use glam::DVec3;
 
     /// A board of `rows` × 8 corners from above, of which a part are anywhere in the picture.

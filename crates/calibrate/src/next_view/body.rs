@@ -2,10 +2,10 @@
 
 use glam::{DMat3, DVec2, DVec3};
 
-use crate::calibrate::input::panel::PanelRef;
-use crate::camera::{Camera, Pose, Projection};
-use crate::polygon::hull;
-use crate::targets::{Panel, Target};
+use crate::input::panel::PanelRef;
+use deltille_core::camera::{Camera, Pose, Projection};
+use deltille_core::polygon::hull;
+use deltille_core::targets::{Panel, Target};
 
 /// Corners by which a panel is judged: more tell the same more slowly. Of several panels, of which a picture shows
 /// some, each has fewer.

@@ -10,18 +10,19 @@
 //! ```
 //!
 //! θ are parameters of the camera, and of the board's shape where that is found too; ξ is a turn and a move of what
-//! the camera sees, by which a pose and the alignment of [`uncertainty`](crate::calibrate::uncertainty::projection) are the same.
+//! the camera sees, by which a pose and the alignment of [`uncertainty`](crate::uncertainty::projection) are the same.
 
 use glam::{DMat3, DVec2};
 use nalgebra::{DMatrix, DVector, Matrix3, Matrix6, SMatrix};
 
 use super::body::{Body, Seen};
-use crate::calibrate::estimate::values::{CameraEstimate, Estimate};
-use crate::calibrate::model::Model;
-use crate::calibrate::problem::shape::{self, Shape};
-use crate::calibrate::uncertainty::known_so_far::KnownSoFar;
-use crate::calibrate::uncertainty::projection::{by_motion, by_parameters, seen_at};
-use crate::camera::{Camera, PROJECTION_PARAMETERS};
+use crate::estimate::values::{CameraEstimate, Estimate};
+use crate::model::Model;
+use crate::problem::shape;
+use crate::problem::shape::Shape;
+use crate::uncertainty::known_so_far::KnownSoFar;
+use crate::uncertainty::projection::{by_motion, by_parameters, seen_at};
+use deltille_core::camera::{Camera, PROJECTION_PARAMETERS};
 
 /// Places along the longer side of the image by which projections are judged.
 const PLACES: usize = 16;
@@ -241,7 +242,7 @@ fn places(camera: &Camera) -> impl Iterator<Item = DVec2> + use<> {
 /// the model starts, and what they determine stays.
 fn believed(
     camera: &Camera,
-    start: Option<crate::camera::Lens>,
+    start: Option<deltille_core::camera::Lens>,
     free: &[usize],
     known: &KnownSoFar,
 ) -> (Camera, Vec<f64>) {

@@ -18,14 +18,14 @@ use rayon::prelude::*;
 use super::body::Body;
 use super::gain::Gain;
 use super::place::Placing;
-use crate::calibrate::error::CalibrationError;
-use crate::calibrate::estimate::values::Estimate;
-use crate::calibrate::input::calibration::{Calibration, Intrinsics};
-use crate::calibrate::input::observation::View;
-use crate::calibrate::input::panel::PanelRef;
-use crate::calibrate::input::reference::Reference;
-use crate::camera::{Camera, Lens, Pose};
-use crate::targets::Target;
+use crate::error::CalibrationError;
+use crate::estimate::values::Estimate;
+use crate::input::calibration::{Calibration, Intrinsics};
+use crate::input::observation::View;
+use crate::input::panel::PanelRef;
+use crate::input::reference::Reference;
+use deltille_core::camera::{Camera, Lens, Pose};
+use deltille_core::targets::Target;
 
 /// Horizontal fields of view that are assumed before anything is known: of a webcam or telephone, and of a lens
 /// whose model is that of a fisheye, rad.
@@ -66,7 +66,7 @@ const LEAST_GAIN: f64 = 0.03;
 /// Proposes views of one camera, one after the other.
 ///
 /// ```
-/// use deltille_core::calibrate::{Guide, Model};
+/// use deltille_calibrate::{Guide, Model};
 /// use deltille_core::targets::{BoardSpec, Target};
 ///
 /// let board = Target::new("desk", BoardSpec::deltille(9, 12, 20.0))?;
@@ -113,7 +113,7 @@ pub struct NextView {
     /// By how much the board is turned in its plane, rad, counterclockwise as seen; 0 where its rows are level.
     pub roll_rad: f64,
     /// How sure projections at infinity are so far, px: the root mean square over the whole image of the deviation
-    /// of a coordinate, as [`ProjectionUncertainty`](crate::calibrate::ProjectionUncertainty) has it from noise. `None` before
+    /// of a coordinate, as [`ProjectionUncertainty`](crate::ProjectionUncertainty) has it from noise. `None` before
     /// there is an estimate.
     pub now_px: Option<f64>,
     /// How sure they are expected to be with this view. `None` before there is an estimate.

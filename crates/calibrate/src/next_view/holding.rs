@@ -5,12 +5,12 @@ use std::collections::BTreeMap;
 use glam::{DVec2, DVec3};
 
 use super::guide::NextView;
-use crate::calibrate::input::observation::{Sighting, View};
-use crate::calibrate::input::panel::PanelRef;
-use crate::calibrate::start::pose::estimate_pose;
-use crate::camera::Pose;
-use crate::polygon::{area, clip, hull};
-use crate::statistics::median;
+use crate::input::observation::{Sighting, View};
+use crate::input::panel::PanelRef;
+use crate::start::pose::estimate_pose;
+use deltille_core::camera::Pose;
+use deltille_core::polygon::{area, clip, hull};
+use deltille_core::statistics::median;
 
 /// The part of both outlines together that they have in common where a board is where it is to be. Of squares of
 /// equal size a shift by a ninth of the side leaves 0.8; a hand does hardly better, and a view that is off by as much
@@ -90,7 +90,7 @@ type Corners = BTreeMap<(PanelRef, i32, i32), DVec2>;
 
 impl Holding {
     /// Of a proposed view; `panels` are target_from_panel of the target's panels, see
-    /// [`Reference::panels`](crate::calibrate::Reference::panels).
+    /// [`Reference::panels`](crate::Reference::panels).
     pub fn new(next: &NextView, panels: impl IntoIterator<Item = Pose>) -> Self {
         Self {
             hull: hull(next.corners.iter().map(|corner| corner.pixel).collect()),

@@ -7,11 +7,11 @@
 //! 3. `guide` proposes the view after which projections are known best.
 //! 4. `words` says it; `holding` tells when somebody holds the target there.
 
-pub(in crate::calibrate) mod body;
-pub(in crate::calibrate) mod gain;
-pub(in crate::calibrate) mod guide;
-pub(in crate::calibrate) mod holding;
-pub(in crate::calibrate) mod place;
+pub(crate) mod body;
+pub(crate) mod gain;
+pub(crate) mod guide;
+pub(crate) mod holding;
+pub(crate) mod place;
 #[cfg(test)]
 mod tests;
-pub(in crate::calibrate) mod words;
+pub(crate) mod words;

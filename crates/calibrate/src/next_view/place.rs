@@ -5,7 +5,7 @@ use std::f64::consts::{PI, TAU};
 use glam::{DMat3, DQuat, DVec2};
 
 use super::body::{Body, COARSE};
-use crate::camera::{Camera, Pose};
+use deltille_core::camera::{Camera, Pose};
 
 /// Poses are alike within this part of the image, so many rad (20°), and this part of the distance: twice of what a hand
 /// is off by.

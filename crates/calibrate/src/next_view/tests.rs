@@ -2,13 +2,13 @@ use std::f64::consts::{FRAC_PI_2, PI};
 
 use glam::{DQuat, DVec2, DVec3};
 
-use crate::calibrate::{
+use crate::{
     Calibration, Guide, Guided, Held, Holding, Model, NextView, Observation, PanelRef,
     ProposedCorner, Reference, Sighting, Source, UncertaintyMap, View,
 };
-use crate::camera::{BrownConrady, Camera, Lens, Pose};
-use crate::lattice::GridKind;
-use crate::targets::{BoardSpec, SolidShape, SolidSpec, Target, TargetSpec};
+use deltille_core::camera::{BrownConrady, Camera, Lens, Pose};
+use deltille_core::lattice::GridKind;
+use deltille_core::targets::{BoardSpec, SolidShape, SolidSpec, Target, TargetSpec};
 
 fn board() -> Target {
     Target::new("board", BoardSpec::deltille(8, 10, 20.0)).unwrap()
@@ -228,10 +228,10 @@ fn a_solid_shows_several_faces_and_boards_without_tags_are_whole() {
     assert!(next.now_px.is_some());
 }
 
-fn spec_family(spec: &TargetSpec) -> Option<crate::family::Family> {
+fn spec_family(spec: &TargetSpec) -> Option<deltille_core::family::Family> {
     match spec {
         TargetSpec::Solid(_) => {
-            spec.family().and_then(|name| crate::family::Family::shipped(name).ok())
+            spec.family().and_then(|name| deltille_core::family::Family::shipped(name).ok())
         }
         _ => None,
     }

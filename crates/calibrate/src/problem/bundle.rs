@@ -5,14 +5,14 @@ use glam::{DVec2, DVec3};
 use super::corner_map::CornerMap;
 use super::shape::Shape;
 use super::unknowns::{Block, CameraUnknowns, PanelUnknowns, TargetUnknowns};
-use crate::calibrate::cancel::Stop;
-use crate::calibrate::input::observation::{LEAST_CORNERS, Observation};
-use crate::calibrate::input::panel::PanelRef;
-use crate::camera::Pose;
+use crate::cancel::Stop;
+use crate::input::observation::{LEAST_CORNERS, Observation};
+use crate::input::panel::PanelRef;
+use deltille_core::camera::Pose;
 
 /// Unknowns and observations. The pose of every frame is unknown.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub(in crate::calibrate) struct Problem {
+pub(crate) struct Problem {
     /// Cameras.
     pub cameras: Vec<CameraUnknowns>,
     /// rig_from_scene, for each moment at which pictures were taken.
@@ -75,11 +75,7 @@ impl Problem {
     }
 
     /// Seen less predicted position of a corner, px; `None` where it is out of the model's reach.
-    pub(in crate::calibrate) fn residual(
-        &self,
-        block: &Block,
-        seen: &Observation,
-    ) -> Option<DVec2> {
+    pub(crate) fn residual(&self, block: &Block, seen: &Observation) -> Option<DVec2> {
         let camera = &self.cameras[block.camera].camera;
         let at = camera.project_with_derivatives(self.camera_point(block, seen))?;
         Some(seen.pixel - at.pixel)
@@ -91,7 +87,7 @@ impl Problem {
     }
 
     /// The same with the frames for which `keep` holds, and their observations.
-    pub(in crate::calibrate) fn with_frames(&self, keep: impl Fn(usize) -> bool) -> Problem {
+    pub(crate) fn with_frames(&self, keep: impl Fn(usize) -> bool) -> Problem {
         let mut places = vec![None; self.frames.len()];
         let mut frames = Vec::new();
         for (index, pose) in self.frames.iter().enumerate().filter(|&(index, _)| keep(index)) {
@@ -107,7 +103,7 @@ impl Problem {
 }
 
 /// Some of a problem's observations, and the frames that have enough of them to be adjusted.
-pub(in crate::calibrate) struct Part {
+pub(crate) struct Part {
     pub problem: Problem,
     /// Indices of its frames in the whole.
     frames: Vec<usize>,
@@ -115,7 +111,7 @@ pub(in crate::calibrate) struct Part {
 
 impl Problem {
     /// The same with only the corners for which `kept` holds.
-    pub(in crate::calibrate) fn with_corners(&self, kept: &[Vec<bool>]) -> Problem {
+    pub(crate) fn with_corners(&self, kept: &[Vec<bool>]) -> Problem {
         let of_block = |(block, kept): (&Block, &Vec<bool>)| {
             let kept = block.observations.iter().zip(kept).filter(|(_, kept)| **kept);
             Block { observations: kept.map(|(seen, _)| *seen).collect(), ..*block }
@@ -125,7 +121,7 @@ impl Problem {
     }
 
     /// The blocks for which `kept` holds, and the frames that still have as many corners as a panel needs.
-    pub(in crate::calibrate) fn part(&self, kept: impl Fn(usize, &Block) -> bool) -> Part {
+    pub(crate) fn part(&self, kept: impl Fn(usize, &Block) -> bool) -> Part {
         let kept: Vec<bool> =
             self.blocks.iter().enumerate().map(|(index, block)| kept(index, block)).collect();
         let mut corners = vec![0; self.frames.len()];
@@ -142,7 +138,7 @@ impl Problem {
     }
 
     /// Takes over what was found in a part.
-    pub(in crate::calibrate) fn take(&mut self, part: Part) {
+    pub(crate) fn take(&mut self, part: Part) {
         let Part { problem, frames } = part;
         for (frame, pose) in frames.into_iter().zip(problem.frames) {
             self.frames[frame] = pose;
@@ -153,7 +149,7 @@ impl Problem {
     }
 
     /// Its observations with what was found in a problem of the same unknowns.
-    pub(in crate::calibrate) fn at(&self, found: &Problem) -> Problem {
+    pub(crate) fn at(&self, found: &Problem) -> Problem {
         Problem { blocks: self.blocks.clone(), ..found.unknowns() }
     }
 

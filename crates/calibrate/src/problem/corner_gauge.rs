@@ -5,7 +5,7 @@ use nalgebra::{DMatrix, Matrix3};
 
 use super::bundle::Problem;
 use super::corner_map::{CornerMap, MappedCorner};
-use crate::calibrate::input::panel::PanelRef;
+use crate::input::panel::PanelRef;
 
 impl CornerMap {
     /// The covariances of the offsets less the share of the directions that poses and distances

@@ -11,9 +11,9 @@ use glam::DVec3;
 use nalgebra::Matrix3;
 
 use super::unknowns::Block;
-use crate::calibrate::input::observation::Observation;
-use crate::calibrate::input::panel::PanelRef;
-use crate::statistics::median;
+use crate::input::observation::Observation;
+use crate::input::panel::PanelRef;
+use deltille_core::statistics::median;
 
 /// First prior standard deviation, in edges: more than the error of any print.
 const FIRST_PRIOR: f64 = 0.01;
@@ -26,7 +26,7 @@ type Label = (usize, i32, i32);
 
 /// Offsets of corners on their panels.
 #[derive(Clone, Debug, PartialEq)]
-pub(in crate::calibrate) struct CornerMap {
+pub(crate) struct CornerMap {
     index: BTreeMap<Label, usize>,
     /// The corners, ordered by label.
     pub corners: Vec<MappedCorner>,
@@ -40,7 +40,7 @@ pub(in crate::calibrate) struct CornerMap {
 
 /// A corner whose place is unknown.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(in crate::calibrate) struct MappedCorner {
+pub(crate) struct MappedCorner {
     pub panel: PanelRef,
     pub row: i32,
     pub col: i32,

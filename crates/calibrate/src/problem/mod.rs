@@ -9,11 +9,11 @@
 //! 4. `whitening` weights residuals by covariances and one common deviation.
 //! 5. `corner_gauge` takes directions out of the offsets that poses absorb.
 
-pub(in crate::calibrate) mod bundle;
-pub(in crate::calibrate) mod corner_gauge;
-pub(in crate::calibrate) mod corner_map;
-pub(in crate::calibrate) mod panels;
-pub(in crate::calibrate) mod roughness;
-pub(in crate::calibrate) mod shape;
-pub(in crate::calibrate) mod unknowns;
-pub(in crate::calibrate) mod whitening;
+pub(crate) mod bundle;
+pub(crate) mod corner_gauge;
+pub(crate) mod corner_map;
+pub(crate) mod panels;
+pub(crate) mod roughness;
+pub(crate) mod shape;
+pub(crate) mod unknowns;
+pub(crate) mod whitening;

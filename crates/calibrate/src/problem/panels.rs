@@ -8,14 +8,11 @@ use std::collections::BTreeSet;
 
 use super::bundle::Problem;
 use super::unknowns::{Block, PanelUnknowns, Prior, TargetUnknowns};
-use crate::calibrate::input::calibration::Calibration;
-use crate::camera::Pose;
+use crate::input::calibration::Calibration;
+use deltille_core::camera::Pose;
 
 /// What is unknown of the panels.
-pub(in crate::calibrate) fn unknowns(
-    blocks: &[Block],
-    calibration: &Calibration,
-) -> Vec<PanelUnknowns> {
+pub(crate) fn unknowns(blocks: &[Block], calibration: &Calibration) -> Vec<PanelUnknowns> {
     let Calibration { panels, targets, refine_panels, .. } = calibration;
     let mut unknowns = Vec::with_capacity(panels.len());
     for (target, of_target) in targets.iter().enumerate() {
@@ -35,7 +32,7 @@ pub(in crate::calibrate) fn unknowns(
 }
 
 /// What is unknown of the targets, from where they are.
-pub(in crate::calibrate) fn targets_unknown(
+pub(crate) fn targets_unknown(
     blocks: &[Block],
     calibration: &Calibration,
     places: &[Pose],
@@ -53,11 +50,7 @@ pub(in crate::calibrate) fn targets_unknown(
 
 /// Holds a panel of those that take part, and a target. Where frames went, a panel may hang together with no
 /// other, or another be held.
-pub(in crate::calibrate) fn hold(
-    problem: &mut Problem,
-    left_out: &[bool],
-    calibration: &Calibration,
-) {
+pub(crate) fn hold(problem: &mut Problem, left_out: &[bool], calibration: &Calibration) {
     let of_blocks = problem.blocks.iter().zip(left_out);
     let taking_part = of_blocks.filter(|(_, out)| !**out).map(|(block, _)| block.clone());
     let taking_part: Vec<Block> = taking_part.collect();

@@ -21,7 +21,7 @@
 use glam::DVec2;
 use nalgebra::{DMatrix, DVector};
 
-use crate::camera::{Camera, Lens, PROJECTION_PARAMETERS, Spline, SplineGrid};
+use deltille_core::camera::{Camera, Lens, PROJECTION_PARAMETERS, Spline, SplineGrid};
 
 /// First standard deviation of a second difference, in distances of knots: a tenth is more than any
 /// lens differs from its parametric model, so that the corners decide.
@@ -41,7 +41,7 @@ const ITS_OWN: f64 = 1e-6;
 
 /// The smoothness prior of the knots of one spline.
 #[derive(Clone, Debug, PartialEq)]
-pub(in crate::calibrate) struct Roughness {
+pub(crate) struct Roughness {
     grid: SplineGrid,
     /// The expected knots, row by row.
     expected: Vec<DVec2>,
@@ -226,7 +226,7 @@ fn curved(grid: &SplineGrid, knots: &[f64]) -> Vec<f64> {
 }
 
 /// All second differences of a grid of knots.
-pub(in crate::calibrate) fn differences(grid: &SplineGrid) -> impl Iterator<Item = Difference> {
+pub(crate) fn differences(grid: &SplineGrid) -> impl Iterator<Item = Difference> {
     let (columns, rows) = (grid.columns, grid.rows);
     let at = move |row: usize, column: usize| row * columns + column;
     let all = (0..rows).flat_map(move |row| (0..columns).map(move |column| (row, column)));

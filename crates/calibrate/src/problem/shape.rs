@@ -2,13 +2,13 @@
 
 use glam::DVec3;
 
-use crate::calibrate::input::observation::Sighting;
+use crate::input::observation::Sighting;
 
 /// Coefficients of a shape.
 pub const COUNT: usize = 9;
 
 /// Index of the coefficient a₁.
-pub(in crate::calibrate) const STRETCH: usize = 7;
+pub(crate) const STRETCH: usize = 7;
 
 /// How a board's sheet differs from its plan: bent, stretched and sheared.
 ///
@@ -61,7 +61,7 @@ impl BoardShape {
 
 impl Shape {
     /// The shape of a sheet as planned, with these corners.
-    pub(in crate::calibrate) fn flat(corners: impl Iterator<Item = DVec3> + Clone) -> Self {
+    pub(crate) fn flat(corners: impl Iterator<Item = DVec3> + Clone) -> Self {
         let count = corners.clone().count().max(1) as f64;
         let middle_mm = corners.clone().sum::<DVec3>() / count;
         let reach_mm = corners.map(|p| p.distance(middle_mm)).fold(0.0, f64::max);
@@ -69,7 +69,7 @@ impl Shape {
     }
 
     /// What each coefficient moves a point of the plan by, in its own units.
-    pub(in crate::calibrate) fn directions(&self, at: DVec3) -> [DVec3; COUNT] {
+    pub(crate) fn directions(&self, at: DVec3) -> [DVec3; COUNT] {
         let DVec3 { x: u, y: v, .. } = (at - self.middle_mm) / self.reach_mm;
         let up = |z: f64| DVec3::new(0.0, 0.0, z);
         [
@@ -86,7 +86,7 @@ impl Shape {
     }
 
     /// How far a point of the plan is moved.
-    pub(in crate::calibrate) fn offset(&self, at: DVec3) -> DVec3 {
+    pub(crate) fn offset(&self, at: DVec3) -> DVec3 {
         let moved = self.directions(at).into_iter().zip(self.coefficients_mm);
         moved.map(|(direction, mm)| direction * mm).sum()
     }

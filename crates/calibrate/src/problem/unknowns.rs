@@ -3,14 +3,14 @@
 use nalgebra::{Matrix6, Vector6};
 
 use super::roughness::Roughness;
-use crate::calibrate::input::observation::Observation;
-use crate::calibrate::input::panel::PanelRef;
-use crate::calibrate::model::without_gauge;
-use crate::camera::{Camera, Pose};
+use crate::input::observation::Observation;
+use crate::input::panel::PanelRef;
+use crate::model::without_gauge;
+use deltille_core::camera::{Camera, Pose};
 
 /// A camera and what of it is unknown.
 #[derive(Clone, Debug, PartialEq)]
-pub(in crate::calibrate) struct CameraUnknowns {
+pub(crate) struct CameraUnknowns {
     /// The camera.
     pub camera: Camera,
     /// Which of its parameters are unknown, in the order of [`Camera::parameter_names`].
@@ -25,7 +25,7 @@ pub(in crate::calibrate) struct CameraUnknowns {
 
 /// A target, whose panels move together.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(in crate::calibrate) struct TargetUnknowns {
+pub(crate) struct TargetUnknowns {
     /// Where it is in the scene.
     pub scene_from_target: Pose,
     /// Whether that is unknown; one target must stay where it is.
@@ -34,7 +34,7 @@ pub(in crate::calibrate) struct TargetUnknowns {
 
 /// A panel of a target.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(in crate::calibrate) struct PanelUnknowns {
+pub(crate) struct PanelUnknowns {
     /// Index of its target.
     pub target: usize,
     /// Where it is on the target.
@@ -47,7 +47,7 @@ pub(in crate::calibrate) struct PanelUnknowns {
 
 /// A pose that was measured before.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(in crate::calibrate) struct Prior {
+pub(crate) struct Prior {
     pose: Pose,
     /// Inverse of the covariance of (ω, τ).
     information: Matrix6<f64>,
@@ -66,7 +66,7 @@ impl Prior {
     }
 
     /// How far a pose is from the measured one, as (ω, τ), and the inverse covariance of that.
-    pub(in crate::calibrate) fn off(&self, pose: &Pose) -> (Vector6<f64>, Matrix6<f64>) {
+    pub(crate) fn off(&self, pose: &Pose) -> (Vector6<f64>, Matrix6<f64>) {
         let [turn, moved] = pose.off(&self.pose);
         let off = Vector6::new(turn.x, turn.y, turn.z, moved.x, moved.y, moved.z);
         (off, self.information)
@@ -75,7 +75,7 @@ impl Prior {
 
 /// What one camera saw of one panel in one frame.
 #[derive(Clone, Debug, PartialEq)]
-pub(in crate::calibrate) struct Block {
+pub(crate) struct Block {
     /// Index of the camera.
     pub camera: usize,
     /// Index of the frame.
@@ -95,7 +95,7 @@ impl CameraUnknowns {
     }
 
     /// Without what is expected of it.
-    pub(in crate::calibrate) fn forget_expected(&mut self) {
+    pub(crate) fn forget_expected(&mut self) {
         self.roughness = None;
     }
 }

@@ -4,11 +4,11 @@ use glam::DVec2;
 
 use super::bundle::Problem;
 use super::unknowns::Block;
-use crate::calibrate::input::weights::Weights;
-use crate::statistics::median;
+use crate::input::weights::Weights;
+use deltille_core::statistics::median;
 
 /// The median of a squared distance in the plane whose coordinates have variance 1: 2 ln 2.
-pub(in crate::calibrate) const MEDIAN_OF_CHI_SQUARED_2: f64 = 1.386_294_361_119_890_6;
+pub(crate) const MEDIAN_OF_CHI_SQUARED_2: f64 = 1.386_294_361_119_890_6;
 
 /// Halvings of the interval in which the common deviation is sought: to 1e-9 of its upper end.
 const HALVINGS: usize = 30;
@@ -19,11 +19,11 @@ const LEAST_SIGMA: f64 = 1e-6;
 
 /// A corner is an outlier beyond so many standard deviations: of a million corners with normal
 /// errors four are.
-pub(in crate::calibrate) const OUTLIER_SIGMA: f64 = 5.0;
+pub(crate) const OUTLIER_SIGMA: f64 = 5.0;
 
 /// For each corner the lower triangle a, b, c of W, with WᵀW = Σ⁻¹.
 #[derive(Clone, Debug)]
-pub(in crate::calibrate) struct Whitening {
+pub(crate) struct Whitening {
     pub blocks: Vec<Vec<[f64; 3]>>,
     /// The common deviation beside the covariances, px; `None` where corners count alike.
     pub common_px: Option<f64>,
@@ -33,18 +33,18 @@ pub(in crate::calibrate) struct Whitening {
 
 impl Whitening {
     /// W r.
-    pub(in crate::calibrate) fn apply([a, b, c]: [f64; 3], DVec2 { x, y }: DVec2) -> DVec2 {
+    pub(crate) fn apply([a, b, c]: [f64; 3], DVec2 { x, y }: DVec2) -> DVec2 {
         DVec2::new(a * x, b * x + c * y)
     }
 
     /// Whether a corner is farther off than corners are by chance.
-    pub(in crate::calibrate) fn is_outlier(&self, weight: [f64; 3], residual: DVec2) -> bool {
+    pub(crate) fn is_outlier(&self, weight: [f64; 3], residual: DVec2) -> bool {
         let off = Self::apply(weight, residual);
         off.x.hypot(off.y) > self.outlier_limit()
     }
 
     /// The whitened distance beyond which a corner is an outlier.
-    pub(in crate::calibrate) fn outlier_limit(&self) -> f64 {
+    pub(crate) fn outlier_limit(&self) -> f64 {
         OUTLIER_SIGMA * self.sigma
     }
 
@@ -56,11 +56,7 @@ impl Whitening {
     }
 
     /// Weights that fit the residuals at hand.
-    pub(in crate::calibrate) fn fit(
-        problem: &Problem,
-        weights: Weights,
-        residuals: &[Vec<DVec2>],
-    ) -> Self {
+    pub(crate) fn fit(problem: &Problem, weights: Weights, residuals: &[Vec<DVec2>]) -> Self {
         let covariances = match weights {
             Weights::Equal => None,
             Weights::Covariance => covariances(problem),
@@ -86,7 +82,7 @@ impl Whitening {
     }
 
     /// The same weights for other corners.
-    pub(in crate::calibrate) fn of(&self, problem: &Problem) -> Self {
+    pub(crate) fn of(&self, problem: &Problem) -> Self {
         let covariances = self.common_px.and_then(|common| Some((common, covariances(problem)?)));
         let blocks = match covariances {
             Some((common, covariances)) => triangles(&covariances, common),
@@ -146,17 +142,17 @@ fn triangle([xx, xy, yy]: [f64; 3], common: f64) -> [f64; 3] {
 
 /// Residuals (observed minus predicted positions), px, for each block; empty for a block with a
 /// corner that its camera cannot image, which problems with valid initial values do not have.
-pub(in crate::calibrate) fn residuals(problem: &Problem) -> Vec<Vec<DVec2>> {
+pub(crate) fn residuals(problem: &Problem) -> Vec<Vec<DVec2>> {
     problem.blocks.iter().map(|block| problem.residuals(block).unwrap_or_default()).collect()
 }
 
 /// Whitening with equal weights for all corners, and the standard deviation of their coordinates.
-pub(in crate::calibrate) fn scale(problem: &Problem) -> Whitening {
+pub(crate) fn scale(problem: &Problem) -> Whitening {
     Whitening::fit(problem, Weights::Equal, &residuals(problem))
 }
 
 /// Length of the whitened residual of each corner; infinite where its camera cannot image it.
-pub(in crate::calibrate) fn deviations(problem: &Problem, whitening: &Whitening) -> Vec<Vec<f64>> {
+pub(crate) fn deviations(problem: &Problem, whitening: &Whitening) -> Vec<Vec<f64>> {
     let weights = whitening.of(problem).blocks;
     let of_block = |(block, weights): (&Block, &Vec<[f64; 3]>)| {
         let off = block.observations.iter().zip(weights).map(|(seen, &w)| {

@@ -7,19 +7,19 @@ use super::first_camera::first_camera;
 use super::frames::{Frame, Start};
 use super::pose::{blocks, estimate_pose, fixed, median_off_px};
 use super::splined::splined;
-use crate::calibrate::equations::minimise::{Until, minimise};
-use crate::calibrate::error::CalibrationError;
-use crate::calibrate::excluded::Reason;
-use crate::calibrate::input::calibration::{Calibration, CameraViews, Intrinsics};
-use crate::calibrate::input::loss::Loss;
-use crate::calibrate::input::observation::View;
-use crate::calibrate::model::Model;
-use crate::calibrate::problem::bundle::Problem;
-use crate::calibrate::problem::roughness::Roughness;
-use crate::calibrate::problem::unknowns::{CameraUnknowns, TargetUnknowns};
-use crate::calibrate::problem::whitening::scale;
-use crate::camera::{Camera, Lens, Pose};
-use crate::statistics::median;
+use crate::equations::minimise::{Until, minimise};
+use crate::error::CalibrationError;
+use crate::excluded::Reason;
+use crate::input::calibration::{Calibration, CameraViews, Intrinsics};
+use crate::input::loss::Loss;
+use crate::input::observation::View;
+use crate::model::Model;
+use crate::problem::bundle::Problem;
+use crate::problem::roughness::Roughness;
+use crate::problem::unknowns::{CameraUnknowns, TargetUnknowns};
+use crate::problem::whitening::scale;
+use deltille_core::camera::{Camera, Lens, Pose};
+use deltille_core::statistics::median;
 
 /// Two views of a plane determine focal lengths and principal point if nothing is off; a third
 /// shows whether something is.
@@ -32,7 +32,7 @@ const FORERUNNERS: [Model; 2] = [Model::KannalaBrandt(4), Model::Radtan5];
 /// pixel on a board of 500 px already looks like a tilt of one degree.
 const PARALLEL_RAD: f64 = 0.05;
 
-pub(in crate::calibrate) fn start(calibration: &Calibration) -> Result<Start, CalibrationError> {
+pub(crate) fn start(calibration: &Calibration) -> Result<Start, CalibrationError> {
     let CameraViews { views, intrinsics, .. } = &calibration.cameras[0];
     let panels = calibration.panel_poses();
     let search = match intrinsics {
@@ -53,7 +53,7 @@ pub(in crate::calibrate) fn start(calibration: &Calibration) -> Result<Start, Ca
 }
 
 /// Refuses too few views to find a camera from.
-pub(in crate::calibrate) fn enough(found: usize, all: usize) -> Result<(), CalibrationError> {
+pub(crate) fn enough(found: usize, all: usize) -> Result<(), CalibrationError> {
     match found < LEAST_VIEWS {
         true => Err(CalibrationError::TooFewViews { found, all, needed: LEAST_VIEWS }),
         false => Ok(()),

@@ -14,8 +14,8 @@
 
 use std::collections::BTreeMap;
 
-use crate::calibrate::input::observation::{LEAST_CORNERS, Observation, Sighting, View};
-use crate::statistics::median;
+use crate::input::observation::{LEAST_CORNERS, Observation, Sighting, View};
+use deltille_core::statistics::median;
 
 /// Greatest deviation of the middle corner from the mean of its neighbours, as a fraction of their
 /// distance: the two distances are then as 5 to 3 at most, which a board shows only where it nearly

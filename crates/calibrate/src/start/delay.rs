@@ -8,9 +8,9 @@ use std::collections::BTreeMap;
 
 use super::linked::{ByFrame, Seen};
 use super::symmetry::{Symmetries, agreed};
-use crate::calibrate::input::calibration::Calibration;
-use crate::calibrate::input::sample::evenly;
-use crate::statistics::median;
+use crate::input::calibration::Calibration;
+use crate::input::sample::evenly;
+use deltille_core::statistics::median;
 
 /// Delays that are looked for, frames.
 const MOST_DELAY: i32 = 10;

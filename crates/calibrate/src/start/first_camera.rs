@@ -5,11 +5,11 @@
 //! views may be wrong.
 
 use super::pose::planar_pose;
-use crate::calibrate::input::observation::{Observation, View};
-use crate::calibrate::input::sample::evenly;
-use crate::calibrate::model::Model;
-use crate::camera::{BrownConrady, Camera, KannalaBrandt, Lens, Pose};
-use crate::statistics::median;
+use crate::input::observation::{Observation, View};
+use crate::input::sample::evenly;
+use crate::model::Model;
+use deltille_core::camera::{BrownConrady, Camera, KannalaBrandt, Lens, Pose};
+use deltille_core::statistics::median;
 
 /// Focal lengths that are tried, in image widths: from lenses that show all around to those that
 /// show a degree.

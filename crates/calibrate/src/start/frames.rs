@@ -1,11 +1,11 @@
 //! The start of a bundle adjustment: values near those that are sought, by frame.
 
 use super::symmetry::LabelRotation;
-use crate::calibrate::excluded::Excluded;
-use crate::calibrate::problem::bundle::Problem;
+use crate::excluded::Excluded;
+use crate::problem::bundle::Problem;
 
 /// A problem whose values are near those that are sought.
-pub(in crate::calibrate) struct Start {
+pub(crate) struct Start {
     pub problem: Problem,
     /// Its frames.
     pub frames: Vec<Frame>,
@@ -18,7 +18,7 @@ pub(in crate::calibrate) struct Start {
 }
 
 /// A moment at which pictures were taken.
-pub(in crate::calibrate) struct Frame {
+pub(crate) struct Frame {
     pub name: String,
     /// Its place among the frames as they were given.
     pub place: usize,

@@ -10,9 +10,9 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use super::motion::{Moment, placed_by_motion};
 use super::pose::middle;
-use crate::calibrate::error::{CalibrationError, TooPlain};
-use crate::calibrate::input::calibration::Calibration;
-use crate::camera::Pose;
+use crate::error::{CalibrationError, TooPlain};
+use crate::input::calibration::Calibration;
+use deltille_core::camera::Pose;
 
 /// Frames that two cameras must share: one may be wrong, of three the middle one is not.
 pub(super) const LEAST_SHARED: usize = 3;
@@ -43,10 +43,9 @@ impl Places {
     /// # Errors
     /// Where something hangs together with nothing else.
     pub(super) fn of(calibration: &Calibration, seen: &ByFrame) -> Result<Self, CalibrationError> {
-        let known =
-            |(index, camera): (usize, &crate::calibrate::input::calibration::CameraViews)| {
-                camera.camera_from_rig.or((index == 0).then_some(Pose::IDENTITY))
-            };
+        let known = |(index, camera): (usize, &crate::input::calibration::CameraViews)| {
+            camera.camera_from_rig.or((index == 0).then_some(Pose::IDENTITY))
+        };
         let cameras = calibration.cameras.iter().enumerate().map(known).collect();
         let targets = calibration.targets.iter().map(|target| target.scene_from_target).collect();
         let mut linking = Linking { calibration, seen, cameras, targets, plain: None };

@@ -9,14 +9,14 @@
 //!    that looks the same after a rotation), `linked` (poses between cameras and targets that share frames), and `motion`
 //!    (those that share none, from how the rig moves).
 
-pub(in crate::calibrate) mod alone;
-pub(in crate::calibrate) mod consensus;
-pub(in crate::calibrate) mod delay;
-pub(in crate::calibrate) mod first_camera;
-pub(in crate::calibrate) mod frames;
-pub(in crate::calibrate) mod linked;
-pub(in crate::calibrate) mod motion;
-pub(in crate::calibrate) mod pose;
-pub(in crate::calibrate) mod splined;
-pub(in crate::calibrate) mod symmetry;
-pub(in crate::calibrate) mod together;
+pub(crate) mod alone;
+pub(crate) mod consensus;
+pub(crate) mod delay;
+pub(crate) mod first_camera;
+pub(crate) mod frames;
+pub(crate) mod linked;
+pub(crate) mod motion;
+pub(crate) mod pose;
+pub(crate) mod splined;
+pub(crate) mod symmetry;
+pub(crate) mod together;

@@ -12,9 +12,9 @@
 use glam::{DMat3, DQuat, DVec3};
 use nalgebra::{Matrix3, Matrix6, SMatrix, Vector6};
 
-use crate::calibrate::error::TooPlain;
-use crate::camera::Pose;
-use crate::statistics::median;
+use crate::error::TooPlain;
+use deltille_core::camera::Pose;
+use deltille_core::statistics::median;
 
 /// Turns about a second axis that tell more than the noise of poses does, rad (1°).
 const LEAST_TURN_RAD: f64 = 0.017;

@@ -3,15 +3,15 @@
 use glam::{DMat3, DQuat, DVec3};
 use nalgebra::{Matrix3, SMatrix};
 
-use crate::calibrate::equations::minimise::{Until, minimise};
-use crate::calibrate::input::loss::Loss;
-use crate::calibrate::input::observation::{Observation, Sighting};
-use crate::calibrate::input::weights::Weights;
-use crate::calibrate::problem::bundle::Problem;
-use crate::calibrate::problem::unknowns::{Block, CameraUnknowns, PanelUnknowns, TargetUnknowns};
-use crate::calibrate::problem::whitening::{Whitening, scale};
-use crate::camera::{Camera, Pose};
-use crate::statistics::median;
+use crate::equations::minimise::{Until, minimise};
+use crate::input::loss::Loss;
+use crate::input::observation::{Observation, Sighting};
+use crate::input::weights::Weights;
+use crate::problem::bundle::Problem;
+use crate::problem::unknowns::{Block, CameraUnknowns, PanelUnknowns, TargetUnknowns};
+use crate::problem::whitening::{Whitening, scale};
+use deltille_core::camera::{Camera, Pose};
+use deltille_core::statistics::median;
 
 /// Corners that determine a homography.
 const LEAST_RAYS: usize = 4;
@@ -25,7 +25,7 @@ const DISAGREE: f64 = 5.0;
 /// camera_from_target; `panels` are the poses of the target's panels on it. Of one panel it has the least
 /// squared error of all corners; of several it is the one on which most corners agree. `None` where the
 /// corners lie on a line or out of the camera's reach.
-pub(in crate::calibrate) fn estimate_pose(
+pub(crate) fn estimate_pose(
     camera: &Camera,
     panels: &[Pose],
     sightings: &[Sighting],
@@ -92,10 +92,7 @@ fn pose_from(
 /// The pose of a plane from the rays to its points. With a homography H from the plane to the rays
 /// b ∼ H (x, y, 1), each point gives b × H (x, y, 1) = 0; H = (r1, r2, t) up to scale. Rays may point
 /// backwards too: the sign is that for which H (x, y, 1) lies along b.
-pub(in crate::calibrate) fn planar_pose(
-    camera: &Camera,
-    observations: &[Observation],
-) -> Option<Pose> {
+pub(crate) fn planar_pose(camera: &Camera, observations: &[Observation]) -> Option<Pose> {
     let n = observations.len() as f64;
     let centre = observations.iter().map(|o| o.panel_mm).sum::<DVec3>() / n;
     let size = observations.iter().map(|o| (o.panel_mm - centre).length()).sum::<f64>() / n;
@@ -186,7 +183,7 @@ fn refine(
 }
 
 /// Panels of one target that stay where they are.
-pub(in crate::calibrate) fn fixed(panels: &[Pose]) -> Vec<PanelUnknowns> {
+pub(crate) fn fixed(panels: &[Pose]) -> Vec<PanelUnknowns> {
     let fixed = |&target_from_panel| PanelUnknowns {
         target: 0,
         target_from_panel,
@@ -197,10 +194,7 @@ pub(in crate::calibrate) fn fixed(panels: &[Pose]) -> Vec<PanelUnknowns> {
 }
 
 /// The blocks of a view of a single camera.
-pub(in crate::calibrate) fn blocks(
-    sightings: &[Sighting],
-    frame: usize,
-) -> impl Iterator<Item = Block> + '_ {
+pub(crate) fn blocks(sightings: &[Sighting], frame: usize) -> impl Iterator<Item = Block> + '_ {
     sightings.iter().map(move |sighting| Block {
         camera: 0,
         frame,
@@ -211,7 +205,7 @@ pub(in crate::calibrate) fn blocks(
 
 /// The pose that lies in the middle of others: its median distance from them is the least. A turn
 /// counts by how far it moves a point as far away as the translations reach.
-pub(in crate::calibrate) fn middle(poses: &[Pose]) -> Pose {
+pub(crate) fn middle(poses: &[Pose]) -> Pose {
     let arm = median(poses.iter().map(|pose| pose.translation.length()).collect())
         .unwrap_or(0.0)
         .max(1.0);

@@ -3,8 +3,8 @@
 use glam::DVec2;
 use nalgebra::{DMatrix, DVector};
 
-use crate::calibrate::problem::roughness::{Roughness, differences};
-use crate::camera::{
+use crate::problem::roughness::{Roughness, differences};
+use deltille_core::camera::{
     Camera, Lens, PROJECTION_PARAMETERS, Spline, SplineGrid, stereographic_direction,
 };
 
@@ -108,7 +108,7 @@ fn reach(camera: &Camera, seen: impl Iterator<Item = DVec2>) -> Option<DVec2> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::camera::{BrownConrady, KannalaBrandt};
+    use deltille_core::camera::{BrownConrady, KannalaBrandt};
 
     #[test]
     fn a_spline_images_as_the_lens_that_it_starts_from() {

@@ -20,12 +20,12 @@ use std::f64::consts::FRAC_PI_4;
 use glam::{DQuat, DVec3};
 
 use super::linked::{ByFrame, LEAST_SHARED, Seen};
-use crate::calibrate::input::calibration::Calibration;
-use crate::calibrate::input::observation::Observation;
-use crate::calibrate::input::sample::evenly;
-use crate::camera::Pose;
-use crate::lattice::{LatticeMap, Vertex};
-use crate::statistics::median;
+use crate::input::calibration::Calibration;
+use crate::input::observation::Observation;
+use crate::input::sample::evenly;
+use deltille_core::camera::Pose;
+use deltille_core::lattice::{LatticeMap, Vertex};
+use deltille_core::statistics::median;
 
 /// Poses of most frames that are compared: more decide no better.
 const MOST_FRAMES: usize = 60;

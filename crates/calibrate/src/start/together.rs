@@ -15,21 +15,21 @@ use super::delay::{delays, in_time};
 use super::frames::{Frame, Start};
 use super::linked::{ByFrame, Places, Seen};
 use super::symmetry::Symmetries;
-use crate::calibrate::equations::minimise::{Until, minimise};
-use crate::calibrate::error::CalibrationError;
-use crate::calibrate::excluded::Excluded;
-use crate::calibrate::input::calibration::{Calibration, CameraViews, Intrinsics};
-use crate::calibrate::input::loss::Loss;
-use crate::calibrate::input::panel::PanelRef;
-use crate::calibrate::problem::bundle::Problem;
-use crate::calibrate::problem::panels::{targets_unknown, unknowns};
-use crate::calibrate::problem::roughness::Roughness;
-use crate::calibrate::problem::unknowns::{Block, CameraUnknowns};
-use crate::calibrate::problem::whitening::scale;
-use crate::camera::{Camera, Pose};
+use crate::equations::minimise::{Until, minimise};
+use crate::error::CalibrationError;
+use crate::excluded::Excluded;
+use crate::input::calibration::{Calibration, CameraViews, Intrinsics};
+use crate::input::loss::Loss;
+use crate::input::panel::PanelRef;
+use crate::problem::bundle::Problem;
+use crate::problem::panels::{targets_unknown, unknowns};
+use crate::problem::roughness::Roughness;
+use crate::problem::unknowns::{Block, CameraUnknowns};
+use crate::problem::whitening::scale;
+use deltille_core::camera::{Camera, Pose};
 
 /// A camera by itself.
-pub(in crate::calibrate) struct Alone {
+pub(crate) struct Alone {
     pub camera: Camera,
     /// What is expected of the knots of a spline.
     pub roughness: Option<Roughness>,
@@ -40,7 +40,7 @@ pub(in crate::calibrate) struct Alone {
 }
 
 /// `by_itself` solves a calibration of one camera.
-pub(in crate::calibrate) fn start(
+pub(crate) fn start(
     calibration: &Calibration,
     by_itself: impl Fn(&Calibration) -> Result<Alone, CalibrationError>,
 ) -> Result<Start, CalibrationError> {

@@ -24,14 +24,14 @@
 use nalgebra::{DMatrix, DVector, Matrix6};
 use rayon::prelude::*;
 
-use crate::calibrate::equations::block::Local;
-use crate::calibrate::equations::covariances::Covariances;
-use crate::calibrate::equations::frame::OfFrame;
-use crate::calibrate::equations::local_share::LocalShare;
-use crate::calibrate::equations::minimise::Minimum;
-use crate::calibrate::input::loss::Loss;
-use crate::calibrate::problem::corner_map::CornerMap;
-use crate::calibrate::problem::whitening::Whitening;
+use crate::equations::block::Local;
+use crate::equations::covariances::Covariances;
+use crate::equations::frame::OfFrame;
+use crate::equations::local_share::LocalShare;
+use crate::equations::minimise::Minimum;
+use crate::input::loss::Loss;
+use crate::problem::corner_map::CornerMap;
+use crate::problem::whitening::Whitening;
 
 /// Least number of frames for an empirical covariance: without one of them a calibration is left.
 const LEAST_FRAMES: usize = 4;
@@ -41,7 +41,7 @@ const LEAST_FRAMES: usize = 4;
 const MOST_OF_ONE: f64 = 0.9;
 
 /// An empirical covariance.
-pub(in crate::calibrate) struct Observed {
+pub(crate) struct Observed {
     pub covariance: DMatrix<f64>,
     /// The part of it that comes from errors of the board.
     pub of_board: Option<DMatrix<f64>>,
@@ -64,7 +64,7 @@ impl Observed {
 
 /// The empirical covariance of the unknowns that all frames share (n × n, in the order of the
 /// layout); `None` with too few frames, or where nothing is shared.
-pub(in crate::calibrate) fn observed(
+pub(crate) fn observed(
     minimum: &Minimum,
     whitening: &Whitening,
     loss: Loss,

@@ -15,13 +15,13 @@ use glam::DVec3;
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
-use crate::calibrate::equations::block::Local;
-use crate::calibrate::equations::covariances::Covariances;
-use crate::calibrate::equations::frame::OfFrame;
-use crate::calibrate::equations::minimise::Minimum;
-use crate::calibrate::input::loss::Loss;
-use crate::calibrate::problem::corner_map::CornerMap;
-use crate::calibrate::problem::whitening::Whitening;
+use crate::equations::block::Local;
+use crate::equations::covariances::Covariances;
+use crate::equations::frame::OfFrame;
+use crate::equations::minimise::Minimum;
+use crate::input::loss::Loss;
+use crate::problem::corner_map::CornerMap;
+use crate::problem::whitening::Whitening;
 
 /// Standard deviation of a corner of a printed board, mm. Office printers stretch a sheet by 0.05 to 0.2 %, by a
 /// different amount across and along the feed: 0.05 to 0.2 mm at 100 mm from the middle. The sheet of the
@@ -37,7 +37,7 @@ const FRAMES_AT_A_TIME: usize = 64;
 /// The covariance of the shared unknowns from errors of the board; `accuracy_mm` is the standard deviation of a
 /// corner's coordinate, that of a printed board where it is not known. `None` where the corners are unknowns
 /// themselves, or exact.
-pub(in crate::calibrate) fn board_errors(
+pub(crate) fn board_errors(
     minimum: &Minimum,
     whitening: &Whitening,
     loss: Loss,
@@ -95,7 +95,7 @@ fn accuracy(map: &CornerMap, given_mm: Option<f64>) -> Option<f64> {
 /// ```
 ///
 /// so that a board that is found to be exact is not taken for a printed sheet.
-pub(in crate::calibrate) fn drawn_to_plan(
+pub(crate) fn drawn_to_plan(
     minimum: &Minimum,
     whitening: &Whitening,
     found: &Covariances,

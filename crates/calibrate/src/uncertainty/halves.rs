@@ -8,8 +8,8 @@
 use nalgebra::{DMatrix, DVector};
 
 use super::state_equations::{Candidate, StateEquations, significance};
-use crate::camera::Camera;
-use crate::statistics::f_chance;
+use deltille_core::camera::Camera;
+use deltille_core::statistics::f_chance;
 
 /// Probability that a covariance that is right is raised, for all parameters and both ways to split.
 const SIGNIFICANT: f64 = 0.01;
@@ -22,7 +22,7 @@ const LEAST_VIEWS: usize = 5;
 
 /// The covariance of a camera's parameters, raised where the halves call for it. `noise` is the one that follows
 /// from noise.
-pub(in crate::calibrate) fn raised(
+pub(crate) fn raised(
     equations: &StateEquations,
     camera: &Camera,
     observed: DMatrix<f64>,

@@ -2,14 +2,14 @@
 
 use nalgebra::DMatrix;
 
-use crate::calibrate::adjust::reweighting::Settled;
-use crate::calibrate::equations::covariances::Covariances;
-use crate::calibrate::problem::shape::COUNT as SHAPE_COEFFICIENTS;
-use crate::statistics::median;
+use crate::adjust::reweighting::Settled;
+use crate::equations::covariances::Covariances;
+use crate::problem::shape::COUNT as SHAPE_COEFFICIENTS;
+use deltille_core::statistics::median;
 
 /// What corners say of the unknowns of one camera, and of the shape of the board.
 #[derive(Clone, Debug, PartialEq)]
-pub(in crate::calibrate) struct KnownSoFar {
+pub(crate) struct KnownSoFar {
     /// Inverse covariance of the parameters that were found, then of the shape.
     pub information: DMatrix<f64>,
     /// Variance of a coordinate of a corner, px², the median.
@@ -17,7 +17,7 @@ pub(in crate::calibrate) struct KnownSoFar {
 }
 
 /// What corners say of the first camera and of the board's shape, all else that is shared taken out.
-pub(in crate::calibrate) fn known_so_far(
+pub(crate) fn known_so_far(
     settled: &Settled,
     found: &Covariances,
     variance: f64,

@@ -7,9 +7,9 @@
 //! 3. `halves` raises the covariance where halves of the views differ by more.
 //! 4. `projection` is how sure a camera is of where it projects a point; `known_so_far` what proposals of views start from.
 
-pub(in crate::calibrate) mod agreement;
-pub(in crate::calibrate) mod board_errors;
-pub(in crate::calibrate) mod halves;
-pub(in crate::calibrate) mod known_so_far;
-pub(in crate::calibrate) mod projection;
-pub(in crate::calibrate) mod state_equations;
+pub(crate) mod agreement;
+pub(crate) mod board_errors;
+pub(crate) mod halves;
+pub(crate) mod known_so_far;
+pub(crate) mod projection;
+pub(crate) mod state_equations;

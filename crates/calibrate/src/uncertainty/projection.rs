@@ -15,10 +15,10 @@
 use glam::{DVec2, DVec3};
 use nalgebra::{DMatrix, Dyn, Matrix2, Matrix6, OMatrix, SMatrix, U2};
 
-use crate::calibrate::problem::bundle::Problem;
-use crate::calibrate::problem::whitening::Whitening;
-use crate::camera::{Camera, Projection};
-use crate::statistics::median;
+use crate::problem::bundle::Problem;
+use crate::problem::whitening::Whitening;
+use deltille_core::camera::{Camera, Projection};
+use deltille_core::statistics::median;
 
 /// How the projections of a camera are known.
 #[derive(Clone, Debug, PartialEq)]
@@ -77,7 +77,7 @@ impl ProjectionUncertainty {
     }
 
     /// Of a camera as its blocks show it; `free` are the parameters that were found. `None` where its motion is open.
-    pub(in crate::calibrate) fn of(
+    pub(crate) fn of(
         problem: &Problem,
         whitening: &Whitening,
         camera: usize,
@@ -118,17 +118,14 @@ fn solved(a: Matrix6<f64>, b: &DMatrix<f64>) -> Option<DMatrix<f64>> {
 }
 
 /// Derivatives of a pixel by a turn and a move of the point.
-pub(in crate::calibrate) fn by_motion(at: &Projection, point: DVec3) -> SMatrix<f64, 2, 6> {
+pub(crate) fn by_motion(at: &Projection, point: DVec3) -> SMatrix<f64, 2, 6> {
     let rows = at.by_point.map(DVec3::from);
     let turns = rows.map(|row| point.cross(row));
     SMatrix::from_fn(|i, j| if j < 3 { turns[i][j] } else { rows[i][j - 3] })
 }
 
 /// Derivatives of a pixel by some parameters.
-pub(in crate::calibrate) fn by_parameters(
-    at: &Projection,
-    free: &[usize],
-) -> OMatrix<f64, U2, Dyn> {
+pub(crate) fn by_parameters(at: &Projection, free: &[usize]) -> OMatrix<f64, U2, Dyn> {
     OMatrix::<f64, U2, Dyn>::from_fn(free.len(), |i, j| at.by_parameter(free[j])[i])
 }
 
@@ -138,11 +135,7 @@ fn information([a, b, c]: [f64; 3]) -> Matrix2<f64> {
 }
 
 /// The point that a pixel shows so many mm away, or the direction to one at infinity.
-pub(in crate::calibrate) fn seen_at(
-    camera: &Camera,
-    pixel: DVec2,
-    distance_mm: Option<f64>,
-) -> Option<DVec3> {
+pub(crate) fn seen_at(camera: &Camera, pixel: DVec2, distance_mm: Option<f64>) -> Option<DVec3> {
     let ray = camera.unproject(pixel)?;
     // A pupil that moves does so by millimetres.
     Some(match distance_mm {
@@ -152,4 +145,4 @@ pub(in crate::calibrate) fn seen_at(
 }
 
 /// Far enough for an entrance pupil's place, a few millimetres, to be none of a pixel's millionths.
-pub(in crate::calibrate) const INFINITY_MM: f64 = 1e9;
+pub(crate) const INFINITY_MM: f64 = 1e9;

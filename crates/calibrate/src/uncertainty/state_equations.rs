@@ -15,16 +15,16 @@ use glam::{DMat3, DVec3};
 use nalgebra::{DMatrix, DVector};
 
 use super::projection::by_motion;
-use crate::calibrate::input::loss::Loss;
-use crate::calibrate::input::observation::LEAST_CORNERS;
-use crate::calibrate::problem::bundle::Problem;
-use crate::calibrate::problem::whitening::Whitening;
-use crate::camera::Lens;
-use crate::statistics::f_chance;
+use crate::input::loss::Loss;
+use crate::input::observation::LEAST_CORNERS;
+use crate::problem::bundle::Problem;
+use crate::problem::whitening::Whitening;
+use deltille_core::camera::Lens;
+use deltille_core::statistics::f_chance;
 
 /// Columns beside those of the camera.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(in crate::calibrate) enum Candidate {
+pub(crate) enum Candidate {
     /// Relative change of both focal lengths.
     Focal,
     /// Change of the principal point in x, px.
@@ -56,17 +56,16 @@ impl Candidate {
     const CAMERA: [Self; 3] = [Self::Focal, Self::CentreX, Self::CentreY];
 
     /// Displacements while the shutter passes the image.
-    pub(in crate::calibrate) const SHUTTER: [Self; 3] =
-        [Self::ShutterX, Self::ShutterY, Self::ShutterZ];
+    pub(crate) const SHUTTER: [Self; 3] = [Self::ShutterX, Self::ShutterY, Self::ShutterZ];
 
     /// How a board may differ from its description.
-    pub(in crate::calibrate) const SHEET: [Self; 5] =
+    pub(crate) const SHEET: [Self; 5] =
         [Self::Stretch, Self::Shear, Self::BendX, Self::Twist, Self::BendY];
 }
 
 /// What a view says.
 #[derive(Clone, Debug, PartialEq)]
-pub(in crate::calibrate) struct ViewEquations {
+pub(crate) struct ViewEquations {
     /// Index of its frame.
     pub frame: usize,
     /// Gram matrix of the camera's columns, the candidates and the residual.
@@ -85,7 +84,7 @@ pub(in crate::calibrate) struct ViewEquations {
 
 /// What the views of a camera say, in their order.
 #[derive(Clone, Debug, PartialEq)]
-pub(in crate::calibrate) struct StateEquations {
+pub(crate) struct StateEquations {
     pub views: Vec<ViewEquations>,
     /// The parameters of the camera that have columns, by index.
     free: Vec<usize>,
@@ -94,13 +93,13 @@ pub(in crate::calibrate) struct StateEquations {
 }
 
 /// A column with a weight for each view.
-pub(in crate::calibrate) struct Column {
+pub(crate) struct Column {
     index: usize,
     weights: Option<Vec<f64>>,
 }
 
 /// A least squares fit of some columns to all views.
-pub(in crate::calibrate) struct Fit {
+pub(crate) struct Fit {
     beta: DVector<f64>,
     inverse: DMatrix<f64>,
     parts: Vec<(DMatrix<f64>, DVector<f64>)>,
@@ -113,7 +112,7 @@ pub(in crate::calibrate) struct Fit {
 
 /// An unknown with its deviation, as the views agree with each other.
 #[derive(Clone, Copy, Debug)]
-pub(in crate::calibrate) struct Effect {
+pub(crate) struct Effect {
     pub value: f64,
     pub sd: f64,
     /// Degrees of freedom of the deviation.
@@ -121,7 +120,7 @@ pub(in crate::calibrate) struct Effect {
 }
 
 /// How often noise makes as much of an effect.
-pub(in crate::calibrate) fn significance(effect: Effect) -> f64 {
+pub(crate) fn significance(effect: Effect) -> f64 {
     match effect.freedom >= 1.0 {
         true => f_chance((effect.value / effect.sd).powi(2), 1.0, effect.freedom),
         false => 1.0,
@@ -130,7 +129,7 @@ pub(in crate::calibrate) fn significance(effect: Effect) -> f64 {
 
 impl StateEquations {
     /// What the views of a camera say at an estimate; `None` where nothing of it was found.
-    pub(in crate::calibrate) fn of(
+    pub(crate) fn of(
         problem: &Problem,
         whitening: &Whitening,
         loss: Loss,
@@ -157,14 +156,14 @@ impl StateEquations {
     }
 
     /// The same of some of the views only, by index.
-    pub(in crate::calibrate) fn some(&self, is_kept: impl Fn(usize) -> bool) -> Self {
+    pub(crate) fn some(&self, is_kept: impl Fn(usize) -> bool) -> Self {
         let views = self.views.iter().enumerate().filter(|&(index, _)| is_kept(index));
         let views = views.map(|(_, view)| view.clone()).collect();
         Self { views, free: self.free.clone(), ..*self }
     }
 
     /// How many views there are.
-    pub(in crate::calibrate) fn count(&self) -> usize {
+    pub(crate) fn count(&self) -> usize {
         self.views.len()
     }
 
@@ -180,7 +179,7 @@ impl StateEquations {
 
     /// By how much a parameter changes in a fit whose first columns are those of the camera, px; of a rigid camera the
     /// candidate in its place, whose unit is so many px.
-    pub(in crate::calibrate) fn change_px(
+    pub(crate) fn change_px(
         &self,
         fit: &Fit,
         parameter: usize,
@@ -195,7 +194,7 @@ impl StateEquations {
     }
 
     /// The columns of the camera.
-    pub(in crate::calibrate) fn camera(&self) -> Vec<Column> {
+    pub(crate) fn camera(&self) -> Vec<Column> {
         let own = 0..self.free.len();
         match self.free.len() {
             0 => Candidate::CAMERA.map(|candidate| self.column(candidate)).into(),
@@ -204,26 +203,22 @@ impl StateEquations {
     }
 
     /// A candidate, the same in all views.
-    pub(in crate::calibrate) fn column(&self, candidate: Candidate) -> Column {
+    pub(crate) fn column(&self, candidate: Candidate) -> Column {
         Column { index: self.free.len() + candidate as usize, weights: None }
     }
 
     /// A candidate times a weight for each view.
-    pub(in crate::calibrate) fn weighted(&self, candidate: Candidate, weights: Vec<f64>) -> Column {
+    pub(crate) fn weighted(&self, candidate: Candidate, weights: Vec<f64>) -> Column {
         Column { weights: Some(weights), ..self.column(candidate) }
     }
 
     /// The fit of some columns; `None` where they cannot be told apart.
-    pub(in crate::calibrate) fn fit(&self, columns: &[Column]) -> Option<Fit> {
+    pub(crate) fn fit(&self, columns: &[Column]) -> Option<Fit> {
         self.fit_with_each(columns, &[])
     }
 
     /// The same with candidates that have a value of their own in every view.
-    pub(in crate::calibrate) fn fit_with_each(
-        &self,
-        columns: &[Column],
-        each: &[Candidate],
-    ) -> Option<Fit> {
+    pub(crate) fn fit_with_each(&self, columns: &[Column], each: &[Candidate]) -> Option<Fit> {
         let m = columns.len();
         let mut parts = Vec::with_capacity(self.views.len());
         let (mut whole, mut right) = (DMatrix::zeros(m, m), DVector::zeros(m));
@@ -245,7 +240,7 @@ impl StateEquations {
     }
 
     /// The values of candidates in each view of such a fit, and by how much they lower its sum of squares.
-    pub(in crate::calibrate) fn each(
+    pub(crate) fn each(
         &self,
         columns: &[Column],
         fit: &Fit,
@@ -278,7 +273,7 @@ impl StateEquations {
     }
 
     /// How many px a whitened coordinate is worth.
-    pub(in crate::calibrate) fn px(&self) -> f64 {
+    pub(crate) fn px(&self) -> f64 {
         let squares: f64 = self.views.iter().map(|view| view.px * view.px).sum();
         (squares / self.views.len().max(1) as f64).sqrt()
     }
@@ -286,7 +281,7 @@ impl StateEquations {
 
 impl Fit {
     /// The unknowns.
-    pub(in crate::calibrate) fn values(&self) -> &DVector<f64> {
+    pub(crate) fn values(&self) -> &DVector<f64> {
         &self.beta
     }
 
@@ -296,7 +291,7 @@ impl Fit {
     }
 
     /// Variance of a whitened coordinate.
-    pub(in crate::calibrate) fn variance(&self) -> f64 {
+    pub(crate) fn variance(&self) -> f64 {
         self.left / self.freedom.max(1.0)
     }
 
@@ -305,7 +300,7 @@ impl Fit {
     ///
     /// The degrees of freedom of the jackknife are those of Satterthwaite's formula for what the views contribute,
     /// less `taken`; the mean has twice as many, as the other variance is known from all directions together.
-    pub(in crate::calibrate) fn effect(&self, index: usize, taken: f64) -> Option<Effect> {
+    pub(crate) fn effect(&self, index: usize, taken: f64) -> Option<Effect> {
         let count = self.parts.len() as f64;
         let (mut without, mut shares) = (Vec::with_capacity(self.parts.len()), Vec::new());
         let along = self.inverse.column(index).into_owned();

@@ -2,7 +2,7 @@
 
 use std::process::ExitCode;
 
-use deltille::cli::{deltag, run};
+use deltille_cli::{deltag, run};
 
 fn main() -> ExitCode {
     run::run(deltag::run)

@@ -2,7 +2,7 @@
 
 use std::process::ExitCode;
 
-use ::deltille::cli::{deltille, run};
+use deltille_cli::{deltille, run};
 
 fn main() -> ExitCode {
     run::run(deltille::run)

@@ -1,11 +1,11 @@
 use std::process::ExitCode;
 
 use super::parameters::Parameters;
-use crate::cli::output::{self, Telling, say};
-use crate::family::{
+use crate::output::{self, Telling, say};
+use deltille::family::{
     self, Construction, bounds::bounds, invariant_bound, published_bounds, shipped_names,
 };
-use crate::lattice::{GridKind, TagCells};
+use deltille::lattice::{GridKind, TagCells};
 
 #[derive(clap::Args)]
 pub(super) struct Args {

@@ -3,9 +3,9 @@ use std::process::ExitCode;
 
 use anyhow::Context;
 
-use crate::cli::output;
-use crate::cli::values::whole;
-use crate::family::{self, Construction, Screen, TagWords};
+use crate::output;
+use crate::values::whole;
+use deltille::family::{self, Construction, Screen, TagWords};
 
 #[derive(clap::Args)]
 pub(super) struct Args {

@@ -7,8 +7,8 @@ use anyhow::{Context, ensure};
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 
-use crate::cli::output::{self, Overwrite};
-use crate::limits;
+use crate::output::{self, Overwrite};
+use deltille::limits;
 
 /// The checkpoint file of one search, if it has one.
 pub(super) struct CheckpointFile<'a> {

@@ -3,8 +3,8 @@
 use anyhow::bail;
 use serde_json::json;
 
-use crate::cli::output::{self, Telling, say};
-use crate::family::{Confusion, Family, PAIRS_COUNTED};
+use crate::output::{self, Telling, say};
+use deltille::family::{Confusion, Family, PAIRS_COUNTED};
 
 /// Tells how far the tags of two families are from each other.
 pub(super) fn about(of: &Family, other: &Family, telling: Telling) -> anyhow::Result<()> {

@@ -4,9 +4,9 @@ use std::process::ExitCode;
 use anyhow::Context;
 use clap::ValueEnum;
 
-use crate::cli::output::{self, Overwrite, say};
-use crate::cli::values::name;
-use crate::family::{ExportFormat, export};
+use crate::output::{self, Overwrite, say};
+use crate::values::name;
+use deltille::family::{ExportFormat, export};
 
 #[derive(clap::Args)]
 pub(super) struct Args {

@@ -2,11 +2,11 @@
 
 use serde_json::{Value, json};
 
-use crate::cli::output::say;
-use crate::family::{
+use crate::output::say;
+use deltille::family::{
     ACCEPTED_FALSE_POSITIVES, Family, NATURAL_FACTOR, TRIANGLES_PER_MEGAPIXEL, corrected_within,
 };
-use crate::words::counted;
+use deltille::words::counted;
 
 /// Adds the fields of `--json` to what is told of a family.
 pub(super) fn add_to(told: &mut Value, family: &Family) {

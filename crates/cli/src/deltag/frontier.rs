@@ -6,10 +6,10 @@ use std::time::Duration;
 use anyhow::{Context, bail};
 
 use super::parameters::Parameters;
-use crate::cli::output::{self, Telling, say};
-use crate::clock;
-use crate::family::best::{Best, Budget};
-use crate::family::{RuleChoice, Rules, best_rule, rule_choices};
+use crate::output::{self, Telling, say};
+use deltille::clock;
+use deltille::family::search::best::{Best, Budget};
+use deltille::family::{RuleChoice, Rules, best_rule, rule_choices};
 
 /// Told at the end of `--help`.
 pub(super) const HELP: &str = "The construction is the best on record, that gen-family starts from. \
@@ -31,11 +31,11 @@ pub(super) struct ChoiceArgs {
     /// Choose the rule for complexity that leaves the most codes with so many natural false positives
     /// for each triangle with a border, such as 1e-4, where --corrects cells are corrected
     #[arg(long, value_name = "RATE", allow_negative_numbers = true,
-          value_parser = crate::cli::values::number(1e-15..=1.0))]
+          value_parser = crate::values::number(1e-15..=1.0))]
     pub(super) false_positives: Option<f64>,
     /// Cells that are corrected in a single tag [default: half of what the distance allows]
     #[arg(long, value_name = "CELLS", requires = "false_positives", allow_negative_numbers = true,
-          value_parser = crate::cli::values::whole(0..=31u32))]
+          value_parser = crate::values::whole(0..=31u32))]
     pub(super) corrects: Option<u32>,
 }
 

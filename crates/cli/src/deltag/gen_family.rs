@@ -13,22 +13,22 @@ use super::frontier::{self, ChoiceArgs};
 use super::parameters::Parameters;
 use super::rules::RuleArgs;
 use super::verify_family::proof_of;
-use crate::cli::interrupt;
-use crate::cli::output::{self, Overwrite, say, tell};
-use crate::cli::progress::SearchProgress;
-use crate::cli::run::FAILED;
-use crate::cli::values::{name, number, whole};
-use crate::clock;
-use crate::export::kind::Kind;
-use crate::family::best::{self, Best, Budget, Start};
-use crate::family::lexicode::{self, Lexicode};
-use crate::family::search::{self, Search};
-use crate::family::{
+use crate::interrupt;
+use crate::output::{self, Overwrite, say, tell};
+use crate::progress::SearchProgress;
+use crate::run::FAILED;
+use crate::values::{name, number, whole};
+use deltille::clock;
+use deltille::export::kind::Kind;
+use deltille::family::lexicode::{self, Lexicode};
+use deltille::family::search::best::{self, Best, Budget, Start};
+use deltille::family::search::{self, Search};
+use deltille::family::{
     self, Control, Family, FamilyError, PAIRS_COUNTED, Progress, Rules, Screen, TagWords,
     certify_codes, check_name,
 };
-use crate::lattice::Dimension;
-use crate::words::counted;
+use deltille::lattice::Dimension;
+use deltille::words::counted;
 
 /// Told at the end of `--help`.
 pub(super) const HELP: &str = "Ctrl-C ends a search early. The methods best and algebraic write \

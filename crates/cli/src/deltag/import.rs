@@ -4,12 +4,12 @@ use std::process::ExitCode;
 use anyhow::{Context, anyhow};
 use clap::ValueEnum;
 
-use crate::cli::output::{self, Overwrite, say};
-use crate::cli::values::{name, whole};
-use crate::family::{ImportSpec, import};
-use crate::lattice::GridKind;
-use crate::limits::{MAX_FAMILY_BYTES, read_short_text};
-use crate::words::counted;
+use crate::output::{self, Overwrite, say};
+use crate::values::{name, whole};
+use deltille::family::{ImportSpec, import};
+use deltille::lattice::GridKind;
+use deltille::limits::{MAX_FAMILY_BYTES, read_short_text};
+use deltille::words::counted;
 
 /// Told at the end of `--help`.
 pub(super) const HELP: &str = "Codes are the hexadecimal words of the table, in their order; in a text without any, the lines of \

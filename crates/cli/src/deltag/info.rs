@@ -3,11 +3,11 @@ use std::process::ExitCode;
 use serde_json::{Value, json};
 
 use super::{confusion, false_positives, place_codes};
-use crate::cli::output::{self, Telling, say};
-use crate::family::{self, Family, HiddenCells, PAIRS_COUNTED, TagWords};
-use crate::lattice::GridKind;
-use crate::targets::{BoardSpec, SolidShape, SolidSpec, TagSpec, Target, TargetSpec};
-use crate::words::counted;
+use crate::output::{self, Telling, say};
+use deltille::family::{self, Family, HiddenCells, PAIRS_COUNTED, TagWords};
+use deltille::lattice::GridKind;
+use deltille::targets::{BoardSpec, SolidShape, SolidSpec, TagSpec, Target, TargetSpec};
+use deltille::words::counted;
 
 #[derive(clap::Args)]
 pub(super) struct Args {

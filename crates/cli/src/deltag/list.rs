@@ -2,8 +2,8 @@ use std::process::ExitCode;
 
 use serde_json::json;
 
-use crate::cli::output::{self, Telling, say};
-use crate::family::{self, places, shipped_names};
+use crate::output::{self, Telling, say};
+use deltille::family::{self, places, shipped_names};
 
 #[derive(clap::Args)]
 pub(super) struct Args {

@@ -25,10 +25,10 @@ use std::process::ExitCode;
 use anyhow::bail;
 use clap::{Parser, Subcommand};
 
-use crate::cli::output::tell;
-use crate::cli::shell;
-use crate::family::{self, Family, PAIRS_COUNTED, certify_codes, shipped_names};
-use crate::lattice::GridKind;
+use crate::output::tell;
+use crate::shell;
+use deltille::family::{self, Family, PAIRS_COUNTED, certify_codes, shipped_names};
+use deltille::lattice::GridKind;
 
 /// Search, check, list and draw DelTag code families.
 #[derive(Parser)]

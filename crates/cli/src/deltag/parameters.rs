@@ -1,6 +1,6 @@
 use std::str::FromStr;
 
-use crate::lattice::Dimension;
+use deltille::lattice::Dimension;
 
 /// Bits and distance, written d25h7.
 #[derive(Clone, Copy)]

@@ -2,10 +2,10 @@
 
 use serde_json::json;
 
-use crate::cli::output::{self, Telling, say};
-use crate::family::Family;
-use crate::family::places::{BITS, BOARDS, PLACES, PatchCertificate, certify_places};
-use crate::words::counted;
+use crate::output::{self, Telling, say};
+use deltille::family::Family;
+use deltille::family::places::{BITS, BOARDS, PLACES, PatchCertificate, certify_places};
+use deltille::words::counted;
 
 /// Tells all about them.
 pub(super) fn about(family: &Family, telling: Telling) -> anyhow::Result<()> {

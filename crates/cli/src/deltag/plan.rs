@@ -6,11 +6,11 @@ use serde_json::Value;
 
 use super::false_positives;
 use super::gen_family::{FILE_LIMIT, bytes_per_code};
-use crate::cli::output::{self, Telling, say};
-use crate::cli::values::whole;
-use crate::family::{Family, NATURAL_FACTOR, ShippedFamily, shipped_names, smallest_shipped};
-use crate::lattice::GridKind;
-use crate::words::counted;
+use crate::output::{self, Telling, say};
+use crate::values::whole;
+use deltille::family::{Family, NATURAL_FACTOR, ShippedFamily, shipped_names, smallest_shipped};
+use deltille::lattice::GridKind;
+use deltille::words::counted;
 
 #[derive(clap::Args)]
 pub(super) struct Args {

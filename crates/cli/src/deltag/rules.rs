@@ -5,18 +5,18 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, bail};
 
 use super::parameters::Parameters;
-use crate::family::{FamilyError, FreeCells, Robust, Rules};
-use crate::limits;
+use deltille::family::{FamilyError, FreeCells, Robust, Rules};
+use deltille::limits;
 
 #[derive(clap::Args)]
 pub(super) struct RuleArgs {
     /// Share of edge-adjacent cell pairs that must differ in every code, 0 to 1 [default: 0.5]
     #[arg(long, value_name = "SHARE", allow_negative_numbers = true,
-          value_parser = crate::cli::values::number(0.0..=1.0))]
+          value_parser = crate::values::number(0.0..=1.0))]
     min_complexity: Option<f64>,
     /// White cells that every code must have [default: the distance]
     #[arg(long, value_name = "CELLS", allow_negative_numbers = true,
-          value_parser = crate::cli::values::whole(0..=64u32))]
+          value_parser = crate::values::whole(0..=64u32))]
     black_distance: Option<u32>,
     /// Keep codes at the family's distance from the all-white tile too
     #[arg(long)]

@@ -5,16 +5,16 @@ use std::process::ExitCode;
 
 use anyhow::{Context, ensure};
 
-use crate::artwork;
-use crate::cli::deltille::files::{Formats, drawn, write_all};
-use crate::cli::interrupt;
-use crate::cli::output::{Overwrite, say};
-use crate::cli::run::{FAILED, Interrupted};
-use crate::cli::values::{Ids, name, whole};
-use crate::layout::{DEFAULT_MARGIN_MM, PaperSpec, Printing};
-use crate::limits::Limits;
-use crate::targets::{TagSheetSpec, TargetSpec, parse_length_mm};
-use crate::verify::{Verifier, VerifyError};
+use crate::deltille::files::{Formats, drawn, write_all};
+use crate::interrupt;
+use crate::output::{Overwrite, say};
+use crate::run::{FAILED, Interrupted};
+use crate::values::{Ids, name, whole};
+use deltille::artwork;
+use deltille::layout::{DEFAULT_MARGIN_MM, PaperSpec, Printing};
+use deltille::limits::Limits;
+use deltille::targets::{TagSheetSpec, TargetSpec, parse_length_mm};
+use deltille::verify::{Verifier, VerifyError};
 
 /// More pages at once are a mistake.
 const MOST_PAGES: usize = 200;
@@ -31,7 +31,7 @@ pub(super) struct Args {
     edge: String,
     /// Black border of a tag in bit-widths, as on boards
     #[arg(long, value_name = "BITS", default_value_t = 1.5, allow_negative_numbers = true,
-          value_parser = crate::cli::values::number(0.6..=10.0))]
+          value_parser = crate::values::number(0.6..=10.0))]
     tag_border: f64,
     /// Paper: A0 to A5, letter, legal, tabloid, or a size such as 297x420mm
     #[arg(long, default_value = "A4", allow_hyphen_values = true)]

@@ -3,12 +3,12 @@ use std::process::ExitCode;
 
 use anyhow::Context;
 
-use crate::artwork::{Artwork, GalleryTile, tag_gallery};
-use crate::cli::output::{self, Overwrite, say};
-use crate::cli::values::{Ids, name, whole};
-use crate::export::kind::Kind;
-use crate::export::{png, svg};
-use crate::layout::Finish;
+use crate::output::{self, Overwrite, say};
+use crate::values::{Ids, name, whole};
+use deltille::artwork::{Artwork, GalleryTile, tag_gallery};
+use deltille::export::kind::Kind;
+use deltille::export::{png, svg};
+use deltille::layout::Finish;
 
 /// Most tags on one picture: a sheet of A0 size at the default edge.
 const MOST_TAGS: usize = 600;

@@ -3,10 +3,10 @@ use std::process::ExitCode;
 use serde_json::json;
 
 use super::place_codes;
-use crate::cli::output::{self, Telling, line, say};
-use crate::cli::run::{BAD_INPUT, FAILED, report};
-use crate::family::{self, Certificate, Family, FamilyFileError, Robust, certify};
-use crate::words::counted;
+use crate::output::{self, Telling, line, say};
+use crate::run::{BAD_INPUT, FAILED, report};
+use deltille::family::{self, Certificate, Family, FamilyFileError, Robust, certify};
+use deltille::words::counted;
 
 /// Told at the end of `--help`.
 pub(super) const HELP: &str = "Checked are the codes (distance, rules, fingerprint, statistics) and the \

@@ -8,11 +8,11 @@ use super::files::text_file;
 use super::meshes::PlateMeshes;
 use super::printing::{PrintingArgs, page};
 use super::settings::TAGS;
-use crate::cli::output::tell;
-use crate::cli::values::{Grid, number, whole};
-use crate::family;
-use crate::layout::tag_range;
-use crate::targets::{AprilGridSpec, TargetSpec, parse_length_mm};
+use crate::output::tell;
+use crate::values::{Grid, number, whole};
+use deltille::family;
+use deltille::layout::tag_range;
+use deltille::targets::{AprilGridSpec, TargetSpec, parse_length_mm};
 
 #[derive(clap::Args)]
 pub struct Args {

@@ -8,12 +8,12 @@ use clap::Subcommand;
 
 use super::finder::FinderArgs;
 use super::images::Images;
-use crate::cli::interrupt;
-use crate::cli::output::say;
-use crate::cli::run::Interrupted;
-use crate::cli::values::whole;
-use crate::statistics::quantile;
-use crate::{clock, photograph};
+use crate::interrupt;
+use crate::output::say;
+use crate::run::Interrupted;
+use crate::values::whole;
+use deltille::statistics::quantile;
+use deltille::{clock, photograph};
 
 /// Arguments of `deltille bench`.
 #[derive(clap::Args)]

@@ -12,13 +12,13 @@ use super::meshes::PlateMeshes;
 use super::printing::idle_without_pages;
 use super::settings::{Plan, Settings};
 use super::template::Template;
-use crate::artwork;
-use crate::cli::output::tell;
-use crate::export::dsc;
-use crate::family::{self, Family, FamilyError, FamilyFileError, square_names};
-use crate::lattice::GridKind;
-use crate::layout::{Printing, tag_range};
-use crate::targets::TargetSpec;
+use crate::output::tell;
+use deltille::artwork;
+use deltille::export::dsc;
+use deltille::family::{self, Family, FamilyError, FamilyFileError, square_names};
+use deltille::lattice::GridKind;
+use deltille::layout::{Printing, tag_range};
+use deltille::targets::TargetSpec;
 
 /// Arguments of both.
 #[derive(clap::Args)]

@@ -15,15 +15,15 @@ use super::camera_file;
 use super::files::{File, check_places, same_file, sample_of, text_file, write_all};
 use super::page::check_images;
 use super::sightings::{Sightings, SightingsArgs};
-use crate::calibrate::{CameraEstimate, Estimate, Intrinsics, Source};
-use crate::camera::{Camera, CameraFile, Lens, PROJECTION_PARAMETERS, Pose, SplineGrid};
-use crate::cli::output::{self, Overwrite, tell};
-use crate::cli::run::{FAILED, report};
-use crate::cli::wording::in_options;
-use crate::export::camera::{FormatError, colmap, kalibr, mrcal, nerfstudio, opencv, ros};
-use crate::export::{calibration, saved};
-use crate::targets::TargetIdentity;
-use crate::words::{counted, places, shown};
+use crate::output::{self, Overwrite, tell};
+use crate::run::{FAILED, report};
+use crate::wording::in_options;
+use deltille::calibrate::{CameraEstimate, Estimate, Intrinsics, Source};
+use deltille::camera::{Camera, CameraFile, Lens, PROJECTION_PARAMETERS, Pose, SplineGrid};
+use deltille::export::camera::{FormatError, colmap, kalibr, mrcal, nerfstudio, opencv, ros};
+use deltille::export::{calibration, saved};
+use deltille::targets::TargetIdentity;
+use deltille::words::{counted, places, shown};
 
 /// Correlations from here on are told: such parameters are hardly told apart.
 const STRONG_CORRELATION: f64 = 0.98;

@@ -9,23 +9,23 @@ use anyhow::{Context, anyhow, bail, ensure};
 use clap::ValueEnum;
 
 use super::files::{File, sample_of, text_file};
-use crate::calibrate::{
+use crate::output::{self, Overwrite, tell};
+use crate::run::FAILED;
+use crate::values::whole;
+use deltille::calibrate::{
     BoardShape, Calibration, CalibrationError, CameraEstimate, Candidate, Diagnosis, Estimate,
     Intrinsics, LEAST_TO_MEASURE, Loss, Model, ModelError, PanelPlace, Source, TargetMap, Weights,
     Words,
 };
-use crate::camera::Camera;
-use crate::cli::output::{self, Overwrite, tell};
-use crate::cli::run::FAILED;
-use crate::cli::values::whole;
-use crate::export::calibration::{Print, Residuals};
-use crate::export::camera::FormatError;
-use crate::export::kind::Kind;
-use crate::layout::Printing;
-use crate::quantity::{board_accuracy_mm, distance_mm};
-use crate::report::target_map_svg;
-use crate::targets::{self, parse_length_mm};
-use crate::words::counted;
+use deltille::camera::Camera;
+use deltille::export::calibration::{Print, Residuals};
+use deltille::export::camera::FormatError;
+use deltille::export::kind::Kind;
+use deltille::layout::Printing;
+use deltille::quantity::{board_accuracy_mm, distance_mm};
+use deltille::report::target_map_svg;
+use deltille::targets::{self, parse_length_mm};
+use deltille::words::counted;
 
 /// How a calibration is solved, and the page about it.
 #[derive(clap::Args)]

@@ -4,12 +4,12 @@ use std::path::Path;
 
 use anyhow::{Context, anyhow};
 
-use crate::camera::{Camera, CameraFile};
-use crate::camera_file;
-use crate::cli::output::tell;
-use crate::export::saved;
-use crate::targets::{Target, TargetIdentity, check_same_board};
-use crate::words::shown;
+use crate::output::tell;
+use deltille::camera::{Camera, CameraFile};
+use deltille::camera_file;
+use deltille::export::saved;
+use deltille::targets::{Target, TargetIdentity, check_same_board};
+use deltille::words::shown;
 
 /// Reads the camera file that an option names.
 pub fn read(option: &str, path: &Path) -> anyhow::Result<Camera> {

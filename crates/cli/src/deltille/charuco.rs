@@ -5,10 +5,10 @@ use std::process::ExitCode;
 use super::meshes::PlateMeshes;
 use super::printing::{PrintingArgs, page};
 use super::settings::TAGS;
-use crate::cli::values::{Grid, whole};
-use crate::family::{Family, dictionary};
-use crate::layout::tag_range;
-use crate::targets::{CharucoSpec, TargetSpec, parse_length_mm};
+use crate::values::{Grid, whole};
+use deltille::family::{Family, dictionary};
+use deltille::layout::tag_range;
+use deltille::targets::{CharucoSpec, TargetSpec, parse_length_mm};
 
 #[derive(clap::Args)]
 pub struct Args {

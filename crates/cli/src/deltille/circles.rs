@@ -3,8 +3,8 @@
 use std::process::ExitCode;
 
 use super::printing::{PrintingArgs, page};
-use crate::cli::values::{Grid, whole};
-use crate::targets::{CirclesSpec, TargetSpec, parse_length_mm};
+use crate::values::{Grid, whole};
+use deltille::targets::{CirclesSpec, TargetSpec, parse_length_mm};
 
 #[derive(clap::Args)]
 pub struct Args {

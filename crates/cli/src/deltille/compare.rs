@@ -10,17 +10,17 @@ use glam::DVec2;
 use super::calibrating::distance;
 use super::camera_file;
 use super::files::{File, check_places, sample_of, text_file, write_all};
-use crate::calibrate::{
+use crate::output::{self, Overwrite, tell};
+use crate::run::{FAILED, UNDECIDED};
+use deltille::calibrate::{
     CameraEstimate, CameraMotion, Comparison, Estimate, Region, Verdict, compare_boards,
 };
-use crate::camera::Pose;
-use crate::cli::output::{self, Overwrite, tell};
-use crate::cli::run::{FAILED, UNDECIDED};
-use crate::export::{comparison, saved};
-use crate::limits::Limits;
-use crate::report::comparison_svg;
-use crate::targets::check_same_board;
-use crate::words::{counted, p_value, shown};
+use deltille::camera::Pose;
+use deltille::export::{comparison, saved};
+use deltille::limits::Limits;
+use deltille::report::comparison_svg;
+use deltille::targets::check_same_board;
+use deltille::words::{counted, p_value, shown};
 
 /// Arguments of `deltille compare`.
 #[derive(clap::Args)]

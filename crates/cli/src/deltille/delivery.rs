@@ -10,12 +10,12 @@ use super::files::{File, same_file, write_all};
 use super::limits::FileLimits;
 use super::target_file;
 use super::verify::{self, Proof};
-use crate::cli::output::{self, Overwrite, Telling, say};
-use crate::family::Family;
-use crate::layout::Printing;
-use crate::limits::Limits;
-use crate::targets::Target;
-use crate::verify::{Format, whole_of};
+use crate::output::{self, Overwrite, Telling, say};
+use deltille::family::Family;
+use deltille::layout::Printing;
+use deltille::limits::Limits;
+use deltille::targets::Target;
+use deltille::verify::{Format, whole_of};
 
 /// Schema and version of what `--json` prints.
 const SCHEMA: &str = "deltille/delivery/1";

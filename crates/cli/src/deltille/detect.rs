@@ -13,19 +13,19 @@ use super::finder::FinderArgs;
 use super::images::{self, Images, Stems};
 use super::in_flight;
 use super::tables::{self, Tables};
-use crate::cli::output::{self, Overwrite, tell};
-use crate::cli::run::{self, BAD_INPUT, FAILED, Interrupted};
-use crate::cli::values::whole;
-use crate::cli::wording::in_options;
-use crate::cli::{interrupt, progress};
-use crate::clock;
-use crate::detect::{Detection, Detector, InkEstimate};
-use crate::export::kind::Kind;
-use crate::export::tables::{EXTENSION, Picture};
-use crate::export::{atomic, csv, detection, orpc, overlay};
-use crate::photograph::{self, Photograph};
-use crate::targets::Target;
-use crate::words::{counted, shown};
+use crate::output::{self, Overwrite, tell};
+use crate::run::{self, BAD_INPUT, FAILED, Interrupted};
+use crate::values::whole;
+use crate::wording::in_options;
+use crate::{interrupt, progress};
+use deltille::clock;
+use deltille::detect::{Detection, Detector, InkEstimate};
+use deltille::export::kind::Kind;
+use deltille::export::tables::{EXTENSION, Picture};
+use deltille::export::{atomic, csv, detection, orpc, overlay};
+use deltille::photograph::{self, Photograph};
+use deltille::targets::Target;
+use deltille::words::{counted, shown};
 
 /// Arguments of `deltille detect`.
 #[derive(clap::Args)]

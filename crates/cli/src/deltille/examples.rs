@@ -95,7 +95,7 @@ pub const RECTIFY: &str = "Examples:
 mod tests {
     use clap::CommandFactory;
 
-    use crate::cli::deltille::Deltille;
+    use crate::deltille::Deltille;
 
     #[test]
     fn every_command_has_examples_that_it_understands() {

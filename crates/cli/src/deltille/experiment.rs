@@ -10,17 +10,17 @@ use clap::Subcommand;
 use super::files::{bytes_file, text_file, write_all};
 use super::images::Images;
 use super::target_file;
-use crate::cli::output::{Overwrite, say};
-use crate::cli::run::Interrupted;
-use crate::cli::values::whole;
-use crate::cli::{interrupt, output, progress};
-use crate::detect::Tone;
-use crate::experiment::photographs::axes::Axis;
-use crate::experiment::photographs::{self, Kind, Subject, table};
-use crate::experiment::states::Scene;
-use crate::experiment::{corners, guide, plot, rig, states, table2};
-use crate::family;
-use crate::limits::Limits;
+use crate::output::{Overwrite, say};
+use crate::run::Interrupted;
+use crate::values::whole;
+use crate::{interrupt, output, progress};
+use deltille::detect::Tone;
+use deltille::family;
+use deltille::limits::Limits;
+use deltille_lab::photographs::axes::Axis;
+use deltille_lab::photographs::{self, Kind, Subject, table};
+use deltille_lab::states::Scene;
+use deltille_lab::{corners, guide, plot, rig, states, table2};
 
 /// Arguments of `deltille experiment`.
 #[derive(clap::Args)]

@@ -6,15 +6,15 @@ use std::rc::Rc;
 
 use anyhow::{Context, anyhow, bail, ensure};
 
-use crate::artwork::Artwork;
-use crate::cli::interrupt;
-use crate::cli::output::{self, Overwrite, tell};
-use crate::cli::run::{Interrupted, message};
-use crate::export::kind::Kind;
-use crate::export::staging::{Staging, same_content};
-use crate::export::{ExportError, atomic, pdf, png, sheet_file_name, svg};
-use crate::target_file::lost_board;
-use crate::targets;
+use crate::interrupt;
+use crate::output::{self, Overwrite, tell};
+use crate::run::{Interrupted, message};
+use deltille::artwork::Artwork;
+use deltille::export::kind::Kind;
+use deltille::export::staging::{Staging, same_content};
+use deltille::export::{ExportError, atomic, pdf, png, sheet_file_name, svg};
+use deltille::target_file::lost_board;
+use deltille::targets;
 
 /// Writes one file to a path.
 type Writer = dyn Fn(&Path) -> anyhow::Result<()>;
@@ -114,7 +114,7 @@ pub fn check_places(folder: &Path, files: &[File], overwrite: Overwrite) -> anyh
 }
 
 /// Writes all files, all or none, and returns where they are, by the names that were asked for: see
-/// [`staging`](crate::export::staging).
+/// [`staging`](deltille::export::staging).
 pub fn write_all(
     folder: &Path,
     files: &[File],

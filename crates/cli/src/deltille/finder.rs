@@ -8,11 +8,11 @@ use clap::ValueEnum;
 use super::limits::ImageLimits;
 use super::refine::Method;
 use super::target_file;
-use crate::cli::values::whole;
-use crate::detect::{Detector, DetectorConfig, Ink, Tone};
-use crate::lattice::GridKind;
-use crate::limits::Limits;
-use crate::targets::{SIDES, Target};
+use crate::values::whole;
+use deltille::detect::{Detector, DetectorConfig, Ink, Tone};
+use deltille::lattice::GridKind;
+use deltille::limits::Limits;
+use deltille::targets::{SIDES, Target};
 
 /// Options that say what to look for.
 #[derive(clap::Args)]

@@ -7,10 +7,10 @@ use serde::{Deserialize, Serialize};
 
 use super::files::{File, bytes_file};
 use super::settings::{is_false, length, refuse_idle};
-use crate::artwork::CuttingError;
-use crate::export::artifacts::{MakeError, Making, What, make};
-use crate::family::Family;
-use crate::layout::{Finish, Printing};
+use deltille::artwork::CuttingError;
+use deltille::export::artifacts::{MakeError, Making, What, make};
+use deltille::family::Family;
+use deltille::layout::{Finish, Printing};
 
 /// Heading of these options.
 const FINISHING: &str = "Glass, print shops, lasers";

@@ -13,23 +13,23 @@ use super::images::photographs_in;
 use super::limits::ImageLimits;
 use super::sightings::{self, GridArgs, SheetArgs};
 use super::{camera_file, target_file};
-use crate::calibrate::{
+use crate::interrupt;
+use crate::output::{self, Overwrite, say, tell};
+use crate::run::Interrupted;
+use deltille::calibrate::{
     Calibration, Excluded, Guide, Intrinsics, Model, NextView, PanelPlace, Reference, View, views,
 };
-use crate::camera::{Camera, Lens};
-use crate::cli::interrupt;
-use crate::cli::output::{self, Overwrite, say, tell};
-use crate::cli::run::Interrupted;
-use crate::detect::{Detection, Detector, DetectorConfig};
-use crate::export::kind::Kind;
-use crate::export::sheet::Sheet;
-use crate::export::{next_view, svg};
-use crate::layout::Printing;
-use crate::limits::Limits;
-use crate::photograph;
-use crate::raster::AnyGray;
-use crate::targets::Target;
-use crate::words::{counted, shown};
+use deltille::camera::{Camera, Lens};
+use deltille::detect::{Detection, Detector, DetectorConfig};
+use deltille::export::kind::Kind;
+use deltille::export::sheet::Sheet;
+use deltille::export::{next_view, svg};
+use deltille::layout::Printing;
+use deltille::limits::Limits;
+use deltille::photograph;
+use deltille::raster::AnyGray;
+use deltille::targets::Target;
+use deltille::words::{counted, shown};
 
 /// How long the folder is left alone between two looks.
 const PAUSE: Duration = Duration::from_millis(400);

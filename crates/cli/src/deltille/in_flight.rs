@@ -5,8 +5,8 @@ use std::sync::{Condvar, Mutex, MutexGuard};
 
 use rayon::ThreadPool;
 
-use crate::limits::Limits;
-use crate::photograph;
+use deltille::limits::Limits;
+use deltille::photograph;
 
 /// Does some work on each of the images, whose number it is told, on the threads of a pool. Images
 /// that are in memory together have no more pixels than one may have.

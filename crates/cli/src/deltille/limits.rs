@@ -1,7 +1,7 @@
 //! The options that say how much of a file is read.
 
-use crate::cli::values::whole;
-use crate::limits::Limits;
+use crate::values::whole;
+use deltille::limits::Limits;
 
 /// Heading of these options in the help.
 const HEADING: &str = "Limits of what is read";

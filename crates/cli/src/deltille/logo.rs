@@ -4,9 +4,9 @@ use std::path::Path;
 
 use anyhow::anyhow;
 
-use crate::layout::PaperSpec;
-use crate::limits;
-use crate::logo::{self, LogoError, MAX_LOGO_BYTES};
+use deltille::layout::PaperSpec;
+use deltille::limits;
+use deltille::logo::{self, LogoError, MAX_LOGO_BYTES};
 
 /// A paper with the logo of a file, so high.
 pub fn on(

@@ -10,14 +10,14 @@ use serde::{Deserialize, Serialize};
 
 use super::files::{File, bytes_file};
 use super::settings::{is_false, length, refuse_idle};
-use crate::cli::values::{number, whole};
-use crate::export::artifacts::{Making, What, make, of_mesh};
-use crate::export::inlay::InlaidBodies;
-use crate::export::mesh::{MAX_TEXTURE_PX, MeshError, Meshing, Resolution, TexturedMesh};
-use crate::export::texture::MAX_TEXTURES;
-use crate::export::threemf;
-use crate::family::Family;
-use crate::targets::{Target, TargetSpec};
+use crate::values::{number, whole};
+use deltille::export::artifacts::{Making, What, make, of_mesh};
+use deltille::export::inlay::InlaidBodies;
+use deltille::export::mesh::{MAX_TEXTURE_PX, MeshError, Meshing, Resolution, TexturedMesh};
+use deltille::export::texture::MAX_TEXTURES;
+use deltille::export::threemf;
+use deltille::family::Family;
+use deltille::targets::{Target, TargetSpec};
 
 /// Heading of these options.
 const MESHES: &str = "Meshes and models for simulators";

@@ -13,7 +13,7 @@ mod delivery;
 mod detect;
 mod examples;
 mod experiment;
-pub(in crate::cli) mod files;
+pub(crate) mod files;
 mod finder;
 mod finishing;
 mod guide;
@@ -43,9 +43,9 @@ use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
 
-use crate::cli::shell;
-use crate::lattice::GridKind;
-use crate::targets::SolidShape;
+use crate::shell;
+use deltille::lattice::GridKind;
+use deltille::targets::SolidShape;
 
 /// Make, detect and verify deltille targets.
 #[derive(Parser)]

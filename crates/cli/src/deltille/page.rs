@@ -6,14 +6,14 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, ensure};
 
 use super::calibrating::Calibrated;
-use crate::calibrate::{View, ViewEstimate};
-use crate::cli::output::{self, Overwrite, tell};
-use crate::cli::wording::in_options;
-use crate::name::is_within;
-use crate::photograph;
-use crate::raster::{AnyGray, Gray};
-use crate::report::{Report, Sample, shown_views, thumbnail};
-use crate::words::counted;
+use crate::output::{self, Overwrite, tell};
+use crate::wording::in_options;
+use deltille::calibrate::{View, ViewEstimate};
+use deltille::name::is_within;
+use deltille::photograph;
+use deltille::raster::{AnyGray, Gray};
+use deltille::report::{Report, Sample, shown_views, thumbnail};
+use deltille::words::counted;
 
 /// Most small pictures of views that were held out.
 const MOST_HELD_OUT: usize = 100;

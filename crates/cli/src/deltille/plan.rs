@@ -7,14 +7,14 @@ use anyhow::{Context, bail, ensure};
 
 use super::calibrating::distance;
 use super::camera_file;
-use crate::cli::output::{self, Telling, say};
-use crate::cli::values::number;
-use crate::detect::{Proposal, Situation};
-use crate::family::{self, places};
-use crate::lattice::GridKind;
-use crate::layout::PaperSpec;
-use crate::targets::{BoardSpec, TagSpec, TagsIn};
-use crate::words::counted;
+use crate::output::{self, Telling, say};
+use crate::values::number;
+use deltille::family::{self, places};
+use deltille::lattice::GridKind;
+use deltille::layout::PaperSpec;
+use deltille::layout::{Proposal, Situation};
+use deltille::targets::{BoardSpec, TagSpec, TagsIn};
+use deltille::words::counted;
 
 /// Tilts for which it is told how far a board is labelled, °.
 const TOLD_DEG: [f64; 3] = [0.0, 45.0, 60.0];

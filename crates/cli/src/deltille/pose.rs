@@ -9,18 +9,18 @@ use super::images::Images;
 use super::limits::ImageLimits;
 use super::sightings::{GridArgs, SheetArgs};
 use super::{camera_file, sightings, target_file};
-use crate::calibrate::{Calibration, Diagnosis, Estimate, Reference, Words, views};
-use crate::camera::Camera;
-use crate::cli::output::{self, Overwrite, say, tell};
-use crate::cli::run::FAILED;
-use crate::cli::wording::in_options;
-use crate::detect::{Detection, Detector, DetectorConfig};
-use crate::export::kind::Kind;
-use crate::export::pose;
-use crate::export::sheet::Sheet;
-use crate::limits::Limits;
-use crate::photograph;
-use crate::targets::Target;
+use crate::output::{self, Overwrite, say, tell};
+use crate::run::FAILED;
+use crate::wording::in_options;
+use deltille::calibrate::{Calibration, Diagnosis, Estimate, Reference, Words, views};
+use deltille::camera::Camera;
+use deltille::detect::{Detection, Detector, DetectorConfig};
+use deltille::export::kind::Kind;
+use deltille::export::pose;
+use deltille::export::sheet::Sheet;
+use deltille::limits::Limits;
+use deltille::photograph;
+use deltille::targets::Target;
 
 /// Arguments of `deltille pose`.
 #[derive(clap::Args)]

@@ -9,11 +9,11 @@ use super::files::{File, Formats, drawn, text_file};
 use super::finishing::{Finishing, Laser};
 use super::logo;
 use super::settings::{DEFAULT_DPI, DPI, PAPER, PRINT, refuse_idle};
-use crate::artwork;
-use crate::cli::values::{name, whole};
-use crate::family::Family;
-use crate::layout::{self, DEFAULT_MARGIN_MM, PaperSpec};
-use crate::targets::{TargetSpec, parse_length_mm};
+use crate::values::{name, whole};
+use deltille::artwork;
+use deltille::family::Family;
+use deltille::layout::{self, DEFAULT_MARGIN_MM, PaperSpec};
+use deltille::targets::{TargetSpec, parse_length_mm};
 
 /// Paper, and files to print.
 #[derive(clap::Args)]

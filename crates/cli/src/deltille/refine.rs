@@ -9,13 +9,13 @@ use clap::ValueEnum;
 use glam::DVec2;
 
 use super::limits::ImageLimits;
-use crate::cli::output::{self, Overwrite};
-use crate::detect::{MAX_WINDOW_PX, RefineStatus, Refined, Refinement, Refiner, Tone};
-use crate::export::csv;
-use crate::lattice::GridKind;
-use crate::limits::Limits;
-use crate::photograph;
-use crate::raster::AnyGray;
+use crate::output::{self, Overwrite};
+use deltille::detect::{MAX_WINDOW_PX, RefineStatus, Refined, Refinement, Refiner, Tone};
+use deltille::export::csv;
+use deltille::lattice::GridKind;
+use deltille::limits::Limits;
+use deltille::photograph;
+use deltille::raster::AnyGray;
 
 /// Corners that are refined at a time: as many as of one picture.
 const MOST_SEEDS: usize = 20_000;

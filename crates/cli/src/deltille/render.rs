@@ -10,13 +10,13 @@ use image::{DynamicImage, ImageBuffer, Luma};
 use super::files::{bytes_file, text_file, write_all};
 use super::limits::ImageLimits;
 use super::{camera_file, target_file};
-use crate::camera::{Camera, Pose};
-use crate::cli::output::{self, Overwrite, say, tell};
-use crate::cli::values::number;
-use crate::export::kind::signed_png;
-use crate::export::truth;
-use crate::quantity::{Range, blur_px, light_gradient, of_full_scale, place_mm};
-use crate::synth::{Light, scene_of_target};
+use crate::output::{self, Overwrite, say, tell};
+use crate::values::number;
+use deltille::camera::{Camera, Pose};
+use deltille::export::kind::signed_png;
+use deltille::export::truth;
+use deltille::quantity::{Range, blur_px, light_gradient, of_full_scale, place_mm};
+use deltille::synth::{Light, scene_of_target};
 
 /// Arguments of `deltille render`.
 #[derive(clap::Args)]

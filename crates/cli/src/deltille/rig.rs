@@ -15,21 +15,21 @@ use super::limits::FileLimits;
 use super::page::check_images;
 use super::sightings::{GridArgs, SheetArgs};
 use super::{camera_file, sightings, target_file};
-use crate::calibrate::{
+use crate::output::{Overwrite, check_folder, fixed, say, tell};
+use crate::run::{FAILED, report};
+use crate::wording::in_options;
+use deltille::calibrate::{
     Calibration, CameraViews, Estimate, Excluded, Intrinsics, Reference, TargetMap,
 };
-use crate::camera::{Camera, CameraFile, Pose};
-use crate::cli::output::{Overwrite, check_folder, fixed, say, tell};
-use crate::cli::run::{FAILED, report};
-use crate::cli::wording::in_options;
-use crate::detect::{Detection, InkEstimate};
-use crate::export::calibration::Print;
-use crate::export::camera::{FormatError, colmap, colmap_rig, kalibr};
-use crate::export::{rig, saved};
-use crate::layout::Printing;
-use crate::report::target_map_svg;
-use crate::targets::{Name, Target};
-use crate::words::counted;
+use deltille::camera::{Camera, CameraFile, Pose};
+use deltille::detect::{Detection, InkEstimate};
+use deltille::export::calibration::Print;
+use deltille::export::camera::{FormatError, colmap, colmap_rig, kalibr};
+use deltille::export::{rig, saved};
+use deltille::layout::Printing;
+use deltille::report::target_map_svg;
+use deltille::targets::{Name, Target};
+use deltille::words::counted;
 
 /// Arguments of `deltille rig`.
 #[derive(clap::Args)]

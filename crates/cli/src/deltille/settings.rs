@@ -12,12 +12,14 @@ use serde::{Deserialize, Serialize};
 use super::finishing::{Finishing, Laser};
 use super::meshes::{Meshes, PlateMeshes};
 use super::{logo, template};
-use crate::cli::values::{number, whole};
-use crate::export::dsc::Dialect;
-use crate::family::places;
-use crate::lattice::GridKind;
-use crate::layout::{DEFAULT_MARGIN_MM, PaperSpec, usual_edge_mm};
-use crate::targets::{BORDER_BITS, BoardSpec, MOST_ROWS, SIDES, TagSpec, TagsIn, parse_length_mm};
+use crate::values::{number, whole};
+use deltille::export::dsc::Dialect;
+use deltille::family::places;
+use deltille::lattice::GridKind;
+use deltille::layout::{DEFAULT_MARGIN_MM, PaperSpec, usual_edge_mm};
+use deltille::targets::{
+    BORDER_BITS, BoardSpec, MOST_ROWS, SIDES, TagSpec, TagsIn, parse_length_mm,
+};
 
 /// Resolution of PNG files, dots per inch.
 pub const DEFAULT_DPI: u32 = 300;

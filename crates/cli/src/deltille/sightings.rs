@@ -8,23 +8,23 @@ use clap::ValueEnum;
 
 use super::limits::FileLimits;
 use super::{camera_file, tables, target_file};
-use crate::SheetUseError;
-use crate::calibrate::{
+use crate::output::tell;
+use crate::values::whole;
+use deltille::SheetUseError;
+use deltille::calibrate::{
     Calibration, Excluded, PanelPlace, Reason, Reference, Shown, UntaggedGrid, View, views,
 };
-use crate::cli::output::tell;
-use crate::cli::values::whole;
-use crate::detect::{Detection, InkEstimate};
-use crate::export::calibration::Print;
-use crate::export::detection;
-use crate::export::sheet::{self, Sheet};
-use crate::export::tables::folder;
-use crate::lattice::GridKind;
-use crate::layout::Printing;
-use crate::limits::{Limits, ReadError};
-use crate::quantity::{edge_mm, print_scale};
-use crate::targets::{SIDES, Target, TargetIdentity, parse_length_mm};
-use crate::words::counted;
+use deltille::detect::{Detection, InkEstimate};
+use deltille::export::calibration::Print;
+use deltille::export::detection;
+use deltille::export::sheet::{self, Sheet};
+use deltille::export::tables::folder;
+use deltille::lattice::GridKind;
+use deltille::layout::Printing;
+use deltille::limits::{Limits, ReadError};
+use deltille::quantity::{edge_mm, print_scale};
+use deltille::targets::{SIDES, Target, TargetIdentity, parse_length_mm};
+use deltille::words::counted;
 
 /// Detections and what they show.
 #[derive(clap::Args)]

@@ -13,15 +13,15 @@ use super::meshes::Meshes;
 use super::settings::{DEFAULT_DPI, TAGS};
 use super::solid_settings::SolidSettings;
 use super::template::Template;
-use crate::artwork;
-use crate::cli::output::say;
-use crate::cli::values::{number, whole};
-use crate::export::artifacts::{self, Making, What};
-use crate::export::{dsc, solid_mesh};
-use crate::family::{self, Family};
-use crate::layout::{Printing, tag_range};
-use crate::quantity::unit_mm;
-use crate::targets::{
+use crate::output::say;
+use crate::values::{number, whole};
+use deltille::artwork;
+use deltille::export::artifacts::{self, Making, What};
+use deltille::export::{dsc, solid_mesh};
+use deltille::family::{self, Family};
+use deltille::layout::{Printing, tag_range};
+use deltille::quantity::unit_mm;
+use deltille::targets::{
     ClosedMesh, NEAR_EQUILATERAL, Name, Skeleton, SolidShape, SolidSpec, Target, TargetSpec,
     parse_box_mm,
 };

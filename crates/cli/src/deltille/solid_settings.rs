@@ -13,12 +13,12 @@ use super::settings::{
     DPI, PAPER, PRINT, TAGS, check_tags, is_false, is_usual, length, refuse_idle,
 };
 use super::{logo, template};
-use crate::cli::values::{number, whole};
-use crate::export::dsc::Dialect;
-use crate::family::places;
-use crate::lattice::GridKind;
-use crate::layout::{DEFAULT_MARGIN_MM, PaperSpec, SolidSheets};
-use crate::targets::{
+use crate::values::{number, whole};
+use deltille::export::dsc::Dialect;
+use deltille::family::places;
+use deltille::lattice::GridKind;
+use deltille::layout::{DEFAULT_MARGIN_MM, PaperSpec, SolidSheets};
+use deltille::targets::{
     BORDER_BITS, FACE_TILES, MOST_ROWS, SkeletonSpec, SolidShape, SolidSpec, TagSpec, TagsIn,
 };
 

@@ -8,13 +8,13 @@ use std::sync::{Mutex, MutexGuard};
 
 use anyhow::Context;
 
-use crate::cli::output::{Overwrite, tell};
-use crate::export::kind::Kind;
-use crate::export::staging::Staging;
-use crate::export::tables::{CORNERS, EXTENSION, PICTURES, Picture, Writer, folder};
-use crate::limits::Limits;
-use crate::targets::Target;
-use crate::words::counted;
+use crate::output::{Overwrite, tell};
+use deltille::export::kind::Kind;
+use deltille::export::staging::Staging;
+use deltille::export::tables::{CORNERS, EXTENSION, PICTURES, Picture, Writer, folder};
+use deltille::limits::Limits;
+use deltille::targets::Target;
+use deltille::words::counted;
 
 /// The files of both tables in a folder.
 pub fn files(folder: &Path) -> [PathBuf; 2] {

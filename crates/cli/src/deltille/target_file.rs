@@ -4,13 +4,13 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, anyhow, bail};
 
-use crate::cli::output::tell;
-use crate::detect::check_distinct;
-use crate::family::{self, Family};
-use crate::layout::Printing;
-use crate::limits::Limits;
-use crate::target_file::{self, TargetFamilyError};
-use crate::targets::Target;
+use crate::output::tell;
+use deltille::detect::check_distinct;
+use deltille::family::{self, Family};
+use deltille::layout::Printing;
+use deltille::limits::Limits;
+use deltille::target_file::{self, TargetFamilyError};
+use deltille::targets::Target;
 
 /// Reads a target with its sheets: `.dsc` by its extension, JSON otherwise.
 pub fn read(path: &Path, limits: &Limits) -> anyhow::Result<Printing> {

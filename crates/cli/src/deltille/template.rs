@@ -6,12 +6,12 @@ use anyhow::{Context, anyhow, bail};
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 
-use crate::cli::output::{self, Overwrite};
-use crate::export::GENERATOR;
-use crate::export::kind::Kind;
-use crate::limits;
-use crate::reading::in_words;
-use crate::words::quoted;
+use crate::output::{self, Overwrite};
+use deltille::export::GENERATOR;
+use deltille::export::kind::Kind;
+use deltille::limits;
+use deltille::reading::in_words;
+use deltille::words::quoted;
 
 /// The settings in a file that was made for a command.
 pub fn read<T: DeserializeOwned>(

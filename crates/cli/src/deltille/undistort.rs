@@ -13,18 +13,18 @@ use super::files::{File, Staged, bytes_file, check_places, same_file, sample_of,
 use super::images::{self, Images, Stems};
 use super::limits::ImageLimits;
 use super::{camera_file, in_flight};
-use crate::calibrate::Estimate;
-use crate::camera::{Camera, CameraFile, Field, PixelMap, Rectification, Undistortion};
-use crate::cli::output::{self, Overwrite, say};
-use crate::cli::run::{self, BAD_INPUT, FAILED, Interrupted};
-use crate::cli::{interrupt, progress};
-use crate::export::camera::{opencv, ros};
-use crate::export::kind::{Kind, signed_png};
-use crate::export::{atomic, saved, undistortion};
-use crate::limits::Limits;
-use crate::photograph;
-use crate::remap::remapped;
-use crate::words::counted;
+use crate::output::{self, Overwrite, say};
+use crate::run::{self, BAD_INPUT, FAILED, Interrupted};
+use crate::{interrupt, progress};
+use deltille::calibrate::Estimate;
+use deltille::camera::{Camera, CameraFile, Field, PixelMap, Rectification, Undistortion};
+use deltille::export::camera::{opencv, ros};
+use deltille::export::kind::{Kind, signed_png};
+use deltille::export::{atomic, saved, undistortion};
+use deltille::limits::Limits;
+use deltille::photograph;
+use deltille::remap::remapped;
+use deltille::words::counted;
 
 /// How the views are made.
 #[derive(clap::Args)]

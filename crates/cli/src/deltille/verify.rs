@@ -11,17 +11,17 @@ use serde::Serialize;
 use super::files::same_file;
 use super::limits::AllLimits;
 use super::target_file;
-use crate::cli::output::{self, Overwrite, Telling, say, tell};
-use crate::cli::run::{self, FAILED};
-use crate::cli::{interrupt, progress};
-use crate::export::kind::Kind;
-use crate::export::{laser_file_name, sheet_file_name, stl, threemf};
-use crate::family::Family;
-use crate::layout::Printing;
-use crate::limits::Limits;
-use crate::targets::Target;
-use crate::verify::{Progress, Verdict, Verifier};
-use crate::words::{counted, shown};
+use crate::output::{self, Overwrite, Telling, say, tell};
+use crate::run::{self, FAILED};
+use crate::{interrupt, progress};
+use deltille::export::kind::Kind;
+use deltille::export::{laser_file_name, sheet_file_name, stl, threemf};
+use deltille::family::Family;
+use deltille::layout::Printing;
+use deltille::limits::Limits;
+use deltille::targets::Target;
+use deltille::verify::{Progress, Verdict, Verifier};
+use deltille::words::{counted, shown};
 
 /// Arguments of `deltille verify`.
 #[derive(clap::Args)]

@@ -4,7 +4,7 @@
 //! The camera frame is right-handed: x right, y down, z forward, the origin at the centre of
 //! projection (of a lens that is not central, where its pupil is on the axis). Pixel centres lie at
 //! integer coordinates. Each model has a file of its own with its formula and its derivatives; which of its
-//! parameters a calibration finds, and from where it starts, is in [`calibrate::Model`](crate::calibrate::Model).
+//! parameters a calibration finds, and from where it starts, is in `deltille_calibrate::Model`.
 
 mod brown_conrady;
 mod double_sphere;
@@ -34,7 +34,8 @@ pub use pose::{Pose, is_rotation};
 pub use pupil::Pupil;
 pub use rectification::{Rectification, RectificationError};
 pub use spline::{Knots, Spline, SplineGrid, SplineGridError};
-pub(crate) use spline::{MOST_TOUCHED, direction as stereographic_direction};
+#[doc(hidden)]
+pub use spline::{MOST_TOUCHED, direction as stereographic_direction};
 pub use undistortion::{Field, PixelMap, Undistortion, UndistortionError};
 
 /// The parameters that every camera has, before those of its lens.
@@ -77,7 +78,8 @@ pub struct Projection {
 
 impl Projection {
     /// By how much a coordinate of the pixel moves with that of the image.
-    pub(crate) fn by_image(&self, coordinate: usize) -> f64 {
+    #[doc(hidden)]
+    pub fn by_image(&self, coordinate: usize) -> f64 {
         self.focal_px[coordinate]
     }
 

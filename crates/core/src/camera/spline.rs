@@ -91,7 +91,8 @@ pub struct Knots {
 const MOST_ORDER: usize = 4;
 
 /// Parameters on which the image of a point depends, at most.
-pub(crate) const MOST_TOUCHED: usize = 2 * MOST_ORDER * MOST_ORDER;
+#[doc(hidden)]
+pub const MOST_TOUCHED: usize = 2 * MOST_ORDER * MOST_ORDER;
 
 impl Knots {
     /// Their indices, row by row, with their parts.
@@ -243,7 +244,8 @@ fn flattened(point: DVec3) -> Option<DVec2> {
 }
 
 /// The direction of a place u.
-pub(crate) fn direction(u: DVec2) -> DVec3 {
+#[doc(hidden)]
+pub fn direction(u: DVec2) -> DVec3 {
     let q = u.length_squared();
     (4.0 * u).extend(4.0 - q) / (4.0 + q)
 }
@@ -272,7 +274,8 @@ impl Spline {
     }
 
     /// The knots of a place u.
-    pub(crate) fn knots_at(&self, u: DVec2) -> Knots {
+    #[doc(hidden)]
+    pub fn knots_at(&self, u: DVec2) -> Knots {
         self.grid.at(u).0
     }
 

@@ -226,7 +226,8 @@ fn steady_rad(camera: &Camera) -> f64 {
 
 impl Camera {
     /// So many steps of pixels along each border of the image.
-    pub(crate) fn border(&self, along: usize) -> impl Iterator<Item = DVec2> {
+    #[doc(hidden)]
+    pub fn border(&self, along: usize) -> impl Iterator<Item = DVec2> {
         let last = DVec2::new(f64::from(self.width) - 1.0, f64::from(self.height) - 1.0);
         (0..=along).flat_map(move |i| {
             let part = i as f64 / along as f64;

@@ -78,6 +78,11 @@ const OVER_THAT_OF_THE_MEAN: f64 = 1.2533;
 const LEAST_DEVIATION: f64 = 1e-9;
 
 impl InkEstimate {
+    /// The spread in one picture, in edge lengths of a tile, with its standard deviation.
+    pub fn new(edges: f64, edges_deviation: f64, used: bool) -> Self {
+        Self { edges, edges_deviation, um: None, um_deviation: None, used, pictures: 1 }
+    }
+
     /// What pictures of one print say together: the weighted median, so that a picture of something else does
     /// not count; from none nothing. Its deviation is what theirs make, or what their scatter says if that is more.
     pub fn of_all(pictures: &[Self]) -> Option<Self> {

@@ -78,25 +78,22 @@ pub enum ReasonKind {
 
 impl ReasonKind {
     /// Whether tags were read, and belong elsewhere.
-    pub(in crate::detect) fn is_of_tags_read(self) -> bool {
+    #[doc(hidden)]
+    pub fn is_of_tags_read(self) -> bool {
         matches!(self, Self::OtherIds | Self::OtherLayout | Self::OtherFamily)
     }
 }
 
 impl Reason {
     /// A reason with what was measured.
-    pub(in crate::detect) fn new<const N: usize>(
-        kind: ReasonKind,
-        figures: [(&str, f64); N],
-    ) -> Self {
+    #[doc(hidden)]
+    pub fn new<const N: usize>(kind: ReasonKind, figures: [(&str, f64); N]) -> Self {
         Self::of(kind, figures)
     }
 
     /// The same of any number of figures.
-    pub(in crate::detect) fn of<'a>(
-        kind: ReasonKind,
-        figures: impl IntoIterator<Item = (&'a str, f64)>,
-    ) -> Self {
+    #[doc(hidden)]
+    pub fn of<'a>(kind: ReasonKind, figures: impl IntoIterator<Item = (&'a str, f64)>) -> Self {
         let owned = |(name, figure): (&str, f64)| (name.to_owned(), figure);
         Self { kind, grid: None, figures: figures.into_iter().map(owned).collect() }
     }

@@ -95,6 +95,14 @@ pub struct ToneEstimate {
     pub used: bool,
 }
 
+impl ToneEstimate {
+    /// A curve between black and white, of full scale, with its curvature κ₀ and the standard deviation of that. It is not
+    /// used, and κ₁ is 0.
+    pub fn new([black, white]: [f64; 2], kappa: f64, kappa_deviation: f64) -> Self {
+        Self { black, white, kappa, kappa_deviation, kappa_odd: 0.0, used: false }
+    }
+}
+
 /// Parameters of a curve that is not known.
 pub const TONE_PARAMS: usize = 3;
 

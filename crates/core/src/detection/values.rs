@@ -117,14 +117,16 @@ impl Grid {
     }
 
     /// Expresses positions in px of a level of the pyramid.
-    pub(in crate::detect) fn moved_to_level(&mut self, level: usize) {
+    #[doc(hidden)]
+    pub fn moved_to_level(&mut self, level: usize) {
         for corner in &mut self.corners {
             corner.move_to(Pyramid::from_level_0(level, corner.position()));
         }
     }
 
     /// Undoes [`Self::moved_to_level`], for covariances too.
-    pub(in crate::detect) fn moved_from_level(&mut self, level: usize) {
+    #[doc(hidden)]
+    pub fn moved_from_level(&mut self, level: usize) {
         let area = 4f64.powi(level as i32);
         for corner in &mut self.corners {
             corner.move_to(Pyramid::to_level_0(level, corner.position()));
@@ -165,7 +167,8 @@ impl GridCorner {
     }
 
     /// Changes the position, px.
-    pub(in crate::detect) fn move_to(&mut self, position: DVec2) {
+    #[doc(hidden)]
+    pub fn move_to(&mut self, position: DVec2) {
         (self.x, self.y) = position.into();
     }
 }

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use glam::DVec2;
 
-use crate::detect::Detection;
+use crate::detection::Detection;
 
 /// Corners that moved by less than this part of the picture's width since the picture before are still: less than a
 /// blur of two pixels while a frame of 1280 pixels is exposed for half of the time.
@@ -19,7 +19,8 @@ const FEWEST_CORNERS: usize = 12;
 /// Looks at pictures one after the other.
 ///
 /// ```
-/// use deltille_core::detect::{Detector, DetectorConfig, Watch};
+/// use deltille_detect::{Detector, DetectorConfig};
+/// use deltille_core::detection::Watch;
 /// use deltille_core::lattice::GridKind;
 /// use deltille_core::raster::Gray;
 ///
@@ -91,7 +92,7 @@ fn moved(one: &Places, other: &Places) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::detect::{Grid, GridCorner};
+    use crate::detection::{Grid, GridCorner};
     use crate::lattice::GridKind;
 
     /// A picture of 1000 px with so many corners of a panel, shifted.

@@ -37,15 +37,23 @@ impl<'a> Control<'a> {
         Self { report: Some(report), ..self }
     }
 
-    pub(super) fn is_cancelled(&self) -> bool {
+    /// Whether it was cancelled.
+    pub fn is_cancelled(&self) -> bool {
         self.cancel.is_some_and(|flag| flag.load(Ordering::Relaxed))
     }
 
-    pub(super) fn check(&self) -> Result<(), FamilyError> {
+    /// Whether to go on.
+    ///
+    /// # Errors
+    /// When it was cancelled.
+    #[doc(hidden)]
+    pub fn check(&self) -> Result<(), FamilyError> {
         if self.is_cancelled() { Err(FamilyError::Cancelled) } else { Ok(()) }
     }
 
-    pub(super) fn tell(&self, done: u64, total: u64, codes: usize) {
+    /// Reports progress.
+    #[doc(hidden)]
+    pub fn tell(&self, done: u64, total: u64, codes: usize) {
         if let Some(report) = self.report {
             report(Progress { done, total, codes });
         }

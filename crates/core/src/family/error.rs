@@ -48,7 +48,9 @@ pub enum FamilyError {
 }
 
 impl FamilyError {
-    pub(super) fn field(field: impl Into<String>, problem: impl Into<String>) -> Self {
+    /// A problem of a field.
+    #[doc(hidden)]
+    pub fn field(field: impl Into<String>, problem: impl Into<String>) -> Self {
         Self::Field { field: field.into(), problem: problem.into() }
     }
 

@@ -61,12 +61,7 @@ impl std::str::FromStr for FreeCells {
 
 #[cfg(test)]
 mod tests {
-    use std::sync::atomic::{AtomicUsize, Ordering};
-
     use super::*;
-    use crate::family::check::bounds::bounds;
-    use crate::family::search::best::{Best, Budget};
-    use crate::family::{Control, Decoder, Family, NaturalWords, Progress, Rules, certify};
 
     #[test]
     fn free_cells_are_in_the_middle_and_stay_there() {
@@ -74,42 +69,6 @@ mod tests {
             let (cells, mask) = (TagCells::new(dimension), FreeCells::Centre.mask(dimension));
             assert_eq!(mask.count_ones(), if dimension.bits() % 3 == 0 { 6 } else { 1 });
             assert_eq!(cells.rotate(mask), mask);
-        }
-    }
-
-    /// Codes leave the free cells alone, and are known whatever these show; rates are those of all words.
-    #[test]
-    fn families_with_free_cells_are_read_without_them() {
-        let dimension = Dimension::from_bits(16).unwrap();
-        let rules = Rules { free: Some(FreeCells::Centre), ..Rules::published(5) };
-        let best = Best::new(dimension, 5, Budget::Work(1)).rules(rules);
-        let told = AtomicUsize::new(0);
-        let report = |progress: Progress| {
-            told.fetch_max(progress.codes, Ordering::Relaxed);
-        };
-        let control = Control::default().report(&report);
-        let family = best.family("holed", best.start(), control).unwrap();
-        assert!((1..=family.len()).contains(&told.into_inner()), "only what is found is told");
-        let (free, certificate) = (family.free_cells(), certify(&family));
-        assert!(certificate.holds(), "{:?}", certificate.failures);
-        let of_all = bounds(family.kind(), dimension, 5).linear_programming;
-        assert!(family.bounds().linear_programming < of_all, "a cell less tells less apart");
-        assert!(family.len() >= 30 && family.codes().iter().all(|code| code & free == 0));
-        assert_eq!(Family::from_json(&family.to_json()).unwrap(), family);
-        assert_ne!(
-            Family::from_json(&family.to_json().replace("\"free\"", "\"fre\"")).ok(),
-            Some(family.clone())
-        );
-
-        let (decoder, natural) = (Decoder::new(&family), NaturalWords::new(dimension));
-        let (coins, rates) =
-            (family.false_positive_rates(), family.natural_false_positive_rates().unwrap());
-        for (errors, (coins, rate)) in (0..).zip(coins.into_iter().zip(rates)) {
-            let taken: Vec<u64> =
-                (0..1u64 << 16).filter(|&word| decoder.decode(word, errors).is_some()).collect();
-            let sum: f64 = taken.iter().map(|&word| natural.chance(word)).sum();
-            assert!((rate - sum).abs() < 1e-9 * sum, "{errors}: {rate}, {sum}");
-            assert!((coins * 65536.0 - taken.len() as f64).abs() < 1e-6);
         }
     }
 }

@@ -46,7 +46,7 @@ pub(super) fn first_nearer(word: u32, list: &[u32], distance: u32) -> Option<usi
     "x86_64+avx512f+avx512bw+avx512vl+avx512vpopcntdq+popcnt",
     "x86_64+avx2+popcnt"
 ))]
-pub(super) fn nearer(word: u64, list: &[u64], distance: u32) -> Vec<u32> {
+pub fn nearer(word: u64, list: &[u64], distance: u32) -> Vec<u32> {
     let mut found = Vec::new();
     for (b, block) in list.chunks(64).enumerate() {
         let near =

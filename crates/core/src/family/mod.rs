@@ -24,7 +24,8 @@
 //! The chapters, in the order in which a family comes to be and is used:
 //!
 //! 1. `rules`, `free`: which words may be codes;
-//! 2. [`search`], [`algebra`]: codes by trial, and by construction; `control`: how a search is watched and stopped;
+//! 2. [`lexicode`], [`algebra`]: codes by trial and by construction, as a family file records them; `control`: how a search
+//!    is watched and stopped. The searches are the crate `deltille-search`;
 //! 3. `check`: what is proved of a family, and how it compares with bounds and with pictures of the world;
 //! 4. `tables`: families as files, those that ship, those of other programs;
 //! 5. `decode`: from the cells of a photograph to a tag; [`places`]: the codes that tell a place.
@@ -44,13 +45,15 @@ mod free;
 mod hex;
 mod kernels;
 mod krawtchouk;
+pub mod lexicode;
 pub mod places;
 mod rules;
-pub mod search;
 mod tables;
 
 use std::collections::BTreeMap;
 
+#[doc(hidden)]
+pub use check::bounds::bounds_of_cells;
 pub use check::{
     ACCEPTED_FALSE_POSITIVES, Certificate, Confusion, HiddenCells, NATURAL_FACTOR, NaturalWords,
     Reading, Robust, RuleChoice, TRIANGLES_PER_MEGAPIXEL, ball, best_rule, bounds, certify,
@@ -62,7 +65,6 @@ pub use decode::{Decoded, Decoder, TagWords};
 pub use error::FamilyError;
 pub use free::FreeCells;
 pub use rules::{Rules, Screen};
-pub use search::{best, lexicode};
 pub(crate) use tables::shipped_name;
 pub use tables::{
     Beginning, Construction, ExportFormat, ImportError, ImportSpec, PublishedBounds, SCHEMA,
@@ -70,6 +72,8 @@ pub use tables::{
     shipped_families, shipped_names, smallest_shipped, square_names,
 };
 use tables::{aruco, file, shipped};
+#[doc(hidden)]
+pub use {hex::parse_word, kernels::nearer};
 
 use crate::lattice::{Dimension, GridKind, TagCells};
 

@@ -79,7 +79,7 @@ pub struct Screen {
     words: TagWords,
     distance: u32,
     /// Pairs of adjacent cells that must differ.
-    pub(super) min_pairs: u32,
+    min_pairs: u32,
     black_distance: u32,
     white_distance: u32,
     /// Cells that no code uses.
@@ -130,8 +130,15 @@ impl Screen {
         !self.robust.is_empty()
     }
 
+    /// The fewest pairs of neighbouring cells that differ in a word.
+    #[doc(hidden)]
+    pub fn min_pairs(&self) -> u32 {
+        self.min_pairs
+    }
+
     /// Words that differ in so many cells are far enough apart, wherever these are.
-    pub(super) fn reach(&self) -> u32 {
+    #[doc(hidden)]
+    pub fn reach(&self) -> u32 {
         self.reach
     }
 
@@ -147,7 +154,8 @@ impl Screen {
     }
 
     /// The differences of `distance` cells and more that are too near with hidden cells.
-    pub(super) fn hidden_differences(&self) -> Vec<u64> {
+    #[doc(hidden)]
+    pub fn hidden_differences(&self) -> Vec<u64> {
         let all = self.words.dimension().mask();
         let of_place = |mask: u64, distance: u32| {
             let seen = (0..distance).flat_map(move |ones| scattered(all & !mask, ones));
@@ -164,7 +172,8 @@ impl Screen {
     }
 
     /// Whether a word is far enough from all words of a list.
-    pub(super) fn is_apart_from(&self, word: u64, list: &[u64]) -> bool {
+    #[doc(hidden)]
+    pub fn is_apart_from(&self, word: u64, list: &[u64]) -> bool {
         match self.is_robust() {
             false => !any_nearer(word, list, self.distance),
             true => list.iter().all(|other| self.is_apart(word ^ other)),

@@ -18,5 +18,6 @@ pub use coverage::Coverage;
 pub use gray::{Gray, Intensity};
 pub use luma::grey_of_colours;
 pub use pyramid::{PYRAMID_FULL_SCALE, Pyramid};
-pub(crate) use view::of_any;
+#[doc(hidden)]
+pub use view::of_any;
 pub use view::{ImageView, View};

@@ -124,6 +124,8 @@ pub enum ImageView<'a> {
 }
 
 /// What holds for a view of any depth.
+#[doc(hidden)]
+#[macro_export]
 macro_rules! of_any {
     ($image:expr, $view:ident => $body:expr) => {
         match $image {
@@ -134,7 +136,7 @@ macro_rules! of_any {
         }
     };
 }
-pub(crate) use of_any;
+pub use of_any;
 
 impl ImageView<'_> {
     /// Width in pixels.

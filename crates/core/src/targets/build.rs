@@ -107,7 +107,10 @@ impl Target {
 }
 
 /// The shipped family that a spec names; `None` without tags.
-pub(crate) fn shipped_family(spec: &TargetSpec) -> Result<Option<Family>, TargetError> {
+///
+/// # Errors
+/// Where a family that it names is not shipped.
+pub fn shipped_family(spec: &TargetSpec) -> Result<Option<Family>, TargetError> {
     let shipped = |name: Option<&str>| name.map(Family::shipped).transpose();
     let family = shipped(spec.family())
         .and_then(|family| Ok(Family::paired(family, shipped(spec.square_family())?)));

@@ -85,17 +85,20 @@ pub enum TargetError {
 }
 
 impl TargetError {
-    pub(crate) fn invalid(setting: &'static str, problem: impl Into<String>) -> Self {
+    /// A setting that is refused.
+    #[doc(hidden)]
+    pub fn invalid(setting: &'static str, problem: impl Into<String>) -> Self {
         Self::Invalid { setting, problem: problem.into() }
     }
 }
 
 /// A field, and what is wrong with it.
-pub(crate) type Problem = (String, String);
+pub type Problem = (String, String);
 
-pub(crate) fn problem<T>(
-    field: impl Into<String>,
-    problem: impl Into<String>,
-) -> Result<T, Problem> {
+/// The error of a field.
+///
+/// # Errors
+/// Always.
+pub fn problem<T>(field: impl Into<String>, problem: impl Into<String>) -> Result<T, Problem> {
     Err((field.into(), problem.into()))
 }

@@ -42,13 +42,14 @@ impl Target {
     }
 
     /// Identity of the target as it was printed: of the one from which this target was measured or refined, or its own.
-    pub(crate) fn printed(&self) -> TargetIdentity {
+    #[doc(hidden)]
+    pub fn printed(&self) -> TargetIdentity {
         self.plan.clone().unwrap_or_else(|| self.identity())
     }
 }
 
 /// Fingerprint of the target with these panels.
-pub(crate) fn fingerprint(panels: &[Panel], family: Option<&FamilyRef>) -> Fingerprint {
+pub fn fingerprint(panels: &[Panel], family: Option<&FamilyRef>) -> Fingerprint {
     hash(panels, family, true)
 }
 

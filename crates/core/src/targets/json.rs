@@ -69,7 +69,7 @@ impl Target {
     ///
     /// # Errors
     /// Where it is no target file, of another version, or a field is wrong. The sheets are not looked at, see
-    /// [`Printing::from_json`](crate::layout::Printing::from_json).
+    /// `Printing::from_json` of `deltille-layout`.
     pub fn from_json(text: &str) -> Result<Target, TargetFileError> {
         let (target, _) = read::<IgnoredAny, IgnoredAny, IgnoredAny>(text)?;
         Ok(target)
@@ -90,10 +90,13 @@ impl Target {
 }
 
 /// What a target file says of the print: sheets `S`, a finish `F` and a logo `L`.
-pub(crate) struct Printed<S, F, L> {
+#[doc(hidden)]
+pub struct Printed<S, F, L> {
+    /// Sheets in the order of printing.
     pub sheets: Vec<S>,
     /// `None` where it is plain.
     pub finish: Option<F>,
+    /// `None` where there is none.
     pub logo: Option<L>,
 }
 
@@ -117,7 +120,11 @@ struct TargetFile<S, F, L> {
 }
 
 /// Reads a target, and what its file says of the print.
-pub(crate) fn read<S, F, L>(text: &str) -> Result<(Target, Printed<S, F, L>), TargetFileError>
+///
+/// # Errors
+/// Where the text is no target file, or describes an invalid target.
+#[doc(hidden)]
+pub fn read<S, F, L>(text: &str) -> Result<(Target, Printed<S, F, L>), TargetFileError>
 where
     S: DeserializeOwned,
     F: DeserializeOwned,
@@ -139,7 +146,8 @@ where
 }
 
 /// The text of a target and its print.
-pub(crate) fn write<S: Serialize, F: Serialize, L: Serialize>(
+#[doc(hidden)]
+pub fn write<S: Serialize, F: Serialize, L: Serialize>(
     target: &Target,
     printed: Printed<S, F, L>,
 ) -> String {

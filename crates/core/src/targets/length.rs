@@ -62,7 +62,7 @@ pub fn parse_box_mm(text: &str) -> Result<DVec3, BoxError> {
 pub struct BoxError(pub String);
 
 /// The shortest way to write a length in millimetres, with its unit: `20 mm`, `12.5 mm`.
-pub(crate) fn format_mm(mm: f64) -> String {
+pub fn format_mm(mm: f64) -> String {
     if mm.abs() > 1e9 {
         return format!("{mm:e} mm");
     }

@@ -29,7 +29,6 @@ mod target;
 
 pub use crate::Name;
 pub use crate::identity::{Fingerprint, TargetIdentity, check_result_of, check_same_board};
-pub(crate) use boards::tagged_tiles;
 pub use boards::{
     AprilGridSpec, BORDER_BITS, BoardSpec, CharucoSpec, CirclesSpec, MOST_ROWS, SIDES,
     TagSheetSpec, TagSpec, board_vertices, least_untagged_corners, zigzag_vertices,
@@ -45,5 +44,16 @@ pub use solids::{
     Polyhedron, Skeleton, SkeletonSpec, SolidShape, SolidSpec, is_coordinate, triangles,
 };
 pub use spec::{ListFormat, ListedSpec, TargetSpec};
-pub(crate) use symmetry::symmetries;
 pub use target::Target;
+
+// For the crates above, which lay targets out and detect them.
+#[doc(hidden)]
+pub use {
+    boards::{size_mm, tagged_tiles, untied_panels},
+    build::shipped_family,
+    error::{Problem, problem},
+    identity::fingerprint,
+    length::format_mm,
+    solids::sides,
+    symmetry::symmetries,
+};

@@ -283,7 +283,8 @@ impl Panel {
     }
 
     /// The same in the panel frame, mm.
-    pub(crate) fn tag_middle_mm(&self, tag: &TagPlacement) -> DVec2 {
+    #[doc(hidden)]
+    pub fn tag_middle_mm(&self, tag: &TagPlacement) -> DVec2 {
         let vertices = self.tag_tile(tag).vertices();
         let count = vertices.clone().count() as f64;
         vertices.map(|vertex| self.lattice_mm(vertex)).sum::<DVec2>() / count
@@ -392,7 +393,8 @@ impl Panel {
     }
 
     /// Width of the quiet zone around tiles of a given edge, mm.
-    pub(crate) fn quiet_zone_at_mm(edge_mm: f64) -> f64 {
+    #[doc(hidden)]
+    pub fn quiet_zone_at_mm(edge_mm: f64) -> f64 {
         (QUIET_EDGES * edge_mm).max(QUIET_MIN_MM)
     }
 }

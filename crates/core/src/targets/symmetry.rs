@@ -32,10 +32,7 @@ impl Panel {
 }
 
 /// The same of corners at these vertices.
-pub(crate) fn symmetries(
-    kind: GridKind,
-    vertices: impl IntoIterator<Item = Vertex>,
-) -> Vec<LatticeMap> {
+pub fn symmetries(kind: GridKind, vertices: impl IntoIterator<Item = Vertex>) -> Vec<LatticeMap> {
     let vertices: BTreeSet<Vertex> = vertices.into_iter().collect();
     let of_turns = |turns: i32| {
         let turned = LatticeMap::new(kind, turns, Vertex::new(0, 0));

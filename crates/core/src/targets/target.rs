@@ -65,13 +65,15 @@ impl Target {
     }
 
     /// Its panels of a tiling alone.
-    pub(crate) fn of_tiling(&self, kind: GridKind) -> Self {
+    #[doc(hidden)]
+    pub fn of_tiling(&self, kind: GridKind) -> Self {
         let panels = self.panels.iter().filter(|panel| panel.kind == kind).cloned().collect();
         Self { panels, ..self.clone() }
     }
 
     /// The ids of its tags in tiles of a kind, and their family.
-    pub(crate) fn tags_of_tiling(&self, kind: GridKind) -> Option<(&FamilyRef, Vec<u32>)> {
+    #[doc(hidden)]
+    pub fn tags_of_tiling(&self, kind: GridKind) -> Option<(&FamilyRef, Vec<u32>)> {
         let own = self.panels.iter().filter(|panel| panel.kind == kind);
         let ids = own.flat_map(|panel| &panel.tags).map(|tag| tag.id).collect();
         Some((self.family.as_ref()?.of_tiling(kind), ids))

@@ -8,8 +8,9 @@ use glam::DVec2;
 use multiversion::multiversion;
 use nalgebra::DMatrix;
 
-use crate::detect::lanes::{self, LANES};
-use crate::raster::{ImageView, Intensity, View, of_any};
+use crate::lanes;
+use crate::lanes::LANES;
+use deltille_core::raster::{ImageView, Intensity, View, of_any};
 
 /// Powers (i, j) of a monomial uⁱvʲ.
 pub type Powers = (i32, i32);

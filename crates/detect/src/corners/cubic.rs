@@ -13,7 +13,7 @@ use glam::DVec2;
 use nalgebra::{Matrix3x2, Vector3};
 
 use super::cone_fit::{ConeFit, Powers};
-use crate::raster::ImageView;
+use deltille_core::raster::ImageView;
 
 /// Number of coefficients kept: c1 … c7; slopes and level do not move the corner.
 const KEPT: usize = 7;
@@ -129,7 +129,7 @@ impl CubicFit {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::raster::Gray;
+    use deltille_core::raster::Gray;
 
     /// x³ − 3xy² about (cx, cy), plus slopes and a level that must not matter.
     fn monkey_saddle(cx: f64, cy: f64) -> Gray<f32> {

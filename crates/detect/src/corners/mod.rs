@@ -8,11 +8,11 @@
 //! 3. `sectors` reads the six or four half-edges with their colours.
 //! 4. `saddles` runs these over all levels of the pyramid and merges what is found twice (`buckets`).
 
-pub(in crate::detect) mod buckets;
-pub(in crate::detect) mod cone_fit;
-pub(in crate::detect) mod cubic;
-pub(in crate::detect) mod polynomial;
-pub(in crate::detect) mod quadric;
-pub(in crate::detect) mod ring;
-pub(in crate::detect) mod saddles;
-pub(in crate::detect) mod sectors;
+pub(crate) mod buckets;
+pub(crate) mod cone_fit;
+pub(crate) mod cubic;
+pub(crate) mod polynomial;
+pub(crate) mod quadric;
+pub(crate) mod ring;
+pub(crate) mod saddles;
+pub(crate) mod sectors;

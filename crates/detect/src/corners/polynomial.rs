@@ -5,8 +5,8 @@ use glam::DVec2;
 
 use super::cubic::{CubicFit, Umbilic};
 use super::quadric::{QuadricFit, QuadricSaddle};
-use crate::lattice::GridKind;
-use crate::raster::ImageView;
+use deltille_core::lattice::GridKind;
+use deltille_core::raster::ImageView;
 
 /// Most iterations of the fits; the reference detector's.
 const CUBIC_ITERATIONS: usize = 5;
@@ -122,7 +122,7 @@ impl Polynomial {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::raster::Gray;
+    use deltille_core::raster::Gray;
 
     #[test]
     fn forms_are_bright_where_the_image_is() {

@@ -10,7 +10,7 @@
 use glam::DVec2;
 
 use super::cone_fit::{ConeFit, Powers};
-use crate::raster::ImageView;
+use deltille_core::raster::ImageView;
 
 /// Monomials in the order of the coefficients.
 const MONOMIALS: [Powers; 6] = [(2, 0), (1, 1), (0, 2), (1, 0), (0, 1), (0, 0)];
@@ -92,7 +92,7 @@ fn stationary_point([c1, c2, c3, c4, c5]: [f64; 5]) -> Option<DVec2> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::raster::Gray;
+    use deltille_core::raster::Gray;
 
     fn surface(form: impl Fn(f32, f32) -> f32) -> Gray<f32> {
         Gray::from_fn(40, 40, |x, y| form(x as f32 - 20.3, y as f32 - 18.9))

@@ -45,9 +45,9 @@ use std::ops::Range;
 
 use multiversion::multiversion;
 
-use crate::detect::tiling::kind;
-use crate::lattice::GridKind;
-use crate::raster::{Gray, bands};
+use crate::tiling::kind;
+use deltille_core::lattice::GridKind;
+use deltille_core::raster::{Gray, bands};
 
 /// Offsets of half the ring, near 0°, 30°, …, 150°; the other half is opposite. Radius 3.6 to 4 px:
 /// the smallest ring on which the twelve directions stay within 4° of multiples of 30°, so that it
@@ -587,7 +587,7 @@ mod tests {
     use rand_chacha::ChaCha8Rng;
 
     use super::*;
-    use crate::raster::Pyramid;
+    use deltille_core::raster::Pyramid;
 
     /// Sectors of 50 and 200, meeting at (cx, cy), turned by `angle`.
     fn star(cx: f64, cy: f64, angle: f64, sectors: f64) -> Gray<i16> {

@@ -6,9 +6,9 @@ use super::buckets::Buckets;
 use super::polynomial::{FittedCorner, Polynomial};
 use super::ring::{Candidate, candidates, maxima_near};
 use super::sectors::{Sectors, contrast_around};
-use crate::detect::tiling::kind;
-use crate::lattice::GridKind;
-use crate::raster::{Gray, Pyramid};
+use crate::tiling::kind;
+use deltille_core::lattice::GridKind;
+use deltille_core::raster::{Gray, Pyramid};
 
 /// Radii of the fits, px. The middle one decides what is a corner; the reference detector's choice.
 const FIT_RADII: [usize; 3] = [2, 3, 4];

@@ -24,9 +24,9 @@ use glam::DVec2;
 use multiversion::multiversion;
 
 use super::polynomial::Form;
-use crate::detect::tiling::kind;
-use crate::lattice::GridKind;
-use crate::raster::Gray;
+use crate::tiling::kind;
+use deltille_core::lattice::GridKind;
+use deltille_core::raster::Gray;
 
 /// Samples on a circle. A sector seen at 75° is 17° wide; 7.5° steps put two samples into it.
 const SAMPLES: usize = 48;

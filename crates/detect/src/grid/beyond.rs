@@ -21,11 +21,11 @@ use std::collections::BTreeMap;
 use glam::DVec2;
 
 use super::checker_tiles::{CheckerTiles, Point, Square, moved};
-use crate::detect::corners::buckets::Buckets;
-use crate::detect::detection::values::Grid;
-use crate::detect::tiling::{CHECKER, step};
-use crate::lattice::{GridKind, Vertex};
-use crate::raster::Gray;
+use crate::corners::buckets::Buckets;
+use crate::tiling::{CHECKER, step};
+use deltille_core::detection::Grid;
+use deltille_core::lattice::{GridKind, Vertex};
+use deltille_core::raster::Gray;
 
 /// Largest part of the pairs of squares beyond a board that differ as black and white do.
 const MOST_DIFFERENT: f64 = 0.2;
@@ -167,7 +167,7 @@ fn times(step: Vertex, count: i32) -> Vertex {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::detect::GridCorner;
+    use deltille_core::detection::GridCorner;
 
     const EDGE_PX: f64 = 20.0;
 

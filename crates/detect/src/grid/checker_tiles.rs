@@ -4,11 +4,11 @@ use std::collections::BTreeMap;
 
 use glam::DVec2;
 
-use crate::detect::detection::values::Grid;
-use crate::detect::tiling::{CHECKER, step};
-use crate::lattice::Vertex;
-use crate::raster::ImageView;
-use crate::statistics::median;
+use crate::tiling::{CHECKER, step};
+use deltille_core::detection::Grid;
+use deltille_core::lattice::Vertex;
+use deltille_core::raster::ImageView;
+use deltille_core::statistics::median;
 
 /// Squares are sampled in the middle and at so many edges from it along rows and columns: on a dot that
 /// is much smaller than its square too.
@@ -65,7 +65,8 @@ pub struct CheckerTiles<'a> {
 
 impl<'a> CheckerTiles<'a> {
     pub fn of(image: ImageView<'a>, grid: &Grid) -> Self {
-        let corner = |c: &crate::detect::GridCorner| (Vertex::new(c.row, c.col), c.position());
+        let corner =
+            |c: &deltille_core::detection::GridCorner| (Vertex::new(c.row, c.col), c.position());
         Self { image, corners: grid.corners.iter().map(corner).collect() }
     }
 

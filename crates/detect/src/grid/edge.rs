@@ -2,11 +2,11 @@
 
 use glam::DVec2;
 
-use crate::detect::corners::saddles::Saddle;
-use crate::detect::corners::sectors::turn;
-use crate::detect::tiling::kind;
-use crate::lattice::GridKind;
-use crate::raster::Pyramid;
+use crate::corners::saddles::Saddle;
+use crate::corners::sectors::turn;
+use crate::tiling::kind;
+use deltille_core::lattice::GridKind;
+use deltille_core::raster::Pyramid;
 
 /// Largest angle between the chord of an edge and the rays at its ends. Over one tile a fisheye
 /// bends an edge by up to 20°, half of it at either end; the rays add a few degrees of noise.
@@ -151,8 +151,8 @@ fn is_clean_along<const N: usize>(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::detect::corners::sectors::Sectors;
-    use crate::raster::Gray;
+    use crate::corners::sectors::Sectors;
+    use deltille_core::raster::Gray;
 
     /// Dark above the arc y = 50 + bulge, bright below; corners at x = 20 and x = 80.
     fn scene(bulge: f64) -> (Gray<u16>, Saddle<6>, Saddle<6>) {

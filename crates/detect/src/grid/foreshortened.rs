@@ -17,9 +17,9 @@ use rayon::prelude::*;
 
 use super::grow::grids;
 use super::saddle_grid::SaddleGrid;
-use crate::detect::corners::saddles::{SaddleFinder, is_all_noise};
-use crate::detect::levels::MIN_LEVEL_SIDE;
-use crate::raster::{Gray, Pyramid};
+use crate::corners::saddles::{SaddleFinder, is_all_noise};
+use crate::levels::MIN_LEVEL_SIDE;
+use deltille_core::raster::{Gray, Pyramid};
 
 /// Directions in a half-turn: none is more than 15° from one of them, where half the width leaves tiles that are four
 /// times as wide as high as if they were 2.4 times.

@@ -8,7 +8,7 @@
 //! the square up and right is dark.
 //!
 //! Every grid has a lattice frame of its own, known up to a motion of the lattice;
-//! [`label`](crate::detect::labels::evidence) finds what it is on the target.
+//! [`label`](crate::labels::evidence) finds what it is on the target.
 
 use std::collections::{BTreeMap, BTreeSet, HashSet, VecDeque};
 
@@ -22,12 +22,12 @@ use super::outline::WholeBoard;
 use super::parts::join;
 use super::rectified::Rectified;
 use super::saddle_grid::{Growing, GrownSaddle, PlacedSaddle, SaddleGrid};
-use crate::detect::corners::buckets::Buckets;
-use crate::detect::corners::saddles::{Saddle, SaddleFinder, merge_px, too_many};
-use crate::detect::corners::sectors::turn;
-use crate::detect::tiling::{kind, neighbours, step, tiles_from};
-use crate::lattice::{GridKind, Vertex};
-use crate::raster::Pyramid;
+use crate::corners::buckets::Buckets;
+use crate::corners::saddles::{Saddle, SaddleFinder, merge_px, too_many};
+use crate::corners::sectors::turn;
+use crate::tiling::{kind, neighbours, step, tiles_from};
+use deltille_core::lattice::{GridKind, Vertex};
+use deltille_core::raster::Pyramid;
 
 /// Greatest distance of a missing corner from the position that its neighbours predict, as a fraction
 /// of the edge length there.
@@ -509,8 +509,8 @@ mod tests {
     use proptest::prelude::*;
 
     use super::*;
-    use crate::detect::tiling::{CHECKER, DELTILLE};
-    use crate::lattice::GridKind;
+    use crate::tiling::{CHECKER, DELTILLE};
+    use deltille_core::lattice::GridKind;
 
     /// A lattice of rows and columns about a place, with edges of this length, px.
     fn lattice(kind: GridKind, side: i32, origin: [f64; 2], edge_px: f64) -> SaddleGrid {

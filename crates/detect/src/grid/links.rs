@@ -4,9 +4,9 @@ use glam::DVec2;
 
 use super::edge::{MAX_CHORD_RAD, is_clean};
 use super::places::Places;
-use crate::detect::corners::saddles::Saddle;
-use crate::detect::corners::sectors::turn;
-use crate::raster::Pyramid;
+use crate::corners::saddles::Saddle;
+use crate::corners::sectors::turn;
+use deltille_core::raster::Pyramid;
 
 /// Nearest corners of like contrast looked at: up to six neighbours, the twelve behind them, and as many strangers.
 const NEAREST: usize = 36;

@@ -17,8 +17,8 @@ use std::sync::LazyLock;
 use glam::DVec2;
 use nalgebra::{Matrix6, Vector6};
 
-use crate::detect::tiling::kind;
-use crate::lattice::{GridKind, Vertex};
+use crate::tiling::kind;
+use deltille_core::lattice::{GridKind, Vertex};
 
 /// Second derivatives in edges of a grid that shows none: over one tile a steep view or a wide lens changes
 /// the next edge by so much, one deviation.

@@ -10,17 +10,17 @@
 //! 5. `outline` fits a board that is seen whole; `beyond` refuses checkerboards without tags whose pattern continues where they
 //!    end, `tile_shape` those whose tiles (`checker_tiles`) are not squares.
 
-pub(in crate::detect) mod beyond;
-pub(in crate::detect) mod checker_tiles;
-pub(in crate::detect) mod edge;
-pub(in crate::detect) mod effort;
-pub(in crate::detect) mod foreshortened;
-pub(in crate::detect) mod grow;
-pub(in crate::detect) mod links;
-pub(in crate::detect) mod local_map;
-pub(in crate::detect) mod outline;
-pub(in crate::detect) mod parts;
-pub(in crate::detect) mod places;
-pub(in crate::detect) mod rectified;
-pub(in crate::detect) mod saddle_grid;
-pub(in crate::detect) mod tile_shape;
+pub(crate) mod beyond;
+pub(crate) mod checker_tiles;
+pub(crate) mod edge;
+pub(crate) mod effort;
+pub(crate) mod foreshortened;
+pub(crate) mod grow;
+pub(crate) mod links;
+pub(crate) mod local_map;
+pub(crate) mod outline;
+pub(crate) mod parts;
+pub(crate) mod places;
+pub(crate) mod rectified;
+pub(crate) mod saddle_grid;
+pub(crate) mod tile_shape;

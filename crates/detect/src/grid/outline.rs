@@ -5,7 +5,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use glam::DVec2;
 
 use super::saddle_grid::SaddleGrid;
-use crate::lattice::{GridKind, LatticeMap, Vertex};
+use deltille_core::lattice::{GridKind, LatticeMap, Vertex};
 
 /// All corners of the one board that is looked for.
 #[derive(Clone, Debug)]
@@ -111,7 +111,7 @@ mod tests {
     use proptest::prelude::*;
 
     use super::*;
-    use crate::detect::grid::saddle_grid::PlacedSaddle;
+    use crate::grid::saddle_grid::PlacedSaddle;
 
     /// A board seen upright: the lower left vertex of the print is `low`, one pixel a column.
     fn board(rows: i32, cols: i32, low: Vertex, turns: u8) -> SaddleGrid {

@@ -15,12 +15,12 @@ use super::effort::Effort;
 use super::links::MAX_CONTRAST_RATIO;
 use super::local_map::{Bend, LocalMap};
 use super::saddle_grid::{Growing, GrownSaddle};
-use crate::detect::corners::buckets::Buckets;
-use crate::detect::corners::saddles::Saddle;
-use crate::detect::corners::sectors::turn;
-use crate::detect::tiling::{kind, neighbours, step};
-use crate::lattice::{GridKind, LatticeMap, Vertex};
-use crate::raster::Pyramid;
+use crate::corners::buckets::Buckets;
+use crate::corners::saddles::Saddle;
+use crate::corners::sectors::turn;
+use crate::tiling::{kind, neighbours, step};
+use deltille_core::lattice::{GridKind, LatticeMap, Vertex};
+use deltille_core::raster::Pyramid;
 
 /// Greatest distance of a vertex from the corners of a grid, in edges of the map: farther away the
 /// map predicts next to nothing.

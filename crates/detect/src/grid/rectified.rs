@@ -16,9 +16,9 @@ use std::f64::consts::TAU;
 use glam::DVec2;
 use nalgebra::{Matrix2, Vector2};
 
-use crate::detect::corners::saddles::{Saddle, SaddleFinder};
-use crate::detect::corners::sectors::Sectors;
-use crate::raster::{Gray, Pyramid};
+use crate::corners::saddles::{Saddle, SaddleFinder};
+use crate::corners::sectors::Sectors;
+use deltille_core::raster::{Gray, Pyramid};
 
 /// Lengths of an edge in the patch, px, in the order of trial: the widest fit of the finder reaches eight and
 /// stays within the tiles around the corner, and the usual one within what tags leave clear of a longer edge.

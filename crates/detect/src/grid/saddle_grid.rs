@@ -4,8 +4,8 @@ use std::collections::BTreeMap;
 
 use glam::DVec2;
 
-use crate::detect::corners::saddles::Saddle;
-use crate::lattice::Vertex;
+use crate::corners::saddles::Saddle;
+use deltille_core::lattice::Vertex;
 
 /// A corner of either tiling, as later stages need it.
 #[derive(Clone, Copy, Debug, PartialEq)]

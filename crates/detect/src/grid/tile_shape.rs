@@ -19,9 +19,9 @@
 use std::collections::BTreeSet;
 
 use super::checker_tiles::{CheckerTiles, Point, Square, parity};
-use crate::detect::detection::values::Grid;
-use crate::lattice::{GridKind, Vertex};
-use crate::raster::ImageView;
+use deltille_core::detection::Grid;
+use deltille_core::lattice::{GridKind, Vertex};
+use deltille_core::raster::ImageView;
 
 /// The least board, of 3 × 3 corners, has so many whole squares.
 const LEAST_SQUARES: usize = 4;

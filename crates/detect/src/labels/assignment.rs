@@ -9,15 +9,15 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use super::evidence::{Budget, Labelled, TagLabeller};
 use super::why;
-use crate::detect::config::DetectorConfig;
-use crate::detect::detection::reason::{Reason, ReasonKind};
-use crate::detect::detection::values::{DecodedTag, Grid, GridCorner};
-use crate::detect::grid::outline::{WholeBoard, fit_outline, fit_rectangle};
-use crate::detect::grid::saddle_grid::{SaddleGrid, mirror_image, mirrored};
-use crate::family::Family;
-use crate::lattice::{GridKind, LatticeMap, Vertex};
-use crate::raster::ImageView;
-use crate::targets::{Target, board_vertices};
+use crate::config::DetectorConfig;
+use crate::grid::outline::{WholeBoard, fit_outline, fit_rectangle};
+use crate::grid::saddle_grid::{SaddleGrid, mirror_image, mirrored};
+use deltille_core::detection::{DecodedTag, Grid, GridCorner};
+use deltille_core::detection::{Reason, ReasonKind};
+use deltille_core::family::Family;
+use deltille_core::lattice::{GridKind, LatticeMap, Vertex};
+use deltille_core::raster::ImageView;
+use deltille_core::targets::{Target, board_vertices};
 
 /// A grid of corners without labels, and its tiling.
 #[derive(Clone, Copy, Debug)]
@@ -63,7 +63,7 @@ struct TargetPanel {
 
 /// More corners than any board has: of 140 × 140 every one would have 14 px in a picture of 4 megapixels. Fabrics and
 /// grids on screens have more, and made-up pictures so many that to refine them takes minutes.
-pub(in crate::detect) const MOST_CORNERS: usize = 20_000;
+pub(crate) const MOST_CORNERS: usize = 20_000;
 
 impl Labels {
     /// By the rows and columns of an untagged board, where they are known.
@@ -246,7 +246,7 @@ fn in_mirror(found: FoundGrid) -> (Grid, Option<Reason>) {
 
 /// Leaves out of grids of one panel what a larger one, which comes before, has already: beside a tag of
 /// few pixels corners may be found twice, a pixel apart. What is a whole edge apart is told.
-pub(in crate::detect) fn report_once(grids: &mut Vec<(Grid, Option<Reason>)>) -> Option<Reason> {
+pub(crate) fn report_once(grids: &mut Vec<(Grid, Option<Reason>)>) -> Option<Reason> {
     let (mut corners, mut tags) = (BTreeMap::new(), BTreeSet::new());
     let mut elsewhere = 0;
     grids.retain_mut(|(grid, _)| {

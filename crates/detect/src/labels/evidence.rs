@@ -52,13 +52,13 @@ use std::collections::{BTreeMap, BTreeSet, HashMap};
 
 use super::tag_words::TargetWords;
 use super::tags::{Read, Reading, TagPlace, TagReader};
-use crate::detect::detection::values::DecodedTag;
-use crate::detect::grid::saddle_grid::{SaddleGrid, mirrored};
-use crate::family::{Decoder, Family, NaturalWords};
-use crate::lattice::{GridKind, LatticeMap, Orientation, Tile, Vertex};
-use crate::raster::ImageView;
-use crate::statistics::median;
-use crate::targets::{Panel, TagsIn, Target};
+use crate::grid::saddle_grid::{SaddleGrid, mirrored};
+use deltille_core::detection::DecodedTag;
+use deltille_core::family::{Decoder, Family, NaturalWords};
+use deltille_core::lattice::{GridKind, LatticeMap, Orientation, Tile, Vertex};
+use deltille_core::raster::ImageView;
+use deltille_core::statistics::median;
+use deltille_core::targets::{Panel, TagsIn, Target};
 
 /// Probability that a tag is hidden or spoiled, so that its tile has no information.
 const SPOILT: f64 = 1.0 / 16.0;
@@ -893,9 +893,9 @@ mod tests {
     use rayon::prelude::*;
 
     use super::*;
-    use crate::detect::grid::saddle_grid::PlacedSaddle;
-    use crate::family::{shipped_names, square_names};
-    use crate::targets::{BoardSpec, SolidShape, SolidSpec, TagSpec, TargetSpec};
+    use crate::grid::saddle_grid::PlacedSaddle;
+    use deltille_core::family::{shipped_names, square_names};
+    use deltille_core::targets::{BoardSpec, SolidShape, SolidSpec, TagSpec, TargetSpec};
 
     /// Noise, of full scale, at which more than a tenth of the cells of four pixels a bit are taken for the other.
     const NOISE_OF_A_TENTH: f64 = 0.335;
@@ -1133,8 +1133,8 @@ mod tests {
     fn what_natural_pictures_show_labels_nothing_alone() {
         let complex = Family::shipped("d36h9").unwrap();
         let codes = [&[0xf_0000_0000], &complex.codes()[..20]].concat();
-        let source = crate::family::Construction::Imported { source: "here".to_owned() };
-        let rules = crate::family::Rules::NONE;
+        let source = deltille_core::family::Construction::Imported { source: "here".to_owned() };
+        let rules = deltille_core::family::Rules::NONE;
         let family = Family::new("plain", complex.dimension(), 9, codes.clone(), rules, source);
         let family = family.unwrap();
         let target = board(&family, 0).unwrap();
@@ -1272,9 +1272,9 @@ mod tests {
         let family = Family::shipped("d36h11").unwrap();
         let target = board(&family, 0).unwrap();
         let labeller = TagLabeller::new(&target, &family, None).unwrap();
-        let scene = crate::synth::scene_of_target(&target, Some(&family)).unwrap();
+        let scene = deltille_layout::synth::scene_of_target(&target, Some(&family)).unwrap();
         let panel = &target.panels[0];
-        let camera = crate::camera::Camera::pinhole(160, 160, 0.3);
+        let camera = deltille_core::camera::Camera::pinhole(160, 160, 0.3);
         let bits_across = family.cells().width(panel.tag_inset_bits());
         let distance_mm = camera.focal_px.x * panel.edge_mm / bits_across / 4.0;
         let mut seen = NoisyTags::default();
@@ -1292,8 +1292,8 @@ mod tests {
             let roll: f64 = rng.random_range(0.0..std::f64::consts::TAU);
             let up = DVec3::new(roll.cos(), roll.sin(), 0.0);
             let eye = centre + distance_mm * DVec3::new(0.1, 0.05, 1.0);
-            let pose = crate::camera::Pose::looking_at(eye, centre, up);
-            let light = crate::synth::Light { noise, seed, ..Default::default() };
+            let pose = deltille_core::camera::Pose::looking_at(eye, centre, up);
+            let light = deltille_layout::synth::Light::default().noise(noise).seed(seed);
             let image = scene.render(&camera, &pose, &light);
             let grid: SaddleGrid = scene
                 .truth(&camera, &pose, 0.0)

@@ -18,10 +18,10 @@ use std::collections::BTreeMap;
 use glam::DVec2;
 use nalgebra::{Matrix3, Vector3};
 
-use crate::detect::grid::saddle_grid::SaddleGrid;
-use crate::detect::refine::blurred_corner::erf_sqrt_half;
-use crate::lattice::{GridKind, Tile, Vertex};
-use crate::raster::ImageView;
+use crate::grid::saddle_grid::SaddleGrid;
+use crate::refine::blurred_corner::erf_sqrt_half;
+use deltille_core::lattice::{GridKind, Tile, Vertex};
+use deltille_core::raster::ImageView;
 
 /// Samples across an edge.
 const ACROSS: usize = 13;

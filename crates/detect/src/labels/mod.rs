@@ -8,11 +8,11 @@
 //! 4. `evidence` lets all tiles decide together where the grid lies on the target.
 //! 5. `assignment` gives the labels to the grids, by tags or by an outline; `why` finds the reason where there are none.
 
-pub(in crate::detect) mod assignment;
-pub(in crate::detect) mod evidence;
-pub(in crate::detect) mod grid_light;
-pub(in crate::detect) mod soft_cells;
-pub(in crate::detect) mod tag_words;
-pub(in crate::detect) mod tags;
-pub(in crate::detect) mod tile_map;
-pub(in crate::detect) mod why;
+pub(crate) mod assignment;
+pub(crate) mod evidence;
+pub(crate) mod grid_light;
+pub(crate) mod soft_cells;
+pub(crate) mod tag_words;
+pub(crate) mod tags;
+pub(crate) mod tile_map;
+pub(crate) mod why;

@@ -25,8 +25,8 @@ use std::rc::Rc;
 use glam::DVec2;
 use nalgebra::{DMatrix, Matrix2};
 
-use crate::detect::refine::blurred_corner::erf_sqrt_half;
-use crate::lattice::{GridKind, TagCells};
+use crate::refine::blurred_corner::erf_sqrt_half;
+use deltille_core::lattice::{GridKind, TagCells};
 
 /// A triangle is divided into 3² parts, of which a square has two.
 const DIVISIONS: usize = 3;
@@ -365,7 +365,7 @@ mod tests {
     use rand_distr::{Distribution, StandardNormal};
 
     use super::*;
-    use crate::lattice::Dimension;
+    use deltille_core::lattice::Dimension;
 
     const MARGIN_BITS: f64 = 0.5;
     const INSET_BITS: f64 = 1.5;

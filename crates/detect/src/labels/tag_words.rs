@@ -1,6 +1,6 @@
 //! The words that the tags of a target may show, and what a tile's cells say about each.
 
-use crate::family::Family;
+use deltille_core::family::Family;
 
 /// How many codes the cells' frequencies in the family count for, against those of the target.
 const FAMILY_WEIGHT: f64 = 16.0;

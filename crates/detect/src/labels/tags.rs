@@ -7,11 +7,11 @@ use glam::DVec2;
 use super::grid_light::{ClearDepth, GridLight};
 use super::soft_cells::{CellModel, Mixings, Sample, TileBlur, in_tile};
 use super::tile_map::TileMap;
-use crate::detect::grid::saddle_grid::SaddleGrid;
-use crate::family::Family;
-use crate::lattice::{GridKind, Tile, Vertex};
-use crate::raster::ImageView;
-use crate::targets::{Panel, TagsIn};
+use crate::grid::saddle_grid::SaddleGrid;
+use deltille_core::family::Family;
+use deltille_core::lattice::{GridKind, Tile, Vertex};
+use deltille_core::raster::ImageView;
+use deltille_core::targets::{Panel, TagsIn};
 
 /// The contrast at the edges of a tile must be this part of that at its corners.
 const MIN_CONTRAST: f64 = 0.4;
@@ -162,7 +162,7 @@ impl TagReader {
                 bits_px.push(bit_px);
             }
         }
-        let bit_px = crate::statistics::median(bits_px).unwrap_or(0.0);
+        let bit_px = deltille_core::statistics::median(bits_px).unwrap_or(0.0);
         Read { readings, bit_px, blur_px: light.blur_px() }
     }
 
@@ -255,21 +255,21 @@ impl TagReader {
 fn corner_contrast(image: ImageView, grid: &SaddleGrid, tile: Tile) -> f64 {
     let amplitudes = tile.vertices().filter_map(|v| grid.get(&v));
     let least = amplitudes.map(|p| p.amplitude).fold(f64::INFINITY, f64::min);
-    2.0 * least * f64::from(image.full_scale() / crate::raster::PYRAMID_FULL_SCALE)
+    2.0 * least * f64::from(image.full_scale() / deltille_core::raster::PYRAMID_FULL_SCALE)
 }
 
 #[cfg(test)]
 mod tests {
     use glam::DVec3;
 
-    use crate::artwork;
-    use crate::camera::{Camera, Pose};
-    use crate::detect::{Detector, DetectorConfig};
-    use crate::family::{Construction, Family, FreeCells, Rules};
-    use crate::lattice::GridKind;
-    use crate::layout::{PaperSpec, Printing};
-    use crate::synth::{Light, scene_of_sheet};
-    use crate::targets::{BoardSpec, TagSpec, TargetSpec};
+    use crate::{Detector, DetectorConfig};
+    use deltille_core::camera::{Camera, Pose};
+    use deltille_core::family::{Construction, Family, FreeCells, Rules};
+    use deltille_core::lattice::GridKind;
+    use deltille_core::targets::{BoardSpec, TagSpec, TargetSpec};
+    use deltille_layout::artwork;
+    use deltille_layout::synth::{Light, scene_of_sheet};
+    use deltille_layout::{PaperSpec, Printing};
 
     /// Ids of the tags that are read of a board of 8 × 10 corners, each with the number of its wrong cells.
     fn read_back(board: &Printing, printed: &Family, family: &Family) -> Vec<(u32, u32)> {

@@ -1,8 +1,8 @@
 use glam::DVec2;
 use nalgebra::{RowVector2, SMatrix, SVector};
 
-use crate::detect::grid::saddle_grid::SaddleGrid;
-use crate::lattice::{Tile, Vertex};
+use crate::grid::saddle_grid::SaddleGrid;
+use deltille_core::lattice::{Tile, Vertex};
 
 /// Weight of a tile's own corners in the fit; the surroundings only bend the map.
 const OWN_WEIGHT: f64 = 8.0;
@@ -102,8 +102,8 @@ fn tile_coordinates([a, b, _]: [Vertex; 3], vertex: Vertex) -> DVec2 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::detect::grid::saddle_grid::PlacedSaddle;
-    use crate::lattice::GridKind;
+    use crate::grid::saddle_grid::PlacedSaddle;
+    use deltille_core::lattice::GridKind;
 
     /// Tiles of an AprilGrid, seen straight: the middle of each is in its middle, at the rim of the grid too.
     #[test]

@@ -3,11 +3,11 @@
 use glam::DVec2;
 
 use super::evidence::TagEvidence;
-use crate::detect::detection::reason::{Reason, ReasonKind};
-use crate::detect::grid::saddle_grid::SaddleGrid;
-use crate::lattice::GridKind;
-use crate::raster::{Gray, PYRAMID_FULL_SCALE, Pyramid};
-use crate::statistics::median;
+use crate::grid::saddle_grid::SaddleGrid;
+use deltille_core::detection::{Reason, ReasonKind};
+use deltille_core::lattice::GridKind;
+use deltille_core::raster::{Gray, PYRAMID_FULL_SCALE, Pyramid};
+use deltille_core::statistics::median;
 
 /// A picture whose brightest pixels are under this part of full scale is too dark to show a board in
 /// more than a dozen grey levels.

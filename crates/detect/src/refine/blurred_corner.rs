@@ -400,7 +400,7 @@ fn bell(h: f32) -> f32 {
 
 /// erf(h/√2), by Abramowitz and Stegun 7.1.26; error below 2·10⁻⁷.
 #[inline(always)]
-pub(in crate::detect) fn erf_sqrt_half(h: f32) -> f32 {
+pub(crate) fn erf_sqrt_half(h: f32) -> f32 {
     let t = 1.0 / (1.0 + 0.327_591_1 * FRAC_1_SQRT_2 * h.abs());
     let poly = t
         * (0.254_829_6

@@ -14,12 +14,12 @@ use std::f64::consts::PI;
 
 use glam::{DMat2, DVec2};
 
-use crate::detect::detection::values::{Grid, GridCorner};
-use crate::detect::grid::local_map::{Bend, LocalMap};
-use crate::detect::tiling::{CHECKER, DELTILLE};
-use crate::family::Family;
-use crate::lattice::{GridKind, Tile, Vertex};
-use crate::targets::{Panel, TagsIn, Target};
+use crate::grid::local_map::{Bend, LocalMap};
+use crate::tiling::{CHECKER, DELTILLE};
+use deltille_core::detection::{Grid, GridCorner};
+use deltille_core::family::Family;
+use deltille_core::lattice::{GridKind, Tile, Vertex};
+use deltille_core::targets::{Panel, TagsIn, Target};
 
 /// Distance to be kept from other edges, in standard deviations of the blur: beyond it, an edge
 /// changes grey values by less than 2.5 % of its contrast.

@@ -12,7 +12,7 @@
 //! position is where they would meet on a print without. Of two edges the halves move against each other, and the corner stays.
 //!
 //! T is the camera's tone curve between the corner's black and white, r the sum of their light over
-//! its difference ([`crate::detect::detection::tone`]); of a linear camera T(S) = S and I = (level + amplitude·f)·g.
+//! its difference ([`deltille_core::detection::tone`]); of a linear camera T(S) = S and I = (level + amplitude·f)·g.
 //! M, of trace 2, tells in which direction the picture is blurred more; where it moved, by a box. Both, and
 //! halos in f, are the same all over a picture and given: [`super::optics`]. What is brighter than white or
 //! darker than black is seen as these; where pixels are, the model ends there too, so that they only count
@@ -38,9 +38,9 @@ use super::blurred_corner::{
 use super::correlation::Influence;
 use super::optics::{INK_UNIT, Optics, PARAMS as COMMON_PARAMS, STEP, Spread};
 use super::small_systems::solved;
-use crate::detect::detection::tone::{Piece, TONE_PARAMS};
-use crate::detect::lanes::LANES;
-use crate::raster::ImageView;
+use crate::lanes::LANES;
+use deltille_core::detection::{Piece, TONE_PARAMS};
+use deltille_core::raster::ImageView;
 
 /// Largest radius of a window, px.
 pub const MAX_RADIUS: usize = 15;
@@ -285,7 +285,7 @@ impl Default for CornerFitter {
 
 /// A parameter that all corners of a picture have in common.
 #[derive(Clone, Debug)]
-pub(in crate::detect) enum Common {
+pub(crate) enum Common {
     /// One of the tone curve, and the optics with it a [`STEP`] further.
     Tone { parameter: usize, moved: Box<Optics> },
     /// The first or second of astigmatism.
@@ -297,13 +297,13 @@ pub(in crate::detect) enum Common {
 }
 
 /// Parameters that are the corner's, and those of the optics behind them.
-pub(in crate::detect) const OWN: usize = PARAMS;
-pub(in crate::detect) const COMMON: usize = COMMON_PARAMS;
+pub(crate) const OWN: usize = PARAMS;
+pub(crate) const COMMON: usize = COMMON_PARAMS;
 const UNKNOWNS: usize = OWN + COMMON;
 
 /// The normal equations of a corner and the optics.
 #[derive(Clone, Debug)]
-pub(in crate::detect) struct Joint {
+pub(crate) struct Joint {
     /// JᵀJ with the prior on the slopes, and ones for parameters of the corner that are not there.
     pub matrix: SMatrix<f64, UNKNOWNS, UNKNOWNS>,
     /// Jᵀr alike.
@@ -629,7 +629,7 @@ impl CornerFitter {
     }
 
     /// The pixels around a position, full scale 1; `None` where one lies outside the image.
-    pub(in crate::detect) fn pixels(
+    pub(crate) fn pixels(
         &mut self,
         image: ImageView,
         window: &Window,
@@ -680,7 +680,7 @@ impl CornerFitter {
 
     /// The normal equations at a corner in picture coordinates, from the window around the pixel `centre`, with
     /// the parameters of the optics behind its own; `None` outside the image.
-    pub(in crate::detect) fn joint<const K: usize>(
+    pub(crate) fn joint<const K: usize>(
         &mut self,
         image: ImageView,
         (window, centre): (&Window, DVec2),
@@ -742,7 +742,7 @@ impl CornerFitter {
 
     /// What the pixels of a fitted corner do to its position, and what is left of them; the corner as for
     /// [`Self::joint`].
-    pub(in crate::detect) fn influence<const K: usize>(
+    pub(crate) fn influence<const K: usize>(
         &mut self,
         image: ImageView,
         (window, centre): (&Window, DVec2),
@@ -899,7 +899,7 @@ impl<const K: usize> Corner<K> {
     }
 
     /// The corner after a step of its own parameters in the joint equations.
-    pub(in crate::detect) fn stepped(&self, step: &SVector<f64, OWN>) -> Option<Self> {
+    pub(crate) fn stepped(&self, step: &SVector<f64, OWN>) -> Option<Self> {
         let mut moved = Self { position: DVec2::ZERO, ..*self }.moved(step, MAX_RADIUS)?;
         moved.position += self.position;
         Some(moved)
@@ -1222,7 +1222,7 @@ fn sum_of_eight(lanes: &[f32; HALF]) -> f32 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::raster::Gray;
+    use deltille_core::raster::Gray;
 
     /// A corner aside of its window's centre, in slanting light, whose edges are bent.
     fn corner<const K: usize>(amplitude: f64) -> Corner<K> {

@@ -11,8 +11,9 @@ use glam::DVec2;
 use multiversion::multiversion;
 
 use super::corner_model::{Corner, Window};
-use crate::detect::lanes::{self, LANES};
-use crate::raster::ImageView;
+use crate::lanes;
+use crate::lanes::LANES;
+use deltille_core::raster::ImageView;
 
 /// Directions on the half-circle: 7.5° apart, so that the 17° between edges at 75° hold two.
 const DIRECTIONS: usize = 24;

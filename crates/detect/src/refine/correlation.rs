@@ -17,7 +17,8 @@
 
 use multiversion::multiversion;
 
-use crate::detect::lanes::{self, LANES};
+use crate::lanes;
+use crate::lanes::LANES;
 
 /// Residuals of a corner, and how its parameters answer to its pixels.
 #[derive(Clone, Debug)]

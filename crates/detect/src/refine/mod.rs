@@ -8,13 +8,13 @@
 //! 3. `corner_model` fits a blurred corner (`blurred_corner`) by Levenberg–Marquardt (`small_systems`).
 //! 4. `shared_optics` estimates from all corners together what they share (`optics`); `correlation` corrects covariances for noise that is not white.
 
-pub(in crate::detect) mod blurred_corner;
-pub(in crate::detect) mod clearance;
-pub(in crate::detect) mod corner_model;
-pub(in crate::detect) mod corner_start;
-pub(in crate::detect) mod correlation;
-pub(in crate::detect) mod optics;
-pub(in crate::detect) mod refine_grid;
-pub(in crate::detect) mod refiner;
-pub(in crate::detect) mod shared_optics;
-pub(in crate::detect) mod small_systems;
+pub(crate) mod blurred_corner;
+pub(crate) mod clearance;
+pub(crate) mod corner_model;
+pub(crate) mod corner_start;
+pub(crate) mod correlation;
+pub(crate) mod optics;
+pub(crate) mod refine_grid;
+pub(crate) mod refiner;
+pub(crate) mod shared_optics;
+pub(crate) mod small_systems;

@@ -2,8 +2,8 @@
 //! ink on the print.
 
 use super::blurred_corner::PLACES_OF_FOUR;
-use crate::detect::detection::ink::InkEstimate;
-use crate::detect::detection::tone::{Curve, Piece, TONE_PARAMS, Tone, ToneEstimate};
+use deltille_core::detection::InkEstimate;
+use deltille_core::detection::{Curve, Piece, TONE_PARAMS, Tone, ToneEstimate};
 
 /// The number of parameters: three of the tone curve, two of the astigmatism, the halo, and the ink.
 pub(super) const PARAMS: usize = TONE_PARAMS + 4;

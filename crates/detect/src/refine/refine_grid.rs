@@ -18,10 +18,10 @@ use super::corner_model::{CornerFitter, MAX_WAY_PX};
 use super::optics::Optics;
 use super::refiner::{MIN_MODEL_RADIUS, MIN_PIXELS, ModelFit, Refined, Refinement, Refiner, Room};
 use super::shared_optics::{REACH_PX, REACH_SIGMAS, SAMPLES, Sample};
-use crate::detect::detection::values::{Grid, GridCorner};
-use crate::lattice::Vertex;
-use crate::raster::{Gray, ImageView, Pyramid};
-use crate::statistics::median;
+use deltille_core::detection::{Grid, GridCorner};
+use deltille_core::lattice::Vertex;
+use deltille_core::raster::{Gray, ImageView, Pyramid};
+use deltille_core::statistics::median;
 
 /// Number of corners from which the blur is estimated, those with the most room of [`LOOKED_AT`]
 /// times as many, from all over the grid.
@@ -70,7 +70,7 @@ const NEXT_WINDOW: f64 = 0.7;
 
 impl Refiner {
     /// The blur of each grid in px, where the model can tell it.
-    pub(in crate::detect) fn blurs(
+    pub(crate) fn blurs(
         &self,
         fitter: &mut CornerFitter,
         images: (ImageView, &[Gray<i16>]),
@@ -82,7 +82,7 @@ impl Refiner {
 
     /// The optics that the grids of a picture share, given their blurs, as one level of the pyramid
     /// shows them.
-    pub(in crate::detect) fn optics(
+    pub(crate) fn optics(
         &self,
         fitter: &mut CornerFitter,
         (image, level): (ImageView, usize),
@@ -135,7 +135,7 @@ impl Refiner {
 
     /// Refines the corners of a grid in place, given its blur in px, and drops corners that are
     /// spoilt.
-    pub(in crate::detect) fn refine_grid(
+    pub(crate) fn refine_grid(
         &self,
         fitter: &mut CornerFitter,
         image: ImageView,
@@ -353,13 +353,13 @@ fn each<F: Send>(count: usize, work: impl Fn(&mut CornerFitter, usize) -> F + Sy
 /// The level of the pyramid, of `levels`, on which a picture is refined: the coarsest on which its
 /// sharpest grid is no sharper than [`SHARP_PX`]. On the finest level an enlarged picture shows
 /// little but the middle of the edges, and noise is correlated over all pixels of the window.
-pub(in crate::detect) fn sharp_level(blurs: &[Option<f64>], levels: usize) -> usize {
+pub(crate) fn sharp_level(blurs: &[Option<f64>], levels: usize) -> usize {
     let is_sampled_on = |&level: &usize| is_sampled(blurs, 1.0 / f64::from(1u32 << level));
     (1..levels).rfind(is_sampled_on).unwrap_or(0)
 }
 
 /// Whether the sharpest grid is no sharper than [`SHARP_PX`] where its blur is `part` of the whole.
-pub(in crate::detect) fn is_sampled(blurs: &[Option<f64>], part: f64) -> bool {
+pub(crate) fn is_sampled(blurs: &[Option<f64>], part: f64) -> bool {
     let sharpest = blurs.iter().copied().flatten().reduce(f64::min);
     sharpest.is_some_and(|blur_px| part * blur_px >= SHARP_PX)
 }

@@ -4,8 +4,8 @@
 //! and adds a covariance. Where the model does not hold, the polynomial's result stays.
 //!
 //! ```
-//! use deltille_core::detect::{Refinement, Refiner};
-//! use deltille_core::synth::SimulatedCorner;
+//! use deltille_detect::{Refinement, Refiner};
+//! use deltille_layout::synth::SimulatedCorner;
 //! use deltille_core::lattice::GridKind;
 //! use glam::DVec2;
 //!
@@ -25,16 +25,16 @@ use super::corner_model::{Accuracy, Corner, CornerFitter, Fitted, MAX_RADIUS, Wi
 use super::corner_start::{start, start_along};
 use super::optics::Optics;
 use super::shared_optics::{SAMPLES, Sample};
-use crate::detect::corners::polynomial::Polynomial;
-use crate::detect::detection::tone::Tone;
-use crate::lattice::GridKind;
-use crate::raster::ImageView;
+use crate::corners::polynomial::Polynomial;
+use deltille_core::detection::Tone;
+use deltille_core::lattice::GridKind;
+use deltille_core::raster::ImageView;
 
 /// Smallest radius in which the model is fitted: 49 pixels for ten unknowns.
 pub const MIN_MODEL_RADIUS: usize = 3;
 
 /// Fewest pixels to which the model is fitted: three for each unknown, so that the noise shows.
-pub(in crate::detect) const MIN_PIXELS: usize = 30;
+pub(crate) const MIN_PIXELS: usize = 30;
 
 /// Half the side of the square around a corner that must be clear for the polynomial, px: a third of
 /// what its usual window reads, where nearly all of its weight lies.
@@ -78,7 +78,7 @@ pub struct Refined {
 
 /// What the model found, of either kind of corner.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(in crate::detect) struct ModelFit {
+pub(crate) struct ModelFit {
     /// The corner; of two edges the last angle means nothing.
     pub corner: Corner<3>,
     /// Covariance xx, xy, yy of its position, px².
@@ -121,7 +121,7 @@ impl From<ModelFit> for Refined {
 
 /// What is known of the surroundings of a corner.
 #[derive(Clone, Copy, Debug)]
-pub(in crate::detect) struct Room<'a> {
+pub(crate) struct Room<'a> {
     /// What lies there.
     pub around: &'a Surroundings,
     /// Deviation of the blur, px.
@@ -168,7 +168,7 @@ pub struct Refiner {
     windows: Vec<Window>,
     tone: Tone,
     /// What is known before any picture is seen.
-    pub(in crate::detect) known: Optics,
+    pub(crate) known: Optics,
 }
 
 impl Refiner {
@@ -180,7 +180,7 @@ impl Refiner {
     }
 
     /// A refiner with a polynomial of radius r and a model of at most `model_radius`.
-    pub(in crate::detect) fn with_radii(
+    pub(crate) fn with_radii(
         kind: GridKind,
         method: Refinement,
         polynomial_radius: usize,
@@ -258,7 +258,7 @@ impl Refiner {
     }
 
     /// The optics of a picture that these corners show, of which so much is known.
-    pub(in crate::detect) fn joint_optics(
+    pub(crate) fn joint_optics(
         &self,
         fitter: &mut CornerFitter,
         image: ImageView,
@@ -292,7 +292,7 @@ impl Refiner {
 
     /// A corner of a grid near `start`, from pixels that show nothing else. Beside it what the model
     /// found.
-    pub(in crate::detect) fn refine_within(
+    pub(crate) fn refine_within(
         &self,
         fitter: &mut CornerFitter,
         image: ImageView,
@@ -343,7 +343,7 @@ impl Refiner {
 
     /// The model of a corner of a grid, in all of its room that is clear and lies in the image, with
     /// the bends that the grid shows: as good as the noise allows from a fit `before`, and such a fit without.
-    pub(in crate::detect) fn model(
+    pub(crate) fn model(
         &self,
         fitter: &mut CornerFitter,
         image: ImageView,
@@ -389,12 +389,7 @@ impl Refiner {
     }
 
     /// The pixels of a corner's room.
-    pub(in crate::detect) fn window(
-        &self,
-        image: ImageView,
-        position: DVec2,
-        room: Room,
-    ) -> Cow<'_, Window> {
+    pub(crate) fn window(&self, image: ImageView, position: DVec2, room: Room) -> Cow<'_, Window> {
         let radius = room.reach_px.min(self.largest_radius());
         let is_whole = radius <= room.clear_square_px().min(distance_to_rim(image, position));
         let whole = self.windows.iter().find(|w| w.radius() as f64 == radius && is_whole);
@@ -404,12 +399,12 @@ impl Refiner {
         }
     }
 
-    pub(in crate::detect) fn method(&self) -> Refinement {
+    pub(crate) fn method(&self) -> Refinement {
         self.method
     }
 
     /// Radius of the largest window of the model, px.
-    pub(in crate::detect) fn largest_radius(&self) -> f64 {
+    pub(crate) fn largest_radius(&self) -> f64 {
         self.windows.last().map_or(0.0, |window| window.radius() as f64)
     }
 }
@@ -437,8 +432,8 @@ mod tests {
     use rand_distr::{Distribution, Normal};
 
     use super::*;
-    use crate::raster::Gray;
-    use crate::synth::SimulatedCorner;
+    use deltille_core::raster::Gray;
+    use deltille_layout::synth::SimulatedCorner;
 
     /// Side of the square in which each corner of a picture lies, px.
     const SIDE: usize = 41;

@@ -15,10 +15,10 @@ use super::corner_model::{Common, Corner, CornerFitter, Joint, OWN, Window};
 use super::correlation::{self, Influence};
 use super::optics::{HALO, INK, INK_UNIT, LEAST_MOTION, Optics, PARAMS, STEP};
 use super::small_systems::solved;
-use crate::detect::detection::ink::InkEstimate;
-use crate::detect::detection::tone::{TONE_PARAMS, ToneEstimate};
-use crate::raster::ImageView;
-use crate::statistics::median;
+use deltille_core::detection::InkEstimate;
+use deltille_core::detection::{TONE_PARAMS, ToneEstimate};
+use deltille_core::raster::ImageView;
+use deltille_core::statistics::median;
 
 /// Number of corners that are fitted together; more would determine the curve better than single
 /// corners can use it.
@@ -178,8 +178,9 @@ impl Optics {
             let slopes = active.iter().map(|&p| self.kappa_slope(greys, p));
             let slopes = DVector::from_iterator(active.len(), slopes);
             let kappa_deviation = slopes.dot(&(cov * &slopes)).max(0.0).sqrt();
-            let [black, white] = greys;
-            ToneEstimate { black, white, kappa, kappa_deviation, kappa_odd, used }
+            let mut tone = ToneEstimate::new(greys, kappa, kappa_deviation);
+            (tone.kappa_odd, tone.used) = (kappa_odd, used);
+            tone
         })
     }
 
@@ -404,14 +405,8 @@ impl<const K: usize> Problem<'_, K> {
     /// The estimated ink spread; `None` where it was not estimated.
     fn ink(&self, optics: &Optics, cov: &DMatrix<f64>, used: bool) -> Option<InkEstimate> {
         let at = self.active.iter().position(|&p| p == INK)?;
-        Some(InkEstimate {
-            edges: INK_UNIT * optics.ink,
-            edges_deviation: INK_UNIT * cov[(at, at)].max(0.0).sqrt(),
-            um: None,
-            um_deviation: None,
-            used,
-            pictures: 1,
-        })
+        let deviation = INK_UNIT * cov[(at, at)].max(0.0).sqrt();
+        Some(InkEstimate::new(INK_UNIT * optics.ink, deviation, used))
     }
 
     /// The optics that fit the corners best up to a part of their deviations.
@@ -682,9 +677,9 @@ mod tests {
     use rand_distr::{Distribution, Normal};
 
     use super::*;
-    use crate::detect::Tone;
-    use crate::detect::refine::corner_model::{Accuracy, Fitted};
-    use crate::raster::Gray;
+    use crate::refine::corner_model::{Accuracy, Fitted};
+    use deltille_core::detection::Tone;
+    use deltille_core::raster::Gray;
 
     /// Square of each corner, px; points of each pixel's side; blur, px.
     const SIDE: usize = 33;

@@ -1,7 +1,7 @@
 //! All that is made of a target, in memory, and sets of files written all or none.
 //!
 //! ```
-//! use deltille_core::layout::Printing;
+//! use deltille_layout::Printing;
 //! use deltille_core::targets::BoardSpec;
 //! use deltille_files::export::artifacts::{Making, What, make};
 //!
@@ -26,12 +26,13 @@ use crate::export::writing::staging::Staging;
 use crate::export::{laser_file_name, sheet_file_name};
 use crate::limits::{Limits, ReadError};
 use crate::target_file;
-use deltille_core::artwork::{self, ArtworkError, CuttingError};
 use deltille_core::family::Family;
-use deltille_core::layout::Printing;
 use deltille_core::targets::{
     Skeleton, SolidSpec, Target, TargetError, TargetIdentity, TargetSpec,
 };
+use deltille_layout::Printing;
+use deltille_layout::artwork;
+use deltille_layout::artwork::{ArtworkError, CuttingError};
 
 /// Resolution of PNG pages, dots per inch, where none is asked for.
 pub const DEFAULT_DPI: f64 = 300.0;

@@ -19,8 +19,8 @@ mod painted;
 
 use std::time::Duration;
 
-use deltille_core::layout::Logo;
 use deltille_core::targets::TargetError;
+use deltille_layout::Logo;
 use glam::DVec2;
 use usvg::roxmltree::{Document, ParsingOptions};
 

@@ -9,11 +9,8 @@ fn read(body: &str) -> Result<Logo, LogoError> {
 /// The area that is black, of one whose ink is a square of that many units.
 fn black(body: &str) -> f64 {
     let logo = read(body).unwrap_or_else(|error| panic!("{body}: {error}"));
-    let place = deltille_core::layout::LogoPlacement {
-        at_mm: DVec2::ZERO,
-        angle_rad: 0.0,
-        height_mm: 100.0,
-    };
+    let place =
+        deltille_layout::LogoPlacement { at_mm: DVec2::ZERO, angle_rad: 0.0, height_mm: 100.0 };
     let outlines = logo.outlines_mm(&place);
     let area: f64 = outlines.iter().map(|outline| signed_area(outline)).sum();
     area.abs()

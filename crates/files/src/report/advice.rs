@@ -2,7 +2,7 @@
 //! of camera. Every diagnosis is a warning, so that the page says no less than the program does.
 
 use super::{Report, Survey};
-use deltille_core::calibrate::{CameraEstimate, Diagnosis, Excluded, Parameter};
+use deltille_calibrate::{CameraEstimate, Diagnosis, Excluded, Parameter};
 use deltille_core::camera::Lens;
 use deltille_core::statistics::median;
 use deltille_core::words::counted;
@@ -391,7 +391,7 @@ mod tests {
     use nalgebra::DMatrix;
 
     use super::*;
-    use deltille_core::calibrate::{Estimate, LackOfFit, Model, PanelPlace, ViewEstimate};
+    use deltille_calibrate::{Estimate, LackOfFit, Model, PanelPlace, ViewEstimate};
     use deltille_core::camera::{Camera, Pose};
 
     /// What is advised where no parameter of the lens is told from zero.

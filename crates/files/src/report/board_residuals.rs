@@ -21,7 +21,7 @@ use super::axes::Axes;
 use super::field::COLOURS;
 use super::panels::{Mark, Panels, round_down};
 use super::survey::Survey;
-use deltille_core::calibrate::{CameraEstimate, Estimate, PanelRef, ViewEstimate};
+use deltille_calibrate::{CameraEstimate, Estimate, PanelRef, ViewEstimate};
 use deltille_core::camera::{Camera, Pose};
 use deltille_core::statistics::quantile;
 

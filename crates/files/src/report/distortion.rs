@@ -17,7 +17,7 @@ use glam::{DVec2, DVec3};
 use super::axes::{Axes, frame};
 use super::panels::round_down;
 use super::survey::Survey;
-use deltille_core::calibrate::CameraEstimate;
+use deltille_calibrate::CameraEstimate;
 use deltille_core::camera::Camera;
 
 /// Widest field for which a lens is compared with a pinhole, rad from the axis: there its radius is

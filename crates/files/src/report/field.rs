@@ -8,7 +8,7 @@ use glam::DVec2;
 
 use super::axes::Axes;
 use super::panels::round_down;
-use deltille_core::calibrate::{CameraEstimate, Comparison, Source, UncertaintyMap};
+use deltille_calibrate::{CameraEstimate, Comparison, Source, UncertaintyMap};
 use deltille_core::statistics::quantile;
 
 /// Room for the scales below the picture, user units.

@@ -2,7 +2,7 @@
 //! views.
 
 use super::{Survey, board_residuals, field, page, plots};
-use deltille_core::calibrate::{CameraEstimate, Estimate, Source};
+use deltille_calibrate::{CameraEstimate, Estimate, Source};
 
 /// Residuals over the image, the target, the radius and the views, and the coverage of the image.
 pub(super) fn residuals(estimate: &Estimate, camera: &CameraEstimate, survey: &Survey) -> String {

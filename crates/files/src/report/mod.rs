@@ -33,7 +33,7 @@ mod views;
 use std::collections::BTreeMap;
 
 use crate::export::calibration::Print;
-use deltille_core::calibrate::{CameraEstimate, Candidate, Diagnosis, Estimate, PanelPlace, Words};
+use deltille_calibrate::{CameraEstimate, Candidate, Diagnosis, Estimate, PanelPlace, Words};
 
 pub use advice::{Advice, Weight, advice};
 pub use field::{comparison_svg, uncertainty_svg};
@@ -65,7 +65,7 @@ pub struct Report<'a> {
     pub samples: BTreeMap<usize, Sample>,
     /// Lens models that were tried, for each camera; see [`Calibration::compare_models`].
     ///
-    /// [`Calibration::compare_models`]: deltille_core::calibrate::Calibration::compare_models
+    /// [`Calibration::compare_models`]: deltille_calibrate::Calibration::compare_models
     pub models: &'a [Vec<Candidate>],
 }
 

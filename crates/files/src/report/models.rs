@@ -1,7 +1,7 @@
 //! Comparison of lens models on held-out views.
 
 use super::page::{escaped, meter};
-use deltille_core::calibrate::{CameraEstimate, Candidate, Comparison, Region};
+use deltille_calibrate::{CameraEstimate, Candidate, Comparison, Region};
 
 /// A model's camera against the one that was found.
 struct Against {

@@ -10,7 +10,7 @@ use super::{
     Advice, Report, Sample, Survey, Weight, advice, distortion, fit, models, parameters, rig,
     scene, target_map, views,
 };
-use deltille_core::calibrate::{CameraEstimate, Diagnosis, Excluded, Source, TargetMap};
+use deltille_calibrate::{CameraEstimate, Diagnosis, Excluded, Source, TargetMap};
 use deltille_core::words::{counted, places};
 
 const STYLE: &str = include_str!("page.css");
@@ -300,7 +300,7 @@ pub(super) fn escaped(text: &str) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use deltille_core::calibrate::{Estimate, Model};
+    use deltille_calibrate::{Estimate, Model};
     use deltille_core::camera::Camera;
 
     #[test]

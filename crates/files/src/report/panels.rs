@@ -6,7 +6,7 @@ use std::fmt::Write as _;
 
 use glam::DVec2;
 
-use deltille_core::calibrate::PanelRef;
+use deltille_calibrate::PanelRef;
 use deltille_core::statistics::median;
 
 /// Margin around every panel, user units; below, it holds the name of the panel.

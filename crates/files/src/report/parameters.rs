@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 
 use super::page::{self, escaped, rounded};
 use super::table::aligned;
-use deltille_core::calibrate::{CameraEstimate, Parameter, Source};
+use deltille_calibrate::{CameraEstimate, Parameter, Source};
 use deltille_core::camera::{Lens, SplineGrid};
 
 /// More parameters than this have their correlations in small print.

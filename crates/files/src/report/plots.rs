@@ -8,7 +8,7 @@ use glam::DVec2;
 use super::axes::{Axes, frame};
 use super::panels::round_down;
 use super::survey::Survey;
-use deltille_core::calibrate::{CameraEstimate, Corner};
+use deltille_calibrate::{CameraEstimate, Corner};
 
 /// Height of the legend below a map, user units.
 const FOOT: f64 = 58.0;

@@ -8,7 +8,7 @@ use super::Report;
 use super::page::{escaped, meter, out_row, rounded};
 use super::table::aligned;
 use super::views::MOST_VIEWS;
-use deltille_core::calibrate::{FrameEstimate, PanelPlace};
+use deltille_calibrate::{FrameEstimate, PanelPlace};
 use deltille_core::camera::Pose;
 
 /// Relative camera poses.

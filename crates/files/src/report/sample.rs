@@ -10,7 +10,7 @@ use image::{DynamicImage, GrayImage};
 use super::page::{data_url, escaped};
 use super::thumbnail::{png, reduced};
 use crate::remap::remapped;
-use deltille_core::calibrate::{CameraEstimate, Corner, ViewEstimate};
+use deltille_calibrate::{CameraEstimate, Corner, ViewEstimate};
 use deltille_core::camera::{Field, Undistortion};
 use deltille_core::raster::Gray;
 

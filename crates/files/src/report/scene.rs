@@ -9,7 +9,7 @@ use glam::{DQuat, DVec2, DVec3};
 use super::axes::Axes;
 use super::board_residuals::{camera_from_panel, on_plane};
 use super::page::escaped;
-use deltille_core::calibrate::{CameraEstimate, Estimate, PanelRef, ViewEstimate};
+use deltille_calibrate::{CameraEstimate, Estimate, PanelRef, ViewEstimate};
 use deltille_core::camera::{Camera, Pose};
 use deltille_core::polygon::hull;
 use deltille_core::statistics::median;

@@ -11,7 +11,7 @@
 
 use glam::{DVec2, DVec3};
 
-use deltille_core::calibrate::{CameraEstimate, ImageCircle, ViewEstimate};
+use deltille_calibrate::{CameraEstimate, ImageCircle, ViewEstimate};
 use deltille_core::camera::{Camera, Pose};
 
 /// Number of cells of the maps along the longer side of the image; cells are nearly square.
@@ -176,7 +176,7 @@ const STEP: f64 = 1e-3;
 
 #[cfg(test)]
 mod tests {
-    use deltille_core::calibrate::{Guide, Model};
+    use deltille_calibrate::{Guide, Model};
     use deltille_core::targets::{BoardSpec, Target};
 
     use super::*;

@@ -4,7 +4,7 @@
 use std::fmt::Write as _;
 
 use super::panels::{Mark, Panels, round_down};
-use deltille_core::calibrate::{CornerOffset, TargetMap};
+use deltille_calibrate::{CornerOffset, TargetMap};
 use deltille_core::statistics::quantile;
 
 /// Width of the picture, user units.

@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 use super::page::{self, data_url, escaped, meter, out_row};
 use super::panels::round_down;
 use super::{Report, Survey, SurveyedView};
-use deltille_core::calibrate::{CameraEstimate, Excluded, ViewEstimate};
+use deltille_calibrate::{CameraEstimate, Excluded, ViewEstimate};
 use deltille_core::statistics::quantile;
 use deltille_core::words::counted;
 

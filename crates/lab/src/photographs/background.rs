@@ -7,7 +7,7 @@ use rand_chacha::ChaCha8Rng;
 
 use super::mips::{Beyond, Mips};
 use super::scene::Background;
-use crate::raster::Gray;
+use deltille::raster::Gray;
 
 /// Side of a texture, texels; a power of two.
 const SIDE: usize = 1024;

@@ -2,7 +2,7 @@
 
 use glam::DVec2;
 
-use crate::raster::Gray;
+use deltille::raster::Gray;
 
 /// What lies beyond the borders of a picture.
 #[derive(Clone, Copy, PartialEq, Eq)]

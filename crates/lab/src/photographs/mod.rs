@@ -5,8 +5,8 @@
 //!   └───────┴── truth ───────────────────────▶ score
 //! ```
 //!
-//! A target's PDF is written and drawn by hayro ([`page`]); nothing of [`crate::synth`] takes part, nor
-//! of [`crate::camera`]. Where its corners are, its own paths say. The page is seen by a pinhole camera
+//! A target's PDF is written and drawn by hayro ([`page`]); nothing of [`deltille::synth`] takes part, nor
+//! of [`deltille::camera`]. Where its corners are, its own paths say. The page is seen by a pinhole camera
 //! with a bending lens ([`view`]), blurred and lit ([`optics`]), partly covered ([`covers`]) and recorded
 //! (`sensor`). One thing at a time is varied ([`axes`]) from a scene that is always the same
 //! ([`scene`]), with the same poses at every level.
@@ -42,15 +42,15 @@ use self::page::PrintedPage;
 use self::photograph::{Photograph, take};
 use self::score::{Score, score};
 use self::table::Row;
-use crate::artwork::ArtworkError;
-use crate::clock;
-use crate::detect::{Detector, DetectorConfig};
-use crate::export::{ExportError, atomic};
-use crate::family::Family;
-use crate::lattice::GridKind;
-use crate::layout::{PaperSpec, Printing};
-use crate::targets::{BoardSpec, TargetSpec};
-use crate::verify::DocumentError;
+use deltille::artwork::ArtworkError;
+use deltille::clock;
+use deltille::detect::{Detector, DetectorConfig};
+use deltille::export::{ExportError, atomic};
+use deltille::family::Family;
+use deltille::lattice::GridKind;
+use deltille::layout::{PaperSpec, Printing};
+use deltille::targets::{BoardSpec, TargetSpec};
+use deltille::verify::DocumentError;
 
 /// Why a page cannot be photographed.
 #[derive(Debug, thiserror::Error)]

@@ -1,7 +1,7 @@
 //! Bayer's colour filters, and colours interpolated from what they leave.
 
 use super::scene::Mosaic;
-use crate::raster::Gray;
+use deltille::raster::Gray;
 
 /// What the filters let pass of a grey scene, relative to green; the gains that follow undo it, and
 /// raise the noise with it.

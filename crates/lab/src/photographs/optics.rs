@@ -19,7 +19,7 @@ use super::mips::{Footprint, Mips};
 use super::page::PrintedPage;
 use super::scene::Scene;
 use super::view::View;
-use crate::raster::Gray;
+use deltille::raster::Gray;
 
 /// Samples along a pixel: so many along a standard deviation of the blur, within these. Four along pixels of the usual
 /// blur displaced edges by 0.002 px.

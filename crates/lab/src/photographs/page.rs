@@ -8,12 +8,12 @@ use glam::DVec2;
 use super::PhotographError;
 use super::mips::{Beyond, Footprint, Mips};
 use super::paths::Vertices;
-use crate::artwork;
-use crate::export::pdf;
-use crate::family::Family;
-use crate::lattice::GridKind;
-use crate::layout::Printing;
-use crate::verify::Document;
+use deltille::artwork;
+use deltille::export::pdf;
+use deltille::family::Family;
+use deltille::lattice::GridKind;
+use deltille::layout::Printing;
+use deltille::verify::Document;
 
 /// Resolution asked for, px/mm: 1200 dpi. Large pages come coarser.
 const PX_PER_MM: f64 = 1200.0 / 25.4;

@@ -17,7 +17,7 @@ use super::page::{PageCorner, PrintedPage};
 use super::scene::{MOST_TILT_DEG, Scene};
 use super::sensor::record;
 use super::view::{Curl, Place, View};
-use crate::raster::Gray;
+use deltille::raster::Gray;
 
 /// A corner nearer to a cover's outline or to the border than this counts neither as seen nor as
 /// hidden, px of the sensor.

@@ -4,7 +4,7 @@ use glam::DVec2;
 
 use super::axes::Axis;
 use super::table::Row;
-use crate::experiment::plot::{line, page, write};
+use crate::plot::{line, page, write};
 
 /// Size of a panel's axes and the room around it, in user units.
 const PANEL: DVec2 = DVec2::new(250.0, 130.0);

@@ -5,7 +5,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use glam::DVec2;
 
 use super::photograph::{Photograph, Sight, TrueCorner};
-use crate::detect::Detection;
+use deltille::detect::Detection;
 
 /// A report within this of a true corner is of that corner, px of the sensor at most.
 const NEAR_PX: f64 = 4.0;
@@ -117,9 +117,9 @@ fn half_turned(truth: &[TrueCorner]) -> BTreeMap<u32, u32> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::detect::{Detector, DetectorConfig, Grid, GridCorner};
-    use crate::lattice::GridKind;
-    use crate::raster::Gray;
+    use deltille::detect::{Detector, DetectorConfig, Grid, GridCorner};
+    use deltille::lattice::GridKind;
+    use deltille::raster::Gray;
 
     fn truth() -> Photograph {
         let corner = |id: u32, sight| TrueCorner {

@@ -9,7 +9,7 @@ use rand_distr::{Distribution, StandardNormal};
 
 use super::mosaic::{RESPONSE, colour, interpolated};
 use super::scene::{Mosaic, SHARPENING_PX, Scene};
-use crate::raster::{Gray, gaussian};
+use deltille::raster::{Gray, gaussian};
 
 /// Rec. 601 weights, those of JPEG.
 const LUMA: [f32; 3] = [0.299, 0.587, 0.114];

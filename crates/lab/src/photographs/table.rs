@@ -11,10 +11,10 @@ use super::axes::{Axis, Level};
 use super::photograph::TrueCorner;
 use super::scene::Scene;
 use super::score::Score;
-use crate::export::kind::signed_png;
-use crate::json;
-use crate::raster::Gray;
-use crate::statistics::quantile;
+use deltille::export::kind::signed_png;
+use deltille::json;
+use deltille::raster::Gray;
+use deltille::statistics::quantile;
 
 /// Schema of the result's JSON.
 const SCHEMA: &str = "deltille/photographs/1";

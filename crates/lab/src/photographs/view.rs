@@ -1,6 +1,6 @@
 //! Where the camera stands, how its lens bends and how the sheet lies: pixels to the page and back.
 //!
-//! Written for this experiment alone, so that it shares no mistake with [`crate::camera`]. With the
+//! Written for this experiment alone, so that it shares no mistake with [`deltille::camera`]. With the
 //! page's frame in the middle of the board, x right, y up, z towards the viewer,
 //!
 //! ```text

@@ -6,9 +6,9 @@ use glam::DVec2;
 
 use super::board::draw_panel;
 use super::{ArtworkError, Sheet};
-use crate::family::Family;
-use crate::layout::Placement;
-use crate::targets::{Face, Panel, Target};
+use crate::Placement;
+use deltille_core::family::Family;
+use deltille_core::targets::{Face, Panel, Target};
 
 /// White between two faces, px: more than the filters of the first mipmap levels reach.
 const PADDING_PX: f64 = 16.0;

@@ -6,10 +6,10 @@ use glam::DVec2;
 use kurbo::{Affine, BezPath, Circle, Point, Rect, Shape as _};
 
 use super::{ArtworkError, Paint, Part, Shape, Sheet, cells, check_bar, strokes_mm, text, window};
-use crate::family::Family;
-use crate::lattice::{TagCells, Tile};
-use crate::layout::{Logo, Placement, Printing, SheetLayout, SheetLine, SheetPage, SheetText};
-use crate::targets::{Panel, TagPlacement, TagsIn, Target};
+use crate::{Logo, Placement, Printing, SheetLayout, SheetLine, SheetPage, SheetText};
+use deltille_core::family::Family;
+use deltille_core::lattice::{TagCells, Tile};
+use deltille_core::targets::{Panel, TagPlacement, TagsIn, Target};
 
 /// How far the curves of a disc may be from a circle, mm.
 const DISC_TOLERANCE_MM: f64 = 1e-4;

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use crate::lattice::{GridKind, TagCells, Tile, Vertex};
+use deltille_core::lattice::{GridKind, TagCells, Tile, Vertex};
 
 /// The outlines of the white areas of a tag, as vertices of the lattice of its cells (triangles or
 /// squares).
@@ -175,7 +175,7 @@ mod tests {
     use proptest::prelude::*;
 
     use super::*;
-    use crate::lattice::Dimension;
+    use deltille_core::lattice::Dimension;
 
     /// The signed area of which a triangular cell has 1, a square one 2.
     fn area(outline: &[Vertex]) -> i32 {

@@ -2,7 +2,7 @@
 
 use kurbo::{Affine, BezPath};
 
-use crate::layout::{CHECK_BAR_STROKE_MM, CheckBar};
+use crate::{CHECK_BAR_STROKE_MM, CheckBar};
 
 /// Width of an end stroke, along the bar, mm: slightly more than the line of a ruler.
 pub const STROKE_WIDTH_MM: f64 = 0.3;

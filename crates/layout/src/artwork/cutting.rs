@@ -6,10 +6,10 @@ use glam::DVec2;
 
 use super::atlas::Packing;
 use super::text::MissingGlyph;
-use crate::layout::{
+use crate::{
     Label, LineKind, Placement, Printing, SheetLayout, edge_numbers, edge_text, upright_number,
 };
-use crate::targets::{Target, TargetError, TargetSpec};
+use deltille_core::targets::{Target, TargetError, TargetSpec};
 
 /// Blank between panels, mm: more than the width of any cut.
 pub(super) const GAP_MM: f64 = 4.0;
@@ -215,14 +215,14 @@ fn outlines(sheet: &SheetLayout) -> Option<Vec<Vec<DVec2>>> {
 }
 
 /// The number of a face, centred on its incircle.
-fn face_number(placement: &Placement, outline: &[DVec2], index: usize) -> crate::layout::SheetText {
+fn face_number(placement: &Placement, outline: &[DVec2], index: usize) -> crate::SheetText {
     let corners: Vec<_> = outline.iter().map(|corner| corner.extend(0.0)).collect();
-    let circle = crate::targets::Incircle::of(&corners);
+    let circle = deltille_core::targets::Incircle::of(&corners);
     let text = upright_number(index);
     let cap = (FACE_CAP.0 * circle.radius).min(FACE_CAP.1);
     let width = text.len() as f64 * ADVANCE_CAPS * cap;
     let at = circle.centre.truncate() - DVec2::new(width, cap) / 2.0;
-    crate::layout::SheetText {
+    crate::SheetText {
         text: Label::Words(text),
         at_mm: placement.page_from_panel(at),
         angle_rad: placement.angle_rad,

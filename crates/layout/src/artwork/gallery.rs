@@ -5,8 +5,8 @@ use kurbo::{Affine, Point};
 
 use super::board::{polygon, tag_outlines};
 use super::{Paint, Part, Shape, Sheet, text};
-use crate::family::Family;
-use crate::lattice::{ROW_HEIGHT, TagCells};
+use deltille_core::family::Family;
+use deltille_core::lattice::{ROW_HEIGHT, TagCells};
 
 /// Layout of a gallery of tags.
 #[derive(Clone, Copy, Debug, PartialEq)]

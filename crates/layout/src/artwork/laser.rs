@@ -20,11 +20,11 @@ use glam::DVec2;
 use super::atlas::Packing;
 use super::cutting::{CutDrawing, CutLayer, CutPath, CuttingError, GAP_MM};
 use super::{ArtworkError, board, cells};
-use crate::family::Family;
-use crate::lattice::{GridKind, Tile, Vertex};
-use crate::layout::{Placement, Printing};
-use crate::polygon::rectangle;
-use crate::targets::{Face, Panel, TagPlacement, TagsIn, Target, TargetSpec};
+use crate::{Placement, Printing};
+use deltille_core::family::Family;
+use deltille_core::lattice::{GridKind, Tile, Vertex};
+use deltille_core::polygon::rectangle;
+use deltille_core::targets::{Face, Panel, TagPlacement, TagsIn, Target, TargetSpec};
 
 /// Widest kerf, mm: less than the gap between two plates.
 const WIDEST_KERF_MM: f64 = 3.0;
@@ -299,8 +299,8 @@ mod tests {
     use proptest::prelude::*;
 
     use super::*;
-    use crate::polygon;
-    use crate::targets::BoardSpec;
+    use deltille_core::polygon;
+    use deltille_core::targets::BoardSpec;
 
     /// The area on a layer, mm².
     fn area(drawing: &CutDrawing, layer: CutLayer) -> f64 {

@@ -2,7 +2,7 @@
 
 use glam::DVec2;
 
-use crate::layout::{LineKind, SheetLine};
+use crate::{LineKind, SheetLine};
 
 /// Dash and gap of a mountain fold, mm; both ends of the line are dashes, so that a ruler can be
 /// laid against them.

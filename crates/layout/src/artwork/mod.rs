@@ -7,7 +7,7 @@
 //! No two shapes overlap: a black tile is one path whose holes are the merged white cells of its
 //! tag, and white is bare paper. Two tiles share only a vertex, so that no renderer shows a seam.
 //!
-//! Frame: the page frame of [`SheetLayout`](crate::layout::SheetLayout), origin at the lower-left
+//! Frame: the page frame of [`SheetLayout`](crate::SheetLayout), origin at the lower-left
 //! corner of the page, x right, y up.
 
 mod atlas;
@@ -24,11 +24,11 @@ mod window;
 use glam::DVec2;
 use kurbo::{Affine, BezPath};
 
-use crate::family::Family;
-use crate::lattice::GridKind;
-use crate::layout::{Finish, LineKind, Placement, Printing, SheetText};
-use crate::targets::{Panel, Target};
-use crate::words::counted;
+use crate::{Finish, LineKind, Placement, Printing, SheetText};
+use deltille_core::family::Family;
+use deltille_core::lattice::GridKind;
+use deltille_core::targets::{Panel, Target};
+use deltille_core::words::counted;
 
 pub use atlas::Atlas;
 pub use board::drawn_lines;
@@ -114,14 +114,14 @@ pub enum Part {
     },
     /// A check bar of the sheet, by index.
     CheckBar {
-        /// Position in [`SheetLayout::check_bars`](crate::layout::SheetLayout::check_bars).
+        /// Position in [`SheetLayout::check_bars`](crate::SheetLayout::check_bars).
         index: usize,
     },
     /// A line to cut or to fold along, by index.
     Line {
         /// Its purpose.
         kind: LineKind,
-        /// Position in [`SheetLayout::lines`](crate::layout::SheetLayout::lines), lines of a page
+        /// Position in [`SheetLayout::lines`](crate::SheetLayout::lines), lines of a page
         /// after those of its sheet.
         index: usize,
     },
@@ -182,7 +182,7 @@ impl Printing {
     /// lacks a character of a text.
     ///
     /// ```
-    /// use deltille_core::layout::Printing;
+    /// use deltille_layout::Printing;
     /// use deltille_core::targets::BoardSpec;
     ///
     /// let artwork = Printing::new("desk", BoardSpec::deltille(4, 5, 20.0))?.draw()?;

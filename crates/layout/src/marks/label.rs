@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 /// those of the solid, from 0.
 ///
 /// ```
-/// use deltille_core::layout::Label;
+/// use deltille_layout::Label;
 ///
 /// let label = Label::Tab { edge: 7, under: 3 };
 /// assert_eq!(label.to_string(), "edge 7 · under face 3");

@@ -11,10 +11,10 @@ use glam::DVec2;
 use kurbo::{BezPath, PathEl, Point};
 use serde::{Deserialize, Serialize};
 
-use crate::layout::{PaperSpec, SheetLayout};
-use crate::targets::TargetError;
-use crate::targets::length::format_mm;
-use crate::{polygon, quantity};
+use crate::{PaperSpec, SheetLayout};
+use deltille_core::targets::TargetError;
+use deltille_core::targets::format_mm;
+use deltille_core::{polygon, quantity};
 
 /// Height of a logo in the units of its outline: of one that is 12 mm high a unit is 1.2 µm.
 const UNITS: i32 = 10_000;
@@ -50,7 +50,7 @@ const SLACK_MM: f64 = 1e-6;
 /// the even-odd rule.
 ///
 /// ```
-/// use deltille_core::layout::Logo;
+/// use deltille_layout::Logo;
 /// use glam::DVec2;
 ///
 /// let triangle = [(0.0, 7.0), (4.0, 0.0), (8.0, 7.0)].map(DVec2::from).to_vec();
@@ -220,7 +220,7 @@ pub struct LogoPlacement {
 
 /// How large a logo is to be.
 #[derive(Clone, Copy)]
-pub(in crate::layout) struct LogoSize {
+pub(crate) struct LogoSize {
     /// Width, in heights.
     width: f64,
     /// The height that is asked for, mm.
@@ -260,7 +260,7 @@ impl LogoSize {
 }
 
 /// Refuses a height without a logo, or one that no logo has.
-pub(in crate::layout) fn check(paper: &PaperSpec) -> Result<(), TargetError> {
+pub(crate) fn check(paper: &PaperSpec) -> Result<(), TargetError> {
     let refused = |problem| Err(TargetError::invalid("PaperSpec::logo_height_mm", problem));
     match paper.logo_height_mm {
         Some(_) if paper.logo.is_none() => {
@@ -275,10 +275,7 @@ pub(in crate::layout) fn check(paper: &PaperSpec) -> Result<(), TargetError> {
 }
 
 /// Refuses sheets on which the logo found too little room.
-pub(in crate::layout) fn check_sheets(
-    sheets: &[SheetLayout],
-    paper: &PaperSpec,
-) -> Result<(), TargetError> {
+pub(crate) fn check_sheets(sheets: &[SheetLayout], paper: &PaperSpec) -> Result<(), TargetError> {
     let pages = sheets.iter().flat_map(|sheet| {
         let pages = sheet.pages.iter().map(|page| &page.marks);
         std::iter::once(sheet).chain(pages)
@@ -321,12 +318,12 @@ mod tests {
     use proptest::prelude::*;
 
     use super::*;
+    use crate::Printing;
     use crate::artwork;
-    use crate::family::Family;
-    use crate::lattice::GridKind;
-    use crate::layout::Printing;
-    use crate::layout::{CHECK_BAR_STROKE_MM, SolidSheets};
-    use crate::targets::{BoardSpec, CirclesSpec, SolidShape, SolidSpec, TargetSpec};
+    use crate::{CHECK_BAR_STROKE_MM, SolidSheets};
+    use deltille_core::family::Family;
+    use deltille_core::lattice::GridKind;
+    use deltille_core::targets::{BoardSpec, CirclesSpec, SolidShape, SolidSpec, TargetSpec};
 
     /// A frame that is `width` times as wide as high.
     fn frame(width: f64) -> Logo {

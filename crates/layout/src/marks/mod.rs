@@ -3,9 +3,9 @@
 //! In come sheets with their panels, out go the same with more on them: `label` (what the texts say), `logo` (an outline in the
 //! margin), `tag_ids` (the id of each tag in small type).
 
-pub(in crate::layout) mod label;
-pub(in crate::layout) mod logo;
-pub(in crate::layout) mod tag_ids;
+pub(crate) mod label;
+pub(crate) mod logo;
+pub(crate) mod tag_ids;
 
 pub use label::Label;
 pub use logo::{Logo, LogoPlacement, MOST_LOGO_BYTES};

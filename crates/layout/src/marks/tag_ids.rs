@@ -4,11 +4,11 @@ use std::collections::BTreeSet;
 
 use glam::DVec2;
 
-use crate::family::places;
-use crate::lattice::{GridKind, Tile, Vertex};
-use crate::layout::{Label, Placement, SheetLayout, SheetText};
-use crate::targets::length::format_mm;
-use crate::targets::{Panel, TagPlacement, TagsIn, Target, TargetError};
+use crate::{Label, Placement, SheetLayout, SheetText};
+use deltille_core::family::places;
+use deltille_core::lattice::{GridKind, Tile, Vertex};
+use deltille_core::targets::format_mm;
+use deltille_core::targets::{Panel, TagPlacement, TagsIn, Target, TargetError};
 
 /// Capital height, in edges of a tile, and the most of it, mm: small beside what a corner is measured from.
 const CAP: (f64, f64) = (0.09, 1.8);
@@ -20,10 +20,7 @@ const DIGIT_CAPS: f64 = 0.85;
 const LEAST_CAP_MM: f64 = 0.7;
 
 /// Adds the ids to all sheets of a target.
-pub(in crate::layout) fn add(
-    target: &Target,
-    sheets: &mut [SheetLayout],
-) -> Result<(), TargetError> {
+pub(crate) fn add(target: &Target, sheets: &mut [SheetLayout]) -> Result<(), TargetError> {
     let refused = |problem: String| Err(TargetError::invalid("PaperSpec::tag_ids", problem));
     if target.panels.iter().all(|panel| panel.tags.is_empty()) {
         return refused("there are no tags: leave it out".to_owned());
@@ -89,13 +86,14 @@ mod tests {
     use proptest::prelude::*;
 
     use super::*;
-    use crate::layout::PaperSpec;
-    use crate::layout::Printing;
-    use crate::targets::{BoardSpec, SolidShape, SolidSpec, TargetSpec};
+    use crate::PaperSpec;
+    use crate::Printing;
+    use deltille_core::targets::{BoardSpec, SolidShape, SolidSpec, TargetSpec};
 
     fn target(spec: &TargetSpec) -> Result<Printing, TargetError> {
         let paper = PaperSpec { tag_ids: true, ..PaperSpec::default() };
-        let family = spec.family().map(|name| crate::family::Family::shipped(name).unwrap());
+        let family =
+            spec.family().map(|name| deltille_core::family::Family::shipped(name).unwrap());
         Printing::build("target", spec, family.as_ref(), Some(&paper))
     }
 

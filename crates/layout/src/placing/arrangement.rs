@@ -15,15 +15,15 @@ use std::f64::consts::FRAC_PI_2;
 
 use glam::DVec2;
 
-use crate::family::places;
-use crate::lattice::GridKind;
-use crate::layout::marks::logo::{LogoPlacement, LogoSize};
-use crate::layout::paper::{Orientation, PaperSize, PaperSpec};
-use crate::layout::{CheckBar, Label, LineKind, Placement, SheetLayout, SheetLine, SheetText};
-use crate::polygon::rectangle;
-use crate::targets::boards::board;
-use crate::targets::length::format_mm;
-use crate::targets::{BoardSpec, FamilyRef, Fingerprint, Panel, TagsIn, TargetError};
+use crate::marks::logo::{LogoPlacement, LogoSize};
+use crate::paper::{Orientation, PaperSize, PaperSpec};
+use crate::{CheckBar, Label, LineKind, Placement, SheetLayout, SheetLine, SheetText};
+use deltille_core::family::places;
+use deltille_core::lattice::GridKind;
+use deltille_core::polygon::rectangle;
+use deltille_core::targets::format_mm;
+use deltille_core::targets::size_mm;
+use deltille_core::targets::{BoardSpec, FamilyRef, Fingerprint, Panel, TagsIn, TargetError};
 
 /// Capital height of the words on a check bar, mm: 7 pt, small print that is still easy to read.
 const BAR_CAP_MM: f64 = 1.8;
@@ -46,7 +46,7 @@ const BAR_INDENT_MM: f64 = 3.0;
 const BAR_STEP_MM: f64 = 10.0;
 /// Average advance of a character in the built-in font, in capital heights; a long text is set
 /// only where it fits by this estimate.
-pub(in crate::layout) const ADVANCE_CAPS: f64 = 0.76;
+pub(crate) const ADVANCE_CAPS: f64 = 0.76;
 /// Blank between the black field of an inverted board and the marks, mm.
 const FIELD_GAP_MM: f64 = 1.0;
 /// Marks to cut a plate's sheet out begin and end so far from its corners, mm.
@@ -55,12 +55,12 @@ const CROP_MM: [f64; 2] = [1.0, 5.0];
 const CROP_WIDTH_MM: f64 = 0.15;
 /// Blank that is left along the edges of the paper whatever the margin, mm: a pixel at 200 dpi has
 /// 0.13 mm, and the stroke of a bar that touches the edge can neither be measured nor trimmed.
-pub(in crate::layout) const LEAST_MARGIN_MM: f64 = 0.5;
+pub(crate) const LEAST_MARGIN_MM: f64 = 0.5;
 /// Finest edge proposed to make a board fit, mm: what office printers resolve in a tag.
 const LEAST_PROPOSED_MM: u32 = 5;
 
 /// The rectangle that a panel's ink takes, and the blanks it needs, mm.
-pub(in crate::layout) struct Footprint {
+pub(crate) struct Footprint {
     pub width: f64,
     pub height: f64,
     /// Distance to the edges of the paper.
@@ -73,7 +73,7 @@ pub(in crate::layout) struct Footprint {
 
 impl Footprint {
     pub fn new(spec: &BoardSpec, margin_mm: f64) -> Self {
-        let DVec2 { x: width, y: height } = board::size_mm(spec);
+        let DVec2 { x: width, y: height } = size_mm(spec);
         let quiet = Panel::quiet_zone_at_mm(spec.edge_mm);
         let is_centred = spec.two_sided_mm.is_some();
         let crop_mm = if is_centred { CROP_MM[1] } else { 0.0 };
@@ -89,7 +89,7 @@ impl Footprint {
 
 /// A sheet before its panel is named: which paper, and where things are.
 #[derive(Clone, Copy)]
-pub(in crate::layout) struct Arrangement {
+pub(crate) struct Arrangement {
     page: DVec2,
     margin: f64,
     /// Whether the board is turned by 90° counter-clockwise.
@@ -134,17 +134,14 @@ impl Marks {
 
 /// Fits a board on paper, in this order of preference: the smallest paper (where it is free), the
 /// orientation of the board's longer side, the board not turned, the label below.
-pub(in crate::layout) fn arrange(
-    spec: &BoardSpec,
-    paper: &PaperSpec,
-) -> Result<Arrangement, TargetError> {
+pub(crate) fn arrange(spec: &BoardSpec, paper: &PaperSpec) -> Result<Arrangement, TargetError> {
     let fitting = |spec: &BoardSpec| fit(&Footprint::new(spec, paper.margin_mm), paper);
     let fits = |smaller: &BoardSpec| fitting(smaller).is_ok_and(|found| found.is_some());
     fitting(spec)?.ok_or_else(|| does_not_fit(spec, paper, fits))
 }
 
 /// What is said of a board that finds no room on paper, with the largest edge that `fits`.
-pub(in crate::layout) fn does_not_fit(
+pub(crate) fn does_not_fit(
     spec: &BoardSpec,
     paper: &PaperSpec,
     fits: impl Fn(&BoardSpec) -> bool,
@@ -167,7 +164,7 @@ pub(in crate::layout) fn does_not_fit(
 }
 
 /// Fits a footprint on paper; `None` where it does not fit.
-pub(in crate::layout) fn fit(
+pub(crate) fn fit(
     footprint: &Footprint,
     paper: &PaperSpec,
 ) -> Result<Option<Arrangement>, TargetError> {
@@ -176,7 +173,7 @@ pub(in crate::layout) fn fit(
 }
 
 /// Fits a footprint on paper as it stands; `None` where it does not fit.
-pub(in crate::layout) fn fit_upright(
+pub(crate) fn fit_upright(
     footprint: &Footprint,
     paper: &PaperSpec,
 ) -> Result<Option<Arrangement>, TargetError> {
@@ -196,7 +193,7 @@ fn fit_turned(
 }
 
 /// The margin asked for, mm, and never less than what must stay blank.
-pub(in crate::layout) fn check_margin(paper: &PaperSpec) -> Result<f64, TargetError> {
+pub(crate) fn check_margin(paper: &PaperSpec) -> Result<f64, TargetError> {
     let margin = paper.margin_mm;
     if !(0.0..=100.0).contains(&margin) {
         let problem = format!("{} is not between 0 mm and 100 mm", format_mm(margin));
@@ -226,7 +223,7 @@ fn on_size(
 }
 
 /// Fits a board on one page.
-pub(in crate::layout) fn on_page(
+pub(crate) fn on_page(
     footprint: &Footprint,
     page: DVec2,
     margin: f64,
@@ -258,13 +255,13 @@ pub(in crate::layout) fn on_page(
 
 impl Arrangement {
     /// The same with the logo of a paper.
-    pub(in crate::layout) fn with_logo(self, paper: &PaperSpec) -> Self {
+    pub(crate) fn with_logo(self, paper: &PaperSpec) -> Self {
         Self { logo: LogoSize::of(paper), ..self }
     }
 
     /// The sheet of one panel, whose `ink` is a rectangle of its frame; one of no area where the sheet is filled otherwise,
     /// up to its strips.
-    pub(in crate::layout) fn sheet(&self, panel: u32, ink: [f64; 4], label: String) -> SheetLayout {
+    pub(crate) fn sheet(&self, panel: u32, ink: [f64; 4], label: String) -> SheetLayout {
         let DVec2 { x: width_mm, y: height_mm } = self.page;
         let [lower_marks, right_marks] = self.marks;
         let corner = right_marks.depth() + right_marks.gap;
@@ -326,12 +323,7 @@ impl Arrangement {
 
     /// The id of a board in large type beside its lower left corner, standing as the board does, so that boards are told
     /// apart, and up from down, from some metres away; none where there is no room. `ink` is a rectangle of the board's frame.
-    pub(in crate::layout) fn large_id(
-        &self,
-        spec: &BoardSpec,
-        id: u32,
-        ink: [f64; 4],
-    ) -> Option<SheetText> {
+    pub(crate) fn large_id(&self, spec: &BoardSpec, id: u32, ink: [f64; 4]) -> Option<SheetText> {
         let placement = self.placement(id, ink);
         let [left, lower, right, upper] = self.clear_mm();
         let corners = [DVec2::new(left, lower), DVec2::new(right, upper)];
@@ -360,7 +352,7 @@ impl Arrangement {
     }
 
     /// Whether a text meets the logo of its sheet.
-    pub(in crate::layout) fn logo_meets(&self, sheet: &SheetLayout, text: &SheetText) -> bool {
+    pub(crate) fn logo_meets(&self, sheet: &SheetLayout, text: &SheetText) -> bool {
         let box_of = |at: DVec2, angle_rad: f64, size: DVec2| {
             let turn = DVec2::from_angle(angle_rad);
             let end = at + turn.rotate(size);
@@ -377,12 +369,7 @@ impl Arrangement {
     }
 
     /// Marks at the corners of a plate, a rectangle of the board's frame, to cut its sheet out, or to lay one side on the other.
-    pub(in crate::layout) fn crop_marks(
-        &self,
-        panel: u32,
-        ink: [f64; 4],
-        plate: [f64; 4],
-    ) -> Vec<SheetLine> {
+    pub(crate) fn crop_marks(&self, panel: u32, ink: [f64; 4], plate: [f64; 4]) -> Vec<SheetLine> {
         let placement = self.placement(panel, ink);
         let corners = rectangle(plate);
         let middle = (corners[0] + corners[2]) / 2.0;
@@ -401,17 +388,17 @@ impl Arrangement {
     }
 
     /// Width and height of the page, mm.
-    pub(in crate::layout) fn page_mm(&self) -> DVec2 {
+    pub(crate) fn page_mm(&self) -> DVec2 {
         self.page
     }
 
     /// Lower-left corner of the footprint on the page, mm.
-    pub(in crate::layout) fn footprint_at_mm(&self) -> DVec2 {
+    pub(crate) fn footprint_at_mm(&self) -> DVec2 {
         self.board_at
     }
 
     /// What the margins and the marks leave free: left, lower, right, upper end, mm.
-    pub(in crate::layout) fn clear_mm(&self) -> [f64; 4] {
+    pub(crate) fn clear_mm(&self) -> [f64; 4] {
         let [lower, right] = self.marks.map(Marks::depth);
         let margin = self.margin;
         [margin, margin + lower, self.page.x - margin - right, self.page.y - margin]
@@ -473,12 +460,12 @@ fn bar_words(length_mm: f64) -> String {
 }
 
 /// How the label of a sheet ends: which target it is part of, and what made it.
-pub(in crate::layout) fn imprint(target: Fingerprint) -> String {
+pub(crate) fn imprint(target: Fingerprint) -> String {
     format!("target {} · deltille {}", target.short(), env!("CARGO_PKG_VERSION"))
 }
 
 /// The label of a sheet of boards: all that is needed to make them again.
-pub(in crate::layout) fn label(
+pub(crate) fn label(
     name: &str,
     spec: &BoardSpec,
     panels: &[Panel],
@@ -508,11 +495,7 @@ pub(in crate::layout) fn label(
 }
 
 /// The label of a board among others on a sheet: what tells it from them.
-pub(in crate::layout) fn label_of_one(
-    spec: &BoardSpec,
-    panel: &Panel,
-    family: Option<&FamilyRef>,
-) -> String {
+pub(crate) fn label_of_one(spec: &BoardSpec, panel: &Panel, family: Option<&FamilyRef>) -> String {
     let mut parts = size_in_words(&format!("board {}", panel.id), spec);
     if let (Some(family), [first, .., last] | [first @ last]) = (family, panel.tags.as_slice()) {
         parts.push(tag_range(&family.name, first.id, last.id));
@@ -547,8 +530,8 @@ mod tests {
     use proptest::prelude::*;
 
     use super::*;
-    use crate::layout::Printing;
-    use crate::targets::{TargetSpec, least_untagged_corners};
+    use crate::Printing;
+    use deltille_core::targets::{TargetSpec, least_untagged_corners};
 
     fn spec(rows: u32, cols: u32, edge_mm: f64) -> BoardSpec {
         BoardSpec { tags: None, ..BoardSpec::new(GridKind::Deltille, rows, cols, edge_mm) }

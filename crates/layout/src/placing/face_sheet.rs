@@ -20,13 +20,13 @@ use glam::DVec2;
 
 use super::arrangement::{ADVANCE_CAPS, Arrangement, Footprint, fit, imprint, tag_range};
 use super::net::Sides;
-use crate::angles::turn_of;
-use crate::layout::paper::PaperSpec;
-use crate::layout::{Label, LineKind, Placement, SheetLayout, SheetLine, SheetText};
-use crate::targets::length::format_mm;
-use crate::targets::solids::polyhedron::sides;
-use crate::targets::{
-    Face, FamilyRef, Fingerprint, Panel, Polyhedron, SolidSpec, TargetError, identity,
+use crate::paper::PaperSpec;
+use crate::{Label, LineKind, Placement, SheetLayout, SheetLine, SheetText};
+use deltille_core::angles::turn_of;
+use deltille_core::targets::format_mm;
+use deltille_core::targets::sides;
+use deltille_core::targets::{
+    Face, FamilyRef, Fingerprint, Panel, Polyhedron, SolidSpec, TargetError, fingerprint,
 };
 
 /// White beyond the edges of a face, mm: what cutting and gluing by hand are off, and some more.
@@ -57,7 +57,7 @@ const INNER_CAP: (f64, f64) = (0.35, 2.0);
 const INNER_PLACE: f64 = 0.9;
 
 /// The sheets of a solid's faces, one each.
-pub(in crate::layout) fn sheets(
+pub(crate) fn sheets(
     name: &str,
     spec: &SolidSpec,
     panels: &[Panel],
@@ -67,7 +67,7 @@ pub(in crate::layout) fn sheets(
     let solid = spec.polyhedron();
     let (edges, sides) = (solid.edges(), Sides::new(&solid));
     let margin_mm = spec.white_margin_mm() - spec.panel_inset_mm()?;
-    let target = identity::fingerprint(panels, family);
+    let target = fingerprint(panels, family);
     let numbered = spec.panel_faces()?.into_iter().zip(panels).enumerate();
     numbered
         .map(|(index, (face, panel))| {

@@ -17,15 +17,15 @@ use std::f64::consts::TAU;
 use glam::{DVec2, DVec3};
 
 use super::arrangement::{ADVANCE_CAPS, Footprint, fit_upright};
-use crate::lattice::{GridKind, Tile};
-use crate::layout::paper::{Orientation, PaperSize, PaperSpec, SolidSheets};
-use crate::layout::{Label, LineKind, SheetLayout, SheetLine, SheetText};
-use crate::polygon::rectangle;
-use crate::targets::length::format_mm;
-use crate::targets::{
+use crate::paper::{Orientation, PaperSize, PaperSpec, SolidSheets};
+use crate::{Label, LineKind, SheetLayout, SheetLine, SheetText};
+use deltille_core::lattice::{GridKind, Tile};
+use deltille_core::polygon::rectangle;
+use deltille_core::targets::format_mm;
+use deltille_core::targets::{
     BoardSpec, Corner, Incircle, Panel, Polyhedron, SolidSpec, Target, TargetError, TargetSpec,
 };
-use crate::words::counted;
+use deltille_core::words::counted;
 
 /// Sides of the paper that is taken as it is, mm: what is printed at a desk. Else the page is an A4.
 const AT_A_DESK_MM: [f64; 2] = [140.0, 360.0];
@@ -69,7 +69,7 @@ const SOLID_FROM: DVec3 = DVec3::new(0.55, -0.75, 0.42);
 const BOARD_FROM: DVec3 = DVec3::new(-0.3, 0.4, 0.85);
 
 /// The page for a target that was laid out on `paper`.
-pub(in crate::layout) fn sheet(
+pub(crate) fn sheet(
     title: &str,
     (target, sheets): (&Target, &[SheetLayout]),
     paper: &PaperSpec,
@@ -574,8 +574,8 @@ fn wrapped(text: &str, most: usize) -> Vec<String> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::layout::Printing;
-    use crate::targets::SolidShape;
+    use crate::Printing;
+    use deltille_core::targets::SolidShape;
 
     fn guide(spec: impl Into<TargetSpec>) -> SheetLayout {
         let target = Printing::new("target", spec).unwrap();

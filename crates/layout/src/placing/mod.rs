@@ -9,14 +9,14 @@
 //! 4. `face_sheet`: a sheet for each face of a solid; `net`: the faces of a solid in one piece, to be folded;
 //! 5. `guide`: a page of its own that says what to do with the others.
 
-pub(in crate::layout) mod arrangement;
-pub(in crate::layout) mod face_sheet;
-pub(in crate::layout) mod guide;
-pub(in crate::layout) mod net;
-pub(in crate::layout) mod packed;
-pub(in crate::layout) mod poster;
-pub(in crate::layout) mod single_panel;
-pub(in crate::layout) mod tag_sheet;
+pub(crate) mod arrangement;
+pub(crate) mod face_sheet;
+pub(crate) mod guide;
+pub(crate) mod net;
+pub(crate) mod packed;
+pub(crate) mod poster;
+pub(crate) mod single_panel;
+pub(crate) mod tag_sheet;
 
 pub use arrangement::{CHECK_BAR_STROKE_MM, tag_range};
 pub use face_sheet::{edge_numbers, edge_text, upright_number};

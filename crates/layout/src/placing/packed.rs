@@ -16,11 +16,11 @@ use glam::DVec2;
 use super::arrangement::{
     ADVANCE_CAPS, Arrangement, Footprint, check_margin, label, label_of_one, on_page,
 };
-use crate::lattice::{GridKind, ROW_HEIGHT};
-use crate::layout::marks::logo::{LogoPlacement, LogoSize};
-use crate::layout::paper::PaperSpec;
-use crate::layout::{Label, LineKind, Placement, SheetLayout, SheetLine, SheetText};
-use crate::targets::{BoardSpec, FamilyRef, Panel, TargetError, identity};
+use crate::marks::logo::{LogoPlacement, LogoSize};
+use crate::paper::PaperSpec;
+use crate::{Label, LineKind, Placement, SheetLayout, SheetLine, SheetText};
+use deltille_core::lattice::{GridKind, ROW_HEIGHT};
+use deltille_core::targets::{BoardSpec, FamilyRef, Panel, TargetError, fingerprint};
 
 /// Capital height of a board's label, mm.
 const LABEL_CAP_MM: f64 = 2.0;
@@ -112,7 +112,7 @@ impl Cell {
 }
 
 /// Sheets with as many boards on each as fit.
-pub(in crate::layout) fn sheets(
+pub(crate) fn sheets(
     name: &str,
     spec: &BoardSpec,
     panels: &[Panel],
@@ -126,7 +126,7 @@ pub(in crate::layout) fn sheets(
     cell.check_note(note)?;
     let (grid @ [columns, rows], arrangement) = arrange(&cell, panels.len(), paper)?
         .ok_or_else(|| super::arrangement::does_not_fit(spec, paper, |spec| fits(spec, paper)))?;
-    let target = identity::fingerprint(panels, family);
+    let target = fingerprint(panels, family);
     let pages: Vec<&[Panel]> = panels.chunks(columns * rows).collect();
     let count = pages.len();
     let sheets = pages.into_iter().enumerate().map(|(index, panels)| {
@@ -140,9 +140,8 @@ pub(in crate::layout) fn sheets(
 }
 
 /// Whether a board of this kind finds room.
-pub(in crate::layout) fn fits(spec: &BoardSpec, paper: &PaperSpec) -> bool {
-    let panels =
-        crate::targets::boards::board::untied_panels(&BoardSpec { boards: 1, ..spec.clone() });
+pub(crate) fn fits(spec: &BoardSpec, paper: &PaperSpec) -> bool {
+    let panels = deltille_core::targets::untied_panels(&BoardSpec { boards: 1, ..spec.clone() });
     let cell = panels.first().map(|panel| Cell::new(spec, panel, paper));
     cell.is_some_and(|cell| arrange(&cell, 1, paper).is_ok_and(|found| found.is_some()))
 }
@@ -175,7 +174,7 @@ fn arrange(
         });
         fitting.max_by_key(|(grid, _)| worth(*grid))
     };
-    let on_size = |size: &crate::layout::PaperSize| {
+    let on_size = |size: &crate::PaperSize| {
         let found = paper.pages_mm(size).into_iter().filter_map(on_sheet);
         found.max_by_key(|(grid, _)| worth(*grid))
     };

@@ -13,11 +13,11 @@ use glam::DVec2;
 
 use super::arrangement::{ADVANCE_CAPS, Arrangement, Footprint, fit_upright};
 use super::net::plane::{Motion, bounds, gap_mm};
-use crate::angles::direction;
-use crate::layout::paper::{Orientation, PaperSize, PaperSpec};
-use crate::layout::{Label, LineKind, SheetLayout, SheetLine, SheetPage, SheetText};
-use crate::polygon::rectangle;
-use crate::targets::TargetError;
+use crate::paper::{Orientation, PaperSize, PaperSpec};
+use crate::{Label, LineKind, SheetLayout, SheetLine, SheetPage, SheetText};
+use deltille_core::angles::direction;
+use deltille_core::polygon::rectangle;
+use deltille_core::targets::TargetError;
 
 /// Width of what neighbouring windows share, mm.
 const OVERLAP_MM: f64 = 10.0;
@@ -35,7 +35,7 @@ const WORDS_MM: f64 = 13.0;
 const LEAST_WINDOW_MM: f64 = 40.0;
 
 /// Most pages of a sheet or a net: an afternoon's work.
-pub(in crate::layout) const MOST_PAGES: usize = 120;
+pub(crate) const MOST_PAGES: usize = 120;
 
 /// Largest sheet, mm²: pictures of it that still resolve its hairlines can be verified.
 const MOST_AREA_MM2: f64 = 4e6;
@@ -53,7 +53,7 @@ const LINE_MM: f64 = 0.15;
 const TRIM_MM: f64 = 0.3;
 
 /// Length of a tick, mm.
-pub(in crate::layout) const TICK_MM: f64 = 2.0;
+pub(crate) const TICK_MM: f64 = 2.0;
 
 /// Width of the frame around the page's own window on the overview, mm.
 const FRAME_MM: f64 = 0.5;
@@ -62,7 +62,7 @@ const FRAME_MM: f64 = 0.5;
 const NAME_CAP_MM: f64 = 6.0;
 
 /// How a net or a board lies over pages.
-pub(in crate::layout) struct Poster {
+pub(crate) struct Poster {
     /// A page as it would be without a window.
     page: Arrangement,
     /// The window on the page: left, lower, right, upper end, mm.

@@ -1,11 +1,11 @@
 //! Sheets of ChArUco boards, AprilGrids and circles: their panel in the middle of the smallest paper that takes it.
 
 use super::arrangement::{Footprint, fit, imprint, tag_range};
-use crate::layout::SheetLayout;
-use crate::layout::paper::PaperSpec;
-use crate::targets::length::format_mm;
-use crate::targets::{
-    AprilGridSpec, CharucoSpec, CirclesSpec, Panel, Target, TargetError, TargetSpec, identity,
+use crate::SheetLayout;
+use crate::paper::PaperSpec;
+use deltille_core::targets::format_mm;
+use deltille_core::targets::{
+    AprilGridSpec, CharucoSpec, CirclesSpec, Panel, Target, TargetError, TargetSpec, fingerprint,
 };
 
 /// Finest size that is proposed to make a target fit, mm: what office printers resolve.
@@ -57,13 +57,13 @@ impl SinglePanel<'_> {
 }
 
 /// The sheet of a target of one of these kinds; of another there is none.
-pub(in crate::layout) fn sheets(
+pub(crate) fn sheets(
     title: &str,
     target: &Target,
     paper: &PaperSpec,
 ) -> Result<Vec<SheetLayout>, TargetError> {
     let Target { spec, panels, family, .. } = target;
-    let imprint = imprint(identity::fingerprint(panels, family.as_ref()));
+    let imprint = imprint(fingerprint(panels, family.as_ref()));
     let family = family.as_ref().map_or("", |family| family.name.as_str());
     let sheet = match spec {
         TargetSpec::Charuco(spec) => {

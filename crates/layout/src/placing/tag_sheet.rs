@@ -10,13 +10,12 @@
 use glam::DVec2;
 
 use super::arrangement::{ADVANCE_CAPS, Arrangement, Footprint, check_margin, on_page};
-use crate::family::Family;
-use crate::lattice::ROW_HEIGHT;
-use crate::layout::paper::{PaperSize, PaperSpec};
-use crate::layout::{Label, Placement, SheetLayout, SheetText};
-use crate::targets::boards::tag_sheet::EDGE_MM;
-use crate::targets::length::format_mm;
-use crate::targets::{TagSheetSpec, TargetError};
+use crate::paper::{PaperSize, PaperSpec};
+use crate::{Label, Placement, SheetLayout, SheetText};
+use deltille_core::family::Family;
+use deltille_core::lattice::ROW_HEIGHT;
+use deltille_core::targets::format_mm;
+use deltille_core::targets::{TagSheetSpec, TargetError};
 
 /// Blank around a tag: so many edges, at least so many mm, and at least a cell's edge.
 const QUIET: (f64, f64) = (0.15, 3.0);
@@ -62,7 +61,7 @@ impl Blanks {
 }
 
 /// The sheets of some tags.
-pub(in crate::layout) fn sheets(
+pub(crate) fn sheets(
     name: &str,
     spec: &TagSheetSpec,
     family: &Family,
@@ -115,7 +114,10 @@ fn arrange(
             let footprint = Blanks::new(f64::from(*mm), spec, family).footprint([1, 1], margin);
             pages.iter().any(|&page| on_page(&footprint, page, margin, false).is_some())
         };
-        let instead = match (*EDGE_MM.start() as u32..spec.edge_mm.ceil() as u32).rev().find(fits) {
+        let instead = match (*TagSheetSpec::EDGE_MM.start() as u32..spec.edge_mm.ceil() as u32)
+            .rev()
+            .find(fits)
+        {
             Some(mm) => format!("larger paper, or `TagSheetSpec::edge_mm` of at most {mm} mm"),
             None => "larger paper, or a smaller `PaperSpec::margin_mm`".to_owned(),
         };
@@ -197,8 +199,8 @@ fn listed(ids: &[u32]) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::layout::Printing;
-    use crate::targets::TargetSpec;
+    use crate::Printing;
+    use deltille_core::targets::TargetSpec;
 
     fn build(ids: Vec<u32>, edge_mm: f64, paper: &str) -> Result<Printing, TargetError> {
         let family = Family::shipped("d36h9").unwrap();

@@ -1,10 +1,10 @@
 //! Which board suits a camera, and the distances from which it is to be seen.
 
 use super::reach::{COMFORTABLE_BIT_PX, COMFORTABLE_EDGE_PX, Reach, shortening};
-use crate::family::Family;
-use crate::lattice::{GridKind, ROW_HEIGHT};
-use crate::layout::{PaperSpec, largest_edge_mm};
-use crate::targets::{BoardSpec, TagSpec, Target, TargetError, TargetSpec};
+use crate::{PaperSpec, largest_edge_mm};
+use deltille_core::family::Family;
+use deltille_core::lattice::{GridKind, ROW_HEIGHT};
+use deltille_core::targets::{BoardSpec, TagSpec, Target, TargetError, TargetSpec};
 
 /// The part of a picture that a board may fill: beyond, a hand moves it out.
 const FILLED: f64 = 0.9;
@@ -90,10 +90,10 @@ impl Situation {
     /// distance, which is whole in the picture at the nearest if that takes 4 × 5 corners, and fits the paper.
     ///
     /// ```
-    /// use deltille_core::detect::Situation;
+    /// use deltille_layout::Situation;
     /// use deltille_core::family::Family;
     /// use deltille_core::lattice::GridKind;
-    /// use deltille_core::layout::PaperSpec;
+    /// use deltille_layout::PaperSpec;
     /// use deltille_core::targets::TagSpec;
     ///
     /// let webcam = Situation {

@@ -2,15 +2,15 @@
 
 use serde::Serialize;
 
-use crate::detect::config::MIN_UNTAGGED_EDGE_PX;
-use crate::family::Family;
-use crate::targets::{Target, TargetSpec};
+use deltille_core::detection::MIN_UNTAGGED_EDGE_PX;
+use deltille_core::family::Family;
+use deltille_core::targets::{Target, TargetSpec};
 
 /// A cell of a tag that is so long leaves room for tilt, blur and noise, px; without these half of it is read.
-pub(in crate::detect) const COMFORTABLE_BIT_PX: f64 = 2.0;
+pub const COMFORTABLE_BIT_PX: f64 = 2.0;
 
 /// Likewise the edge of a tile of a board without tags.
-pub(in crate::detect) const COMFORTABLE_EDGE_PX: f64 = 1.25 * MIN_UNTAGGED_EDGE_PX;
+pub const COMFORTABLE_EDGE_PX: f64 = 1.25 * MIN_UNTAGGED_EDGE_PX;
 
 /// A cell of a tag from which on boards are labelled where pictures are sharp, px: half of the views are at 1.25, nearly all
 /// from a twentieth more on. Tilted cells need as large an area.
@@ -43,7 +43,7 @@ impl Reach {
     /// What a target offers; `family` is the one that it names.
     ///
     /// ```
-    /// use deltille_core::detect::Reach;
+    /// use deltille_layout::Reach;
     /// use deltille_core::targets::{BoardSpec, Target};
     ///
     /// let board = Target::new("desk", BoardSpec::deltille(10, 11, 20.0))?;
@@ -115,15 +115,15 @@ impl Reach {
 }
 
 /// What is left, at a tilt, of how far a board is labelled: cells of tags must keep their area, tiles without their height.
-pub(in crate::detect) fn shortening(has_tags: bool, tilt_rad: f64) -> f64 {
+pub fn shortening(has_tags: bool, tilt_rad: f64) -> f64 {
     if has_tags { tilt_rad.cos().sqrt() } else { tilt_rad.cos() }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::lattice::GridKind;
-    use crate::targets::BoardSpec;
+    use deltille_core::lattice::GridKind;
+    use deltille_core::targets::BoardSpec;
 
     #[test]
     fn without_tags_tiles_must_be_seen() {

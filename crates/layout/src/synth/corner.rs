@@ -7,7 +7,7 @@
 //! of full scale for blurs from 0.4 px (tests).
 //!
 //! ```
-//! use deltille_core::synth::SimulatedCorner;
+//! use deltille_layout::synth::SimulatedCorner;
 //! use glam::DVec2;
 //!
 //! let corner = SimulatedCorner::seen_from(3, 0.3, 0.5, DVec2::new(10.2, 9.9), 1.0);
@@ -19,7 +19,7 @@ use std::f64::consts::{FRAC_1_SQRT_2, FRAC_2_PI, PI};
 
 use glam::DVec2;
 
-use crate::raster::Gray;
+use deltille_core::raster::Gray;
 
 /// Nodes of the rule along each side of a pixel, on −1 … 1, and weights; sharper blurs than 1 px
 /// ask for the second.

@@ -1,7 +1,7 @@
 //! A target seen by a camera, as an image with exact ground truth.
 //!
 //! Outlines are projected edge by edge and their area in every pixel is computed, not sampled
-//! ([`crate::raster::Coverage`]), so the image before blur and noise is exact, and so are the
+//! ([`deltille_core::raster::Coverage`]), so the image before blur and noise is exact, and so are the
 //! positions of the corners.
 
 mod corner;

@@ -7,7 +7,7 @@
 use glam::{DVec2, DVec3};
 
 use super::Surface;
-use crate::polygon::clip;
+use deltille_core::polygon::clip;
 
 /// A piece hides nothing of a plane above which it rises by less than this, mm: faces that meet in
 /// an edge.

@@ -5,8 +5,8 @@ use rand_distr::{Distribution, Normal};
 use serde::{Deserialize, Serialize};
 
 use super::occlusion::Shadow;
-use crate::camera::{Camera, Pose};
-use crate::raster::{Coverage, Gray, gaussian};
+use deltille_core::camera::{Camera, Pose};
+use deltille_core::raster::{Coverage, Gray, gaussian};
 
 /// An edge is divided until its image leaves the straight line by less than this, px.
 const MAX_CHORD_ERROR_PX: f64 = 1e-4;
@@ -17,7 +17,7 @@ const MAX_DIVISIONS: u32 = 10;
 /// Brightness and imperfections of a photograph.
 ///
 /// ```
-/// use deltille_core::synth::Light;
+/// use deltille_layout::synth::Light;
 ///
 /// let dim = Light::default().white(0.3).noise(0.02).seed(7);
 /// assert_eq!([dim.white, dim.blur_px], [0.3, 0.8]);

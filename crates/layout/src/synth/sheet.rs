@@ -3,8 +3,8 @@ use kurbo::{BezPath, PathEl};
 
 use super::{Scene, Surface};
 use crate::artwork::{Paint, Shape, Sheet};
-use crate::camera::Pose;
-use crate::layout::{Placement, Printing};
+use crate::{Placement, Printing};
+use deltille_core::camera::Pose;
 
 /// Curves of letters are replaced by chords that leave them by less than this, mm.
 const FLATTENING_MM: f64 = 0.005;
@@ -39,7 +39,7 @@ fn rectangle(width: f64, height: f64) -> Vec<DVec2> {
     [(0.0, 0.0), (width, 0.0), (width, height), (0.0, height)].map(DVec2::from).to_vec()
 }
 
-fn target_from_page(placement: &Placement, panel: &crate::targets::Panel) -> Pose {
+fn target_from_page(placement: &Placement, panel: &deltille_core::targets::Panel) -> Pose {
     let page_from_panel = Pose {
         rotation: DQuat::from_rotation_z(placement.angle_rad),
         translation: placement.origin_mm.extend(0.0),

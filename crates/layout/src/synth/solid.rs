@@ -1,9 +1,10 @@
 use super::sheet::black_areas;
 use super::{Scene, Surface};
-use crate::artwork::{self, ArtworkError};
-use crate::family::Family;
-use crate::polygon::rectangle;
-use crate::targets::{Panel, Target, TargetSpec};
+use crate::artwork;
+use crate::artwork::ArtworkError;
+use deltille_core::family::Family;
+use deltille_core::polygon::rectangle;
+use deltille_core::targets::{Panel, Target, TargetSpec};
 
 /// The panels of a target where they are in space: the faces of a solid, or boards cut out along
 /// their quiet zone.

@@ -10,10 +10,10 @@ use rand::seq::SliceRandom;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-use super::cycles::cycles_in;
-use super::{Arrangement, CycleSpace};
-use crate::family::{Rules, Screen, TagWords};
-use crate::lattice::{Dimension, TagCells};
+use deltille_core::family::algebra::cycles_in;
+use deltille_core::family::algebra::{Arrangement, CycleSpace};
+use deltille_core::family::{Rules, Screen, TagWords};
+use deltille_core::lattice::{Dimension, TagCells};
 
 /// 512 words of the code, one bit each.
 type Slice = [u64; 8];
@@ -77,7 +77,7 @@ impl Arranger {
             space,
             slices,
             edges: edges.collect(),
-            min_pairs: screen.min_pairs,
+            min_pairs: screen.min_pairs(),
             black_distance: rules.black_distance,
             white_distance: rules.white_distance,
             words,
@@ -92,7 +92,7 @@ impl Arranger {
 
     /// Lets sums of two words of the code, in cycle coordinates, count where hidden cells leave too little of
     /// them: of n words at least n / (1 + s) can then stand together, where s sums are too light.
-    pub(in crate::family) fn with_sums(mut self, mut sums: Vec<u64>) -> Self {
+    pub fn with_sums(mut self, mut sums: Vec<u64>) -> Self {
         sums.retain(|&word| self.space.canonical(word) == word);
         self.sums = sums;
         self
@@ -124,7 +124,7 @@ impl Arranger {
     }
 
     /// Codes that an arrangement has for sure: with hidden cells some of the words that satisfy the rules stand apart.
-    pub(in crate::family) fn sure(&self, arrangement: &Arrangement) -> usize {
+    pub fn sure(&self, arrangement: &Arrangement) -> usize {
         (self.share_apart(arrangement) * f64::from(self.score(arrangement))) as usize
     }
 
@@ -140,7 +140,7 @@ impl Arranger {
     }
 
     /// The objective of [`Self::anneal`] for one arrangement.
-    pub(in crate::family) fn judge(&self, arrangement: &Arrangement) -> f64 {
+    pub fn judge(&self, arrangement: &Arrangement) -> f64 {
         self.worth(arrangement, &self.weights(arrangement.inverted))
     }
 
@@ -156,11 +156,7 @@ impl Arranger {
     }
 
     /// An arrangement that differs in one choice.
-    pub(in crate::family) fn changed(
-        &self,
-        arrangement: &Arrangement,
-        random: &mut impl Rng,
-    ) -> Arrangement {
+    pub fn changed(&self, arrangement: &Arrangement, random: &mut impl Rng) -> Arrangement {
         let n = self.movable();
         let mut next = arrangement.clone();
         match random.random_range(0..10) {

@@ -6,7 +6,7 @@
 //! third root of unity, is a shift of that code: it fixes 0 alone, and moves the other positions in 21 cycles of three, as a
 //! turn moves the cells of a tag of 64 bits.
 
-use super::{CycleSpace, Span};
+use deltille_core::family::algebra::{CycleSpace, Span};
 
 /// Elements of the field other than 0.
 const POWERS: u32 = 63;
@@ -80,8 +80,8 @@ impl Field {
 
 #[cfg(test)]
 mod tests {
-    use super::super::ranked::Ranked;
-    use super::super::weights::weights;
+    use deltille_core::family::algebra::{Ranked, weights};
+
     use super::*;
 
     /// Dimensions and distances are those of MacWilliams & Sloane, figure 9.1, a parity bit added; all words are weighed, of

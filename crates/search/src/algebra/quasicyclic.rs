@@ -7,7 +7,7 @@
 
 use rand::Rng;
 
-use super::{CycleSpace, Span};
+use deltille_core::family::algebra::{CycleSpace, Span};
 
 /// A symmetry that commutes with the turn: within each block of `block` cycles every cycle moves to
 /// the next, and the last moves to the first, rotated by one step if `twisted`. Cycles beyond the

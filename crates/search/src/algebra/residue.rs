@@ -6,7 +6,7 @@
 //! MacWilliams & Sloane, chapter 16). For q ≡ 2 mod 3 its element x → 1/(1−x), of order three,
 //! fixes no point, so it cuts the q+1 positions into three-cycles.
 
-use super::{CycleSpace, Span};
+use deltille_core::family::algebra::{CycleSpace, Span};
 
 /// Primes q whose extended codes fit a word: lengths q+1 of 18, 24, 42 and 48.
 pub const PRIMES: [u32; 4] = [17, 23, 41, 47];

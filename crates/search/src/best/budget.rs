@@ -3,7 +3,7 @@
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Duration;
 
-use crate::Clock;
+use deltille_core::Clock;
 
 /// How long a search goes on.
 #[derive(Clone, Copy, Debug)]

@@ -8,7 +8,7 @@ use std::time::Duration;
 use serde::{Deserialize, Serialize};
 
 use super::{Best, Budget, Start};
-use crate::family::{Construction, Control, Family, FamilyError, Progress};
+use deltille_core::family::{Construction, Control, Family, FamilyError, Progress};
 
 /// What the legs of a search have found, to go on from there.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -163,7 +163,7 @@ mod tests {
     use std::sync::atomic::{AtomicBool, Ordering};
 
     use super::*;
-    use crate::lattice::Dimension;
+    use deltille_core::lattice::Dimension;
 
     #[test]
     fn a_search_by_work_in_pieces_finds_what_it_finds_at_once() {
@@ -173,7 +173,7 @@ mod tests {
         let mut checkpoint = Checkpoint::default();
         for piece in 1..=3 {
             let cancel = AtomicBool::new(false);
-            let control = Control { cancel: Some(&cancel), report: None };
+            let control = Control::default().cancel(&cancel);
             let stop = |_: &Checkpoint| cancel.store(piece < 3, Ordering::Relaxed);
             search.resume("d9h4", None, &mut checkpoint, &stop, control).unwrap();
             assert_eq!(checkpoint.legs_done, piece);
@@ -187,7 +187,7 @@ mod tests {
 
     #[test]
     fn what_is_searched_already_counts() {
-        let clock: crate::Clock = || Duration::ZERO;
+        let clock: deltille_core::Clock = || Duration::ZERO;
         let time = Budget::Time(Duration::from_secs(600), clock);
         let search = Best::new(Dimension::from_bits(9).unwrap(), 4, time);
         let left = |legs_done, seconds| {

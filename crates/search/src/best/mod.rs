@@ -24,24 +24,26 @@ use super::joint::{AllWords, Joint};
 use super::local::Search;
 use super::polish::{Effort, polish};
 use super::robust::with_the_most_codes;
-use crate::family::algebra::arrange::Arranger;
-use crate::family::algebra::cosets::{CosetGraph, CosetUnion, MAX_SYNDROME_BITS};
-use crate::family::algebra::quasicyclic::{Symmetry, random_code};
-use crate::family::algebra::ranked::Ranked;
-use crate::family::algebra::record::{has_free_centre, stride_of};
-use crate::family::algebra::{AlgebraicConstruction, Arrangement, CycleSpace, Span, bch, residue};
-use crate::family::check::bounds::bounds_of_cells;
-use crate::family::hex::parse_word;
-use crate::family::tables::shipped::shipped_names;
-use crate::family::{
+use crate::algebra::arrange::Arranger;
+use crate::algebra::coset_graph::{CosetGraph, MAX_SYNDROME_BITS};
+use crate::algebra::quasicyclic::{Symmetry, random_code};
+use crate::algebra::{bch, residue};
+use deltille_core::family::algebra::CosetUnion;
+use deltille_core::family::algebra::Ranked;
+use deltille_core::family::algebra::{AlgebraicConstruction, Arrangement, CycleSpace, Span};
+use deltille_core::family::algebra::{has_free_centre, stride_of};
+use deltille_core::family::bounds_of_cells;
+use deltille_core::family::parse_word;
+use deltille_core::family::shipped_names;
+use deltille_core::family::{
     Construction, Control, Family, FamilyError, Progress, Rules, Screen, TagWords,
 };
-use crate::lattice::{Dimension, GridKind};
+use deltille_core::lattice::{Dimension, GridKind};
 
 /// What to search and for how long.
 ///
 /// ```
-/// use deltille_core::family::best::{Best, Budget};
+/// use deltille_search::best::{Best, Budget};
 /// use deltille_core::family::Control;
 /// use deltille_core::lattice::Dimension;
 ///

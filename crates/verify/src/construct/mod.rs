@@ -26,11 +26,11 @@ use serde_json::Value;
 
 use super::reader::Reader;
 use super::{Artifact, DocumentError, Finding, Format, PageFinding};
-use deltille_core::artwork::{drawn_lines, subject};
-use deltille_core::layout::{Finish, LineKind, Printing, SheetLayout};
 use deltille_files::export::inlay::Body;
 use deltille_files::export::mesh::extras;
 use deltille_files::export::scene;
+use deltille_layout::artwork::{drawn_lines, subject};
+use deltille_layout::{Finish, LineKind, Printing, SheetLayout};
 
 /// Problem of marks outside the page: some viewers show more than the page, and then these as well.
 const OFF_PAGE: &str = "a mark that reaches over the edge of the page";

@@ -8,9 +8,9 @@ use lopdf::xref::XrefEntry;
 use lopdf::{Dictionary, Document, Object, ObjectId, StringFormat, decode_text_string};
 
 use super::{Findings, Words, is_creator, pdf_content, unpack};
-use deltille_core::layout::Finish;
 use deltille_files::export::pdf::{VERSION, color_spaces, graphics_states};
 use deltille_files::limits::Limits;
+use deltille_layout::Finish;
 
 /// The permitted keys of the trailer, the catalogue, the information, the page tree and a page.
 const TRAILER: [&str; 4] = ["Root", "Info", "Size", "ID"];

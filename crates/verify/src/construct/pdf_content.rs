@@ -7,9 +7,9 @@ use kurbo::{BezPath, Shape as _};
 
 use super::ink::Ink;
 use super::{Findings, OFF_PAGE, start};
-use deltille_core::layout::Finish;
 use deltille_files::export::pdf::{CONTOUR, OVERPRINT, WHITE};
 use deltille_files::limits::{Exceeded, Limits};
+use deltille_layout::Finish;
 
 /// Millimetres per point of 1/72 inch.
 const MM_PER_PT: f64 = 25.4 / 72.0;

@@ -1,29 +1,12 @@
-//! Unions of cosets of an invariant linear code K, by clique search.
-//!
-//! Two cosets of K are at distance h or more exactly when the sum of their syndromes is not the
-//! syndrome of a word lighter than h. All syndromes of such words are marked once. A code K ∪ (K+a)
-//! ∪ … with distance h is then a set of syndromes that contains 0 and all of whose pairwise sums
-//! are unmarked: a clique in a Cayley graph (an independent set in its complement). Its vertices
-//! here are whole orbits of syndromes under the turn, so that the union is invariant.
-//!
-//! The search draws the first vertices at random and finds the best of what they leave: the union need not be the largest. The
-//! table of marks has one bit for each syndrome, which limits codes to [`MAX_SYNDROME_BITS`].
+//! Unions of cosets of an invariant linear code K.
 
 use std::collections::BTreeSet;
 
-use rand::SeedableRng;
-use rand::seq::IndexedRandom;
-use rand_chacha::ChaCha8Rng;
-
-use super::clique::Cliques;
 use super::ranked::Ranked;
-use super::{CycleSpace, LinearMap, Span};
+use super::{CycleSpace, Span};
 
-/// The most bits that a syndrome may have; the table of marked syndromes then takes 16 MiB.
-pub const MAX_SYNDROME_BITS: u32 = 27;
-
-/// A union of cosets of a linear code. It is invariant under the turn when [`CosetGraph::grow`]
-/// made it.
+/// A union of cosets of a linear code. It is invariant under the turn where its
+/// syndromes are whole orbits.
 #[derive(Clone, Debug, PartialEq)]
 pub struct CosetUnion {
     /// The space of the words.
@@ -45,7 +28,7 @@ impl CosetUnion {
 
     /// The number of orbits of three words, and some of them, spread over all: no more than `most`. Of a linear code of more
     /// than 24 dimensions no list is made.
-    pub(in crate::family) fn some_orbits(&self, most: usize) -> (usize, Vec<u64>) {
+    pub fn some_orbits(&self, most: usize) -> (usize, Vec<u64>) {
         const LISTED_DIMENSIONS: u32 = 24;
         if self.cosets == [0]
             && self.code.dimension() > LISTED_DIMENSIONS
@@ -62,7 +45,7 @@ impl CosetUnion {
     }
 
     /// The sums of two words that are lighter than `weight`, each once, and not zero.
-    pub(in crate::family) fn differences_lighter_than(&self, weight: u32) -> Vec<u64> {
+    pub fn differences_lighter_than(&self, weight: u32) -> Vec<u64> {
         let pairs = self.cosets.iter().enumerate();
         let shifts: BTreeSet<u64> = pairs
             .flat_map(|(i, a)| self.cosets[..=i].iter().map(move |b| self.code.reduce(a ^ b)))
@@ -70,183 +53,4 @@ impl CosetUnion {
         let words = shifts.into_iter().flat_map(|shift| self.code.words().map(move |w| w ^ shift));
         words.filter(|word| (1..weight).contains(&word.count_ones())).collect()
     }
-}
-
-/// The compatibility graph of the cosets of one code: vertices are orbits of cosets that keep the
-/// distance, edges join those that keep it from each other.
-#[derive(Clone, Debug)]
-pub struct CosetGraph {
-    space: CycleSpace,
-    code: Span,
-    free_bits: Vec<u32>,
-    /// Bit s: some word lighter than h has syndrome s.
-    marked: Vec<u64>,
-    turned: LinearMap,
-    vertices: Vec<Vertex>,
-}
-
-/// An orbit of syndromes under the turn: one syndrome that the turn fixes, or three.
-#[derive(Clone, Copy, Debug)]
-struct Vertex {
-    syndrome: u32,
-    /// Number of orbits of three words in its cosets.
-    weight: u32,
-}
-
-impl CosetGraph {
-    /// The graph of an invariant `code` for minimum distance `distance` (1 or more). `None` when
-    /// the code itself has a smaller distance, when its syndromes have more than
-    /// [`MAX_SYNDROME_BITS`] bits, or when `halt` returned true before the table was complete.
-    pub fn new(
-        space: CycleSpace,
-        code: Span,
-        distance: u32,
-        halt: &dyn Fn() -> bool,
-    ) -> Option<Self> {
-        let free_bits = code.free_bits(space.bits());
-        let syndrome_bits = free_bits.len() as u32;
-        if syndrome_bits > MAX_SYNDROME_BITS {
-            return None;
-        }
-        let syndromes = code.syndromes(space.bits())?;
-        let columns: Vec<u32> = (0..space.bits()).map(|i| syndromes.apply(1 << i)).collect();
-        let mut marked = vec![0u64; (1usize << syndrome_bits).div_ceil(64)];
-        if !mark(&columns, 0, distance - 1, &mut marked, halt) {
-            return None;
-        }
-        let turned: Vec<u32> =
-            free_bits.iter().map(|&i| syndromes.apply(space.turn(1 << i))).collect();
-        let turned = LinearMap::of_columns(&turned);
-        let mut graph = Self { space, code, free_bits, marked, turned, vertices: Vec::new() };
-        graph.vertices = graph.find_vertices();
-        Some(graph)
-    }
-
-    /// Number of orbits of cosets that can be united with the code itself.
-    pub fn vertices(&self) -> usize {
-        self.vertices.len()
-    }
-
-    fn find_vertices(&self) -> Vec<Vertex> {
-        let words = 1u32 << self.code.dimension();
-        let fixed_words = self.code.words().filter(|&w| self.space.turn(w) == w).count() as u32;
-        let fixed_weight = (words - fixed_words) / 3;
-        (1..1u32 << self.free_bits.len())
-            .filter(|&s| !self.is_marked(s))
-            .filter_map(|syndrome| {
-                let once = self.turn(syndrome);
-                if once == syndrome {
-                    return Some(Vertex { syndrome, weight: fixed_weight });
-                }
-                let twice = self.turn(once);
-                let first = syndrome < once && syndrome < twice;
-                (first && !self.is_marked(syndrome ^ once))
-                    .then_some(Vertex { syndrome, weight: words })
-            })
-            .collect()
-    }
-
-    fn is_marked(&self, syndrome: u32) -> bool {
-        self.marked[syndrome as usize / 64] >> (syndrome % 64) & 1 == 1
-    }
-
-    fn turn(&self, syndrome: u32) -> u32 {
-        self.turned.apply(syndrome.into())
-    }
-
-    fn adjacent(&self, a: u32, b: u32) -> bool {
-        let once = self.turn(b);
-        !self.is_marked(a ^ b) && !self.is_marked(a ^ once) && !self.is_marked(a ^ self.turn(once))
-    }
-
-    /// A large union, grown from one random start: vertices are added one by one, each time the one of a
-    /// few random candidates that leaves the most words possible, until so few are left that the
-    /// heaviest clique of these is found by branch and bound, or `halt` returns true. The result
-    /// depends on `seed` only, unless `halt` ended the search.
-    pub fn grow(&self, seed: u64, halt: impl Fn() -> bool) -> CosetUnion {
-        /// Candidates that are compared before each choice.
-        const LOOK_AT: usize = 12;
-        /// So many vertices are few, and so many branches are looked at.
-        const FEW: usize = 800;
-        const NODES: u32 = 4_000;
-        let mut random = ChaCha8Rng::seed_from_u64(seed);
-        let mut chosen: Vec<Vertex> = Vec::new();
-        let mut open = self.vertices.clone();
-        while !open.is_empty() && !halt() {
-            if open.len() <= FEW {
-                let weights = open.iter().map(|v| v.weight).collect();
-                let adjacent =
-                    |i: usize, j: usize| self.adjacent(open[i].syndrome, open[j].syndrome);
-                let heaviest = Cliques::new(weights, adjacent).heaviest(NODES);
-                chosen.extend(heaviest.into_iter().map(|v| open[v]));
-                break;
-            }
-            let tries = if open.len() > 50_000 { 1 } else { LOOK_AT.min(open.len()) };
-            let best = (0..tries)
-                .map(|_| {
-                    let pick = *open.choose(&mut random).expect("not empty");
-                    let left: Vec<Vertex> = open
-                        .iter()
-                        .copied()
-                        .filter(|v| {
-                            v.syndrome != pick.syndrome && self.adjacent(v.syndrome, pick.syndrome)
-                        })
-                        .collect();
-                    (pick, left)
-                })
-                .max_by_key(|(pick, left)| {
-                    let weight: u64 = left.iter().map(|v| u64::from(v.weight)).sum();
-                    u64::from(pick.weight) * 3 + weight
-                });
-            let Some((pick, left)) = best else { break };
-            chosen.push(pick);
-            open = left;
-        }
-        self.union(&chosen)
-    }
-
-    fn union(&self, chosen: &[Vertex]) -> CosetUnion {
-        let mut syndromes = vec![0];
-        for vertex in chosen {
-            let once = self.turn(vertex.syndrome);
-            syndromes.push(vertex.syndrome);
-            if once != vertex.syndrome {
-                syndromes.extend([once, self.turn(once)]);
-            }
-        }
-        let cosets = syndromes.iter().map(|&s| self.word(s)).collect();
-        CosetUnion { space: self.space, code: self.code.clone(), cosets }
-    }
-
-    /// The word of this syndrome that has only free bits set.
-    fn word(&self, syndrome: u32) -> u64 {
-        (0..)
-            .zip(&self.free_bits)
-            .filter(|&(i, _)| syndrome >> i & 1 == 1)
-            .fold(0, |word, (_, bit)| word | 1 << bit)
-    }
-}
-
-/// Marks the syndromes of all words of up to `weight` set bits, as sums of columns added to `sum`.
-/// Returns false when one or more columns sum to zero, so that the code has a word that light, or
-/// when `halt` came first.
-fn mark(
-    columns: &[u32],
-    sum: u32,
-    weight: u32,
-    marked: &mut [u64],
-    halt: &dyn Fn() -> bool,
-) -> bool {
-    /// Remaining weight at which `halt` is asked: some ten thousand sums lie between two calls.
-    const LOOK_AT: u32 = 4;
-    marked[sum as usize / 64] |= 1 << (sum % 64);
-    if weight == 0 {
-        return true;
-    }
-    if weight == LOOK_AT && halt() {
-        return false;
-    }
-    columns.iter().enumerate().all(|(i, column)| {
-        sum != *column && mark(&columns[i + 1..], sum ^ column, weight - 1, marked, halt)
-    })
 }

@@ -132,14 +132,15 @@ impl Arrangement {
 
 /// An arrangement made ready for many words.
 #[derive(Clone, Debug)]
-pub(in crate::family) struct Placing {
+pub struct Placing {
     translation: u64,
     /// tables[i][x]: the word of the tag of the word with byte i = x and all else 0.
     tables: Vec<[u64; 256]>,
 }
 
 impl Placing {
-    pub(in crate::family) fn new(arrangement: &Arrangement, dimension: Dimension) -> Self {
+    /// Prepares an arrangement for tags of a dimension.
+    pub fn new(arrangement: &Arrangement, dimension: Dimension) -> Self {
         let map = arrangement.bit_map(dimension);
         let table = |places: &[u8]| {
             std::array::from_fn(|x| {
@@ -153,14 +154,14 @@ impl Placing {
 
     /// The word of the tag of a word in cycle coordinates.
     #[inline]
-    pub(in crate::family) fn on_tag(&self, word: u64) -> u64 {
+    pub fn on_tag(&self, word: u64) -> u64 {
         let bytes = (word ^ self.translation).to_le_bytes();
         self.tables.iter().zip(bytes).fold(0, |tag, (table, byte)| tag | table[usize::from(byte)])
     }
 }
 
 /// The cycles of the tag, by their index, whose bits are all in a mask.
-pub(super) fn cycles_in(dimension: Dimension, mask: u64) -> Vec<u8> {
+pub fn cycles_in(dimension: Dimension, mask: u64) -> Vec<u8> {
     let (cycles, _) = tag_cycles(dimension);
     let is_in = |cycle: &[u8; 3]| cycle.iter().all(|bit| mask >> bit & 1 == 1);
     (0..).zip(&cycles).filter(|(_, cycle)| is_in(cycle)).map(|(i, _)| i).collect()

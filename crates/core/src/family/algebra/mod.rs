@@ -7,30 +7,26 @@
 //! are `u64` with one bit for each cell, 64 at most. A code that this permutation leaves invariant yields a
 //! family: one tag for each orbit of three words (`docs/families.md`).
 //!
-//! - [`residue`]: extended quadratic-residue codes (extended cyclic codes), which have a symmetry of order three.
-//! - [`bch`]: extended BCH codes of length 64, which have one, too, and fix one position.
-//! - [`quasicyclic`]: random invariant linear codes with a further quasi-cyclic symmetry.
-//! - [`cosets`]: unions of cosets of an invariant linear code, found by clique search over syndromes.
-//! - [`ranked`]: the tags of a linear code by number, computed without listing the code.
-//! - [`weights`]: how many words have each weight, by those of the dual where a code has too many.
-//! - [`arrange`]: the assignment of code cycles to tag cycles, by simulated annealing; it decides
-//!   how many words satisfy the rules on complexity.
+//! - `cycles`: cycle coordinates, and how cycles are placed on the cells of a tag;
+//! - `span`: linear codes; `linear_map`: their syndromes; `weights`: how many words have each weight, by those of the dual where
+//!   a code has too many;
+//! - `cosets`: unions of cosets of a linear code; `ranked`: the tags of a linear code by number, without listing the code;
+//! - `record`: the construction as its file holds it, which lists the codes again and proves their distance.
+//!
+//! How such codes are found is the crate `deltille-search`.
 
-pub mod arrange;
-pub mod bch;
-mod clique;
-pub mod cosets;
+mod cosets;
 mod cycles;
 mod linear_map;
-pub mod quasicyclic;
-pub mod ranked;
-pub(in crate::family) mod record;
-pub mod residue;
+mod ranked;
+mod record;
 mod span;
-pub mod weights;
+mod weights;
 
-pub(in crate::family) use cycles::Placing;
-pub use cycles::{Arrangement, CycleSpace};
+pub use cosets::CosetUnion;
+pub use cycles::{Arrangement, CycleSpace, Placing, cycles_in};
 pub use linear_map::LinearMap;
-pub use record::AlgebraicConstruction;
+pub use ranked::Ranked;
+pub use record::{AlgebraicConstruction, arranged, has_free_centre, stride_of};
 pub use span::Span;
+pub use weights::weights;

@@ -76,24 +76,3 @@ impl Ranked {
         Some(word)
     }
 }
-
-#[cfg(test)]
-mod tests {
-    use std::collections::HashSet;
-
-    use super::super::residue;
-    use super::*;
-
-    #[test]
-    fn ranks_meet_every_orbit_once() {
-        let (code, space) = (residue::extended(23), residue::space(23));
-        let ranked = Ranked::new(space, &code).unwrap();
-        let orbits: HashSet<u64> =
-            (0..ranked.len()).map(|r| space.canonical(ranked.word(r).unwrap())).collect();
-        assert_eq!((ranked.len(), orbits.len()), (1360, 1360));
-        assert!(orbits.iter().all(|&w| code.contains(w) && space.turn(w) != w));
-        assert_eq!(ranked.word(ranked.len()), None);
-        let large = Ranked::new(residue::space(47), &residue::extended(47)).unwrap();
-        assert_eq!(large.len(), 5_592_320);
-    }
-}

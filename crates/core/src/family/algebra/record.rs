@@ -126,10 +126,10 @@ impl AlgebraicConstruction {
     }
 
     /// The words of the union on the tag that the screen admits one by one, and the exchanged ones.
-    pub(in crate::family) fn words_of_the_union(
-        &self,
-        screen: &Screen,
-    ) -> Result<Vec<u64>, FamilyError> {
+    ///
+    /// # Errors
+    /// Where the record is not valid, see [`Self::codes`].
+    pub fn words_of_the_union(&self, screen: &Screen) -> Result<Vec<u64>, FamilyError> {
         let dimension = screen.words().dimension();
         let mut words = arranged(screen, &self.union(dimension)?, &self.arrangement);
         words.extend(self.words("exchanged", &self.exchanged, dimension)?);
@@ -151,7 +151,7 @@ impl AlgebraicConstruction {
     ///
     /// # Errors
     /// When a word does not parse or is too long for the dimension, or the basis has more than 26 dimensions.
-    pub(in crate::family) fn union(&self, dimension: Dimension) -> Result<CosetUnion, FamilyError> {
+    pub fn union(&self, dimension: Dimension) -> Result<CosetUnion, FamilyError> {
         let code = Span::of(self.words("basis", &self.basis, dimension)?);
         if code.dimension() > MOST_DIMENSIONS {
             return Err(FamilyError::field("construction.basis", "more than 26 dimensions"));
@@ -194,10 +194,7 @@ impl AlgebraicConstruction {
     /// The linear code and one word of each of its cosets as words of the tag, and a mask of the
     /// central cell where no word uses it, else 0. `None` when the family has exchanged words, or
     /// the record is not consistent.
-    pub(in crate::family) fn on_the_tag(
-        &self,
-        dimension: Dimension,
-    ) -> Option<(Span, Vec<u64>, u64)> {
+    pub fn on_the_tag(&self, dimension: Dimension) -> Option<(Span, Vec<u64>, u64)> {
         let space = CycleSpace::of(dimension);
         if !self.exchanged.is_empty() || !self.arrangement.fits(space) {
             return None;
@@ -301,11 +298,7 @@ fn taken_in_order(screen: &Screen, words: impl Iterator<Item = u64>, limit: usiz
 }
 
 /// The words of a union on the tag that the screen admits, one of each orbit.
-pub(in crate::family) fn arranged(
-    screen: &Screen,
-    union: &CosetUnion,
-    arrangement: &Arrangement,
-) -> Vec<u64> {
+pub fn arranged(screen: &Screen, union: &CosetUnion, arrangement: &Arrangement) -> Vec<u64> {
     let dimension = screen.words().dimension();
     let words = arrangement.apply(dimension, &union.orbits());
     if !has_free_centre(union) {
@@ -336,14 +329,14 @@ fn greatest_common_divisor(a: u64, b: u64) -> u64 {
 }
 
 /// A stride for so many tags that spreads any number of them evenly: about a golden section of them.
-pub(in crate::family) fn stride_of(tags: u64) -> u64 {
+pub fn stride_of(tags: u64) -> u64 {
     let golden = (tags as f64 * 0.618_033_988_749_895) as u64;
     let coprime = |stride: &u64| greatest_common_divisor(*stride, tags) == 1;
     (golden.max(1)..).find(coprime).unwrap_or(1)
 }
 
 /// Whether the space has a central bit that no word of the union uses.
-pub(in crate::family) fn has_free_centre(union: &CosetUnion) -> bool {
+pub fn has_free_centre(union: &CosetUnion) -> bool {
     let centre = 1u64 << (union.space.bits() - 1);
     union.space.centre
         && union.code.rows().iter().chain(&union.cosets).all(|word| word & centre == 0)

@@ -2,7 +2,7 @@ use std::collections::BTreeMap;
 
 use super::hidden::least_seen;
 use crate::family::hex::parse_word;
-use crate::family::search::lexicode::Lexicode;
+use crate::family::lexicode::Lexicode;
 use crate::family::{
     Confusion, Construction, Control, Family, PAIRS_COUNTED, Robust, Screen, TagWords,
     distance_histogram,
@@ -227,7 +227,7 @@ fn admits(cells: &TagCells, screen: &Screen, family: &Family, code: u64) -> bool
     let differing = cells.neighbours().iter().filter(counts).count() as u32;
     let white = code.count_ones();
     code & free == 0
-        && differing >= screen.min_pairs
+        && differing >= screen.min_pairs()
         && white >= rules.black_distance
         && family.used_cells() - white >= rules.white_distance
 }

@@ -35,7 +35,7 @@ pub enum Construction {
     /// A union of cosets of a linear code, arranged on the tag, with some codes exchanged
     /// ([`crate::family::algebra`]).
     Algebraic(AlgebraicConstruction),
-    /// Local search from nothing ([`Search`](crate::family::search::Search)); rerun with the same numbers it gives the same.
+    /// Local search from nothing (`deltille_search::Search`); rerun with the same numbers it gives the same.
     Search {
         /// Seed of the random choices.
         seed: u64,

@@ -10,7 +10,7 @@ pub(in crate::family) mod file;
 pub(in crate::family) mod growth;
 pub(in crate::family) mod import;
 pub(in crate::family) mod published_bounds;
-pub(in crate::family) mod shipped;
+pub(super) mod shipped;
 
 pub use aruco::{dictionary, dictionary_names};
 pub use export::{ExportFormat, export};

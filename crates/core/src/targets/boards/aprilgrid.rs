@@ -111,7 +111,8 @@ impl AprilGridSpec {
     }
 
     /// The panel of a checked spec.
-    pub(crate) fn panel(&self) -> Panel {
+    #[doc(hidden)]
+    pub fn panel(&self) -> Panel {
         let [columns, rows] = self.tags;
         let mut panel = Panel {
             id: self.board_id,

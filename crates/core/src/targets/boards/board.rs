@@ -47,7 +47,7 @@ pub fn board_vertices(kind: GridKind, rows: u32, cols: u32) -> Vec<Vertex> {
 }
 
 /// Width and height of the drawn tiles, mm; what [`Panel::bounds_mm`] finds without a panel at hand.
-pub(crate) fn size_mm(spec: &BoardSpec) -> DVec2 {
+pub fn size_mm(spec: &BoardSpec) -> DVec2 {
     let (rows, cols) = (f64::from(spec.rows), f64::from(spec.cols));
     let edges = match spec.grid {
         GridKind::Deltille => DVec2::new(cols + 1.5, (rows + 1.0) * ROW_HEIGHT),
@@ -62,7 +62,7 @@ pub(crate) fn size_mm(spec: &BoardSpec) -> DVec2 {
 /// `spacing`-th row and column; on a checkerboard in the squares among them that have the right
 /// colour. Of the possible starts the one with most tags is taken, and of those the one whose tags
 /// lie most evenly about the centre of the board.
-pub(crate) fn tagged_tiles(
+pub fn tagged_tiles(
     kind: GridKind,
     corners: &[Vertex],
     spacing: u32,
@@ -119,7 +119,7 @@ pub(crate) fn panels(
 }
 
 /// The panels of a checked spec, whether or not its family has so many tags.
-pub(crate) fn untied_panels(spec: &BoardSpec) -> Vec<Panel> {
+pub fn untied_panels(spec: &BoardSpec) -> Vec<Panel> {
     let vertices = board_vertices(spec.grid, spec.rows, spec.cols);
     let tagged = |tags: &TagSpec| tagged_tiles(spec.grid, &vertices, tags.spacing, tags.tags_in);
     let tiles = spec.tags.as_ref().map_or_else(Vec::new, tagged);

@@ -67,6 +67,9 @@ fn is_deltille(kind: &GridKind) -> bool {
 }
 
 impl BoardSpec {
+    /// Edge of the tiles of the published board, mm, which fits A4 with 10 × 11 corners.
+    pub const USUAL_EDGE_MM: f64 = 20.0;
+
     /// One deltille board with tags, of so many rows and columns of corners.
     pub fn deltille(rows: u32, cols: u32, edge_mm: f64) -> Self {
         Self::new(GridKind::Deltille, rows, cols, edge_mm)

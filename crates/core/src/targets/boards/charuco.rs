@@ -77,7 +77,11 @@ impl CharucoSpec {
     }
 
     /// Checks every number by itself; returns the dimension of the markers.
-    pub(crate) fn check(&self) -> Result<Dimension, TargetError> {
+    ///
+    /// # Errors
+    /// Where a setting is not possible.
+    #[doc(hidden)]
+    pub fn check(&self) -> Result<Dimension, TargetError> {
         if let Some(side) = self.squares.iter().find(|side| !SIDES.contains(side)) {
             let problem = format!("{side} is not between {} and {}", SIDES.start(), SIDES.end());
             return Err(TargetError::invalid("CharucoSpec::squares", problem));
@@ -117,7 +121,8 @@ impl CharucoSpec {
     }
 
     /// The panel of a checked spec with markers of this dimension.
-    pub(crate) fn panel(&self, dimension: Dimension) -> Panel {
+    #[doc(hidden)]
+    pub fn panel(&self, dimension: Dimension) -> Panel {
         let [columns, rows] = self.squares.map(|side| side as i32);
         let (first, kind, edge_mm) = (self.first_col(), GridKind::Checker, self.square_mm);
         let bit_mm = self.marker_mm / TagCells::of(kind, dimension).width(BORDER_BITS);

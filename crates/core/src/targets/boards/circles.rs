@@ -79,7 +79,8 @@ impl CirclesSpec {
     }
 
     /// The panel of a checked spec: its corners are the middles of the circles.
-    pub(crate) fn panel(&self) -> Panel {
+    #[doc(hidden)]
+    pub fn panel(&self) -> Panel {
         let [columns, rows] = self.circles.map(|side| side as i32);
         let (kind, edge_mm) = (GridKind::Checker, self.spacing_mm);
         let downwards = DMat3::from_diagonal(DVec3::new(1.0, -1.0, -1.0));

@@ -14,8 +14,7 @@ pub(crate) mod tag_sheet;
 pub(crate) mod tag_spec;
 
 pub use aprilgrid::AprilGridSpec;
-pub(crate) use board::tagged_tiles;
-pub use board::{board_vertices, zigzag_vertices};
+pub use board::{board_vertices, size_mm, tagged_tiles, untied_panels, zigzag_vertices};
 pub use board_spec::{BoardSpec, SIDES, least_untagged_corners};
 pub use charuco::CharucoSpec;
 pub use circles::CirclesSpec;

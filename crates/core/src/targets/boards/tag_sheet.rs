@@ -22,8 +22,10 @@ pub struct TagSheetSpec {
     pub border_bits: f64,
 }
 
-/// Range of a tag's edge, mm: what office printers resolve in a tag, and what fits the largest page.
-pub(crate) const EDGE_MM: std::ops::RangeInclusive<f64> = 5.0..=2000.0;
+impl TagSheetSpec {
+    /// Range of a tag's edge, mm: what office printers resolve in a tag, and what fits the largest page.
+    pub const EDGE_MM: std::ops::RangeInclusive<f64> = 5.0..=2000.0;
+}
 
 /// A panel for each tag, and their family.
 pub(in crate::targets) fn tagged(
@@ -46,7 +48,7 @@ fn check(spec: &TagSheetSpec, family: &Family) -> Result<(), TargetError> {
         let problem = format!("{} has square tags, a sheet takes triangular ones", family.name());
         return Err(TargetError::invalid("TagSheetSpec::family", problem));
     }
-    if !EDGE_MM.contains(&spec.edge_mm) {
+    if !TagSheetSpec::EDGE_MM.contains(&spec.edge_mm) {
         let problem = format!("{} is not between 5 mm and 2000 mm", format_mm(spec.edge_mm));
         return Err(TargetError::invalid("TagSheetSpec::edge_mm", problem));
     }

@@ -13,6 +13,6 @@ pub(crate) mod solid_spec;
 
 pub use closed_mesh::{ClosedMesh, ClosedMeshError, FaceNoun, NEAR_EQUILATERAL, is_coordinate};
 pub use face::{Face, FaceBoard};
-pub use polyhedron::{Polyhedron, triangles};
+pub use polyhedron::{Polyhedron, sides, triangles};
 pub use skeleton::{Incircle, Skeleton, SkeletonSpec};
 pub use solid_spec::{FACE_TILES, SolidShape, SolidSpec};

@@ -126,7 +126,7 @@ impl Polyhedron {
 }
 
 /// The sides of a face: pairs of vertices.
-pub(crate) fn sides(face: &[usize]) -> impl Iterator<Item = (usize, usize)> {
+pub fn sides(face: &[usize]) -> impl Iterator<Item = (usize, usize)> {
     face.iter().copied().zip(face.iter().copied().cycle().skip(1))
 }
 

@@ -176,7 +176,8 @@ impl SolidSpec {
     }
 
     /// Width of the white along the edges of a face, mm.
-    pub(crate) fn white_margin_mm(&self) -> f64 {
+    #[doc(hidden)]
+    pub fn white_margin_mm(&self) -> f64 {
         self.margin_mm - self.rim_mm().unwrap_or_default()
     }
 

@@ -10,10 +10,10 @@ use super::estimate::{
 };
 pub use super::estimate::{Print, Residuals, is_failure};
 use super::finding::{FindingRecord, records};
-use deltille_core::calibrate::{Diagnosis, Estimate, Excluded};
+use deltille_calibrate::{Diagnosis, Estimate, Excluded};
 use deltille_core::camera::SplineGrid;
-use deltille_core::detect::InkEstimate;
-use deltille_core::json::{self};
+use deltille_core::detection::InkEstimate;
+use deltille_core::json;
 use deltille_core::targets::TargetIdentity;
 
 /// Schema and version that this crate writes.

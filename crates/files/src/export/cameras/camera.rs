@@ -355,7 +355,7 @@ fn list(values: &[f64]) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use deltille_core::calibrate::Model;
+    use deltille_calibrate::Model;
 
     fn camera(model: Model, count: usize) -> Camera {
         let lens = model.lens();

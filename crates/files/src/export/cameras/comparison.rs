@@ -4,7 +4,7 @@ use glam::DVec3;
 use serde::Serialize;
 
 use super::motion::Motion;
-use deltille_core::calibrate::{CameraMotion, Comparison};
+use deltille_calibrate::{CameraMotion, Comparison};
 use deltille_core::json;
 
 /// Schema and version that this crate writes.
@@ -92,7 +92,7 @@ pub fn write(names: &[&str], found: &[Comparison], motions: &[CameraMotion]) -> 
     json::to_text(&file, 4)
 }
 
-fn place(found: &deltille_core::calibrate::Difference) -> PlaceRecord {
+fn place(found: &deltille_calibrate::Difference) -> PlaceRecord {
     PlaceRecord {
         x: found.pixel.x,
         y: found.pixel.y,

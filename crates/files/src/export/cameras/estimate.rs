@@ -7,12 +7,12 @@ use nalgebra::DMatrix;
 use serde::Serialize;
 
 use super::motion::Motion;
-use deltille_core::calibrate::{
+use deltille_calibrate::{
     BoardShape, CameraEstimate, ChangedIntrinsic, Coverage, Diagnosis, Estimate, Instead,
     LackOfFit, LensEnd, PanelRef, Source, TargetMap, ViewEstimate, Words,
 };
 use deltille_core::camera::{Lens, SplineGrid};
-use deltille_core::detect::InkEstimate;
+use deltille_core::detection::InkEstimate;
 
 /// What is known of the print that was photographed, besides its plan.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -122,7 +122,7 @@ struct CornerRecord<'a> {
 pub(in crate::export) struct ShapeRecord {
     middle_mm: DVec3,
     reach_mm: f64,
-    /// b₁ … b₇, a₁, a₂ of [`deltille_core::calibrate::Shape`].
+    /// b₁ … b₇, a₁, a₂ of [`deltille_calibrate::Shape`].
     coefficients_mm: Vec<f64>,
     sd_mm: Vec<f64>,
     bent_mm: f64,

@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-use deltille_core::calibrate::{Diagnosis, Estimate, Finding, PanelRef, Shared, Words};
+use deltille_calibrate::{Diagnosis, Estimate, Finding, PanelRef, Shared, Words};
 
 /// A finding as files store it; `panel` is an id, `camera` a name.
 #[derive(Debug, Default, Serialize)]

@@ -11,7 +11,7 @@ use super::motion::Motion;
 use crate::export::corners::overlay::{self, Outlined, OverlayError};
 #[cfg(feature = "print")]
 use crate::export::pages::svg::HEAD;
-use deltille_core::calibrate::NextView;
+use deltille_calibrate::NextView;
 #[cfg(feature = "print")]
 use deltille_core::raster::AnyGray;
 

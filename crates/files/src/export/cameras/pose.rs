@@ -3,7 +3,7 @@
 use serde::Serialize;
 
 use super::motion::Motion;
-use deltille_core::calibrate::{Estimate, Reference, ViewEstimate};
+use deltille_calibrate::{Estimate, Reference, ViewEstimate};
 use deltille_core::targets::Target;
 
 /// Schema and version that this crate writes.

@@ -10,7 +10,7 @@ use super::estimate::{
 };
 use super::finding::{FindingRecord, records};
 use super::motion::Motion;
-use deltille_core::calibrate::{CameraEstimate, Diagnosis, Estimate, Excluded};
+use deltille_calibrate::{CameraEstimate, Diagnosis, Estimate, Excluded};
 use deltille_core::camera::SplineGrid;
 use deltille_core::json;
 use deltille_core::targets::TargetIdentity;

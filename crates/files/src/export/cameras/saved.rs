@@ -11,13 +11,14 @@ use serde::{Deserialize, Deserializer};
 
 use super::sheet::StoredShape;
 use super::{calibration, rig};
-use deltille_core::calibrate::{
+use deltille_calibrate::{
     BoardShape, CameraEstimate, Corner, CornerOffset, Coverage, Estimate, Excluded, FrameEstimate,
     Model, ObservedCovariance, PanelRef, Parameter, ProjectionUncertainty, Reason, Reference,
     SHAPE_COEFFICIENTS as COUNT, TargetEstimate, TargetMap, ViewEstimate,
 };
 use deltille_core::camera::{Camera, Lens, Pose, Spline, SplineGrid, is_rotation};
-use deltille_core::json::{self, ReadError};
+use deltille_core::json;
+use deltille_core::json::ReadError;
 use deltille_core::quantity;
 use deltille_core::targets::{Target, TargetIdentity, check_result_of};
 

@@ -4,11 +4,12 @@ use glam::DVec3;
 use serde::Deserialize;
 
 use super::{calibration, rig};
-use deltille_core::calibrate::{SHAPE_COEFFICIENTS as COUNT, Shape};
-use deltille_core::json::{self, ReadError};
-use deltille_core::layout::SheetLayout;
+use deltille_calibrate::{SHAPE_COEFFICIENTS as COUNT, Shape};
+use deltille_core::json;
+use deltille_core::json::ReadError;
 use deltille_core::quantity;
 use deltille_core::targets::{TargetIdentity, check_result_of};
+use deltille_layout::SheetLayout;
 
 /// What is known of the printed sheet before a calibration.
 #[derive(Clone, Debug, Default, PartialEq)]

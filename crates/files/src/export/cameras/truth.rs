@@ -6,9 +6,10 @@ use serde::{Deserialize, Serialize};
 use super::motion::Motion;
 use super::saved::SavedPose;
 use deltille_core::camera::Pose;
-use deltille_core::json::{self, ReadError};
+use deltille_core::json;
+use deltille_core::json::ReadError;
 use deltille_core::quantity;
-use deltille_core::synth::{Light, TruthCorner};
+use deltille_layout::synth::{Light, TruthCorner};
 
 /// Schema and version that this crate writes.
 pub const SCHEMA: &str = "deltille/truth/1";

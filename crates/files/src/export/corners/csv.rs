@@ -9,7 +9,7 @@ use std::fmt::Write;
 
 use glam::DVec2;
 
-use deltille_core::detect::Detection;
+use deltille_core::detection::Detection;
 use deltille_core::lattice::GridKind;
 
 /// The header line.
@@ -18,7 +18,7 @@ pub const HEADER: &str = "grid,kind,panel,row,col,id,x,y,cov_xx,cov_xy,cov_yy,ta
 /// The text of the CSV file of one image.
 ///
 /// ```
-/// use deltille_core::detect::Detection;
+/// use deltille_core::detection::Detection;
 /// use deltille_files::export::csv;
 ///
 /// assert_eq!(csv::write(&Detection::default()).lines().next(), Some(csv::HEADER));

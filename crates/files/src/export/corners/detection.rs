@@ -4,8 +4,9 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use serde::{Deserialize, Serialize};
 
-use deltille_core::detect::{Detection, Grid, InkEstimate, Reason, ToneEstimate};
-use deltille_core::json::{self, ReadError};
+use deltille_core::detection::{Detection, Grid, InkEstimate, Reason, ToneEstimate};
+use deltille_core::json;
+use deltille_core::json::ReadError;
 use deltille_core::quantity;
 use deltille_core::raster::FileNotes;
 use deltille_core::reading::in_words;
@@ -101,7 +102,7 @@ struct DetectionFile {
 /// The JSON text of the detection in one image, with one corner in each line; positions in px.
 ///
 /// ```
-/// use deltille_core::detect::Detection;
+/// use deltille_core::detection::Detection;
 /// use deltille_files::export::detection;
 ///
 /// let found = Detection::new("desk.png", [640, 480], Vec::new());

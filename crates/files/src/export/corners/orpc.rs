@@ -18,7 +18,7 @@
 use std::fmt::Write;
 
 use super::dsc::{Dialect, point_id};
-use deltille_core::detect::{Detection, Grid};
+use deltille_core::detection::{Detection, Grid};
 use deltille_core::lattice::Vertex;
 use deltille_core::targets::Target;
 
@@ -50,12 +50,12 @@ fn corner_lines(grid: &Grid, target: Option<&Target>) -> Vec<String> {
         Some((board, &target.panels[board], Dialect::of(target)))
     });
     // The product of two numbers from a file may exceed 32 bits.
-    let low = |of: fn(&deltille_core::detect::GridCorner) -> i32| {
+    let low = |of: fn(&deltille_core::detection::GridCorner) -> i32| {
         grid.corners.iter().map(of).min().map_or(0, i64::from)
     };
     let (row0, col0) = (low(|c| c.row), low(|c| c.col));
     let cols = grid.corners.iter().map(|c| i64::from(c.col) - col0 + 1).max().unwrap_or(0);
-    let line = |corner: &deltille_core::detect::GridCorner| {
+    let line = |corner: &deltille_core::detection::GridCorner| {
         let (x, y) = (corner.x, corner.y);
         match labelled {
             Some((board, panel, dialect)) => {

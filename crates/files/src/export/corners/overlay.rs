@@ -12,10 +12,10 @@ use tiny_skia::{
 };
 
 use crate::export::writing::kind::signed_png;
-use deltille_core::artwork::text;
-use deltille_core::detect::{Detection, Grid};
+use deltille_core::detection::{Detection, Grid};
 use deltille_core::lattice::{GridKind, Vertex};
 use deltille_core::raster::{AnyGray, Gray, Intensity};
+use deltille_layout::artwork::text;
 
 /// Colours of successive grids: far apart in hue, bright enough on black.
 const COLOURS: [[u8; 3]; 6] =

@@ -18,10 +18,10 @@ use spade::{ConstrainedDelaunayTriangulation, Point2, Triangulation};
 
 pub use super::meshing::{INLAY_MM, LEAST_INLAY_MM};
 use super::meshing::{MeshError, Meshing};
-use deltille_core::artwork::{Part, Shape, panel_shapes, subject};
 use deltille_core::family::Family;
 use deltille_core::polygon::rectangle;
 use deltille_core::targets::{Panel, Polyhedron, Target, TargetSpec};
+use deltille_layout::artwork::{Part, Shape, panel_shapes, subject};
 
 /// Points that are nearer than this are one, mm: the same corner, computed in two ways.
 const SAME_MM: f64 = 1e-6;

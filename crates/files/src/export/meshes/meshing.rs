@@ -2,9 +2,9 @@
 
 use std::io;
 
-use deltille_core::artwork::ArtworkError;
 use deltille_core::targets::{ClosedMeshError, TargetError};
 use deltille_core::words::counted;
+use deltille_layout::artwork::ArtworkError;
 
 /// Depth of the inlay, mm, unless another is asked for: two layers of most printers.
 pub const INLAY_MM: f64 = 0.4;

@@ -9,9 +9,9 @@
 use std::ops::Range;
 
 use super::meshing::{MAX_TEXTURE_PX, MeshError, Resolution, TEXELS_PER_BIT};
-use deltille_core::artwork::Atlas;
 use deltille_core::polygon::area;
 use deltille_core::targets::{Face, Panel};
+use deltille_layout::artwork::Atlas;
 
 /// Most textures of a mesh: readers hold all of them at the same time.
 pub const MAX_TEXTURES: u32 = 64;

@@ -13,8 +13,8 @@ use glam::DVec3;
 
 use super::inlay::{Body, InlaidBodies};
 use crate::export::GENERATOR;
-use deltille_core::artwork::subject;
 use deltille_core::targets::{ClosedMesh, ClosedMeshError, Target, triangles};
+use deltille_layout::artwork::subject;
 
 /// The part of the file that holds the bodies.
 pub const MODEL: &str = "3D/3dmodel.model";

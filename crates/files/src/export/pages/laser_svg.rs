@@ -9,7 +9,7 @@ use svg::Document;
 use svg::node::element::{Description, Path, Title};
 
 use super::svg::{HEAD, data, number};
-use deltille_core::artwork::{CutDrawing, CutLayer, CutPath};
+use deltille_layout::artwork::{CutDrawing, CutLayer, CutPath};
 
 /// Blank around the drawing, mm.
 pub const AROUND_MM: f64 = 1.0;
@@ -92,9 +92,9 @@ fn points(outline: &str) -> Option<Vec<DVec2>> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use deltille_core::artwork::to_laser;
-    use deltille_core::layout::Printing;
     use deltille_core::targets::BoardSpec;
+    use deltille_layout::Printing;
+    use deltille_layout::artwork::to_laser;
 
     #[test]
     fn what_is_written_is_read_and_nothing_else() {

@@ -16,8 +16,8 @@ use sha2::{Digest, Sha256};
 
 use crate::export::writing::atomic;
 use crate::export::{ExportError, GENERATOR};
-use deltille_core::artwork::{Artwork, Paint, Part, Sheet};
-use deltille_core::layout::{Finish, LineKind};
+use deltille_layout::artwork::{Artwork, Paint, Part, Sheet};
+use deltille_layout::{Finish, LineKind};
 
 /// Version of the PDF format.
 pub const VERSION: &str = "1.6";
@@ -84,7 +84,7 @@ pub fn write(artwork: &Artwork, path: &Path) -> Result<(), ExportError> {
 /// The bytes of one PDF file with all sheets; they are the same for the same artwork.
 ///
 /// ```
-/// use deltille_core::layout::Printing;
+/// use deltille_layout::Printing;
 /// use deltille_core::targets::BoardSpec;
 /// use deltille_files::export::pdf;
 ///

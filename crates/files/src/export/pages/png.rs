@@ -9,7 +9,7 @@ use tiny_skia::{FillRule, Mask, PathBuilder, Transform};
 use super::supersample::render as supersample;
 use crate::export::writing::{atomic, kind};
 use crate::export::{Block, ExportError, GENERATOR, SUBPIXELS};
-use deltille_core::artwork::{Paint, Shape, Sheet};
+use deltille_layout::artwork::{Paint, Shape, Sheet};
 
 /// Most pixels of an image: 2 gigapixels, as of an A0 sheet at 1200 dpi.
 const MAX_PIXELS: f64 = 2.0e9;

@@ -9,7 +9,7 @@ use kurbo::{Affine, BezPath, PathEl, Point};
 
 use crate::export::ExportError;
 use crate::export::writing::atomic;
-use deltille_core::artwork::{Artwork, Paint, Part, Shape};
+use deltille_layout::artwork::{Artwork, Paint, Part, Shape};
 
 /// Decimals of a coordinate: to a tenth of a micrometre.
 const DECIMALS: usize = 4;
@@ -37,7 +37,7 @@ pub fn write(artwork: &Artwork, sheet: usize, path: &Path) -> Result<(), ExportE
 /// When the artwork has no such sheet.
 ///
 /// ```
-/// use deltille_core::layout::Printing;
+/// use deltille_layout::Printing;
 /// use deltille_core::targets::BoardSpec;
 /// use deltille_files::export::svg;
 ///

@@ -1,6 +1,6 @@
 """Writes `inter-outlines.txt`, the glyphs of `inter-subset.otf` as paths; needs fonttools.
 
-    python crates/core/src/artwork/font/outlines.py [--check]
+    python crates/layout/src/artwork/font/outlines.py [--check]
 """
 
 import sys

@@ -4,9 +4,9 @@ use glam::DVec3;
 use serde::Serialize;
 
 use super::unfold::{Side, Sides};
-use crate::angles::angle;
-use crate::layout::Printing;
-use crate::targets::{SolidSpec, TargetSpec};
+use crate::Printing;
+use deltille_core::angles::angle;
+use deltille_core::targets::{SolidSpec, TargetSpec};
 
 /// Sides that lie on each other on a sheet differ by less, mm.
 const TOUCHING_MM: f64 = 0.01;
@@ -30,7 +30,7 @@ impl Printing {
     /// are no nets.
     ///
     /// ```
-    /// use deltille_core::layout::Printing;
+    /// use deltille_layout::Printing;
     /// use deltille_core::targets::{SolidShape, SolidSpec};
     ///
     /// let die = Printing::new("die", SolidSpec::new(SolidShape::Icosahedron))?;
@@ -105,7 +105,7 @@ mod tests {
     use glam::{DAffine3, DQuat};
 
     use super::*;
-    use crate::targets::SolidShape;
+    use deltille_core::targets::SolidShape;
 
     /// Turned about their hinges, all faces lie in one plane, as they do on the sheet.
     #[test]
@@ -153,7 +153,7 @@ mod tests {
 
     #[test]
     fn what_is_no_net_has_no_hinges() {
-        let board = crate::targets::BoardSpec::deltille(10, 11, 20.0);
+        let board = deltille_core::targets::BoardSpec::deltille(10, 11, 20.0);
         assert!(Printing::new("board", board).unwrap().hinges().is_empty());
     }
 }

@@ -15,7 +15,7 @@
 //! Faces never overlap, and tabs overlap neither faces nor each other: see [`plane::gap_mm`]. A
 //! solid whose faces cannot be laid out in one piece, or whose net is larger than the paper, is printed
 //! in several pieces of whole faces, nested on as few pages as will do; tabs and numbers then lead from
-//! one to the other. With [`SolidSheets::SeamedNet`](crate::layout::SolidSheets::SeamedNet) a net that is larger
+//! one to the other. With [`SolidSheets::SeamedNet`](crate::SolidSheets::SeamedNet) a net that is larger
 //! than the paper stays in one piece, over several pages that are joined first.
 //!
 //! `unfold` lays the faces of a solid in the plane, `tabs` adds what is glued, `nest` packs pieces on pages, and `sheet` makes the
@@ -23,11 +23,11 @@
 
 mod hinge;
 mod nest;
-pub(in crate::layout) mod plane;
+pub(crate) mod plane;
 mod sheet;
 mod tabs;
 mod unfold;
 
 pub use hinge::Hinge;
-pub(in crate::layout) use sheet::sheets;
-pub(in crate::layout) use unfold::Sides;
+pub(crate) use sheet::sheets;
+pub(crate) use unfold::Sides;

@@ -13,7 +13,7 @@ use std::f64::consts::{FRAC_PI_2, TAU};
 use glam::DVec2;
 
 use super::plane::{Motion, bounds};
-use crate::polygon::area;
+use deltille_core::polygon::area;
 
 /// Blank between pieces, mm: scissors pass.
 const BLANK_MM: f64 = 2.0;

@@ -2,7 +2,7 @@
 
 use glam::DVec2;
 
-use crate::angles::direction;
+use deltille_core::angles::direction;
 
 /// Depth of an overlap that rounding makes of two polygons that share an edge, mm; coordinates of
 /// metres carry errors a million times smaller.

@@ -8,18 +8,20 @@ use super::nest::{self, Outline, Place};
 use super::plane::{Motion, bounds};
 use super::tabs::{self, Tab};
 use super::unfold::{self, Piece, Side, Sides};
-use crate::angles::turn_of;
-use crate::lattice::{GridKind, Vertex};
-use crate::layout::paper::{PaperSpec, SolidSheets};
-use crate::layout::placing::arrangement::{
+use crate::paper::{PaperSpec, SolidSheets};
+use crate::placing::arrangement::{
     ADVANCE_CAPS, Arrangement, Footprint, fit_upright, imprint, tag_range,
 };
-use crate::layout::placing::face_sheet::edge_numbers;
-use crate::layout::placing::poster::{MOST_PAGES, Poster};
-use crate::layout::{Label, LineKind, Placement, SheetLayout, SheetLine, SheetText};
-use crate::polygon;
-use crate::targets::length::format_mm;
-use crate::targets::{Face, FamilyRef, Panel, Polyhedron, SolidSpec, TargetError, identity};
+use crate::placing::face_sheet::edge_numbers;
+use crate::placing::poster::{MOST_PAGES, Poster};
+use crate::{Label, LineKind, Placement, SheetLayout, SheetLine, SheetText};
+use deltille_core::angles::turn_of;
+use deltille_core::lattice::{GridKind, Vertex};
+use deltille_core::polygon;
+use deltille_core::targets::format_mm;
+use deltille_core::targets::{
+    Face, FamilyRef, Panel, Polyhedron, SolidSpec, TargetError, fingerprint,
+};
 
 /// Faces that rise or fall from one plane by less than this are not folded, radians (a tenth of a
 /// degree): no hand makes so slight a fold, and the neighbours hold the paper in its place.
@@ -303,7 +305,7 @@ fn with_tabs(pieces: Vec<Piece>, sides: &Sides) -> Option<Net> {
 
 /// The convex shape that the tiles of a face fill, in the panel frame, mm.
 fn tiles_outline(panel: &Panel) -> Vec<DVec2> {
-    if panel.outline != crate::targets::Outline::Triangle {
+    if panel.outline != deltille_core::targets::Outline::Triangle {
         let tiles = panel.dark_tiles();
         let vertices = tiles.iter().flat_map(|tile| tile.vertices());
         return polygon::hull(vertices.map(|vertex| panel.lattice_mm(vertex)).collect());
@@ -534,7 +536,7 @@ impl<'a> Drawing<'a> {
         }
         let last = self.panels.last().map_or(0, |panel| panel.id);
         parts.push(format!("boards {}–{last}", spec.board_id));
-        parts.push(imprint(identity::fingerprint(self.panels, self.family)));
+        parts.push(imprint(fingerprint(self.panels, self.family)));
         parts.join(" · ")
     }
 }
@@ -606,10 +608,10 @@ mod tests {
 
     use super::super::plane::gap_mm;
     use super::*;
-    use crate::family::Family;
-    use crate::layout::Printing;
-    use crate::layout::placing::poster::TICK_MM;
-    use crate::targets::{SolidShape, TargetSpec};
+    use crate::Printing;
+    use crate::placing::poster::TICK_MM;
+    use deltille_core::family::Family;
+    use deltille_core::targets::{SolidShape, TargetSpec};
 
     /// The rectangle that a text takes, by estimate.
     fn text_box(text: &SheetText) -> [DVec2; 4] {
@@ -685,7 +687,7 @@ mod tests {
         }
         for line in sheet.lines.iter().filter(|_| !sheet.pages.is_empty()) {
             let shown = |at: DVec2| {
-                let on = |page: &&crate::layout::SheetPage| {
+                let on = |page: &&crate::SheetPage| {
                     let [left, lower, right, upper] = page.window_mm;
                     let DVec2 { x, y } = at + page.sheet_at_mm;
                     left <= x && x <= right && lower <= y && y <= upper
@@ -726,7 +728,7 @@ mod tests {
     /// A sphere of 320 faces.
     #[test]
     fn pieces_of_a_mesh_are_nested() {
-        let ball = crate::targets::Polyhedron::icosahedron(100.0);
+        let ball = deltille_core::targets::Polyhedron::icosahedron(100.0);
         let (mut vertices, mut faces) = (ball.vertices_mm, ball.faces);
         for _ in 0..2 {
             let mut between = std::collections::BTreeMap::new();
@@ -746,7 +748,7 @@ mod tests {
                 })
                 .collect();
         }
-        let (mesh, _) = crate::targets::ClosedMesh::new(&vertices, &faces).unwrap();
+        let (mesh, _) = deltille_core::targets::ClosedMesh::new(&vertices, &faces).unwrap();
         let mut spec =
             SolidSpec { tiles: 6, edge_mm: 130.0, ..SolidSpec::new(SolidShape::Mesh(mesh)) };
         spec.tags.as_mut().unwrap().family = "d36h9".to_owned();

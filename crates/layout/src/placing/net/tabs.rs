@@ -13,7 +13,7 @@ use glam::DVec2;
 
 use super::plane::{TOUCHING_MM, bounds, gap_mm};
 use super::unfold::{Piece, Side, Sides};
-use crate::angles::tangent;
+use deltille_core::angles::tangent;
 
 /// Depth of a tab in lengths of its edge, and its least and most, mm: the least takes its words,
 /// the most is what glue needs.

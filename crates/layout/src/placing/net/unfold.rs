@@ -8,8 +8,8 @@ use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
 use super::plane::{Motion, TOUCHING_MM, bounds, gap_mm};
-use crate::targets::solids::polyhedron::sides;
-use crate::targets::{Polyhedron, SolidShape};
+use deltille_core::targets::sides;
+use deltille_core::targets::{Polyhedron, SolidShape};
 
 /// Seed of the search for nets of meshes: any will do, a fixed one makes results repeatable.
 const SEED: u64 = 20;
@@ -206,7 +206,8 @@ fn usual_hinges(shape: &SolidShape) -> Vec<(usize, Vec<(usize, usize)>)> {
         SolidShape::Cube | SolidShape::Cuboid(_) => {
             vec![(1, vec![(1, 0), (1, 2), (2, 3), (1, 4), (1, 5)])]
         }
-        SolidShape::Mesh(_) => Vec::new(),
+        // Found from its shape.
+        _ => Vec::new(),
     }
 }
 
@@ -333,7 +334,7 @@ mod tests {
     use proptest::prelude::*;
 
     use super::*;
-    use crate::layout::placing::net::tabs;
+    use crate::placing::net::tabs;
 
     /// A named solid with its vertices moved; a face keeps its lengths, not its angles.
     fn dented(shape: &SolidShape, moves: &[DVec3]) -> Polyhedron {
@@ -374,7 +375,7 @@ mod tests {
                     let length = space[side].distance(space[(side + 1) % space.len()]);
                     prop_assert!((p.distance(q) - length).abs() < 1e-9);
                 }
-                prop_assert!(crate::polygon::area(&face.corners) > 0.0);
+                prop_assert!(deltille_core::polygon::area(&face.corners) > 0.0);
                 if let Some((on, own)) = face.hinge {
                     let on_face = piece.iter().find(|other| other.face == on.face).unwrap();
                     let [p, q] = on_face.ends(on.side);

@@ -5,7 +5,7 @@
 //! [detection](super::detection): the tags one by one, and how long each stage took.
 //!
 //! ```
-//! use deltille_core::detect::Detection;
+//! use deltille_core::detection::Detection;
 //! use deltille_files::export::tables::{Picture, Reader, Writer};
 //! use deltille_files::limits::Limits;
 //!
@@ -27,7 +27,7 @@ mod pages;
 mod read;
 mod write;
 
-use deltille_core::detect::Detection;
+use deltille_core::detection::Detection;
 
 use crate::limits::Exceeded;
 

@@ -19,9 +19,10 @@ use super::write::kind_name;
 use super::{CORNERS_SCHEMA, PICTURES_SCHEMA, Picture, SCHEMA, TableError};
 use crate::export::corners::detection;
 use crate::limits::{self, Broken, Kind as Limit, Limits};
-use deltille_core::detect::{Detection, Grid, GridCorner, InkEstimate, Reason, ToneEstimate};
+use deltille_core::detection::{Detection, Grid, GridCorner, InkEstimate, Reason, ToneEstimate};
 use deltille_core::lattice::GridKind;
-use deltille_core::quantity::{self, Range};
+use deltille_core::quantity;
+use deltille_core::quantity::Range;
 use deltille_core::raster::FileNotes;
 use deltille_core::targets::TargetIdentity;
 

@@ -17,7 +17,7 @@ use parquet::schema::types::{ColumnPath, Type};
 use super::column::{self, Cell, Column, Kind};
 use super::{CORNERS_SCHEMA, PICTURES_SCHEMA, Picture, SCHEMA, TableError};
 use crate::export::GENERATOR;
-use deltille_core::detect::Detection;
+use deltille_core::detection::Detection;
 use deltille_core::lattice::GridKind;
 use deltille_core::targets::Target;
 
@@ -164,7 +164,7 @@ fn picture_row(picture: &Picture) -> [Cell; column::PICTURES.len()] {
     let count = |of: fn(&Detection) -> usize| whole(found.map(|found| of(found) as u32));
     let reasons = found.map(|found| &found.reasons).filter(|reasons| !reasons.is_empty());
     let targets = found.map(|found| &found.targets).filter(|targets| !targets.is_empty());
-    let sentences = |reasons: &Vec<deltille_core::detect::Reason>| {
+    let sentences = |reasons: &Vec<deltille_core::detection::Reason>| {
         text(&reasons.iter().map(ToString::to_string).collect::<Vec<_>>().join("; "))
     };
     // Reasons are names and numbers.

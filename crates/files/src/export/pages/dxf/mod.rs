@@ -12,7 +12,7 @@ mod write;
 pub use read::{DxfError, read};
 pub use write::text;
 
-use deltille_core::artwork::CutLayer;
+use deltille_layout::artwork::CutLayer;
 
 /// Layers with their colours: red, green, magenta, blue.
 const LAYERS: [(CutLayer, &str, u8); 4] = [

@@ -3,7 +3,7 @@
 use glam::DVec2;
 
 use super::LAYERS;
-use deltille_core::artwork::{CutDrawing, CutLayer, CutPath};
+use deltille_layout::artwork::{CutDrawing, CutLayer, CutPath};
 
 /// The only line style.
 const CONTINUOUS: [(u32, &str); 6] =

@@ -6,7 +6,7 @@ use glam::DVec2;
 
 use super::{LAYERS, layer_name};
 use crate::export::GENERATOR;
-use deltille_core::artwork::{CutDrawing, CutPath};
+use deltille_layout::artwork::{CutDrawing, CutPath};
 
 /// The text of the `.dxf` file of a drawing, mm.
 pub fn text(drawing: &CutDrawing) -> String {
