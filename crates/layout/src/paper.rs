@@ -144,9 +144,7 @@ pub struct PaperSize {
 #[non_exhaustive]
 pub enum PaperError {
     /// Neither a name nor two lengths.
-    #[error(
-        "`{0}` is no paper: give A0 to A5, letter, legal, tabloid, or a size such as 297x420mm"
-    )]
+    #[error("`{0}` is no paper: give {size}", size = PaperSize::choice())]
     Unknown(String),
     /// A side that is too short or too long.
     #[error("`{0}` is no paper: its sides must be {SHORTEST_MM} to {LONGEST_MM} mm long")]
@@ -157,9 +155,18 @@ pub enum PaperError {
 }
 
 impl PaperSize {
-    /// The sizes tried, smallest first, when none is asked for.
+    /// The sizes tried, smallest first, when none is asked for: A4 to A0.
     pub fn automatic() -> impl Iterator<Item = PaperSize> {
-        NAMED[..5].iter().rev().map(|&(name, sides)| Self::named(name, sides))
+        let from_a4 = NAMED.iter().rev().skip_while(|(name, _)| *name != "A4");
+        from_a4.map(|&(name, sides)| Self::named(name, sides))
+    }
+
+    /// What may be given, in words: the sizes with a name, and an example of another.
+    pub fn choice() -> String {
+        let (series, other): (Vec<&str>, Vec<&str>) =
+            NAMED.iter().map(|&(name, _)| name).partition(|name| name.starts_with('A'));
+        let (largest, smallest) = (series[0], series[series.len() - 1]);
+        format!("{largest} to {smallest}, {}, or a size such as 297x420mm", other.join(", "))
     }
 
     fn named(name: &str, [short_mm, long_mm]: [f64; 2]) -> Self {

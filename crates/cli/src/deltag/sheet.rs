@@ -11,7 +11,7 @@ use crate::output::{Overwrite, say};
 use crate::run::{FAILED, Interrupted};
 use crate::values::{Ids, name, whole};
 use deltille::artwork;
-use deltille::layout::{DEFAULT_MARGIN_MM, PaperSpec, Printing};
+use deltille::layout::{DEFAULT_MARGIN_MM, PaperSize, PaperSpec, Printing};
 use deltille::limits::Limits;
 use deltille::targets::{TagSheetSpec, TargetSpec, parse_length_mm};
 use deltille::verify::{Verifier, VerifyError};
@@ -33,8 +33,8 @@ pub(super) struct Args {
     #[arg(long, value_name = "BITS", default_value_t = 1.5, allow_negative_numbers = true,
           value_parser = crate::values::number(0.6..=10.0))]
     tag_border: f64,
-    /// Paper: A0 to A5, letter, legal, tabloid, or a size such as 297x420mm
-    #[arg(long, default_value = "A4", allow_hyphen_values = true)]
+    /// Paper
+    #[arg(long, help = format!("Paper: {}", PaperSize::choice()), default_value = "A4", allow_hyphen_values = true)]
     paper: String,
     /// Which way the paper lies: auto (the one that takes more tags), portrait, landscape
     #[arg(long, default_value = "auto")]

@@ -12,15 +12,16 @@ use super::settings::{DEFAULT_DPI, DPI, PAPER, PRINT, refuse_idle};
 use crate::values::{name, whole};
 use deltille::artwork;
 use deltille::family::Family;
-use deltille::layout::{self, DEFAULT_MARGIN_MM, PaperSpec};
+use deltille::layout::{self, DEFAULT_MARGIN_MM, PaperSize, PaperSpec};
 use deltille::targets::{TargetSpec, parse_length_mm};
 
 /// Paper, and files to print.
 #[derive(clap::Args)]
 pub struct PrintingArgs {
-    /// A0 to A5, letter, legal, tabloid, or a size such as 297x420mm [default: the smallest of A4
-    /// to A0 that takes the target]
-    #[arg(long, help_heading = PAPER, value_name = "SIZE")]
+    /// The paper.
+    #[arg(long, help_heading = PAPER, value_name = "SIZE", help = format!(
+        "{} [default: the smallest of A4 to A0 that takes the target]", PaperSize::choice()
+    ))]
     paper: Option<String>,
     /// auto, portrait or landscape
     #[arg(long, help_heading = PAPER, default_value = "auto")]

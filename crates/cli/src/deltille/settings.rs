@@ -16,7 +16,7 @@ use crate::values::{number, whole};
 use deltille::export::dsc::Dialect;
 use deltille::family::places;
 use deltille::lattice::GridKind;
-use deltille::layout::{DEFAULT_MARGIN_MM, PaperSpec, usual_edge_mm};
+use deltille::layout::{DEFAULT_MARGIN_MM, PaperSize, PaperSpec, usual_edge_mm};
 use deltille::targets::{
     BORDER_BITS, BoardSpec, MOST_ROWS, SIDES, TagSpec, TagsIn, parse_length_mm,
 };
@@ -103,9 +103,10 @@ pub struct Settings {
     /// 3mm
     #[arg(long, value_name = "THICKNESS", allow_hyphen_values = true)]
     two_sided: Option<String>,
-    /// A0 to A5, letter, legal, tabloid, or a size such as 297x420mm [default: the smallest of A4
-    /// to A0 that takes the board]
-    #[arg(long, help_heading = PAPER, value_name = "SIZE")]
+    /// The paper.
+    #[arg(long, help_heading = PAPER, value_name = "SIZE", help = format!(
+        "{} [default: the smallest of A4 to A0 that takes the board]", PaperSize::choice()
+    ))]
     paper: Option<String>,
     /// Print a board that is larger than the paper over several pages, to be joined
     #[arg(long, help_heading = PAPER)]

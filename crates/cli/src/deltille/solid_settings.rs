@@ -17,7 +17,7 @@ use crate::values::{number, whole};
 use deltille::export::dsc::Dialect;
 use deltille::family::places;
 use deltille::lattice::GridKind;
-use deltille::layout::{DEFAULT_MARGIN_MM, PaperSpec, SolidSheets};
+use deltille::layout::{DEFAULT_MARGIN_MM, PaperSize, PaperSpec, SolidSheets};
 use deltille::targets::{
     BORDER_BITS, FACE_TILES, MOST_ROWS, SkeletonSpec, SolidShape, SolidSpec, TagSpec, TagsIn,
 };
@@ -151,9 +151,12 @@ pub struct SolidSettings {
     /// Resolution of the PNG pages, dots per inch [default: 300]
     #[arg(long, help_heading = PRINT, value_parser = whole(200..=2400u32))]
     pub dpi: Option<u32>,
-    /// A0 to A5, letter, legal, tabloid, or a size such as 297x420mm; a net that is larger is
-    /// printed in several pieces of whole faces [default: the smallest of A4 to A0 that takes it, else A0]
-    #[arg(long, help_heading = PAPER, value_name = "SIZE")]
+    /// The paper; a net that is larger is printed in several pieces of whole faces.
+    #[arg(long, help_heading = PAPER, value_name = "SIZE", help = format!(
+        "{}; a net that is larger is printed in several pieces of whole faces [default: the smallest of A4 to A0 that \
+         takes it, else A0]",
+        PaperSize::choice()
+    ))]
     pub paper: Option<String>,
     /// auto, portrait or landscape [default: auto]
     #[arg(long, help_heading = PAPER)]
