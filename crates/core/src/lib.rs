@@ -26,6 +26,8 @@
 pub mod angles;
 pub mod camera;
 mod clock;
+#[doc(hidden)]
+pub mod damping;
 pub mod detection;
 pub mod family;
 mod identity;

@@ -24,6 +24,7 @@ use crate::equations::local_share::LocalShare;
 use crate::equations::normal::{Normal, Reduced};
 use crate::input::loss::Loss;
 use crate::problem::bundle::Problem;
+use deltille_core::damping::Damping;
 use deltille_core::statistics::median;
 
 /// Least number of views for the test: three remain without the tested one.
@@ -119,7 +120,7 @@ fn pulls(settled: &Settled, loss: Loss) -> Option<Vec<Option<Pull>>> {
     if problem.cameras.iter().any(|camera| camera.roughness.is_some()) {
         return pulls_of_some(settled, loss);
     }
-    let all = settled.minimum.normal.reduced(0.0)?.matrix;
+    let all = settled.minimum.normal.reduced(Damping::NONE)?.matrix;
     let whiten = whitener(&all)?;
     let variance = settled.whitening.sigma.powi(2);
     let of_frame = |frame: usize| {
@@ -157,7 +158,7 @@ fn reduced_of(
     let mut part = problem.with_frames(|other| other == frame);
     part.cameras.iter_mut().for_each(|camera| camera.forget_expected());
     let whitening = settled.whitening.of(&part);
-    let found = Normal::of(&part, &Layout::of(&part), &whitening, loss)?.reduced(0.0);
+    let found = Normal::of(&part, &Layout::of(&part), &whitening, loss)?.reduced(Damping::NONE);
     let found = found.map(|Reduced { matrix, right, .. }| (matrix, right));
     found.filter(|(matrix, right)| matrix.iter().chain(right).all(|v| v.is_finite()))
 }

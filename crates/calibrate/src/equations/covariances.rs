@@ -1,5 +1,6 @@
 //! The inverse of the normal equations: covariances of all unknowns, and which of them are open.
 
+use deltille_core::damping::Damping;
 use std::collections::BTreeSet;
 
 use nalgebra::{DMatrix, DVector, Matrix3, Matrix6, SMatrix};
@@ -65,7 +66,7 @@ const TIED: f64 = 1000.0;
 impl Normal {
     /// The inverse of the equations; `None` where a frame's pose is open by itself.
     pub(crate) fn covariances(&self, layout: &Layout) -> Option<Covariances> {
-        let Reduced { matrix, inverses, .. } = self.reduced(0.0)?;
+        let Reduced { matrix, inverses, .. } = self.reduced(Damping::NONE)?;
         let Inverse { matrix: kept, root, loose, tied } = self.invert(matrix)?;
         let of_part = |(part, inverse): (&Part, DMatrix<f64>)| {
             let through = &part.b * &inverse;
@@ -83,7 +84,7 @@ impl Normal {
 
     /// The covariance of what is kept for residuals of variance 1; `None` where something is open.
     pub(crate) fn covariance_of_kept(&self) -> Option<DMatrix<f64>> {
-        let matrix = self.reduced(0.0)?.matrix;
+        let matrix = self.reduced(Damping::NONE)?.matrix;
         let n = matrix.nrows();
         let scale = DVector::from_fn(n, |i, _| 1.0 / matrix[(i, i)].max(f64::MIN_POSITIVE).sqrt());
         let scaled = DMatrix::from_fn(n, n, |i, j| matrix[(i, j)] * scale[i] * scale[j]);

@@ -5,14 +5,13 @@ use super::normal::Normal;
 use crate::input::loss::Loss;
 use crate::problem::bundle::Problem;
 use crate::problem::whitening::Whitening;
+use deltille_core::damping::Damping;
 
 /// Accepted steps at most; problems that have a minimum take ten to forty.
 const MOST_STEPS: usize = 200;
 
-/// Damping at the start, and the factors by which it falls and grows (Marquardt 1963).
+/// Damping at the start.
 const DAMPING: f64 = 1e-4;
-const EASE: f64 = 0.1;
-const STIFFEN: f64 = 10.0;
 
 /// Beyond this damping no step is left that would help.
 const MOST_DAMPING: f64 = 1e12;
@@ -57,14 +56,14 @@ pub(crate) fn minimise(
     let layout = Layout::of(&problem);
     let normal = Normal::of(&problem, &layout, whitening, loss)?;
     let mut best = Minimum { problem, normal, layout, steps: 0 };
-    let mut damping = DAMPING;
+    let mut damping = Damping::from(DAMPING);
     let coordinates = 2.0 * best.problem.count() as f64;
-    while best.steps < MOST_STEPS && damping < MOST_DAMPING {
+    while best.steps < MOST_STEPS && damping.part() < MOST_DAMPING {
         if best.problem.stop.is_raised() {
             return None;
         }
         let Some(step) = best.normal.step(&best.layout, damping) else {
-            damping *= STIFFEN;
+            damping.stiffen();
             continue;
         };
         let variance = best.normal.cost / coordinates;
@@ -76,9 +75,9 @@ pub(crate) fn minimise(
             Some(normal) if normal.cost < best.normal.cost => {
                 (best.problem, best.normal) = (problem, normal);
                 best.steps += 1;
-                damping *= EASE;
+                damping.ease();
             }
-            _ => damping *= STIFFEN,
+            _ => damping.stiffen(),
         }
     }
     Some(best)

@@ -21,6 +21,7 @@ use crate::input::loss::Loss;
 use crate::problem::bundle::Problem;
 use crate::problem::corner_map::CornerMap;
 use crate::problem::whitening::Whitening;
+use deltille_core::damping::Damping;
 
 /// The equations of unknowns that are eliminated: a frame, or a corner.
 #[derive(Clone, Debug)]
@@ -211,7 +212,7 @@ impl Normal {
 
     /// The step of Levenberg and Marquardt: diagonals grow by the factor 1 + `damping`. `None`
     /// where the equations have no unique solution.
-    pub(crate) fn step(&self, layout: &Layout, damping: f64) -> Option<Step> {
+    pub(crate) fn step(&self, layout: &Layout, damping: Damping) -> Option<Step> {
         let Reduced { matrix, right, inverses } = self.reduced(damping)?;
         let kept = solve_scaled(matrix, right)?;
         let parts = self.parts.iter().zip(inverses);
@@ -233,8 +234,8 @@ impl Normal {
     }
 
     /// What is left of the equations when parts are eliminated. `None` where a frame's pose is open by itself.
-    pub(crate) fn reduced(&self, damping: f64) -> Option<Reduced> {
-        let grown = |diagonal: f64| diagonal * (1.0 + damping);
+    pub(crate) fn reduced(&self, damping: Damping) -> Option<Reduced> {
+        let grown = |diagonal: f64| damping.grown(diagonal);
         let (mut matrix, mut right) = (self.a.clone(), self.right.clone());
         (0..matrix.nrows()).for_each(|i| matrix[(i, i)] = grown(matrix[(i, i)]));
         let mut inverses = Vec::with_capacity(self.parts.len());
@@ -296,6 +297,7 @@ mod tests {
     use crate::problem::unknowns::{CameraUnknowns, PanelUnknowns, Prior, TargetUnknowns};
     use crate::{PanelRef, Shape};
     use deltille_core::camera::{Camera, Pose};
+    use deltille_core::damping::Damping;
     use glam::DVec2;
     use glam::DVec3;
     use nalgebra::Vector3;
@@ -466,7 +468,7 @@ mod tests {
             let expected = (&inverse * right).component_div(&scale);
 
             assert!((normal.cost - here.norm_squared()).abs() < 1e-9 * normal.cost);
-            let found = normal.step(&layout, 0.0).unwrap();
+            let found = normal.step(&layout, Damping::NONE).unwrap();
             let frames = found.frames.iter().flat_map(|frame| frame.iter());
             let corners = found.corners.iter().flat_map(|corner| corner.iter());
             let found = found.shared.iter().chain(frames).chain(corners).copied();

@@ -21,7 +21,7 @@ use crate::model::Model;
 use crate::problem::shape;
 use crate::problem::shape::Shape;
 use crate::uncertainty::known_so_far::KnownSoFar;
-use crate::uncertainty::projection::{by_motion, by_parameters, seen_at};
+use crate::uncertainty::projection::{by_motion, by_parameters, seen_at, solved};
 use deltille_core::camera::{Camera, PROJECTION_PARAMETERS};
 
 /// Places along the longer side of the image by which projections are judged.
@@ -286,14 +286,4 @@ fn inverse(matrix: &DMatrix<f64>) -> Option<DMatrix<f64>> {
     let scaled = DMatrix::from_fn(n, n, |i, j| matrix[(i, j)] * scale[i] * scale[j]);
     let inverse = scaled.cholesky()?.inverse();
     Some(DMatrix::from_fn(n, n, |i, j| inverse[(i, j)] * scale[i] * scale[j]))
-}
-
-/// A⁻¹ B of turns and moves, which have different units.
-fn solved(a: &Matrix6<f64>, b: &DMatrix<f64>) -> Option<DMatrix<f64>> {
-    let scale =
-        SMatrix::<f64, 6, 1>::from_fn(|i, _| a[(i, i)].max(f64::MIN_POSITIVE).sqrt().recip());
-    let scaled = Matrix6::from_fn(|i, j| a[(i, j)] * scale[i] * scale[j]);
-    let right = DMatrix::from_fn(6, b.ncols(), |i, j| b[(i, j)] * scale[i]);
-    let solution = scaled.cholesky()?.solve(&right);
-    Some(DMatrix::from_fn(6, b.ncols(), |i, j| solution[(i, j)] * scale[i]))
 }

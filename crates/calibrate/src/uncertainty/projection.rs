@@ -104,15 +104,16 @@ impl ProjectionUncertainty {
             [] => vec![median(distances)?],
             asked => asked.to_vec(),
         };
-        Some(Self { alignment: solved(motion, &across)?, distances_mm, observed })
+        Some(Self { alignment: -solved(&motion, &across)?, distances_mm, observed })
     }
 }
 
-/// −A⁻¹ B of turns and moves, which have different units.
-fn solved(a: Matrix6<f64>, b: &DMatrix<f64>) -> Option<DMatrix<f64>> {
-    let scale = SMatrix::<f64, 6, 1>::from_fn(|i, _| a[(i, i)].sqrt().recip());
+/// A⁻¹ B of turns and moves, which have different units.
+pub(crate) fn solved(a: &Matrix6<f64>, b: &DMatrix<f64>) -> Option<DMatrix<f64>> {
+    let scale =
+        SMatrix::<f64, 6, 1>::from_fn(|i, _| a[(i, i)].max(f64::MIN_POSITIVE).sqrt().recip());
     let scaled = Matrix6::from_fn(|i, j| a[(i, j)] * scale[i] * scale[j]);
-    let right = DMatrix::from_fn(6, b.ncols(), |i, j| -b[(i, j)] * scale[i]);
+    let right = DMatrix::from_fn(6, b.ncols(), |i, j| b[(i, j)] * scale[i]);
     let solution = scaled.cholesky()?.solve(&right);
     Some(DMatrix::from_fn(6, b.ncols(), |i, j| solution[(i, j)] * scale[i]))
 }

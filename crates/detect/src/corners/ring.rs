@@ -54,6 +54,9 @@ use deltille_core::raster::{Gray, bands};
 /// fits between a corner and the code of a small tag (5 px at 2 px a bit).
 const HALF_RING: [(isize, isize); 6] = [(4, 0), (3, 2), (2, 3), (0, 4), (-2, 3), (-3, 2)];
 
+/// R of a perfect corner, per |α|²: see above.
+pub const PER_AMPLITUDE: f32 = 4.5;
+
 /// Largest offset in [`HALF_RING`], px.
 const RADIUS: usize = 4;
 
@@ -94,7 +97,7 @@ impl Threshold {
         // The bounds are rounded down by up to a half.
         let below = |harmonic: f32| (harmonic.floor() - 1.0) as i16;
         Self {
-            response: 4.5 * min_amplitude * min_amplitude,
+            response: PER_AMPLITUDE * min_amplitude * min_amplitude,
             odd: below(6.0 * min_amplitude),
             even: below(12.0 * min_amplitude),
         }
@@ -494,7 +497,7 @@ fn odd_response(at: impl Fn(usize, usize) -> i16) -> f32 {
         squares += i32::from(even) * i32::from(even);
     }
     let sum = i32::from(sum);
-    let alpha = (c3 * c3 + s3 * s3) as f32 * (4.5 / 36.0);
+    let alpha = (c3 * c3 + s3 * s3) as f32 * (PER_AMPLITUDE / 36.0);
     let beta = (c1 * c1 + s1 * s1) as f32 * (1.0 / 2304.0);
     let variance = squares as f32 - (sum * sum) as f32 * (1.0 / 6.0);
     alpha - beta - 0.5 * variance
@@ -516,7 +519,7 @@ fn even_response(at: impl Fn(usize, usize) -> i16, centre: i16) -> f32 {
         sum += even[k];
         squares += i32::from(odd[k]) * i32::from(odd[k]);
     }
-    let alpha = (c2 * c2 + 3 * (s2 * s2)) as f32 * (4.5 / 144.0);
+    let alpha = (c2 * c2 + 3 * (s2 * s2)) as f32 * (PER_AMPLITUDE / 144.0);
     // 12(c − m)
     let off = f32::from(12 * centre - sum);
     alpha - 0.5 * squares as f32 - off * off * (9.0 / 144.0)
@@ -699,7 +702,7 @@ mod tests {
                     let other = response(x.wrapping_add_signed(u), y.wrapping_add_signed(v));
                     if (v, u) > (0, 0) { other < here } else { other <= here }
                 });
-                if here > 4.5 * min_amplitude * min_amplitude && strongest {
+                if here > PER_AMPLITUDE * min_amplitude * min_amplitude && strongest {
                     found.push(Candidate { x, y, response: here });
                 }
             }

@@ -4,7 +4,7 @@ use glam::DVec2;
 
 use super::buckets::Buckets;
 use super::polynomial::{FittedCorner, Polynomial};
-use super::ring::{Candidate, candidates, maxima_near};
+use super::ring::{Candidate, PER_AMPLITUDE, candidates, maxima_near};
 use super::sectors::{Sectors, contrast_around};
 use crate::tiling::kind;
 use deltille_core::lattice::GridKind;
@@ -261,13 +261,13 @@ fn candidates_above_noise<const N: usize>(level: &Gray<i16>, noise: f32) -> Vec<
     // Nearly always there are nine that stand clear; what is weak need then not be looked for.
     if noise > MIN_AMPLITUDE {
         let found = candidates::<N>(level, noise);
-        if ninth(&found).is_some_and(|ninth| PART * PART * ninth >= 4.5 * noise * noise) {
+        if ninth(&found).is_some_and(|ninth| PART * PART * ninth >= PER_AMPLITUDE * noise * noise) {
             return found;
         }
     }
     let mut found = candidates::<N>(level, MIN_AMPLITUDE);
     if let Some(ninth) = ninth(&found) {
-        let threshold = (4.5 * noise * noise).min(PART * PART * ninth);
+        let threshold = (PER_AMPLITUDE * noise * noise).min(PART * PART * ninth);
         found.retain(|candidate| candidate.response > threshold);
     }
     strongest(&mut found, (level.pixels().len() / LEAST_TILE_PX2).min(MOST_CANDIDATES));

@@ -39,6 +39,7 @@ use super::correlation::Influence;
 use super::optics::{INK_UNIT, Optics, PARAMS as COMMON_PARAMS, STEP, Spread};
 use super::small_systems::solved;
 use crate::lanes::LANES;
+use deltille_core::damping::Damping;
 use deltille_core::detection::{Piece, TONE_PARAMS};
 use deltille_core::raster::ImageView;
 
@@ -69,6 +70,14 @@ pub const SLOPE_PRIOR: f64 = 0.0005;
 
 /// Most evaluations of the model; five are usual.
 const MAX_EVALUATIONS: usize = 25;
+
+/// Damping of the first step, which starts from a fit to grey values without blur, and the least later on: less than that
+/// changes no digit of a step.
+const DAMPING: f64 = 1e-3;
+const LEAST_DAMPING: f64 = 1e-6;
+
+/// With less damping than this a small step says that the minimum is near, and not that steps are kept short.
+const HARDLY_DAMPED: f64 = 0.1;
 
 /// The iteration ends with a step whose squared length, in standard deviations of the estimate, is
 /// below this; the next would be smaller by orders of magnitude.
@@ -525,7 +534,7 @@ impl CornerFitter {
         let start = *start;
         let freedom = (window.count - (ANGLE + K)) as f64;
         let mut corner = start;
-        let mut damping = 1e-3;
+        let mut damping = Damping::from(DAMPING).at_least(LEAST_DAMPING, 0.0);
         // The curve's piece is held, so that steps know all that they change, and made anew after the first
         // step, which finds the light, and for what came of them all.
         let mut toned = start;
@@ -542,7 +551,7 @@ impl CornerFitter {
             }
             let mut damped = matrix;
             for i in 0..PARAMS {
-                damped[(i, i)] *= 1.0 + damping;
+                damped[(i, i)] = damping.grown(damped[(i, i)]);
             }
             let rows = std::array::from_fn::<[f64; PARAMS + 1], PARAMS, _>(|i| {
                 std::array::from_fn(|j| if j < PARAMS { damped[(i, j)] } else { gradient[i] })
@@ -550,7 +559,7 @@ impl CornerFitter {
             let solution = solved(rows)?;
             let step = SVector::from_fn(|i, _| solution[i][PARAMS]);
             let Some(moved) = corner.moved(&step, window.radius) else {
-                damping *= 10.0;
+                damping.stiffen();
                 continue;
             };
             let is_toned_anew =
@@ -562,7 +571,7 @@ impl CornerFitter {
                 }
                 Accuracy::Rough => (is_within(&step, ROUGH), ROUGHLY_SAME_LIGHT),
             };
-            if is_last && damping < 0.1 {
+            if is_last && damping.part() < HARDLY_DAMPED {
                 converged = true;
                 corner = moved;
                 if !is_toned_anew(tolerance) {
@@ -583,9 +592,9 @@ impl CornerFitter {
             let prior = |c: &Corner<K>| weight * c.slope.length_squared();
             if there.cost + prior(&moved) <= normal.cost + prior(&corner) {
                 (corner, normal) = (moved, there);
-                damping = (damping * 0.1).max(1e-6);
+                damping.ease();
             } else {
-                damping *= 10.0;
+                damping.stiffen();
             }
         }
         let noise = noise(&normal, &corner, freedom);

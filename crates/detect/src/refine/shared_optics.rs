@@ -15,6 +15,7 @@ use super::corner_model::{Common, Corner, CornerFitter, Joint, OWN, Window};
 use super::correlation::{self, Influence};
 use super::optics::{HALO, INK, INK_UNIT, LEAST_MOTION, Optics, PARAMS, STEP};
 use super::small_systems::solved;
+use deltille_core::damping::Damping;
 use deltille_core::detection::InkEstimate;
 use deltille_core::detection::{TONE_PARAMS, ToneEstimate};
 use deltille_core::raster::ImageView;
@@ -61,6 +62,10 @@ const MAX_STEP: f64 = 2.0;
 
 /// Most iterations; four are usual.
 const MAX_ITERATIONS: usize = 10;
+
+/// The least damping after a step that raised the cost. Steps before are whole: the equations of a few common parameters
+/// are nearly linear.
+const FIRST_DAMPING: f64 = 0.01;
 
 /// The iteration ends where it lacks less than this fraction of the standard deviations of the parameters,
 /// as a series of steps that go on to shrink as the last one did would; earlier where it only decides which
@@ -412,7 +417,8 @@ impl<const K: usize> Problem<'_, K> {
     /// The optics that fit the corners best up to a part of their deviations.
     fn adjusted(&mut self, mut at: Linearised<K>, converged: f64) -> Adjusted<K> {
         let mut optics = at.optics.clone();
-        let (mut damping, mut before, mut lack) = (0.0, None, f64::INFINITY);
+        let mut damping = Damping::NONE.at_least(0.0, FIRST_DAMPING);
+        let (mut before, mut lack) = (None, f64::INFINITY);
         // By the noise that is left so far: of a curve that is not yet known it is many times what it will be.
         let mut weights = weights_of(&at.equations);
         let mut reduced = self.reduced(&at, &weights);
@@ -438,7 +444,7 @@ impl<const K: usize> Problem<'_, K> {
                 optics.clone_from(&at.optics);
                 weights = weights_of(&at.equations);
                 reduced = self.reduced(&at, &weights);
-                damping *= 0.1;
+                damping.ease();
             } else {
                 self.put_back(&at.corners);
                 if length < 2.0 * ROUGHLY_CONVERGED {
@@ -446,7 +452,7 @@ impl<const K: usize> Problem<'_, K> {
                     break;
                 }
                 before = None;
-                damping = (damping * 10.0).max(0.01);
+                damping.stiffen();
             }
         }
         let count = self.active.len();
@@ -519,10 +525,10 @@ impl<const K: usize> Problem<'_, K> {
     }
 
     /// The next step of the active parameters: none further than [`MAX_STEP`], and the halo not beyond its end.
-    fn step(&self, reduced: &Reduced, optics: &Optics, damping: f64) -> Option<DVector<f64>> {
+    fn step(&self, reduced: &Reduced, optics: &Optics, damping: Damping) -> Option<DVector<f64>> {
         let mut damped = reduced.matrix.clone();
         for i in 0..damped.nrows() {
-            damped[(i, i)] *= 1.0 + damping;
+            damped[(i, i)] = damping.grown(damped[(i, i)]);
         }
         let mut step = damped.clone().cholesky()?.solve(&reduced.gradient);
         if let Some(at) = self.active.iter().position(|&p| p == HALO) {
