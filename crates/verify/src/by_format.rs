@@ -3,13 +3,11 @@
 use std::path::Path;
 
 use crate::body::{inlay, shape};
-use crate::construct::{findings, inspect};
 use crate::cut::{laser, outlines};
 use crate::error::VerifyError;
 use crate::listing;
 use crate::mesh::{simulator, textured};
-use crate::model::load::load;
-use crate::model::stl::load_stl;
+use crate::printed;
 use crate::reading::format::Format;
 use crate::reading::names::{file_name, whole_of};
 use crate::reading::on_disk::OnDisk;
@@ -64,7 +62,7 @@ pub fn verify(
     Verifier::new(printing, family)?.verify(name, files)
 }
 
-impl<'a> Verifier<'a> {
+impl Verifier<'_> {
     /// Compares the artifact named `name` among files in memory with the target. A PDF shows all
     /// sheets, an SVG or PNG the one that its name tells. All files of the artifact must be among
     /// `files`: all pages of [`set_of`](Self::set_of) for a net, material library and textures for
@@ -74,48 +72,9 @@ impl<'a> Verifier<'a> {
     /// When the name tells no format or sheet, or a file is missing or cannot be read at all.
     pub fn verify(&self, name: &str, files: &[Artifact]) -> Result<Verdict, VerifyError> {
         let reader = Reader { files: &files, limits: self.limits, guard: self.guard };
-        self.verify_by(&reader, Path::new(name))
+        compare(self, &reader, Path::new(name))
     }
 
-    /// Compares an artifact whose files come from `reader`.
-    pub(crate) fn verify_by(&self, reader: &Reader, path: &Path) -> Result<Verdict, VerifyError> {
-        let name = file_name(path);
-        if let Some(whole) = whole_of(&self.target().name, &name) {
-            return Err(VerifyError::PartOf { path: path.to_owned(), whole });
-        }
-        let Some(format) = Format::of(path) else {
-            return Err(VerifyError::OtherKind { path: path.to_owned() });
-        };
-        match format {
-            Format::Dsc => return Ok(listing::verify(self, reader, path)?),
-            Format::Dxf | Format::Svg if laser::is_named(self.target(), path) => {
-                return laser::verify(self, reader, path, format);
-            }
-            Format::Dxf => return outlines::verify(self, reader, path),
-            Format::Pdf | Format::Svg | Format::Png => {
-                return self.verify_sheets(reader, path, format);
-            }
-            Format::Sdf | Format::Urdf | Format::Mjcf => {
-                return simulator::verify(self, reader, path, format);
-            }
-            Format::ThreeMf => return Ok(inlay::verify(self, reader, path)?),
-            Format::Glb | Format::Obj | Format::Usda | Format::Stl => {}
-        }
-        let (refused, parts) = inspect::check(reader, path, format, &self.printing)?;
-        if findings::refuse(&refused) {
-            return Ok(Verdict::new(path, format, refused));
-        }
-        let mut verdict = match format {
-            Format::Stl => shape::verify(self, path, &load_stl(reader, path)?, format)?,
-            _ => textured::verify(self, path, load(reader, path, parts)?, format),
-        };
-        verdict.passed &= refused.is_empty();
-        verdict.findings.extend(refused);
-        Ok(verdict)
-    }
-}
-
-impl Verifier<'_> {
     /// Reads an artifact from disk, with the files beside it that belong to it, and compares it as
     /// [`verify`](Self::verify) does. Third-party readers run on a thread of their own, for at most
     /// [`Limits::max_seconds`] in each step.
@@ -124,6 +83,33 @@ impl Verifier<'_> {
     /// When the name tells no format or sheet, or a file is missing or cannot be read at all.
     pub fn verify_path(&self, path: &Path) -> Result<Verdict, VerifyError> {
         let files = OnDisk(self.limits);
-        self.verify_by(&Reader { files: &files, limits: self.limits, guard: Guard::Timed }, path)
+        compare(self, &Reader { files: &files, limits: self.limits, guard: Guard::Timed }, path)
+    }
+}
+
+/// Compares an artifact whose files come from `reader`.
+fn compare(verifier: &Verifier, reader: &Reader, path: &Path) -> Result<Verdict, VerifyError> {
+    let target = verifier.target();
+    if let Some(whole) = whole_of(&target.name, &file_name(path)) {
+        return Err(VerifyError::PartOf { path: path.to_owned(), whole });
+    }
+    let Some(format) = Format::of(path) else {
+        return Err(VerifyError::OtherKind { path: path.to_owned() });
+    };
+    match format {
+        Format::Dsc => Ok(listing::verify(verifier, reader, path)?),
+        Format::Dxf | Format::Svg if laser::is_named(target, path) => {
+            laser::verify(verifier, reader, path, format)
+        }
+        Format::Dxf => outlines::verify(verifier, reader, path),
+        Format::Pdf | Format::Svg | Format::Png => printed::verify(verifier, reader, path, format),
+        Format::Sdf | Format::Urdf | Format::Mjcf => {
+            Ok(simulator::verify(verifier, reader, path, format)?)
+        }
+        Format::ThreeMf => Ok(inlay::verify(verifier, reader, path)?),
+        Format::Glb | Format::Obj | Format::Usda => {
+            Ok(textured::verify(verifier, reader, path, format)?)
+        }
+        Format::Stl => Ok(shape::verify(verifier, reader, path)?),
     }
 }

@@ -12,7 +12,7 @@ use crate::verdict::Verdict;
 use crate::verifier::Verifier;
 use deltille_files::export::sheet_file_name;
 
-impl<'a> Verifier<'a> {
+impl Verifier<'_> {
     /// The files that are verified together with `path`: all pages of a net, or of a board over several pages, where
     /// each is a file of its own. Any other file is verified by itself.
     pub fn set_of(&self, path: &Path) -> Vec<PathBuf> {
@@ -60,9 +60,7 @@ impl<'a> Verifier<'a> {
             }
         }
     }
-}
 
-impl Verifier<'_> {
     /// Verdicts on sets of pages that `named` does not name completely. A single page may be named
     /// alone if it can be verified by itself and `alone` is set; pages of a net are always
     /// completed by [`set_of`](Self::set_of).

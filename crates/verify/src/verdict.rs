@@ -192,9 +192,14 @@ impl Verdict {
             cut: None,
         }
     }
-}
 
-impl Verdict {
+    /// The same with what the inspection of the file found.
+    pub(super) fn with(mut self, refused: Vec<Finding>) -> Self {
+        self.passed &= refused.is_empty();
+        self.findings.extend(refused);
+        self
+    }
+
     /// Goes on with what its surfaces show.
     fn corners_and_tags(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let sum = |count: fn(&SheetVerdict) -> usize| self.sheets.iter().map(count).sum::<usize>();

@@ -1,5 +1,5 @@
 //! Verification of two bodies to print, as 3MF: both closed, the black one inlaid into the white one, and the surface that
-//! they have in common compared like a printed page, face by face; a skeleton is one body, see [`super::body`].
+//! they have in common compared like a printed page, face by face; a skeleton is one body, see [`super::shape`].
 //!
 //! Vertices lie on a face, below it on the floor of the inlay, or on the back of a plate; triangles are level or upright.
 //! So the outline that is seen on the surface is that of the bodies all the way down, and volumes follow from areas.
@@ -23,6 +23,7 @@ use crate::reading::format::Format;
 use crate::reading::names::file_name;
 use crate::reading::reader::Reader;
 use crate::sheet::face_picture::FacePicture;
+use crate::sheet::whole;
 use crate::verdict::{InlayVerdict, SheetVerdict, Verdict};
 use crate::verifier::Verifier;
 use deltille_core::layout::SheetLayout;
@@ -78,7 +79,7 @@ fn skeleton(verifier: &Verifier, path: &Path, bodies: &[Body]) -> Result<Verdict
         let [a, b, c] = vertices_mm;
         Facet { normal: (b - a).cross(c - a).normalize_or_zero(), vertices_mm }
     });
-    shape::verify(verifier, path, &facets.collect::<Vec<_>>(), Format::ThreeMf)
+    shape::compare(verifier, path, &facets.collect::<Vec<_>>(), Format::ThreeMf)
 }
 
 /// Compares a white and a black body with the board or the solid of a target.
@@ -124,7 +125,7 @@ fn inlaid(verifier: &Verifier, path: &Path, bodies: &[Body; 2]) -> Result<Verdic
             let (page, layout, problem) = surface(verifier, face, fronts);
             let problem = problem.map(|problem| MeshFinding::Body { problem }.into());
             let mut sheet = SheetVerdict::new(index, &page, problem.into_iter().collect());
-            verifier.verify_sheet(&page, &layout, &mut sheet);
+            whole::compare(verifier, &page, &layout, &mut sheet);
             verifier.tell(done.fetch_add(1, Ordering::Relaxed) + 1, faces.len());
             sheet
         })

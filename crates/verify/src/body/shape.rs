@@ -21,12 +21,14 @@ use rayon::prelude::*;
 use rstar::RTree;
 use rstar::primitives::GeomWithData;
 
+use crate::construct::{findings, inspect};
 use crate::finding::any::Finding;
 use crate::finding::mesh::MeshFinding;
 use crate::mesh::measures::{MESH_TOLERANCE_MM, is_other_mesh, other_count, volume};
-use crate::model::stl::Facet;
+use crate::model::stl::{Facet, load_stl};
 use crate::reading::error::DocumentError;
 use crate::reading::format::Format;
+use crate::reading::reader::Reader;
 use crate::verdict::{BodyVerdict, Verdict};
 use crate::verifier::Verifier;
 use deltille_core::targets::{
@@ -52,12 +54,29 @@ const SAME_MIDDLE: usize = 4;
 /// Positions along a side of a face, as fractions of its length, at which rays are sent.
 const PLACES: [f64; 3] = [0.15, 0.5, 0.85];
 
+/// Reads an STL, and compares it with the target.
+///
+/// # Errors
+///
+/// The file cannot be read, or the target has no such body. Deviations are findings of the verdict.
+pub(crate) fn verify(
+    verifier: &Verifier,
+    reader: &Reader,
+    path: &Path,
+) -> Result<Verdict, DocumentError> {
+    let (refused, _) = inspect::check(reader, path, Format::Stl, &verifier.printing)?;
+    if findings::refuse(&refused) {
+        return Ok(Verdict::new(path, Format::Stl, refused));
+    }
+    Ok(compare(verifier, path, &load_stl(reader, path)?, Format::Stl)?.with(refused))
+}
+
 /// Compares the triangles of a solid or of its skeleton, as the file is named, with the target.
 ///
 /// # Errors
 ///
 /// The target is no solid, or the file is named as a skeleton and the target has none. Deviations are findings of the verdict.
-pub(crate) fn verify(
+pub(super) fn compare(
     verifier: &Verifier,
     path: &Path,
     facets: &[Facet],

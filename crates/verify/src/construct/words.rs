@@ -10,20 +10,20 @@ use deltille_files::export::mesh::extras;
 /// not look at the picture.
 pub(super) struct Words {
     /// Its name.
-    pub(crate) title: String,
+    pub title: String,
     /// One line on what it is.
-    pub(crate) subject: String,
+    pub subject: String,
     /// The same facts as JSON, for programs.
     extras: Value,
     /// How its pages are printed.
-    pub(crate) finish: Finish,
+    pub finish: Finish,
     /// Number of lines to cut along on each sheet.
-    pub(crate) cut_lines: Vec<usize>,
+    pub cut_lines: Vec<usize>,
 }
 
 impl Words {
     /// The texts that belong to a target.
-    pub(crate) fn of(printing: &Printing) -> Self {
+    pub fn of(printing: &Printing) -> Self {
         let target = &printing.target;
         let (title, finish) = (target.name.to_string(), printing.finish.clone());
         let cut = |layout: &SheetLayout| {
@@ -34,7 +34,7 @@ impl Words {
     }
 
     /// Whether data in a mesh is that of the target; any version of the program may have written it.
-    pub(crate) fn are_extras(&self, found: &Value) -> bool {
+    pub fn are_extras(&self, found: &Value) -> bool {
         let creator = found["generator"].as_str().is_some_and(is_creator);
         let mut stated = self.extras.clone();
         stated["generator"] = found["generator"].clone();

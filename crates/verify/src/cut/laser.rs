@@ -22,6 +22,7 @@ use crate::reading::format::Format;
 use crate::reading::names::file_name;
 use crate::reading::reader::Reader;
 use crate::sheet::face_picture::FacePicture;
+use crate::sheet::whole;
 use crate::verdict::{CutVerdict, SheetVerdict, Verdict};
 use crate::verifier::{PRINT_PX_PER_MM, Verifier};
 use deltille_core::artwork::{self, CutDrawing, CutLayer, CuttingError, LaserBoard};
@@ -206,7 +207,7 @@ fn surfaces(
         let dark = engraved.iter().map(|outline| (outline.as_slice(), 1.0));
         let (page, layout) = picture.inked(dark);
         let mut sheet = SheetVerdict::new(index, &page, Vec::new());
-        verifier.verify_sheet(&page, &layout, &mut sheet);
+        whole::compare(verifier, &page, &layout, &mut sheet);
         sheet
     };
     boards.par_iter().enumerate().map(surface).collect()

@@ -131,9 +131,7 @@ impl Document {
         let (smear_px, texel_px, left_px) = (0.0, 0.0, 0.0);
         Ok(Page { width_mm, height_mm, px_per_mm, image, smear_px, texel_px, left_px })
     }
-}
 
-impl Document {
     /// Opens a `.pdf`, `.svg` or `.png` file within the default limits.
     ///
     /// # Errors

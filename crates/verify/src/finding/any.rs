@@ -1,5 +1,4 @@
-//! Findings: the deviations of an artifact, each with its place and figures, collected from the
-//! modules that check them.
+//! Any deviation of an artifact, also where it is of one page among several.
 
 use glam::DVec2;
 use serde::Serialize;

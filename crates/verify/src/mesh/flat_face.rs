@@ -101,17 +101,15 @@ pub(super) fn face_page(
     (page, Placement { panel: panel.id, angle_rad: 0.0, origin_mm: DVec2::new(-left, -lower) })
 }
 
-impl Verifier<'_> {
-    /// The outline of a panel's face, or of the side of a plate, counter-clockwise in the panel frame, mm.
-    pub(crate) fn face_outline_mm(&self, panel: &Panel) -> Vec<DVec2> {
-        let of_plate = || rectangle(panel.field_mm()).to_vec();
-        let TargetSpec::Solid(spec) = &self.target().spec else { return of_plate() };
-        let solid = spec.polyhedron();
-        let index = self.target().panels.iter().position(|p| p.id == panel.id);
-        let Some(index) = index.filter(|&index| index < solid.faces.len()) else {
-            return of_plate();
-        };
-        let corners = solid.corners_mm(index).into_iter();
-        corners.map(|v| panel.pose.panel_from_target(v).truncate()).collect()
-    }
+/// The outline of a panel's face, or of the side of a plate, counter-clockwise in the panel frame, mm.
+pub(super) fn face_outline_mm(verifier: &Verifier, panel: &Panel) -> Vec<DVec2> {
+    let of_plate = || rectangle(panel.field_mm()).to_vec();
+    let TargetSpec::Solid(spec) = &verifier.target().spec else { return of_plate() };
+    let solid = spec.polyhedron();
+    let index = verifier.target().panels.iter().position(|p| p.id == panel.id);
+    let Some(index) = index.filter(|&index| index < solid.faces.len()) else {
+        return of_plate();
+    };
+    let corners = solid.corners_mm(index).into_iter();
+    corners.map(|v| panel.pose.panel_from_target(v).truncate()).collect()
 }

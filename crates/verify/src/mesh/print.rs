@@ -4,7 +4,7 @@ use glam::DVec2;
 
 use crate::finding::mesh::MeshFinding;
 use crate::mesh::face_view::MOST_TEXEL_PX;
-use crate::mesh::flat_face::{face_page, front};
+use crate::mesh::flat_face::{face_outline_mm, face_page, front};
 use crate::mesh::texels::Texels;
 use crate::model::mesh::Model;
 use crate::panel::affine_map::AffineMap;
@@ -27,7 +27,7 @@ pub(super) fn check_print(
     px_per_mm: f64,
     verdict: &mut FaceVerdict,
 ) {
-    let outline = verifier.face_outline_mm(panel);
+    let outline = face_outline_mm(verifier, panel);
     let front = front(model, panel, &outline);
     // Texels just beside the face are on the page, too.
     let around_mm = DVec2::splat(AROUND_PX / px_per_mm);

@@ -4,7 +4,8 @@
 use std::path::Path;
 
 use crate::construct::{findings, inspect};
-use crate::error::VerifyError;
+use crate::mesh::textured;
+use crate::reading::error::DocumentError;
 use crate::reading::format::Format;
 use crate::reading::names::file_name;
 use crate::reading::reader::Reader;
@@ -17,13 +18,13 @@ pub(crate) fn verify(
     reader: &Reader,
     path: &Path,
     format: Format,
-) -> Result<Verdict, VerifyError> {
+) -> Result<Verdict, DocumentError> {
     let (refused, _) = inspect::check(reader, path, format, &verifier.printing)?;
     if findings::refuse(&refused) {
         return Ok(Verdict::new(path, format, refused));
     }
     let mesh = path.with_file_name(format!("{}.obj", verifier.target().name));
-    let mut verdict = verifier.verify_by(reader, &mesh)?;
+    let mut verdict = textured::verify(verifier, reader, &mesh, Format::Obj)?;
     if format == Format::Mjcf && verdict.passed {
         verdict.findings = inspect::check_parts(reader, path, &mesh, &verifier.printing)?;
         verdict.passed = verdict.findings.is_empty();

@@ -7,7 +7,7 @@ use glam::DVec3;
 use crate::finding::any::Finding;
 use crate::finding::mesh::MeshFinding;
 use crate::finding::shown::shown;
-use crate::mesh::flat_face::front;
+use crate::mesh::flat_face::{face_outline_mm, front};
 use crate::mesh::measures::{self, MESH_TOLERANCE_MM};
 use crate::mesh::texels;
 use crate::model::mesh::{Model, Triangle};
@@ -62,7 +62,7 @@ pub(super) fn not_on_faces(verifier: &Verifier, model: &Model) -> Option<Finding
         TargetSpec::Solid(_) => verifier.target().panels.as_slice(),
         _ => sides(verifier.target()),
     };
-    let on_face = |panel: &Panel| front(model, panel, &verifier.face_outline_mm(panel));
+    let on_face = |panel: &Panel| front(model, panel, &face_outline_mm(verifier, panel));
     let fronts: Vec<&Triangle> =
         panels.iter().flat_map(on_face).map(|front| front.triangle).collect();
     let (on_faces, all) = (fronts.len(), model.triangles.len());

@@ -1,5 +1,4 @@
-//! Verification of meshes of solids: every face is rendered by a virtual camera, and every detected
-//! corner is projected back onto the mesh.
+//! A mesh with textures as a whole: what tells that it is another one, then face by face.
 
 use std::path::Path;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -7,14 +6,18 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use glam::DVec2;
 use rayon::prelude::*;
 
+use crate::construct::{findings, inspect};
 use crate::finding::board::BoardFinding;
 use crate::finding::mesh::MeshFinding;
 use crate::mesh::face::check_face;
 use crate::mesh::measures::{MESH_TOLERANCE_MM, is_other_mesh, other_count};
 use crate::mesh::surface::{beside_boards, not_on_faces, scale, sides, wrong_surface};
 use crate::mesh::texels;
+use crate::model::load::load;
 use crate::model::mesh::Model;
+use crate::reading::error::DocumentError;
 use crate::reading::format::Format;
+use crate::reading::reader::Reader;
 use crate::verdict::Verdict;
 use crate::verifier::Verifier;
 use deltille_core::targets::TargetSpec;
@@ -26,8 +29,26 @@ const NORMAL_SLACK: f64 = 1e-4;
 /// A mesh this much larger or smaller, relative, is not looked at any further.
 const MAX_SCALE_ERROR: f64 = 0.05;
 
+/// Reads a mesh with its textures, and compares it with the target.
+///
+/// # Errors
+///
+/// A file is missing or cannot be read. Deviations are findings of the verdict.
+pub(crate) fn verify(
+    verifier: &Verifier,
+    reader: &Reader,
+    path: &Path,
+    format: Format,
+) -> Result<Verdict, DocumentError> {
+    let (refused, parts) = inspect::check(reader, path, format, &verifier.printing)?;
+    if findings::refuse(&refused) {
+        return Ok(Verdict::new(path, format, refused));
+    }
+    Ok(compare(verifier, path, load(reader, path, parts)?, format).with(refused))
+}
+
 /// Compares a loaded mesh with the target.
-pub(crate) fn verify(verifier: &Verifier, path: &Path, model: Model, format: Format) -> Verdict {
+fn compare(verifier: &Verifier, path: &Path, model: Model, format: Format) -> Verdict {
     let mut findings = Vec::new();
     let mut faces = Vec::new();
     let scale = scale(verifier, &model);

@@ -1,16 +1,5 @@
-//! Verification of the net of a solid: the faces, each with the pose that its detected corners have
-//! on the paper, are folded about their common edges, and must come to lie where the target states.
-//!
-//! ```text
-//!    page            R_child = turn(edge, dihedral angle) · R_parent       solid
-//!   ╱╲──╱╲                                                                   ╱│╲
-//!  ╱1 ╲╱2 ╲   ──▶   face 1 is laid where it is stated to be; face 2 turns   ╱1│2╲
-//!  ────────         about their edge by the angle between the two faces     ‾‾‾‾‾
-//! ```
-//!
-//! Only the fold lines and the numbers of edges are taken from the layout, and the ink of both is
-//! compared separately; the places of faces follow from their corners. A face that comes to lie in
-//! the place of another, or rotated in its own, is named as such.
+//! Folding: a face is laid where it is stated to be, and the others are turned about their common edges by the angles between
+//! the faces. Of several faces that may be the first, the one is taken with which the fewest are off.
 
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
 
@@ -30,24 +19,24 @@ pub(super) struct Place {
     /// Vertices of the solid where the corners of the printed outline come to lie.
     vertices: Vec<usize>,
     /// Pose of the part of the page with this face.
-    pub(crate) space_from_page: SpaceFromPage,
+    pub space_from_page: SpaceFromPage,
 }
 
 /// The faces of a piece after folding.
 pub(super) struct Folded {
     /// Index of each face that was reached, and its place.
-    pub(crate) places: Vec<(usize, Place)>,
+    pub places: Vec<(usize, Place)>,
     /// Deviations from the target.
-    pub(crate) findings: Vec<FoldFinding>,
+    pub findings: Vec<FoldFinding>,
     /// Whether a face is in the place of another, rotated, or was not reached.
-    pub(crate) misplaced: bool,
+    pub misplaced: bool,
     /// Largest distance of a folded corner from its stated position, mm, of faces in their places.
-    pub(crate) deviation_mm: f64,
+    pub deviation_mm: f64,
 }
 
 impl Net {
     /// The pieces of a sheet: faces that hang together by folds, the largest piece first.
-    pub(crate) fn pieces(&self, sheet: usize) -> Vec<Vec<usize>> {
+    pub fn pieces(&self, sheet: usize) -> Vec<Vec<usize>> {
         let mut left: BTreeSet<usize> =
             (0..self.faces.len()).filter(|&face| self.faces[face].sheet == sheet).collect();
         let mut pieces = Vec::new();
@@ -68,7 +57,7 @@ impl Net {
 
     /// Whether faces lack the fold by which they belong to another piece: whether a side of theirs is neither folded nor
     /// numbered.
-    pub(crate) fn is_broken_off(&self, members: &[usize]) -> bool {
+    pub fn is_broken_off(&self, members: &[usize]) -> bool {
         let mut sides = members.iter().flat_map(|&face| self.sides_of(face));
         sides.any(|(face, side)| {
             !self.folds.contains_key(&(face, side)) && self.faces[face].numbers[side].is_empty()
@@ -77,7 +66,7 @@ impl Net {
 
     /// Folds the faces of a piece, `members`, about several roots and returns the result with the
     /// fewest findings: if a misprinted face is the root, all others are off.
-    pub(crate) fn best_fold(&self, members: &[usize]) -> Folded {
+    pub fn best_fold(&self, members: &[usize]) -> Folded {
         let mut best: Option<Folded> = None;
         for &root in members.iter().take(MOST_ROOTS) {
             let folded = self.fold(members, root);

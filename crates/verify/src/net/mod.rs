@@ -5,7 +5,7 @@
 //! 1. `printed_net` has each face with the pose that its detected corners have on the paper, folds and numbers.
 //! 2. `fold` turns one face after the other about their common edges: they must come to lie where the target states.
 //! 3. `seams` compares the two sides of every edge.
-//! 4. `whole` runs these. `motion` has the poses on the paper and in space.
+//! 4. `folded` runs these. `motion` has the poses on the paper and in space.
 //!
 //! ```text
 //!    page            R_child = turn(edge, dihedral angle) · R_parent       solid
@@ -19,7 +19,7 @@
 //! the place of another, or rotated in its own, is named as such.
 
 mod fold;
+pub(super) mod folded;
 pub(super) mod motion;
 pub(super) mod printed_net;
 mod seams;
-pub(super) mod whole;

@@ -3,22 +3,22 @@
 use glam::{DMat3, DVec2, DVec3};
 
 /// Largest distance of a folded corner, or of an end of an edge, from its stated position, mm: that
-/// of meshes, see [`MESH_TOLERANCE_MM`](super::MESH_TOLERANCE_MM).
+/// of meshes, see [`MESH_TOLERANCE_MM`](crate::MESH_TOLERANCE_MM).
 pub const FOLD_TOLERANCE_MM: f64 = 0.05;
 
 /// A rigid motion of the plane, mm: `page = turn · panel + shift`, where `turn` is a unit complex
 /// number.
 #[derive(Clone, Copy)]
 pub(super) struct Rigid {
-    pub(crate) turn: DVec2,
-    pub(crate) shift: DVec2,
+    pub turn: DVec2,
+    pub shift: DVec2,
 }
 
 impl Rigid {
     /// The least-squares rigid motion that takes the first point of each pair to the second; `None`
     /// where the points do not determine the rotation. With p and q as complex numbers about their
     /// means, turn ∝ Σ p̄ q.
-    pub(crate) fn fit(pairs: &[(DVec2, DVec2)]) -> Option<Self> {
+    pub fn fit(pairs: &[(DVec2, DVec2)]) -> Option<Self> {
         let n = pairs.len() as f64;
         let p0 = pairs.iter().map(|(p, _)| *p).sum::<DVec2>() / n;
         let q0 = pairs.iter().map(|(_, q)| *q).sum::<DVec2>() / n;
@@ -28,7 +28,7 @@ impl Rigid {
         Some(Self { turn, shift: q0 - turn.rotate(p0) })
     }
 
-    pub(crate) fn apply(&self, p: DVec2) -> DVec2 {
+    pub fn apply(&self, p: DVec2) -> DVec2 {
         self.turn.rotate(p) + self.shift
     }
 }
@@ -37,18 +37,18 @@ impl Rigid {
 /// `linear`. The plane is that of the page, or of a panel.
 #[derive(Clone, Copy)]
 pub(super) struct SpaceFromPage {
-    pub(crate) linear: DMat3,
-    pub(crate) shift: DVec3,
+    pub linear: DMat3,
+    pub shift: DVec3,
 }
 
 impl SpaceFromPage {
-    pub(crate) fn apply(&self, p: DVec2) -> DVec3 {
+    pub fn apply(&self, p: DVec2) -> DVec3 {
         self.linear * p.extend(0.0) + self.shift
     }
 
     /// The same pose followed by a rotation by an angle about the line from the first to the second of
     /// two points of the page.
-    pub(crate) fn folded(&self, [p, q]: [DVec2; 2], angle_rad: f64) -> Self {
+    pub fn folded(&self, [p, q]: [DVec2; 2], angle_rad: f64) -> Self {
         let (a, b) = (self.apply(p), self.apply(q));
         let turn = DMat3::from_axis_angle((b - a).normalize_or(DVec3::X), angle_rad);
         Self { linear: turn * self.linear, shift: turn * (self.shift - a) + a }

@@ -24,46 +24,46 @@ pub(crate) fn is_net(printing: &Printing) -> bool {
 /// A face of the net as it was detected. Side i runs from vertex i to vertex i + 1.
 pub(super) struct PrintedFace {
     /// Panel id.
-    pub(crate) panel: u32,
+    pub panel: u32,
     /// Index of the sheet that it is on.
-    pub(crate) sheet: usize,
+    pub sheet: usize,
     /// Its outline on the page, counter-clockwise, mm: the stated one at the detected pose.
     outline_mm: Vec<DVec2>,
     /// Its pose on the page, fitted to the detected corners.
-    pub(crate) page_from_panel: Rigid,
+    pub page_from_panel: Rigid,
     /// Indices of the vertices of the solid at the corners of its outline.
-    pub(crate) vertices: Vec<usize>,
+    pub vertices: Vec<usize>,
     /// The detected corners: the position on the page and the stated one in the target frame, mm.
-    pub(crate) corners: Vec<(DVec2, DVec3)>,
+    pub corners: Vec<(DVec2, DVec3)>,
     /// Edge numbers printed along each of its sides.
-    pub(crate) numbers: Vec<Vec<usize>>,
+    pub numbers: Vec<Vec<usize>>,
     /// Tabs on its sides: the side, and the number of the face under which the tab says that it is
     /// to be glued.
-    pub(crate) under: Vec<(usize, usize)>,
+    pub under: Vec<(usize, usize)>,
     /// Face numbers printed in it.
-    pub(crate) names: Vec<usize>,
+    pub names: Vec<usize>,
 }
 
 /// The net as it was detected, and the solid that is to come of it. A side is the index of a face and
 /// the number of its side.
 pub(super) struct Net {
     /// All faces, in the order of the target's panels.
-    pub(crate) faces: Vec<PrintedFace>,
+    pub faces: Vec<PrintedFace>,
     /// Stated positions of the vertices of the solid in the target frame, mm.
-    pub(crate) vertices_mm: BTreeMap<usize, DVec3>,
+    pub vertices_mm: BTreeMap<usize, DVec3>,
     /// Stated pose of each panel in the target frame.
-    pub(crate) poses: Vec<SpaceFromPage>,
+    pub poses: Vec<SpaceFromPage>,
     /// The side that runs from one vertex of the solid to another.
-    pub(crate) along: BTreeMap<[usize; 2], (usize, usize)>,
+    pub along: BTreeMap<[usize; 2], (usize, usize)>,
     /// The side of another face from which each side is separated by a fold only.
-    pub(crate) folds: BTreeMap<(usize, usize), (usize, usize)>,
+    pub folds: BTreeMap<(usize, usize), (usize, usize)>,
     /// Sides along which a tab is folded.
-    pub(crate) tabs: BTreeSet<(usize, usize)>,
+    pub tabs: BTreeSet<(usize, usize)>,
 }
 
 impl Net {
     /// The net of a target from the corners detected on each sheet; `None` where a face is missing.
-    pub(crate) fn new(printing: &Printing, seen: &[Seen]) -> Option<Self> {
+    pub fn new(printing: &Printing, seen: &[Seen]) -> Option<Self> {
         let target = &printing.target;
         let TargetSpec::Solid(spec) = &target.spec else { return None };
         let (outlines, solid) = (spec.faces().ok()?, spec.polyhedron());
@@ -116,13 +116,13 @@ impl Net {
     }
 
     /// Ends of a side on the page, mm.
-    pub(crate) fn ends(&self, (face, side): (usize, usize)) -> [DVec2; 2] {
+    pub fn ends(&self, (face, side): (usize, usize)) -> [DVec2; 2] {
         let outline = &self.faces[face].outline_mm;
         [outline[side], outline[(side + 1) % outline.len()]]
     }
 
     /// The sides of a face.
-    pub(crate) fn sides_of(&self, face: usize) -> impl Iterator<Item = (usize, usize)> + use<> {
+    pub fn sides_of(&self, face: usize) -> impl Iterator<Item = (usize, usize)> + use<> {
         (0..self.faces[face].vertices.len()).map(move |side| (face, side))
     }
 

@@ -20,10 +20,10 @@ pub(crate) const PROBES: u32 = 24;
 /// The expected appearance of a tile.
 pub(crate) struct Expected<'a> {
     /// Black, as a whole or around its tag.
-    pub(crate) black: bool,
+    pub black: bool,
     /// Black and white are exchanged.
     inverted: bool,
-    pub(crate) tag: Option<ExpectedTag<'a>>,
+    pub tag: Option<ExpectedTag<'a>>,
 }
 
 impl Expected<'_> {
@@ -89,17 +89,17 @@ impl<'a> Pattern<'a> {
 }
 
 pub(crate) struct ExpectedTag<'a> {
-    pub(crate) placement: TagPlacement,
-    pub(crate) word: u64,
-    pub(crate) looks: &'a TagLooks,
+    pub placement: TagPlacement,
+    pub word: u64,
+    pub looks: &'a TagLooks,
 }
 
 /// The places of the cells of the tags of a panel, in tile coordinates.
 pub(crate) struct TagLooks {
-    pub(crate) cells: TagCells,
+    pub cells: TagCells,
     /// From the edges of the tile to the border, and to the cells, bit-widths.
     margin: f64,
-    pub(crate) inset: f64,
+    pub inset: f64,
     width: f64,
     /// Radius of the hole in the middle of a triangle, edges.
     hole: Option<f64>,
@@ -157,7 +157,7 @@ impl TagLooks {
     }
 
     /// The bit of the cell at tile coordinates (u, v); `None` beside the cells.
-    pub(crate) fn bit(&self, p: DVec2) -> Option<u32> {
+    pub fn bit(&self, p: DVec2) -> Option<u32> {
         let DVec2 { x: u, y: v } = p * self.width - self.inset;
         if u < 0.0 || v < 0.0 {
             return None;

@@ -101,7 +101,7 @@ impl<'a> PlacedPanel<'a> {
     }
 
     /// Picture positions of a tile's A, B and C.
-    pub(crate) fn frame_px(&self, tile: Tile) -> [DVec2; 3] {
+    pub fn frame_px(&self, tile: Tile) -> [DVec2; 3] {
         tile.frame().map(|vertex| self.px_of(vertex))
     }
 

@@ -35,7 +35,7 @@ pub(super) enum What {
 
 impl What {
     /// The finding that a mark differs from the layout.
-    pub(crate) fn differs(self, layout: &SheetLayout) -> MarkFinding {
+    pub fn differs(self, layout: &SheetLayout) -> MarkFinding {
         match self {
             Self::Text(i) => {
                 MarkFinding::TextDiffers { text: i + 1, stated: layout.texts[i].text.clone() }
@@ -52,11 +52,11 @@ impl What {
 
 /// A mark beside the panels.
 pub(super) struct Mark {
-    pub(crate) what: What,
+    pub what: What,
     /// Its black outlines, in the page frame, mm.
-    pub(crate) outlines: Vec<Vec<DVec2>>,
+    pub outlines: Vec<Vec<DVec2>>,
     /// Its area, in pieces.
-    pub(crate) areas: Vec<Area>,
+    pub areas: Vec<Area>,
 }
 
 /// A rectangle along a mark, so that what is slanted claims no more than what is upright.
@@ -152,20 +152,20 @@ fn pieces([from, to]: [DVec2; 2], width_mm: f64) -> Vec<Area> {
 
 impl Area {
     /// The rectangle of pixels around it.
-    pub(crate) fn pixels(&self, page: &Page) -> [usize; 4] {
+    pub fn pixels(&self, page: &Page) -> [usize; 4] {
         let Rect { x0, y0, x1, y1 } = self.along.inverse().transform_rect_bbox(self.bounds);
         pixels(page, [x0, y0, x1, y1], BLANK_PX)
     }
 
     /// Whether a pixel belongs to it, with `blank` around.
-    pub(crate) fn contains(&self, page: &Page, x: usize, y: usize, blank_px: f64) -> bool {
+    pub fn contains(&self, page: &Page, x: usize, y: usize, blank_px: f64) -> bool {
         let place = page.page_from_px(DVec2::new(x as f64, y as f64));
         let blank = blank_px / page.px_per_mm;
         self.bounds.inflate(blank, blank).contains(self.along * Point::new(place.x, place.y))
     }
 
     /// Marks its pixels.
-    pub(crate) fn cover(&self, page: &Page, known: &mut [bool]) {
+    pub fn cover(&self, page: &Page, known: &mut [bool]) {
         let [x0, y0, x1, y1] = self.pixels(page);
         for y in y0..y1 {
             for x in x0..x1 {

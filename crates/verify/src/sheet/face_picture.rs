@@ -4,6 +4,7 @@ use glam::DVec2;
 
 use crate::document::drawing::MAX_PIXELS;
 use crate::document::page::Page;
+use crate::sheet::source::wish_px_per_mm;
 use crate::verifier::Verifier;
 use deltille_core::layout::{Placement, SheetLayout};
 use deltille_core::raster::{Coverage, Gray};
@@ -41,7 +42,7 @@ impl FacePicture {
             pages: Vec::new(),
         };
         let finest = (MAX_PIXELS / (size.x * size.y)).sqrt();
-        let px_per_mm = verifier.wish_px_per_mm(&layout).min(finest);
+        let px_per_mm = wish_px_per_mm(verifier, &layout).min(finest);
         let size_px = size.to_array().map(|mm| (mm * px_per_mm).ceil() as usize);
         let page = Page {
             width_mm: size.x,
@@ -56,14 +57,14 @@ impl FacePicture {
     }
 
     /// The place of a pixel in the frame of the panel, mm.
-    pub(crate) fn place(&self, index: usize) -> DVec2 {
+    pub fn place(&self, index: usize) -> DVec2 {
         let width = self.size_px[0];
         let pixel = DVec2::new((index % width) as f64, (index / width) as f64);
         self.page.page_from_px(pixel) + self.low
     }
 
     /// How much of each pixel polygons in the frame of the panel cover, each times its value; clockwise ones negative.
-    pub(crate) fn covered<'p>(&self, parts: impl Iterator<Item = (&'p [DVec2], f64)>) -> Gray<f32> {
+    pub fn covered<'p>(&self, parts: impl Iterator<Item = (&'p [DVec2], f64)>) -> Gray<f32> {
         let mut cover = Coverage::new(self.size_px[0], self.size_px[1]);
         for (corners, value) in parts {
             // Clockwise on the screen is positive.

@@ -6,7 +6,11 @@ use crate::document::opened::Document;
 use crate::document::page::Page;
 use crate::finding::any::{Finding, PageFinding};
 use crate::reading::error::DocumentError;
+use crate::verifier::{PRINT_PX_PER_MM, Verifier};
 use deltille_core::layout::SheetLayout;
+
+/// Least edge of a cell of a tag in the picture, px, so that more than a few pixels lie inside it.
+const CELL_PX: f64 = 8.0;
 
 /// A page with a side this many times as long as stated is not rendered: at the resolution that is
 /// possible for it nothing of its boards could be seen.
@@ -15,13 +19,13 @@ const MOST_ENLARGED: f64 = 10.0;
 /// A page of a document.
 #[derive(Clone, Copy)]
 pub(crate) struct Source<'a> {
-    pub(crate) document: &'a Document,
-    pub(crate) page: usize,
+    pub document: &'a Document,
+    pub page: usize,
 }
 
 impl Source<'_> {
     /// The page as a picture, turned over where it is printed as its mirror image, and whether it has the stated size.
-    pub(crate) fn render(
+    pub fn render(
         &self,
         layout: &SheetLayout,
         px_per_mm: f64,
@@ -44,4 +48,16 @@ impl Source<'_> {
         (page.width_mm, page.height_mm) = (layout.width_mm, layout.height_mm);
         Ok((turned(page), Vec::new()))
     }
+}
+
+/// Print resolution, or finer where the cells of tags are small.
+pub(crate) fn wish_px_per_mm(verifier: &Verifier, layout: &SheetLayout) -> f64 {
+    let panels = verifier.target().panels.iter();
+    let here = panels.filter(|panel| layout.placements.iter().any(|p| p.panel == panel.id));
+    let cells_mm = here.filter_map(|panel| {
+        panel.border_bits?;
+        let family = verifier.family?.of_tiling(panel.kind)?;
+        Some(panel.edge_mm / family.cells().width(panel.tag_inset_bits()))
+    });
+    cells_mm.map(|cell_mm| CELL_PX / cell_mm).fold(PRINT_PX_PER_MM, f64::max)
 }

@@ -6,14 +6,12 @@ use std::f64::consts::PI;
 
 use glam::DVec2;
 
-use crate::document::page::Page;
 use crate::finding::any::Finding;
 use crate::finding::board::BoardFinding;
 use crate::finding::tile::TileFinding;
 use crate::panel::placed::PlacedPanel;
 use crate::verdict::SheetVerdict;
 use crate::verifier::{TOLERANCE_MM, Verifier};
-use deltille_core::layout::SheetLayout;
 use deltille_core::targets::Corner;
 
 /// Whether all panels of a page are such, if it has any.
@@ -26,19 +24,14 @@ pub(super) fn is_for(placed: &[PlacedPanel]) -> bool {
 }
 
 /// Compares the panels of the page.
-pub(super) fn check(
-    verifier: &Verifier,
-    page: &Page,
-    layout: &SheetLayout,
-    verdict: &mut SheetVerdict,
-) {
-    for placed in verifier.placed(page, layout) {
+pub(super) fn check(verifier: &Verifier, panels: &[PlacedPanel], verdict: &mut SheetVerdict) {
+    for placed in panels {
         let panel = placed.panel;
         verdict.tags += panel.tags.len();
         verdict.corners += panel.corners.len();
         if let Some(diameter_mm) = panel.discs_mm {
             verdict.has_discs = true;
-            check_discs(&placed, diameter_mm, verdict);
+            check_discs(placed, diameter_mm, verdict);
             continue;
         }
         let report = placed.check_tiles(verifier.family);

@@ -9,69 +9,52 @@ use crate::panel::placed::PlacedPanel;
 use crate::sheet::seen::Seen;
 use crate::sheet::{bars, boards, marks, undetected};
 use crate::verdict::SheetVerdict;
-use crate::verifier::{PRINT_PX_PER_MM, TOLERANCE_MM, Verifier};
+use crate::verifier::{TOLERANCE_MM, Verifier};
 use deltille_core::layout::SheetLayout;
 
-/// Least edge of a cell of a tag in the picture, px, so that more than a few pixels lie inside it.
-const CELL_PX: f64 = 8.0;
-
-impl<'a> Verifier<'a> {
-    /// The panels of a page where they are stated.
-    pub(crate) fn placed<'p>(
-        &'p self,
-        page: &'p Page,
-        layout: &'p SheetLayout,
-    ) -> Vec<PlacedPanel<'p>> {
-        let found_from_stated = AffineMap::IDENTITY;
-        let placed = layout.placements.iter().filter_map(|placement| {
-            let panel = self.target().panels.iter().find(|panel| panel.id == placement.panel)?;
-            Some(PlacedPanel::new(page, panel, placement, found_from_stated).among(layout))
-        });
-        placed.collect()
+/// Compares the panels and marks of a whole sheet.
+pub(crate) fn compare(
+    verifier: &Verifier,
+    page: &Page,
+    layout: &SheetLayout,
+    verdict: &mut SheetVerdict,
+) -> Seen {
+    let placed = placed(verifier, page, layout);
+    let all_stated = placed.len() == layout.placements.len() && undetected::is_for(&placed);
+    let (found_from_stated, seen) = if all_stated {
+        undetected::check(verifier, &placed, verdict);
+        (AffineMap::IDENTITY, Seen::new())
+    } else {
+        boards::check(verifier, page, layout, verdict)
+    };
+    let toneless = |finding: &Finding| {
+        use BoardFinding::{Contrast, Inverted};
+        matches!(finding, Finding::Board(Inverted { .. } | Contrast { .. }))
+    };
+    if verdict.findings.iter().any(toneless) {
+        return seen;
     }
-
-    /// Print resolution, or finer where the cells of tags are small.
-    pub(crate) fn wish_px_per_mm(&self, layout: &SheetLayout) -> f64 {
-        let panels = self.target().panels.iter();
-        let here = panels.filter(|panel| layout.placements.iter().any(|p| p.panel == panel.id));
-        let cells_mm = here.filter_map(|panel| {
-            panel.border_bits?;
-            let family = self.family?.of_tiling(panel.kind)?;
-            Some(panel.edge_mm / family.cells().width(panel.tag_inset_bits()))
-        });
-        cells_mm.map(|cell_mm| CELL_PX / cell_mm).fold(PRINT_PX_PER_MM, f64::max)
+    let in_place = verdict.findings.iter().all(Finding::is_local);
+    check_bars(page, layout, &found_from_stated, verdict);
+    if in_place {
+        let logo = verifier.printing.logo.as_ref();
+        marks::check(page, (layout, logo), &placed, None, verdict);
     }
+    seen
+}
 
-    /// Compares the panels and marks of a whole sheet.
-    pub(crate) fn verify_sheet(
-        &self,
-        page: &Page,
-        layout: &SheetLayout,
-        verdict: &mut SheetVerdict,
-    ) -> Seen {
-        let placed = self.placed(page, layout);
-        let all_stated = placed.len() == layout.placements.len() && undetected::is_for(&placed);
-        let (found_from_stated, seen) = if all_stated {
-            undetected::check(self, page, layout, verdict);
-            (AffineMap::IDENTITY, Seen::new())
-        } else {
-            boards::check(self, page, layout, verdict)
-        };
-        let toneless = |finding: &Finding| {
-            use BoardFinding::{Contrast, Inverted};
-            matches!(finding, Finding::Board(Inverted { .. } | Contrast { .. }))
-        };
-        if verdict.findings.iter().any(toneless) {
-            return seen;
-        }
-        let in_place = verdict.findings.iter().all(Finding::is_local);
-        check_bars(page, layout, &found_from_stated, verdict);
-        if in_place {
-            let logo = self.printing.logo.as_ref();
-            marks::check(page, (layout, logo), &placed, None, verdict);
-        }
-        seen
-    }
+/// The panels of a page where they are stated.
+fn placed<'p>(
+    verifier: &'p Verifier,
+    page: &'p Page,
+    layout: &'p SheetLayout,
+) -> Vec<PlacedPanel<'p>> {
+    let found_from_stated = AffineMap::IDENTITY;
+    let placed = layout.placements.iter().filter_map(|placement| {
+        let panel = verifier.target().panels.iter().find(|panel| panel.id == placement.panel)?;
+        Some(PlacedPanel::new(page, panel, placement, found_from_stated).among(layout))
+    });
+    placed.collect()
 }
 
 /// Measures the check bars. Where the boards lie only tells where to look for them.
