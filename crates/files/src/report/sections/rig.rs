@@ -4,15 +4,15 @@ use std::collections::BTreeMap;
 
 use glam::DVec3;
 
-use super::Report;
-use super::page::{escaped, meter, out_row, rounded};
-use super::table::aligned;
-use super::views::MOST_VIEWS;
+use crate::report::content::Report;
+use crate::report::html::{escaped, meter, out_row};
+use crate::report::sections::numbers::{aligned, rounded};
+use crate::report::sections::views::MOST_VIEWS;
 use deltille_core::calibrate::{FrameEstimate, PanelPlace};
 use deltille_core::camera::Pose;
 
 /// Relative camera poses.
-pub(super) fn places(report: &Report) -> String {
+pub(in crate::report) fn places(report: &Report) -> String {
     let first = report.estimate.cameras.first().map_or("", |camera| camera.name.as_str());
     let rows = report.estimate.cameras.iter().map(|camera| {
         let place = pose_cells(&camera.camera_from_rig.inverse(), camera.pose_sd);
@@ -34,7 +34,7 @@ pub(super) fn places(report: &Report) -> String {
 }
 
 /// Relative poses of targets, where there are several.
-pub(super) fn targets(report: &Report) -> String {
+pub(in crate::report) fn targets(report: &Report) -> String {
     let targets = &report.estimate.targets;
     if targets.len() < 2 {
         return String::new();
@@ -74,7 +74,7 @@ fn pose_cells(pose: &Pose, sd: Option<[f64; 6]>) -> String {
 }
 
 /// Refined panel poses against those of the target file.
-pub(super) fn panels(report: &Report) -> String {
+pub(in crate::report) fn panels(report: &Report) -> String {
     let seen = report.estimate.corners().map(|corner| (corner.panel.index(), corner.panel.id()));
     let ids: BTreeMap<usize, u32> = seen.collect();
     let found = report.estimate.panels.iter().zip(report.stated).enumerate();
@@ -129,7 +129,7 @@ fn deviation(of: DVec3, covariance: &[[f64; 6]; 6], block: usize) -> f64 {
 }
 
 /// The moments, and what of each was seen.
-pub(super) fn frames(report: &Report) -> String {
+pub(in crate::report) fn frames(report: &Report) -> String {
     let estimate = report.estimate;
     let mut order: Vec<usize> = (0..estimate.frames.len()).collect();
     let rms = |&index: &usize| estimate.frames[index].rms_px;

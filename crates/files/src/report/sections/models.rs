@@ -1,6 +1,6 @@
 //! Comparison of lens models on held-out views.
 
-use super::page::{escaped, meter};
+use crate::report::html::{escaped, meter};
 use deltille_core::calibrate::{CameraEstimate, Candidate, Comparison, Region};
 
 /// A model's camera against the one that was found.
@@ -10,7 +10,7 @@ struct Against {
 }
 
 /// The table of models of a camera; empty where none were tried.
-pub(super) fn section(camera: &CameraEstimate, tried: &[Candidate]) -> String {
+pub(in crate::report) fn section(camera: &CameraEstimate, tried: &[Candidate]) -> String {
     if tried.is_empty() {
         return String::new();
     }

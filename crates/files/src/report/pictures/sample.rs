@@ -7,9 +7,9 @@ use std::fmt::Write as _;
 use glam::{DVec2, DVec3};
 use image::{DynamicImage, GrayImage};
 
-use super::page::{data_url, escaped};
-use super::thumbnail::{png, reduced};
 use crate::remap::remapped;
+use crate::report::html::{data_url, escaped};
+use crate::report::pictures::thumbnail::{png, reduced};
 use deltille_core::calibrate::{CameraEstimate, Corner, ViewEstimate};
 use deltille_core::camera::{Field, Undistortion};
 use deltille_core::raster::Gray;
@@ -113,7 +113,7 @@ impl Sample {
     }
 
     /// Both pictures beside each other.
-    pub(super) fn section(&self) -> String {
+    pub(crate) fn section(&self) -> String {
         let drawn = |index: usize, png: &[u8], size: DVec2, shows: &str| {
             let DVec2 { x: w, y: h } = size;
             // Lines as wide in both.

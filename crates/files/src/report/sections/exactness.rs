@@ -1,46 +1,52 @@
 //! Plots of residuals and of the uncertainty of projections, over the image, the target and the
 //! views.
 
-use super::{Survey, board_residuals, field, page, plots};
+use crate::report::html;
+use crate::report::measures::survey::Survey;
+use crate::report::plots::{board_residuals, field, residuals};
 use deltille_core::calibrate::{CameraEstimate, Estimate, Source};
 
 /// Residuals over the image, the target, the radius and the views, and the coverage of the image.
-pub(super) fn residuals(estimate: &Estimate, camera: &CameraEstimate, survey: &Survey) -> String {
-    let (arrows, caption) = plots::residual_map(survey);
+pub(in crate::report) fn residuals(
+    estimate: &Estimate,
+    camera: &CameraEstimate,
+    survey: &Survey,
+) -> String {
+    let (arrows, caption) = residuals::residual_map(survey);
     let mut figures = vec![(arrows, caption)];
     figures.extend(board_residuals::plot(estimate, camera, survey));
     figures.push((
-        plots::scatter(camera, survey),
+        residuals::scatter(camera, survey),
         "Residuals of all corners: a round cloud is noise, anything else is not. Rings on the rim lie beyond it."
             .to_owned(),
     ));
     figures.push((
-        plots::histogram(camera, survey),
+        residuals::histogram(camera, survey),
         "How many residuals of a coordinate are how large, and the normal distribution of the same deviation."
             .to_owned(),
     ));
     figures.push((
-        plots::against_radius(camera, survey),
+        residuals::against_radius(camera, survey),
         "Errors of corners by their place in the image, and the rms of rings per coordinate, which should be level. \
          Rings on the rim lie beyond it."
             .to_owned(),
     ));
     figures.push((
-        plots::coverage(survey),
+        residuals::coverage(survey),
         "Corners in each part of the image. Where there are none (red) distortion is extrapolated."
             .to_owned(),
     ));
     figures.push((
-        plots::of_views(camera, survey),
+        residuals::of_views(camera, survey),
         "The rms of each view in their order: steps show that something changed, peaks a bad picture.".to_owned(),
     ));
-    let (place, caption) = plots::against_place(camera, survey);
+    let (place, caption) = residuals::against_place(camera, survey);
     figures.push((place, caption.to_owned()));
-    page::section("Residuals and coverage", &page::figures(figures))
+    html::section("Residuals and coverage", &html::figures(figures))
 }
 
 /// Uncertainty of projections over the image.
-pub(super) fn uncertainty(camera: &CameraEstimate) -> String {
+pub(in crate::report) fn uncertainty(camera: &CameraEstimate) -> String {
     let maps = camera.uncertainty_maps();
     if maps.is_empty() {
         return String::new();
@@ -61,8 +67,8 @@ pub(super) fn uncertainty(camera: &CameraEstimate) -> String {
         "{}<div class=\"wide-table\"><table class=\"plain\"><tr><th>distance</th><th class=\"words\">deviation</th><th>px</th></tr>{}</table></div>\
          <p class=\"note\">Standard deviation of a coordinate where corners were, after the motion of the camera that explains \
          the corners best.</p>",
-        page::figures(drawn),
+        html::figures(drawn),
         told.collect::<String>()
     );
-    page::section("How sure projections are", &body)
+    html::section("How sure projections are", &body)
 }

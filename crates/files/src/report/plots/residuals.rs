@@ -5,9 +5,9 @@
 
 use glam::DVec2;
 
-use super::axes::{Axes, frame};
-use super::panels::round_down;
-use super::survey::Survey;
+use crate::report::measures::survey::Survey;
+use crate::report::plots::axes::{Axes, frame};
+use crate::report::plots::round_down::round_down;
 use deltille_core::calibrate::{CameraEstimate, Corner};
 
 /// Height of the legend below a map, user units.
@@ -47,7 +47,7 @@ fn thinned(camera: &CameraEstimate) -> impl Iterator<Item = &Corner> {
 }
 
 /// Scatter plot of the residuals of all corners, px.
-pub(super) fn scatter(camera: &CameraEstimate, survey: &Survey) -> String {
+pub(in crate::report) fn scatter(camera: &CameraEstimate, survey: &Survey) -> String {
     let size = frame(survey.size_px);
     // As many pixels in all directions, however wide the frame is.
     let range = range_px(camera) * size / size.min_element();
@@ -74,7 +74,7 @@ pub(super) fn scatter(camera: &CameraEstimate, survey: &Survey) -> String {
 
 /// Histogram of the residuals of both coordinates, px, with the normal distribution of the same
 /// standard deviation.
-pub(super) fn histogram(camera: &CameraEstimate, survey: &Survey) -> String {
+pub(in crate::report) fn histogram(camera: &CameraEstimate, survey: &Survey) -> String {
     let range = range_px(camera);
     let width = range / BINS as f64;
     let mut counts = vec![0usize; 2 * BINS];
@@ -128,7 +128,7 @@ fn within(survey: &Survey, from: DVec2, arrow: DVec2) -> DVec2 {
 }
 
 /// Map of the mean residuals over the image, enlarged, and its caption.
-pub(super) fn residual_map(survey: &Survey) -> (String, String) {
+pub(in crate::report) fn residual_map(survey: &Survey) -> (String, String) {
     let cell = survey.size_px.x / survey.cells[0] as f64;
     let means = || survey.means_px.iter().flatten();
     let longest = means().map(|cell| cell.mean_px.length()).fold(0.0, f64::max);
@@ -163,7 +163,7 @@ pub(super) fn residual_map(survey: &Survey) -> (String, String) {
 }
 
 /// Map of the number of corners in each cell of the image.
-pub(super) fn coverage(survey: &Survey) -> String {
+pub(in crate::report) fn coverage(survey: &Survey) -> String {
     let most = survey.counts.iter().copied().max().unwrap_or(0).max(1) as f64;
     let mut axes = Axes::of_image(survey.size_px);
     for (index, &count) in survey.counts.iter().enumerate() {
@@ -188,7 +188,7 @@ pub(super) fn coverage(survey: &Survey) -> String {
 
 /// Length of each residual, px, against the distance of its corner from the principal point, px,
 /// and the RMS per coordinate of concentric rings.
-pub(super) fn against_radius(camera: &CameraEstimate, survey: &Survey) -> String {
+pub(in crate::report) fn against_radius(camera: &CameraEstimate, survey: &Survey) -> String {
     let radius = |corner: &Corner| camera.camera.radius_px(corner.pixel);
     let error = |corner: &Corner| corner.residual.x.hypot(corner.residual.y);
     let farthest = camera.corners().map(radius).fold(1.0, f64::max);
@@ -225,7 +225,10 @@ pub(super) fn against_radius(camera: &CameraEstimate, survey: &Survey) -> String
 
 /// RMS of each view, px, against the tilt of the board, degrees, or for solids, whose faces are seen
 /// at all tilts at once, against the distance of the target, mm; and the caption.
-pub(super) fn against_place(camera: &CameraEstimate, survey: &Survey) -> (String, &'static str) {
+pub(in crate::report) fn against_place(
+    camera: &CameraEstimate,
+    survey: &Survey,
+) -> (String, &'static str) {
     let tilts = survey.views.iter().map(|view| view.tilt_rad.map(f64::to_degrees));
     let (places, least, name, shows, caption) = match tilts.collect::<Option<Vec<f64>>>() {
         Some(tilts) => (
@@ -254,7 +257,7 @@ pub(super) fn against_place(camera: &CameraEstimate, survey: &Survey) -> (String
 }
 
 /// RMS of each view, px, in their order, and that of all as a line.
-pub(super) fn of_views(camera: &CameraEstimate, survey: &Survey) -> String {
+pub(in crate::report) fn of_views(camera: &CameraEstimate, survey: &Survey) -> String {
     let views = &camera.views;
     let worst = views.iter().map(|view| view.rms_px).fold(1e-6, f64::max);
     let mut axes =

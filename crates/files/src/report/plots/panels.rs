@@ -58,7 +58,7 @@ pub(super) struct Panels<'a> {
 impl<'a> Panels<'a> {
     /// Lays out marks, which are sorted by panel, at the largest scale that fits a width and a height,
     /// user units.
-    pub(super) fn new(marks: &'a [Mark], width: f64, most_height: f64) -> Self {
+    pub fn new(marks: &'a [Mark], width: f64, most_height: f64) -> Self {
         let panels: Vec<&[Mark]> = marks.chunk_by(|a, b| a.panel == b.panel).collect();
         let in_a_row = panels.len().clamp(1, PANELS_IN_A_ROW);
         let rows = panels.len().div_ceil(in_a_row).max(1);
@@ -74,23 +74,23 @@ impl<'a> Panels<'a> {
     }
 
     /// The median distance from a corner to the next in its row, mm.
-    pub(super) fn spacing_mm(&self) -> f64 {
+    pub fn spacing_mm(&self) -> f64 {
         self.spacing_mm
     }
 
     /// User units per millimetre on the panel.
-    pub(super) fn per_mm(&self) -> f64 {
+    pub fn per_mm(&self) -> f64 {
         self.per_mm
     }
 
     /// Height of the whole drawing, user units.
-    pub(super) fn height(&self) -> f64 {
+    pub fn height(&self) -> f64 {
         let in_a_row = self.panels.len().clamp(1, PANELS_IN_A_ROW);
         self.panels.len().div_ceil(in_a_row) as f64 * self.cell.y
     }
 
     /// The SVG elements of all panels, with offsets enlarged by a factor.
-    pub(super) fn drawn(&self, enlarged: f64) -> String {
+    pub fn drawn(&self, enlarged: f64) -> String {
         let in_a_row = self.panels.len().clamp(1, PANELS_IN_A_ROW);
         let mut drawn = String::new();
         for (index, marks) in self.panels.iter().enumerate() {
@@ -156,13 +156,4 @@ fn spacing_mm(marks: &[Mark]) -> f64 {
         (pair[0].panel, pair[0].row, pair[0].col + 1) == (pair[1].panel, pair[1].row, pair[1].col)
     });
     median(pairs.map(|pair| pair[0].at_mm.distance(pair[1].at_mm)).collect()).unwrap_or(1.0)
-}
-
-/// The largest value of the form 1, 2 or 5 times a power of ten that does not exceed `value`.
-pub(super) fn round_down(value: f64) -> f64 {
-    let decade = 10f64.powf(value.log10().floor());
-    let digit = [5.0, 2.0].into_iter().find(|digit| digit * decade <= value * (1.0 + 1e-9));
-    let rounded = digit.unwrap_or(1.0) * decade;
-    // Without the digits that a power leaves.
-    format!("{rounded:.6}").parse().unwrap_or(rounded)
 }

@@ -6,9 +6,9 @@ use std::fmt::Write as _;
 
 use glam::{DQuat, DVec2, DVec3};
 
-use super::axes::Axes;
-use super::board_residuals::{camera_from_panel, on_plane};
-use super::page::escaped;
+use crate::report::html::escaped;
+use crate::report::measures::corner_offsets::{camera_from_panel, on_plane};
+use crate::report::plots::axes::Axes;
 use deltille_core::calibrate::{CameraEstimate, Estimate, PanelRef, ViewEstimate};
 use deltille_core::camera::{Camera, Pose};
 use deltille_core::polygon::hull;
@@ -30,7 +30,7 @@ const FEW_VIEWS: usize = 12;
 
 /// The frame in which a scene is drawn, and the direction from which it is viewed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Fixed {
+pub(in crate::report) enum Fixed {
     /// The cameras, and the viewer stands above and behind the first.
     Rig,
     /// The target, and the viewer stands before and below it.
@@ -67,7 +67,7 @@ struct Shape {
 
 /// The scene as an SVG of the size of the other plots of a camera with this image, px; empty where
 /// nothing was seen.
-pub(super) fn drawing(estimate: &Estimate, fixed: Fixed, image_px: DVec2) -> String {
+pub(in crate::report) fn drawing(estimate: &Estimate, fixed: Fixed, image_px: DVec2) -> String {
     let [_, size_px] = Axes::bare(image_px).bounds();
     let (width, height) = (size_px.x, size_px.y);
     let depths = targets(estimate).iter().map(|shape| shape.middle().length()).collect();

@@ -6,8 +6,8 @@ use std::fmt::Write as _;
 
 use glam::DVec2;
 
-use super::axes::Axes;
-use super::panels::round_down;
+use crate::report::plots::axes::Axes;
+use crate::report::plots::round_down::round_down;
 use deltille_core::calibrate::{CameraEstimate, Comparison, Source, UncertaintyMap};
 use deltille_core::statistics::quantile;
 
@@ -89,7 +89,7 @@ pub fn comparison_svg(size_px: [u32; 2], found: &Comparison) -> String {
 const UNCERTAIN: &str = "How sure the camera is over its image";
 
 /// The uncertainty map of a camera for a page.
-pub(super) fn uncertainty(camera: &CameraEstimate, map: &UncertaintyMap) -> String {
+pub(in crate::report) fn uncertainty(camera: &CameraEstimate, map: &UncertaintyMap) -> String {
     of_uncertainty(camera, map).axes().svg(NAMES, UNCERTAIN)
 }
 
@@ -117,7 +117,7 @@ fn of_uncertainty(camera: &CameraEstimate, map: &UncertaintyMap) -> Field {
 }
 
 /// What a map of uncertainty shows, in words.
-pub(super) fn caption(map: &UncertaintyMap) -> String {
+pub(in crate::report) fn caption(map: &UncertaintyMap) -> String {
     let source = match map.source {
         Source::Noise => "from the noise of corners alone",
         Source::Observed => "observed: as the views agree with each other",

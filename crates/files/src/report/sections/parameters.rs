@@ -2,8 +2,8 @@
 
 use std::fmt::Write as _;
 
-use super::page::{self, escaped, rounded};
-use super::table::aligned;
+use crate::report::html::{self, escaped};
+use crate::report::sections::numbers::{aligned, rounded};
 use deltille_core::calibrate::{CameraEstimate, Parameter, Source};
 use deltille_core::camera::{Lens, SplineGrid};
 
@@ -14,14 +14,14 @@ const FEW: usize = 12;
 const STRONG: f64 = 0.85;
 
 /// Parameters with their deviations, and their correlations.
-pub(super) fn section(camera: &CameraEstimate) -> String {
+pub(in crate::report) fn section(camera: &CameraEstimate) -> String {
     if let Lens::Spline(spline) = &camera.camera.lens {
         let SplineGrid { degree, columns, rows, fov_x_deg } = spline.grid();
         let told = format!(
             "<p>The lens is a spline of degree {degree} with {columns} × {rows} knots over {fov_x_deg}° across. \
              Single knots mean nothing by themselves: see how sure projections are.</p>"
         );
-        return page::section("Parameters", &told);
+        return html::section("Parameters", &told);
     }
     let told = |(p, _): &(&Parameter, Option<f64>)| p.sd.is_some() || p.value != 0.0;
     let is_observed = camera.covariance_from(Source::Observed).is_some();
@@ -75,5 +75,5 @@ pub(super) fn section(camera: &CameraEstimate) -> String {
     let table = format!(
         "<div class=\"wide-table\"><table class=\"plain\"><tr><th>name</th><th>value</th>{heads}</tr>{rows}</table></div>"
     );
-    page::section("Parameters", &format!("<div class=\"plots\">{table}{matrix}</div>"))
+    html::section("Parameters", &format!("<div class=\"plots\">{table}{matrix}</div>"))
 }

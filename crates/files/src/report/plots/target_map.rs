@@ -3,7 +3,8 @@
 
 use std::fmt::Write as _;
 
-use super::panels::{Mark, Panels, round_down};
+use crate::report::plots::panels::{Mark, Panels};
+use crate::report::plots::round_down::round_down;
 use deltille_core::calibrate::{CornerOffset, TargetMap};
 use deltille_core::statistics::quantile;
 
@@ -37,7 +38,7 @@ pub fn target_map_svg(map: &TargetMap) -> String {
 }
 
 /// The picture; `space` is an attribute that files of their own need.
-pub(super) fn drawing(map: &TargetMap, space: &str) -> String {
+pub(in crate::report) fn drawing(map: &TargetMap, space: &str) -> String {
     let mut marks: Vec<Mark> = map.corners().iter().map(|corner| mark(map, corner)).collect();
     let panels = Panels::new(&marks, WIDTH, f64::INFINITY);
     let (scale, per_mm) = (Scale::of(map, panels.spacing_mm()), panels.per_mm());

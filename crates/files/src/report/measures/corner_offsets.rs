@@ -13,39 +13,25 @@
 //! that are left.
 
 use std::collections::BTreeMap;
-use std::fmt::Write as _;
 
 use glam::{DMat2, DVec2};
 
-use super::axes::Axes;
-use super::field::COLOURS;
-use super::panels::{Mark, Panels, round_down};
-use super::survey::Survey;
 use deltille_core::calibrate::{CameraEstimate, Estimate, PanelRef, ViewEstimate};
 use deltille_core::camera::{Camera, Pose};
-use deltille_core::statistics::quantile;
 
 /// Corners that are taken into account, of views evenly over all: more say no more.
 const MOST_CORNERS: usize = 200_000;
 
 /// Threshold of a significant offset (χ² of two coordinates, exceeded by chance once in a thousand
 /// times).
-const SURE: f64 = 13.8;
+pub(in crate::report) const SURE: f64 = 13.8;
 
 /// Fewest views of a corner.
 const LEAST_VIEWS: usize = 3;
 
-/// Nearly all arrows are at most as long as this part of the distance between corners.
-const ARROW_PART: f64 = 0.8;
-const NEARLY_ALL: f64 = 0.95;
-
-/// Room for scales below, user units, and parts of the scale of colours.
-const FOOT: f64 = 58.0;
-const STEPS: usize = 22;
-
 /// Statistics of a corner of the target.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct OfCorner {
+pub(in crate::report) struct OfCorner {
     pub panel: PanelRef,
     pub row: i32,
     pub col: i32,
@@ -72,7 +58,7 @@ struct Sums {
 
 /// The corners that a camera saw, by panel, row and column. Outliers are excluded; but where a
 /// corner is an outlier in most of its views, this is no accident, and all of them count.
-pub(super) fn of_corners(estimate: &Estimate, camera: &CameraEstimate) -> Vec<OfCorner> {
+pub(in crate::report) fn of_corners(estimate: &Estimate, camera: &CameraEstimate) -> Vec<OfCorner> {
     let step = camera.corner_count().div_ceil(MOST_CORNERS).max(1);
     // Of those that are no outliers, and of all.
     let mut sums: BTreeMap<(PanelRef, i32, i32), [Sums; 2]> = BTreeMap::new();
@@ -117,7 +103,7 @@ pub(super) fn of_corners(estimate: &Estimate, camera: &CameraEstimate) -> Vec<Of
 }
 
 /// The pose of a panel in a view.
-pub(super) fn camera_from_panel(
+pub(in crate::report) fn camera_from_panel(
     estimate: &Estimate,
     view: &ViewEstimate,
     panel: PanelRef,
@@ -141,97 +127,15 @@ fn at_corner(camera: &Camera, camera_from_panel: &Pose, pixel: DVec2) -> Option<
 }
 
 /// The point of the plane of a panel that a pixel sees, mm.
-pub(super) fn on_plane(camera: &Camera, camera_from_panel: &Pose, pixel: DVec2) -> Option<DVec2> {
+pub(in crate::report) fn on_plane(
+    camera: &Camera,
+    camera_from_panel: &Pose,
+    pixel: DVec2,
+) -> Option<DVec2> {
     let ray = camera.unproject(pixel)?;
     let panel_from_camera = camera_from_panel.inverse();
     let (origin, direction) =
         (panel_from_camera.apply(ray.origin), panel_from_camera.rotation * ray.direction);
     let far = -origin.z / direction.z;
     (far.is_finite() && far > 0.0).then(|| (origin + far * direction).truncate())
-}
-
-/// The corners as a picture, and in words what it is; `None` where no corner was seen often enough.
-pub(super) fn plot(
-    estimate: &Estimate,
-    camera: &CameraEstimate,
-    survey: &Survey,
-) -> Option<(String, String)> {
-    let corners = of_corners(estimate, camera);
-    let mut errors: Vec<f64> = corners.iter().map(|corner| corner.rms_px).collect();
-    let most_px = quantile(&mut errors, 1.0)?.max(1e-9);
-    let colour = |px: f64| {
-        // The darkest would hide the arrows' feet.
-        let place = (px / most_px * (COLOURS.len() - 2) as f64) as usize;
-        COLOURS[place.min(COLOURS.len() - 2)]
-    };
-    let marks = corners.iter().map(|corner| Mark {
-        panel: corner.panel,
-        row: corner.row,
-        col: corner.col,
-        at_mm: corner.at_mm,
-        by_mm: corner.move_mm,
-        is_sure: corner.is_sure,
-        colour: colour(corner.rms_px).to_owned(),
-        title: format!(
-            "row {}, column {}: rms {:.4} px, ({:.4}, {:.4}) mm, {} views",
-            corner.row, corner.col, corner.rms_px, corner.move_mm.x, corner.move_mm.y, corner.views
-        ),
-    });
-    let marks: Vec<Mark> = marks.collect();
-    // Within a frame as large as that of the other plots.
-    let mut axes = Axes::bare(survey.size_px);
-    let [origin, room] = axes.bounds();
-    let panels = Panels::new(&marks, room.x, room.y);
-    let mut lengths: Vec<f64> = corners.iter().map(|corner| corner.move_mm.length()).collect();
-    let longest = quantile(&mut lengths, NEARLY_ALL)?.max(1e-9);
-    let enlarged = round_down(ARROW_PART * panels.spacing_mm() / longest).max(1.0);
-    let down = origin.y + (room.y - panels.height()).max(0.0) / 2.0;
-    axes.add(&format!(
-        "<g class=\"target-map\" transform=\"translate({:.1} {down:.1})\">{}</g>",
-        origin.x,
-        panels.drawn(enlarged)
-    ));
-    axes.foot(FOOT, scales(most_px, &colour, round_down(longest), enlarged * panels.per_mm()));
-    let svg = axes.svg(["", ""], "Residuals of each corner of the target");
-    let sure = corners.iter().filter(|corner| corner.is_sure).count();
-    let caption = format!(
-        "Residuals of each corner of the target over all views: colour is their rms, arrows show where on its panel they \
-         would have the corner, {enlarged} times enlarged; {sure} of {} by more than chance makes (the others are grey).",
-        corners.len()
-    );
-    Some((svg, caption))
-}
-
-/// What colours and arrows mean.
-fn scales(
-    most_px: f64,
-    colour: &impl Fn(f64) -> &'static str,
-    example_mm: f64,
-    per_mm: f64,
-) -> String {
-    let mut drawn = String::new();
-    let wide = 10.0;
-    for step in 0..STEPS {
-        let px = most_px * (step as f64 + 0.5) / STEPS as f64;
-        let (x, fill) = (wide * step as f64, colour(px));
-        let _ = write!(
-            drawn,
-            "<rect x=\"{x:.1}\" y=\"8\" width=\"{:.1}\" height=\"10\" fill=\"{fill}\"/>",
-            wide + 0.3
-        );
-    }
-    let end = wide * STEPS as f64;
-    let _ = write!(
-        drawn,
-        "<text x=\"0\" y=\"31\">0</text><text x=\"{end}\" y=\"31\" text-anchor=\"middle\">{most_px:.3}</text>\
-         <text x=\"{:.1}\" y=\"17\">rms, px</text>",
-        end + 8.0
-    );
-    let (from, to) = (310.0, 310.0 + example_mm * per_mm);
-    let _ = write!(
-        drawn,
-        "<g class=\"target-map\"><line class=\"offset\" x1=\"{from}\" y1=\"13\" x2=\"{to:.1}\" y2=\"13\"/></g>\
-         <text x=\"{from}\" y=\"31\">{example_mm} mm</text>"
-    );
-    drawn
 }

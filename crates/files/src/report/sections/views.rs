@@ -2,9 +2,10 @@
 
 use std::fmt::Write as _;
 
-use super::page::{self, data_url, escaped, meter, out_row};
-use super::panels::round_down;
-use super::{Report, Survey, SurveyedView};
+use crate::report::content::Report;
+use crate::report::html::{self, data_url, escaped, meter, out_row};
+use crate::report::measures::survey::{Survey, SurveyedView};
+use crate::report::plots::round_down::round_down;
 use deltille_core::calibrate::{CameraEstimate, Excluded, ViewEstimate};
 use deltille_core::statistics::quantile;
 use deltille_core::words::counted;
@@ -35,7 +36,7 @@ fn order(camera: &CameraEstimate) -> Vec<usize> {
 
 /// The section about the views of a camera: the worst as pictures with enlarged residuals, and all,
 /// held-out views included, in a folded table.
-pub(super) fn section(report: &Report, index: usize, survey: &Survey) -> String {
+pub(in crate::report) fn section(report: &Report, index: usize, survey: &Survey) -> String {
     let camera = &report.estimate.cameras[index];
     let (order, all) = (order(camera), camera.views.len());
     let held_out = report.held_out(index).map(|held_out| (held_out, Survey::new(held_out)));
@@ -94,7 +95,7 @@ pub(super) fn section(report: &Report, index: usize, survey: &Survey) -> String 
          <table class=\"plain views\"><tr><th></th><th>view</th><th>corners</th><th>rms, px</th><th>outliers</th>\
          <th>tilt</th><th>distance, mm</th></tr>{rows}</table></div></details>"
     );
-    page::section("Views, the worst first", &body)
+    html::section("Views, the worst first", &body)
 }
 
 /// The factor by which the residuals of these views are enlarged in their pictures, the same for
