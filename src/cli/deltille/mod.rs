@@ -16,6 +16,7 @@ mod experiment;
 pub(in crate::cli) mod files;
 mod finder;
 mod finishing;
+mod given;
 mod guide;
 mod images;
 mod in_flight;
