@@ -3,9 +3,9 @@
 //! Comes in: an estimate, its diagnoses, photographs and the models that were tried, as a [`Report`]. Goes out: one HTML file.
 //! Data meets the files and folders in this order:
 //!
-//! 1. `content` is what the page is made of.
-//! 2. `measures` has what is shown beside the estimate itself: coverage, offsets of corners, distortion.
-//! 3. `pictures` makes thumbnails and a sample of the photographs.
+//! 1. `measures` has what is shown beside the estimate itself: coverage, offsets of corners, distortion.
+//! 2. `pictures` makes thumbnails and a sample of the photographs.
+//! 3. `content` is all that the page is made of.
 //! 4. `plots` draws SVG, `advice` says in words what would improve the calibration.
 //! 5. `sections` puts tables and plots under headlines, with the elements of `html`.
 //! 6. `page` puts the verdict, the advice and all sections of each camera together.

@@ -1,5 +1,4 @@
-//! Residuals by corner of the target: the offset on its panel that would explain them, and their
-//! RMS.
+//! The offset of each corner on its panel that would explain its residuals, and their RMS.
 //!
 //! An offset d of a corner in the plane of its panel causes the residual r = J d, with J the
 //! derivative of the pixel by the offset. The least-squares offset over all views of the corner is

@@ -1,5 +1,4 @@
-//! Distortion of a lens: its radial displacement over the angle from the axis, and a grid over the
-//! image, both compared with an ideal lens.
+//! Radial displacement of a lens over the angle from its axis, compared with an ideal lens.
 //!
 //! ```text
 //!     displacement(θ) = mean over φ of |p(θ, φ) − c| − |i(θ, φ) − c|       px

@@ -1,5 +1,4 @@
-//! Residuals by corner of the target: the offset on its panel that would explain them, and their
-//! RMS.
+//! Residuals by corner of the target, drawn on its panels.
 
 use std::fmt::Write as _;
 
