@@ -14,7 +14,7 @@ use crate::reading::error::DocumentError;
 use crate::reading::format::Format;
 use crate::reading::names::{file_name, of_all};
 use crate::reading::reader::Reader;
-use crate::sheet::seen::Seen;
+use crate::sheet::boards::Seen;
 use crate::sheet::source::{Source, wish_px_per_mm};
 use crate::sheet::{assemble, marks, whole};
 use crate::verdict::{SheetVerdict, Verdict};

@@ -18,6 +18,13 @@ use deltille_core::words::counted;
 
 const STYLE: &str = include_str!("page.css");
 
+impl Report<'_> {
+    /// The page as one HTML file, with its pictures embedded.
+    pub fn html(&self) -> String {
+        html(self)
+    }
+}
+
 /// The page as one HTML file.
 fn html(report: &Report) -> String {
     let cameras = &report.estimate.cameras;
@@ -236,12 +243,5 @@ mod tests {
             assert!(told.contains(&format!("class=\"verdict {class}\"")), "{told}");
             assert!(told.contains(&format!("<b>{head}.</b>")) && told.contains(why), "{told}");
         }
-    }
-}
-
-impl<'a> Report<'a> {
-    /// The page as one HTML file, with its pictures embedded.
-    pub fn html(&self) -> String {
-        html(self)
     }
 }

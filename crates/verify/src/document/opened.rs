@@ -10,8 +10,7 @@ use crate::document::page::Page;
 use crate::document::{pdf, png, svg};
 use crate::reading::error::DocumentError;
 use crate::reading::format::Format;
-use crate::reading::on_disk::OnDisk;
-use crate::reading::reader::{self, Artifact, Reader};
+use crate::reading::reader::{self, Artifact, OnDisk, Reader};
 use deltille_files::limits::{Guard, Limits};
 
 /// An opened document of printed pages.

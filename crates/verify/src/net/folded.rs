@@ -3,7 +3,7 @@
 use crate::finding::any::Finding;
 use crate::finding::fold::FoldFinding;
 use crate::net::printed_net::Net;
-use crate::sheet::seen::Seen;
+use crate::sheet::boards::Seen;
 use crate::verdict::{FoldVerdict, SheetVerdict};
 use deltille_core::layout::Printing;
 

@@ -6,7 +6,7 @@ use glam::{DVec2, DVec3};
 use kurbo::Shape as _;
 
 use crate::net::motion::{Rigid, SpaceFromPage};
-use crate::sheet::seen::Seen;
+use crate::sheet::boards::Seen;
 use deltille_core::artwork;
 use deltille_core::layout::{Label, Printing, SheetLayout};
 use deltille_core::targets::TargetSpec;

@@ -57,6 +57,19 @@ impl Files for &[Artifact] {
     }
 }
 
+/// The files on disk, read within limits.
+pub(crate) struct OnDisk(pub(crate) Limits);
+
+impl Files for OnDisk {
+    fn has(&self, path: &Path) -> bool {
+        path.exists()
+    }
+
+    fn read(&self, path: &Path) -> Result<Arc<Vec<u8>>, DocumentError> {
+        Ok(Arc::new(self.0.read(path)?))
+    }
+}
+
 /// Reads files within limits.
 #[derive(Clone, Copy)]
 pub(crate) struct Reader<'a> {

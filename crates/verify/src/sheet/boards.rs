@@ -11,7 +11,6 @@ use crate::panel::affine_map::AffineMap;
 use crate::panel::alone::{MATCH_EDGES, detect_alone, outline_alone};
 use crate::panel::placed::PlacedPanel;
 use crate::panel::tones::wrong_tones;
-use crate::sheet::seen::Seen;
 use crate::verdict::SheetVerdict;
 use crate::verifier::{TOLERANCE_MM, Verifier, detector_config};
 use deltille_core::detect::{Detection, Detector, GridCorner};
@@ -26,6 +25,10 @@ const MAX_WRONG_TILES: f64 = 0.25;
 /// Greatest share of corners missing, or more than stated; beyond it the picture shows another
 /// board.
 const MAX_MISSING: f64 = 0.25;
+
+/// Positions of the corners detected on a sheet, mm in the frame of the sheet: by panel id, then by
+/// corner id.
+pub(crate) type Seen = BTreeMap<u32, BTreeMap<u32, DVec2>>;
 
 /// Compares all panels of a page; tells where on the page the first of them lies, and where the
 /// corners of each were found.

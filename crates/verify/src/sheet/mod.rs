@@ -1,6 +1,6 @@
 //! One sheet of paper compared with its layout.
 //!
-//! Comes in: pages of a document. Goes out: a verdict on the sheet, and the corners that were `seen` on it.
+//! Comes in: pages of a document. Goes out: a verdict on the sheet, and the corners that were seen on it.
 //!
 //! 1. `source` renders a page; `assemble` joins the pages of a larger sheet, `face_picture` draws a face as a sheet.
 //! 2. `whole` runs the following on it.
@@ -11,12 +11,11 @@
 
 pub(super) mod assemble;
 mod bars;
-mod boards;
+pub(super) mod boards;
 mod expected_marks;
 pub(super) mod face_picture;
 pub(super) mod ground;
 pub(super) mod marks;
-pub(super) mod seen;
 pub(super) mod source;
 mod undetected;
 pub(super) mod whole;

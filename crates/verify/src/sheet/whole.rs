@@ -6,7 +6,7 @@ use crate::finding::board::BoardFinding;
 use crate::finding::mark::MarkFinding;
 use crate::panel::affine_map::AffineMap;
 use crate::panel::placed::PlacedPanel;
-use crate::sheet::seen::Seen;
+use crate::sheet::boards::Seen;
 use crate::sheet::{bars, boards, marks, undetected};
 use crate::verdict::SheetVerdict;
 use crate::verifier::{TOLERANCE_MM, Verifier};

@@ -40,6 +40,20 @@ fn split(number: &str) -> (&str, &str) {
     number.split_at(number.find('.').unwrap_or(number.len()))
 }
 
+/// A value with two digits of its deviation, and the deviation.
+pub(super) fn rounded(value: f64, sd: Option<f64>) -> (String, String) {
+    let sign = |text: String| text.replace('-', "−");
+    match sd {
+        Some(sd) if sd > 0.0 && sd.is_finite() => {
+            let places = places(sd);
+            // Nothing but zeros has no sign.
+            let value = if 2.0 * value.abs() < 0.1_f64.powi(places as i32) { 0.0 } else { value };
+            (sign(format!("{value:.places$}")), format!("{sd:.places$}"))
+        }
+        _ => (sign(value.to_string()), "kept".to_owned()),
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -65,19 +79,5 @@ mod tests {
     fn whole_numbers_need_no_fractions() {
         let cells = aligned(&["7".to_owned(), "130".to_owned()]);
         assert_eq!(cells, ["<td class=\"number\">7</td>", "<td class=\"number\">130</td>"]);
-    }
-}
-
-/// A value with two digits of its deviation, and the deviation.
-pub(super) fn rounded(value: f64, sd: Option<f64>) -> (String, String) {
-    let sign = |text: String| text.replace('-', "−");
-    match sd {
-        Some(sd) if sd > 0.0 && sd.is_finite() => {
-            let places = places(sd);
-            // Nothing but zeros has no sign.
-            let value = if 2.0 * value.abs() < 0.1_f64.powi(places as i32) { 0.0 } else { value };
-            (sign(format!("{value:.places$}")), format!("{sd:.places$}"))
-        }
-        _ => (sign(value.to_string()), "kept".to_owned()),
     }
 }
