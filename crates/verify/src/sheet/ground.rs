@@ -14,7 +14,7 @@ use crate::panel::tile_table::TileTable;
 use deltille_core::polygon::rectangle;
 
 /// Names each connected spot of wrong pixels outside the tiles and the `known` marks.
-pub(crate) fn spots(page: &Page, known: &[bool], panels: &[PlacedPanel]) -> Vec<MarkFinding> {
+pub(super) fn spots(page: &Page, known: &[bool], panels: &[PlacedPanel]) -> Vec<MarkFinding> {
     let (width, height) = (page.image.width(), page.image.height());
     let grounds: Vec<Ground> = panels.iter().map(Ground::new).collect();
     let is_inverted = grounds.iter().any(Ground::inverted);

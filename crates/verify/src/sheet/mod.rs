@@ -14,7 +14,7 @@ mod bars;
 pub(super) mod boards;
 mod expected_marks;
 pub(super) mod face_picture;
-pub(super) mod ground;
+mod ground;
 pub(super) mod marks;
 pub(super) mod source;
 mod undetected;
