@@ -1,8 +1,8 @@
-//! Arrays of many small things, and back; numbers that arguments give.
+//! Arrays of many small things, and back; numbers that arguments give; plain data as dictionaries.
 
 use deltille::glam::DMat3;
 use deltille::nalgebra::DMatrix;
-use deltille::quantity::{OutOfRange, Range};
+use deltille::quantity::{OutOfRange, Range, distance_mm};
 use numpy::ndarray::{Array1, Array2, Array3};
 use numpy::{Element, IntoPyArray, PyArray1, PyArray2, PyArray3, PyArrayLikeDyn};
 use pyo3::prelude::*;
@@ -147,4 +147,18 @@ pub fn whole<T: TryFrom<i64>>(
         _ => class(format!("{argument}: {given} is too large")),
     };
     given.try_into().map_err(wrong)
+}
+
+/// A distance at which projections are looked at, mm; infinity where none is given.
+pub fn distance(distance_mm: Option<f64>) -> PyResult<Option<f64>> {
+    let given = distance_mm.filter(|mm| *mm != f64::INFINITY);
+    let checked =
+        given.map(|mm| number("distance_mm", mm, distance_mm::RANGE, errors::calibration));
+    checked.transpose()
+}
+
+/// Plain data as a dictionary.
+pub fn record<'py>(py: Python<'py>, data: &impl serde::Serialize) -> PyResult<Bound<'py, PyAny>> {
+    let text = serde_json::to_string(data).unwrap_or_default();
+    py.import("json")?.call_method1("loads", (text,))
 }

@@ -6,12 +6,10 @@ use deltille::calibrate::{self as solver, CameraEstimate, Source, ViewEstimate};
 use numpy::{PyArray1, PyArray2, PyArray3};
 use pyo3::prelude::*;
 
-use crate::arrays;
-use crate::calibration::{pickled, restored};
+use crate::arrays::{self, distance, record};
 use crate::camera::Camera;
-use crate::comparison::distance;
-use crate::detection::record;
 use crate::errors::{raised, unlocked};
+use crate::pickled::{Part, pickled, restored};
 use crate::pose::Pose;
 use crate::solving::Solved;
 use crate::views::{View, residual_arrays};
@@ -37,9 +35,6 @@ impl CalibratedCamera {
         self.solved.in_file(Some(self.index))?[figure].as_f64()
     }
 }
-
-/// What a part of a calibration is restored from: the whole, its targets, the camera, and the view, if it is one.
-pub type Part = (String, Vec<String>, usize, Option<usize>);
 
 /// A camera, or one of its views, that was pickled.
 #[pyfunction]

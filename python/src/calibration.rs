@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 use std::sync::Arc;
 
-use deltille::calibrate::{self as solver, Estimate, Reference};
+use deltille::calibrate as solver;
 use deltille::camera::CameraFile;
 use deltille::export::calibration::Residuals;
 use deltille::export::camera::{colmap, colmap_rig, kalibr};
@@ -14,11 +14,12 @@ use deltille::report;
 use numpy::PyArray2;
 use pyo3::prelude::*;
 
-use crate::arrays;
+use crate::arrays::{self, record};
 use crate::calibrated_camera::CalibratedCamera;
 use crate::camera::save_text;
-use crate::detection::{Targets, record};
+use crate::detection::Targets;
 use crate::errors::{self, Raise, RaiseFile, raised, unlocked};
+use crate::pickled::{of_text, pickled, restored};
 use crate::pose::Pose;
 use crate::solving::Solved;
 use crate::targets::Target;
@@ -251,17 +252,6 @@ impl Calibration {
     }
 }
 
-/// What pickle restores a calibration or a rig by.
-pub fn pickled<'py>(
-    py: Python<'py>,
-    restore: &str,
-    solved: &Solved,
-) -> crate::Reduced<'py, (String, Vec<String>)> {
-    let restore = py.import("deltille._core")?.getattr(restore)?;
-    let targets = solved.targets.iter().map(Printing::to_json).collect();
-    Ok((restore, (solved.json(Residuals::Listed), targets)))
-}
-
 /// A calibration that was pickled.
 #[pyfunction]
 pub fn _calibration(py: Python<'_>, json: &str, targets: Vec<String>) -> PyResult<Py<Calibration>> {
@@ -272,12 +262,6 @@ pub fn _calibration(py: Python<'_>, json: &str, targets: Vec<String>) -> PyResul
 #[pyfunction]
 pub fn _rig(json: &str, targets: Vec<String>) -> PyResult<Rig> {
     Ok(Rig { solved: Arc::new(restored(json, &targets)?) })
-}
-
-/// What was pickled.
-pub fn restored(json: &str, targets: &[String]) -> PyResult<Solved> {
-    let targets = targets.iter().map(|text| Printing::from_json(text).raise(errors::target));
-    of_text(json, targets.collect::<PyResult<_>>()?).raise(errors::calibration)
 }
 
 #[pymethods]
@@ -424,19 +408,6 @@ fn text_of(solved: &Solved, residuals: bool) -> PyResult<String> {
     }
     let listed = if residuals { Residuals::Listed } else { Residuals::LeftOut };
     Ok(solved.json(listed))
-}
-
-/// A calibration or rig of a text.
-fn of_text(text: &str, targets: Vec<Printing>) -> Result<Solved, saved::SavedError> {
-    let scene: Vec<_> = targets.iter().map(|printing| printing.target.clone()).collect();
-    let estimate: Estimate = match scene.as_slice() {
-        [] => saved::read_without_target(text)?,
-        [only] => saved::read(text, &Reference::Target(only))?,
-        several => saved::read(text, &Reference::Scene(several))?,
-    };
-    let model = estimate.cameras.first().and_then(|camera| camera.model);
-    let model = model.map_or("fixed".to_owned(), |model| model.to_string());
-    Ok(Solved::read(estimate, targets, model, text))
 }
 
 fn read(path: &std::path::Path, target: Option<Targets>, is_rig: bool) -> PyResult<Solved> {

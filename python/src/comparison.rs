@@ -9,12 +9,11 @@ use deltille::calibrate::{
 use deltille::export::sheet::Sheet;
 use deltille::export::{comparison, pose};
 use deltille::glam::DVec2;
-use deltille::quantity::distance_mm;
 use deltille::targets::TargetIdentity;
 use numpy::{PyArray1, PyArray2};
 use pyo3::prelude::*;
 
-use crate::arrays::{self, number};
+use crate::arrays::{self, distance};
 use crate::calibrated_camera::CalibratedCamera;
 use crate::calibration::Rig;
 use crate::camera::Camera;
@@ -176,14 +175,6 @@ fn told_significant(is_significant: Option<bool>) -> &'static str {
         Some(false) => ", no more than chance makes",
         None => ", cannot be judged",
     }
-}
-
-/// A distance at which projections are looked at, mm; infinity where none is given.
-pub fn distance(distance_mm: Option<f64>) -> PyResult<Option<f64>> {
-    let given = distance_mm.filter(|mm| *mm != f64::INFINITY);
-    let checked =
-        given.map(|mm| number("distance_mm", mm, distance_mm::RANGE, errors::calibration));
-    checked.transpose()
 }
 
 /// How a camera of a rig is elsewhere than before.

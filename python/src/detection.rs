@@ -15,6 +15,7 @@ use pyo3::exceptions::PyTypeError;
 use pyo3::prelude::*;
 use serde::{Deserialize, Serialize};
 
+use crate::arrays::record;
 use crate::camera::save_text;
 use crate::errors::{self, Raise, RaiseFile, raised};
 use crate::targets::Target;
@@ -483,12 +484,6 @@ pub fn _grid(of: &Detection, index: usize) -> PyResult<Grid> {
         true => Ok(Grid { of: of.clone(), index }),
         false => Err(raised::DetectionError::new_err(format!("there is no grid {index}"))),
     }
-}
-
-/// Plain data as a dictionary.
-pub fn record<'py>(py: Python<'py>, data: &impl serde::Serialize) -> PyResult<Bound<'py, PyAny>> {
-    let text = serde_json::to_string(data).unwrap_or_default();
-    py.import("json")?.call_method1("loads", (text,))
 }
 
 /// A target, or several.

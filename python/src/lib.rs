@@ -33,6 +33,8 @@ mod making;
 mod next_view;
 mod other_detectors;
 mod paper;
+mod pickled;
+mod pickled_target;
 mod pose;
 mod programs;
 mod rendering;
@@ -101,6 +103,8 @@ mod _core {
     #[pymodule_export]
     use super::other_detectors::{AprilGrid, Charuco, Circles};
     #[pymodule_export]
+    use super::pickled_target::_target;
+    #[pymodule_export]
     use super::pose::Pose;
     #[pymodule_export]
     use super::programs::_run;
@@ -109,7 +113,7 @@ mod _core {
     #[pymodule_export]
     use super::solids::{Cube, Cuboid, Icosahedron, Octahedron, Solid, Tetrahedron};
     #[pymodule_export]
-    use super::targets::{_target, Tag, Target};
+    use super::targets::{Tag, Target};
     #[pymodule_export]
     use super::verdict::Verdict;
     #[pymodule_export]

@@ -15,13 +15,10 @@ use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict};
 use serde::{Deserialize, Serialize};
 
-use crate::boards::{Board, Checkerboard};
 use crate::errors::{self, Raise, RaiseFile, raised, unlocked};
 use crate::families::{Family, FamilyChoice};
 use crate::interrupt::interruptible;
 use crate::making::{Formats, Keywords};
-use crate::other_detectors::{AprilGrid, Charuco, Circles};
-use crate::solids::{Cube, Cuboid, Icosahedron, Octahedron, Solid, Tetrahedron};
 use crate::verdict::{Proof, Verdict};
 use crate::{arrays, pickles};
 
@@ -114,7 +111,7 @@ impl Target {
     /// ``panels``, ``corners`` and ``edge_mm``; of a measured or refined target also ``plan``, the fingerprint of its print.
     #[getter]
     fn identity<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        crate::detection::record(py, &self.target().identity())
+        arrays::record(py, &self.target().identity())
     }
 
     /// Places of all corners in the target's frame, N × 3, float64, mm: where they were measured, else as planned.
@@ -387,7 +384,9 @@ impl Target {
             }
         };
         let own = self.clone();
-        interruptible(py, move |stop| Verdict::of(&own, proof, stop))?
+        interruptible(py, move |stop| {
+            Verdict::of(&own.printing, own.family.as_deref(), proof, stop)
+        })?
     }
 
     /// Makes the list of corners and tags that the reference detector reads.
@@ -456,47 +455,6 @@ impl Target {
         let class = slf.get_type().name()?.to_string();
         Ok((restore, (class, own.printing.to_json(), family, squares)))
     }
-}
-
-/// A target that was pickled.
-#[pyfunction]
-pub fn _target<'py>(
-    py: Python<'py>,
-    class_: &str,
-    json: &str,
-    family: Option<&str>,
-    squares: Option<&str>,
-) -> PyResult<Bound<'py, PyAny>> {
-    let target = Printing::from_json(json).raise(errors::target)?;
-    let read = |text| deltille::family::Family::from_json(text).raise(errors::family);
-    let [family, squares] = [family, squares].map(|text| text.map(read).transpose());
-    let (family, squares) = (family?, squares?);
-    let family = deltille::family::Family::paired(family, squares);
-    let target = Target { printing: Arc::new(target), family: family.map(Arc::new) };
-    macro_rules! of_class {
-        ($($class:ident),*) => {
-            match class_ {
-                $(stringify!($class) => {
-                    let made = PyClassInitializer::from(target).add_subclass($class);
-                    Ok(Bound::new(py, made)?.into_any())
-                })*
-                _ => Ok(Bound::new(py, target)?.into_any()),
-            }
-        };
-    }
-    of_class!(
-        Board,
-        Checkerboard,
-        Charuco,
-        AprilGrid,
-        Circles,
-        Tetrahedron,
-        Octahedron,
-        Icosahedron,
-        Cube,
-        Cuboid,
-        Solid
-    )
 }
 
 /// A tag of a target.

@@ -4,12 +4,13 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
 
 use deltille::export::artifacts::Files;
+use deltille::family::Family;
+use deltille::layout::Printing;
 use deltille::verify::{self, Artifact, Verifier};
 use pyo3::prelude::*;
 use serde_json::Value;
 
 use crate::errors::{self, Raise, RaiseFile};
-use crate::targets::Target;
 
 /// Content of a file, or where it is.
 #[derive(FromPyObject)]
@@ -28,11 +29,12 @@ pub struct Verdict {
 impl Verdict {
     /// Compares a file by its name, which is on disk or in memory.
     pub fn of(
-        target: &Target,
+        printing: &Printing,
+        family: Option<&Family>,
         (name, files): (String, Option<Files>),
         stop: &AtomicBool,
     ) -> PyResult<Self> {
-        let verifier = Verifier::new(&target.printing, target.family.as_deref());
+        let verifier = Verifier::new(printing, family);
         let verifier = verifier.raise(errors::verify)?.stopped_by(stop);
         let path = Path::new(&name);
         let verdict = match files {

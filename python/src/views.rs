@@ -10,9 +10,8 @@ use numpy::{PyArray1, PyArray2};
 use pyo3::prelude::*;
 use serde::{Deserialize, Serialize};
 
-use crate::calibrated_camera::Part;
-use crate::calibration::pickled;
-use crate::detection::record;
+use crate::arrays::record;
+use crate::pickled::{Part, pickled};
 use crate::pose::Pose;
 use crate::solving::Solved;
 use crate::{arrays, errors, pickles};

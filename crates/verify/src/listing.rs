@@ -3,29 +3,19 @@
 
 use std::path::Path;
 
-use serde::Serialize;
-
-use super::construct::ConstructFinding;
-use super::reader::Reader;
-use super::{DocumentError, Finding, Format, ListVerdict, Verdict, Verifier};
+use crate::finding::any::Finding;
+use crate::finding::construct::ConstructFinding;
+use crate::finding::list::ListFinding;
+use crate::reading::error::DocumentError;
+use crate::reading::format::Format;
+use crate::reading::reader::Reader;
+use crate::verdict::{ListVerdict, Verdict};
+use crate::verifier::Verifier;
 use deltille_core::targets::{Panel, Target};
 use deltille_files::export::dsc::{self, Dialect};
 
 /// Largest deviation of a position or an edge, mm, by the number of digits.
 const LIST_TOLERANCE_MM: f64 = 1e-6;
-
-/// A deviation of a list for other detectors.
-#[derive(Clone, Debug, PartialEq, Serialize, thiserror::Error)]
-#[serde(tag = "kind", rename_all = "snake_case")]
-#[non_exhaustive]
-pub enum ListFinding {
-    /// The list is not that of the target.
-    #[error("{problem}")]
-    Listed {
-        /// The difference in words.
-        problem: String,
-    },
-}
 
 /// Reads a `.dsc` and compares it with the target.
 pub(super) fn verify(

@@ -6,8 +6,10 @@ use std::path::Path;
 use glam::DVec2;
 use serde::Serialize;
 
-use super::document::Format;
-use super::finding::Finding;
+use crate::document::page::Page;
+use crate::finding::any::Finding;
+use crate::reading::format::Format;
+use crate::reading::names::file_name;
 use deltille_core::words::counted;
 
 /// The result for one artifact.
@@ -178,7 +180,7 @@ impl Verdict {
     /// The verdict on a file as a whole; what was found of its parts is added.
     pub(super) fn new(path: &Path, format: Format, findings: Vec<Finding>) -> Self {
         Self {
-            artifact: super::file_name(path),
+            artifact: file_name(path),
             format,
             passed: findings.is_empty(),
             findings,
@@ -190,9 +192,14 @@ impl Verdict {
             cut: None,
         }
     }
-}
 
-impl Verdict {
+    /// The same with what the inspection of the file found.
+    pub(super) fn with(mut self, refused: Vec<Finding>) -> Self {
+        self.passed &= refused.is_empty();
+        self.findings.extend(refused);
+        self
+    }
+
     /// Goes on with what its surfaces show.
     fn corners_and_tags(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let sum = |count: fn(&SheetVerdict) -> usize| self.sheets.iter().map(count).sum::<usize>();
@@ -335,6 +342,27 @@ impl fmt::Display for Verdict {
         match all.len().saturating_sub(NAMED) {
             0 => Ok(()),
             more => write!(f, "; and {more} more"),
+        }
+    }
+}
+
+impl SheetVerdict {
+    /// The verdict on a page of which only its size was looked at.
+    pub(crate) fn new(index: usize, page: &Page, findings: Vec<Finding>) -> Self {
+        Self {
+            sheet: index + 1,
+            has_discs: false,
+            px_per_mm: page.px_per_mm,
+            size_mm: DVec2::new(page.width_mm, page.height_mm),
+            check_bars_mm: Vec::new(),
+            corners: 0,
+            corners_found: 0,
+            tags: 0,
+            tags_exact: 0,
+            max_deviation_mm: 0.0,
+            pages: 1,
+            fold: None,
+            findings,
         }
     }
 }

@@ -2,7 +2,7 @@
 
 use serde_json::{Map, Value, json};
 
-use super::mutate::Dice;
+use super::dice::Dice;
 use super::text::{NUMBERS, WORDS};
 
 /// Changes one thing; `None` for what is no JSON.

@@ -1,116 +1,21 @@
-//! The readers of files, one by one: a good file of each, ways of damaging it, and what must hold
-//! whatever is read.
+//! The readers of files, one by one, used by the fuzz targets and by the test `tests/it/files/readers.rs`.
 //!
-//! Used by the fuzz targets and by the test `tests/it/files/readers.rs`.
+//! Comes in: chance. Goes out: a file that was changed, and whether its reader keeps what must hold.
+//!
+//! 1. `reader` names the readers.
+//! 2. `good` makes a file that each reads without complaint.
+//! 3. `mutate` changes it, keeping its form: `text`, `json`, `png` and `pdf` each know one, `dice` is the chance.
+//! 4. `read` reads it, and panics where something holds that must not.
 
+mod dice;
 mod good;
 mod json;
 mod mutate;
 mod pdf;
 mod png;
 mod read;
+mod reader;
 mod text;
 
-use std::fs;
-
-use tempfile::TempDir;
-
-pub use mutate::{Dice, Form};
-
-/// A reader of files.
-pub struct Reader {
-    /// Name of the fuzz target.
-    pub name: &'static str,
-    /// How its files are built, that is what can be changed in one.
-    pub form: Form,
-    /// Extension of a file's name.
-    extension: &'static str,
-    good: fn() -> Vec<u8>,
-    read: fn(read::File) -> bool,
-}
-
-/// All readers.
-pub const READERS: &[Reader] = &[
-    of("target", Form::Json, "json", good::target, read::target),
-    of("detection", Form::Json, "json", good::detection, read::detection),
-    of("sheet", Form::Json, "json", good::sheet, read::sheet),
-    of("family", Form::Json, "json", good::family, read::family),
-    of("camera", Form::Text, "yaml", good::camera, read::camera),
-    of("template", Form::Text, "toml", good::template, read::template),
-    of("csv", Form::Text, "csv", good::points, read::points),
-    of("dsc", Form::Text, "dsc", good::dsc, read::dsc),
-    of("mesh", Form::Text, "obj", good::obj, read::mesh),
-    of("mesh_stl", Form::Bytes, "stl", good::stl, read::mesh),
-    of("mesh_ply", Form::Text, "ply", good::ply, read::mesh),
-    of("png", Form::Png, "png", good::photograph_png, read::photograph),
-    of("jpeg", Form::Bytes, "jpg", good::photograph_jpeg, read::photograph),
-    of("tiff", Form::Bytes, "tiff", good::photograph_tiff, read::photograph),
-    of("webp", Form::Bytes, "webp", good::photograph_webp, read::photograph),
-    of("bmp", Form::Bytes, "bmp", good::photograph_bmp, read::photograph),
-    of("pnm", Form::Bytes, "ppm", good::photograph_pnm, read::photograph),
-    of("verify_pdf", Form::Pdf, "pdf", good::pdf, read::page),
-    of("verify_svg", Form::Text, "svg", good::svg, read::page),
-    of("verify_png", Form::Png, "png", good::page_png, read::page),
-    of("verify_dsc", Form::Text, "dsc", good::dsc, read::page),
-    of("verify_glb", Form::Glb, "glb", good::glb, read::solid),
-    of("verify_obj", Form::Text, "obj", good::obj, read::solid),
-    of("verify_stl", Form::Bytes, "stl", good::stl, read::solid),
-    of("verify_3mf", Form::Bytes, "3mf", good::threemf, read::page),
-    of("verify_dxf", Form::Text, "dxf", good::dxf, read::solid),
-    of("verify_laser", Form::Text, "svg", good::laser, read::page),
-];
-
-const fn of(
-    name: &'static str,
-    form: Form,
-    extension: &'static str,
-    good: fn() -> Vec<u8>,
-    read: fn(read::File) -> bool,
-) -> Reader {
-    Reader { name, form, extension, good, read }
-}
-
-impl Reader {
-    /// A file that is read without complaint.
-    pub fn good(&self) -> Vec<u8> {
-        (self.good)()
-    }
-
-    /// Reads a file, and tells whether it was let in. Panics where something holds that must not.
-    pub fn read(&self, bytes: &[u8]) -> bool {
-        thread_local!(static FOLDER: TempDir = {
-            let memory = std::path::Path::new("/dev/shm");
-            let folder = if memory.is_dir() { TempDir::new_in(memory) } else { TempDir::new() };
-            folder.expect("a folder for the files")
-        });
-        FOLDER.with(|folder| {
-            let stem = match self.name {
-                "verify_laser" => "b-laser",
-                _ => good::stem(self.extension),
-            };
-            let path = folder.path().join(format!("{stem}.{}", self.extension));
-            if self.name == "verify_obj" {
-                for (name, bytes) in good::beside_mesh() {
-                    fs::write(folder.path().join(name), bytes)
-                        .expect("what a mesh names is written");
-                }
-            }
-            fs::write(&path, bytes).expect("the file is written");
-            (self.read)(read::File { path: &path, bytes })
-        })
-    }
-
-    /// A file with some of it changed; now and then a good one, from which changes begin anew.
-    pub fn changed(&self, bytes: &[u8], dice: &mut Dice) -> Vec<u8> {
-        let again = bytes.is_empty() || dice.below(50) == 0;
-        let mut changed = if again { self.good() } else { bytes.to_vec() };
-        for _ in 0..=dice.below(3) {
-            // A file that has lost its form is begun anew.
-            changed = match mutate::change(self.form, &changed, dice) {
-                Some(changed) => changed,
-                None => self.good(),
-            };
-        }
-        changed
-    }
-}
+pub use dice::Dice;
+pub use reader::{READERS, Reader};

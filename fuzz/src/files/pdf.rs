@@ -2,7 +2,7 @@
 
 use lopdf::{Dictionary, Document, Object, StringFormat};
 
-use super::mutate::Dice;
+use super::dice::Dice;
 use super::text::{self, WORDS};
 
 /// Changes one thing; `None` for what is no PDF.

@@ -6,7 +6,7 @@ use flate2::Compression;
 use flate2::read::ZlibDecoder;
 use flate2::write::ZlibEncoder;
 
-use super::mutate::{Dice, noise};
+use super::dice::{Dice, noise};
 
 const SIGNATURE: &[u8] = b"\x89PNG\r\n\x1a\n";
 

@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use super::mutate::Dice;
+use super::dice::Dice;
 
 /// Numbers on which readers stumble.
 pub const NUMBERS: [&str; 24] = [

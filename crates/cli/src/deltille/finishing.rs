@@ -6,7 +6,7 @@ use anyhow::{Context, bail};
 use serde::{Deserialize, Serialize};
 
 use super::files::{File, bytes_file};
-use super::settings::{is_false, length, refuse_idle};
+use super::given::{is_false, length, refuse_idle};
 use deltille::artwork::CuttingError;
 use deltille::export::artifacts::{MakeError, Making, What, make};
 use deltille::family::Family;

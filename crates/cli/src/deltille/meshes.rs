@@ -9,7 +9,7 @@ use anyhow::{Context, anyhow, bail};
 use serde::{Deserialize, Serialize};
 
 use super::files::{File, bytes_file};
-use super::settings::{is_false, length, refuse_idle};
+use super::given::{is_false, length, refuse_idle};
 use crate::values::{number, whole};
 use deltille::export::artifacts::{Making, What, make, of_mesh};
 use deltille::export::inlay::InlaidBodies;

@@ -16,6 +16,7 @@ mod experiment;
 pub(crate) mod files;
 mod finder;
 mod finishing;
+mod given;
 mod guide;
 mod images;
 mod in_flight;

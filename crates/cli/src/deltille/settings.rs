@@ -10,6 +10,7 @@ use anyhow::{Context, anyhow, bail};
 use serde::{Deserialize, Serialize};
 
 use super::finishing::{Finishing, Laser};
+use super::given::{is_false, is_usual, length};
 use super::meshes::{Meshes, PlateMeshes};
 use super::{logo, template};
 use crate::values::{number, whole};
@@ -17,9 +18,7 @@ use deltille::export::dsc::Dialect;
 use deltille::family::places;
 use deltille::lattice::GridKind;
 use deltille::layout::{DEFAULT_MARGIN_MM, PaperSize, PaperSpec, usual_edge_mm};
-use deltille::targets::{
-    BORDER_BITS, BoardSpec, MOST_ROWS, SIDES, TagSpec, TagsIn, parse_length_mm,
-};
+use deltille::targets::{BORDER_BITS, BoardSpec, MOST_ROWS, SIDES, TagSpec, TagsIn};
 
 /// Resolution of PNG files, dots per inch.
 pub const DEFAULT_DPI: u32 = 300;
@@ -186,16 +185,6 @@ fn colour(text: &str) -> Result<TagsIn, String> {
     }
 }
 
-/// Refuses the first option of these that is given and not used; the last of each says what it needs, and how to have it.
-pub(super) fn refuse_idle(options: &[(&str, bool, bool, &str)]) -> anyhow::Result<()> {
-    match options.iter().find(|(_, is_given, is_used, _)| *is_given && !is_used) {
-        Some((option, .., needed)) => {
-            bail!("{option}: it says nothing without {needed}, or leave it out")
-        }
-        None => Ok(()),
-    }
-}
-
 /// What is said of tags and not of place codes.
 const NOT_DENSE: [&str; 4] = ["--family", "--hole", "--tag-spacing", "--first-id"];
 
@@ -214,22 +203,6 @@ pub(super) fn check_tags(
         bail!("--dense: there are place codes and no other tags: leave it or {option} out");
     }
     Ok(())
-}
-
-/// Whether a setting is left out of a template.
-pub(super) fn is_false(value: &bool) -> bool {
-    !value
-}
-
-/// Whether settings say nothing.
-pub(super) fn is_usual<T: Default + PartialEq>(settings: &T) -> bool {
-    *settings == T::default()
-}
-
-/// A length in millimetres that an option gives, if it is given.
-pub(super) fn length(option: &str, text: &Option<String>) -> anyhow::Result<Option<f64>> {
-    let parsed = text.as_deref().map(parse_length_mm).transpose();
-    parsed.with_context(|| format!("--{option}"))
 }
 
 /// Settings understood.

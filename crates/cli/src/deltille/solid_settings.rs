@@ -8,10 +8,9 @@ use anyhow::{Context, anyhow, bail};
 use serde::{Deserialize, Serialize};
 
 use super::finishing::Laser;
+use super::given::{is_false, is_usual, length, refuse_idle};
 use super::meshes::Meshes;
-use super::settings::{
-    DPI, PAPER, PRINT, TAGS, check_tags, is_false, is_usual, length, refuse_idle,
-};
+use super::settings::{DPI, PAPER, PRINT, TAGS, check_tags};
 use super::{logo, template};
 use crate::values::{number, whole};
 use deltille::export::dsc::Dialect;

@@ -15,6 +15,18 @@ pub(super) enum Tone {
     White,
 }
 
+/// Closed outlines of straight lines, and which side of them is within.
+pub(super) struct Straight {
+    pub outlines: Vec<Vec<[f64; 2]>>,
+    pub rule: FillRule,
+}
+
+impl Straight {
+    pub fn area(&self) -> Area {
+        Area::within(&self.outlines, self.rule)
+    }
+}
+
 /// An area; its outlines do not cross, outer ones run one way and holes the other.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Area {

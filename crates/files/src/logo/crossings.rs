@@ -3,7 +3,7 @@
 
 use glam::DVec2;
 
-use super::painted::Straight;
+use super::area::Straight;
 
 /// Whether at most so many pairs of lines meet other than in their common end.
 pub(super) fn are_at_most<'a>(most: usize, all: impl Iterator<Item = &'a Straight>) -> bool {

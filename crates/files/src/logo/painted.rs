@@ -5,7 +5,7 @@ use kurbo::{Affine, BezPath, Cap, Join, PathEl, Point, Rect, Shape, StrokeOpts};
 use usvg::tiny_skia_path::PathSegment;
 use usvg::{ClipPath, Color, Fill, Group, Node, Paint, PaintOrder, Path, Stroke, Transform, Tree};
 
-use super::area::{Area, Tone};
+use super::area::{Area, Straight, Tone};
 use super::elements::{named, unnamed};
 use super::{LogoError, crossings};
 
@@ -243,19 +243,8 @@ fn outlines_of_clip(clip: &ClipPath, drawing_from_user: Affine) -> Result<Vec<Ou
     Ok(outlines)
 }
 
-/// The same with straight lines for curves, in the drawing.
-pub(super) struct Straight {
-    pub outlines: Vec<Vec<[f64; 2]>>,
-    rule: FillRule,
-}
-
-impl Straight {
-    fn area(&self) -> Area {
-        Area::within(&self.outlines, self.rule)
-    }
-}
-
 impl Outline {
+    /// The same with straight lines for curves, in the drawing.
     fn straight(&self, flatness: f64) -> Straight {
         let scale = self.drawing_from_path.determinant().abs().sqrt();
         let path = match &self.stroke {

@@ -1,7 +1,8 @@
 //! Advice on what would improve a calibration. Every rule has its reason; none depends on the kind
 //! of camera. Every diagnosis is a warning, so that the page says no less than the program does.
 
-use super::{Report, Survey};
+use crate::report::content::Report;
+use crate::report::measures::survey::Survey;
 use deltille_calibrate::{CameraEstimate, Diagnosis, Excluded, Parameter};
 use deltille_core::camera::Lens;
 use deltille_core::statistics::median;

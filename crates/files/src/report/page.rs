@@ -1,22 +1,32 @@
 //! Assembly of the HTML page: verdict, key figures and advice first, then the sections of each
-//! camera, and the elements that all sections share.
+//! camera.
 
 use std::fmt::Write as _;
 
-use base64::Engine as _;
 use glam::DVec2;
 
-use super::{
-    Advice, Report, Sample, Survey, Weight, advice, distortion, fit, models, parameters, rig,
-    scene, target_map, views,
-};
-use deltille_calibrate::{CameraEstimate, Diagnosis, Excluded, Source, TargetMap};
-use deltille_core::words::{counted, places};
+use crate::report::advice::{Advice, Weight, advice};
+use crate::report::content::Report;
+use crate::report::html::{escaped, figures, section};
+use crate::report::measures::survey::Survey;
+use crate::report::pictures::sample::Sample;
+use crate::report::plots::{distortion, scene, target_map};
+use crate::report::sections::key_figures::{cells, of_camera, of_rig};
+use crate::report::sections::{exactness, models, parameters, rig, views};
+use deltille_calibrate::{CameraEstimate, Diagnosis, Source, TargetMap};
+use deltille_core::words::counted;
 
 const STYLE: &str = include_str!("page.css");
 
+impl Report<'_> {
+    /// The page as one HTML file, with its pictures embedded.
+    pub fn html(&self) -> String {
+        html(self)
+    }
+}
+
 /// The page as one HTML file.
-pub(super) fn html(report: &Report) -> String {
+fn html(report: &Report) -> String {
     let cameras = &report.estimate.cameras;
     let surveys: Vec<Survey> = cameras.iter().map(Survey::new).collect();
     let title = escaped(report.title);
@@ -53,8 +63,8 @@ pub(super) fn html(report: &Report) -> String {
             let cells = cells(&of_camera(report, index, camera));
             let _ = write!(page, "<h2 class=\"camera\">{}</h2>{cells}", escaped(&camera.name));
         }
-        page += &fit::uncertainty(camera);
-        page += &fit::residuals(report.estimate, camera, survey);
+        page += &exactness::uncertainty(camera);
+        page += &exactness::residuals(report.estimate, camera, survey);
         if !report.is_rig() {
             page += &shared(report);
         }
@@ -163,110 +173,6 @@ fn sureness(report: &Report) -> String {
     })
 }
 
-/// A key figure with its unit, as HTML, and what it is.
-type Figure = (String, &'static str);
-
-/// The key figures of a camera.
-fn of_camera(report: &Report, index: usize, found: &CameraEstimate) -> Vec<Figure> {
-    let camera = &found.camera;
-    let model = found.model.map_or("fixed".to_owned(), |model| model.to_string());
-    let mut cells = vec![
-        (format!("{:.4} px", found.rms_px), "rms of a coordinate"),
-        (escaped(&model), "model"),
-        (format!("{}\u{a0}×\u{a0}{}", camera.width, camera.height), "image, px"),
-        (found.views.len().to_string(), "views"),
-        (found.corner_count().to_string(), "corners"),
-    ];
-    if found.outlier_count() > 0 {
-        cells.insert(1, (format!("{:.4} px", found.inlier_rms_px()), "rms without outliers"));
-    }
-    if let Some(held_out) = report.held_out(index) {
-        let name = "rms on views held out";
-        cells.insert(1, (format!("{:.4} px", held_out.rms_px), name));
-    }
-    cells.extend(of_print(report).filter(|_| !report.is_rig()));
-    cells
-}
-
-/// The key figures of all cameras together.
-fn of_rig(report: &Report) -> Vec<Figure> {
-    let found = report.estimate;
-    let mut cells = vec![
-        (format!("{:.4} px", found.rms_px), "rms of a coordinate"),
-        (found.cameras.len().to_string(), "cameras"),
-        (found.frames.len().to_string(), "frames"),
-        (found.corner_count().to_string(), "corners"),
-    ];
-    if found.outlier_count() > 0 {
-        cells.insert(1, (format!("{:.4} px", found.inlier_rms_px()), "rms without outliers"));
-    }
-    if let Some(held_out) = &found.held_out {
-        cells.insert(1, (format!("{:.4} px", held_out.rms_px), "rms on frames held out"));
-    }
-    cells.extend(of_print(report));
-    cells
-}
-
-/// The ink spread of the print, where it was measured together with its deviation.
-fn of_print(report: &Report) -> Option<Figure> {
-    let (um, deviation) = report.print.ink.and_then(|ink| ink.um.zip(ink.um_deviation))?;
-    let (um, deviation) = rounded(um, Some(deviation));
-    Some((format!("{um} ± {deviation} µm"), "ink spread"))
-}
-
-/// Key figures as a row of boxes.
-fn cells(cells: &[Figure]) -> String {
-    let cells = cells.iter().map(|(value, name)| format!("<div><b>{value}</b>{name}</div>"));
-    format!("<div class=\"figures\">{}</div>", cells.collect::<String>())
-}
-
-/// Pictures and captions side by side; a picture that is empty is left out with its caption.
-pub(super) fn figures(pictures: impl IntoIterator<Item = (String, String)>) -> String {
-    let pictures = pictures.into_iter().filter(|(svg, _)| !svg.is_empty());
-    let pictures = pictures
-        .map(|(svg, caption)| format!("<figure>{svg}<figcaption>{caption}</figcaption></figure>"));
-    format!("<div class=\"plots\">{}</div>", pictures.collect::<String>())
-}
-
-/// A section of the page; `body` is HTML.
-pub(super) fn section(title: &str, body: &str) -> String {
-    format!("<section><h2>{title}</h2>{body}</section>\n")
-}
-
-/// A bar below a number in a table; `part` is its length as a fraction of the longest, 0 to 1.
-pub(super) fn meter(part: f64) -> String {
-    format!("<div class=\"meter\" style=\"width:{:.0}%\"></div>", 100.0 * part)
-}
-
-/// A PNG as a `data:` URL, so that the page needs no other file.
-pub(super) fn data_url(png: &[u8]) -> String {
-    let data = base64::engine::general_purpose::STANDARD.encode(png);
-    format!("data:image/png;base64,{data}")
-}
-
-/// A table row of an excluded view, over `columns` columns beside its name.
-pub(super) fn out_row(out: &Excluded, columns: usize) -> String {
-    format!(
-        "<td class=\"name\">{}</td><td colspan=\"{columns}\" class=\"out\">left out: {}</td></tr>",
-        escaped(&out.view),
-        escaped(&out.reason.to_string())
-    )
-}
-
-/// A value with two digits of its deviation, and the deviation.
-pub(super) fn rounded(value: f64, sd: Option<f64>) -> (String, String) {
-    let sign = |text: String| text.replace('-', "−");
-    match sd {
-        Some(sd) if sd > 0.0 && sd.is_finite() => {
-            let places = places(sd);
-            // Nothing but zeros has no sign.
-            let value = if 2.0 * value.abs() < 0.1_f64.powi(places as i32) { 0.0 } else { value };
-            (sign(format!("{value:.places$}")), format!("{sd:.places$}"))
-        }
-        _ => (sign(value.to_string()), "kept".to_owned()),
-    }
-}
-
 /// The corners of the target that was measured.
 fn target(map: &TargetMap) -> String {
     let [plane, out] = map.rms_mm();
@@ -290,11 +196,6 @@ fn with_whole_options(text: &str) -> String {
         false => escaped(word),
     };
     text.split(' ').map(word).collect::<Vec<_>>().join(" ")
-}
-
-/// A text with the characters escaped that HTML gives a meaning.
-pub(super) fn escaped(text: &str) -> String {
-    text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
 }
 
 #[cfg(test)]

@@ -1,7 +1,9 @@
 //! The PNG chunks and pixels that every viewer shows alike: grey of 8 bits without transparency,
 //! without a colour space to interpret and without a second picture.
 
-use super::{Findings, is_creator, unpack};
+use crate::construct::findings::Findings;
+use crate::construct::words::is_creator;
+use crate::construct::zlib::unpack;
 use deltille_files::export::kind::SOFTWARE;
 use deltille_files::limits::{Exceeded, Limits};
 

@@ -11,7 +11,7 @@ use hayro::vello_cpu::color::palette::css::WHITE;
 use hayro::vello_cpu::{Pixmap, RasterizerSettings, RenderContext, Resources, TargetInit};
 use hayro::{RenderCache, RenderSettings, hayro_syntax, render_into};
 
-use super::{is_over, luma, pixels};
+use crate::document::drawing::{is_over, luma, pixels};
 use deltille_core::raster::Gray;
 
 const MM_PER_PT: f64 = 25.4 / 72.0;

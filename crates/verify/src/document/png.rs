@@ -5,7 +5,7 @@ use std::io::Cursor;
 use glam::DVec2;
 use image::ImageReader;
 
-use super::MAX_PIXELS;
+use crate::document::drawing::MAX_PIXELS;
 use deltille_core::raster::Gray;
 use deltille_files::limits::Limits;
 

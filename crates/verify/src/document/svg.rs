@@ -7,7 +7,7 @@ use glam::DVec2;
 use resvg::tiny_skia::{Color, Pixmap, Transform};
 use resvg::usvg::{self, roxmltree};
 
-use super::{is_over, luma, pixels};
+use crate::document::drawing::{is_over, luma, pixels};
 use deltille_core::raster::Gray;
 use deltille_files::export::{Block, SUBPIXELS, supersample};
 use deltille_files::limits::{self, Broken};

@@ -14,10 +14,11 @@ use std::path::Path;
 use glam::{DMat4, DVec2, DVec3, Vec2, Vec3};
 use image::ImageDecoder as _;
 
-use super::{Model, Triangle};
-use crate::construct::usda::list;
-use crate::reader::Reader;
-use crate::{Artifact, DocumentError, Format};
+use crate::construct::meshes::usda::list;
+use crate::model::mesh::{Model, Triangle};
+use crate::reading::error::DocumentError;
+use crate::reading::format::Format;
+use crate::reading::reader::{Artifact, Reader};
 use deltille_core::raster::Gray;
 use deltille_files::export::scene::USD_SUBSET;
 use deltille_files::limits::Limits;

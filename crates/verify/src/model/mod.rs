@@ -1,58 +1,12 @@
-//! Meshes read back through the gltf and tobj crates, as other programs read them.
+//! Meshes read back, by other code than wrote them.
+//!
+//! Comes in: a file that was inspected. Goes out: its triangles, and what a camera sees of them.
+//!
+//! 1. `load` reads a mesh with textures through the gltf and tobj crates, as other programs do; `stl` one without.
+//! 2. `mesh` is that as values.
+//! 3. `view` is a virtual camera before it.
 
-mod load;
-mod stl;
-mod view;
-
-use glam::{DVec2, DVec3};
-
-use deltille_core::raster::Gray;
-
-pub(super) use load::load;
-pub(super) use stl::{Facet, load_stl};
-pub(super) use view::View;
-
-/// A loaded mesh with its textures, in the target frame.
-pub(super) struct Model {
-    /// Its triangles, each with a texture that is there.
-    pub triangles: Vec<Triangle>,
-    /// Its textures as grey values.
-    pub textures: Vec<Gray<u8>>,
-}
-
-impl Model {
-    /// The texture of a triangle, and its size, px.
-    pub fn texture(&self, triangle: &Triangle) -> (&Gray<u8>, DVec2) {
-        let texture = &self.textures[triangle.texture];
-        (texture, DVec2::new(texture.width() as f64, texture.height() as f64))
-    }
-
-    /// Side of a pixel of its texture on a triangle, mm.
-    pub fn texel_mm(&self, triangle: &Triangle) -> f64 {
-        let (_, size_px) = self.texture(triangle);
-        let [a, b, c] = triangle.uv.map(|uv| uv * size_px);
-        (triangle.winding().length() / (b - a).perp_dot(c - a).abs()).sqrt()
-    }
-}
-
-/// A triangle as loaded, with the attributes of its three vertices.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Triangle {
-    /// Positions in the target frame, mm; counter-clockwise from outside.
-    pub vertices_mm: [DVec3; 3],
-    /// Stated normals in the target frame.
-    pub normals: [DVec3; 3],
-    /// Texture coordinates, 0 to 1: (0, 0) is the upper left corner of the texture, (1, 1) the lower
-    /// right one.
-    pub uv: [DVec2; 3],
-    /// Which texture they are of.
-    pub texture: usize,
-}
-
-impl Triangle {
-    /// Normal that follows from the order of the vertices; its length is twice the area, mm².
-    pub fn winding(&self) -> DVec3 {
-        let [a, b, c] = self.vertices_mm;
-        (b - a).cross(c - a)
-    }
-}
+pub(super) mod load;
+pub(super) mod mesh;
+pub(super) mod stl;
+pub(super) mod view;

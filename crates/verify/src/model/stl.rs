@@ -5,8 +5,8 @@ use std::path::Path;
 
 use glam::{DVec3, Vec3};
 
-use crate::DocumentError;
-use crate::reader::Reader;
+use crate::reading::error::DocumentError;
+use crate::reading::reader::Reader;
 
 /// Number of bytes before the triangles, and of a triangle.
 const HEAD: usize = 84;

@@ -3,7 +3,7 @@
 
 use glam::{DVec2, DVec3};
 
-use super::Model;
+use crate::model::mesh::Model;
 use deltille_core::camera::{Camera, Pose};
 use deltille_core::raster::Gray;
 

@@ -1,0 +1,173 @@
+//! A photograph beside its undistorted version, in which lines through the corners of a row are
+//! straight.
+
+use std::collections::BTreeMap;
+use std::fmt::Write as _;
+
+use glam::{DVec2, DVec3};
+use image::{DynamicImage, GrayImage};
+
+use crate::remap::remapped;
+use crate::report::html::{data_url, escaped};
+use crate::report::pictures::thumbnail::{png, reduced};
+use deltille_calibrate::{CameraEstimate, Corner, ViewEstimate};
+use deltille_core::camera::{Field, Undistortion};
+use deltille_core::raster::Gray;
+
+/// Longest side of the pictures, px.
+const SIDE: usize = 520;
+
+/// Widest field of view that is shown, rad: beyond it the border takes up all of the picture.
+const WIDEST_RAD: f64 = 110.0 / 180.0 * std::f64::consts::PI;
+
+/// Angle from the axis within which corners are inside that field, rad.
+const AHEAD_RAD: f64 = 45.0 / 180.0 * std::f64::consts::PI;
+
+/// Least number of corners of a line.
+const LEAST_IN_LINE: usize = 3;
+
+/// A photograph of a camera and its undistorted version.
+#[derive(Clone, Debug)]
+pub struct Sample {
+    view: String,
+    size_px: DVec2,
+    photograph: Vec<u8>,
+    undistorted: Vec<u8>,
+    /// Size of the undistorted picture, px.
+    undistorted_px: DVec2,
+    field_rad: f64,
+    /// Chords from the first to the last corner of rows and columns, and the corners, in both pictures.
+    lines: [Vec<[DVec2; 2]>; 2],
+    corners: [Vec<DVec2>; 2],
+}
+
+impl Sample {
+    /// The view of a camera, among those that satisfy `is_meant`, whose corners fill most of the
+    /// picture within the field of a pinhole.
+    pub fn best(
+        camera: &CameraEstimate,
+        is_meant: impl Fn(&&ViewEstimate) -> bool,
+    ) -> Option<&ViewEstimate> {
+        let area = |view: &ViewEstimate| {
+            let pixels = || view.corners.iter().map(|corner| corner.pixel);
+            let low = pixels().fold(DVec2::INFINITY, DVec2::min);
+            let high = pixels().fold(DVec2::NEG_INFINITY, DVec2::max);
+            let is_ahead = |pixel: &DVec2| {
+                let ray = camera.camera.unproject(*pixel);
+                ray.is_some_and(|ray| ray.direction.angle_between(DVec3::Z) < AHEAD_RAD)
+            };
+            let part = pixels().filter(is_ahead).count() as f64 / pixels().count().max(1) as f64;
+            part.powi(4) * (high - low).element_product()
+        };
+        let mut views: Vec<&ViewEstimate> = camera.views.iter().collect();
+        views.sort_by(|a, b| area(b).total_cmp(&area(a)));
+        views.into_iter().find(is_meant)
+    }
+
+    /// Undistorts the photograph of a view; `None` where the camera has no ray along its axis, or
+    /// the picture cannot be made.
+    pub fn of(camera: &CameraEstimate, view: &ViewEstimate, photograph: Gray<u8>) -> Option<Self> {
+        let lens = &camera.camera;
+        let distance_mm = view.pose.translation.length();
+        let size = DVec2::new(f64::from(lens.width), f64::from(lens.height));
+        let new_size = (size * (SIDE as f64 / size.max_element()).min(1.0)).round();
+        let [width, height] = new_size.to_array().map(|side| side.max(1.0) as u32);
+        let widest = Undistortion::new(lens, [width, height], Field::Whole).ok()?;
+        let narrow = f64::from(width) / 2.0 / (WIDEST_RAD / 2.0).tan();
+        let focal = widest.view().focal_px.x.max(narrow);
+        let undistortion = widest.with_focal(focal).at_distance(distance_mm);
+        let small = png(&reduced(&photograph, SIDE))?;
+        let [w, h] = [photograph.width(), photograph.height()];
+        let whole = GrayImage::from_raw(w as u32, h as u32, photograph.pixels().to_vec())?;
+        let straight = remapped(&DynamicImage::ImageLuma8(whole), &undistortion.map());
+        let straight = png(&straight.into_luma8())?;
+        // A corner in the new picture.
+        let place = |pixel: DVec2| {
+            let ray = lens.unproject(pixel)?;
+            let point: DVec3 = ray.origin + ray.direction * distance_mm;
+            let at = undistortion.view_from_camera() * point;
+            (at.z > 0.0).then(|| undistortion.view().project(at)).flatten()
+        };
+        let seen = |corner: &Corner| Some((corner.pixel, place(corner.pixel)?));
+        let mut lines: [Vec<[DVec2; 2]>; 2] = Default::default();
+        for along_rows in [true, false] {
+            for line in lines_of(view, along_rows).into_values() {
+                let ends = line.first().zip(line.last()).filter(|_| line.len() >= LEAST_IN_LINE);
+                let ends = ends.and_then(|(a, b)| Some([seen(a)?, seen(b)?]));
+                let Some([(a, a_new), (b, b_new)]) = ends else { continue };
+                lines[0].push([a, b]);
+                lines[1].push([a_new, b_new]);
+            }
+        }
+        let (before, after) = view.corners.iter().filter_map(seen).unzip();
+        Some(Self {
+            view: view.name.clone(),
+            size_px: size,
+            photograph: small,
+            undistorted: straight,
+            undistorted_px: new_size,
+            field_rad: 2.0 * (f64::from(width) / 2.0 / focal).atan(),
+            lines,
+            corners: [before, after],
+        })
+    }
+
+    /// Both pictures beside each other.
+    pub(crate) fn section(&self) -> String {
+        let drawn = |index: usize, png: &[u8], size: DVec2, shows: &str| {
+            let DVec2 { x: w, y: h } = size;
+            // Lines as wide in both.
+            let unit = w / SIDE as f64;
+            let mut svg = format!(
+                "<svg class=\"sample\" viewBox=\"-0.5 -0.5 {w} {h}\" width=\"{SIDE}\" role=\"img\" aria-label=\"{shows}\">\
+                 <image href=\"{}\" x=\"-0.5\" y=\"-0.5\" width=\"{w}\" height=\"{h}\"/>",
+                data_url(png)
+            );
+            for [a, b] in &self.lines[index] {
+                let _ = write!(
+                    svg,
+                    "<path class=\"chord\" stroke-width=\"{:.2}\" d=\"M{:.1} {:.1}L{:.1} {:.1}\"/>",
+                    0.9 * unit,
+                    a.x,
+                    a.y,
+                    b.x,
+                    b.y
+                );
+            }
+            for at in &self.corners[index] {
+                let _ = write!(
+                    svg,
+                    "<circle class=\"seen\" cx=\"{:.1}\" cy=\"{:.1}\" r=\"{:.2}\"/>",
+                    at.x,
+                    at.y,
+                    1.9 * unit
+                );
+            }
+            svg + "</svg>"
+        };
+        let [photograph, straight] = [
+            drawn(0, &self.photograph, self.size_px, "A photograph"),
+            drawn(1, &self.undistorted, self.undistorted_px, "The same without distortion"),
+        ];
+        format!(
+            "<section><h2>Without distortion</h2><div class=\"plots\"><figure>{photograph}<figcaption>View {}, as it was \
+             taken: straight lines between the first and the last corner of rows and columns miss those \
+             between.</figcaption></figure><figure>{straight}<figcaption>The same without distortion, {:.0}° wide: corners \
+             lie on the lines if the camera is right.</figcaption></figure></div></section>\n",
+            escaped(&self.view),
+            self.field_rad.to_degrees()
+        )
+    }
+}
+
+/// The corners of each row, or of each column, in their order.
+fn lines_of(view: &ViewEstimate, along_rows: bool) -> BTreeMap<(usize, i32), Vec<&Corner>> {
+    let mut lines: BTreeMap<(usize, i32), Vec<&Corner>> = BTreeMap::new();
+    let of_line = |corner: &Corner| if along_rows { corner.row } else { corner.col };
+    let in_line = |corner: &&Corner| if along_rows { corner.col } else { corner.row };
+    for corner in view.corners.iter().filter(|corner| !corner.outlier) {
+        lines.entry((corner.panel.index(), of_line(corner))).or_default().push(corner);
+    }
+    lines.values_mut().for_each(|line| line.sort_by_key(in_line));
+    lines
+}

@@ -1,0 +1,79 @@
+//! Table of the parameters of a camera, with standard deviations and correlations.
+
+use std::fmt::Write as _;
+
+use crate::report::html::{self, escaped};
+use crate::report::sections::numbers::{aligned, rounded};
+use deltille_calibrate::{CameraEstimate, Parameter, Source};
+use deltille_core::camera::{Lens, SplineGrid};
+
+/// More parameters than this have their correlations in small print.
+const FEW: usize = 12;
+
+/// Correlations from here on are drawn in a blue on which white is read better than ink.
+const STRONG: f64 = 0.85;
+
+/// Parameters with their deviations, and their correlations.
+pub(in crate::report) fn section(camera: &CameraEstimate) -> String {
+    if let Lens::Spline(spline) = &camera.camera.lens {
+        let SplineGrid { degree, columns, rows, fov_x_deg } = spline.grid();
+        let told = format!(
+            "<p>The lens is a spline of degree {degree} with {columns} × {rows} knots over {fov_x_deg}° across. \
+             Single knots mean nothing by themselves: see how sure projections are.</p>"
+        );
+        return html::section("Parameters", &told);
+    }
+    let told = |(p, _): &(&Parameter, Option<f64>)| p.sd.is_some() || p.value != 0.0;
+    let is_observed = camera.covariance_from(Source::Observed).is_some();
+    let (mut names, mut columns) = (Vec::new(), [Vec::new(), Vec::new(), Vec::new()]);
+    for (parameter, observed) in camera.parameters.iter().zip(camera.observed_sd()).filter(told) {
+        let (value, sd) = rounded(parameter.value, parameter.sd);
+        let observed = observed.map(|_| rounded(parameter.value, observed).1);
+        names.push(escaped(&parameter.name));
+        for (column, text) in columns.iter_mut().zip([value, sd, observed.unwrap_or_default()]) {
+            column.push(text);
+        }
+    }
+    let columns = columns.map(|column| aligned(&column));
+    let shown = if is_observed { &columns[..] } else { &columns[..2] };
+    let rows = names.iter().enumerate().map(|(row, name)| {
+        let cells = shown.iter().map(|column| column[row].as_str());
+        format!("<tr><td>{name}</td>{}</tr>", cells.collect::<String>())
+    });
+    let rows: String = rows.collect();
+    let heads = match is_observed {
+        true => "<th>± from noise</th><th>± observed</th>",
+        false => "<th>± from noise</th>",
+    };
+    let names: Vec<&str> = camera.found().collect();
+    let mut matrix = String::new();
+    if !names.is_empty() {
+        let heads = names.iter().map(|name| format!("<th>{}</th>", escaped(name)));
+        let _ = write!(matrix, "<tr><th></th>{}</tr>", heads.collect::<String>());
+        for (i, name) in names.iter().enumerate() {
+            let cells = (0..names.len()).map(|j| {
+                let c = camera.correlation(i, j);
+                let hue = if c < 0.0 { "var(--below)" } else { "var(--above)" };
+                // Ink is hard to read on the full blue.
+                let strong = if c > STRONG { " class=\"strong\"" } else { "" };
+                let share = (100.0 * c.abs()).round();
+                format!(
+                    "<td{strong} style=\"background:color-mix(in srgb,{hue} {share}%,transparent)\">{}</td>",
+                    // Nothing is no minus nothing.
+                    format!("{:.2}", if c.abs() < 0.005 { 0.0 } else { c }).replace('-', "−")
+                )
+            });
+            let _ =
+                write!(matrix, "<tr><th>{}</th>{}</tr>", escaped(name), cells.collect::<String>());
+        }
+        let many = if names.len() > FEW { " many" } else { "" };
+        matrix = format!(
+            "<figure><div class=\"wide-table\"><table class=\"matrix{many}\">{matrix}</table></div><figcaption>Correlations. \
+             Parameters that are strongly correlated are known only together.</figcaption></figure>"
+        );
+    }
+    let table = format!(
+        "<div class=\"wide-table\"><table class=\"plain\"><tr><th>name</th><th>value</th>{heads}</tr>{rows}</table></div>"
+    );
+    html::section("Parameters", &format!("<div class=\"plots\">{table}{matrix}</div>"))
+}

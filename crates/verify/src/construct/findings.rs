@@ -1,0 +1,91 @@
+//! Constructs that are not permitted, collected while a file is inspected.
+
+use crate::finding::any::{Finding, PageFinding};
+use crate::finding::construct::ConstructFinding;
+
+/// Most findings that are listed for a file.
+const MOST_LISTED: usize = 64;
+
+/// Constructs that are not permitted, collected while a file is inspected.
+#[derive(Default)]
+pub(super) struct Findings(pub(super) Vec<Finding>);
+
+impl Findings {
+    /// Adds a construct, such as "element <image>", and where it is, such as "line 12".
+    pub fn add(&mut self, place: impl Into<String>, construct: impl Into<String>) {
+        if !self.is_full() {
+            let (place, construct) = (place.into(), construct.into());
+            self.0.push(ConstructFinding::Construct { place, construct }.into());
+        }
+    }
+
+    /// Adds a line that is not the one that the program writes.
+    pub fn add_other_line(&mut self, place: String, found: String) {
+        if !self.is_full() {
+            self.0.push(ConstructFinding::OtherLine { place, found }.into());
+        }
+    }
+
+    /// Adds a construct unless `holds`.
+    pub fn unless(&mut self, holds: bool, place: impl Into<String>, construct: impl Into<String>) {
+        if !holds {
+            self.add(place, construct);
+        }
+    }
+
+    /// Adds hidden content unless `holds`; the file is rendered and compared all the same.
+    pub fn unseen_unless(
+        &mut self,
+        holds: bool,
+        place: impl Into<String>,
+        problem: impl Into<String>,
+    ) {
+        if !holds && !self.is_full() {
+            let (place, problem) = (place.into(), problem.into());
+            self.0.push(ConstructFinding::Unseen { place, problem }.into());
+        }
+    }
+
+    /// Whether the file has a construct that is not permitted, so that it is not rendered.
+    pub fn refuse(&self) -> bool {
+        refuse(&self.0)
+    }
+
+    /// Whether as many findings are listed as are listed at all; more are dropped.
+    pub fn is_full(&self) -> bool {
+        self.0.len() >= MOST_LISTED
+    }
+
+    /// Adds the findings of a file that belongs to this one, such as a texture, with its name before
+    /// the places.
+    pub fn add_of(&mut self, file: &str, other: Findings) {
+        for finding in other.0 {
+            match finding {
+                Finding::Construct(ConstructFinding::Construct { place, construct }) => {
+                    self.add(format!("{file}, {place}"), construct);
+                }
+                Finding::Construct(ConstructFinding::Unseen { place, problem }) => {
+                    self.unseen_unless(false, format!("{file}, {place}"), problem);
+                }
+                Finding::Construct(ConstructFinding::OtherLine { place, found }) => {
+                    self.add_other_line(format!("{file}, {place}"), found);
+                }
+                other => self.0.push(other),
+            }
+        }
+    }
+}
+
+/// Whether a file has a construct that not every viewer shows alike, or another line than the program writes, so that it
+/// is not rendered.
+/// Hidden content alone does not prevent that.
+pub(crate) fn refuse(findings: &[Finding]) -> bool {
+    let refuses = |finding: &Finding| {
+        use ConstructFinding::{Construct, OtherLine};
+        matches!(finding, Finding::Construct(Construct { .. } | OtherLine { .. }))
+    };
+    findings.iter().any(|finding| match finding {
+        Finding::Page(PageFinding::OnPage { finding, .. }) => refuses(finding),
+        finding => refuses(finding),
+    })
+}

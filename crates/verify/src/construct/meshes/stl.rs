@@ -1,0 +1,34 @@
+//! Inspection of binary STL for what every reader takes alike: the header that is written here, and
+//! triangles without attributes, which some readers take for colours.
+
+use crate::construct::findings::Findings;
+use deltille_files::export::stl::header;
+use deltille_files::limits::Limits;
+
+/// Number of bytes before the triangles, of a triangle, and of a triangle without its attributes.
+const HEAD: usize = 84;
+const TRIANGLE: usize = 50;
+const GEOMETRY: usize = 48;
+
+/// Inspects a binary STL of a target of this name. A truncated file is left to its reader.
+///
+/// # Errors
+///
+/// There are more triangles than the limits allow.
+pub(in crate::construct) fn check(
+    bytes: &[u8],
+    name: &str,
+    limits: &Limits,
+) -> Result<Findings, String> {
+    let count = bytes.len().saturating_sub(HEAD) / TRIANGLE;
+    limits.check_nodes(count).map_err(|exceeded| exceeded.to_string())?;
+    let mut found = Findings::default();
+    let head = bytes.get(..80).is_none_or(|head| head == header(name));
+    found.unless(head, "the head", "words other than the target's name");
+    let triangles = bytes.get(HEAD..).unwrap_or_default().chunks_exact(TRIANGLE);
+    let coloured = triangles.enumerate().find(|(_, triangle)| triangle[GEOMETRY..] != [0, 0]);
+    if let Some((index, _)) = coloured {
+        found.add(format!("triangle {index}"), "attribute bytes");
+    }
+    Ok(found)
+}

@@ -1,0 +1,116 @@
+//! Any deviation of an artifact, also where it is of one page among several.
+
+use glam::DVec2;
+use serde::Serialize;
+
+use crate::finding::board::BoardFinding;
+use crate::finding::construct::ConstructFinding;
+use crate::finding::cut::CutFinding;
+use crate::finding::fold::FoldFinding;
+use crate::finding::list::ListFinding;
+use crate::finding::mark::MarkFinding;
+use crate::finding::mesh::MeshFinding;
+use crate::finding::tile::TileFinding;
+use deltille_core::words::counted;
+
+/// One deviation of an artifact from its target; in JSON its `kind` is that of the specific
+/// finding.
+#[derive(Clone, Debug, PartialEq, Serialize, thiserror::Error)]
+#[serde(untagged)]
+#[non_exhaustive]
+pub enum Finding {
+    /// About the constructs of the file.
+    #[error(transparent)]
+    Construct(#[from] ConstructFinding),
+    /// About its pages.
+    #[error(transparent)]
+    Page(#[from] PageFinding),
+    /// About marks outside the tiles.
+    #[error(transparent)]
+    Mark(#[from] MarkFinding),
+    /// About a board.
+    #[error(transparent)]
+    Board(#[from] BoardFinding),
+    /// About a tile.
+    #[error(transparent)]
+    Tile(#[from] TileFinding),
+    /// About the fold of a net.
+    #[error(transparent)]
+    Fold(#[from] FoldFinding),
+    /// About a mesh or a body.
+    #[error(transparent)]
+    Mesh(#[from] MeshFinding),
+    /// About a list for other detectors.
+    #[error(transparent)]
+    List(#[from] ListFinding),
+    /// About a drawing for a cutter.
+    #[error(transparent)]
+    Cut(#[from] CutFinding),
+}
+
+/// A deviation of the pages of a file. Lengths in mm.
+#[derive(Clone, Debug, PartialEq, Serialize, thiserror::Error)]
+#[serde(tag = "kind", rename_all = "snake_case")]
+#[non_exhaustive]
+pub enum PageFinding {
+    /// The file has too many or too few pages.
+    #[error("{} instead of {stated}", counted(*found, "page"))]
+    Pages {
+        /// Pages of the file.
+        found: usize,
+        /// Sheets of the target.
+        stated: usize,
+    },
+    /// A page that is a file of its own is missing, or was not named with the others.
+    #[error("{page} is missing, or not named with the others")]
+    PageMissing {
+        /// File name of the page.
+        page: String,
+    },
+    /// The page has another size.
+    #[error(
+        "page of {:.3} x {:.3} mm instead of {:.3} x {:.3} mm",
+        found_mm.x, found_mm.y, stated_mm.x, stated_mm.y
+    )]
+    PageSize {
+        /// Width and height in the file.
+        found_mm: DVec2,
+        /// Width and height in the target.
+        stated_mm: DVec2,
+    },
+    /// A deviation on one of the pages on which a sheet is printed.
+    #[error("page {page}: {finding}")]
+    OnPage {
+        /// The page's label.
+        page: String,
+        /// The deviation.
+        finding: Box<Finding>,
+    },
+    /// Two pages show different things where they overlap.
+    #[error(
+        "pages {} and {} differ where they overlap, at ({:.2}, {:.2}) mm",
+        pages[0], pages[1], at_mm.x, at_mm.y
+    )]
+    PagesDiffer {
+        /// Labels of the pages.
+        pages: [String; 2],
+        /// Position on the sheet.
+        at_mm: DVec2,
+    },
+}
+
+impl Finding {
+    /// The same, on one of several pages.
+    pub(crate) fn on_page(self, page: String) -> Self {
+        PageFinding::OnPage { page, finding: Box::new(self) }.into()
+    }
+
+    /// Whether the rest of the sheet is as stated: a tag, a tile or a corner is wrong, not a board.
+    pub(crate) fn is_local(&self) -> bool {
+        match self {
+            Self::Tile(finding) => !matches!(finding, TileFinding::TagMissing { .. }),
+            Self::Board(finding) => finding.is_local(),
+            _ => false,
+        }
+    }
+}

@@ -1,0 +1,116 @@
+//! The texture of a face of a mesh, drawn flat as seen from its front, so that a face is checked like
+//! a printed page.
+
+use glam::{DVec2, DVec3};
+
+use crate::document::page::Page;
+use crate::model::mesh::{Model, Triangle};
+use crate::verifier::Verifier;
+use deltille_core::polygon;
+use deltille_core::polygon::rectangle;
+use deltille_core::raster::Gray;
+use deltille_core::targets::{Panel, TargetSpec};
+use deltille_layout::Placement;
+
+/// Greatest distance of the triangles of a face from the plane of its panel, and of their corners from its outline, mm.
+const IN_PLANE_MM: f64 = 0.25;
+
+/// Samples of the texture per pixel of the page along each axis.
+const SAMPLES: usize = 2;
+
+/// A triangle on the front of a face.
+pub(super) struct Front<'a> {
+    pub triangle: &'a Triangle,
+    /// Its corners in the panel frame, mm: those of the face, where they are near to them.
+    pub flat: [DVec2; 3],
+}
+
+/// The triangles of a mesh that lie on a face with this outline, counter-clockwise in the frame of its panel, mm, and are
+/// seen from its front.
+pub(super) fn front<'a>(model: &'a Model, panel: &Panel, outline: &[DVec2]) -> Vec<Front<'a>> {
+    let sides = || outline.iter().zip(outline.iter().cycle().skip(1));
+    let is_in = |p: DVec2| {
+        sides()
+            .all(|(&from, &to)| (to - from).normalize_or_zero().perp_dot(p - from) >= -IN_PLANE_MM)
+    };
+    let front = model.triangles.iter().filter_map(|triangle| {
+        let flat = triangle.vertices_mm.map(|v| panel.pose.panel_from_target(v));
+        let is_level = flat.iter().all(|p| p.z.abs() <= IN_PLANE_MM);
+        let flat = flat.map(DVec3::truncate);
+        let is_front = polygon::area(&flat) > 0.0 && flat.iter().all(|&p| is_in(p));
+        let corner = |p: DVec2| {
+            let corner = outline.iter().find(|corner| corner.distance(p) <= IN_PLANE_MM);
+            corner.copied().unwrap_or(p)
+        };
+        (is_level && is_front).then(|| Front { triangle, flat: flat.map(corner) })
+    });
+    front.collect()
+}
+
+/// The texture of a loaded mesh on the face of a panel, seen from its front, as a page, and the
+/// placement of the panel on that page; white where no triangle is in the face.
+///
+/// `area_mm` is the left, lower, right and upper end of the page in the panel frame, and `px_per_mm` its resolution.
+pub(super) fn face_page(
+    model: &Model,
+    panel: &Panel,
+    front: &[Front],
+    area_mm: [f64; 4],
+    px_per_mm: f64,
+) -> (Page, Placement) {
+    let [left, lower, right, upper] = area_mm;
+    let (width_mm, height_mm) = (right - left, upper - lower);
+    let [width, height] =
+        [width_mm, height_mm].map(|mm| (mm * px_per_mm).ceil().max(1.0) as usize * SAMPLES);
+    let scale = px_per_mm * SAMPLES as f64;
+    let mut shades = vec![u8::MAX; width * height];
+    // Side of the largest pixel of the texture, px of the page: it smears edges by as much.
+    let mut texel_px = 0.0f64;
+    for Front { triangle, flat } in front {
+        // In samples of the page, whose centres are integers; y runs down there and up on the panel.
+        let [a, b, c] =
+            flat.map(|p| DVec2::new(p.x - left, upper - p.y) * scale - DVec2::splat(0.5));
+        let area = (b - a).perp_dot(c - a);
+        let (texture, size) = model.texture(triangle);
+        texel_px = texel_px.max(model.texel_mm(triangle) * px_per_mm);
+        let low = a.min(b).min(c).ceil().max(DVec2::ZERO);
+        let high = a.max(b).max(c).floor() + 1.0;
+        let end = |high: f64, size: usize| (high.max(0.0) as usize).min(size);
+        for y in low.y as usize..end(high.y, height) {
+            for x in low.x as usize..end(high.x, width) {
+                let p = DVec2::new(x as f64, y as f64);
+                let weights = [
+                    (b - p).perp_dot(c - p) / area,
+                    (c - p).perp_dot(a - p) / area,
+                    (a - p).perp_dot(b - p) / area,
+                ];
+                if weights.iter().all(|&w| w >= 0.0) {
+                    let uv: DVec2 = (0..3).map(|i| triangle.uv[i] * weights[i]).sum();
+                    let at = uv * size - DVec2::splat(0.5);
+                    shades[y * width + x] = texture.bilinear(at.x, at.y).round() as u8;
+                }
+            }
+        }
+    }
+    let image = Gray::from_fn(width / SAMPLES, height / SAMPLES, |x, y| {
+        let rows = (0..SAMPLES).map(|s| (y * SAMPLES + s) * width + x * SAMPLES);
+        let sum: u32 = rows.flat_map(|at| &shades[at..at + SAMPLES]).map(|&v| u32::from(v)).sum();
+        (sum / (SAMPLES * SAMPLES) as u32) as u8
+    });
+    let (smear_px, left_px) = (1.0 + texel_px, 0.0);
+    let page = Page { width_mm, height_mm, px_per_mm, image, smear_px, texel_px, left_px };
+    (page, Placement { panel: panel.id, angle_rad: 0.0, origin_mm: DVec2::new(-left, -lower) })
+}
+
+/// The outline of a panel's face, or of the side of a plate, counter-clockwise in the panel frame, mm.
+pub(super) fn face_outline_mm(verifier: &Verifier, panel: &Panel) -> Vec<DVec2> {
+    let of_plate = || rectangle(panel.field_mm()).to_vec();
+    let TargetSpec::Solid(spec) = &verifier.target().spec else { return of_plate() };
+    let solid = spec.polyhedron();
+    let index = verifier.target().panels.iter().position(|p| p.id == panel.id);
+    let Some(index) = index.filter(|&index| index < solid.faces.len()) else {
+        return of_plate();
+    };
+    let corners = solid.corners_mm(index).into_iter();
+    corners.map(|v| panel.pose.panel_from_target(v).truncate()).collect()
+}

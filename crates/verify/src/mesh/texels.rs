@@ -1,0 +1,224 @@
+//! Comparison of the texture on a face, texel by texel, over all that a viewer shows of it.
+//!
+//! ```text
+//!    ·───·───·     A viewer interpolates between the four texels around a point, so a triangle
+//!    │ ╱‾│‾‾╲│     shows each texel (·) that lies less than one texel from it along both axes,
+//!    ·╱──·───·     also those just outside. All of them have the colour of the face there.
+//! ```
+
+use std::f64::consts::TAU;
+use std::ops::Range;
+
+use glam::{DAffine2, DMat2, DVec2};
+use rayon::prelude::*;
+
+use crate::document::page::{MAX_INK_ERROR, Page};
+use crate::mesh::flat_face::Front;
+use crate::mesh::measures::MESH_TOLERANCE_MM;
+use crate::model::mesh::{Model, Triangle};
+use crate::panel::pattern::{EDGE_PX, PROBES, Pattern};
+use deltille_core::raster::Gray;
+use deltille_core::targets::Panel;
+
+/// Least area of a triangle on the texture of a printed face, squared texels.
+const LEAST_AREA: f64 = 1e-6;
+
+/// Texels at exactly the distance of one are not shown: their weight is 0.
+const OPEN: f64 = 1e-6;
+
+/// A face and its texture.
+pub(super) struct Texels<'a> {
+    pub model: &'a Model,
+    pub panel: &'a Panel,
+    pub pattern: &'a Pattern<'a>,
+    /// Outline of the black field of an inverted panel, counter-clockwise, mm.
+    pub field: Vec<DVec2>,
+    /// Whether the field is the whole face, so that its outline is no printed edge.
+    pub fills_face: bool,
+}
+
+impl Texels<'_> {
+    /// Marks the pixels of a page on which a texel of `front` has the wrong colour; those of tiles only if they are
+    /// `with_tiles`. An error says why the texture cannot be compared.
+    pub fn wrong(
+        &self,
+        front: &[Front],
+        page: &Page,
+        low: DVec2,
+        with_tiles: bool,
+    ) -> Result<Vec<bool>, &'static str> {
+        let (width, height) = (page.image.width(), page.image.height());
+        let mut wrong = vec![false; width * height];
+        for Front { triangle, flat } in front {
+            let (texture, size) = self.model.texture(triangle);
+            let corners = triangle.uv.map(|uv| uv * size - 0.5);
+            let panel_from_texel = affine(corners, *flat)
+                .ok_or("a triangle of a printed face shows no area of the texture")?;
+            let rows: Vec<_> = rows(corners, texture).collect();
+            let texel_mm = self.model.texel_mm(triangle);
+            let found: Vec<DVec2> = (rows.into_par_iter())
+                .flat_map_iter(|(row, columns)| {
+                    columns.map(move |column| DVec2::new(column as f64, row as f64))
+                })
+                .filter(|&texel| {
+                    let light = texture.at(texel.x as usize, texel.y as usize);
+                    let place = panel_from_texel.transform_point2(texel);
+                    self.is_wrong(light, place, texel_mm, with_tiles)
+                })
+                .map(|texel| panel_from_texel.transform_point2(texel))
+                .collect();
+            for place in found {
+                let last = DVec2::new(width as f64 - 1.0, height as f64 - 1.0);
+                let at = page.px_from_page(place - low).round().clamp(DVec2::ZERO, last);
+                wrong[at.y as usize * width + at.x as usize] = true;
+            }
+        }
+        Ok(wrong)
+    }
+
+    /// Whether a texel at a place on the panel, mm, has a colour that is wrong there, and is no part of an edge.
+    fn is_wrong(&self, light: u8, place: DVec2, texel_mm: f64, with_tiles: bool) -> bool {
+        let ink = 1.0 - f64::from(light) / 255.0;
+        let at = place / self.panel.edge_mm;
+        let inside = self.inside_mm(place);
+        let in_field = |inside: f64| !self.panel.inverted || inside >= 0.0;
+        let black = self.pattern.is_black_at(at) && in_field(inside);
+        if (ink - f64::from(u8::from(black))).abs() <= MAX_INK_ERROR {
+            return false;
+        }
+        if !with_tiles && self.pattern.has_tile_at(at) {
+            return false;
+        }
+        // Where edges are drawn: within the tolerance of positions, and what drawing smears.
+        let smear_mm = EDGE_PX * texel_mm;
+        let near_mm = smear_mm + MESH_TOLERANCE_MM;
+        let field_mm = if self.fills_face { smear_mm } else { near_mm };
+        if self.panel.inverted && inside.abs() <= field_mm {
+            return false;
+        }
+        let colour = self.pattern.is_black_at(at);
+        let mut probes = (0..PROBES).map(|n| f64::from(n) * TAU / f64::from(PROBES));
+        !probes.any(|angle| {
+            let probe = near_mm / self.panel.edge_mm * DVec2::from_angle(angle);
+            self.pattern.is_black_at(at + probe) != colour
+        })
+    }
+
+    /// How far a place lies within the field of an inverted panel, mm.
+    fn inside_mm(&self, place: DVec2) -> f64 {
+        let next = self.field.iter().cycle().skip(1);
+        let depths = self
+            .field
+            .iter()
+            .zip(next)
+            .map(|(&from, &to)| (to - from).normalize_or_zero().perp_dot(place - from));
+        depths.fold(f64::INFINITY, f64::min)
+    }
+}
+
+/// The map from texels to the panel, mm, by the corners of a triangle on both; `None` where it has no area on the texture.
+fn affine(texels: [DVec2; 3], flat: [DVec2; 3]) -> Option<DAffine2> {
+    let sides = |[a, b, c]: [DVec2; 3]| DMat2::from_cols(b - a, c - a);
+    let of_texture = sides(texels);
+    let has_area = of_texture.determinant().abs() >= LEAST_AREA;
+    let matrix = has_area.then(|| sides(flat) * of_texture.inverse())?;
+    Some(DAffine2::from_mat2_translation(matrix, flat[0] - matrix * texels[0]))
+}
+
+/// The rows of a texture of which a triangle shows something, each with its columns. Texels have whole numbers.
+fn rows(corners: [DVec2; 3], texture: &Gray<u8>) -> impl Iterator<Item = (usize, Range<usize>)> {
+    let (width, height) = (texture.width(), texture.height());
+    // From the first to behind the last that lies less than one from an extent.
+    let reached = |[low, high]: [f64; 2], size: usize| {
+        let last = size as f64 - 1.0;
+        let first = (low - 1.0 + OPEN).ceil().clamp(0.0, last) as usize;
+        first..(high + 1.0 - OPEN).floor().clamp(0.0, last) as usize + 1
+    };
+    let extent = |values: &mut dyn Iterator<Item = f64>| {
+        values.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], value| {
+            [low.min(value), high.max(value)]
+        })
+    };
+    let across = extent(&mut corners.iter().map(|corner| corner.y));
+    reached(across, height).map(move |row| {
+        // The part of the triangle less than a row from this one; beyond the edge of the texture its last row is shown.
+        let first = if row == 0 { f64::NEG_INFINITY } else { row as f64 - 1.0 };
+        let last = if row + 1 == height { f64::INFINITY } else { row as f64 + 1.0 };
+        let sides = (0..3).map(|i| [corners[i], corners[(i + 1) % 3]]);
+        let mut ends = sides.flat_map(|[a, b]| {
+            let at = |y: f64| a.x + (b.x - a.x) * (y - a.y) / (b.y - a.y);
+            let crosses = |y: f64| (a.y < y) != (b.y < y);
+            let crossings = [first, last].map(|y| crosses(y).then(|| at(y)));
+            let corner = (first..=last).contains(&a.y).then_some(a.x);
+            crossings.into_iter().chain([corner]).flatten()
+        });
+        let [low, high] = extent(&mut ends);
+        let columns = if low > high { 0..0 } else { reached([low, high], width) };
+        (row, columns)
+    })
+}
+
+/// Whether the triangles show so much of the textures that they share parts of them: each has its own.
+pub(super) fn are_shared(model: &Model) -> bool {
+    let area = |triangle: &Triangle| {
+        let (_, size) = model.texture(triangle);
+        let [a, b, c] = triangle.uv.map(|uv| uv * size);
+        (b - a).perp_dot(c - a).abs() / 2.0
+    };
+    let shown: f64 = model.triangles.iter().map(area).sum();
+    let pixels: usize = model.textures.iter().map(|texture| texture.pixels().len()).sum();
+    shown > pixels as f64
+}
+
+/// A texel that is not white although no triangle shows it, as the texture and its column and row: coarser levels of a
+/// texture would blend it into a face.
+pub(super) fn hidden(model: &Model) -> Option<[usize; 3]> {
+    (0..model.textures.len()).find_map(|index| {
+        let texture = &model.textures[index];
+        let mut shown: Vec<Vec<Range<usize>>> = vec![Vec::new(); texture.height()];
+        for triangle in model.triangles.iter().filter(|triangle| triangle.texture == index) {
+            let (_, size) = model.texture(triangle);
+            for (row, columns) in rows(triangle.uv.map(|uv| uv * size - 0.5), texture) {
+                shown[row].push(columns);
+            }
+        }
+        shown.par_iter_mut().enumerate().find_map_first(|(row, ranges)| {
+            ranges.sort_unstable_by_key(|range| range.start);
+            let mut begin = 0;
+            let end = texture.width()..texture.width();
+            ranges.iter().chain([&end]).find_map(|range| {
+                let gap = begin..range.start.max(begin);
+                begin = begin.max(range.end);
+                let is_inked = |&column: &usize| texture.at(column, row) != u8::MAX;
+                gap.into_iter().find(is_inked).map(|column| [index, column, row])
+            })
+        })
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Every texel that takes part in the interpolation at a point of a triangle is among its rows.
+    #[test]
+    fn all_texels_that_interpolation_takes_are_in_the_rows() {
+        let texture = Gray::<u8>::new(12, 9);
+        let corners = [DVec2::new(1.3, 0.2), DVec2::new(10.9, 3.7), DVec2::new(4.4, 7.9)];
+        let mut listed = [[false; 12]; 9];
+        rows(corners, &texture).for_each(|(row, columns)| listed[row][columns].fill(true));
+        let mut taken = [[false; 12]; 9];
+        let steps = || (0..=100).map(|step| f64::from(step) / 100.0);
+        for (u, v) in steps().flat_map(|u| steps().map(move |v| (u, v * (1.0 - u)))) {
+            let [a, b, c] = corners;
+            let at = a + u * (b - a) + v * (c - a);
+            for (x, y) in [(0, 0), (1, 0), (0, 1), (1, 1)] {
+                taken[at.y as usize + y][at.x as usize + x] = true;
+            }
+        }
+        for (row, column) in (0..9).flat_map(|row| (0..12).map(move |column| (row, column))) {
+            assert!(listed[row][column] || !taken[row][column], "row {row}, column {column}");
+        }
+        assert!(listed.iter().flatten().filter(|&&listed| !listed).count() > 30);
+    }
+}

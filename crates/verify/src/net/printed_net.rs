@@ -1,0 +1,200 @@
+//! The net as it was detected: its faces, the folds between them, and the numbers on their sides.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use glam::{DVec2, DVec3};
+use kurbo::Shape as _;
+
+use crate::net::motion::{Rigid, SpaceFromPage};
+use crate::sheet::boards::Seen;
+use deltille_core::targets::TargetSpec;
+use deltille_layout::artwork;
+use deltille_layout::{Label, Printing, SheetLayout};
+
+/// Two sides within this distance of each other on the paper are one fold, mm: more than the error
+/// of any acceptable print, less than the width of any tab.
+const COMMON_MM: f64 = 0.2;
+
+/// Whether the sheets of a target are a net: whether faces of a solid are joined by folds.
+pub(crate) fn is_net(printing: &Printing) -> bool {
+    let folds = |sheet: &SheetLayout| sheet.lines.iter().any(|line| line.kind.joins_faces());
+    matches!(printing.target.spec, TargetSpec::Solid(_)) && printing.sheets.iter().any(folds)
+}
+
+/// A face of the net as it was detected. Side i runs from vertex i to vertex i + 1.
+pub(super) struct PrintedFace {
+    /// Panel id.
+    pub panel: u32,
+    /// Index of the sheet that it is on.
+    pub sheet: usize,
+    /// Its outline on the page, counter-clockwise, mm: the stated one at the detected pose.
+    outline_mm: Vec<DVec2>,
+    /// Its pose on the page, fitted to the detected corners.
+    pub page_from_panel: Rigid,
+    /// Indices of the vertices of the solid at the corners of its outline.
+    pub vertices: Vec<usize>,
+    /// The detected corners: the position on the page and the stated one in the target frame, mm.
+    pub corners: Vec<(DVec2, DVec3)>,
+    /// Edge numbers printed along each of its sides.
+    pub numbers: Vec<Vec<usize>>,
+    /// Tabs on its sides: the side, and the number of the face under which the tab says that it is
+    /// to be glued.
+    pub under: Vec<(usize, usize)>,
+    /// Face numbers printed in it.
+    pub names: Vec<usize>,
+}
+
+/// The net as it was detected, and the solid that is to come of it. A side is the index of a face and
+/// the number of its side.
+pub(super) struct Net {
+    /// All faces, in the order of the target's panels.
+    pub faces: Vec<PrintedFace>,
+    /// Stated positions of the vertices of the solid in the target frame, mm.
+    pub vertices_mm: BTreeMap<usize, DVec3>,
+    /// Stated pose of each panel in the target frame.
+    pub poses: Vec<SpaceFromPage>,
+    /// The side that runs from one vertex of the solid to another.
+    pub along: BTreeMap<[usize; 2], (usize, usize)>,
+    /// The side of another face from which each side is separated by a fold only.
+    pub folds: BTreeMap<(usize, usize), (usize, usize)>,
+    /// Sides along which a tab is folded.
+    pub tabs: BTreeSet<(usize, usize)>,
+}
+
+impl Net {
+    /// The net of a target from the corners detected on each sheet; `None` where a face is missing.
+    pub fn new(printing: &Printing, seen: &[Seen]) -> Option<Self> {
+        let target = &printing.target;
+        let TargetSpec::Solid(spec) = &target.spec else { return None };
+        let (outlines, solid) = (spec.faces().ok()?, spec.polyhedron());
+        let mut net = Self {
+            faces: Vec::with_capacity(target.panels.len()),
+            vertices_mm: BTreeMap::new(),
+            poses: Vec::with_capacity(target.panels.len()),
+            along: BTreeMap::new(),
+            folds: BTreeMap::new(),
+            tabs: BTreeSet::new(),
+        };
+        for (index, (panel, face)) in target.panels.iter().zip(&outlines).enumerate() {
+            let (sheet, found) =
+                seen.iter().enumerate().find_map(|(n, seen)| Some((n, seen.get(&panel.id)?)))?;
+            let corner = |c: &deltille_core::targets::Corner| {
+                Some((c.panel_mm, *found.get(&c.id)?, c.target_mm))
+            };
+            let corners: Vec<_> = panel.corners.iter().filter_map(corner).collect();
+            let pairs: Vec<_> = corners.iter().map(|&(flat, at, _)| (flat, at)).collect();
+            let page_from_panel = Rigid::fit(&pairs)?;
+            let vertices = solid.faces.get(index)?.clone();
+            for side in 0..vertices.len() {
+                let ends = [vertices[side], vertices[(side + 1) % vertices.len()]];
+                net.along.insert(ends, (index, side));
+            }
+            for (&vertex, &corner) in vertices.iter().zip(&face.outline_mm) {
+                net.vertices_mm.insert(vertex, panel.pose.target_from_panel(corner));
+            }
+            net.poses.push(SpaceFromPage {
+                linear: panel.pose.matrix(),
+                shift: panel.pose.translation_mm,
+            });
+            net.faces.push(PrintedFace {
+                panel: panel.id,
+                sheet,
+                outline_mm: face.outline_mm.iter().map(|&p| page_from_panel.apply(p)).collect(),
+                page_from_panel,
+                numbers: vec![Vec::new(); vertices.len()],
+                vertices,
+                corners: corners.into_iter().map(|(_, at, space)| (at, space)).collect(),
+                under: Vec::new(),
+                names: Vec::new(),
+            });
+        }
+        for (sheet, layout) in printing.sheets.iter().enumerate() {
+            net.find_folds(sheet, layout);
+            net.read_numbers(sheet, layout);
+        }
+        Some(net)
+    }
+
+    /// Ends of a side on the page, mm.
+    pub fn ends(&self, (face, side): (usize, usize)) -> [DVec2; 2] {
+        let outline = &self.faces[face].outline_mm;
+        [outline[side], outline[(side + 1) % outline.len()]]
+    }
+
+    /// The sides of a face.
+    pub fn sides_of(&self, face: usize) -> impl Iterator<Item = (usize, usize)> + use<> {
+        (0..self.faces[face].vertices.len()).map(move |side| (face, side))
+    }
+
+    /// The sides of all faces on a sheet.
+    fn sides_on(&self, sheet: usize) -> impl Iterator<Item = (usize, usize)> {
+        let faces = (0..self.faces.len()).filter(move |&face| self.faces[face].sheet == sheet);
+        faces.flat_map(|face| self.sides_of(face))
+    }
+
+    /// Notes which sides of two faces lie on one fold line of the layout, and which side of a single
+    /// face does, so that a tab hangs on it.
+    fn find_folds(&mut self, sheet: usize, layout: &SheetLayout) {
+        let sides: Vec<_> = self.sides_on(sheet).map(|side| (side, self.ends(side))).collect();
+        for line in layout.lines.iter().filter(|line| line.kind.joins_faces()) {
+            let ends = [line.from_mm, line.to_mm].map(DVec2::from);
+            let near = |[p, q]: [DVec2; 2]| {
+                p.distance(ends[0]) < COMMON_MM && q.distance(ends[1]) < COMMON_MM
+            };
+            let along = |side: [DVec2; 2]| ends.iter().all(|&end| distance(end, side) < COMMON_MM);
+            let forward = sides.iter().find(|(_, ends)| near(*ends));
+            let backward = sides.iter().find(|(_, [p, q])| near([*q, *p]));
+            if let (Some(&(a, _)), Some(&(b, _))) = (forward, backward) {
+                self.folds.insert(a, b);
+                self.folds.insert(b, a);
+            } else if let Some(&(side, _)) = sides.iter().find(|(_, ends)| along(*ends)) {
+                self.tabs.insert(side);
+            }
+        }
+    }
+
+    /// Assigns each printed number to the face in which it stands, or to a side: within a face the
+    /// nearest side of that face, outside all faces, as on a tab, the nearest side without a fold.
+    fn read_numbers(&mut self, sheet: usize, layout: &SheetLayout) {
+        for text in &layout.texts {
+            if !text.text.is_number() {
+                continue;
+            }
+            let Ok(outline) = artwork::text_outline(text) else { continue };
+            let centre = outline.bounding_box().center();
+            let at = DVec2::new(centre.x, centre.y);
+            let inside = |face: usize| {
+                self.sides_of(face).all(|side| {
+                    let [p, q] = self.ends(side);
+                    (q - p).perp_dot(at - p) > 0.0
+                })
+            };
+            let within = self.sides_on(sheet).map(|(face, _)| face).find(|&face| inside(face));
+            let (number, under) = match text.text {
+                Label::Face(number) => {
+                    within.into_iter().for_each(|face| self.faces[face].names.push(number));
+                    continue;
+                }
+                Label::Edge(edge) => (edge, None),
+                Label::Tab { edge, under } => (edge, Some(under)),
+                Label::Beyond { .. } | Label::Words(_) => continue,
+            };
+            let sides = self.sides_on(sheet).filter(|side| match within {
+                Some(face) => side.0 == face,
+                None => !self.folds.contains_key(side),
+            });
+            let distance = |side: &(usize, usize)| distance(at, self.ends(*side));
+            let nearest = sides.min_by(|a, b| distance(a).total_cmp(&distance(b)));
+            if let Some((face, side)) = nearest {
+                self.faces[face].numbers[side].push(number);
+                self.faces[face].under.extend(under.map(|under| (side, under)));
+            }
+        }
+    }
+}
+
+/// Distance of a point from a segment of positive length, mm.
+fn distance(at: DVec2, [p, q]: [DVec2; 2]) -> f64 {
+    let along = ((at - p).dot(q - p) / (q - p).length_squared()).clamp(0.0, 1.0);
+    at.distance(p + (q - p) * along)
+}

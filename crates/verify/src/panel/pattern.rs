@@ -1,0 +1,173 @@
+//! What every point of a panel should look like: its tiles, and the cells of their tags.
+
+use std::collections::BTreeMap;
+
+use glam::DVec2;
+
+use crate::panel::tile_table::TileTable;
+use deltille_core::family::Family;
+use deltille_core::lattice::{Cell, GridKind, TagCells, Tile};
+use deltille_core::targets::{Panel, TagPlacement};
+
+/// Pixels nearer than this to a change of colour are ignored, px: the half diagonal of a pixel
+/// (0.71), over which an edge is smeared, 0.02 mm at 300 dpi (0.24), and some blur.
+pub(crate) const EDGE_PX: f64 = 1.25;
+
+/// Directions in which an edge is looked for beside a pixel: so many that no tip of a tile or cell,
+/// of 60°, fits between two of them and reaches the pixel.
+pub(crate) const PROBES: u32 = 24;
+
+/// The expected appearance of a tile.
+pub(crate) struct Expected<'a> {
+    /// Black, as a whole or around its tag.
+    pub black: bool,
+    /// Black and white are exchanged.
+    inverted: bool,
+    pub tag: Option<ExpectedTag<'a>>,
+}
+
+impl Expected<'_> {
+    /// Whether the tile is black at tile coordinates.
+    pub fn is_black_at(&self, p: DVec2) -> bool {
+        let Some(tag) = &self.tag else { return self.black };
+        match tag.looks.region(p) {
+            Region::Margin => self.black,
+            Region::Border => !self.inverted,
+            Region::Hole => self.inverted,
+            Region::Cell(bit) => (tag.word >> bit & 1 == 0) != self.inverted,
+        }
+    }
+}
+
+/// The expected appearance of all tiles of a panel; `family` is that of its tiling.
+pub(crate) fn expected<'a>(
+    panel: &Panel,
+    family: Option<&Family>,
+    looks: Option<&'a TagLooks>,
+) -> BTreeMap<Tile, Expected<'a>> {
+    let tags: BTreeMap<Tile, TagPlacement> =
+        panel.tags.iter().map(|tag| (panel.tag_tile(tag), *tag)).collect();
+    let expected = panel.tiles().into_iter().map(|tile| {
+        let tag = tags.get(&tile).and_then(|&placement| {
+            let word = family?.code(placement.id)?;
+            Some(ExpectedTag { placement, word, looks: looks? })
+        });
+        let inverted = panel.inverted;
+        (tile, Expected { black: tile.is_dark() != inverted, inverted, tag })
+    });
+    expected.collect()
+}
+
+/// The colours of a panel at any point.
+pub(crate) struct Pattern<'a> {
+    panel: &'a Panel,
+    table: TileTable<&'a Expected<'a>>,
+}
+
+impl<'a> Pattern<'a> {
+    pub fn new(panel: &'a Panel, expected: &'a BTreeMap<Tile, Expected<'a>>) -> Self {
+        let table = TileTable::new(expected.iter().map(|(&tile, expected)| (tile, expected)));
+        Self { panel, table }
+    }
+
+    /// Whether a point of the panel, in edges, lies in a tile.
+    pub fn has_tile_at(&self, at: DVec2) -> bool {
+        self.table.get(self.panel.tile_at(at)).is_some()
+    }
+
+    /// Whether the panel is black at a point, in edges. Outside the tiles that is the colour of its field.
+    pub fn is_black_at(&self, at: DVec2) -> bool {
+        let tile = self.panel.tile_at(at);
+        let Some(expected) = self.table.get(tile) else { return self.panel.inverted };
+        if expected.tag.is_none() {
+            return expected.black;
+        }
+        let [a, b, c] = tile.frame().map(|vertex| self.panel.position(vertex));
+        let (ab, ac, p) = (b - a, c - a, at - a);
+        expected.is_black_at(DVec2::new(p.perp_dot(ac), ab.perp_dot(p)) / ab.perp_dot(ac))
+    }
+}
+
+pub(crate) struct ExpectedTag<'a> {
+    pub placement: TagPlacement,
+    pub word: u64,
+    pub looks: &'a TagLooks,
+}
+
+/// The places of the cells of the tags of a panel, in tile coordinates.
+pub(crate) struct TagLooks {
+    pub cells: TagCells,
+    /// From the edges of the tile to the border, and to the cells, bit-widths.
+    margin: f64,
+    pub inset: f64,
+    width: f64,
+    /// Radius of the hole in the middle of a triangle, edges.
+    hole: Option<f64>,
+    /// Bit of each cell, in rows of `columns` places, two to a column: inverted, upright.
+    bits: Vec<Option<u32>>,
+    columns: usize,
+}
+
+/// A part of a tile with a tag.
+#[derive(Clone, Copy, PartialEq)]
+enum Region {
+    Margin,
+    Border,
+    Cell(u32),
+    Hole,
+}
+
+impl TagLooks {
+    pub fn new(family: &Family, panel: &Panel) -> Self {
+        let cells = family.cells();
+        let (margin, inset) = (panel.tag_margin_bits(), panel.tag_inset_bits());
+        let most = |of: fn(&Cell) -> u32| {
+            cells.cells().iter().map(of).max().map_or(0, |most| most as usize + 1)
+        };
+        let columns = most(|cell| cell.col);
+        let mut bits = vec![None; most(|cell| cell.row) * columns * 2];
+        for (bit, cell) in (0..).zip(cells.cells()) {
+            let place = cell.row as usize * columns + cell.col as usize;
+            bits[2 * place + usize::from(cell.upright)] = Some(bit);
+        }
+        let width = cells.width(inset);
+        let hole = panel.hole_mm.map(|diameter| diameter / 2.0 / panel.edge_mm);
+        Self { cells, margin, inset, width, hole, bits, columns }
+    }
+
+    /// The region at tile coordinates.
+    fn region(&self, p: DVec2) -> Region {
+        if let Some(radius) = self.hole {
+            // The edges that the coordinates are along meet at 60°.
+            let from_middle = p - 1.0 / 3.0;
+            let squared = from_middle.length_squared() + from_middle.x * from_middle.y;
+            if squared < radius * radius {
+                return Region::Hole;
+            }
+        }
+        if let Some(bit) = self.bit(p) {
+            return Region::Cell(bit);
+        }
+        // Only squares have a margin.
+        let margin = self.margin / self.width;
+        match p.min_element() >= margin && p.max_element() <= 1.0 - margin {
+            true => Region::Border,
+            false => Region::Margin,
+        }
+    }
+
+    /// The bit of the cell at tile coordinates (u, v); `None` beside the cells.
+    pub fn bit(&self, p: DVec2) -> Option<u32> {
+        let DVec2 { x: u, y: v } = p * self.width - self.inset;
+        if u < 0.0 || v < 0.0 {
+            return None;
+        }
+        let upright = self.cells.kind() == GridKind::Checker || u.fract() + v.fract() < 1.0;
+        let (row, col) = (v as usize, u as usize);
+        if col >= self.columns {
+            return None;
+        }
+        let place = row * self.columns + col;
+        self.bits.get(2 * place + usize::from(upright)).copied().flatten()
+    }
+}

@@ -1,0 +1,77 @@
+//! A whole sheet: its panels, its check bars, and its marks.
+
+use crate::document::page::Page;
+use crate::finding::any::Finding;
+use crate::finding::board::BoardFinding;
+use crate::finding::mark::MarkFinding;
+use crate::panel::affine_map::AffineMap;
+use crate::panel::placed::PlacedPanel;
+use crate::sheet::boards::Seen;
+use crate::sheet::{bars, boards, marks, undetected};
+use crate::verdict::SheetVerdict;
+use crate::verifier::{TOLERANCE_MM, Verifier};
+use deltille_layout::SheetLayout;
+
+/// Compares the panels and marks of a whole sheet.
+pub(crate) fn compare(
+    verifier: &Verifier,
+    page: &Page,
+    layout: &SheetLayout,
+    verdict: &mut SheetVerdict,
+) -> Seen {
+    let placed = placed(verifier, page, layout);
+    let all_stated = placed.len() == layout.placements.len() && undetected::is_for(&placed);
+    let (found_from_stated, seen) = if all_stated {
+        undetected::check(verifier, &placed, verdict);
+        (AffineMap::IDENTITY, Seen::new())
+    } else {
+        boards::check(verifier, page, layout, verdict)
+    };
+    let toneless = |finding: &Finding| {
+        use BoardFinding::{Contrast, Inverted};
+        matches!(finding, Finding::Board(Inverted { .. } | Contrast { .. }))
+    };
+    if verdict.findings.iter().any(toneless) {
+        return seen;
+    }
+    let in_place = verdict.findings.iter().all(Finding::is_local);
+    check_bars(page, layout, &found_from_stated, verdict);
+    if in_place {
+        let logo = verifier.printing.logo.as_ref();
+        marks::check(page, (layout, logo), &placed, None, verdict);
+    }
+    seen
+}
+
+/// The panels of a page where they are stated.
+fn placed<'p>(
+    verifier: &'p Verifier,
+    page: &'p Page,
+    layout: &'p SheetLayout,
+) -> Vec<PlacedPanel<'p>> {
+    let found_from_stated = AffineMap::IDENTITY;
+    let placed = layout.placements.iter().filter_map(|placement| {
+        let panel = verifier.target().panels.iter().find(|panel| panel.id == placement.panel)?;
+        Some(PlacedPanel::new(page, panel, placement, found_from_stated).among(layout))
+    });
+    placed.collect()
+}
+
+/// Measures the check bars. Where the boards lie only tells where to look for them.
+pub(crate) fn check_bars(
+    page: &Page,
+    layout: &SheetLayout,
+    found_from_stated: &AffineMap,
+    verdict: &mut SheetVerdict,
+) {
+    for (index, bar) in layout.check_bars.iter().enumerate() {
+        let stated_mm = bar.length_mm();
+        let found_mm =
+            bars::measure(page, [bar.from_mm, bar.to_mm].map(|end| found_from_stated.apply(end)));
+        verdict.check_bars_mm.push((stated_mm, found_mm));
+        if found_mm.is_none_or(|found| (found - stated_mm).abs() > TOLERANCE_MM) {
+            let finding = MarkFinding::CheckBar { bar: index + 1, found_mm, stated_mm };
+            verdict.findings.push(finding.into());
+        }
+    }
+}
