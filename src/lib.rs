@@ -32,8 +32,8 @@
 //! images row-major with y down, the board frame right-handed with x right and y up on the print.
 
 pub use deltille_core::{
-    Clock, Name, camera, glam, json, lattice, nalgebra, name, quantity, raster, reading,
-    statistics, targets, words,
+    Clock, Name, camera, glam, json, lattice, name, quantity, raster, reading, statistics, targets,
+    words,
 };
 #[cfg(feature = "print")]
 pub use deltille_files::logo;

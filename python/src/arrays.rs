@@ -1,7 +1,7 @@
 //! Arrays of many small things, and back; numbers that arguments give; plain data as dictionaries.
 
+use deltille::calibrate::Matrix;
 use deltille::glam::DMat3;
-use deltille::nalgebra::DMatrix;
 use deltille::quantity::{OutOfRange, Range, distance_mm};
 use numpy::ndarray::{Array1, Array2, Array3};
 use numpy::{Element, IntoPyArray, PyArray1, PyArray2, PyArray3, PyArrayLikeDyn};
@@ -43,8 +43,8 @@ pub fn column<T: Element>(
 }
 
 /// A matrix.
-pub fn matrix<'py>(py: Python<'py>, matrix: &DMatrix<f64>) -> Bound<'py, PyArray2<f64>> {
-    let (rows, columns) = matrix.shape();
+pub fn matrix<'py>(py: Python<'py>, matrix: &Matrix) -> Bound<'py, PyArray2<f64>> {
+    let (rows, columns) = (matrix.rows(), matrix.columns());
     Array2::from_shape_fn((rows, columns), |(i, j)| matrix[(i, j)]).into_pyarray(py)
 }
 

@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 
+use deltille::calibrate::Matrix;
 use deltille::calibrate::{self as solver, CameraEstimate, Source, ViewEstimate};
 use numpy::{PyArray1, PyArray2, PyArray3};
 use pyo3::prelude::*;
@@ -230,7 +231,7 @@ impl CalibratedCamera {
         let map = unlocked(py, || self.estimate().uncertainty_map(distance_mm, source))?;
         Ok(map.map(|map| {
             let sd = |i: usize, j: usize| map.sd_px[i * map.columns + j].unwrap_or(f64::NAN);
-            let full = deltille::nalgebra::DMatrix::from_fn(map.rows, map.columns, sd);
+            let full = Matrix::from_fn(map.rows, map.columns, sd);
             arrays::matrix(py, &full)
         }))
     }

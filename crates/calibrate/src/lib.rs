@@ -13,7 +13,7 @@
 //! 8. `diagnose` says what is wrong with an estimate, what that comes from, and what helps.
 //!
 //! `adjusted` runs 4 to 7 on all views. `solve` is around it and holds frames out, `automatic` chooses a model by `solve`,
-//! `located` asks where a target is. `compare` and `next_view` read estimates. Everything may import `model` (of lenses),
+//! `located` asks where a target is. `compare` and `next_view` read estimates. Everything may import `model` (of lenses), `matrix` (in results),
 //! `error` (why there is no estimate), `excluded` (views that took no part, and why) and `cancel`; otherwise a module imports from chapters above it in this list, never in a circle.
 //!
 //! A pixel is predicted through a chain of frames,
@@ -43,6 +43,7 @@ mod estimate;
 mod excluded;
 mod input;
 mod located;
+mod matrix;
 mod model;
 mod next_view;
 mod problem;
@@ -81,6 +82,7 @@ pub use input::panel::PanelRef;
 pub use input::reference::Reference;
 pub use input::views::{Shown, views};
 pub use input::weights::Weights;
+pub use matrix::Matrix;
 pub use model::{Model, ModelError};
 pub use next_view::guide::{Guide, Guided, NextView, ProposedCorner};
 pub use next_view::holding::{Held, Holding};

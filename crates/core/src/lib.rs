@@ -43,5 +43,5 @@ pub mod targets;
 pub mod words;
 
 pub use clock::Clock;
+pub use glam;
 pub use name::Name;
-pub use {glam, nalgebra};

@@ -41,7 +41,7 @@ fn off(found: &CameraEstimate, truth: &Camera) -> [f64; 2] {
     truth.views = found.views.clone();
     // As good as exact.
     truth.parameters[0].sd = Some(1e-9);
-    truth.covariance = nalgebra::DMatrix::from_element(1, 1, 1e-18);
+    truth.covariance = deltille::calibrate::Matrix::from_fn(1, 1, |_, _| 1e-18);
     let compared = Comparison::of(found, &truth, None, Region::Seen).unwrap();
     [compared.rms_px, compared.expected_px.unwrap()]
 }

@@ -1,5 +1,7 @@
 //! Whatever comes in, nothing panics, and what comes out is finite.
 
+use std::path::Path;
+
 use deltille::camera::Camera;
 use deltille::detect::{Detection, Detector, DetectorConfig};
 use deltille::export::{detection, dsc, solid_mesh};
@@ -103,7 +105,9 @@ fn each_file_is_taken_by_one_reader() {
 #[test]
 fn recorded_faults_are_refused_or_read() {
     let mut files = 0;
-    for entry in std::fs::read_dir("tests/corpus").unwrap() {
+    for entry in
+        std::fs::read_dir(Path::new(crate::common::REPOSITORY).join("tests/corpus")).unwrap()
+    {
         let path = entry.unwrap().path();
         let bytes = std::fs::read(&path).unwrap();
         read_all(&String::from_utf8_lossy(&bytes));

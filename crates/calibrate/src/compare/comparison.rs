@@ -532,7 +532,7 @@ fn half_of(camera: &CameraEstimate) -> Option<DMatrix<f64>> {
     let observed = camera.projection.as_ref().and_then(|known| known.observed.as_ref());
     let observed = observed.map(ObservedCovariance::without_board);
     let covariance = observed.or_else(|| camera.covariance_from(Source::Noise).cloned())?;
-    let n = covariance.nrows();
+    let n = covariance.rows();
     let sd = DVector::from_fn(n, |i, _| covariance[(i, i)].sqrt());
     let scaled = DMatrix::from_fn(n, n, |i, j| covariance[(i, j)] / sd[i] / sd[j]);
     let eigen = scaled.symmetric_eigen();

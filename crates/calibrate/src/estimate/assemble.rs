@@ -18,6 +18,7 @@ use crate::input::calibration::{Calibration, CameraViews};
 use crate::input::loss::Loss;
 use crate::input::order::in_order;
 use crate::input::panel::{PanelPlace, PanelRef};
+use crate::matrix::Matrix;
 use crate::problem::bundle::Problem;
 use crate::problem::corner_map::CornerMap;
 use crate::problem::shape::{BoardShape, Shape};
@@ -224,7 +225,7 @@ fn camera_estimate(
         parameters: values
             .map(|(i, (name, value))| Parameter { name: name.clone(), value, sd: sd_of(i) })
             .collect(),
-        covariance: DMatrix::from_fn(columns.len(), columns.len(), |i, j| {
+        covariance: Matrix::from_fn(columns.len(), columns.len(), |i, j| {
             covariance[(columns[i].1, columns[j].1)]
         }),
         projection: None,
@@ -261,11 +262,12 @@ fn projection(
             |of: &DMatrix<f64>| DMatrix::from_fn(n, n, |i, j| of[(columns[i].1, columns[j].1)]);
         let covariance = match state {
             Some(state) => {
-                halves::raised(state, &camera.camera, own(covariance), &camera.covariance)
+                halves::raised(state, &camera.camera, own(covariance), camera.covariance.inner())
             }
             None => own(covariance),
         };
-        ObservedCovariance { covariance, of_board: of_board.as_ref().map(own), freedom: *freedom }
+        let of_board = of_board.as_ref().map(|of| Matrix::new(own(of)));
+        ObservedCovariance { covariance: Matrix::new(covariance), of_board, freedom: *freedom }
     });
     let (whitening, free) = (&settled.whitening, camera.free());
     ProjectionUncertainty::of(problem, whitening, index, &free, distances_mm, observed)

@@ -1,9 +1,9 @@
 //! How sure an estimated camera is of where it projects a point, over its image.
 
 use glam::DVec2;
-use nalgebra::DMatrix;
 
 use super::values::CameraEstimate;
+use crate::matrix::Matrix;
 use crate::uncertainty::projection::{Source, by_motion, by_parameters, seen_at};
 
 /// How sure a camera is over its image.
@@ -30,9 +30,9 @@ const ENOUGH_CORNERS: usize = 1000;
 
 impl CameraEstimate {
     /// The covariance of its parameters that were found, in their order; `None` where it is not known from there.
-    pub fn covariance_from(&self, source: Source) -> Option<&DMatrix<f64>> {
+    pub fn covariance_from(&self, source: Source) -> Option<&Matrix> {
         match source {
-            Source::Noise => (self.covariance.nrows() > 0).then_some(&self.covariance),
+            Source::Noise => (self.covariance.rows() > 0).then_some(&self.covariance),
             Source::Observed => Some(&self.projection.as_ref()?.observed.as_ref()?.covariance),
         }
     }
@@ -45,10 +45,10 @@ impl CameraEstimate {
         distance_mm: Option<f64>,
         source: Source,
     ) -> Option<[[f64; 2]; 2]> {
-        let covariance = self.covariance_from(source)?;
+        let covariance = self.covariance_from(source)?.inner();
         let point = seen_at(&self.camera, pixel, distance_mm)?;
         let at = self.camera.project_with_derivatives(point)?;
-        let alignment = &self.projection.as_ref()?.alignment;
+        let alignment = self.projection.as_ref()?.alignment.inner();
         let mut by_motion = by_motion(&at, point);
         if distance_mm.is_none() {
             by_motion.fixed_columns_mut::<3>(3).fill(0.0);

@@ -4,7 +4,6 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Range;
 
 use glam::DVec2;
-use nalgebra::DMatrix;
 
 use super::coverage::Coverage;
 use super::lens_end::LensEnd;
@@ -13,6 +12,7 @@ use crate::adjust::finding::Finding;
 use crate::adjust::lack_of_fit::LackOfFit;
 use crate::excluded::Excluded;
 use crate::input::panel::{PanelPlace, PanelRef};
+use crate::matrix::Matrix;
 use crate::model::Model;
 use crate::problem::roughness::Roughness;
 use crate::problem::shape::BoardShape;
@@ -83,7 +83,7 @@ pub struct CameraEstimate {
     /// All its parameters, estimated and kept ones.
     pub parameters: Vec<Parameter>,
     /// Covariance of the estimated parameters, in their order; each entry in the product of their units.
-    pub covariance: DMatrix<f64>,
+    pub covariance: Matrix,
     /// How sure it is of where it projects a point; `None` where it was given, or where its motion is open.
     pub projection: Option<ProjectionUncertainty>,
     /// Names of parameters that the views cannot tell apart: some change of them together moves no
@@ -290,7 +290,7 @@ impl CameraEstimate {
             parameters: values.map(parameter).collect(),
             camera,
             model: None,
-            covariance: DMatrix::zeros(0, 0),
+            covariance: Matrix::empty(),
             projection: None,
             ill_conditioned: Vec::new(),
             camera_from_rig: Pose::IDENTITY,
@@ -307,7 +307,7 @@ impl CameraEstimate {
 
     /// Removes all uncertainties, as of a calibration that failed: they follow from residuals that the model does not explain.
     pub fn forget_uncertainties(&mut self) {
-        self.covariance = DMatrix::zeros(0, 0);
+        self.covariance = Matrix::empty();
         (self.projection, self.pose_sd, self.observed_pose_sd) = (None, None, None);
     }
 

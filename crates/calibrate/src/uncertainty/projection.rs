@@ -15,6 +15,7 @@
 use glam::{DVec2, DVec3};
 use nalgebra::{DMatrix, Dyn, Matrix2, Matrix6, OMatrix, SMatrix, U2};
 
+use crate::matrix::Matrix;
 use crate::problem::bundle::Problem;
 use crate::problem::whitening::Whitening;
 use deltille_core::camera::{Camera, Projection};
@@ -25,7 +26,7 @@ use deltille_core::statistics::median;
 #[non_exhaustive]
 pub struct ProjectionUncertainty {
     /// K: the motion (ω in rad, τ in mm) of what the camera sees for a change of each parameter that was found.
-    pub alignment: DMatrix<f64>,
+    pub alignment: Matrix,
     /// How far the points are for which it is told, beside those at infinity, mm: what was asked for, else the
     /// median distance of the corners.
     pub distances_mm: Vec<f64>,
@@ -38,19 +39,19 @@ pub struct ProjectionUncertainty {
 #[derive(Clone, Debug, PartialEq)]
 pub struct ObservedCovariance {
     /// The covariance, in the order of the parameters that were found.
-    pub covariance: DMatrix<f64>,
+    pub covariance: Matrix,
     /// The part of it that comes from errors of the board, which are the same in every frame, and in every
     /// calibration with that board; `None` where the board is exact or its corners were found too.
-    pub of_board: Option<DMatrix<f64>>,
+    pub of_board: Option<Matrix>,
     /// How well it is known: a variance of it as from so many independent squares.
     pub freedom: f64,
 }
 
 impl ObservedCovariance {
     /// The covariance without the part that comes from errors of the board.
-    pub fn without_board(&self) -> DMatrix<f64> {
+    pub fn without_board(&self) -> Matrix {
         match &self.of_board {
-            Some(of_board) => &self.covariance - of_board,
+            Some(of_board) => Matrix::new(self.covariance.inner() - of_board.inner()),
             None => self.covariance.clone(),
         }
     }
@@ -69,7 +70,7 @@ pub enum Source {
 impl ProjectionUncertainty {
     /// As an earlier calibration found it.
     pub fn new(
-        alignment: DMatrix<f64>,
+        alignment: Matrix,
         distances_mm: Vec<f64>,
         observed: Option<ObservedCovariance>,
     ) -> Self {
@@ -104,7 +105,7 @@ impl ProjectionUncertainty {
             [] => vec![median(distances)?],
             asked => asked.to_vec(),
         };
-        Some(Self { alignment: -solved(&motion, &across)?, distances_mm, observed })
+        Some(Self { alignment: Matrix::new(-solved(&motion, &across)?), distances_mm, observed })
     }
 }
 

@@ -389,7 +389,7 @@ fn residuals(report: &Report, index: usize, survey: &Survey, add: &mut impl FnMu
 
 #[cfg(test)]
 mod tests {
-    use nalgebra::DMatrix;
+    use deltille_calibrate::Matrix;
 
     use super::*;
     use deltille_calibrate::{Estimate, LackOfFit, Model, PanelPlace, ViewEstimate};
@@ -406,7 +406,7 @@ mod tests {
         let count = model.free().into_iter().filter(|free| *free).count();
         let mut camera = CameraEstimate::given("camera", camera);
         (camera.model, camera.parameters) = (Some(model), parameters);
-        camera.covariance = DMatrix::identity(count, count);
+        camera.covariance = Matrix::from_fn(count, count, |i, j| f64::from(i == j));
         camera.rms_px = 0.1;
         let surveys = [Survey::new(&camera)];
         let mut estimate = Estimate::default();

@@ -2,8 +2,8 @@
 
 use std::collections::BTreeMap;
 
+use deltille_calibrate::Matrix;
 use glam::DVec3;
-use nalgebra::DMatrix;
 use serde::Serialize;
 
 use super::motion::Motion;
@@ -211,13 +211,13 @@ pub(in crate::export) fn parameters(camera: &CameraEstimate) -> Vec<ParameterRec
         .collect()
 }
 
-fn lower_triangle(matrix: &DMatrix<f64>) -> Vec<Vec<f64>> {
-    (0..matrix.nrows()).map(|i| (0..=i).map(|j| matrix[(i, j)]).collect()).collect()
+fn lower_triangle(matrix: &Matrix) -> Vec<Vec<f64>> {
+    (0..matrix.rows()).map(|i| (0..=i).map(|j| matrix[(i, j)]).collect()).collect()
 }
 
 pub(in crate::export) fn projection(camera: &CameraEstimate) -> Option<ProjectionRecord> {
     let known = camera.projection.as_ref()?;
-    let (rows, columns) = known.alignment.shape();
+    let (rows, columns) = (known.alignment.rows(), known.alignment.columns());
     let row = |i: usize| (0..columns).map(|j| known.alignment[(i, j)]).collect();
     let maps = camera.uncertainty_maps().into_iter().map(|map| UncertaintyRecord {
         distance_mm: map.distance_mm,
@@ -249,14 +249,14 @@ pub(in crate::export) fn projection(camera: &CameraEstimate) -> Option<Projectio
 
 /// With many parameters only the lower triangle is written, to nine digits: the file of a fisheye
 /// would have 30 MB otherwise.
-fn correlations_of(covariance: &DMatrix<f64>, are_many: bool) -> Vec<Vec<f64>> {
+fn correlations_of(covariance: &Matrix, are_many: bool) -> Vec<Vec<f64>> {
     let c = covariance;
     let of = |i: usize, j: usize| c[(i, j)] / (c[(i, i)] * c[(j, j)]).sqrt();
     if are_many {
         let rounded = |i: usize, j: usize| (of(i, j) * 1e9).round() / 1e9;
-        return (0..c.nrows()).map(|i| (0..=i).map(|j| rounded(i, j)).collect()).collect();
+        return (0..c.rows()).map(|i| (0..=i).map(|j| rounded(i, j)).collect()).collect();
     }
-    (0..c.nrows()).map(|i| (0..c.nrows()).map(|j| of(i, j)).collect()).collect()
+    (0..c.rows()).map(|i| (0..c.rows()).map(|j| of(i, j)).collect()).collect()
 }
 
 pub(in crate::export) fn correlations(camera: &CameraEstimate) -> Vec<Vec<f64>> {

@@ -4,8 +4,8 @@
 //! findings and lack of fit, which files describe in words, and refined panel poses, which are in
 //! the refined target. The reasons for excluded views are the words of the file.
 
+use deltille_calibrate::Matrix;
 use glam::{DMat3, DQuat, DVec2, DVec3};
-use nalgebra::DMatrix;
 use serde::de::Error;
 use serde::{Deserialize, Deserializer};
 
@@ -526,13 +526,13 @@ impl SavedCamera {
 
 /// The covariance matrix from correlations and standard deviations; `None` where there is not one
 /// correlation for each pair.
-fn covariance_of(rows: &[Vec<f64>], sds: &[f64]) -> Option<DMatrix<f64>> {
+fn covariance_of(rows: &[Vec<f64>], sds: &[f64]) -> Option<Matrix> {
     let n = sds.len();
     // For a spline only the lower triangle is stored.
     let has_all = |(i, row): (usize, &Vec<f64>)| row.len() == n || row.len() == i + 1;
     let is_whole = rows.len() == n && rows.iter().enumerate().all(has_all);
     let of = |i: usize, j: usize| rows[i].get(j).copied().unwrap_or_else(|| rows[j][i]);
-    is_whole.then(|| DMatrix::from_fn(n, n, |i, j| of(i, j) * sds[i] * sds[j]))
+    is_whole.then(|| Matrix::from_fn(n, n, |i, j| of(i, j) * sds[i] * sds[j]))
 }
 
 impl SavedProjection {
@@ -543,7 +543,7 @@ impl SavedProjection {
         if alignment.len() != 6 || alignment.iter().any(|row| row.len() != found) {
             return Err("`alignment` has not six rows with a number for each parameter");
         }
-        let alignment = DMatrix::from_fn(6, found, |i, j| alignment[i][j]);
+        let alignment = Matrix::from_fn(6, found, |i, j| alignment[i][j]);
         let observed = observed_correlations.zip(observed_freedom).map(|(rows, freedom)| {
             let covariance = covariance_of(&rows, sds).filter(|_| sds.len() == found);
             let covariance = covariance

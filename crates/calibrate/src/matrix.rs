@@ -1,0 +1,53 @@
+use std::ops::Index;
+
+use nalgebra::DMatrix;
+
+/// A matrix in a result, such as a covariance.
+///
+/// ```
+/// use deltille_calibrate::Matrix;
+///
+/// let covariance = Matrix::from_fn(2, 2, |row, column| if row == column { 0.25 } else { 0.0 });
+/// assert_eq!((covariance.rows(), covariance[(1, 1)].sqrt()), (2, 0.5));
+/// ```
+#[derive(Clone, Debug, PartialEq)]
+pub struct Matrix(DMatrix<f64>);
+
+impl Matrix {
+    /// A matrix of entries by row and column.
+    pub fn from_fn(rows: usize, columns: usize, entry: impl FnMut(usize, usize) -> f64) -> Self {
+        Self(DMatrix::from_fn(rows, columns, entry))
+    }
+
+    /// One without rows, where nothing is known.
+    pub(crate) fn empty() -> Self {
+        Self(DMatrix::zeros(0, 0))
+    }
+
+    pub(crate) fn new(inner: DMatrix<f64>) -> Self {
+        Self(inner)
+    }
+
+    pub(crate) fn inner(&self) -> &DMatrix<f64> {
+        &self.0
+    }
+
+    /// Number of rows.
+    pub fn rows(&self) -> usize {
+        self.0.nrows()
+    }
+
+    /// Number of columns.
+    pub fn columns(&self) -> usize {
+        self.0.ncols()
+    }
+}
+
+/// The entry of a row and a column.
+impl Index<(usize, usize)> for Matrix {
+    type Output = f64;
+
+    fn index(&self, at: (usize, usize)) -> &f64 {
+        &self.0[at]
+    }
+}
