@@ -76,7 +76,7 @@ impl Verifier<'_> {
 
     /// Reads an artifact from disk, with the files beside it that belong to it, and compares it as
     /// [`verify`](Self::verify) does. Third-party readers run on a thread of their own, for at most
-    /// [`Limits::max_seconds`] in each step.
+    /// [`Limits::max_seconds`](deltille_files::limits::Limits::max_seconds) in each step.
     ///
     /// # Errors
     /// When the name tells no format or sheet, or a file is missing or cannot be read at all.

@@ -23,7 +23,7 @@ pub enum VerifyError {
         /// Name of the target.
         target: String,
     },
-    /// The file name has no extension of a known [`Format`].
+    /// The file name has no extension of a known [`Format`](crate::Format).
     #[error(
         "{}: only .pdf, .svg, .png, .glb, .obj, .sdf, .urdf, .xml (MuJoCo), .usda, .3mf, .stl, .dsc and .dxf files are \
          compared with their target",

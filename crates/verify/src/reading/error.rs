@@ -18,7 +18,7 @@ pub enum DocumentError {
         path: PathBuf,
     },
     /// The file is not of the format of its extension, states no physical size, or exceeds the
-    /// [`Limits`].
+    /// [`Limits`](deltille_files::limits::Limits).
     #[error("{}: {problem}", path.display())]
     Unreadable {
         /// The file.
