@@ -12,7 +12,7 @@ type Module = Vec<String>;
 const SOURCES: [(&str, bool); 12] = [
     ("crates/calibrate/src", true),
     ("crates/cli/src", true),
-    ("crates/core/src", false),
+    ("crates/core/src", true),
     ("crates/detect/src", true),
     ("crates/files/src", true),
     ("crates/lab/src", true),

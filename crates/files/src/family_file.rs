@@ -47,12 +47,12 @@ impl FamilyFileError {
 /// family.
 pub fn resolve(name_or_path: &str) -> Result<Family, FamilyFileError> {
     match Family::shipped(name_or_path) {
-        Err(FamilyError::Unknown { name }) => {
+        Err(FamilyError::Unknown { name, shipped }) => {
             let path = Path::new(name_or_path);
             if path.extension().is_some_and(|e| e == "json") || path.exists() {
                 return read(path);
             }
-            Err(FamilyFileError::Name(FamilyError::Unknown { name }))
+            Err(FamilyFileError::Name(FamilyError::Unknown { name, shipped }))
         }
         shipped => shipped.map_err(FamilyFileError::Name),
     }

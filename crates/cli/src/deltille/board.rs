@@ -55,15 +55,17 @@ pub fn run(grid: GridKind, args: Args) -> anyhow::Result<ExitCode> {
     meshes.check_use(plan.spec.two_sided_mm)?;
     let family = plan.spec.tags.as_ref().map(|tags| family::resolve(&tags.family)).transpose();
     let family = match (family, grid) {
-        (Err(FamilyFileError::Name(FamilyError::Unknown { name })), GridKind::Checker) => bail!(
-            "--tags: no family of square tags is called `{name}`: give {}, or the path of a .json \
+        (Err(FamilyFileError::Name(FamilyError::Unknown { name, .. })), GridKind::Checker) => {
+            bail!(
+                "--tags: no family of square tags is called `{name}`: give {}, or the path of a .json \
              family file",
-            square_names()
-                .iter()
-                .map(|name| format!("{name} ({})", name.replacen("aprilTag", "t", 1)))
-                .collect::<Vec<_>>()
-                .join(", ")
-        ),
+                square_names()
+                    .iter()
+                    .map(|name| format!("{name} ({})", name.replacen("aprilTag", "t", 1)))
+                    .collect::<Vec<_>>()
+                    .join(", ")
+            )
+        }
         (family, GridKind::Checker) => family.context("--tags")?,
         (family, GridKind::Deltille) => family.context("--family")?,
     };

@@ -1,6 +1,6 @@
 use glam::{DVec2, DVec3};
 
-use super::lens::{Imaged, LensLaw, Ray};
+use super::law::{Imaged, LensLaw, Ray};
 use super::reach::{product, sign_changes, slope_times_q};
 
 /// Points nearer to the image plane than this part of their distance are not projected: beyond

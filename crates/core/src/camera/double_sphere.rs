@@ -1,7 +1,7 @@
 use glam::{DVec2, DVec3};
 
 use super::extended_unified::{by_height, limit, quotient};
-use super::lens::{Imaged, LensLaw, Ray};
+use super::law::{Imaged, LensLaw, Ray};
 
 /// Double sphere model (Usenko, Demmel and Cremers 2018):
 ///

@@ -5,7 +5,7 @@ use std::f64::consts::PI;
 
 use glam::{DVec2, DVec3};
 
-use super::lens::Imaged;
+use super::law::Imaged;
 use super::reach::sign_changes;
 
 /// Steps of the angle in which the way back looks for a root, rad: polynomials of the few terms

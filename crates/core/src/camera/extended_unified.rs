@@ -1,6 +1,6 @@
 use glam::{DVec2, DVec3};
 
-use super::lens::{Imaged, LensLaw, Ray};
+use super::law::{Imaged, LensLaw, Ray};
 
 /// Extended unified camera model, EUCM (Khomutenko, Garcia and Martinet 2016):
 ///

@@ -1,7 +1,7 @@
 use glam::{DVec2, DVec3};
 
 use super::equidistant::{self, Angle};
-use super::lens::{Imaged, LensLaw, Ray};
+use super::law::{Imaged, LensLaw, Ray};
 
 /// Equidistant fisheye polynomial (Kannala and Brandt 2006), with four terms as in OpenCV's
 /// fisheye module, or more:

@@ -13,6 +13,7 @@ mod extended_unified;
 #[cfg(feature = "yaml")]
 pub mod file;
 mod kannala_brandt;
+mod law;
 mod lens;
 mod pose;
 mod pupil;
@@ -29,7 +30,8 @@ pub use extended_unified::ExtendedUnified;
 #[cfg(feature = "yaml")]
 pub use file::{CameraFile, CameraFileError};
 pub use kannala_brandt::KannalaBrandt;
-pub use lens::{Imaged, Lens, MAX_LENS_PARAMETERS, Ray};
+pub use law::{Imaged, Ray};
+pub use lens::{Lens, MAX_LENS_PARAMETERS};
 pub use pose::{Pose, is_rotation};
 pub use pupil::Pupil;
 pub use rectification::{Rectification, RectificationError};

@@ -4,7 +4,7 @@ use glam::{DVec2, DVec3};
 
 use super::brown_conrady::solve;
 use super::equidistant::{self, Angle};
-use super::lens::{Imaged, LensLaw, Ray};
+use super::law::{Imaged, LensLaw, Ray};
 
 /// Newton's iterations for the angle and for the tangential terms; from starts that are off by the
 /// small parts that pupil and tilt have, five reach the last bit.

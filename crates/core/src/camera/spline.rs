@@ -1,7 +1,7 @@
 use glam::{DMat2, DVec2, DVec3};
 use serde::{Deserialize, Serialize};
 
-use super::lens::{Imaged, LensLaw, Ray};
+use super::law::{Imaged, LensLaw, Ray};
 
 /// Knots along a side at least, a patch of the cubic spline, and at most: what no calibration determines.
 const KNOTS: std::ops::RangeInclusive<usize> = 4..=40;

@@ -7,11 +7,13 @@ pub enum FamilyError {
     /// No shipped family and no file of this name.
     #[error(
         "no family is called `{name}`: give one of {}, or the path of a .json family file",
-        [crate::family::shipped_names(), crate::family::square_names(), vec![super::places::NAME]].concat().join(", ")
+        shipped.join(", ")
     )]
     Unknown {
         /// The name asked for.
         name: String,
+        /// The families that come with the library.
+        shipped: Vec<&'static str>,
     },
     /// Not JSON, cut off, or with a field missing, unknown or of the wrong type.
     #[error("not a family file: {}; generate it anew with `Family::to_json`", in_words(.0))]

@@ -65,17 +65,21 @@ pub use decode::{Decoded, Decoder, TagWords};
 pub use error::FamilyError;
 pub use free::FreeCells;
 pub use rules::{Rules, Screen};
+use tables::fingerprint::fingerprint;
 pub(crate) use tables::shipped_name;
 pub use tables::{
-    Beginning, Construction, ExportFormat, ImportError, ImportSpec, PublishedBounds, SCHEMA,
-    ShippedFamily, check_name, dictionary, dictionary_names, export, import, published_bounds,
-    shipped_families, shipped_names, smallest_shipped, square_names,
+    Beginning, Construction, ExportFormat, ImportError, ImportSpec, PublishedBounds, ShippedFamily,
+    check_name, dictionary, dictionary_names, export, import, published_bounds, shipped_families,
+    shipped_names, smallest_shipped, square_names,
 };
 use tables::{aruco, file, shipped};
 #[doc(hidden)]
 pub use {hex::parse_word, kernels::nearer};
 
 use crate::lattice::{Dimension, GridKind, TagCells};
+
+/// Schema and version that this crate writes and reads.
+pub const SCHEMA: &str = "deltille/family/1";
 
 /// The pairs of larger families are too many to count one by one.
 pub const PAIRS_COUNTED: usize = 100_000;
@@ -135,7 +139,7 @@ impl Family {
         } else {
             BTreeMap::new()
         };
-        let fingerprint = file::fingerprint(kind, dimension, distance, rules.free, &codes);
+        let fingerprint = fingerprint(kind, dimension, distance, rules.free, &codes);
         let name = name.to_owned();
         Ok(Self {
             name,
@@ -179,8 +183,10 @@ impl Family {
     pub fn shipped(name: &str) -> Result<Self, FamilyError> {
         match shipped::json(name) {
             Some(json) => Self::from_json(json),
-            None => aruco::family(name)
-                .unwrap_or_else(|| Err(FamilyError::Unknown { name: name.to_owned() })),
+            None => aruco::family(name).unwrap_or_else(|| {
+                let shipped = [shipped_names(), square_names(), vec![places::NAME]].concat();
+                Err(FamilyError::Unknown { name: name.to_owned(), shipped })
+            }),
         }
     }
 
@@ -189,7 +195,7 @@ impl Family {
         let cells = places::cells();
         let dimension = cells.dimension();
         let codes = places::first_board();
-        let fingerprint = file::fingerprint(cells.kind(), dimension, 1, None, &codes);
+        let fingerprint = fingerprint(cells.kind(), dimension, 1, None, &codes);
         Self {
             name: places::NAME.to_owned(),
             kind: cells.kind(),

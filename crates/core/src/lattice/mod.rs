@@ -19,15 +19,13 @@
 //! squares, of which those with even r + c are black. [`GridKind`] says what differs.
 
 mod cells;
-mod kind;
 mod map;
 mod tile;
 mod vertex;
 
 pub use cells::{Cell, Dimension, DimensionError, TagCells};
-pub use kind::GridKind;
 pub use map::LatticeMap;
-pub use tile::{Orientation, Tile};
+pub use tile::{GridKind, Orientation, Tile};
 pub use vertex::Vertex;
 
 /// Height of an equilateral triangle over its edge, √3/2.

@@ -3,10 +3,7 @@ use std::borrow::Cow;
 use glam::DVec2;
 use multiversion::multiversion;
 
-use super::{Gray, ImageView, Intensity, View, fill_bands, of_any};
-
-/// Full scale of a pyramid's pixels: 10 bits leave room for sums of a dozen in 16-bit arithmetic.
-pub const PYRAMID_FULL_SCALE: f32 = 1023.0;
+use super::{Gray, ImageView, Intensity, PYRAMID_FULL_SCALE, View, fill_bands, of_any};
 
 /// Smoothed copies of an image, each half the size of the one before.
 ///

@@ -6,7 +6,7 @@
 //!
 //! 1. `spec`: what is asked for; `boards` and `solids` each hold the specifications of their kind and make panels of them;
 //! 2. `build`: from a specification and a family to a target; `error`: why there is none; `family_ref`: which family it has;
-//! 3. `target`, `panel`, `pose`: the values; `symmetry`: rotations after which a panel looks the same; `length`: numbers in mm;
+//! 3. `target`, `panel`, `corner`, `pose`: the values; `symmetry`: rotations after which a panel looks the same; `length`: numbers in mm;
 //! 4. `identity`: the fingerprint of a target; `json`: its file, which `against_spec` compares with what the spec makes.
 //!
 //! Frames: a *panel* frame has its origin on the panel's lattice vertex (0,0), x along the rows, y
@@ -15,6 +15,7 @@
 mod against_spec;
 pub(crate) mod boards;
 pub(crate) mod build;
+mod corner;
 pub(crate) mod error;
 mod family_ref;
 pub(crate) mod identity;
@@ -33,11 +34,12 @@ pub use boards::{
     AprilGridSpec, BORDER_BITS, BoardSpec, CharucoSpec, CirclesSpec, MOST_ROWS, SIDES,
     TagSheetSpec, TagSpec, board_vertices, least_untagged_corners, zigzag_vertices,
 };
+pub use corner::{Corner, MeasuredPlace};
 pub use error::TargetError;
 pub use family_ref::{FamilyRef, OtherFamily};
 pub use json::{SCHEMA, TargetFileError};
 pub use length::{BoxError, LengthError, parse_box_mm, parse_length_mm};
-pub use panel::{Corner, MeasuredPlace, Outline, Panel, TagPlacement, TagsIn};
+pub use panel::{Outline, Panel, TagPlacement, TagsIn};
 pub use pose::PanelPose;
 pub use solids::{
     ClosedMesh, ClosedMeshError, FACE_TILES, Face, FaceBoard, FaceNoun, Incircle, NEAR_EQUILATERAL,

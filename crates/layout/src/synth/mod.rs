@@ -9,8 +9,10 @@ mod occlusion;
 mod scene;
 mod sheet;
 mod solid;
+mod surface;
 
 pub use corner::SimulatedCorner;
-pub use scene::{Light, Scene, Surface, Truth, TruthCorner};
+pub use scene::{Light, Scene, Truth, TruthCorner};
 pub use sheet::scene_of_sheet;
 pub use solid::scene_of_target;
+pub use surface::Surface;

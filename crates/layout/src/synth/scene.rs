@@ -4,6 +4,7 @@ use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, Normal};
 use serde::{Deserialize, Serialize};
 
+use super::Surface;
 use super::occlusion::Shadow;
 use deltille_core::camera::{Camera, Pose};
 use deltille_core::raster::{Coverage, Gray, gaussian};
@@ -98,22 +99,6 @@ impl Light {
     pub fn seed(self, seed: u64) -> Self {
         Self { seed, ..self }
     }
-}
-
-/// A plane piece of the world: white paper with black outlines, in its own frame (mm, y up).
-#[derive(Clone, Debug, PartialEq)]
-pub struct Surface {
-    /// Panel id.
-    pub panel: u32,
-    /// Pose of the surface: from its own frame to the target frame, mm.
-    pub target_from_surface: Pose,
-    /// Outline of the paper in the surface's frame, counter-clockwise, mm.
-    pub paper_mm: Vec<DVec2>,
-    /// Black areas in the surface's frame, mm: each a list of outlines, filled by the even-odd rule; areas do not
-    /// overlap.
-    pub black_mm: Vec<Vec<Vec<DVec2>>>,
-    /// Corners: id, lattice row, lattice column, and position in the surface's frame, mm.
-    pub corners: Vec<(u32, i32, i32, DVec2)>,
 }
 
 /// Surfaces of solids, seen from their front sides only. They may hide each other, but not cut
@@ -232,12 +217,6 @@ impl Scene {
             others.filter_map(|before| Shadow::of(before, behind, eye)).collect()
         };
         facing.iter().map(|&surface| (surface, shadows(surface))).collect()
-    }
-}
-
-impl Surface {
-    fn camera_from(&self, camera_from_target: &Pose) -> Pose {
-        camera_from_target.after(&self.target_from_surface)
     }
 }
 

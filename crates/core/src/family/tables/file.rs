@@ -3,18 +3,15 @@
 use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
-use sha2::{Digest, Sha256};
 
+use super::fingerprint::fingerprint;
 use crate::Name;
 use crate::family::algebra::AlgebraicConstruction;
 use crate::family::hex::parse_word;
 use crate::family::{
-    Beginning, Family, FamilyError, FreeCells, Rules, TagWords, false_positive_rates,
+    Beginning, Family, FamilyError, Rules, SCHEMA, TagWords, false_positive_rates,
 };
 use crate::lattice::{Dimension, GridKind};
-
-/// Schema and version that this crate writes and reads.
-pub const SCHEMA: &str = "deltille/family/1";
 
 /// How the codes of a family were found.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -239,26 +236,4 @@ pub fn check_name(name: &str, dimension: Dimension, distance: u32) -> Result<(),
         }
         _ => Ok(()),
     }
-}
-
-/// See [`Family::fingerprint`].
-pub(in crate::family) fn fingerprint(
-    kind: GridKind,
-    dimension: Dimension,
-    distance: u32,
-    free: Option<FreeCells>,
-    codes: &[u64],
-) -> String {
-    let words = TagWords::of(kind, dimension);
-    let mut hash = Sha256::new();
-    let kind = if kind == GridKind::Checker { "kind checker\n" } else { "" };
-    hash.update(format!("deltille/family\n{kind}bits {}\ndistance {distance}\n", dimension.bits()));
-    if let Some(free) = free {
-        hash.update(format!("free {}\n", free.name()));
-    }
-    for &code in codes {
-        hash.update(words.hex(code));
-        hash.update("\n");
-    }
-    hash.finalize()[..8].iter().map(|byte| format!("{byte:02x}")).collect()
 }

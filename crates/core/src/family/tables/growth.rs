@@ -7,7 +7,7 @@ use std::collections::HashSet;
 
 use serde::{Deserialize, Serialize};
 
-use super::file;
+use super::fingerprint::fingerprint;
 use crate::family::{Family, FamilyError};
 
 /// What a family was before it grew: its first codes, and the fingerprint that they had.
@@ -76,7 +76,7 @@ impl Family {
 
     /// The fingerprint that codes have in such a family.
     fn fingerprint_of(&self, codes: &[u64]) -> String {
-        file::fingerprint(self.kind, self.dimension, self.distance, self.rules.free, codes)
+        fingerprint(self.kind, self.dimension, self.distance, self.rules.free, codes)
     }
 
     /// Checks that the first codes have the fingerprints that are stated.

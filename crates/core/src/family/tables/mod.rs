@@ -1,12 +1,13 @@
 //! Families as tables: files, those that ship, those of other programs.
 //!
-//! `file` is the family file, `shipped` the list of those in the library, `growth` what they were before they had all their
+//! `file` is the family file, `fingerprint` what identifies its codes, `shipped` the list of those in the library, `growth` what they were before they had all their
 //! codes; `aruco` and `import` read tables of other programs, `export` writes source text for them. `published_bounds` are
 //! sizes of codes that others keep.
 
 pub(in crate::family) mod aruco;
 pub(in crate::family) mod export;
 pub(in crate::family) mod file;
+pub(in crate::family) mod fingerprint;
 pub(in crate::family) mod growth;
 pub(in crate::family) mod import;
 pub(in crate::family) mod published_bounds;
@@ -14,7 +15,7 @@ pub(super) mod shipped;
 
 pub use aruco::{dictionary, dictionary_names};
 pub use export::{ExportFormat, export};
-pub use file::{Construction, SCHEMA, check_name};
+pub use file::{Construction, check_name};
 pub use growth::Beginning;
 pub use import::{ImportError, ImportSpec, import};
 pub use published_bounds::{PublishedBounds, published_bounds};
