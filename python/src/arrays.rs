@@ -2,7 +2,7 @@
 
 use deltille::calibrate::Matrix;
 use deltille::glam::DMat3;
-use deltille::quantity::{OutOfRange, Range, distance_mm};
+use deltille_core::quantity::{OutOfRange, Range, distance_mm};
 use numpy::ndarray::{Array1, Array2, Array3};
 use numpy::{Element, IntoPyArray, PyArray1, PyArray2, PyArray3, PyArrayLikeDyn};
 use pyo3::prelude::*;

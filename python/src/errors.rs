@@ -8,7 +8,7 @@ use std::io;
 use std::path::Path;
 
 use deltille::limits::{self, ReadError};
-use deltille::words::with_short_quotes;
+use deltille_core::words::with_short_quotes;
 use pyo3::exceptions::{PyKeyboardInterrupt, PyUserWarning};
 use pyo3::prelude::*;
 

@@ -2,7 +2,7 @@
 
 use deltille::calibrate::{Guide, Guided, Intrinsics, Reference, views};
 use deltille::export::next_view::write;
-use deltille::quantity::distance_mm;
+use deltille_core::quantity::distance_mm;
 use numpy::PyArray2;
 use pyo3::prelude::*;
 

@@ -2,7 +2,7 @@
 
 use deltille::camera;
 use deltille::glam::{DMat3, DQuat, DVec3};
-use deltille::quantity::{angle_rad, place_mm};
+use deltille_core::quantity::{angle_rad, place_mm};
 use numpy::{PyArray1, PyArray2};
 use pyo3::exceptions::PyTypeError;
 use pyo3::prelude::*;

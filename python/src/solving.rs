@@ -12,8 +12,8 @@ use deltille::export::calibration::{Print, Residuals};
 use deltille::export::sheet::Sheet;
 use deltille::export::{calibration, rig};
 use deltille::layout::Printing;
-use deltille::quantity::{board_accuracy_mm, distance_mm, edge_mm, print_scale};
 use deltille::{camera, detect, targets};
+use deltille_core::quantity::{board_accuracy_mm, distance_mm, edge_mm, print_scale};
 use pyo3::prelude::*;
 use serde_json::Value;
 

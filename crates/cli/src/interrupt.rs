@@ -8,7 +8,7 @@ use std::time::Duration;
 
 use crate::output::tell;
 use deltille::export::atomic;
-use deltille::words::shown;
+use deltille_core::words::shown;
 
 /// How long work may take to come to its own end after the signal; then it is left as it stands.
 const PATIENCE: Duration = Duration::from_millis(300);

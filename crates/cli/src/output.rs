@@ -9,7 +9,7 @@ use crate::wording::in_options;
 use deltille::export::kind::Kind;
 use deltille::export::{atomic, staging};
 use deltille::limits::{Limits, ReadError};
-use deltille::words::shown;
+use deltille_core::words::shown;
 
 /// The file that `-o` means: itself when it ends in the extension, else `<stem>.<extension>` in
 /// that folder. A path that ends in another extension is no folder, unless it is there as one.

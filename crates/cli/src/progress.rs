@@ -9,7 +9,7 @@ use indicatif::{ProgressBar, ProgressStyle};
 
 use crate::output::tell;
 use deltille::family::Progress;
-use deltille::words::counted;
+use deltille_core::words::counted;
 
 /// A bar with position and estimate, for `total` units of work called `unit`; silent where standard
 /// error is not a terminal.

@@ -10,7 +10,7 @@ use clap::error::{ContextKind, ContextValue, ErrorKind};
 
 use crate::output::tell;
 use crate::{interrupt, wording};
-use deltille::words::{cut, shown, with_short_quotes};
+use deltille_core::words::{cut, shown, with_short_quotes};
 
 /// Exit code for bad input of every kind.
 pub const BAD_INPUT: u8 = 2;

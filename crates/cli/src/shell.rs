@@ -7,7 +7,7 @@ use anyhow::Context;
 use clap::{Command, CommandFactory};
 
 use crate::output::{self, Overwrite, print, say};
-use deltille::words::counted;
+use deltille_core::words::counted;
 
 /// At the end of the help of `deltille completions`.
 pub const COMPLETIONS: &str = "Examples:

@@ -19,8 +19,8 @@ use super::bound;
 use deltille::detect::{RefineStatus, Refinement, Refiner, Tone};
 use deltille::lattice::GridKind;
 use deltille::raster::Gray;
-use deltille::statistics::quantile;
 use deltille::synth::SimulatedCorner;
+use deltille_core::statistics::quantile;
 
 /// Side of the window that all methods read, px: the reference's 11×11 fit on smoothed pixels.
 pub const WINDOW_PX: usize = 21;

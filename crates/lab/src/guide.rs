@@ -30,9 +30,9 @@ use deltille::calibrate::{
 use deltille::camera::{BrownConrady, Camera, KannalaBrandt, Lens, Pose};
 use deltille::detect::Detector;
 use deltille::family::FamilyError;
-use deltille::statistics::median;
 use deltille::synth::{Light, Scene, scene_of_target};
 use deltille::targets::{BoardSpec, Target, TargetError};
+use deltille_core::statistics::median;
 
 /// The board: 9 rows of 12 corners, 20 mm, about A4.
 const BOARD: (u32, u32, f64) = (9, 12, 20.0);

@@ -6,7 +6,7 @@ use crate::output::say;
 use deltille::family::{
     ACCEPTED_FALSE_POSITIVES, Family, NATURAL_FACTOR, TRIANGLES_PER_MEGAPIXEL, corrected_within,
 };
-use deltille::words::counted;
+use deltille_core::words::counted;
 
 /// Adds the fields of `--json` to what is told of a family.
 pub(super) fn add_to(told: &mut Value, family: &Family) {

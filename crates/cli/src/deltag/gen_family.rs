@@ -28,7 +28,7 @@ use deltille::family::{
     certify_codes, check_name,
 };
 use deltille::lattice::Dimension;
-use deltille::words::counted;
+use deltille_core::words::counted;
 
 /// Told at the end of `--help`.
 pub(super) const HELP: &str = "Ctrl-C ends a search early. The methods best and algebraic write \

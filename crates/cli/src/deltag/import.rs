@@ -9,7 +9,7 @@ use crate::values::{name, whole};
 use deltille::family::{ImportSpec, import};
 use deltille::lattice::GridKind;
 use deltille::limits::{MAX_FAMILY_BYTES, read_short_text};
-use deltille::words::counted;
+use deltille_core::words::counted;
 
 /// Told at the end of `--help`.
 pub(super) const HELP: &str = "Codes are the hexadecimal words of the table, in their order; in a text without any, the lines of \

@@ -7,7 +7,7 @@ use crate::output::{self, Telling, say};
 use deltille::family::{self, Family, HiddenCells, PAIRS_COUNTED, TagWords};
 use deltille::lattice::GridKind;
 use deltille::targets::{BoardSpec, SolidShape, SolidSpec, TagSpec, Target, TargetSpec};
-use deltille::words::counted;
+use deltille_core::words::counted;
 
 #[derive(clap::Args)]
 pub(super) struct Args {

@@ -5,7 +5,7 @@ use serde_json::json;
 use crate::output::{self, Telling, say};
 use deltille::family::Family;
 use deltille::family::places::{BITS, BOARDS, PLACES, PatchCertificate, certify_places};
-use deltille::words::counted;
+use deltille_core::words::counted;
 
 /// Tells all about them.
 pub(super) fn about(family: &Family, telling: Telling) -> anyhow::Result<()> {

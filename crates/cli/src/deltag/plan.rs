@@ -10,7 +10,7 @@ use crate::output::{self, Telling, say};
 use crate::values::whole;
 use deltille::family::{Family, NATURAL_FACTOR, ShippedFamily, shipped_names, smallest_shipped};
 use deltille::lattice::GridKind;
-use deltille::words::counted;
+use deltille_core::words::counted;
 
 #[derive(clap::Args)]
 pub(super) struct Args {

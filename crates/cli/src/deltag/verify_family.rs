@@ -6,7 +6,7 @@ use super::place_codes;
 use crate::output::{self, Telling, line, say};
 use crate::run::{BAD_INPUT, FAILED, report};
 use deltille::family::{self, Certificate, Family, FamilyFileError, Robust, certify};
-use deltille::words::counted;
+use deltille_core::words::counted;
 
 /// Told at the end of `--help`.
 pub(super) const HELP: &str = "Checked are the codes (distance, rules, fingerprint, statistics) and the \

@@ -12,8 +12,8 @@ use crate::interrupt;
 use crate::output::say;
 use crate::run::Interrupted;
 use crate::values::whole;
-use deltille::statistics::quantile;
 use deltille::{clock, photograph};
+use deltille_core::statistics::quantile;
 
 /// Arguments of `deltille bench`.
 #[derive(clap::Args)]

@@ -23,7 +23,7 @@ use deltille::camera::{Camera, CameraFile, Lens, PROJECTION_PARAMETERS, Pose, Sp
 use deltille::export::camera::{FormatError, colmap, kalibr, mrcal, nerfstudio, opencv, ros};
 use deltille::export::{calibration, saved};
 use deltille::targets::TargetIdentity;
-use deltille::words::{counted, places, shown};
+use deltille_core::words::{counted, places, shown};
 
 /// Correlations from here on are told: such parameters are hardly told apart.
 const STRONG_CORRELATION: f64 = 0.98;

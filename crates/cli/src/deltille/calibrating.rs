@@ -22,10 +22,10 @@ use deltille::export::calibration::{Print, Residuals};
 use deltille::export::camera::FormatError;
 use deltille::export::kind::Kind;
 use deltille::layout::Printing;
-use deltille::quantity::{board_accuracy_mm, distance_mm};
 use deltille::report::target_map_svg;
 use deltille::targets::{self, parse_length_mm};
-use deltille::words::counted;
+use deltille_core::quantity::{board_accuracy_mm, distance_mm};
+use deltille_core::words::counted;
 
 /// How a calibration is solved, and the page about it.
 #[derive(clap::Args)]

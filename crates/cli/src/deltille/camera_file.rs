@@ -9,7 +9,7 @@ use deltille::camera::{Camera, CameraFile};
 use deltille::camera_file;
 use deltille::export::saved;
 use deltille::targets::{Target, TargetIdentity, check_same_board};
-use deltille::words::shown;
+use deltille_core::words::shown;
 
 /// Reads the camera file that an option names.
 pub fn read(option: &str, path: &Path) -> anyhow::Result<Camera> {

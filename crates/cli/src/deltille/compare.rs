@@ -20,7 +20,7 @@ use deltille::export::{comparison, saved};
 use deltille::limits::Limits;
 use deltille::report::comparison_svg;
 use deltille::targets::check_same_board;
-use deltille::words::{counted, p_value, shown};
+use deltille_core::words::{counted, p_value, shown};
 
 /// Arguments of `deltille compare`.
 #[derive(clap::Args)]

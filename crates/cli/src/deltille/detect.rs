@@ -25,7 +25,7 @@ use deltille::export::tables::{EXTENSION, Picture};
 use deltille::export::{atomic, csv, detection, orpc, overlay};
 use deltille::photograph::{self, Photograph};
 use deltille::targets::Target;
-use deltille::words::{counted, shown};
+use deltille_core::words::{counted, shown};
 
 /// Arguments of `deltille detect`.
 #[derive(clap::Args)]

@@ -29,7 +29,7 @@ use deltille::limits::Limits;
 use deltille::photograph;
 use deltille::raster::AnyGray;
 use deltille::targets::Target;
-use deltille::words::{counted, shown};
+use deltille_core::words::{counted, shown};
 
 /// How long the folder is left alone between two looks.
 const PAUSE: Duration = Duration::from_millis(400);

@@ -9,11 +9,11 @@ use super::calibrating::Calibrated;
 use crate::output::{self, Overwrite, tell};
 use crate::wording::in_options;
 use deltille::calibrate::{View, ViewEstimate};
-use deltille::name::is_within;
 use deltille::photograph;
 use deltille::raster::{AnyGray, Gray};
 use deltille::report::{Report, Sample, shown_views, thumbnail};
-use deltille::words::counted;
+use deltille_core::name::is_within;
+use deltille_core::words::counted;
 
 /// Most small pictures of views that were held out.
 const MOST_HELD_OUT: usize = 100;

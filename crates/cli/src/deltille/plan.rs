@@ -14,7 +14,7 @@ use deltille::lattice::GridKind;
 use deltille::layout::PaperSpec;
 use deltille::layout::{Proposal, Situation};
 use deltille::targets::{BoardSpec, TagSpec, TagsIn};
-use deltille::words::counted;
+use deltille_core::words::counted;
 
 /// Tilts for which it is told how far a board is labelled, °.
 const TOLD_DEG: [f64; 3] = [0.0, 45.0, 60.0];

@@ -15,8 +15,8 @@ use crate::values::number;
 use deltille::camera::{Camera, Pose};
 use deltille::export::kind::signed_png;
 use deltille::export::truth;
-use deltille::quantity::{Range, blur_px, light_gradient, of_full_scale, place_mm};
 use deltille::synth::{Light, scene_of_target};
+use deltille_core::quantity::{Range, blur_px, light_gradient, of_full_scale, place_mm};
 
 /// Arguments of `deltille render`.
 #[derive(clap::Args)]

@@ -29,7 +29,7 @@ use deltille::export::{rig, saved};
 use deltille::layout::Printing;
 use deltille::report::target_map_svg;
 use deltille::targets::{Name, Target};
-use deltille::words::counted;
+use deltille_core::words::counted;
 
 /// Arguments of `deltille rig`.
 #[derive(clap::Args)]

@@ -22,9 +22,9 @@ use deltille::export::tables::folder;
 use deltille::lattice::GridKind;
 use deltille::layout::Printing;
 use deltille::limits::{Limits, ReadError};
-use deltille::quantity::{edge_mm, print_scale};
 use deltille::targets::{SIDES, Target, TargetIdentity, parse_length_mm};
-use deltille::words::counted;
+use deltille_core::quantity::{edge_mm, print_scale};
+use deltille_core::words::counted;
 
 /// Detections and what they show.
 #[derive(clap::Args)]

@@ -20,11 +20,11 @@ use deltille::export::artifacts::{self, Making, What};
 use deltille::export::{dsc, solid_mesh};
 use deltille::family::{self, Family};
 use deltille::layout::{Printing, tag_range};
-use deltille::quantity::unit_mm;
 use deltille::targets::{
     ClosedMesh, NEAR_EQUILATERAL, Name, Skeleton, SolidShape, SolidSpec, Target, TargetSpec,
     parse_box_mm,
 };
+use deltille_core::quantity::unit_mm;
 
 /// Arguments of the commands that make solids.
 #[derive(clap::Args)]

@@ -14,7 +14,7 @@ use deltille::export::staging::Staging;
 use deltille::export::tables::{CORNERS, EXTENSION, PICTURES, Picture, Writer, folder};
 use deltille::limits::Limits;
 use deltille::targets::Target;
-use deltille::words::counted;
+use deltille_core::words::counted;
 
 /// The files of both tables in a folder.
 pub fn files(folder: &Path) -> [PathBuf; 2] {

@@ -10,8 +10,8 @@ use crate::output::{self, Overwrite};
 use deltille::export::GENERATOR;
 use deltille::export::kind::Kind;
 use deltille::limits;
-use deltille::reading::in_words;
-use deltille::words::quoted;
+use deltille_core::reading::in_words;
+use deltille_core::words::quoted;
 
 /// The settings in a file that was made for a command.
 pub fn read<T: DeserializeOwned>(

@@ -24,7 +24,7 @@ use deltille::export::{atomic, saved, undistortion};
 use deltille::limits::Limits;
 use deltille::photograph;
 use deltille::remap::remapped;
-use deltille::words::counted;
+use deltille_core::words::counted;
 
 /// How the views are made.
 #[derive(clap::Args)]

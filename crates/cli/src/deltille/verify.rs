@@ -21,7 +21,7 @@ use deltille::layout::Printing;
 use deltille::limits::Limits;
 use deltille::targets::Target;
 use deltille::verify::{Progress, Verdict, Verifier};
-use deltille::words::{counted, shown};
+use deltille_core::words::{counted, shown};
 
 /// Arguments of `deltille verify`.
 #[derive(clap::Args)]

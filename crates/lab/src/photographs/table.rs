@@ -12,9 +12,9 @@ use super::photograph::TrueCorner;
 use super::scene::Scene;
 use super::score::Score;
 use deltille::export::kind::signed_png;
-use deltille::json;
 use deltille::raster::Gray;
-use deltille::statistics::quantile;
+use deltille_core::json;
+use deltille_core::statistics::quantile;
 
 /// Schema of the result's JSON.
 const SCHEMA: &str = "deltille/photographs/1";

@@ -32,7 +32,7 @@ use deltille::lattice::GridKind;
 use deltille::layout::{PaperSpec, Printing};
 use deltille::targets::{BoardSpec, SolidShape, SolidSpec, TargetSpec};
 use deltille::verify::{Finding, Format, Verdict, Verifier, whole_of};
-use deltille::words::shown;
+use deltille_core::words::shown;
 use tempfile::TempDir;
 
 use crate::common::page::Page;
