@@ -29,7 +29,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         .camera("camera", shown.views, Model::Radtan)
         .hold_out(Some(5));
     let estimate = calibration.solve()?;
-    let diagnoses = calibration.diagnose(&estimate);
+    let diagnoses = calibration.explain(&estimate);
 
     let camera = &estimate.cameras[0];
     for parameter in &camera.parameters {

@@ -524,7 +524,7 @@ impl Asked {
             Ok(estimate) => {
                 let words = Words::new(&estimate, None);
                 let is_of_picture = |said: &&Diagnosis| !matches!(said, Diagnosis::LensEnds { .. });
-                let said = estimate.inspect();
+                let said = estimate.diagnose();
                 let said = said.iter().filter(is_of_picture).map(|said| words.sentence(said));
                 let warnings = said.collect();
                 Ok(of(None, Some(estimate), warnings))

@@ -426,7 +426,7 @@ pub fn solve(
             }
         }
         let estimate = calibration.solve()?;
-        let diagnoses = calibration.diagnose(&estimate);
+        let diagnoses = calibration.explain(&estimate);
         Ok::<_, CalibrationError>((estimate, diagnoses, models))
     })?;
     let (mut estimate, diagnoses, models) = solved.raise(errors::calibration)?;

@@ -18,7 +18,7 @@ impl Calibration {
             Err(error @ CalibrationError::OtherSize { .. }) => return Ok(Err(error.to_string())),
             found => found?,
         };
-        let said = found.inspect();
+        let said = found.diagnose();
         let foreign = said.iter().find(|said| matches!(said, Diagnosis::ForeignCamera { .. }));
         if let Some(foreign) = foreign {
             return Ok(Err(Words::new(&found, None).sentence(foreign)));

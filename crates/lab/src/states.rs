@@ -326,7 +326,7 @@ fn said(calibration: &Calibration, found: &Estimate) -> Vec<(&'static str, f64)>
         Diagnosis::StretchedBoard { stretch, .. } => Some(("stretched_board", stretch.ratio)),
         _ => None,
     };
-    calibration.diagnose(found).iter().filter_map(kind).collect()
+    calibration.explain(found).iter().filter_map(kind).collect()
 }
 
 /// Makes runs of each scene; `None` when it was interrupted. `tick` is called after each.

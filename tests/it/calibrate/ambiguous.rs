@@ -145,7 +145,7 @@ fn an_upside_down_camera_is_found_where_it_is() {
         let rotation = rig.said[1].unwrap();
         assert_eq!((rotation.degrees, rotation.frames, rotation.of), (180, 16, 16));
         assert!(rotation.is_sure);
-        assert!(rig.found.inspect().iter().any(|s| matches!(s, Diagnosis::LabelsRotated { .. })));
+        assert!(rig.found.diagnose().iter().any(|s| matches!(s, Diagnosis::LabelsRotated { .. })));
     }
 }
 

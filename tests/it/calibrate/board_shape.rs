@@ -144,7 +144,7 @@ fn a_rig_finds_the_shape_of_a_sheet() {
     check_read_back(&found, &text);
     // Without the shape the board is to blame.
     let flat = both.solve().unwrap();
-    let said = both.diagnose(&flat);
+    let said = both.explain(&flat);
     let is_of_shape = |said: &Diagnosis| matches!(said, Diagnosis::Remedied { remedy, .. } if remedy.instead == Instead::Shape);
     assert!(said.len() == 1 && said.iter().all(is_of_shape), "{said:?}");
 }
@@ -159,12 +159,12 @@ fn a_bent_and_stretched_sheet_is_found() {
     };
     assert!((0.05..0.5).contains(&rms_mm), "{rms_mm}");
     assert_eq!(found.lack_of_fit, []);
-    let said = plain.diagnose(&flat);
+    let said = plain.explain(&flat);
     let [Diagnosis::Remedied { remedy: Remedy { instead: Instead::Shape, .. }, .. }] = said[..]
     else {
         panic!("{said:?}")
     };
-    assert_eq!(with_shape.diagnose(&found), []);
+    assert_eq!(with_shape.explain(&found), []);
     assert!(flat.rms_px > 2.0 * found.rms_px, "{} {}", flat.rms_px, found.rms_px);
     assert!((found.rms_px / NOISE_PX - 1.0).abs() < 0.05, "{}", found.rms_px);
     check_shape(&found);

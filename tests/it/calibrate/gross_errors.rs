@@ -519,7 +519,7 @@ fn displaced_panels_are_no_fault_of_the_lens() {
     for seed in 0..2 {
         let views = views(RADTAN, &target, Wrong::AllDisplaced(0.5), seed);
         let calibration = of_target(&target).camera("", views, RADTAN);
-        let said = calibration.diagnose(&calibration.solve().unwrap());
+        let said = calibration.explain(&calibration.solve().unwrap());
         let is_of_panels =
             |said: &Diagnosis| matches!(said, Diagnosis::LackOfFit(LackOfFit::Target { .. }));
         let is_of_lens = |said: &Diagnosis| {

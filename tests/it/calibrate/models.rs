@@ -373,7 +373,7 @@ fn the_smallest_model_that_holds_a_lens_is_named() {
 fn what_makes_a_calibration_fit_is_found() {
     let said = |truth: &Camera, model: Model| {
         let (views, _) = simulated(truth, 20, 0.8, 5);
-        of(&views, model).diagnose(&solved(&views, model))
+        of(&views, model).explain(&solved(&views, model))
     };
     assert_eq!(said(&camera(Model::Radtan), Model::Radtan), []);
     for (truth, model, better) in [

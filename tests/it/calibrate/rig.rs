@@ -253,7 +253,7 @@ fn a_camera_that_is_another_one_is_named() {
     }
     let said = |truth: &Simulated| {
         let calibration = calibration(&truth.views, &truth.really(), false);
-        calibration.diagnose(&calibration.solve().unwrap())
+        calibration.explain(&calibration.solve().unwrap())
     };
     assert_eq!(said(&truth), []);
     // Refocused since: all fits worse.

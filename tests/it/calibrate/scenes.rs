@@ -342,7 +342,7 @@ const LATE: [i32; 8] = [0, 0, 0, 1, 0, 0, 0, 0];
 fn one_is_late(found: &Estimate) {
     let delays: Vec<i32> = found.cameras.iter().map(|camera| camera.delay).collect();
     assert_eq!(delays, LATE);
-    let said = found.inspect();
+    let said = found.diagnose();
     assert!(said.contains(&Diagnosis::Late { camera: 3, frames: 1 }), "{said:?}");
 }
 
@@ -378,7 +378,7 @@ fn faces_with_ids_of_others_are_left_out() {
             |seed| with_wrong_faces(around(3, 30, seed), part, seed),
             |found| {
                 let is_named = |said: &Diagnosis| matches!(said, Diagnosis::GrossErrors(_));
-                assert!(found.inspect().iter().any(is_named));
+                assert!(found.diagnose().iter().any(is_named));
             },
         );
     }

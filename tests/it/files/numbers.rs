@@ -309,7 +309,7 @@ fn detections() {
         match calibration.solve() {
             Err(error) => is_told(&error.to_string(), &what),
             Ok(found) => {
-                let said = calibration.diagnose(&found);
+                let said = calibration.explain(&found);
                 let text =
                     calibration::write(&found, &said, Print::default(), Residuals::Listed).unwrap();
                 is_finite_json(&text, &what);

@@ -51,7 +51,7 @@ impl Solved {
             Intrinsics::Unknown(model),
         );
         let mut estimate = calibration.solve().raise()?;
-        let diagnoses = calibration.diagnose(&estimate);
+        let diagnoses = calibration.explain(&estimate);
         estimate.excluded.splice(0..0, shown.left_out.into_iter().map(|(_, out)| out));
         let found = estimate.cameras.first().ok_or_else(|| JsError::new("there is no camera"))?;
         let words = Words::new(&estimate, None);

@@ -194,10 +194,10 @@ impl Diagnosis {
 }
 
 impl Calibration {
-    /// What is to be said about what [`solve`](Self::solve) found, what matters most first. Where residuals
-    /// are not noise, other models, the shape of the board, and the places of panels are tried, on a part of
-    /// the views.
-    pub fn diagnose(&self, found: &Estimate) -> Vec<Diagnosis> {
+    /// What [`Estimate::diagnose`] says of what [`solve`](Self::solve) found, and what explains it, what matters most first.
+    /// Where residuals are not noise, other calibrations are solved: with other models, the shape of the board, and the
+    /// places of panels, on a part of the views.
+    pub fn explain(&self, found: &Estimate) -> Vec<Diagnosis> {
         // What was solved was split before.
         let own = self.split().map_or_else(|_| self.clone(), |(own, _)| own);
         let alone = own.each_alone(found);
@@ -279,9 +279,9 @@ impl Calibration {
 }
 
 impl Estimate {
-    /// What is to be said about it as far as it tells that by itself, without trying anything else; see
-    /// [`Calibration::diagnose`].
-    pub fn inspect(&self) -> Vec<Diagnosis> {
+    /// What is wrong with it as far as it says so by itself, what matters most first; no other calibration is solved. See
+    /// [`Calibration::explain`].
+    pub fn diagnose(&self) -> Vec<Diagnosis> {
         said(self, &vec![None; self.cameras.len()])
     }
 }

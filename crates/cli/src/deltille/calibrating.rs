@@ -235,7 +235,7 @@ impl SolveArgs {
                 None => anyhow!(error),
             }
         })?;
-        let diagnoses = calibration.diagnose(&estimate);
+        let diagnoses = calibration.explain(&estimate);
         let stated = calibration.panels().to_vec();
         // The page compares models where none were to be chosen from; too few views for that are no error.
         let compared = |(camera, tried): (usize, Vec<Candidate>)| match tried.is_empty() {

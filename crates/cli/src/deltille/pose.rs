@@ -191,7 +191,7 @@ impl Finder {
         let calibration = Calibration::new(panels).camera("", views, self.camera.clone());
         let found = calibration.located(&seen[0].1).with_context(|| image.display().to_string())?;
         let Ok(found) = found else { return Ok(found) };
-        let (words, said) = (Words::new(&found, None), found.inspect());
+        let (words, said) = (Words::new(&found, None), found.diagnose());
         // Where the lens ends is the camera's, and the same for every picture.
         for diagnosis in said.iter().filter(|said| !matches!(said, Diagnosis::LensEnds { .. })) {
             let of_target = self.of_target(target);
