@@ -33,15 +33,6 @@ def root() -> Path:
     return ROOT
 
 
-@pytest.fixture(scope="session")
-def shared() -> Path:
-    """Photographs beside the repository, where they are present."""
-    folder = Path(os.environ.get("DELTILLE_DATA", ROOT / "../shared/data"))
-    if not folder.is_dir():
-        pytest.skip("the photographs are not there")
-    return folder
-
-
 def script(name: str) -> str:
     """A program that the package installed."""
     found = shutil.which(name, path=sysconfig.get_path("scripts"))

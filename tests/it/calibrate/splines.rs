@@ -97,7 +97,7 @@ fn a_spline_is_chosen_where_it_holds_what_others_do_not() {
 #[test]
 fn whatever_else_is_found_a_spline_may_be_found_too() {
     let truth = wavy(2);
-    let (views, _) = simulated(&truth, 60, 0.8, 2);
+    let (views, _) = simulated(&truth, 36, 0.8, 2);
     is_noise(&of(&views, Model::SPLINE).board_shape(true).solve().unwrap());
     let measured = of(&views, Model::SPLINE).measure_target(true).solve().unwrap();
     is_noise(&measured);

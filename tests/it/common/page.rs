@@ -93,24 +93,37 @@ impl Page {
     }
 }
 
-/// A line without what depends on the system, and without how exact what was verified is.
+/// A line without what depends on the system; figures whose last digits do are rounded, or held against the others.
 fn same_everywhere(line: &str) -> String {
     let line =
         if cfg!(windows) { line.replace('\\', "/").replace(".exe", "") } else { line.to_owned() };
     if line.contains(": verified, ") {
-        let digits = |c: char| c.is_ascii_digit() || c == '.';
         let mut parts = line.split(" within ");
         let first = parts.next().unwrap().to_owned();
-        return parts.fold(first, |all, part| all + " within …" + part.trim_start_matches(digits));
+        return parts.fold(first, |all, part| {
+            let (figure, after) = part.split_once(" mm").unwrap_or_else(|| panic!("{line}"));
+            all + " within " + &within(figure.parse().unwrap()) + " mm" + after
+        });
     }
     if let Some((before, after)) = line.split_once("the lens is good up to ") {
         // Where hardly determined numbers have a pole.
+        let figures = after.split(" px").take(3).map(|to| to.rsplit(' ').next().unwrap());
+        let figures: Vec<f64> = figures.map(|figure| figure.parse().unwrap()).collect();
+        let [steady, outermost, farthest] = figures[..] else { panic!("{line}") };
+        assert!(0.0 < steady && steady < farthest, "{line}");
+        assert_eq!(steady < outermost, after.contains("use no pixels near that radius"), "{line}");
         let after = after.trim_start_matches(|c: char| c.is_ascii_digit());
         return format!("{before}the lens is good up to …{after}");
     }
     let Some(end) = line.find(" (os error ") else { return line };
     let begin = line[..end].rfind(": ").map_or(0, |colon| colon + 2);
     line[..begin].to_owned() + "[what the system says]"
+}
+
+/// How exact what was verified is: places in lists, drawings and bodies as exactly as they are written, corners in
+/// pictures to a hundredth of a millimetre, or as many as a coarse texture takes.
+fn within(mm: f64) -> String {
+    if mm < 0.0004 { "0.0004".to_owned() } else { format!("{:.2}", (100.0 * mm).ceil() / 100.0) }
 }
 
 /// All files below a folder with their sizes and times.

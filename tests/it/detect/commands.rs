@@ -1,5 +1,7 @@
 //! `deltille detect`: results in every format, overlays, and images that cannot be read.
 
+use std::path::Path;
+
 use crate::common::command::deltille;
 use crate::common::page::Page;
 use assert_cmd::Command;
@@ -261,15 +263,12 @@ fn what_detect_says() {
 
 /// A stream prints each picture before it has seen the others, so their ink is not that of all.
 #[test]
-#[cfg_attr(not(has_data), ignore = "no photographs: set DELTILLE_DATA to their folder")]
 fn a_stream_says_that_files_would_have_other_corners() {
     let folder = tempfile::tempdir().unwrap();
-    let photographs = std::fs::read_dir(crate::common::data("robot-hand")).unwrap();
-    let mut paths: Vec<_> = photographs.map(|entry| entry.unwrap().path()).collect();
-    paths.retain(|path| path.extension().is_some_and(|end| end == "png"));
-    paths.sort();
-    for path in &paths[..3] {
-        std::fs::copy(path, folder.path().join(path.file_name().unwrap())).unwrap();
+    let root = Path::new(crate::common::REPOSITORY);
+    for name in ["a.png", "b.png", "c.png"] {
+        let photograph = root.join("tests/photographs/robot-hand-0108.png");
+        std::fs::copy(photograph, folder.path().join(name)).unwrap();
     }
     let detect = |images: &str, how: &str| {
         let args = format!("detect --grid deltille --rows 10 --cols 11 {how} {images}");
@@ -283,8 +282,7 @@ fn a_stream_says_that_files_would_have_other_corners() {
         "{told}"
     );
     assert!(lines.lines().all(|line| line.contains("\"pictures\": 1}")));
-    let first = paths[0].file_name().unwrap().to_string_lossy();
-    assert!(!detect(&first, "--stream").1.contains("note:"));
+    assert!(!detect("a.png", "--stream").1.contains("note:"));
     assert!(!detect("*.png", "--stream --ink none").1.contains("note:"));
     assert!(!detect("*.png", "-o corners").1.contains("note:"));
 }

@@ -1,5 +1,5 @@
-//! Real photographs: two in `tests/photographs`, and the sets and published artifacts in `../shared/data` or where
-//! `DELTILLE_DATA` says.
+//! Real photographs: one of each set in `tests/photographs`, the sets and published artifacts in `../shared/data` or
+//! where `DELTILLE_DATA` says.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -14,11 +14,18 @@ use deltille::raster::Gray;
 use deltille::verify::Document;
 use image::imageops::{self, FilterType};
 
-/// Every image of a folder of the data.
-fn images(folder: &str) -> Vec<PathBuf> {
-    let entries = std::fs::read_dir(data(folder)).unwrap();
-    let mut images: Vec<PathBuf> = entries.map(|entry| entry.unwrap().path()).collect();
+/// The photographs of a set: that in the repository, and all others where they are there.
+fn images(set: &str) -> Vec<PathBuf> {
+    let here = Path::new(crate::common::REPOSITORY).join("tests/photographs");
+    let in_folder = |folder: &Path| {
+        let entries = std::fs::read_dir(folder).into_iter().flatten();
+        entries.map(|entry| entry.unwrap().path()).collect::<Vec<_>>()
+    };
+    let is_of_set = |path: &PathBuf| path.file_name().unwrap().to_string_lossy().starts_with(set);
+    let mut images = in_folder(&data(set));
     images.sort();
+    images.splice(..0, in_folder(&here).into_iter().filter(is_of_set));
+    assert!(!images.is_empty() && (cfg!(not(has_data)) || images.len() > 30), "{images:?}");
     images
 }
 
@@ -46,32 +53,6 @@ fn topology_is_consistent(grid: &Grid) -> bool {
 }
 
 #[test]
-fn all_corners_of_a_photograph_of_either_tiling() {
-    for (name, kind, size, is_consistent) in [
-        (
-            "robot-hand-0108",
-            GridKind::Deltille,
-            (10, 11),
-            topology_is_consistent as fn(&Grid) -> bool,
-        ),
-        ("fisheye-0200", GridKind::Checker, (8, 11), squares_are_consistent),
-    ] {
-        let path =
-            Path::new(crate::common::REPOSITORY).join(format!("tests/photographs/{name}.png"));
-        let detector = Detector::for_grid(kind, Some(size), DetectorConfig::default());
-        let detection = detector.detect(&photograph::read(&path).unwrap(), name);
-        let [grid] = &detection.grids[..] else {
-            panic!("{name}: {} grids", detection.grids.len())
-        };
-        assert_eq!(grid.corners.len() as u32, size.0 * size.1, "{name}");
-        assert!(is_consistent(grid), "wrong topology in {name}");
-        let last = grid.corners.last().map(|c| (c.row as u32, c.col as u32));
-        assert_eq!(last, Some((size.0 - 1, size.1 - 1)), "labels of {name}");
-    }
-}
-
-#[test]
-#[cfg_attr(not(has_data), ignore = "no photographs: set DELTILLE_DATA to their folder")]
 fn all_110_corners_of_the_robot_hand_photographs() {
     let images = images("robot-hand");
     let detector =
@@ -109,7 +90,6 @@ fn all_pictures_of_one_print_have_the_same_ink() {
 }
 
 #[test]
-#[cfg_attr(not(has_data), ignore = "no photographs: set DELTILLE_DATA to their folder")]
 fn checkerboards_and_lamps_are_no_deltille_grids() {
     let images = images("fisheye");
     let detector = Detector::for_grid(GridKind::Deltille, None, DetectorConfig::default());
@@ -143,7 +123,6 @@ fn squares_are_consistent(grid: &Grid) -> bool {
 }
 
 #[test]
-#[cfg_attr(not(has_data), ignore = "no photographs: set DELTILLE_DATA to their folder")]
 fn corners_of_the_fisheye_photographs() {
     let images = images("fisheye");
     let detector = Detector::for_grid(GridKind::Checker, Some((8, 11)), DetectorConfig::default());
@@ -174,14 +153,13 @@ fn corners_of_the_fisheye_photographs() {
 /// Enlarged to 48 megapixels a photograph shows its corners where it did before: among the grain, which is as large
 /// as they are and far more, and with ink that has spread over pixels.
 #[test]
-#[cfg_attr(not(has_data), ignore = "no photographs: set DELTILLE_DATA to their folder")]
 fn enlarged_photographs_show_the_same_corners() {
     for (folder, kind, size) in
         [("robot-hand", GridKind::Deltille, (10, 11)), ("fisheye", GridKind::Checker, (8, 11))]
     {
-        let images = images(folder);
+        let path = &images(folder)[0];
         let detector = Detector::for_grid(kind, Some(size), DetectorConfig::default());
-        for (path, filter) in images.iter().zip([FilterType::Triangle, FilterType::CatmullRom]) {
+        for filter in [FilterType::Triangle, FilterType::CatmullRom] {
             let small = image::open(path).unwrap().into_luma8();
             let (width, height) = (5 * small.width(), 5 * small.height());
             let large = imageops::resize(&small, width, height, filter);
@@ -207,7 +185,6 @@ fn enlarged_photographs_show_the_same_corners() {
 }
 
 #[test]
-#[cfg_attr(not(has_data), ignore = "no photographs: set DELTILLE_DATA to their folder")]
 fn deltille_boards_are_no_checkerboards() {
     let images = images("robot-hand");
     let detector = Detector::for_grid(GridKind::Checker, None, DetectorConfig::default());

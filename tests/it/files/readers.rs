@@ -9,7 +9,7 @@ use std::path::Path;
 use crate::changed::{Dice, READERS, Reader};
 
 /// Changed files of each reader.
-const CHANGED: u64 = 300;
+const CHANGED: u64 = 150;
 
 /// Reads a file; what panicked is named.
 fn harm(reader: &Reader, what: &str, bytes: &[u8]) -> Option<String> {

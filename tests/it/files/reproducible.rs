@@ -116,7 +116,7 @@ fn targets_and_what_verification_says_of_them() {
 #[test]
 fn families() {
     let commands = [
-        "deltag gen-family d16h6 --work 1 -j $ -o @best",
+        "deltag gen-family d16h8 --work 1 -j $ -o @best",
         "deltag gen-family d9h3 --work 1 --from-nothing --method algebraic -j $ -o @algebraic",
         "deltag gen-family d9h3 --method search --rounds 1 -j $ -o @search",
     ];

@@ -117,10 +117,10 @@ fn every_kind_of_target_carries_a_logo() {
     let logo = Path::new(crate::common::REPOSITORY).join("docs/gallery/logo.svg");
     std::fs::copy(logo, folder.path().join("logo.svg")).unwrap();
     for args in [
-        "board --rows 6 --cols 7 --edge 30mm --paper A3 --logo-height 15mm --pdf --svg --png",
-        "board --rows 6 --cols 7 --edge 25mm --two-sided 3mm --guide-page --pdf",
+        "board --rows 4 --cols 5 --edge 30mm --logo-height 15mm --pdf --svg --png",
+        "board --rows 4 --cols 5 --edge 25mm --two-sided 3mm --guide-page --pdf",
         "board --rows 4 --cols 5 --edge 12mm --boards 4 --pack --paper A4 --pdf",
-        "board --rows 6 --cols 7 --edge 40mm --paper A4 --poster --pdf",
+        "board --rows 4 --cols 5 --edge 30mm --paper A5 --poster --pdf",
         "checkerboard --rows 5 --cols 7 --tags t36h11 --mirrored --svg",
         "charuco --squares 8x6 --edge 30mm --marker 22mm --dictionary 5x5_100 --pdf",
         "aprilgrid --tags 4x4 --edge 30mm --pdf",

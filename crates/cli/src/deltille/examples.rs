@@ -1,4 +1,4 @@
-//! Examples at the end of every command's help. Each is a command that the program understands: see the test below.
+//! Examples at the end of every command's help. The program understands each, see `tests/it/files/help.rs`.
 
 pub const PLAN: &str = "Examples:
   deltille plan --size 1920x1080 --fov 62 --distance 50cm..3m
@@ -90,27 +90,3 @@ pub const UNDISTORT: &str = "Examples:
 
 pub const RECTIFY: &str = "Examples:
   deltille rectify rig.json --pair left,right -o rectified";
-
-#[cfg(test)]
-mod tests {
-    use clap::CommandFactory;
-
-    use crate::deltille::Deltille;
-
-    #[test]
-    fn every_command_has_examples_that_it_understands() {
-        let program = Deltille::command();
-        for command in program.get_subcommands().filter(|command| !command.has_subcommands()) {
-            let name = command.get_name();
-            let help = command.get_after_help().map(ToString::to_string).unwrap_or_default();
-            let examples: Vec<&str> =
-                help.lines().filter_map(|line| line.strip_prefix("  ")).collect();
-            assert!(!examples.is_empty(), "{name}");
-            for example in examples {
-                let words = example.split_whitespace().map(|word| word.trim_matches('\''));
-                let parsed = Deltille::command().try_get_matches_from(words);
-                assert!(parsed.is_ok(), "{example}: {}", parsed.unwrap_err());
-            }
-        }
-    }
-}
