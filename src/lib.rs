@@ -32,7 +32,7 @@
 //! images row-major with y down, the board frame right-handed with x right and y up on the print.
 
 pub use deltille_core::{
-    Clock, Name, camera, glam, json, lattice, nalgebra, name, quantity, raster, reading,
+    Clock, Name, camera, glam, json, lattice, nalgebra, name, quantity, raster, reading, setting,
     statistics, targets, words,
 };
 #[cfg(feature = "print")]
