@@ -31,7 +31,7 @@
 //! Conventions: lengths in millimetres, angles in radians, pixel centres at integer coordinates,
 //! images row-major with y down, the board frame right-handed with x right and y up on the print.
 
-pub use deltille_core::{Clock, Name, camera, glam, lattice, raster, targets};
+pub use deltille_core::{Clock, Name, camera, glam, lattice, raster, setting, targets};
 #[cfg(feature = "print")]
 pub use deltille_files::logo;
 #[cfg(feature = "report")]

@@ -154,7 +154,7 @@ macro_rules! whole {
                     (page.print, page.models) = (solved.print, &solved.models);
                     page.html()
                 })?;
-                save_text(path, errors::told_in_lines(&page), overwrite)
+                save_text(path, page, overwrite)
             }
         }
     };

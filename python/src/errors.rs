@@ -1,6 +1,5 @@
 //! From the library's errors to exceptions, in the words of Python.
 
-use std::borrow::Cow;
 use std::error::Error;
 use std::ffi::CString;
 use std::fmt::Display;
@@ -8,6 +7,7 @@ use std::io;
 use std::path::Path;
 
 use deltille::limits::{self, ReadError};
+use deltille::setting::Setting;
 use deltille_core::words::with_short_quotes;
 use pyo3::exceptions::{PyKeyboardInterrupt, PyUserWarning};
 use pyo3::prelude::*;
@@ -27,111 +27,102 @@ pub mod raised {
     pyo3::import_exception!(deltille.errors, FileError);
 }
 
-/// What messages of the library call a setting, and what it is called here.
-pub const KEYWORDS: &[(&str, &str)] = &[
-    ("AprilGridSpec::gap", "gap"),
-    ("AprilGridSpec::tag_mm", "tag_mm"),
-    ("AprilGridSpec::tags", "tags"),
-    ("BoardSpec::board_id", "board_id"),
-    ("BoardSpec::boards", "boards"),
-    ("BoardSpec::cols", "cols"),
-    ("BoardSpec::edge_mm", "edge_mm"),
-    ("BoardSpec::rows", "rows"),
-    ("BoardSpec::tags", "family"),
-    ("BoardSpec::two_sided_mm", "two_sided_mm"),
-    ("Calibration::board_shape", "board_shape"),
-    ("Calibration::measure_target", "measure_target"),
-    ("Calibration::refine_panels", "refine_target=True"),
-    ("CharucoSpec::dictionary", "dictionary"),
-    ("CharucoSpec::marker_mm", "marker_mm"),
-    ("CharucoSpec::square_mm", "square_mm"),
-    ("CharucoSpec::squares", "squares"),
-    ("CirclesSpec::circles", "circles"),
-    ("CirclesSpec::diameter_mm", "diameter_mm"),
-    ("CirclesSpec::spacing_mm", "spacing_mm"),
-    ("Detection::assume_targets", "assume_target=True"),
-    ("Dialect::Fork", "dsc-fork"),
-    ("Family::to_json", "Family.to_json"),
-    ("Finish::contour", "contour"),
-    ("Finish::white", "white"),
-    ("ImportSpec::bits", "bits"),
-    ("ImportSpec::distance", "distance"),
-    ("ImportSpec::kind", "kind"),
-    ("Limits::max_bytes", "max_bytes"),
-    ("Limits::max_depth", "max_depth"),
-    ("Limits::max_nodes", "max_nodes"),
-    ("Limits::max_pixels", "max_pixels"),
-    ("Limits::max_pixels_per_byte", "max_pixels_per_byte"),
-    ("Limits::max_seconds", "max_seconds"),
-    ("Meshing::textures", "textures"),
-    ("PaperSpec::guide_page", "guide_page"),
-    ("PaperSpec::logo", "logo"),
-    ("PaperSpec::logo_height_mm", "logo_height_mm"),
-    ("PaperSpec::margin_mm", "margin_mm"),
-    ("PaperSpec::note", "note"),
-    ("PaperSpec::packed", "packed"),
-    ("PaperSpec::poster", "poster"),
-    ("PaperSpec::size", "paper"),
-    ("PaperSpec::tag_ids", "tag_ids"),
-    ("Print::scale", "print_scale"),
-    ("Region::Image", "region=\"image\""),
-    ("Sighting::bend", "shape"),
-    ("Sighting::stretch", "print_scale"),
-    ("SkeletonSpec::panel_thickness_mm", "panel_thickness_mm"),
-    ("SkeletonSpec::rib_mm", "rib_mm"),
-    ("SkeletonSpec::wall_mm", "wall_mm"),
-    ("SolidShape::Cuboid", "size_mm"),
-    ("SolidShape::Mesh", "mesh"),
-    ("SolidSheets::PerFace", "per_face"),
-    ("SolidSheets::SeamedNet", "allow_seams"),
-    ("SolidSpec::board_id", "board_id"),
-    ("SolidSpec::edge_mm", "edge_mm"),
-    ("SolidSpec::margin_mm", "face_margin_mm"),
-    ("SolidSpec::skeleton", "skeleton"),
-    ("SolidSpec::square_tags", "square_family"),
-    ("SolidSpec::square_tags::family", "square_family"),
-    ("SolidSpec::square_tags::first_id", "first_square_id"),
-    ("SolidSpec::tiles", "tiles"),
-    ("TagSheetSpec::border_bits", "tag_border"),
-    ("TagSheetSpec::edge_mm", "edge_mm"),
-    ("TagSheetSpec::family", "family"),
-    ("TagSheetSpec::ids", "ids"),
-    ("TagSpec::border_bits", "tag_border"),
-    ("TagSpec::hole_mm", "hole_mm"),
-    ("TagSpec::family", "family"),
-    ("TagSpec::first_id", "first_id"),
-    ("TagSpec::spacing", "tag_spacing"),
-    ("TagSpec::tags_in", "tags_in"),
-    ("TagsIn::Black", "tags_in=\"black\""),
-    ("Target::name", "name"),
-    ("Target::to_json", "Target.to_json"),
-    ("UntaggedGrid::edge_mm", "edge_mm"),
-    ("UntaggedGrid::kind", "grid"),
-    ("UntaggedGrid::size", "rows and cols"),
-    ("calibrate::Model", "model"),
-    ("calibration::write", "Calibration.save"),
-    ("compare_boards::assume_target", "assume_target=True"),
-    ("detection::write", "Detection.save"),
-    ("family::shipped_names", "Family.shipped()"),
-    ("photograph::read_with_notes", "accept_damaged=True"),
-    ("rig::write", "Rig.save"),
-];
+/// What a setting is called here.
+pub fn keyword(setting: Setting) -> String {
+    let keyword = match setting {
+        Setting::AprilGridGap => "gap",
+        Setting::AprilGridTagMm => "tag_mm",
+        Setting::AprilGridTags => "tags",
+        Setting::BoardBoardId => "board_id",
+        Setting::BoardBoards => "boards",
+        Setting::BoardCols => "cols",
+        Setting::BoardEdgeMm => "edge_mm",
+        Setting::BoardRows => "rows",
+        Setting::BoardTags => "family",
+        Setting::BoardTwoSidedMm => "two_sided_mm",
+        Setting::CalibrateModel => "model",
+        Setting::CalibrationBoardShape => "board_shape",
+        Setting::CalibrationMeasureTarget => "measure_target",
+        Setting::CalibrationRefinePanels => "refine_target=True",
+        Setting::CalibrationWrite => "Calibration.save",
+        Setting::CharucoDictionary => "dictionary",
+        Setting::CharucoMarkerMm => "marker_mm",
+        Setting::CharucoSquareMm => "square_mm",
+        Setting::CharucoSquares => "squares",
+        Setting::CirclesCircles => "circles",
+        Setting::CirclesDiameterMm => "diameter_mm",
+        Setting::CirclesSpacingMm => "spacing_mm",
+        Setting::CompareBoardsAssumeTarget => "assume_target=True",
+        Setting::DetectionAssumeTargets => "assume_target=True",
+        Setting::DetectionWrite => "Detection.save",
+        Setting::DialectFork => "dsc-fork",
+        Setting::FamilyShippedNames => "Family.shipped()",
+        Setting::FamilyToJson => "Family.to_json",
+        Setting::FinishContour => "contour",
+        Setting::FinishWhite => "white",
+        Setting::ImportBits => "bits",
+        Setting::ImportDistance => "distance",
+        Setting::ImportKind => "kind",
+        Setting::LimitsMaxBytes => "max_bytes",
+        Setting::LimitsMaxDepth => "max_depth",
+        Setting::LimitsMaxNodes => "max_nodes",
+        Setting::LimitsMaxPixels => "max_pixels",
+        Setting::LimitsMaxPixelsPerByte => "max_pixels_per_byte",
+        Setting::LimitsMaxSeconds => "max_seconds",
+        Setting::MeshingTextures => "textures",
+        Setting::PaperGuidePage => "guide_page",
+        Setting::PaperLogo => "logo",
+        Setting::PaperLogoHeightMm => "logo_height_mm",
+        Setting::PaperMarginMm => "margin_mm",
+        Setting::PaperNote => "note",
+        Setting::PaperPacked => "packed",
+        Setting::PaperPoster => "poster",
+        Setting::PaperSize => "paper",
+        Setting::PaperTagIds => "tag_ids",
+        Setting::PhotographReadWithNotes => "accept_damaged=True",
+        Setting::PrintScale => "print_scale",
+        Setting::RegionImage => "region=\"image\"",
+        Setting::RigWrite => "Rig.save",
+        Setting::SightingBend => "shape",
+        Setting::SightingStretch => "print_scale",
+        Setting::SkeletonPanelThicknessMm => "panel_thickness_mm",
+        Setting::SkeletonRibMm => "rib_mm",
+        Setting::SkeletonWallMm => "wall_mm",
+        Setting::SolidBoardId => "board_id",
+        Setting::SolidEdgeMm => "edge_mm",
+        Setting::SolidMarginMm => "face_margin_mm",
+        Setting::SolidShapeCuboid => "size_mm",
+        Setting::SolidShapeMesh => "mesh",
+        Setting::SolidSheetsPerFace => "per_face",
+        Setting::SolidSheetsSeamedNet => "allow_seams",
+        Setting::SolidSkeleton => "skeleton",
+        Setting::SolidSquareTags => "square_family",
+        Setting::SolidSquareTagsFamily => "square_family",
+        Setting::SolidSquareTagsFirstId => "first_square_id",
+        Setting::SolidTiles => "tiles",
+        Setting::TagBorderBits => "tag_border",
+        Setting::TagFamily => "family",
+        Setting::TagFirstId => "first_id",
+        Setting::TagHoleMm => "hole_mm",
+        Setting::TagSheetBorderBits => "tag_border",
+        Setting::TagSheetEdgeMm => "edge_mm",
+        Setting::TagSheetFamily => "family",
+        Setting::TagSheetIds => "ids",
+        Setting::TagSpacing => "tag_spacing",
+        Setting::TagTagsIn => "tags_in",
+        Setting::TagsInBlack => "tags_in=\"black\"",
+        Setting::TargetName => "name",
+        Setting::TargetToJson => "Target.to_json",
+        Setting::UntaggedGridEdgeMm => "edge_mm",
+        Setting::UntaggedGridKind => "grid",
+        Setting::UntaggedGridSize => "rows and cols",
+    };
+    keyword.to_owned()
+}
 
-/// A message of the library on one line, with its settings as keywords.
+/// A message of the library on one line.
 pub fn told(message: &impl Display) -> String {
-    let text = with_short_quotes(&message.to_string().replace('\n', " ")).into_owned();
-    let (mut told, mut rest) = (String::with_capacity(text.len()), text.as_str());
-    while let Some((before, after)) = rest.split_once('`') {
-        told += before;
-        let found = KEYWORDS.iter().find_map(|(setting, keyword)| {
-            let after = after.strip_prefix(setting)?.strip_prefix('`')?;
-            Some((Cow::Borrowed(*keyword), after))
-        });
-        let (word, after) = found.unwrap_or((Cow::Borrowed("`"), after));
-        told += &word;
-        rest = after;
-    }
-    told + rest
+    with_short_quotes(&message.to_string().replace('\n', " ")).into_owned()
 }
 
 /// What became of work that was not to be finished.
@@ -254,15 +245,4 @@ pub fn warn(py: Python<'_>, what: &str) -> PyResult<()> {
 /// Where the work panics.
 pub fn unlocked<T: Send>(py: Python<'_>, work: impl FnOnce() -> T + Send) -> PyResult<T> {
     py.detach(|| limits::caught(work)).map_err(|broken| Fault::from(broken).into())
-}
-
-/// What settings are called here, by what the library calls them.
-#[pyfunction]
-pub fn _keywords() -> Vec<(&'static str, &'static str)> {
-    KEYWORDS.to_vec()
-}
-
-/// The same of a text of several lines.
-pub fn told_in_lines(text: &str) -> String {
-    text.split('\n').map(|line| told(&line)).collect::<Vec<_>>().join("\n")
 }

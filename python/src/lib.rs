@@ -95,8 +95,6 @@ mod _core {
     #[pymodule_export]
     use super::detector::{_detector, Detector};
     #[pymodule_export]
-    use super::errors::_keywords;
-    #[pymodule_export]
     use super::families::{Family, search_family};
     #[pymodule_export]
     use super::next_view::{NextView, next_view};
@@ -121,6 +119,7 @@ mod _core {
 
     #[pymodule_init]
     fn init(module: &Bound<'_, PyModule>) -> PyResult<()> {
+        deltille::setting::speak(errors::keyword);
         module.add("__version__", env!("CARGO_PKG_VERSION"))
     }
 }

@@ -8,14 +8,6 @@ import numpy
 import pytest
 
 import deltille
-from deltille import _core
-
-
-def test_every_setting_that_the_library_names_has_a_keyword(root):
-    """The words of the command line are held against the library by a test of its own."""
-    wording = (root / "crates/cli/src/wording.rs").read_text()
-    named = set(re.findall(r'^    named\("([^"]+)"', wording, re.M))
-    assert named and named == {setting for setting, _ in _core._keywords()}
 
 
 def test_errors_are_of_python_with_the_words_of_the_library(tmp_path):

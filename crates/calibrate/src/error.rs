@@ -2,6 +2,8 @@
 
 use std::fmt;
 
+use deltille_core::setting::Setting::CalibrationRefinePanels;
+
 /// How a rig moved too plainly to place cameras that do not see the same target.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum TooPlain {
@@ -196,7 +198,7 @@ pub enum CalibrationError {
     /// The shape of a target of several panels.
     #[error(
         "the target has {panels} panels: the shape of a sheet is found for one board; the places of \
-         the panels are found by `Calibration::refine_panels`"
+         the panels are found by {CalibrationRefinePanels}"
     )]
     ShapeOfMany {
         /// How many.

@@ -5,7 +5,6 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, bail, ensure};
 
-use crate::wording::in_options;
 use deltille::export::kind::Kind;
 use deltille::export::{atomic, staging};
 use deltille::limits::{Limits, ReadError};
@@ -65,9 +64,9 @@ pub fn print(text: &str) -> anyhow::Result<()> {
     }
 }
 
-/// A line as a terminal shows it, in the words of its user.
+/// A line as a terminal shows it.
 pub(crate) fn line(text: &str) -> String {
-    format!("{}\n", shown(&in_options(text)))
+    format!("{}\n", shown(text))
 }
 
 /// Prints a [`line`], and returns from the function where that fails.

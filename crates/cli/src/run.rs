@@ -43,6 +43,7 @@ pub fn run_with<A: Parser>(
     program: impl FnOnce(A) -> anyhow::Result<ExitCode>,
 ) -> ExitCode {
     interrupt::listen();
+    wording::speak();
     let mut command = A::command();
     let parsed = command.try_get_matches_from_mut(&arguments).and_then(|matches| {
         wording::runs(&command, &matches);

@@ -38,6 +38,7 @@ pub mod polygon;
 pub mod quantity;
 pub mod raster;
 pub mod reading;
+pub mod setting;
 pub mod statistics;
 pub mod targets;
 pub mod words;

@@ -4,6 +4,7 @@ use std::collections::BTreeSet;
 
 use deltille_core::family::places;
 use deltille_core::lattice::GridKind;
+use deltille_core::setting::Setting::{BoardBoardId, TagFirstId};
 use deltille_core::targets::Target;
 
 /// Why targets cannot be looked for together. Messages say what to do about it.
@@ -30,7 +31,7 @@ pub enum SceneError {
     /// Targets that show the same tags.
     #[error(
         "{first} and {second} both show tag {id} of {family}: make one of them with other ids, by {}",
-        if family == places::NAME { "`BoardSpec::board_id`" } else { "`TagSpec::first_id`" }
+        if family == places::NAME { BoardBoardId } else { TagFirstId }
     )]
     SameTag {
         /// A target.

@@ -28,6 +28,7 @@ use zune_jpeg::zune_core::options::DecoderOptions;
 
 use crate::limits::{self, Exceeded, Limits};
 use deltille_core::raster::{AnyGray, FileNotes, Gray};
+use deltille_core::setting::Setting::{LimitsMaxPixels, PhotographReadWithNotes};
 
 /// Most bytes of decompressed metadata in a PNG: profiles and texts.
 const MAX_BESIDE_BYTES: u64 = 32 << 20;
@@ -95,7 +96,7 @@ pub enum ImageError {
         exceeded: Exceeded,
     },
     /// The JPEG does not hold exactly its stated pixels.
-    #[error("{}: a damaged JPEG ({problem}): take it anew, or accept it by `photograph::read_with_notes`", path.display())]
+    #[error("{}: a damaged JPEG ({problem}): take it anew, or accept it by {PhotographReadWithNotes}", path.display())]
     Damaged {
         /// The file.
         path: PathBuf,
@@ -113,7 +114,7 @@ pub enum ImageError {
     /// The image, or its file, takes more memory than the limits allow, although its number of
     /// pixels does not exceed them.
     #[error(
-        "{}: takes more than {bytes} bytes of memory; `Limits::max_pixels` sets how many, 4 for each",
+        "{}: takes more than {bytes} bytes of memory; {LimitsMaxPixels} sets how many, 4 for each",
         path.display()
     )]
     Memory {

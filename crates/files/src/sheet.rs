@@ -1,6 +1,7 @@
 //! What is known of the printed sheet beforehand, put on views before they are calibrated.
 
 use deltille_calibrate::{PanelPlace, Reference, View};
+use deltille_core::setting::Setting::{CalibrationRefinePanels, PrintScale, SightingBend};
 use deltille_core::targets::{Target, TargetSpec};
 use deltille_layout::SheetLayout;
 
@@ -11,10 +12,10 @@ use crate::export::sheet::Sheet;
 #[non_exhaustive]
 pub enum SheetUseError {
     /// A print scale of several targets.
-    #[error("`Print::scale`: it is that of one target")]
+    #[error("{PrintScale}: it is that of one target")]
     ScaleOfMany,
     /// A shape of several targets.
-    #[error("`Sighting::bend`: it is that of one board")]
+    #[error("{SightingBend}: it is that of one board")]
     ShapeOfMany,
     /// Boards that lie about, in a scene.
     #[error(
@@ -23,30 +24,30 @@ pub enum SheetUseError {
     Loose,
     /// Two scales of a solid's net.
     #[error(
-        "`Print::scale`: faces that are stretched in one direction do not close to the solid that was planned: give \
-         one number for both, or find their places by `Calibration::refine_panels`"
+        "{PrintScale}: faces that are stretched in one direction do not close to the solid that was planned: give \
+         one number for both, or find their places by {CalibrationRefinePanels}"
     )]
     Skewed,
     /// A solid whose faces were printed one by one.
     #[error(
-        "`Print::scale`: faces that are printed one by one keep their places on the solid: those are found by \
-         `Calibration::refine_panels`"
+        "{PrintScale}: faces that are printed one by one keep their places on the solid: those are found by \
+         {CalibrationRefinePanels}"
     )]
     OneByOne,
     /// A board with two sides.
     #[error(
-        "`Print::scale`: the sides of a board are printed one by one, and how they lie to each other is found by \
-         `Calibration::refine_panels`: leave it out"
+        "{PrintScale}: the sides of a board are printed one by one, and how they lie to each other is found by \
+         {CalibrationRefinePanels}: leave it out"
     )]
     Sides,
     /// A scale of a target that was measured.
-    #[error("`Print::scale`: {0} says where its corners were measured, as they were printed")]
+    #[error("{PrintScale}: {0} says where its corners were measured, as they were printed")]
     ScaleOfMeasured(String),
     /// A shape of a target that was measured.
-    #[error("`Sighting::bend`: {0} says where its corners were measured, as they were printed")]
+    #[error("{SightingBend}: {0} says where its corners were measured, as they were printed")]
     ShapeOfMeasured(String),
     /// A shape of a target of several panels.
-    #[error("`Sighting::bend`: it is that of one board, and the target has several panels")]
+    #[error("{SightingBend}: it is that of one board, and the target has several panels")]
     ShapeOfPanels,
 }
 

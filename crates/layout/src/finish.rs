@@ -6,6 +6,9 @@ use serde::{Deserialize, Serialize};
 
 use crate::{LineKind, Printing, SheetLayout, SheetLine};
 use deltille_core::polygon::rectangle;
+use deltille_core::setting::Setting::{
+    self, BoardTwoSidedMm, FinishContour, FinishWhite, PaperGuidePage, PaperPoster,
+};
 use deltille_core::targets::TargetError;
 
 /// Width of the line to cut along, mm: the quarter of a point that print shops ask for.
@@ -45,14 +48,14 @@ impl Finish {
     }
 
     /// The spot colours, each with the setting that names it.
-    pub fn spots(&self) -> impl Iterator<Item = (&'static str, &str)> {
-        let white = self.white.as_deref().map(|name| ("Finish::white", name));
-        let contour = self.contour.as_deref().map(|name| ("Finish::contour", name));
+    pub fn spots(&self) -> impl Iterator<Item = (Setting, &str)> {
+        let white = self.white.as_deref().map(|name| (FinishWhite, name));
+        let contour = self.contour.as_deref().map(|name| (FinishContour, name));
         white.into_iter().chain(contour)
     }
 
     /// Checks the names; returns the setting at fault and what is wrong with it.
-    pub(super) fn check(&self) -> Result<(), (&'static str, String)> {
+    pub(super) fn check(&self) -> Result<(), (Setting, String)> {
         for (setting, name) in self.spots() {
             let is_plain = |c: char| c.is_ascii_alphanumeric() || " _-.".contains(c);
             let is_name =
@@ -68,7 +71,7 @@ impl Finish {
         }
         if self.white.is_some() && self.white == self.contour {
             let problem = "it is the name of the white, too: give another".to_owned();
-            return Err(("Finish::contour", problem));
+            return Err((FinishContour, problem));
         }
         Ok(())
     }
@@ -95,15 +98,15 @@ impl Printing {
         finish.check().map_err(|(setting, problem)| TargetError::invalid(setting, problem))?;
         if !finish.is_plain() && self.sheets.iter().any(|sheet| !sheet.pages.is_empty()) {
             let problem = "pages to be joined are neither mirrored nor printed in spot colours: take paper as large as the board";
-            return Err(TargetError::invalid("PaperSpec::poster", problem));
+            return Err(TargetError::invalid(PaperPoster, problem));
         }
         if !finish.is_plain() && self.sheets.iter().any(|sheet| sheet.placements.is_empty()) {
             let problem = "the guide is for paper, to be read as it is: make it with a plain print";
-            return Err(TargetError::invalid("PaperSpec::guide_page", problem));
+            return Err(TargetError::invalid(PaperGuidePage, problem));
         }
         if finish.mirrored && self.target.spec.two_sided_mm().is_some() {
             let problem = "each side is seen from its own front: leave the mirror image out";
-            return Err(TargetError::invalid("BoardSpec::two_sided_mm", problem));
+            return Err(TargetError::invalid(BoardTwoSidedMm, problem));
         }
         if finish.contour.is_some() {
             for sheet in &mut self.sheets {

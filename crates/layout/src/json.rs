@@ -5,6 +5,7 @@ use std::collections::BTreeSet;
 use glam::DVec2;
 
 use crate::{Printing, SheetLayout};
+use deltille_core::setting::Setting;
 use deltille_core::targets::TargetFileError;
 use deltille_core::targets::json;
 use deltille_core::targets::json::Printed;
@@ -49,8 +50,9 @@ impl Printing {
 /// Checks what the types do not say; returns the field at fault and what is wrong with it.
 fn check(printing: &Printing) -> Result<(), Problem> {
     let panels: BTreeSet<u32> = printing.target.panels.iter().map(|panel| panel.id).collect();
-    let named = |setting: &str| {
-        let field = setting.rsplit_once(':').map_or(setting, |(_, field)| field);
+    let named = |setting: Setting| {
+        let path = setting.path();
+        let field = path.rsplit_once(':').map_or(path, |(_, field)| field);
         format!("finish.{field}")
     };
     printing.finish.check().or_else(|(setting, what)| problem(named(setting), what))?;

@@ -11,6 +11,7 @@ use crate::{Finish, LineKind, Logo, Placement, SheetLayout, SheetLine};
 use deltille_core::angles::turn_of;
 use deltille_core::family::Family;
 use deltille_core::polygon::rectangle;
+use deltille_core::setting::Setting::{BoardEdgeMm, PaperNote, PaperPacked};
 use deltille_core::targets::shipped_family;
 use deltille_core::targets::{
     BoardSpec, FamilyRef, Panel, Target, TargetError, TargetSpec, fingerprint,
@@ -139,7 +140,7 @@ const LONGEST_NOTE: usize = 80;
 
 /// A note that can be printed.
 fn checked_note(note: &str) -> Result<&str, TargetError> {
-    let refused = |problem: String| Err(TargetError::invalid("PaperSpec::note", problem));
+    let refused = |problem: String| Err(TargetError::invalid(PaperNote, problem));
     let is_printed = |c: char| (' '..='~').contains(&c) || "°±·×–−".contains(c);
     let count = note.chars().count();
     match note.chars().find(|&c| !is_printed(c)) {
@@ -167,7 +168,7 @@ fn board_sheets(
     if paper.packed {
         if board.two_sided_mm.is_some() {
             let problem = "each side of a board has a sheet of its own: leave it out";
-            return Err(TargetError::invalid("PaperSpec::packed", problem));
+            return Err(TargetError::invalid(PaperPacked, problem));
         }
         return packed::sheets(name, board, panels, family, paper);
     }
@@ -203,7 +204,7 @@ fn poster(
 ) -> Result<SheetLayout, TargetError> {
     let corners = rectangle(panel.field_mm());
     let poster = Poster::new(&corners, paper)?;
-    poster.check("the board", ("BoardSpec::edge_mm", board.edge_mm), "", paper)?;
+    poster.check("the board", (BoardEdgeMm, board.edge_mm), None, paper)?;
     let mut sheet = poster.sheet();
     let motion = poster.sheet_from_points();
     sheet.placements.push(Placement {

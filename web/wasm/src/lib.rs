@@ -42,8 +42,10 @@ extern "C" {
     fn error(text: &str);
 }
 
-/// Where the library fails within, the browser's console says where; the page starts the module anew.
+/// Where the library fails within, the browser's console says where; the page starts the module anew. Messages name settings
+/// as the page does.
 #[wasm_bindgen(start)]
 pub fn start() {
+    deltille_core::setting::speak(errors::name);
     std::panic::set_hook(Box::new(|what| error(&format!("the library failed within: {what}"))));
 }

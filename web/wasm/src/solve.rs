@@ -11,7 +11,7 @@ use deltille_files::export::{calibration, camera, detection, next_view, saved};
 use deltille_files::report::{Report, Survey};
 use wasm_bindgen::prelude::*;
 
-use crate::errors::{Raise, named, told};
+use crate::errors::{Raise, told};
 
 /// A calibrated camera: its files and its page.
 #[wasm_bindgen]
@@ -68,7 +68,6 @@ impl Solved {
             "projection_sd_px": found.projection_sd_px(None, deltille_calibrate::Source::Noise),
         });
         let json = calibration::write(&estimate, &diagnoses, print, Residuals::LeftOut)
-            .map(|json| named(&json))
             .unwrap_or_default();
         let file = CameraFile {
             camera: found.camera.clone(),
@@ -80,7 +79,7 @@ impl Solved {
             json,
             opencv: camera::opencv(&found.camera).ok(),
             ros: camera::ros(&found.camera, "camera").ok(),
-            page: named(&page.html()),
+            page: page.html(),
             said,
             figures: figures.to_string(),
         })

@@ -26,6 +26,7 @@ use crate::uncertainty::projection::{
     INFINITY_MM, ObservedCovariance, Source, by_motion, by_parameters, seen_at,
 };
 use deltille_core::camera::Pose;
+use deltille_core::setting::Setting::{CompareBoardsAssumeTarget, RegionImage};
 use deltille_core::statistics::{chi_squared_chance, f_chance};
 use deltille_core::targets::{check_result_of, check_same_board};
 
@@ -110,7 +111,7 @@ pub enum ComparisonError {
     },
     /// No part of the image that both cover.
     #[error(
-        "too little of the image was seen by both, or lies in the region: take `Region::Image`, or a larger part"
+        "too little of the image was seen by both, or lies in the region: take {RegionImage}, or a larger part"
     )]
     Nothing,
 }
@@ -144,8 +145,10 @@ pub fn compare_boards(
     let boards = [first.calibrated_with.as_slice(), second.calibrated_with.as_slice()];
     if !assume_target {
         check_same_board(what, boards).map_err(|problem| {
-            problem
-                + "; calibrate both with its description, or set `compare_boards::assume_target` to compare them as they are"
+            format!(
+                "{problem}; calibrate both with its description, or set {CompareBoardsAssumeTarget} to compare them as \
+                 they are"
+            )
         })?;
     }
     if check_result_of(boards[0], boards[1]).is_err() {

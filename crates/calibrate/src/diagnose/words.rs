@@ -11,6 +11,10 @@ use crate::input::panel::PanelRef;
 use crate::model::Model;
 use crate::start::symmetry::LabelRotation;
 use deltille_core::camera::Camera;
+use deltille_core::setting::Setting::{
+    CalibrateModel, CalibrationBoardShape, CalibrationMeasureTarget, CalibrationRefinePanels,
+    SightingBend, SightingStretch,
+};
 use deltille_core::words::{counted, p_value, places};
 
 /// A panel that is turned by less looks only moved.
@@ -173,7 +177,7 @@ impl<'a> Words<'a> {
                         };
                         format!(
                             "it seems displaced by {by_mm:.2} mm{turned} from where the target's file has \
-                             it (`Calibration::refine_panels` finds where panels are)"
+                             it ({CalibrationRefinePanels} finds where panels are)"
                         )
                     }
                     None => {
@@ -219,7 +223,7 @@ impl<'a> Words<'a> {
             Instead::Model(other) => (
                 match model {
                     Some(model) => {
-                        format!("the lens is not one of `{model}`: take `calibrate::Model` {other}")
+                        format!("the lens is not one of `{model}`: take {CalibrateModel} {other}")
                     }
                     None => GIVEN_CAMERA.to_owned(),
                 },
@@ -270,7 +274,7 @@ impl<'a> Words<'a> {
             return format!("panels are not flat or not printed as stated{most}");
         }
         format!(
-            "panels are not where the target's file has them{most}: `Calibration::refine_panels` finds \
+            "panels are not where the target's file has them{most}: {CalibrationRefinePanels} finds \
              where they are"
         )
     }
@@ -279,13 +283,13 @@ impl<'a> Words<'a> {
         let scale = match self.print_scale {
             // The same scale both ways leaves nothing behind.
             Some([across, up]) if across != up => {
-                format!("`Sighting::stretch` {across},{up} is not how it was printed, or ")
+                format!("{SightingStretch} {across},{up} is not how it was printed, or ")
             }
             _ => String::new(),
         };
         let bars = match self.print_scale {
-            Some(_) => "measure its check bars again",
-            None => "measure its check bars for `Sighting::stretch`",
+            Some(_) => "measure its check bars again".to_owned(),
+            None => format!("measure its check bars for {SightingStretch}"),
         };
         let measuring = self.measuring();
         match (self.estimate.shape, model) {
@@ -293,17 +297,17 @@ impl<'a> Words<'a> {
                 "{scale}the board is not the same in all views: glue it on something flat, {bars}"
             ),
             (Some(_), _) => format!(
-                "{scale}the board is bent in more ways than `Calibration::board_shape` describes, or not \
+                "{scale}the board is bent in more ways than {CalibrationBoardShape} describes, or not \
                  the same in all views: {measuring}, glue it on something flat, {bars}"
             ),
             (None, Some(_)) => format!(
                 "{scale}the board is not flat or not printed as stated: try \
-                 `Calibration::board_shape`, {measuring}, {bars}"
+                 {CalibrationBoardShape}, {measuring}, {bars}"
             ),
             (None, None) => format!(
                 "{scale}the board is not flat or not printed as stated, or the camera that was given is \
-                 another one: find its shape by a calibration with `Calibration::board_shape`, \
-                 and give it by `Sighting::bend`, {bars}"
+                 another one: find its shape by a calibration with {CalibrationBoardShape}, \
+                 and give it by {SightingBend}, {bars}"
             ),
         }
     }
@@ -312,11 +316,11 @@ impl<'a> Words<'a> {
     fn measuring(&self) -> String {
         match self.estimate.views_of_a_corner() {
             views if views >= LEAST_TO_MEASURE => {
-                "find the place of every corner by `Calibration::measure_target`".to_owned()
+                format!("find the place of every corner by {CalibrationMeasureTarget}")
             }
             views => format!(
                 "take at least {LEAST_TO_MEASURE} views of every corner, not {views}, to find their places by \
-                 `Calibration::measure_target`"
+                 {CalibrationMeasureTarget}"
             ),
         }
     }
@@ -359,7 +363,7 @@ fn does_not_fit(model: Option<Model>, rms_px: f64) -> String {
     let others: Vec<String> = richer.chain(fisheye).map(|model| model.to_string()).collect();
     let advice = match others.as_slice() {
         [] => "none of the richer models here does".to_owned(),
-        others => format!("try `calibrate::Model` {}", others.join(" or ")),
+        others => format!("try {CalibrateModel} {}", others.join(" or ")),
     };
     format!(
         "the model does not fit the lens ({of}{rms_px:.1} px, more than {} % of the image's width): {advice}; or \
@@ -415,7 +419,7 @@ fn stretched(stretch: &BoardStretch) -> String {
     format!(
         "the board is {:.digits$} ± {:.digits$} % longer along {along} than described, compared with {other} ({}): it \
          is another board, its tiles have two different edges, or the print was fitted to its page; correct the \
-         description, or measure both check bars for `Sighting::stretch`",
+         description, or measure both check bars for {SightingStretch}",
         100.0 * (ratio - 1.0),
         100.0 * sd,
         p_value(significance)
@@ -426,7 +430,7 @@ fn stretched(stretch: &BoardStretch) -> String {
 /// the lens as well.
 fn cannot_tell_apart(parameters: &[String], sufficient: Option<Model>) -> String {
     let advice = match sufficient {
-        Some(model) => format!("take `calibrate::Model` {model}, which holds this lens as well"),
+        Some(model) => format!("take {CalibrateModel} {model}, which holds this lens as well"),
         None => "fill the corners of the image, or choose a model with fewer parameters".to_owned(),
     };
     format!(
@@ -443,7 +447,7 @@ fn other_lens(model: Option<Model>) -> String {
     match model.richer().iter().map(|model| format!("`{model}`")).collect::<Vec<_>>().as_slice() {
         [] => format!("the lens is not one of `{model}`, nor of any richer model here"),
         models => format!(
-            "the lens is not one of `{model}`: try `calibrate::Model` {}",
+            "the lens is not one of `{model}`: try {CalibrateModel} {}",
             models.join(" or ")
         ),
     }

@@ -6,13 +6,19 @@ use glam::DVec3;
 
 use deltille_core::detection::Grid;
 use deltille_core::lattice::{GridKind, LatticeMap};
+use deltille_core::setting::Setting::{
+    DetectionAssumeTargets, UntaggedGridEdgeMm, UntaggedGridSize,
+};
 use deltille_core::targets::{
     BoardSpec, Target, TargetError, TargetIdentity, TargetSpec, board_vertices, symmetries,
 };
 
 /// What to do about detections of another target.
-pub(super) const ASSUME_TARGET: &str = "give the description that it was detected with, or set \
-                                        `Detection::assume_targets` to assume this one";
+pub(super) fn assume_target() -> String {
+    format!(
+        "give the description that it was detected with, or set {DetectionAssumeTargets} to assume this one"
+    )
+}
 
 /// An untagged board that no file describes. Its labels may differ between views by a motion of the
 /// lattice, which the pose of the view takes up.
@@ -47,13 +53,15 @@ impl UntaggedGrid {
     pub(super) fn check_target(&self, seen: Option<&TargetIdentity>) -> Result<(), String> {
         match seen {
             Some(seen) if seen.edge_mm != [self.edge_mm; 2] => Err(format!(
-                "it was detected as {seen}, but `UntaggedGrid::edge_mm` is {} mm: {ASSUME_TARGET}",
-                self.edge_mm
+                "it was detected as {seen}, but {UntaggedGridEdgeMm} is {} mm: {}",
+                self.edge_mm,
+                assume_target()
             )),
             Some(seen) if self.size.is_some_and(|[rows, cols]| rows * cols != seen.corners) => {
                 Err(format!(
-                    "it was detected as {seen}, but `UntaggedGrid::size` has {} corners: {ASSUME_TARGET}",
-                    self.size.map_or(0, |[rows, cols]| rows * cols)
+                    "it was detected as {seen}, but {UntaggedGridSize} has {} corners: {}",
+                    self.size.map_or(0, |[rows, cols]| rows * cols),
+                    assume_target()
                 ))
             }
             _ => Ok(()),
@@ -77,7 +85,7 @@ impl UntaggedGrid {
         }
         Err(if labels == self.labels(cols, rows) {
             format!(
-                "it has {cols} rows × {rows} columns: those of `UntaggedGrid::size` are exchanged"
+                "it has {cols} rows × {rows} columns: those of {UntaggedGridSize} are exchanged"
             )
         } else {
             format!("its rows and columns are not those of a board of {rows} × {cols} corners")

@@ -4,17 +4,19 @@ use std::collections::BTreeMap;
 
 use glam::DVec3;
 
-use super::grid::{ASSUME_TARGET, UntaggedGrid};
+use super::grid::{UntaggedGrid, assume_target};
 use super::observation::{Observation, Sighting, View};
 use super::panel::{PanelPlace, PanelRef};
 use deltille_core::camera::Pose;
 use deltille_core::detection::{Detection, Grid};
 use deltille_core::lattice::LatticeMap;
+use deltille_core::setting::Setting::UntaggedGridKind;
 use deltille_core::targets::{Panel, Target, TargetIdentity};
 
 /// What is wrong with a board of the other tiling.
-const OTHER_KIND: &str =
-    "the board in it has the other tiling: give `UntaggedGrid::kind` that of the board";
+fn other_kind() -> String {
+    format!("the board in it has the other tiling: give {UntaggedGridKind} that of the board")
+}
 
 /// What follows from labels that are not on the target.
 const OTHER_TARGET: &str = "; the target does not belong to this detection";
@@ -167,7 +169,7 @@ impl Reference<'_> {
                 let of_kind = detection.grids.iter().filter(|grid| grid.kind == board.kind);
                 let Some(grid) = of_kind.max_by_key(|grid| grid.corners.len()) else {
                     return match detection.grids.first() {
-                        Some(_) => Err((None, OTHER_KIND.to_owned())),
+                        Some(_) => Err((None, other_kind())),
                         None => Ok(Vec::new()),
                     };
                 };
@@ -230,7 +232,8 @@ impl Reference<'_> {
         let confusable = identities.iter().find(|own| own.is_confusable(seen));
         match confusable.or_else(|| identities.first().filter(|_| grid.target.is_none())) {
             Some(own) => Err(format!(
-                "it was detected as {seen}, but the target given is {own}: {ASSUME_TARGET}"
+                "it was detected as {seen}, but the target given is {own}: {}",
+                assume_target()
             )),
             None => Ok(None),
         }

@@ -17,7 +17,6 @@ use super::page::check_images;
 use super::sightings::{Sightings, SightingsArgs};
 use crate::output::{self, Overwrite, tell};
 use crate::run::{FAILED, report};
-use crate::wording::in_options;
 use deltille::calibrate::{CameraEstimate, Estimate, Intrinsics, Source};
 use deltille::camera::{Camera, CameraFile, Lens, PROJECTION_PARAMETERS, Pose, SplineGrid};
 use deltille::export::camera::{FormatError, colmap, kalibr, mrcal, nerfstudio, opencv, ros};
@@ -145,7 +144,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
             Some(_) => &estimate.calibrated_with,
             None => &known_with,
         };
-        (files, refused) = args.files(&stem, &camera.camera, of_camera, &views, &in_options(&json));
+        (files, refused) = args.files(&stem, &camera.camera, of_camera, &views, &json);
     }
     files.extend(solved.measured(&stem, target.as_ref()));
     let mut written = write_all(folder, &files, args.overwrite)?;

@@ -16,7 +16,6 @@ use super::tables::{self, Tables};
 use crate::output::{self, Overwrite, tell};
 use crate::run::{self, BAD_INPUT, FAILED, Interrupted};
 use crate::values::whole;
-use crate::wording::in_options;
 use crate::{interrupt, progress};
 use deltille::clock;
 use deltille::detect::{Detection, Detector, InkEstimate};
@@ -292,7 +291,7 @@ fn row_of(name: Option<String>, result: &mut anyhow::Result<Outcome>) -> Option<
     match result {
         Ok(Outcome::Seen(found)) => found.row.take(),
         Ok(Outcome::Skipped) => None,
-        Err(error) => Some(Picture::unread(name?, in_options(&run::message(error)))),
+        Err(error) => Some(Picture::unread(name?, run::message(error))),
     }
 }
 

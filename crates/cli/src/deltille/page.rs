@@ -7,7 +7,6 @@ use anyhow::{Context, ensure};
 
 use super::calibrating::Calibrated;
 use crate::output::{self, Overwrite, tell};
-use crate::wording::in_options;
 use deltille::calibrate::{View, ViewEstimate};
 use deltille::photograph;
 use deltille::raster::{AnyGray, Gray};
@@ -54,7 +53,7 @@ impl Calibrated {
         (report.diagnoses, report.stated) = (diagnoses, stated);
         (report.print, report.thumbnails) = (*print, thumbnails);
         (report.samples, report.models) = (samples, models);
-        output::write(page, in_options(&report.html()).as_bytes(), overwrite).context("--report")
+        output::write(page, report.html().as_bytes(), overwrite).context("--report")
     }
 }
 

@@ -11,7 +11,6 @@ use super::sightings::{GridArgs, SheetArgs};
 use super::{camera_file, sightings, target_file};
 use crate::output::{self, Overwrite, say, tell};
 use crate::run::FAILED;
-use crate::wording::in_options;
 use deltille::calibrate::{Calibration, Diagnosis, Estimate, Reference, Words, views};
 use deltille::camera::Camera;
 use deltille::detect::{Detection, Detector, DetectorConfig};
@@ -96,7 +95,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
                 tell!("error: {why}");
                 (without, unread) = (without + 1, unread + 1);
                 for target in finder.targets.iter().filter(|_| args.every_picture) {
-                    of_image += &(pose::write_none(&name, &target.name, &in_options(&why)) + "\n");
+                    of_image += &(pose::write_none(&name, &target.name, &why) + "\n");
                 }
             }
             Seen::Targets(found) => {
@@ -115,7 +114,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
                                 tell!("{}: {}{why}", image.display(), finder.of_target(target));
                             }
                             if args.every_picture {
-                                let line = pose::write_none(&name, &target.name, &in_options(&why));
+                                let line = pose::write_none(&name, &target.name, &why);
                                 of_image += &(line + "\n");
                             }
                         }

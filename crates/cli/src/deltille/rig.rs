@@ -17,7 +17,6 @@ use super::sightings::{GridArgs, SheetArgs};
 use super::{camera_file, sightings, target_file};
 use crate::output::{Overwrite, check_folder, fixed, say, tell};
 use crate::run::{FAILED, report};
-use crate::wording::in_options;
 use deltille::calibrate::{
     Calibration, CameraViews, Estimate, Excluded, Intrinsics, Reference, TargetMap,
 };
@@ -178,7 +177,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let cameras = estimate.cameras.iter();
     let cameras = cameras.map(|c| (c.name.as_str(), &c.camera, c.camera_from_rig));
     let cameras = cameras.collect::<Vec<_>>();
-    let (files, refused) = args.files(&cameras, &in_options(&json), estimate, &printed)?;
+    let (files, refused) = args.files(&cameras, &json, estimate, &printed)?;
     let mut written = write_all(&args.output, &files, args.overwrite)?;
     if let Some(page) = page {
         let folder = |(name, _): &(String, PathBuf)| of_name(&args.images, name);

@@ -258,19 +258,12 @@ pub fn put_on(sheet: &Sheet, target: Option<&Target>, views: &mut [View]) -> any
 
 /// What is wrong with a sheet, in words of the command line.
 fn told(error: SheetUseError) -> anyhow::Error {
-    let text = match error {
-        SheetUseError::Loose => {
+    match error {
+        SheetUseError::Loose => anyhow!(
             "--target: boards of one file that lie about have no place in a scene: make a file for each"
-                .to_owned()
-        }
-        _ => error.to_string(),
-    };
-    let named = [
-        ("`Print::scale`", "--print-scale"),
-        ("`Sighting::bend`", "--shape"),
-        ("`Calibration::refine_panels`", "`rig --refine-target`"),
-    ];
-    anyhow!(named.into_iter().fold(text, |text, (setting, option)| text.replace(setting, option)))
+        ),
+        _ => error.into(),
+    }
 }
 
 /// What detections show.

@@ -1,4 +1,5 @@
 use crate::reading::in_words;
+use crate::setting::Setting::FamilyToJson;
 
 /// What is wrong with a family, its text or its name.
 #[derive(Debug, thiserror::Error)]
@@ -16,12 +17,12 @@ pub enum FamilyError {
         shipped: Vec<&'static str>,
     },
     /// Not JSON, cut off, or with a field missing, unknown or of the wrong type.
-    #[error("not a family file: {}; generate it anew with `Family::to_json`", in_words(.0))]
+    #[error("not a family file: {}; generate it anew with {FamilyToJson}", in_words(.0))]
     Json(#[from] serde_json::Error),
     /// Another schema, or another version of it.
     #[error(
         "field `schema` is `{found}`, this version reads `{}`: generate the file anew with \
-         `Family::to_json`",
+         {FamilyToJson}",
         crate::family::SCHEMA
     )]
     Schema {

@@ -1,5 +1,6 @@
 use crate::family::{Family, FamilyError, places};
-use crate::targets::boards::capacity::Setting;
+use crate::setting::Setting::{BoardBoardId, SolidBoardId, TargetName};
+use crate::targets::boards::capacity::TagSettings;
 use crate::targets::boards::{aprilgrid, board, charuco, circles, tag_sheet};
 use crate::targets::solids::solid;
 use crate::targets::{FamilyRef, Name, Target, TargetError, TargetSpec};
@@ -42,8 +43,7 @@ impl Target {
         spec: &TargetSpec,
         family: Option<&Family>,
     ) -> Result<Target, TargetError> {
-        let name =
-            Name::new(name).map_err(|problem| TargetError::invalid("Target::name", problem))?;
+        let name = Name::new(name).map_err(|problem| TargetError::invalid(TargetName, problem))?;
         let (panels, family) = match spec {
             TargetSpec::Board(spec) => {
                 spec.check()?;
@@ -94,13 +94,13 @@ impl Target {
                 // Place codes follow from the ids of boards.
                 && family.name != places::NAME
             {
-                let setting = Setting::of(kind, self.tilings().count() > 1);
-                overlap(setting.first_id(), "tag ids", &ids, &others)?;
+                let settings = TagSettings::of(kind, self.tilings().count() > 1);
+                overlap(settings.first_id(), "tag ids", &ids, &others)?;
             }
         }
         let board_id = match self.spec {
-            TargetSpec::Solid(_) => "SolidSpec::board_id",
-            _ => "BoardSpec::board_id",
+            TargetSpec::Solid(_) => SolidBoardId,
+            _ => BoardBoardId,
         };
         overlap(board_id, "board ids", &boards(self), &boards(other))
     }

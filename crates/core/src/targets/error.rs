@@ -1,3 +1,7 @@
+use crate::setting::Setting::{
+    self, BoardCols, BoardEdgeMm, BoardRows, PaperMarginMm, PaperPoster, PaperSize, TagFamily,
+};
+
 /// Why a target cannot be made. Messages name the setting to change, such as `BoardSpec::rows`.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
@@ -9,15 +13,15 @@ pub enum TargetError {
     #[error("a listed target is read from its list, it cannot be made anew")]
     Listed,
     /// A value that is no use by itself.
-    #[error("`{setting}`: {problem}")]
+    #[error("{setting}: {problem}")]
     Invalid {
         /// The field or variant, such as `BoardSpec::rows`.
-        setting: &'static str,
+        setting: Setting,
         /// What is wrong and what would do.
         problem: String,
     },
     /// Tags are asked for and no family was given, or another one.
-    #[error("`TagSpec::family`: the target carries tags of {wanted}, {given}")]
+    #[error("{TagFamily}: the target carries tags of {wanted}, {given}")]
     Family {
         /// The family asked for.
         wanted: String,
@@ -26,11 +30,11 @@ pub enum TargetError {
     },
     /// More tags than codes.
     #[error(
-        "`{setting}`: tags {first} to {last} are needed, but family {family} ends at {end}: {instead}"
+        "{setting}: tags {first} to {last} are needed, but family {family} ends at {end}: {instead}"
     )]
     IdsRunOut {
         /// The field to change, such as `TagSpec::first_id`.
-        setting: &'static str,
+        setting: Setting,
         /// First id needed.
         first: u32,
         /// Last id needed.
@@ -43,10 +47,10 @@ pub enum TargetError {
         instead: String,
     },
     /// Targets to be used together share ids.
-    #[error("`{setting}`: {what} {first} to {last} overlap those of `{other}`: start at {free}")]
+    #[error("{setting}: {what} {first} to {last} overlap those of `{other}`: start at {free}")]
     Overlap {
         /// The field to change, such as `TagSpec::first_id`.
-        setting: &'static str,
+        setting: Setting,
         /// Ids of what.
         what: &'static str,
         /// Lowest id.
@@ -60,12 +64,12 @@ pub enum TargetError {
     },
     /// The board is too large for the paper.
     #[error(
-        "`PaperSpec::size`: {rows} × {cols} corners with {edge} edges and what is printed around them do \
-         not fit {paper}: take larger paper, {}fewer `BoardSpec::rows` or `BoardSpec::cols`, or {}",
-        if *packed { "" } else { "several pages by `PaperSpec::poster`, " },
+        "{PaperSize}: {rows} × {cols} corners with {edge} edges and what is printed around them do \
+         not fit {paper}: take larger paper, {}fewer {BoardRows} or {BoardCols}, or {}",
+        if *packed { String::new() } else { format!("several pages by {PaperPoster}, ") },
         match fitting_edge_mm {
-            Some(mm) => format!("`BoardSpec::edge_mm` of at most {mm} mm"),
-            None => "a smaller `PaperSpec::margin_mm`".to_owned(),
+            Some(mm) => format!("{BoardEdgeMm} of at most {mm} mm"),
+            None => format!("a smaller {PaperMarginMm}"),
         }
     )]
     DoesNotFit {
@@ -87,7 +91,7 @@ pub enum TargetError {
 impl TargetError {
     /// A setting that is refused.
     #[doc(hidden)]
-    pub fn invalid(setting: &'static str, problem: impl Into<String>) -> Self {
+    pub fn invalid(setting: Setting, problem: impl Into<String>) -> Self {
         Self::Invalid { setting, problem: problem.into() }
     }
 }

@@ -12,6 +12,7 @@ use crate::json::{self, ReadError};
 use crate::lattice::{GridKind, Vertex};
 use crate::quantity;
 use crate::reading::in_words;
+use crate::setting::Setting::TargetToJson;
 use crate::targets::{FamilyRef, Fingerprint, Name, Panel, Target, TargetIdentity, TargetSpec};
 
 /// Schema and version that this crate writes and reads.
@@ -38,7 +39,7 @@ const COVARIANCE_SLACK: f64 = 1e-6;
 #[non_exhaustive]
 pub enum TargetFileError {
     /// Not JSON, or cut off.
-    #[error("not a target file: {}; make it anew with `Target::to_json`", in_words(.0))]
+    #[error("not a target file: {}; make it anew with {TargetToJson}", in_words(.0))]
     Json(serde_json::Error),
     /// A file of something else.
     #[error(

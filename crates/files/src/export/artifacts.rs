@@ -27,6 +27,7 @@ use crate::export::{laser_file_name, sheet_file_name};
 use crate::limits::{Limits, ReadError};
 use crate::target_file;
 use deltille_core::family::Family;
+use deltille_core::setting::Setting::SolidSkeleton;
 use deltille_core::targets::{
     Skeleton, SolidSpec, Target, TargetError, TargetIdentity, TargetSpec,
 };
@@ -163,7 +164,7 @@ pub enum MakeError {
     #[error("{0} is no solid: only solids are meshes")]
     NotSolid(String),
     /// It has no skeleton.
-    #[error("{0} has no skeleton: set `SolidSpec::skeleton`")]
+    #[error("{0} has no skeleton: set {SolidSkeleton}")]
     NoSkeleton(String),
     /// Its specification makes none.
     #[error(transparent)]

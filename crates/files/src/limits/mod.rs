@@ -23,6 +23,11 @@ use std::io::{self, Read};
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
+use deltille_core::setting::Setting::{
+    LimitsMaxBytes, LimitsMaxDepth, LimitsMaxNodes, LimitsMaxPixels, LimitsMaxPixelsPerByte,
+    LimitsMaxSeconds,
+};
+
 pub use guard::{Broken, Guard, bounded, caught};
 
 /// Most bytes of a settings file: a camera, a template, rules. Most have a hundredth of it, and
@@ -106,33 +111,27 @@ impl fmt::Display for Exceeded {
         let limit = self.limit;
         match self.kind {
             Kind::Bytes => {
-                write!(f, "more than {limit} bytes; `Limits::max_bytes` sets how many are read")
+                write!(f, "more than {limit} bytes; {LimitsMaxBytes} sets how many are read")
             }
             Kind::Pixels => {
                 let mega = limit / 1e6;
-                write!(
-                    f,
-                    "more than {mega} megapixels; `Limits::max_pixels` sets how many are read"
-                )
+                write!(f, "more than {mega} megapixels; {LimitsMaxPixels} sets how many are read")
             }
             Kind::PixelsPerByte => {
                 write!(f, "more than {limit} pixels for each byte, as no photograph has; ")?;
-                write!(f, "`Limits::max_pixels_per_byte` sets how many are read")
+                write!(f, "{LimitsMaxPixelsPerByte} sets how many are read")
             }
             Kind::Nodes => {
-                write!(f, "more than {limit} parts; `Limits::max_nodes` sets how many are read")
+                write!(f, "more than {limit} parts; {LimitsMaxNodes} sets how many are read")
             }
             Kind::Depth => {
                 write!(
                     f,
-                    "parts more than {limit} deep; `Limits::max_depth` sets how deep they may be"
+                    "parts more than {limit} deep; {LimitsMaxDepth} sets how deep they may be"
                 )
             }
             Kind::Seconds => {
-                write!(
-                    f,
-                    "not done after {limit} s; `Limits::max_seconds` sets how long it may take"
-                )
+                write!(f, "not done after {limit} s; {LimitsMaxSeconds} sets how long it may take")
             }
         }
     }

@@ -5,6 +5,7 @@ use crate::report::content::Report;
 use crate::report::measures::survey::Survey;
 use deltille_calibrate::{CameraEstimate, Diagnosis, Excluded, Parameter};
 use deltille_core::camera::Lens;
+use deltille_core::setting::Setting::{CalibrationBoardShape, CalibrationRefinePanels, PrintScale};
 use deltille_core::statistics::median;
 use deltille_core::words::counted;
 
@@ -125,10 +126,10 @@ pub fn advice(report: &Report, surveys: &[Survey]) -> Vec<Advice> {
         }
     }
     if report.print.scale.is_none() {
-        let text =
-            "Distances are as true as the print: measure both check bars of the sheet and give \
-                    `Print::scale`. Focal lengths and distortion do not depend on it where both are off alike."
-                .to_owned();
+        let text = format!(
+            "Distances are as true as the print: measure both check bars of the sheet and give {PrintScale}. Focal \
+             lengths and distortion do not depend on it where both are off alike."
+        );
         add(Weight::Hint, text);
     }
     found.sort_by_key(|advice| std::cmp::Reverse(advice.weight));
@@ -367,9 +368,9 @@ fn residuals(report: &Report, index: usize, survey: &Survey, add: &mut impl FnMu
             let (target, remedy) = match report.has_panels() {
                 true => (
                     "panels are not flat or not where the target's file has them",
-                    "`Calibration::refine_panels`",
+                    CalibrationRefinePanels,
                 ),
-                false => ("the board is not flat", "`Calibration::board_shape`"),
+                false => ("the board is not flat", CalibrationBoardShape),
             };
             add(
                 Weight::Hint,

@@ -12,6 +12,7 @@ use kurbo::{BezPath, PathEl, Point};
 use serde::{Deserialize, Serialize};
 
 use crate::{PaperSpec, SheetLayout};
+use deltille_core::setting::Setting::{PaperLogo, PaperLogoHeightMm, PaperSize};
 use deltille_core::targets::TargetError;
 use deltille_core::targets::format_mm;
 use deltille_core::{polygon, quantity};
@@ -155,7 +156,7 @@ fn width(outline: &[DVec2]) -> f64 {
 }
 
 fn refused<T>(problem: impl Into<String>) -> Result<T, TargetError> {
-    Err(TargetError::invalid("PaperSpec::logo", problem.into()))
+    Err(TargetError::invalid(PaperLogo, problem.into()))
 }
 
 impl fmt::Display for Logo {
@@ -261,10 +262,10 @@ impl LogoSize {
 
 /// Refuses a height without a logo, or one that no logo has.
 pub(crate) fn check(paper: &PaperSpec) -> Result<(), TargetError> {
-    let refused = |problem| Err(TargetError::invalid("PaperSpec::logo_height_mm", problem));
+    let refused = |problem| Err(TargetError::invalid(PaperLogoHeightMm, problem));
     match paper.logo_height_mm {
         Some(_) if paper.logo.is_none() => {
-            refused("there is no logo: give `PaperSpec::logo`, or leave it out".to_owned())
+            refused(format!("there is no logo: give {PaperLogo}, or leave it out"))
         }
         Some(height) if !HEIGHT_MM.contains(&height) => {
             let [least, most] = [*HEIGHT_MM.start(), *HEIGHT_MM.end()].map(format_mm);
@@ -292,19 +293,19 @@ pub(crate) fn check_sheets(sheets: &[SheetLayout], paper: &PaperSpec) -> Result<
     match paper.logo_height_mm {
         Some(asked) if least < asked - SLACK_MM => {
             let remedy = if least < *HEIGHT_MM.start() {
-                "take larger `PaperSpec::size`".to_owned()
+                format!("take larger {PaperSize}")
             } else {
-                format!("take at most {fitting}, or larger `PaperSpec::size`")
+                format!("take at most {fitting}, or larger {PaperSize}")
             };
             let problem = format!(
                 "beside what else is printed there is no room for a logo {} high: {remedy}",
                 format_mm(asked)
             );
-            Err(TargetError::invalid("PaperSpec::logo_height_mm", problem))
+            Err(TargetError::invalid(PaperLogoHeightMm, problem))
         }
         None if least < *HEIGHT_MM.start() => refused(format!(
             "{:.1} times as wide as high it would find room only {fitting} high, less than {}: take larger \
-             `PaperSpec::size`, or a logo that is less wide",
+             {PaperSize}, or a logo that is less wide",
             logo.width(),
             format_mm(*HEIGHT_MM.start()),
         )),

@@ -7,6 +7,7 @@ use glam::DVec2;
 use crate::{Label, Placement, SheetLayout, SheetText};
 use deltille_core::family::places;
 use deltille_core::lattice::{GridKind, Tile, Vertex};
+use deltille_core::setting::Setting::PaperTagIds;
 use deltille_core::targets::format_mm;
 use deltille_core::targets::{Panel, TagPlacement, TagsIn, Target, TargetError};
 
@@ -21,7 +22,7 @@ const LEAST_CAP_MM: f64 = 0.7;
 
 /// Adds the ids to all sheets of a target.
 pub(crate) fn add(target: &Target, sheets: &mut [SheetLayout]) -> Result<(), TargetError> {
-    let refused = |problem: String| Err(TargetError::invalid("PaperSpec::tag_ids", problem));
+    let refused = |problem: String| Err(TargetError::invalid(PaperTagIds, problem));
     if target.panels.iter().all(|panel| panel.tags.is_empty()) {
         return refused("there are no tags: leave it out".to_owned());
     }

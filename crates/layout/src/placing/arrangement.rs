@@ -21,6 +21,7 @@ use crate::{CheckBar, Label, LineKind, Placement, SheetLayout, SheetLine, SheetT
 use deltille_core::family::places;
 use deltille_core::lattice::GridKind;
 use deltille_core::polygon::rectangle;
+use deltille_core::setting::Setting::PaperMarginMm;
 use deltille_core::targets::format_mm;
 use deltille_core::targets::size_mm;
 use deltille_core::targets::{BoardSpec, FamilyRef, Fingerprint, Panel, TagsIn, TargetError};
@@ -197,7 +198,7 @@ pub(crate) fn check_margin(paper: &PaperSpec) -> Result<f64, TargetError> {
     let margin = paper.margin_mm;
     if !(0.0..=100.0).contains(&margin) {
         let problem = format!("{} is not between 0 mm and 100 mm", format_mm(margin));
-        return Err(TargetError::invalid("PaperSpec::margin_mm", problem));
+        return Err(TargetError::invalid(PaperMarginMm, problem));
     }
     Ok(margin.max(LEAST_MARGIN_MM))
 }

@@ -23,6 +23,7 @@ use super::net::Sides;
 use crate::paper::PaperSpec;
 use crate::{Label, LineKind, Placement, SheetLayout, SheetLine, SheetText};
 use deltille_core::angles::turn_of;
+use deltille_core::setting::Setting::{PaperSize, SolidEdgeMm};
 use deltille_core::targets::format_mm;
 use deltille_core::targets::sides;
 use deltille_core::targets::{
@@ -132,12 +133,12 @@ fn arrange(
     }
     let paper = paper.size.as_ref().map_or("even A0".to_owned(), ToString::to_string);
     let instead = fitting.map_or("larger paper".to_owned(), |mm| {
-        format!("larger paper, or `SolidSpec::edge_mm` of at most {mm} mm")
+        format!("larger paper, or {SolidEdgeMm} of at most {mm} mm")
     });
     let edge = format_mm(spec.edge_mm);
     let problem =
         format!("a face with {edge} edges and its marks do not fit {paper}: take {instead}");
-    Err(TargetError::invalid("PaperSpec::size", problem))
+    Err(TargetError::invalid(PaperSize, problem))
 }
 
 /// Adds cutting marks, numbers and instructions.

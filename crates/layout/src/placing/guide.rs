@@ -21,6 +21,7 @@ use crate::paper::{Orientation, PaperSize, PaperSpec, SolidSheets};
 use crate::{Label, LineKind, SheetLayout, SheetLine, SheetText};
 use deltille_core::lattice::{GridKind, Tile};
 use deltille_core::polygon::rectangle;
+use deltille_core::setting::Setting::PaperMarginMm;
 use deltille_core::targets::format_mm;
 use deltille_core::targets::{
     BoardSpec, Corner, Incircle, Panel, Polyhedron, SolidSpec, Target, TargetError, TargetSpec,
@@ -90,7 +91,7 @@ pub(crate) fn sheet(
     let arrangement = fit_upright(&small, &paper)?.ok_or_else(|| {
         let problem =
             format!("{} leaves no room for the guide: take less", format_mm(paper.margin_mm));
-        TargetError::invalid("PaperSpec::margin_mm", problem)
+        TargetError::invalid(PaperMarginMm, problem)
     })?;
     let mut sheet = arrangement.sheet(0, [0.0; 4], description(title, target));
     sheet.placements.clear();

@@ -20,6 +20,7 @@ use crate::marks::logo::{LogoPlacement, LogoSize};
 use crate::paper::PaperSpec;
 use crate::{Label, LineKind, Placement, SheetLayout, SheetLine, SheetText};
 use deltille_core::lattice::{GridKind, ROW_HEIGHT};
+use deltille_core::setting::Setting::PaperNote;
 use deltille_core::targets::{BoardSpec, FamilyRef, Panel, TargetError, fingerprint};
 
 /// Capital height of a board's label, mm.
@@ -102,7 +103,7 @@ impl Cell {
         let problem = format!(
             "{count} characters are more than the {most} that can be read below such a board: take fewer, or larger boards"
         );
-        Err(TargetError::invalid("PaperSpec::note", problem))
+        Err(TargetError::invalid(PaperNote, problem))
     }
 
     /// Blank below the board, with its label.

@@ -17,6 +17,7 @@ use crate::paper::{Orientation, PaperSize, PaperSpec};
 use crate::{Label, LineKind, SheetLayout, SheetLine, SheetPage, SheetText};
 use deltille_core::angles::direction;
 use deltille_core::polygon::rectangle;
+use deltille_core::setting::Setting;
 use deltille_core::targets::TargetError;
 
 /// Width of what neighbouring windows share, mm.
@@ -101,7 +102,7 @@ impl Poster {
         best.ok_or_else(|| {
             let problem =
                 format!("{size} is too small for the pages of a larger sheet: take larger paper");
-            TargetError::invalid("PaperSpec::size", problem)
+            TargetError::invalid(Setting::PaperSize, problem)
         })
     }
 
@@ -139,8 +140,8 @@ impl Poster {
     pub fn check(
         &self,
         what: &str,
-        (setting, edge_mm): (&'static str, f64),
-        instead: &str,
+        (setting, edge_mm): (Setting, f64),
+        instead: Option<Setting>,
         paper: &PaperSpec,
     ) -> Result<(), TargetError> {
         let area = self.size_mm().element_product();
@@ -149,11 +150,13 @@ impl Poster {
             return Ok(());
         }
         let edge = (edge_mm / excess.sqrt() * 0.95).floor();
+        let instead = instead.map_or(String::new(), |instead| format!("{instead}, "));
         let problem = format!(
-            "{what} takes {} pages of {}, more than can be assembled and verified: take {instead}`{setting}` of at most \
-             {edge} mm, or larger `PaperSpec::size`",
+            "{what} takes {} pages of {}, more than can be assembled and verified: take {instead}{setting} of at most \
+             {edge} mm, or larger {}",
             self.windows(),
             Self::paper_size(paper),
+            Setting::PaperSize
         );
         Err(TargetError::invalid(setting, problem))
     }

@@ -3,6 +3,10 @@
 use super::arrangement::{Footprint, fit, imprint, tag_range};
 use crate::SheetLayout;
 use crate::paper::PaperSpec;
+use deltille_core::setting::Setting::{
+    self, AprilGridTagMm, AprilGridTags, CharucoSquareMm, CharucoSquares, CirclesCircles,
+    CirclesSpacingMm, PaperMarginMm, PaperSize,
+};
 use deltille_core::targets::format_mm;
 use deltille_core::targets::{
     AprilGridSpec, CharucoSpec, CirclesSpec, Panel, Target, TargetError, TargetSpec, fingerprint,
@@ -18,9 +22,9 @@ struct SinglePanel<'a> {
     /// The length asked for, mm.
     size_mm: f64,
     /// The field that sets it.
-    setting: &'static str,
-    /// What else would make it fit, such as fewer squares.
-    fewer: &'static str,
+    setting: Setting,
+    /// The field of which less would make it fit, too, such as the number of squares.
+    fewer: Setting,
 }
 
 impl SinglePanel<'_> {
@@ -45,14 +49,14 @@ impl SinglePanel<'_> {
             fit(&self.footprint(f64::from(*mm), paper), paper).is_ok_and(|found| found.is_some())
         };
         let smaller = match (LEAST_PROPOSED_MM..self.size_mm.ceil() as u32).rev().find(fits) {
-            Some(mm) => format!("`{}` of at most {mm} mm", self.setting),
-            None => "a smaller `PaperSpec::margin_mm`".to_owned(),
+            Some(mm) => format!("{} of at most {mm} mm", self.setting),
+            None => format!("a smaller {PaperMarginMm}"),
         };
         let problem = format!(
-            "with {size} the target and what is printed around it do not fit {on}: take larger paper, {}, or {smaller}",
+            "with {size} the target and what is printed around it do not fit {on}: take larger paper, fewer {}, or {smaller}",
             self.fewer
         );
-        TargetError::invalid("PaperSpec::size", problem)
+        TargetError::invalid(PaperSize, problem)
     }
 }
 
@@ -72,13 +76,13 @@ pub(crate) fn sheets(
                 let marker_mm = spec.marker_mm * square_mm / spec.square_mm;
                 CharucoSpec { square_mm, marker_mm, ..spec.clone() }.panel(dimension)
             };
-            let (setting, fewer) = ("CharucoSpec::square_mm", "fewer `CharucoSpec::squares`");
+            let (setting, fewer) = (CharucoSquareMm, CharucoSquares);
             let single = SinglePanel { of_size: &of_size, size_mm: spec.square_mm, setting, fewer };
             sheet(&single, paper, charuco_label(title, spec, family, imprint))?
         }
         TargetSpec::AprilGrid(spec) => {
             let of_size = |tag_mm| AprilGridSpec { tag_mm, ..spec.clone() }.panel();
-            let (setting, fewer) = ("AprilGridSpec::tag_mm", "fewer `AprilGridSpec::tags`");
+            let (setting, fewer) = (AprilGridTagMm, AprilGridTags);
             let single = SinglePanel { of_size: &of_size, size_mm: spec.tag_mm, setting, fewer };
             sheet(&single, paper, aprilgrid_label(title, spec, family, imprint))?
         }
@@ -87,7 +91,7 @@ pub(crate) fn sheets(
                 let diameter_mm = spec.diameter_mm * spacing_mm / spec.spacing_mm;
                 CirclesSpec { spacing_mm, diameter_mm, ..spec.clone() }.panel()
             };
-            let (setting, fewer) = ("CirclesSpec::spacing_mm", "fewer `CirclesSpec::circles`");
+            let (setting, fewer) = (CirclesSpacingMm, CirclesCircles);
             let single =
                 SinglePanel { of_size: &of_size, size_mm: spec.spacing_mm, setting, fewer };
             sheet(&single, paper, circles_label(title, spec, imprint))?

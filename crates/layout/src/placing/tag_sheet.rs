@@ -14,6 +14,7 @@ use crate::paper::{PaperSize, PaperSpec};
 use crate::{Label, Placement, SheetLayout, SheetText};
 use deltille_core::family::Family;
 use deltille_core::lattice::ROW_HEIGHT;
+use deltille_core::setting::Setting::{self, PaperMarginMm, TagSheetEdgeMm};
 use deltille_core::targets::format_mm;
 use deltille_core::targets::{TagSheetSpec, TargetError};
 
@@ -89,7 +90,7 @@ fn arrange(
     let margin = check_margin(paper)?;
     let size = paper.size.clone().or_else(|| PaperSize::automatic().next());
     let Some(size) = size else {
-        return Err(TargetError::invalid("PaperSpec::size", "none is named"));
+        return Err(TargetError::invalid(Setting::PaperSize, "none is named"));
     };
     let pages = paper.pages_mm(&size);
     let pitch = blanks.pitch();
@@ -118,13 +119,13 @@ fn arrange(
             .rev()
             .find(fits)
         {
-            Some(mm) => format!("larger paper, or `TagSheetSpec::edge_mm` of at most {mm} mm"),
-            None => "larger paper, or a smaller `PaperSpec::margin_mm`".to_owned(),
+            Some(mm) => format!("larger paper, or {TagSheetEdgeMm} of at most {mm} mm"),
+            None => format!("larger paper, or a smaller {PaperMarginMm}"),
         };
         let problem = format!(
             "a tag with {edge} edges, its id and the check bars do not fit {size}: take {instead}"
         );
-        TargetError::invalid("PaperSpec::size", problem)
+        TargetError::invalid(Setting::PaperSize, problem)
     })
 }
 

@@ -11,6 +11,7 @@ use crate::family::{
     Construction, Family, FamilyError, PAIRS_COUNTED, Rules, TagWords, distance_histogram,
 };
 use crate::lattice::{Dimension, GridKind};
+use crate::setting::Setting::{ImportBits, ImportDistance, ImportKind};
 
 /// What is known of a table that is to be imported.
 #[derive(Clone, Debug, PartialEq)]
@@ -43,10 +44,10 @@ pub enum ImportError {
         found: usize,
     },
     /// The number of cells is not known.
-    #[error("it does not say how many cells a tag has: give `ImportSpec::bits`")]
+    #[error("it does not say how many cells a tag has: give {ImportBits}")]
     Bits,
     /// The shape of the tags is not known.
-    #[error("it does not say whether tags are triangles or squares: give `ImportSpec::kind`")]
+    #[error("it does not say whether tags are triangles or squares: give {ImportKind}")]
     Kind,
     /// The bits are not where those of a tag are.
     #[error("its bits do not fill a square of {bits} cells: such tags are not read here")]
@@ -64,7 +65,7 @@ pub enum ImportError {
         id: usize,
     },
     /// Two codes are too close.
-    #[error("`ImportSpec::distance`: its codes are as close as {found}, not {claimed}")]
+    #[error("{ImportDistance}: its codes are as close as {found}, not {claimed}")]
     Distance {
         /// Smallest distance of two codes.
         found: u32,

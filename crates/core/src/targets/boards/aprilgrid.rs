@@ -10,11 +10,14 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::capacity::{Setting, check_ids};
+use super::capacity::{TagSettings, check_ids};
 use super::tag_spec::BORDER_BITS;
 use crate::family::Family;
 use crate::lattice::{GridKind, Vertex};
 use crate::quantity;
+use crate::setting::Setting::{
+    AprilGridGap, AprilGridTagMm, AprilGridTags, BoardBoardId, TagBorderBits, TagFamily,
+};
 use crate::targets::length::format_mm;
 use crate::targets::{
     Corner, FamilyRef, Outline, Panel, PanelPose, TagPlacement, TagsIn, TargetError,
@@ -89,23 +92,23 @@ impl AprilGridSpec {
     pub(in crate::targets) fn check(&self) -> Result<(), TargetError> {
         if let Some(side) = self.tags.iter().find(|side| !SIDES.contains(side)) {
             let problem = format!("{side} is not between {} and {}", SIDES.start(), SIDES.end());
-            return Err(TargetError::invalid("AprilGridSpec::tags", problem));
+            return Err(TargetError::invalid(AprilGridTags, problem));
         }
         if !TAG_MM.contains(&self.tag_mm) {
             let problem = format!("{} is not between 2 mm and 1000 mm", format_mm(self.tag_mm));
-            return Err(TargetError::invalid("AprilGridSpec::tag_mm", problem));
+            return Err(TargetError::invalid(AprilGridTagMm, problem));
         }
         if !GAP.contains(&self.gap) {
             let problem = format!("{} is not between {} and {}", self.gap, GAP.start(), GAP.end());
-            return Err(TargetError::invalid("AprilGridSpec::gap", problem));
+            return Err(TargetError::invalid(AprilGridGap, problem));
         }
         if !(1.0..=*BORDER_BITS.end()).contains(&self.border_bits) {
             let problem = format!("{} is not between 1 and 10 bit-widths", self.border_bits);
-            return Err(TargetError::invalid("TagSpec::border_bits", problem));
+            return Err(TargetError::invalid(TagBorderBits, problem));
         }
         if self.board_id == u32::MAX {
             let problem = format!("{} leaves no id for a board after it", self.board_id);
-            return Err(TargetError::invalid("BoardSpec::board_id", problem));
+            return Err(TargetError::invalid(BoardBoardId, problem));
         }
         Ok(())
     }
@@ -164,11 +167,11 @@ pub(in crate::targets) fn tagged(
     let panels = untied_panels(spec)?;
     if family.kind() != GridKind::Checker {
         let problem = format!("{} has triangular tags, not square ones", family.name());
-        return Err(TargetError::invalid("TagSpec::family", problem));
+        return Err(TargetError::invalid(TagFamily, problem));
     }
     let ids = (spec.first_id, spec.count().into());
     let family =
-        check_ids(Setting::TAGS, ids, family, || "make fewer `AprilGridSpec::tags`".to_owned())?;
+        check_ids(TagSettings::TAGS, ids, family, || format!("make fewer {AprilGridTags}"))?;
     Ok((panels, family))
 }
 

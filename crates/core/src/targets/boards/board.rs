@@ -4,9 +4,10 @@ use std::collections::BTreeMap;
 
 use glam::{DMat3, DVec2, DVec3};
 
-use super::capacity::{Setting, check_family, wider_spacing};
+use super::capacity::{TagSettings, check_family, wider_spacing};
 use crate::family::Family;
 use crate::lattice::{GridKind, ROW_HEIGHT, Vertex};
+use crate::setting::Setting::BoardBoards;
 use crate::targets::{
     BoardSpec, Corner, FamilyRef, Outline, Panel, PanelPose, TagSpec, TagsIn, TargetError,
 };
@@ -108,13 +109,13 @@ pub(crate) fn panels(
     let instead = |available: u64| {
         let wider = wider_spacing(tags, available, |spacing| boards * on_each(spacing));
         let fewer = available / on_each(tags.spacing).max(1);
-        let fewer = (fewer > 0 && spec.boards > 1)
-            .then(|| format!("make at most {fewer} `BoardSpec::boards`"));
+        let fewer =
+            (fewer > 0 && spec.boards > 1).then(|| format!("make at most {fewer} {BoardBoards}"));
         wider.into_iter().chain(fewer).collect()
     };
     let needed = boards * on_each(tags.spacing);
     let family =
-        check_family(spec.grid, tags, spec.edge_mm, family, needed, Setting::TAGS, instead)?;
+        check_family(spec.grid, tags, spec.edge_mm, family, needed, TagSettings::TAGS, instead)?;
     Ok((panels, Some(family)))
 }
 

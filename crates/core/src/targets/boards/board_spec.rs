@@ -4,6 +4,10 @@ use serde::{Deserialize, Serialize};
 
 use super::tag_spec::{LEAST_DENSE_TILES, MOST_ROWS};
 use crate::lattice::GridKind;
+use crate::setting::Setting::{
+    BoardBoardId, BoardBoards, BoardCols, BoardEdgeMm, BoardRows, BoardTags, BoardTwoSidedMm,
+    TagFamily, TagHoleMm, TagTagsIn,
+};
 use crate::targets::length::format_mm;
 use crate::targets::{TagSpec, TagsIn, TargetError};
 
@@ -97,8 +101,7 @@ impl BoardSpec {
 
     /// Checks what two sides need.
     fn check_sides(&self) -> Result<(), TargetError> {
-        let refused =
-            |problem: String| Err(TargetError::invalid("BoardSpec::two_sided_mm", problem));
+        let refused = |problem: String| Err(TargetError::invalid(BoardTwoSidedMm, problem));
         match self.two_sided_mm {
             None => Ok(()),
             Some(mm) if !TWO_SIDED_MM.contains(&mm) => {
@@ -111,11 +114,12 @@ impl BoardSpec {
             Some(_) if self.tags.is_none() => {
                 refused("untagged sides cannot be told apart: give them tags".to_owned())
             }
-            Some(_) if self.tags.as_ref().is_some_and(|tags| tags.hole_mm.is_some()) => refused(
-                "a hole through a tag of one side would be in a tile of the other: leave out `TagSpec::hole_mm`, or \
+            Some(_) if self.tags.as_ref().is_some_and(|tags| tags.hole_mm.is_some()) => {
+                refused(format!(
+                    "a hole through a tag of one side would be in a tile of the other: leave out {TagHoleMm}, or \
                  make one side"
-                    .to_owned(),
-            ),
+                ))
+            }
             Some(_) => Ok(()),
         }
     }
@@ -123,7 +127,7 @@ impl BoardSpec {
     /// Checks every number by itself.
     pub(crate) fn check(&self) -> Result<(), TargetError> {
         self.check_sides()?;
-        for (setting, value) in [("BoardSpec::rows", self.rows), ("BoardSpec::cols", self.cols)] {
+        for (setting, value) in [(BoardRows, self.rows), (BoardCols, self.cols)] {
             if !SIDES.contains(&value) {
                 let problem = format!("{value} is not between 2 and {MOST_ROWS}");
                 return Err(TargetError::invalid(setting, problem));
@@ -131,21 +135,21 @@ impl BoardSpec {
         }
         if !EDGE_MM.contains(&self.edge_mm) {
             let problem = format!("{} is not between 1 mm and 1000 mm", format_mm(self.edge_mm));
-            return Err(TargetError::invalid("BoardSpec::edge_mm", problem));
+            return Err(TargetError::invalid(BoardEdgeMm, problem));
         }
         if !(1..=MOST_ROWS).contains(&self.boards) {
             let problem = format!("{} is not between 1 and {MOST_ROWS}", self.boards);
-            return Err(TargetError::invalid("BoardSpec::boards", problem));
+            return Err(TargetError::invalid(BoardBoards, problem));
         }
         let corners =
             [self.rows, self.cols, self.panel_count()].into_iter().map(u64::from).product::<u64>();
         if corners > MOST_CORNERS {
             let problem = format!("{corners} corners are more than {MOST_CORNERS} in one target");
-            return Err(TargetError::invalid("BoardSpec::boards", problem));
+            return Err(TargetError::invalid(BoardBoards, problem));
         }
         if self.board_id.checked_add(self.panel_count()).is_none() {
             let problem = format!("{} leaves no ids for the boards after it", self.board_id);
-            return Err(TargetError::invalid("BoardSpec::board_id", problem));
+            return Err(TargetError::invalid(BoardBoardId, problem));
         }
         let least = least_untagged_corners(self.grid);
         if self.tags.is_none() && self.rows * self.cols < least {
@@ -155,8 +159,8 @@ impl BoardSpec {
                 self.rows, self.cols
             );
             let setting = match self.grid {
-                GridKind::Deltille => "BoardSpec::tags",
-                GridKind::Checker => "BoardSpec::rows",
+                GridKind::Deltille => BoardTags,
+                GridKind::Checker => BoardRows,
             };
             return Err(TargetError::invalid(setting, problem));
         }
@@ -167,7 +171,7 @@ impl BoardSpec {
                     == (GridKind::Checker, 2, 2, TagsIn::White)
                 {
                     let problem = "the one square between 2 × 2 corners is black";
-                    return Err(TargetError::invalid("TagSpec::tags_in", problem));
+                    return Err(TargetError::invalid(TagTagsIn, problem));
                 }
                 if tags.is_dense() && self.grid == GridKind::Deltille {
                     let boards = self.board_id..self.board_id + self.panel_count();
@@ -175,20 +179,17 @@ impl BoardSpec {
                     if (rows - 1) * (cols - 1) < LEAST_DENSE_TILES {
                         let problem = format!(
                             "{rows} × {cols} corners have fewer than {LEAST_DENSE_TILES} tiles between them, too few to \
-                             tell a place: take more, or tags of another `TagSpec::family`"
+                             tell a place: take more, or tags of another {TagFamily}"
                         );
-                        return Err(TargetError::invalid("BoardSpec::rows", problem));
+                        return Err(TargetError::invalid(BoardRows, problem));
                     }
-                    tags.check_places(
-                        ("BoardSpec::board_id", boards),
-                        ("BoardSpec::rows", rows, cols),
-                    )?;
+                    tags.check_places((BoardBoardId, boards), (BoardRows, rows, cols))?;
                 }
                 Ok(())
             }
             None if self.boards > 1 => {
                 let problem = "untagged boards cannot be told apart: give them tags, or make one";
-                Err(TargetError::invalid("BoardSpec::boards", problem))
+                Err(TargetError::invalid(BoardBoards, problem))
             }
             None => Ok(()),
         }

@@ -2,6 +2,10 @@
 
 use crate::family::{Family, smallest_shipped};
 use crate::lattice::GridKind;
+use crate::setting::Setting::{
+    self, FamilyShippedNames, SolidSquareTagsFamily, SolidSquareTagsFirstId, TagFamily, TagFirstId,
+    TagHoleMm, TagSpacing,
+};
 use crate::targets::{FamilyRef, TagSpec, TargetError};
 
 /// Spacings beyond this are not proposed: a tag in twenty tiles is easily hidden.
@@ -9,35 +13,33 @@ const SPARSEST: u32 = 20;
 
 /// What sets the family and the ids of tags.
 #[derive(Clone, Copy)]
-pub(in crate::targets) struct Setting {
-    family: &'static str,
-    first_id: &'static str,
+pub(in crate::targets) struct TagSettings {
+    family: Setting,
+    first_id: Setting,
 }
 
-impl Setting {
+impl TagSettings {
     /// Of all tags of a target.
-    pub const TAGS: Self = Self { family: "TagSpec::family", first_id: "TagSpec::first_id" };
+    pub const TAGS: Self = Self { family: TagFamily, first_id: TagFirstId };
 
     /// Of square tags beside others.
-    pub const SQUARE_TAGS: Self = Self {
-        family: "SolidSpec::square_tags::family",
-        first_id: "SolidSpec::square_tags::first_id",
-    };
+    pub const SQUARE_TAGS: Self =
+        Self { family: SolidSquareTagsFamily, first_id: SolidSquareTagsFirstId };
 
     /// Of the tags in tiles of a kind on a target of one or two tilings.
     pub fn of(kind: GridKind, has_both: bool) -> Self {
         if has_both && kind == GridKind::Checker { Self::SQUARE_TAGS } else { Self::TAGS }
     }
 
-    /// The name of the first id.
-    pub fn first_id(self) -> &'static str {
+    /// What sets the first id.
+    pub fn first_id(self) -> Setting {
         self.first_id
     }
 }
 
 /// Checks that a family has `count` codes from the first id on; `instead` says what else to change.
 pub(in crate::targets) fn check_ids(
-    setting: Setting,
+    settings: TagSettings,
     (first, count): (u32, u64),
     family: &Family,
     instead: impl FnOnce() -> String,
@@ -47,7 +49,7 @@ pub(in crate::targets) fn check_ids(
         return Ok(FamilyRef::of(family));
     }
     Err(TargetError::IdsRunOut {
-        setting: setting.first_id,
+        setting: settings.first_id,
         first,
         last: end - 1,
         family: family.name().to_owned(),
@@ -65,7 +67,7 @@ pub(in crate::targets) fn check_family(
     edge_mm: f64,
     family: Option<&Family>,
     needed: u64,
-    setting: Setting,
+    settings: TagSettings,
     instead: impl FnOnce(u64) -> Vec<String>,
 ) -> Result<FamilyRef, TargetError> {
     let Some(family) = family else {
@@ -75,23 +77,22 @@ pub(in crate::targets) fn check_family(
     let family = family.of_tiling(kind).unwrap_or(family);
     if family.kind() != kind {
         let problem = match kind {
-            GridKind::Deltille => {
-                "has square tags, deltille tiles need triangular ones: take one \
-                                   of `family::shipped_names`"
-            }
+            GridKind::Deltille => format!(
+                "has square tags, deltille tiles need triangular ones: take one of {FamilyShippedNames}"
+            ),
             GridKind::Checker => {
-                "has triangular tags, squares need one of aprilTag36h11, \
-                                  aprilTag25h9, aprilTag16h5"
+                "has triangular tags, squares need one of aprilTag36h11, aprilTag25h9, aprilTag16h5"
+                    .to_owned()
             }
         };
-        return Err(TargetError::invalid(setting.family, format!("{} {problem}", family.name())));
+        return Err(TargetError::invalid(settings.family, format!("{} {problem}", family.name())));
     }
     if let Some(hole_mm) = tags.hole_mm
         && let Some(problem) = no_room_for_hole(family, edge_mm, tags.border_bits, hole_mm)
     {
-        return Err(TargetError::invalid("TagSpec::hole_mm", problem));
+        return Err(TargetError::invalid(TagHoleMm, problem));
     }
-    check_ids(setting, (tags.first_id, needed), family, || {
+    check_ids(settings, (tags.first_id, needed), family, || {
         let (there, first) = (family.len() as u64, u64::from(tags.first_id));
         let mut proposals = Vec::new();
         if let Some(highest) = there.checked_sub(needed) {
@@ -100,7 +101,7 @@ pub(in crate::targets) fn check_family(
         proposals.extend(instead(there.saturating_sub(first)));
         if let Some(larger) = smallest_shipped(kind, first + needed, 0) {
             let (name, codes) = (larger.name, larger.codes);
-            proposals.push(format!("take `{}` {name} with its {codes} codes", setting.family));
+            proposals.push(format!("take {} {name} with its {codes} codes", settings.family));
         }
         if proposals.is_empty() {
             proposals.push(
@@ -143,5 +144,5 @@ pub(in crate::targets) fn wider_spacing(
     count: impl Fn(u32) -> u64,
 ) -> Option<String> {
     let spacing = (tags.spacing + 1..=SPARSEST).find(|&spacing| count(spacing) <= available)?;
-    Some(format!("raise `TagSpec::spacing` to at least {spacing}"))
+    Some(format!("raise {TagSpacing} to at least {spacing}"))
 }

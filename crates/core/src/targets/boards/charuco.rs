@@ -14,10 +14,13 @@
 use glam::{DMat3, DVec3};
 use serde::{Deserialize, Serialize};
 
-use super::capacity::{Setting, check_ids};
+use super::capacity::{TagSettings, check_ids};
 use crate::family::{Family, dictionary, dictionary_names};
 use crate::lattice::{Dimension, GridKind, TagCells, Vertex};
 use crate::quantity;
+use crate::setting::Setting::{
+    BoardBoardId, CharucoDictionary, CharucoMarkerMm, CharucoSquareMm, CharucoSquares,
+};
 use crate::targets::length::format_mm;
 use crate::targets::{
     Corner, FamilyRef, Outline, Panel, PanelPose, TagPlacement, TagsIn, TargetError,
@@ -84,22 +87,22 @@ impl CharucoSpec {
     pub fn check(&self) -> Result<Dimension, TargetError> {
         if let Some(side) = self.squares.iter().find(|side| !SIDES.contains(side)) {
             let problem = format!("{side} is not between {} and {}", SIDES.start(), SIDES.end());
-            return Err(TargetError::invalid("CharucoSpec::squares", problem));
+            return Err(TargetError::invalid(CharucoSquares, problem));
         }
         if !SQUARE_MM.contains(&self.square_mm) {
             let problem = format!("{} is not between 1 mm and 1000 mm", format_mm(self.square_mm));
-            return Err(TargetError::invalid("CharucoSpec::square_mm", problem));
+            return Err(TargetError::invalid(CharucoSquareMm, problem));
         }
         if !MARKER_SQUARES.contains(&(self.marker_mm / self.square_mm)) {
             let [least, most] = [MARKER_SQUARES.start(), MARKER_SQUARES.end()]
                 .map(|part| format_mm((part * self.square_mm * 1e3).round() / 1e3));
             let marker = format_mm(self.marker_mm);
             let problem = format!("{marker} is not between {least} and {most} in such a square");
-            return Err(TargetError::invalid("CharucoSpec::marker_mm", problem));
+            return Err(TargetError::invalid(CharucoMarkerMm, problem));
         }
         if self.board_id == u32::MAX {
             let problem = format!("{} leaves no id for a board after it", self.board_id);
-            return Err(TargetError::invalid("BoardSpec::board_id", problem));
+            return Err(TargetError::invalid(BoardBoardId, problem));
         }
         let Some((_, dimension)) = dictionary(&self.dictionary) else {
             let names: Vec<&str> = dictionary_names().collect();
@@ -108,7 +111,7 @@ impl CharucoSpec {
                 self.dictionary,
                 names.join(", ")
             );
-            return Err(TargetError::invalid("CharucoSpec::dictionary", problem));
+            return Err(TargetError::invalid(CharucoDictionary, problem));
         };
         Ok(dimension)
     }
@@ -191,8 +194,8 @@ pub(in crate::targets) fn tagged(
         return Err(TargetError::Family { wanted: spec.dictionary.clone(), given });
     }
     let ids = (spec.first_id, spec.markers().into());
-    let family = check_ids(Setting::TAGS, ids, family, || {
-        "take a larger `CharucoSpec::dictionary`, or fewer `CharucoSpec::squares`".to_owned()
+    let family = check_ids(TagSettings::TAGS, ids, family, || {
+        format!("take a larger {CharucoDictionary}, or fewer {CharucoSquares}")
     })?;
     Ok((panels, family))
 }

@@ -15,6 +15,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::lattice::GridKind;
 use crate::quantity;
+use crate::setting::Setting::{BoardBoardId, CirclesCircles, CirclesDiameterMm, CirclesSpacingMm};
 use crate::targets::length::format_mm;
 use crate::targets::{Corner, Outline, Panel, PanelPose, TagsIn, TargetError};
 
@@ -57,23 +58,23 @@ impl CirclesSpec {
     fn check(&self) -> Result<(), TargetError> {
         if let Some(side) = self.circles.iter().find(|side| !SIDES.contains(side)) {
             let problem = format!("{side} is not between {} and {}", SIDES.start(), SIDES.end());
-            return Err(TargetError::invalid("CirclesSpec::circles", problem));
+            return Err(TargetError::invalid(CirclesCircles, problem));
         }
         if !SPACING_MM.contains(&self.spacing_mm) {
             let spacing = format_mm(self.spacing_mm);
             let problem = format!("{spacing} is not between 1 mm and 1000 mm");
-            return Err(TargetError::invalid("CirclesSpec::spacing_mm", problem));
+            return Err(TargetError::invalid(CirclesSpacingMm, problem));
         }
         if !DIAMETER.contains(&(self.diameter_mm / self.spacing_mm)) {
             let [least, most] = [DIAMETER.start(), DIAMETER.end()]
                 .map(|part| format_mm((part * self.spacing_mm * 1e3).round() / 1e3));
             let diameter = format_mm(self.diameter_mm);
             let problem = format!("{diameter} is not between {least} and {most} at such a spacing");
-            return Err(TargetError::invalid("CirclesSpec::diameter_mm", problem));
+            return Err(TargetError::invalid(CirclesDiameterMm, problem));
         }
         if self.board_id == u32::MAX {
             let problem = format!("{} leaves no id for a board after it", self.board_id);
-            return Err(TargetError::invalid("BoardSpec::board_id", problem));
+            return Err(TargetError::invalid(BoardBoardId, problem));
         }
         Ok(())
     }

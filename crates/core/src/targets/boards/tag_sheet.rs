@@ -5,6 +5,7 @@ use serde::{Deserialize, Serialize};
 use super::tag_spec::BORDER_BITS;
 use crate::family::Family;
 use crate::lattice::GridKind;
+use crate::setting::Setting::{TagSheetBorderBits, TagSheetEdgeMm, TagSheetFamily, TagSheetIds};
 use crate::targets::length::format_mm;
 use crate::targets::{FamilyRef, Outline, Panel, PanelPose, TagPlacement, TagsIn, TargetError};
 
@@ -46,23 +47,23 @@ pub(in crate::targets) fn panels(spec: &TagSheetSpec) -> Vec<Panel> {
 fn check(spec: &TagSheetSpec, family: &Family) -> Result<(), TargetError> {
     if family.kind() != GridKind::Deltille {
         let problem = format!("{} has square tags, a sheet takes triangular ones", family.name());
-        return Err(TargetError::invalid("TagSheetSpec::family", problem));
+        return Err(TargetError::invalid(TagSheetFamily, problem));
     }
     if !TagSheetSpec::EDGE_MM.contains(&spec.edge_mm) {
         let problem = format!("{} is not between 5 mm and 2000 mm", format_mm(spec.edge_mm));
-        return Err(TargetError::invalid("TagSheetSpec::edge_mm", problem));
+        return Err(TargetError::invalid(TagSheetEdgeMm, problem));
     }
     if !BORDER_BITS.contains(&spec.border_bits) {
         let problem = format!("{} is not between 0.6 and 10 bit-widths", spec.border_bits);
-        return Err(TargetError::invalid("TagSheetSpec::border_bits", problem));
+        return Err(TargetError::invalid(TagSheetBorderBits, problem));
     }
     if spec.ids.is_empty() {
-        return Err(TargetError::invalid("TagSheetSpec::ids", "there is no tag to print"));
+        return Err(TargetError::invalid(TagSheetIds, "there is no tag to print"));
     }
     if let Some(id) = spec.ids.iter().find(|&&id| family.code(id).is_none()) {
         let last = family.len() - 1;
         let problem = format!("{} has no tag {id}, its ids run from 0 to {last}", family.name());
-        return Err(TargetError::invalid("TagSheetSpec::ids", problem));
+        return Err(TargetError::invalid(TagSheetIds, problem));
     }
     Ok(())
 }

@@ -5,6 +5,7 @@ use serde::{Deserialize, Serialize};
 use crate::family::places;
 use crate::lattice::{GridKind, Vertex};
 use crate::quantity;
+use crate::setting::Setting::{self, TagBorderBits, TagFirstId, TagHoleMm, TagSpacing, TagTagsIn};
 use crate::targets::{TagPlacement, TagsIn, TargetError};
 
 /// Most rows or columns of a board: more than the largest paper holds at the finest edge that
@@ -108,8 +109,8 @@ impl TagSpec {
     /// Checks that there are place codes for panels with these ids, whose tiles lie in so many rows and columns.
     pub(crate) fn check_places(
         &self,
-        (setting, panels): (&'static str, std::ops::Range<u32>),
-        (size, rows, cols): (&'static str, u32, u32),
+        (setting, panels): (Setting, std::ops::Range<u32>),
+        (size, rows, cols): (Setting, u32, u32),
     ) -> Result<(), TargetError> {
         let last = places::BOARDS - 1;
         if panels.end > places::BOARDS {
@@ -130,13 +131,8 @@ impl TagSpec {
             return Err(TargetError::invalid(size, problem));
         }
         let fixed = [
-            ("TagSpec::spacing", self.spacing, 1, "every tile has a place code"),
-            (
-                "TagSpec::first_id",
-                self.first_id,
-                0,
-                "the ids of place codes follow from the board's",
-            ),
+            (TagSpacing, self.spacing, 1, "every tile has a place code"),
+            (TagFirstId, self.first_id, 0, "the ids of place codes follow from the board's"),
         ];
         match fixed.into_iter().find(|(_, value, only, _)| value != only) {
             Some((setting, value, only, why)) => {
@@ -172,7 +168,7 @@ impl TagSpec {
     pub(crate) fn check(&self, grid: GridKind) -> Result<(), TargetError> {
         if grid == GridKind::Deltille && self.tags_in == TagsIn::White {
             let problem = "the tags of a deltille board are in its black tiles";
-            return Err(TargetError::invalid("TagSpec::tags_in", problem));
+            return Err(TargetError::invalid(TagTagsIn, problem));
         }
         let least = LEAST_SQUARE_BORDER_BITS;
         if grid == GridKind::Checker && self.border_bits < least {
@@ -180,17 +176,17 @@ impl TagSpec {
                 "{} is too narrow, a square tag has a border of at least {least} bit-width",
                 self.border_bits
             );
-            return Err(TargetError::invalid("TagSpec::border_bits", problem));
+            return Err(TargetError::invalid(TagBorderBits, problem));
         }
         if !(1..=MOST_ROWS).contains(&self.spacing) {
             let problem = format!("{} is not between 1 and {MOST_ROWS}", self.spacing);
-            return Err(TargetError::invalid("TagSpec::spacing", problem));
+            return Err(TargetError::invalid(TagSpacing, problem));
         }
         if !BORDER_BITS.contains(&self.border_bits) {
             let problem = format!("{} is not between 0.6 and 10 bit-widths", self.border_bits);
-            return Err(TargetError::invalid("TagSpec::border_bits", problem));
+            return Err(TargetError::invalid(TagBorderBits, problem));
         }
-        let refused = |problem: &str| Err(TargetError::invalid("TagSpec::hole_mm", problem));
+        let refused = |problem: &str| Err(TargetError::invalid(TagHoleMm, problem));
         match self.hole_mm {
             Some(_) if grid == GridKind::Checker => {
                 refused("square tags have no free cells: make a deltille board or solid")

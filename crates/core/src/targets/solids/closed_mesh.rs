@@ -9,6 +9,7 @@ use serde::{Deserialize, Serialize};
 
 use super::polyhedron::{normal, sides, triangles};
 use crate::angles::angle;
+use crate::setting::Setting::{SolidBoardId, TagFirstId};
 
 /// Largest deviation of an edge from the mean of its face for a face that counts as
 /// near-equilateral. The faces of geodesic spheres, made of equal triangles as nearly as a sphere
@@ -93,7 +94,7 @@ pub enum ClosedMeshError {
     Pinched(DVec3),
     /// More than one solid.
     #[error(
-        "it has {0} separate pieces: make a target of each, with `TagSpec::first_id` and `SolidSpec::board_id` so that \
+        "it has {0} separate pieces: make a target of each, with {TagFirstId} and {SolidBoardId} so that \
          no id is used twice"
     )]
     Pieces(usize),

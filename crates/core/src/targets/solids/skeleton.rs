@@ -19,6 +19,9 @@ use serde::{Deserialize, Serialize};
 
 use super::polyhedron::normal;
 use crate::angles::{angle, tangent};
+use crate::setting::Setting::{
+    SkeletonPanelThicknessMm, SkeletonRibMm, SkeletonWallMm, SolidEdgeMm, SolidSkeleton,
+};
 use crate::targets::length::format_mm;
 use crate::targets::{ClosedMesh, Polyhedron, TargetError};
 
@@ -78,8 +81,7 @@ impl Skeleton {
     /// Where seats, ledges and windows find no room.
     pub fn new(solid: &Polyhedron, spec: &SkeletonSpec) -> Result<Self, TargetError> {
         let SkeletonSpec { panel_thickness_mm: thickness, wall_mm: wall, rib_mm } = *spec;
-        let thicknesses =
-            [("SkeletonSpec::panel_thickness_mm", thickness), ("SkeletonSpec::wall_mm", wall)];
+        let thicknesses = [(SkeletonPanelThicknessMm, thickness), (SkeletonWallMm, wall)];
         for (setting, mm) in thicknesses {
             if !THICKNESS_MM.contains(&mm) {
                 let problem = format!("{} is not between 0.2 mm and 50 mm", format_mm(mm));
@@ -99,7 +101,7 @@ impl Skeleton {
                 sharpest.to_degrees(),
                 (least_rib * 10.0).ceil() / 10.0
             );
-            return Err(TargetError::invalid("SkeletonSpec::rib_mm", problem));
+            return Err(TargetError::invalid(SkeletonRibMm, problem));
         }
         let window = (rib + wall).max(inside(thickness + wall) + wall);
         let faces = || (0..solid.faces.len()).map(|face| solid.corners_mm(face));
@@ -108,11 +110,11 @@ impl Skeleton {
         if window + LEAST_WINDOW_MM > inradius {
             let problem = format!(
                 "seats and ledges take {:.1} mm from the edges, but the smallest face has its \
-                 middle {inradius:.1} mm from them: take thinner `SkeletonSpec::wall_mm` or panels, or \
-                 a larger `SolidSpec::edge_mm`",
+                 middle {inradius:.1} mm from them: take thinner {SkeletonWallMm} or panels, or \
+                 a larger {SolidEdgeMm}",
                 window + LEAST_WINDOW_MM
             );
-            return Err(TargetError::invalid("SolidSpec::skeleton", problem));
+            return Err(TargetError::invalid(SolidSkeleton, problem));
         }
         let inner = inner_vertices(solid, thickness + wall);
         let mut triangles_mm = Vec::new();
@@ -141,9 +143,10 @@ impl Skeleton {
         match ClosedMesh::new(&vertices, &indices) {
             Ok((_, false)) => {}
             _ => {
-                let problem = "the frame would cut through itself: take thinner \
-                               `SkeletonSpec::wall_mm` or panels";
-                return Err(TargetError::invalid("SolidSpec::skeleton", problem));
+                let problem = format!(
+                    "the frame would cut through itself: take thinner {SkeletonWallMm} or panels"
+                );
+                return Err(TargetError::invalid(SolidSkeleton, problem));
             }
         }
         Ok(Self { triangles_mm, panel_inset_mm: rib + PLAY_MM, rib_mm: rib, window_mm: window })

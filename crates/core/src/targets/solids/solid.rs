@@ -7,8 +7,9 @@ use glam::DVec3;
 use super::solid_spec::mean_side;
 use crate::family::Family;
 use crate::lattice::{GridKind, Vertex};
+use crate::setting::Setting::{SolidEdgeMm, SolidMarginMm, SolidTiles};
 use crate::targets::boards::board::tagged_tiles;
-use crate::targets::boards::capacity::{Setting, check_family, wider_spacing};
+use crate::targets::boards::capacity::{TagSettings, check_family, wider_spacing};
 use crate::targets::boards::tag_spec::MOST_ROWS;
 use crate::targets::length::format_mm;
 use crate::targets::{
@@ -60,7 +61,7 @@ impl SolidSpec {
                     let problem = format!(
                         "face {index} would have {most} corners in a row, more than {MOST_ROWS}: take fewer, or sides that differ less"
                     );
-                    return Err(TargetError::invalid("SolidSpec::tiles", problem));
+                    return Err(TargetError::invalid(SolidTiles, problem));
                 }
                 let is_filled = matches!(face.board, FaceBoard::Filled { .. });
                 let is_bare = |tags: &TagSpec| tagged(&face.board, tags).is_empty();
@@ -70,7 +71,7 @@ impl SolidSpec {
                         self.tiles,
                         face.outline_mm.len()
                     );
-                    return Err(TargetError::invalid("SolidSpec::tiles", problem));
+                    return Err(TargetError::invalid(SolidTiles, problem));
                 }
                 Ok(face)
             })
@@ -119,7 +120,7 @@ impl SolidSpec {
                 format_mm(self.margin_mm),
                 (self.margin_around_mm(inset_mm) * 10.0).ceil() / 10.0
             );
-            return Err(TargetError::invalid("SolidSpec::margin_mm", problem));
+            return Err(TargetError::invalid(SolidMarginMm, problem));
         }
         Ok(inset_mm)
     }
@@ -143,14 +144,14 @@ impl SolidSpec {
         let least = needed.fold(Self::LEAST_EDGE_MM, f64::max).ceil();
         let problem = format!(
             "{} leaves no room for {} tiles of at least {} a side within margins of {}: take \
-             `SolidSpec::edge_mm` of at least {least} mm, fewer `SolidSpec::tiles`, or a smaller \
-             `SolidSpec::margin_mm`",
+             {SolidEdgeMm} of at least {least} mm, fewer {SolidTiles}, or a smaller \
+             {SolidMarginMm}",
             format_mm(self.edge_mm),
             self.tiles,
             format_mm(Self::FINEST_TILE_MM),
             format_mm(self.margin_mm),
         );
-        TargetError::invalid("SolidSpec::edge_mm", problem)
+        TargetError::invalid(SolidEdgeMm, problem)
     }
 }
 
@@ -212,13 +213,13 @@ fn family_of(
         let fewer = (SolidSpec::FEWEST_TILES..spec.tiles)
             .rev()
             .find(has_enough)
-            .map(|tiles| format!("take at most {tiles} `SolidSpec::tiles`"));
+            .map(|tiles| format!("take at most {tiles} {SolidTiles}"));
         wider.into_iter().chain(fewer).collect()
     };
     let needed = tag_count(faces, kind, tags);
     let edges = faces.iter().filter(|face| face.board.kind() == kind).map(|face| face.tile_edge_mm);
     let finest_mm = edges.fold(f64::INFINITY, f64::min);
-    check_family(kind, tags, finest_mm, family, needed, Setting::of(kind, has_both), instead)
+    check_family(kind, tags, finest_mm, family, needed, TagSettings::of(kind, has_both), instead)
 }
 
 /// The panels of a checked spec, whether or not its family has so many tags.

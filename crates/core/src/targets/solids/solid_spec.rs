@@ -4,6 +4,10 @@ use glam::DVec3;
 use serde::{Deserialize, Serialize};
 
 use crate::lattice::GridKind;
+use crate::setting::Setting::{
+    SolidBoardId, SolidEdgeMm, SolidMarginMm, SolidShapeCuboid, SolidShapeMesh, SolidSquareTags,
+    SolidTiles,
+};
 use crate::targets::boards::board_spec::EDGE_MM;
 use crate::targets::length::format_mm;
 use crate::targets::{ClosedMesh, Polyhedron, SkeletonSpec, TagSpec, TagsIn, TargetError};
@@ -206,7 +210,7 @@ impl SolidSpec {
                 }
                 _ => format!("{edge} is not between 10 mm and 5000 mm"),
             };
-            return Err(TargetError::invalid("SolidSpec::edge_mm", problem));
+            return Err(TargetError::invalid(SolidEdgeMm, problem));
         }
         if let SolidShape::Cuboid(sides) = &self.shape {
             let scale = self.edge_mm / mean_side(*sides);
@@ -214,21 +218,21 @@ impl SolidSpec {
             if let Some(side) = sides.to_array().into_iter().find(wrong) {
                 let side = format_mm(side * scale);
                 let problem = format!("a side of {side} is not between 10 mm and 5000 mm");
-                return Err(TargetError::invalid("SolidShape::Cuboid", problem));
+                return Err(TargetError::invalid(SolidShapeCuboid, problem));
             }
         }
         if let SolidShape::Mesh(mesh) = &self.shape
             && mesh.faces().len() > MOST_FACES as usize
         {
             let problem = format!("{} faces are more than {MOST_FACES}", mesh.faces().len());
-            return Err(TargetError::invalid("SolidShape::Mesh", problem));
+            return Err(TargetError::invalid(SolidShapeMesh, problem));
         }
         if let SolidShape::Mesh(mesh) = &self.shape {
             let triangles: usize = mesh.faces().iter().map(|face| face.len() - 2).sum();
             if triangles > MOST_TRIANGLES {
                 let problem =
                     format!("its faces are {triangles} triangles, more than {MOST_TRIANGLES}");
-                return Err(TargetError::invalid("SolidShape::Mesh", problem));
+                return Err(TargetError::invalid(SolidShapeMesh, problem));
             }
         }
         if let SolidShape::Mesh(mesh) = &self.shape {
@@ -241,20 +245,20 @@ impl SolidSpec {
                     format_mm(farthest),
                     format_mm(FARTHEST_MM)
                 );
-                return Err(TargetError::invalid("SolidShape::Mesh", problem));
+                return Err(TargetError::invalid(SolidShapeMesh, problem));
             }
         }
         if !FACE_TILES.contains(&self.tiles) {
             let problem = format!("{} is not between 6 and 200", self.tiles);
-            return Err(TargetError::invalid("SolidSpec::tiles", problem));
+            return Err(TargetError::invalid(SolidTiles, problem));
         }
         if !(0.0..=SOLID_EDGE_MM.end() / 4.0).contains(&self.margin_mm) {
             let problem = format!("{} is no margin of a face", format_mm(self.margin_mm));
-            return Err(TargetError::invalid("SolidSpec::margin_mm", problem));
+            return Err(TargetError::invalid(SolidMarginMm, problem));
         }
         if self.board_id.checked_add(MOST_FACES).is_none() {
             let problem = format!("{} leaves no ids for the faces after it", self.board_id);
-            return Err(TargetError::invalid("SolidSpec::board_id", problem));
+            return Err(TargetError::invalid(SolidBoardId, problem));
         }
         if self.inverted && self.margin_mm < LEAST_INVERTED_MARGIN_MM {
             let problem = format!(
@@ -262,13 +266,13 @@ impl SolidSpec {
                 format_mm(self.margin_mm),
                 format_mm(LEAST_INVERTED_MARGIN_MM)
             );
-            return Err(TargetError::invalid("SolidSpec::margin_mm", problem));
+            return Err(TargetError::invalid(SolidMarginMm, problem));
         }
         let Some(tags) = &self.tags else {
             return match self.square_tags {
                 Some(_) => {
                     let problem = "the other faces have no tags: leave it out";
-                    Err(TargetError::invalid("SolidSpec::square_tags", problem))
+                    Err(TargetError::invalid(SolidSquareTags, problem))
                 }
                 None => Ok(()),
             };
@@ -277,8 +281,8 @@ impl SolidSpec {
             let boards = self.board_id..self.board_id + self.polyhedron().faces.len() as u32;
             // Faces of other shapes than triangles have up to twice as many rows.
             let rows = if matches!(self.shape, SolidShape::Mesh(_)) { 2 } else { 1 } * self.tiles;
-            let size = ("SolidSpec::tiles", rows, rows);
-            tags.check_places(("SolidSpec::board_id", boards), size)?;
+            let size = (SolidTiles, rows, rows);
+            tags.check_places((SolidBoardId, boards), size)?;
         }
         let kind = match (self.shape.tilings(), &self.square_tags) {
             ([true, true], Some(tags)) => {
@@ -289,11 +293,11 @@ impl SolidSpec {
             ([false, _], None) => GridKind::Checker,
             ([true, true], None) => {
                 let problem = "rectangular faces need square tags, the others have triangular ones";
-                return Err(TargetError::invalid("SolidSpec::square_tags", problem));
+                return Err(TargetError::invalid(SolidSquareTags, problem));
             }
             (_, Some(_)) => {
                 let problem = "all faces are of one kind and have one kind of tags: leave it out";
-                return Err(TargetError::invalid("SolidSpec::square_tags", problem));
+                return Err(TargetError::invalid(SolidSquareTags, problem));
             }
         };
         tags.check(kind)

@@ -20,6 +20,7 @@ use deltille_core::camera::{Camera, Lens, Pose, Spline, SplineGrid, is_rotation}
 use deltille_core::json;
 use deltille_core::json::ReadError;
 use deltille_core::quantity;
+use deltille_core::setting::Setting::{CalibrationWrite, RigWrite};
 use deltille_core::targets::{Target, TargetIdentity, check_result_of};
 
 /// Why a calibration cannot be read from a file.
@@ -27,7 +28,7 @@ use deltille_core::targets::{Target, TargetIdentity, check_result_of};
 #[non_exhaustive]
 pub enum SavedError {
     /// The file is neither the calibration of a camera nor of a rig.
-    #[error("not what `calibration::write` or `rig::write` made")]
+    #[error("not what {CalibrationWrite} or {RigWrite} made")]
     Foreign,
     /// A field is missing, or has an invalid value.
     #[error("field `{field}`: {problem}")]

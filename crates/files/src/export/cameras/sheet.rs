@@ -8,6 +8,7 @@ use deltille_calibrate::{SHAPE_COEFFICIENTS as COUNT, Shape};
 use deltille_core::json;
 use deltille_core::json::ReadError;
 use deltille_core::quantity;
+use deltille_core::setting::Setting::{CalibrationBoardShape, CalibrationWrite, RigWrite};
 use deltille_core::targets::{TargetIdentity, check_result_of};
 use deltille_layout::SheetLayout;
 
@@ -28,12 +29,12 @@ pub struct Sheet {
 pub enum SheetError {
     /// The file is not a calibration.
     #[error(
-        "not what `calibration::write` or `rig::write` made: make it by a calibration with `Calibration::board_shape`"
+        "not what {CalibrationWrite} or {RigWrite} made: make it by a calibration with {CalibrationBoardShape}"
     )]
     Foreign,
     /// A field is missing, or has an invalid value.
     #[error(
-        "field `{field}`: {problem}; make it anew by a calibration with `Calibration::board_shape`"
+        "field `{field}`: {problem}; make it anew by a calibration with {CalibrationBoardShape}"
     )]
     Field {
         /// The field, such as `board_shape.reach_mm`.
@@ -45,7 +46,7 @@ pub enum SheetError {
     #[error("{0}")]
     OtherTarget(String),
     /// The calibration did not estimate a shape.
-    #[error("no `board_shape` in it: make it by a calibration with `Calibration::board_shape`")]
+    #[error("no `board_shape` in it: make it by a calibration with {CalibrationBoardShape}")]
     Flat,
 }
 

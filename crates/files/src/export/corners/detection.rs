@@ -10,6 +10,7 @@ use deltille_core::json::ReadError;
 use deltille_core::quantity;
 use deltille_core::raster::FileNotes;
 use deltille_core::reading::in_words;
+use deltille_core::setting::Setting::DetectionWrite;
 use deltille_core::targets::TargetIdentity;
 
 /// Schema and version that this crate writes and reads.
@@ -20,7 +21,7 @@ pub const SCHEMA: &str = "deltille/detection/1";
 #[non_exhaustive]
 pub enum DetectionFileError {
     /// The file is not JSON, or truncated.
-    #[error("not a detection file: {}; make it anew with `detection::write`", in_words(.0))]
+    #[error("not a detection file: {}; make it anew with {DetectionWrite}", in_words(.0))]
     Json(serde_json::Error),
     /// The file has another version of the schema.
     #[error("field `schema` is `{found}`, this version reads `{SCHEMA}`: make the file anew")]
@@ -29,13 +30,13 @@ pub enum DetectionFileError {
         found: String,
     },
     /// The file is not a detection.
-    #[error("this is a {found} file, not a detection: give what `detection::write` made")]
+    #[error("this is a {found} file, not a detection: give what {DetectionWrite} made")]
     Kind {
         /// The schema that the file names.
         found: String,
     },
     /// A field is missing, unknown, or has an invalid value.
-    #[error("field `{field}`: {problem}; make the file anew with `detection::write`")]
+    #[error("field `{field}`: {problem}; make the file anew with {DetectionWrite}")]
     Field {
         /// The field, such as `grids[0].corners[3].x`.
         field: String,

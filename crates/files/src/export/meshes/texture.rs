@@ -10,6 +10,7 @@ use std::ops::Range;
 
 use super::meshing::{MAX_TEXTURE_PX, MeshError, Resolution, TEXELS_PER_BIT};
 use deltille_core::polygon::area;
+use deltille_core::setting::Setting::MeshingTextures;
 use deltille_core::targets::{Face, Panel};
 use deltille_layout::artwork::Atlas;
 
@@ -105,7 +106,7 @@ pub(in crate::export) fn pictures(
             longest(&set.at(px_per_m)) <= side
         };
         let found = (count + 1..=most).find(enough);
-        found.map_or(String::new(), |count| format!(", or `Meshing::textures` {count}"))
+        found.map_or(String::new(), |count| format!(", or {MeshingTextures} {count}"))
     };
     let sharp = per_m(SPARE * needed);
     Err(match resolution {

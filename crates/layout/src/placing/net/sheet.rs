@@ -18,6 +18,9 @@ use crate::{Label, LineKind, Placement, SheetLayout, SheetLine, SheetText};
 use deltille_core::angles::turn_of;
 use deltille_core::lattice::{GridKind, Vertex};
 use deltille_core::polygon;
+use deltille_core::setting::Setting::{
+    PaperSize, SolidEdgeMm, SolidMarginMm, SolidSheetsPerFace, SolidSheetsSeamedNet,
+};
 use deltille_core::targets::format_mm;
 use deltille_core::targets::{
     Face, FamilyRef, Panel, Polyhedron, SolidSpec, TargetError, fingerprint,
@@ -106,11 +109,11 @@ pub fn sheets(
     if spec.margin_mm < LEAST_MARGIN_MM {
         let problem = format!(
             "a net has its numbers in the margins of the faces: take at least {} instead of {}, \
-             or `SolidSheets::PerFace`",
+             or {SolidSheetsPerFace}",
             format_mm(LEAST_MARGIN_MM),
             format_mm(spec.margin_mm)
         );
-        return Err(TargetError::invalid("SolidSpec::margin_mm", problem));
+        return Err(TargetError::invalid(SolidMarginMm, problem));
     }
     let (solid, faces) = (spec.polyhedron(), spec.faces()?);
     let sides = Sides::new(&solid);
@@ -141,17 +144,17 @@ fn seamed(
     paper: &PaperSpec,
 ) -> Result<Vec<SheetLayout>, TargetError> {
     let [net, ..] = nets else {
-        let problem = "the faces leave no room for glue tabs: take `SolidSheets::PerFace`";
-        return Err(TargetError::invalid("SolidSpec::edge_mm", problem));
+        let problem = format!("the faces leave no room for glue tabs: take {SolidSheetsPerFace}");
+        return Err(TargetError::invalid(SolidEdgeMm, problem));
     };
     let what = format!("the net of a solid with {} edges", format_mm(spec.edge_mm));
-    let edge = ("SolidSpec::edge_mm", spec.edge_mm);
+    let edge = (SolidEdgeMm, spec.edge_mm);
     let count = net.pieces.len();
     let pieces = net.pieces.iter().zip(&net.tabs).enumerate();
     pieces
         .map(|(index, (piece, tabs))| {
             let poster = Poster::new(&points(piece, tabs), paper)?;
-            poster.check(&what, edge, "`SolidSheets::PerFace`, ", paper)?;
+            poster.check(&what, edge, Some(SolidSheetsPerFace), paper)?;
             let mut sheet = poster.sheet();
             drawing.draw(&mut sheet, piece, tabs, &poster.sheet_from_points());
             let of = match count {
@@ -205,10 +208,10 @@ fn nested(
         if count > MOST_PAGES {
             let problem = format!(
                 "the net of a solid with {} edges takes {count} pages of {size}, more than can be assembled: take \
-                 `SolidSheets::PerFace`, a shorter `SolidSpec::edge_mm`, or larger `PaperSpec::size`",
+                 {SolidSheetsPerFace}, a shorter {SolidEdgeMm}, or larger {PaperSize}",
                 format_mm(spec.edge_mm),
             );
-            return Err(TargetError::invalid("SolidSpec::edge_mm", problem));
+            return Err(TargetError::invalid(SolidEdgeMm, problem));
         }
         let corner = DVec2::new(left, lower + WORDS_MM + BLANK_MM);
         let sheet = |number: usize| {
@@ -236,13 +239,13 @@ fn nested(
         return Ok((0..count).map(sheet).collect());
     }
     let size = sizes.last().map(ToString::to_string).unwrap_or_default();
-    let seams = if paper.size.is_some() { ", larger `PaperSpec::size`" } else { "" };
+    let seams = if paper.size.is_some() { format!(", larger {PaperSize}") } else { String::new() };
     let problem = format!(
-        "a face with {} edges and its tabs is larger than {size}: take `SolidSheets::SeamedNet`{seams}, or a shorter \
-         `SolidSpec::edge_mm`",
+        "a face with {} edges and its tabs is larger than {size}: take {SolidSheetsSeamedNet}{seams}, or a shorter \
+         {SolidEdgeMm}",
         format_mm(spec.edge_mm),
     );
-    Err(TargetError::invalid("SolidSpec::edge_mm", problem))
+    Err(TargetError::invalid(SolidEdgeMm, problem))
 }
 
 /// The net whose pieces take the fewest pages with a room of this size, then that with the fewest pieces.

@@ -6,6 +6,7 @@ use glam::DVec3;
 
 use super::{Dialect, DscError, FAMILIES};
 use deltille_core::lattice::{GridKind, Vertex};
+use deltille_core::setting::Setting::{DialectFork, TagFamily, TagsInBlack};
 use deltille_core::targets::{Panel, TagsIn, Target};
 
 /// The text of the `.dsc` file of a target; positions are in the target frame, mm.
@@ -30,7 +31,7 @@ pub fn write(target: &Target, dialect: Dialect) -> Result<String, DscError> {
         let names = FAMILIES.map(|f| format!("delTag{f}"));
         refused(&format!(
             "its readers have the codes of {} only, not those of {name}: choose one of them with \
-             `TagSpec::family`",
+             {TagFamily}",
             names.join(", ")
         ))
     })?;
@@ -44,9 +45,9 @@ pub fn write(target: &Target, dialect: Dialect) -> Result<String, DscError> {
             return Err(refused("its readers look for black tags, and the board is inverted"));
         }
         if panel.tags_in == TagsIn::White {
-            return Err(refused(
-                "its readers look for tags in black squares: take `TagsIn::Black`",
-            ));
+            return Err(refused(&format!(
+                "its readers look for tags in black squares: take {TagsInBlack}"
+            )));
         }
         let [a, b] = header(panel, dialect).map_err(|reason| refused(&reason))?;
         let border = panel.border_bits.unwrap_or_default();
@@ -81,9 +82,9 @@ fn header(panel: &Panel, dialect: Dialect) -> Result<[u32; 2], String> {
             if triangle.eq(listed) {
                 Ok([side as u32 + 2, 0])
             } else {
-                let reason = "it knows triangular boards with an equilateral outline only; use \
-                              `Dialect::Fork`";
-                Err(reason.to_owned())
+                Err(format!(
+                    "it knows triangular boards with an equilateral outline only; use {DialectFork}"
+                ))
             }
         }
     }
