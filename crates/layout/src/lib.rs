@@ -7,7 +7,7 @@
 //! 1. `paper`: what is printed on; `printing`: how a kind of target is laid out on it;
 //! 2. `placing`: where panels and check bars lie on one page, several pages, or the sheets of a solid;
 //! 3. `marks`: what is printed beside a target: labels, ids of tags, a logo;
-//! 4. `finish`: how all of it is printed: mirrored, in spot colours, with lines to cut along;
+//! 4. `finish`, and `finished` prints: how all of it is printed: mirrored, in spot colours, with lines to cut along;
 //! 5. `sheet`: the values that these fill; `json`: the target file that holds them;
 //! 6. [`artwork`]: what is drawn of a sheet, in mm;
 //! 7. [`synth`]: a sheet or a target seen by a camera, as an image with exact ground truth.
@@ -16,6 +16,7 @@
 
 pub mod artwork;
 mod finish;
+mod finished;
 mod json;
 mod marks;
 mod paper;

@@ -3,7 +3,7 @@
 use std::borrow::Cow;
 
 use super::paper::{PaperSpec, SolidSheets};
-use crate::marks::{logo, tag_ids};
+use crate::marks::{logo_room, tag_ids};
 use crate::placing::arrangement::{arrange, label};
 use crate::placing::poster::Poster;
 use crate::placing::{face_sheet, guide, net, packed, single_panel, tag_sheet};
@@ -83,7 +83,7 @@ impl Printing {
         family: Option<&Family>,
         paper: &PaperSpec,
     ) -> Result<Self, TargetError> {
-        logo::check(paper)?;
+        logo_room::check(paper)?;
         let title = match &paper.note {
             Some(note) => format!("{} · {}", target.name, checked_note(note)?),
             None => target.name.to_string(),
@@ -106,7 +106,7 @@ impl Printing {
             }
             TargetSpec::Listed(_) => return Err(TargetError::Listed),
         };
-        logo::check_sheets(&sheets, paper)?;
+        logo_room::check_sheets(&sheets, paper)?;
         let logo = paper.logo.clone();
         let mut printing = Self { target, sheets, finish: Finish::default(), logo };
         if paper.tag_ids {

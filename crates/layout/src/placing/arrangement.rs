@@ -15,7 +15,8 @@ use std::f64::consts::FRAC_PI_2;
 
 use glam::DVec2;
 
-use crate::marks::logo::{LogoPlacement, LogoSize};
+use crate::marks::logo::LogoPlacement;
+use crate::marks::logo_room::LogoSize;
 use crate::paper::{Orientation, PaperSize, PaperSpec};
 use crate::{CheckBar, Label, LineKind, Placement, SheetLayout, SheetLine, SheetText};
 use deltille_core::family::places;

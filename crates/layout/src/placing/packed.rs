@@ -16,7 +16,8 @@ use glam::DVec2;
 use super::arrangement::{
     ADVANCE_CAPS, Arrangement, Footprint, check_margin, label, label_of_one, on_page,
 };
-use crate::marks::logo::{LogoPlacement, LogoSize};
+use crate::marks::logo::LogoPlacement;
+use crate::marks::logo_room::LogoSize;
 use crate::paper::PaperSpec;
 use crate::{Label, LineKind, Placement, SheetLayout, SheetLine, SheetText};
 use deltille_core::lattice::{GridKind, ROW_HEIGHT};
