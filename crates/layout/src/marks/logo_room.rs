@@ -124,7 +124,7 @@ mod tests {
     use super::*;
     use crate::artwork;
     use crate::{CHECK_BAR_STROKE_MM, SolidSheets};
-    use crate::{Logo, Printing};
+    use crate::{Logo, LogoPlacement, Printing};
     use deltille_core::family::Family;
     use deltille_core::lattice::GridKind;
     use deltille_core::targets::{BoardSpec, CirclesSpec, SolidShape, SolidSpec, TargetSpec};
