@@ -12,6 +12,7 @@
 //! | 1 | [`lattice`] | the triangular lattice: vertices, tiles, symmetries, the cells of a tag | `deltille-core` |
 //! | 1 | [`raster`] | grey images: storage, sampling, blur | |
 //! | 1 | [`camera`] | camera models and poses | |
+//! | 1 | [`setting`] | the settings that messages name, and what they are called | |
 //! | 2 | [`family`] | DelTag code families: certificates and decoding; [`family::search`] is `deltille-search` | |
 //! | 3 | [`targets`] | what exists in the world: panels, corners and tags in millimetres | |
 //! | 4 | [`layout`] | targets on paper: sheets with labels, check bars and cutting lines | `deltille-layout` |

@@ -10,6 +10,7 @@
 //! | 1 | [`lattice`] | the triangular and the square lattice: vertices, tiles, symmetries, the cells of a tag |
 //! | 1 | [`raster`] | grey images: storage, sampling, blur |
 //! | 1 | [`camera`] | camera models and poses |
+//! | 1 | [`setting`] | the settings that messages name, and what they are called |
 //! | 2 | [`family`] | DelTag code families: files, certificates, decoding |
 //! | 3 | [`targets`] | what exists in the world: panels, corners and tags in millimetres |
 //! | 4 | [`detection`] | what a detector finds in an image |

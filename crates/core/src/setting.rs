@@ -8,7 +8,7 @@ macro_rules! settings {
     ($($name:ident = $path:literal,)*) => {
         /// What a message tells its reader to look at or to change. It is displayed in the words of whoever reads, see
         /// [`speak`]. Another one is a breaking change: a front end without a word for it must not compile.
-        #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+        #[derive(Clone, Copy, Debug, PartialEq, Eq)]
         pub enum Setting {
             $(
                 #[doc = concat!("`", $path, "`")]
