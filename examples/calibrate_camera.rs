@@ -20,7 +20,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let detector = Detector::new(&target)?;
     let mut found = Vec::new();
     for path in args {
-        found.push((path.clone(), detector.detect(&photograph::read(&path)?, &path)));
+        found.push(detector.detect(&photograph::read(&path)?, &path));
     }
     let target = Reference::Target(&target);
     let shown = views(&found, &target)?;

@@ -34,7 +34,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         let frame_view = View::new(1280, 960, 1280, &bytes).ok_or("too few bytes")?;
         let name = format!("frame {frame}");
         let found = detector.detect(ImageView::from(frame_view), &name);
-        let shown = views(&[(name.clone(), found)], &reference)?;
+        let shown = views([&found], &reference)?;
         let estimate = Calibration::new(reference.panels())
             .camera("camera", shown.views, camera.clone())
             .solve()?;

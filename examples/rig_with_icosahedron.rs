@@ -43,8 +43,7 @@ fn main() -> Result<(), Box<dyn Error>> {
             let image = scene.render(&camera, &camera_from_world.after(&world_from_target), &light);
             let image = image.map(|grey| (255.0 * grey + 0.5) as u8);
             // Pictures of one moment have the same name.
-            let name = format!("{frame:02}");
-            found.push((name.clone(), detector.detect(&image, &name)));
+            found.push(detector.detect(&image, &format!("{frame:02}")));
         }
         calibration = calibration.camera(name, views(&found, &reference)?.views, Model::Radtan);
     }

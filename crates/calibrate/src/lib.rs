@@ -80,7 +80,7 @@ pub use input::observation::{Sighting, View};
 pub use input::panel::PanelPlace;
 pub use input::panel::PanelRef;
 pub use input::reference::Reference;
-pub use input::views::{Shown, views};
+pub use input::views::{Named, Shown, views};
 pub use input::weights::Weights;
 pub use matrix::Matrix;
 pub use model::{Model, ModelError};

@@ -33,8 +33,27 @@ pub struct Shown {
     pub left_out: Vec<(usize, Excluded)>,
 }
 
-/// The views of all detections, each with its name; an error where most of those that show
-/// something do not belong to the target.
+/// A detection and the name of its view: that of its image, or another one. Views of several cameras that were seen at the
+/// same moment have the same name.
+#[derive(Clone, Copy, Debug)]
+pub struct Named<'a> {
+    name: &'a str,
+    detection: &'a Detection,
+}
+
+impl<'a> From<&'a Detection> for Named<'a> {
+    fn from(detection: &'a Detection) -> Self {
+        Self { name: &detection.image, detection }
+    }
+}
+
+impl<'a> From<&'a (String, Detection)> for Named<'a> {
+    fn from((name, detection): &'a (String, Detection)) -> Self {
+        Self { name, detection }
+    }
+}
+
+/// The views of all detections; an error where most of those that show something do not belong to the target.
 ///
 /// ```
 /// use deltille_calibrate::{Reference, views};
@@ -50,17 +69,23 @@ pub struct Shown {
 /// let scene = scene_of_target(&board, board.family()?.as_ref())?;
 /// let image = scene.render(&Camera::pinhole(640, 480, 1.0), &pose, &Light::default());
 /// let found = Detector::new(&board)?.detect(&image.map(|grey| (255.0 * grey) as u8), "desk.png");
-/// let shown = views(&[("desk".to_owned(), found)], &Reference::Target(&board))?;
+/// let shown = views([&found], &Reference::Target(&board))?;
 /// assert_eq!(shown.views[0].corner_count(), 20);
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 ///
 /// # Errors
 /// Where pictures have different sizes, or most that show something are not of the target.
-pub fn views(
-    detections: &[(String, Detection)],
+pub fn views<'a, N: Into<Named<'a>>>(
+    detections: impl IntoIterator<Item = N>,
     reference: &Reference,
 ) -> Result<Shown, CalibrationError> {
+    let named: Vec<Named> = detections.into_iter().map(Into::into).collect();
+    views_of(&named, reference)
+}
+
+/// [`views`], compiled here and not in every crate that uses it.
+fn views_of(detections: &[Named], reference: &Reference) -> Result<Shown, CalibrationError> {
     let mut views = Vec::new();
     let mut empty = Vec::new();
     let mut left_out = Vec::new();
@@ -69,21 +94,21 @@ pub fn views(
     let mut copies = 0;
     let mut seen = HashMap::new();
     let identities = reference.identities();
-    for (index, (name, detection)) in detections.iter().enumerate() {
+    for (index, &Named { name, detection }) in detections.iter().enumerate() {
         let size_px = [detection.width, detection.height];
-        if let Some((first, other)) = detections.first()
+        if let Some(&Named { name: first, detection: other }) = detections.first()
             && size_px != [other.width, other.height]
         {
             return Err(CalibrationError::MixedSizes {
-                first: first.clone(),
+                first: first.to_owned(),
                 first_px: [other.width, other.height],
-                other: name.clone(),
+                other: name.to_owned(),
                 other_px: size_px,
             });
         }
         let excluded = |panel, reason| Excluded {
             camera: None,
-            view: name.clone(),
+            view: name.to_owned(),
             image: detection.image.clone(),
             panel,
             corners: detection.grids.iter().map(|grid| grid.corners.len()).sum(),
@@ -98,7 +123,7 @@ pub fn views(
             Err((panel, problem)) => {
                 left_out.push((index, excluded(panel, Reason::Foreign(problem.clone()))));
                 wrong += 1;
-                let view = name.clone();
+                let view = name.to_owned();
                 first_wrong.get_or_insert(CalibrationError::WrongDetection { view, problem });
             }
             Ok(sightings) if sightings.is_empty() => empty.push(index),
@@ -111,7 +136,7 @@ pub fn views(
                 }));
             }
             Ok(sightings) => {
-                let (name, image) = (name.clone(), detection.image.clone());
+                let (name, image) = (name.to_owned(), detection.image.clone());
                 views.push(View { name, image, size_px, sightings });
             }
         }

@@ -19,14 +19,10 @@ const FEWEST_CORNERS: usize = 12;
 /// Looks at pictures one after the other.
 ///
 /// ```
-/// use deltille_detect::{Detector, DetectorConfig};
-/// use deltille_core::detection::Watch;
-/// use deltille_core::lattice::GridKind;
-/// use deltille_core::raster::Gray;
+/// use deltille_core::detection::{Detection, Watch};
 ///
-/// let detector = Detector::for_grid(GridKind::Deltille, None, DetectorConfig::default());
 /// let mut watch = Watch::default();
-/// let seen = watch.look(&detector.detect(&Gray::<u8>::new(640, 480), "black"));
+/// let seen = watch.look(&Detection::new("black", [640, 480], Vec::new()));
 /// assert!(!seen.is_worth_keeping());
 /// ```
 #[derive(Clone, Debug, Default)]
