@@ -19,7 +19,7 @@ use crate::labels::evidence::Budget;
 use crate::refine::clearance::TagAreas;
 use crate::refine::corner_model::CornerFitter;
 use crate::refine::optics::Optics;
-use crate::refine::refine_grid::{is_sampled, sharp_level};
+use crate::refine::refine_grid::{Level, is_sampled, sharp_level};
 use crate::refine::refiner::Refiner;
 use deltille_core::Clock;
 use deltille_core::detection::{
@@ -59,6 +59,13 @@ const POLYNOMIAL_RADIUS: usize = 3;
 /// Largest radius of the model that refines, px: beyond, lenses bend edges more than a wider
 /// window gains.
 const MODEL_RADIUS: usize = 10;
+
+/// A picture and its pyramid.
+#[derive(Clone, Copy)]
+struct Frame<'a> {
+    image: ImageView<'a>,
+    pyramid: &'a Pyramid<'a>,
+}
 
 /// Grids, each with why it has no labels.
 type Judged = Vec<(Grid, Option<Reason>)>;
@@ -319,11 +326,12 @@ impl Detector {
     ) -> Detection {
         let mut timing = Timing::start(self.clock);
         let pyramid = Pyramid::new(image, levels_of(image), MIN_LEVEL_SIDE);
+        let frame = Frame { image, pyramid: &pyramid };
         timing.lap("pyramid");
-        let whole = self.whole_on_coarser_level(finder, (image, &pyramid), &mut timing);
+        let whole = self.whole_on_coarser_level(finder, frame, &mut timing);
         let Found { grids, optics, left_out, saddles } = match whole {
             Some((grids, optics)) => Found { grids, optics, left_out: Vec::new(), saddles: 0 },
-            None => self.all_grids(finder, (image, &pyramid), &mut timing),
+            None => self.all_grids(finder, frame, &mut timing),
         };
         let mut reasons = if grids.is_empty() {
             let nothing = || self.nothing_found::<N>(&pyramid, saddles);
@@ -363,10 +371,11 @@ impl Detector {
     fn whole_on_coarser_level<const N: usize>(
         &self,
         finder: &SaddleFinder<N>,
-        (image, pyramid): (ImageView, &Pyramid),
+        frame: Frame,
         timing: &mut Timing,
     ) -> Option<(Judged, Optics)> {
         let whole = self.labels.whole()?;
+        let pyramid = frame.pyramid;
         let levels = pyramid.levels();
         let least = LEAST_PX2_A_CORNER * whole.corners();
         let coarsest = levels.iter().rposition(|level| level.pixels().len() >= least)?;
@@ -387,12 +396,12 @@ impl Detector {
                 placed.position = Pyramid::to_level_0(level, placed.position);
             }
             let mut left_out = Vec::new();
-            let labelled = self.plausible::<N>(image, pyramid, &found, &mut left_out);
+            let labelled = self.plausible::<N>(frame, &found, &mut left_out);
             let is_alone = labelled.len() == 1 && labelled[0].1.is_none() && left_out.is_empty();
             is_alone.then_some(labelled)
         });
         timing.lap("coarse");
-        let refined = seen.map(|seen| self.refined::<N>((image, pyramid), seen));
+        let refined = seen.map(|seen| self.refined::<N>(frame, seen));
         timing.lap("refine");
         refined.filter(|(grids, _)| {
             grids.first().is_some_and(|(grid, _)| grid.corners.len() == whole.corners())
@@ -403,9 +412,10 @@ impl Detector {
     fn all_grids<const N: usize>(
         &self,
         finder: &SaddleFinder<N>,
-        (image, pyramid): (ImageView, &Pyramid),
+        frame: Frame,
         timing: &mut Timing,
     ) -> Found {
+        let Frame { image, pyramid } = frame;
         let saddles = finder.find(pyramid);
         timing.lap("saddles");
         let found = grids(finder, pyramid, &saddles, self.labels.whole());
@@ -419,30 +429,26 @@ impl Detector {
             });
         }
         timing.lap("grids");
-        let mut grids = self.plausible::<N>(image, pyramid, &found, &mut left_out);
+        let mut grids = self.plausible::<N>(frame, &found, &mut left_out);
         timing.lap("labels");
         if grids.is_empty() && self.labels.are_wanted() {
             let found = foreshortened_grids(finder, pyramid);
-            grids = self.plausible::<N>(image, pyramid, &found, &mut left_out);
+            grids = self.plausible::<N>(frame, &found, &mut left_out);
             // Compressed patterns of all kinds have triangles and squares too.
             grids.retain(|(grid, _)| is_labelled(grid));
             timing.lap("foreshortened");
         }
-        let (grids, optics) = self.refined::<N>((image, pyramid), grids);
+        let (grids, optics) = self.refined::<N>(frame, grids);
         timing.lap("refine");
         Found { grids, optics, left_out, saddles: saddles.len() }
     }
 
     /// Grids with their corners refined, those that are still grids, and what they have in common.
-    fn refined<const N: usize>(
-        &self,
-        (image, pyramid): (ImageView, &Pyramid),
-        grids: Judged,
-    ) -> (Judged, Optics) {
+    fn refined<const N: usize>(&self, frame: Frame, grids: Judged) -> (Judged, Optics) {
         let least = least_untagged_corners(kind::<N>()) as usize;
         let mut fitter = CornerFitter::default();
         let (mut refined, reasons): (Vec<Grid>, Vec<Option<Reason>>) = grids.into_iter().unzip();
-        let (optics, are_waves) = self.refine(&mut fitter, (image, pyramid), &mut refined);
+        let (optics, are_waves) = self.refine(&mut fitter, frame, &mut refined);
         let refined = refined.into_iter().zip(reasons).zip(are_waves);
         let mut grids: Judged = refined
             .filter(|((grid, _), is_wave)| {
@@ -451,24 +457,25 @@ impl Detector {
             .map(|(grid, _)| grid)
             .collect();
         let may_have_tags = !self.tag_areas.is_empty();
-        grids.retain(|(grid, _)| is_labelled(grid) || is_of_squares(image, grid, may_have_tags));
+        grids.retain(|(grid, _)| {
+            is_labelled(grid) || is_of_squares(frame.image, grid, may_have_tags)
+        });
         // Of what was no corner, some is gone.
-        refuse_patterns(pyramid, &mut grids);
+        refuse_patterns(frame.pyramid, &mut grids);
         (grids, optics)
     }
 
     /// The grids with their labels that may be what is looked for, and why others are left out.
     fn plausible<const N: usize>(
         &self,
-        image: ImageView,
-        pyramid: &Pyramid,
+        frame: Frame,
         found: &[SaddleGrid],
         left_out: &mut Vec<Reason>,
     ) -> Judged {
         let mut budget = Budget::default();
         let found = found.iter().map(|corners| FoundGrid { kind: kind::<N>(), corners });
         let mut grids: Judged =
-            found.flat_map(|grid| self.labels.label(image, grid, &mut budget)).collect();
+            found.flat_map(|grid| self.labels.label(frame.image, grid, &mut budget)).collect();
         let least = least_untagged_corners(kind::<N>()) as usize;
         let most = self.labels.most_corners();
         let mut refused = None;
@@ -495,7 +502,7 @@ impl Detector {
             is_vouched_for(grid) || is_plausible
         });
         left_out.extend(refused);
-        refuse_patterns(pyramid, &mut grids);
+        refuse_patterns(frame.pyramid, &mut grids);
         left_out.extend(report_once(&mut grids));
         let (count, mut corners) = (grids.len(), 0);
         grids.retain(|(grid, _)| {
@@ -515,28 +522,28 @@ impl Detector {
     fn refine(
         &self,
         fitter: &mut CornerFitter,
-        (image, pyramid): (ImageView, &Pyramid),
+        frame: Frame,
         grids: &mut [Grid],
     ) -> (Optics, Vec<bool>) {
-        let levels = pyramid.levels();
-        let blurs = self.refiner.blurs(fitter, (image, levels), grids, &self.tag_areas);
-        for level in (1..=sharp_level(&blurs, levels.len())).rev() {
-            let image = ImageView::from(&levels[level]);
-            grids.iter_mut().for_each(|grid| grid.moved_to_level(level));
-            let blurs =
-                self.refiner.blurs(fitter, (image, &levels[level..]), grids, &self.tag_areas);
-            let optics =
-                self.refiner.optics(fitter, (image, level), (grids, &blurs), &self.tag_areas);
+        let levels = frame.pyramid.levels();
+        let finest = Level { image: frame.image, number: 0, coarser: &levels[1..] };
+        let blurs = self.refiner.blurs(fitter, finest, grids, &self.tag_areas);
+        for number in (1..=sharp_level(&blurs, levels.len())).rev() {
+            let image = ImageView::from(&levels[number]);
+            let level = Level { image, number, coarser: &levels[number + 1..] };
+            grids.iter_mut().for_each(|grid| grid.moved_to_level(number));
+            let blurs = self.refiner.blurs(fitter, level, grids, &self.tag_areas);
+            let optics = self.refiner.optics(fitter, level, grids, &blurs, &self.tag_areas);
             // A picture that moved is as sharp as ever across its way.
             let found = is_sampled(&blurs, optics.narrowest())
-                .then(|| self.refine_under(fitter, image, grids, (&optics, &blurs)));
-            grids.iter_mut().for_each(|grid| grid.moved_from_level(level));
+                .then(|| self.refine_under(fitter, image, grids, &optics, &blurs));
+            grids.iter_mut().for_each(|grid| grid.moved_from_level(number));
             if let Some(are_waves) = found {
                 return (optics, are_waves);
             }
         }
-        let optics = self.refiner.optics(fitter, (image, 0), (grids, &blurs), &self.tag_areas);
-        let are_waves = self.refine_under(fitter, image, grids, (&optics, &blurs));
+        let optics = self.refiner.optics(fitter, finest, grids, &blurs, &self.tag_areas);
+        let are_waves = self.refine_under(fitter, frame.image, grids, &optics, &blurs);
         (optics, are_waves)
     }
 
@@ -546,11 +553,12 @@ impl Detector {
         fitter: &mut CornerFitter,
         image: ImageView,
         grids: &mut [Grid],
-        (optics, blurs): (&Optics, &[Option<f64>]),
+        optics: &Optics,
+        blurs: &[Option<f64>],
     ) -> Vec<bool> {
         let refine = |(grid, &blur_px): (&mut Grid, &Option<f64>)| {
             let edge_px = grid.edge_px().unwrap_or(0.0);
-            self.refiner.refine_grid(fitter, image, grid, &self.tag_areas, (optics, blur_px));
+            self.refiner.refine_grid(fitter, image, grid, &self.tag_areas, optics, blur_px);
             blur_px.is_some_and(|blur_px| blur_px > max_untagged_blur(grid.kind) * edge_px)
         };
         grids.iter_mut().zip(blurs).map(refine).collect()

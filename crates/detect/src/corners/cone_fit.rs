@@ -96,7 +96,7 @@ fn products<const N: usize, T: Intensity>(
     let mut sums = [[0.0f32; LANES]; N];
     for half in 0..2 {
         let first = half * HALF;
-        let part = half_sums(kernels, (side, first), image, ([left + first, top], [fx, fy], level));
+        let part = half_sums(kernels, side, first, image, [left + first, top], [fx, fy], level);
         for k in 0..N {
             sums[k][first..first + HALF].copy_from_slice(&part[k]);
         }
@@ -104,13 +104,16 @@ fn products<const N: usize, T: Intensity>(
     sums.each_ref().map(lanes::sum)
 }
 
-/// The sums of half of the lanes, from one on: so many stay in registers.
+/// The sums of half of the lanes, from `first` on, less `level`: so many stay in registers.
 #[inline(always)]
 fn half_sums<const N: usize, T: Intensity>(
     kernels: &[[[f32; LANES]; N]],
-    (side, first): (usize, usize),
+    side: usize,
+    first: usize,
     image: View<T>,
-    ([left, top], [fx, fy], level): ([usize; 2], [f32; 2], f32),
+    [left, top]: [usize; 2],
+    [fx, fy]: [f32; 2],
+    level: f32,
 ) -> [[f32; HALF]; N] {
     let groups = side.div_ceil(LANES);
     let mut sums = [[0.0f32; HALF]; N];

@@ -14,7 +14,7 @@ use std::collections::{BTreeMap, BTreeSet, HashSet, VecDeque};
 
 use glam::DVec2;
 
-use super::edge::{MAX_CHORD_RAD, is_clean_somehow};
+use super::edge::{End, MAX_CHORD_RAD, is_clean_somehow};
 use super::effort::Effort;
 use super::links::{Link, Links, facing_ray, links};
 use super::local_map::{Bend, LocalMap};
@@ -70,13 +70,13 @@ pub fn grids<const N: usize>(
     saddles.iter().for_each(|saddle| index.insert(saddle.position));
     let (mut growing, mut members) = (Vec::new(), Vec::new());
     for seed in seeds(&links) {
-        if seed.iter().any(|&(corner, _)| growth.taken[corner]) {
+        if seed.iter().any(|placed| growth.taken[placed.corner]) {
             continue;
         }
         let places = growth.grow(&seed);
         let mut own: BTreeMap<usize, Vertex> =
-            places.iter().map(|&(corner, place)| (corner, place.vertex)).collect();
-        let placed = places.into_iter().map(|(corner, Place { vertex, turn })| {
+            places.iter().map(|placed| (placed.corner, placed.place.vertex)).collect();
+        let placed = places.into_iter().map(|Placed { corner, place: Place { vertex, turn } }| {
             (vertex, GrownSaddle { saddle: saddles[corner], turn })
         });
         let mut grid: Growing<N> = placed.collect();
@@ -94,16 +94,15 @@ pub fn grids<const N: usize>(
         growing.push(grid);
         members.push(own);
     }
-    let mut grids: Vec<SaddleGrid> =
-        join(pyramid, (saddles, &index), growing, members, &mut effort)
-            .into_iter()
-            .map(|(mut grid, has_grown)| {
-                if has_grown {
-                    fill_gaps(finder, pyramid, &mut grid, &mut effort);
-                }
-                grid.into_iter().map(|(v, grown)| (v, plain(&grown))).collect()
-            })
-            .collect();
+    let mut grids: Vec<SaddleGrid> = join(pyramid, saddles, &index, growing, members, &mut effort)
+        .into_iter()
+        .map(|(mut grid, has_grown)| {
+            if has_grown {
+                fill_gaps(finder, pyramid, &mut grid, &mut effort);
+            }
+            grid.into_iter().map(|(v, grown)| (v, plain(&grown))).collect()
+        })
+        .collect();
     grids.sort_by_key(|grid: &SaddleGrid| std::cmp::Reverse(grid.len()));
     let mut grids = without_tag_cells::<N>(grids);
     each_once(&mut grids, no_places);
@@ -194,8 +193,14 @@ fn is_inside(tile: &[DVec2], p: DVec2) -> bool {
     })
 }
 
-/// Index of a corner, and its place.
-type Placed = (usize, Place);
+/// A corner at a place of a grid.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+struct Placed {
+    /// Index of the corner.
+    corner: usize,
+    /// Where it is.
+    place: Place,
+}
 
 /// The four corners from which a grid grows.
 type Seed = [Placed; 4];
@@ -214,8 +219,8 @@ type Seed = [Placed; 4];
 fn seeds<const N: usize>(links: &[Links<N>]) -> Vec<Seed> {
     let root = Place { vertex: Vertex::new(0, 0), turn: 0 };
     let mut seeds: Vec<(usize, Seed)> = Vec::new();
-    for a in 0..links.len() {
-        let a = (a, root);
+    for corner in 0..links.len() {
+        let a = Placed { corner, place: root };
         let seed = match kind::<N>() {
             GridKind::Deltille => (|| {
                 let [b, c, d] = [0, 1, 2].map(|k| follow(links, a, k));
@@ -226,17 +231,17 @@ fn seeds<const N: usize>(links: &[Links<N>]) -> Vec<Seed> {
             GridKind::Checker => square(links, a, 0, 1),
         };
         let Some(seed) = seed else { continue };
-        let complete = seed.iter().map(|&(i, _)| links[i].iter().flatten().count()).sum();
+        let complete = seed.iter().map(|at| links[at.corner].iter().flatten().count()).sum();
         seeds.push((complete, seed));
     }
-    seeds.sort_by_key(|(complete, seed)| (std::cmp::Reverse(*complete), seed[0].0));
+    seeds.sort_by_key(|(complete, seed)| (std::cmp::Reverse(*complete), seed[0].corner));
     seeds.into_iter().map(|(_, seed)| seed).collect()
 }
 
 /// The corner that is linked to `from` along step `k` of the lattice.
-fn follow<const N: usize>(links: &[Links<N>], (corner, place): Placed, k: usize) -> Option<Placed> {
-    let link = links[corner][(k + N - place.turn) % N]?;
-    Some((link.corner, across::<N>(place, k, link)))
+fn follow<const N: usize>(links: &[Links<N>], from: Placed, k: usize) -> Option<Placed> {
+    let link = links[from.corner][(k + N - from.place.turn) % N]?;
+    Some(Placed { corner: link.corner, place: across::<N>(from.place, k, link) })
 }
 
 /// The corners of the square that steps `k` and `l` span at `a`, in order around it; `None` unless all
@@ -294,7 +299,7 @@ impl<'a, const N: usize> Growth<'a, N> {
             let Some(place) = self.places[corner] else {
                 continue;
             };
-            let at = (corner, place);
+            let at = Placed { corner, place };
             for k in 0..N {
                 let Some(next) = follow(self.links, at, k).filter(|&next| self.is_free(next))
                 else {
@@ -308,11 +313,13 @@ impl<'a, const N: usize> Growth<'a, N> {
             }
         }
         let members = std::mem::take(&mut self.members).into_iter();
-        members.filter_map(|corner| Some((corner, self.places[corner].take()?))).collect()
+        members
+            .filter_map(|corner| Some(Placed { corner, place: self.places[corner].take()? }))
+            .collect()
     }
 
     /// Adds a corner, whose links are then followed.
-    fn add(&mut self, (corner, place): Placed) {
+    fn add(&mut self, Placed { corner, place }: Placed) {
         self.places[corner] = Some(place);
         self.members.push(corner);
         self.occupied.insert(place.vertex);
@@ -320,7 +327,7 @@ impl<'a, const N: usize> Growth<'a, N> {
     }
 
     /// Whether the corner belongs to no grid yet, and its vertex is not occupied in this one.
-    fn is_free(&self, (corner, place): Placed) -> bool {
+    fn is_free(&self, Placed { corner, place }: Placed) -> bool {
         !self.taken[corner]
             && self.places[corner].is_none()
             && !self.occupied.contains(&place.vertex)
@@ -330,7 +337,7 @@ impl<'a, const N: usize> Growth<'a, N> {
     /// is linked to it as if it had another place.
     fn votes(&self, next: Placed) -> Option<usize> {
         let linked = (0..N).filter_map(|k| follow(self.links, next, k));
-        let mut known = linked.filter_map(|(corner, place)| Some(self.places[corner]? == place));
+        let mut known = linked.filter_map(|next| Some(self.places[next.corner]? == next.place));
         known.try_fold(0, |votes, agrees| agrees.then_some(votes + 1))
     }
 
@@ -338,7 +345,7 @@ impl<'a, const N: usize> Growth<'a, N> {
     fn join(&mut self, next: Placed) {
         self.add(next);
         // Corners beside it that lacked one vote may now have it.
-        let linked = (0..N).filter_map(|k| follow(self.links, next, k)).map(|(corner, _)| corner);
+        let linked = (0..N).filter_map(|k| follow(self.links, next, k)).map(|next| next.corner);
         self.queue.extend(linked.filter(|&corner| self.places[corner].is_some()));
     }
 
@@ -349,7 +356,7 @@ impl<'a, const N: usize> Growth<'a, N> {
             let Some([_, next, beside, known]) = square(self.links, at, k, side % N) else {
                 continue;
             };
-            let in_grid = self.places[known.0] == Some(known.1);
+            let in_grid = self.places[known.corner] == Some(known.place);
             if in_grid && self.is_free(beside) && self.votes(beside) == Some(1) {
                 self.join(next);
                 self.join(beside);
@@ -376,12 +383,10 @@ fn fill_gaps<const N: usize>(
             .collect();
         let mut grown = false;
         for vertex in empty {
-            let Some((position, edge)) = predict(grid, vertex) else {
+            let Some(predicted) = predict(grid, vertex) else {
                 continue;
             };
-            if let Some(placed) =
-                corner_near(finder, pyramid, grid, (vertex, position, edge), effort)
-            {
+            if let Some(placed) = corner_near(finder, pyramid, grid, vertex, predicted, effort) {
                 grid.insert(vertex, placed);
                 grown = true;
                 // The vertices around it are predicted anew, so they are tried again.
@@ -396,8 +401,16 @@ fn fill_gaps<const N: usize>(
     }
 }
 
-/// Position of a missing corner, px, and the length of an edge there, px: the mean of what the rows
-/// through `vertex` predict. With the next three corners p, q, r of a row, the position is
+/// Where a missing corner is sought.
+#[derive(Clone, Copy, Debug)]
+struct Predicted {
+    /// Its position, px.
+    position: DVec2,
+    /// Length of an edge there, px.
+    edge_px: f64,
+}
+
+/// Where a missing corner is: the mean of what the rows through `vertex` predict. With the next three corners p, q, r of a row, the position is
 ///
 /// ```text
 ///     3 p − 3 q + r        a row that bends evenly (its second difference is constant)
@@ -406,7 +419,7 @@ fn fill_gaps<const N: usize>(
 ///
 /// Where fewer than two rows predict it, a local map of the corners around does, if there are two
 /// neighbours; else the result is `None`.
-fn predict<const N: usize>(grid: &Growing<N>, vertex: Vertex) -> Option<(DVec2, f64)> {
+fn predict<const N: usize>(grid: &Growing<N>, vertex: Vertex) -> Option<Predicted> {
     let at = |v: Vertex| grid.get(&v).map(|grown| grown.saddle.position);
     let mut sum = DVec2::ZERO;
     let (mut count, mut edge) = (0.0, 0.0);
@@ -424,22 +437,24 @@ fn predict<const N: usize>(grid: &Growing<N>, vertex: Vertex) -> Option<(DVec2, 
         count += 1.0;
     }
     if count >= 2.0 {
-        return Some((sum / count, edge / count));
+        return Some(Predicted { position: sum / count, edge_px: edge / count });
     }
     // The seed of a grid has no rows yet, but two of its corners beside the vertex.
     let beside: Vec<DVec2> = neighbours::<N>(vertex).into_iter().filter_map(at).collect();
     let map = (beside.len() >= 2).then(|| LocalMap::about::<N>(vertex, at, Bend::usual()))??;
     let px = |p: &DVec2| (p.x - map.place.x).hypot(p.y - map.place.y);
-    Some((map.place, beside.iter().map(px).sum::<f64>() / beside.len() as f64))
+    let edge_px = beside.iter().map(px).sum::<f64>() / beside.len() as f64;
+    Some(Predicted { position: map.place, edge_px })
 }
 
-/// The corner at `vertex`, if one is found near the predicted `position`, px: in the picture, or, where
-/// the board is seen at a steep angle, in a view that is rectified by the edges to its neighbours.
+/// The corner at `vertex`, if one is found near where it is predicted: in the picture, or, where the
+/// board is seen at a steep angle, in a view that is rectified by the edges to its neighbours.
 fn corner_near<const N: usize>(
     finder: &SaddleFinder<N>,
     pyramid: &Pyramid,
     grid: &Growing<N>,
-    (vertex, position, edge_px): (Vertex, DVec2, f64),
+    vertex: Vertex,
+    Predicted { position, edge_px }: Predicted,
     effort: &mut Effort,
 ) -> Option<GrownSaddle<N>> {
     if !effort.spend(LOOKS_FOR_CORNER) {
@@ -479,7 +494,7 @@ fn placed_at<const N: usize>(
         };
         let back = other.ray(k + N / 2);
         if let Some(ray) = facing_ray(&other.saddle, back, &saddle)
-            && is_clean_somehow(pyramid, &other.saddle, back, &saddle, ray)
+            && is_clean_somehow(pyramid, End::of(&other.saddle, back), End::of(&saddle, ray))
         {
             votes[(k + N - ray) % N] += 1;
         }
@@ -594,14 +609,14 @@ mod tests {
         let links = linked::<N>(&vertices, &turns, lost);
         let (mut growth, mut seen) = (Growth::new(&links), BTreeSet::new());
         for seed in seeds(&links) {
-            if seed.iter().any(|&(corner, _)| growth.taken[corner]) {
+            if seed.iter().any(|placed| growth.taken[placed.corner]) {
                 continue;
             }
-            let root = seed[0].0;
+            let root = seed[0].corner;
             let grid = growth.grow(&seed);
-            let places: BTreeSet<Vertex> = grid.iter().map(|(_, place)| place.vertex).collect();
+            let places: BTreeSet<Vertex> = grid.iter().map(|placed| placed.place.vertex).collect();
             assert_eq!(places.len(), grid.len());
-            for (corner, place) in grid {
+            for Placed { corner, place } in grid {
                 growth.taken[corner] = true;
                 assert!(seen.insert(corner), "corner {corner} has two places");
                 let truth = vertices[root] + turned::<N>(place.vertex, turns[root]);

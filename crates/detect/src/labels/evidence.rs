@@ -207,6 +207,13 @@ struct LabelPanel {
     tiles: BTreeSet<Tile>,
 }
 
+impl LabelPanel {
+    /// How its tags are read in a picture as it is.
+    fn way(&self) -> Way {
+        Way { reader: self.reader, inverted: self.inverted, mirrored: false }
+    }
+}
+
 /// A tag of a panel.
 #[derive(Clone, Copy, Debug)]
 struct LabelTag {
@@ -215,14 +222,21 @@ struct LabelTag {
     code: usize,
 }
 
-/// The readings of the tiles of a grid by one reader, as the picture shows them or in its mirror image.
-struct Sight {
+/// A way in which the tags of a grid are read.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+struct Way {
     /// Index of the reader.
     reader: usize,
     /// Whether black and white are exchanged.
     inverted: bool,
-    /// Whether it is the mirror image.
+    /// Whether the mirror image is read.
     mirrored: bool,
+}
+
+/// The readings of the tiles of a grid in one way.
+struct Sight {
+    /// How they were read.
+    way: Way,
     /// Index of the reading of each tile.
     index: BTreeMap<Tile, usize>,
     /// The readings; their tiles are mirrored with them.
@@ -359,20 +373,20 @@ impl TagLabeller {
     pub fn label(&self, image: ImageView, grid: &SaddleGrid, budget: &mut Budget) -> TagEvidence {
         let mut evidence = TagEvidence::default();
         let mut sights = Vec::new();
-        for (reader, inverted) in self.ways_to_read() {
+        for way in self.ways_to_read() {
             let cost = READING_COST + 2 * self.words.len();
             let most = (budget.0 / cost).min(MOST_TILES);
             if most == 0 {
                 evidence.is_cut_short = true;
                 return evidence;
             }
-            let read = self.readers[reader].read(image, grid, inverted, most);
+            let read = self.readers[way.reader].read(image, grid, way.inverted, most);
             let Read { readings, bit_px, blur_px } = read;
             budget.0 -= readings.len() * cost;
             evidence.tiles += readings.len();
             evidence.bit_px = evidence.bit_px.max(bit_px);
             evidence.blur_px = evidence.blur_px.max(blur_px);
-            sights.push(self.sight((reader, inverted, false), readings, &mut evidence));
+            sights.push(self.sight(way, readings, &mut evidence));
         }
         self.decide(sights, grid, evidence)
     }
@@ -394,9 +408,9 @@ impl TagLabeller {
             let in_mirror: Vec<Sight> = sights
                 .iter()
                 .map(|sight| {
-                    let reader = &self.readers[sight.reader];
+                    let reader = &self.readers[sight.way.reader];
                     let readings = sight.readings.iter().map(|r| reader.mirrored(r)).collect();
-                    let way = (sight.reader, sight.inverted, true);
+                    let way = Way { mirrored: true, ..sight.way };
                     self.sight(way, readings, &mut TagEvidence::default())
                 })
                 .collect();
@@ -410,7 +424,7 @@ impl TagLabeller {
         if evidence.found.is_empty() {
             let needed_bits = (self.family_words.max(1) as f64).log2();
             let is_unread = |reading: &&Reading| reading.bits_told() < needed_bits;
-            let as_seen = sights.iter().filter(|sight| !sight.mirrored);
+            let as_seen = sights.iter().filter(|sight| !sight.way.mirrored);
             evidence.unread = as_seen.flat_map(|sight| &sight.readings).filter(is_unread).count();
         }
         let mut taken = BTreeSet::new();
@@ -420,22 +434,16 @@ impl TagLabeller {
         evidence
     }
 
-    /// The ways in which the target's panels are read: index of the reader, and whether black and white
-    /// are exchanged.
-    fn ways_to_read(&self) -> BTreeSet<(usize, bool)> {
+    /// The ways in which the target's panels are read in a picture as it is.
+    fn ways_to_read(&self) -> BTreeSet<Way> {
         let tagged = self.panels.iter().filter(|panel| !panel.tags.is_empty());
-        tagged.map(|panel| (panel.reader, panel.inverted)).collect()
+        tagged.map(LabelPanel::way).collect()
     }
 
     /// Compares readings with all words of the target; what they say beyond that, such as codes of the
     /// family that the target does not have, is added to `noted`.
-    fn sight(
-        &self,
-        (reader, inverted, mirrored): (usize, bool, bool),
-        readings: Vec<Reading>,
-        noted: &mut TagEvidence,
-    ) -> Sight {
-        let plain = self.readers[reader].plain_word();
+    fn sight(&self, way: Way, readings: Vec<Reading>, noted: &mut TagEvidence) -> Sight {
+        let plain = self.readers[way.reader].plain_word();
         let mut evidence = Vec::with_capacity(readings.len());
         let mut shown = Vec::with_capacity(readings.len());
         for reading in &readings {
@@ -448,18 +456,19 @@ impl TagLabeller {
                     }
                 }
             }
-            shown.push(self.shown((reading, plain), &of_words, noted));
+            shown.push(self.shown(reading, plain, &of_words, noted));
             evidence.push(of_words);
         }
         let index = readings.iter().enumerate().map(|(i, reading)| (reading.tile, i)).collect();
-        Sight { reader, inverted, mirrored, index, readings, evidence, shown }
+        Sight { way, index, readings, evidence, shown }
     }
 
     /// What a tile shows, by its evidence for the words of the target; `plain` is the word of a tile
     /// without a tag.
     fn shown(
         &self,
-        (reading, plain): (&Reading, u64),
+        reading: &Reading,
+        plain: u64,
         of_words: &[f32],
         noted: &mut TagEvidence,
     ) -> Shown {
@@ -584,8 +593,8 @@ impl TagLabeller {
                         continue;
                     }
                     for &(panel, tile) in &self.places[word / turns] {
-                        let LabelPanel { reader, inverted, .. } = self.panels[panel];
-                        if (reader, inverted) == (sight.reader, sight.inverted) {
+                        let Way { reader, inverted, .. } = self.panels[panel].way();
+                        if (reader, inverted) == (sight.way.reader, sight.way.inverted) {
                             let map = panel_from_grid(reading.tile, tile, (word % turns) as u8);
                             *sums.entry((index, panel, map)).or_default() += f64::from(evidence);
                         }
@@ -686,7 +695,7 @@ impl TagLabeller {
         let Some(kind) = sight.readings.first().map(|reading| reading.tile.kind()) else {
             return 0;
         };
-        let side = |v: Vertex| if sight.mirrored { mirrored(v) } else { v };
+        let side = |v: Vertex| if sight.way.mirrored { mirrored(v) } else { v };
         let corners = &self.panels[placement.panel].corners;
         let is_on = |v: Vertex| corners.contains(&placement.map.apply(side(v)));
         let on_panel = |v: Vertex| grid.get(&v).filter(|_| is_on(v)).map(|placed| placed.amplitude);
@@ -714,7 +723,7 @@ impl TagLabeller {
         taken: &BTreeSet<Vertex>,
     ) -> impl Iterator<Item = Judged> {
         let free = |tile: Tile| {
-            let side = |v: Vertex| if sight.mirrored { mirrored(v) } else { v };
+            let side = |v: Vertex| if sight.way.mirrored { mirrored(v) } else { v };
             taken.is_empty() || tile.vertices().all(|v| !taken.contains(&side(v)))
         };
         let tiles = (0..sight.readings.len()).filter(move |&i| free(sight.readings[i].tile));
@@ -790,7 +799,7 @@ impl TagLabeller {
         grid: &SaddleGrid,
         placement: &Placement,
     ) -> BTreeMap<Vertex, Vertex> {
-        let is_mirrored = sights[placement.sight].mirrored;
+        let is_mirrored = sights[placement.sight].way.mirrored;
         let side = |v: Vertex| if is_mirrored { mirrored(v) } else { v };
         let corners = &self.panels[placement.panel].corners;
         grid.keys()
@@ -822,7 +831,7 @@ impl TagLabeller {
         tags.sort_by_key(|tag| (tag.row, tag.col));
         Labelled {
             panel: placement.panel,
-            mirrored: sight.mirrored,
+            mirrored: sight.way.mirrored,
             vertices: self.on_panel(sights, grid, placement),
             tags,
         }
@@ -903,6 +912,9 @@ mod tests {
     /// Half odds of a cell that is read without doubt.
     const SURE: f32 = 2.6;
 
+    /// By the first reader, in a picture as it is.
+    const AS_SEEN: Way = Way { reader: 0, inverted: false, mirrored: false };
+
     /// What is found of `asked` where the tiles of another target, or of the same, are read without doubt, in the grid
     /// that a picture of it or of its mirror image gives.
     fn found_in(family: &Family, asked: &Target, shown: &Target, flopped: bool) -> TagEvidence {
@@ -939,15 +951,16 @@ mod tests {
         let dark = panel.tiles().into_iter().filter(|tile| tile.is_dark());
         let readings = dark.map(reading).filter(whole).collect();
         let mut evidence = TagEvidence::default();
-        let sight = labeller.sight((0, panel.inverted, false), readings, &mut evidence);
+        let sight =
+            labeller.sight(Way { inverted: panel.inverted, ..AS_SEEN }, readings, &mut evidence);
         labeller.decide(vec![sight], &grid, evidence)
     }
 
     fn board(family: &Family, first_id: u32) -> Option<Target> {
-        board_of(family, (8, 9), TagSpec { first_id, ..TagSpec::default() })
+        board_of(family, [8, 9], TagSpec { first_id, ..TagSpec::default() })
     }
 
-    fn board_of(family: &Family, (rows, cols): (u32, u32), tags: TagSpec) -> Option<Target> {
+    fn board_of(family: &Family, [rows, cols]: [u32; 2], tags: TagSpec) -> Option<Target> {
         let mut spec = BoardSpec::new(family.kind(), rows, cols, 20.0);
         spec.tags = Some(TagSpec { family: family.name().to_owned(), ..tags });
         Target::build("board", &TargetSpec::Board(spec), Some(family)).ok()
@@ -1020,7 +1033,7 @@ mod tests {
             let family = Family::shipped(name).unwrap();
             let asked = board(&family, 0).unwrap();
             for (size, spacing) in
-                [((8, 9), 2), ((8, 9), 4), ((8, 9), 5), ((9, 12), 3), ((6, 7), 3)]
+                [([8, 9], 2), ([8, 9], 4), ([8, 9], 5), ([9, 12], 3), ([6, 7], 3)]
             {
                 let tags = TagSpec { spacing, ..TagSpec::default() };
                 let Some(shown) = board_of(&family, size, tags) else {
@@ -1050,7 +1063,7 @@ mod tests {
             }
             let asked = board(&family, 0).unwrap();
             for &(rows, cols) in &sizes {
-                let Some(shown) = board_of(&family, (rows, cols), TagSpec::default()) else {
+                let Some(shown) = board_of(&family, [rows, cols], TagSpec::default()) else {
                     continue;
                 };
                 for found in found_in(&family, &asked, &shown, false).found {
@@ -1077,7 +1090,7 @@ mod tests {
                     continue;
                 };
                 // Smaller boards have just the tags of a face, or one more.
-                for size in [(10, 11), (12, 16)] {
+                for size in [[10, 11], [12, 16]] {
                     let Some(shown) = board_of(&family, size, TagSpec::default()) else {
                         continue;
                     };
@@ -1118,7 +1131,7 @@ mod tests {
             let vertices = readings.iter().flat_map(|reading| reading.tile.vertices());
             let grid: SaddleGrid = vertices.map(|v| (v, placed)).collect();
             let mut evidence = TagEvidence::default();
-            let sight = labeller.sight((0, false, false), readings, &mut evidence);
+            let sight = labeller.sight(AS_SEEN, readings, &mut evidence);
             let found = labeller.decide(vec![sight], &grid, evidence).found;
             assert_eq!(found.len(), usize::from(labelled), "{what}");
             for (from, to) in found.iter().flat_map(|found| &found.vertices) {
@@ -1151,7 +1164,7 @@ mod tests {
             let vertices = readings.iter().flat_map(|reading| reading.tile.vertices());
             let grid: SaddleGrid = vertices.map(|v| (v, placed)).collect();
             let mut evidence = TagEvidence::default();
-            let sight = labeller.sight((0, false, false), readings, &mut evidence);
+            let sight = labeller.sight(AS_SEEN, readings, &mut evidence);
             let found = labeller.decide(vec![sight], &grid, evidence).found;
             assert_eq!(!found.is_empty(), labelled, "{shown:?}");
         }
@@ -1216,7 +1229,7 @@ mod tests {
             let vertices = readings.iter().flat_map(|reading| reading.tile.vertices());
             let grid: SaddleGrid = vertices.map(|v| (v, placed)).collect();
             let mut evidence = TagEvidence::default();
-            let sight = labeller.sight((0, false, false), readings, &mut evidence);
+            let sight = labeller.sight(AS_SEEN, readings, &mut evidence);
             let found = labeller.decide(vec![sight], &grid, evidence).found;
             labelled += found.len();
             for (from, to) in found.iter().flat_map(|found| &found.vertices) {
@@ -1314,7 +1327,7 @@ mod tests {
             let code = family.code(tag.id).unwrap();
             let found = |readings: Vec<Reading>| {
                 let mut evidence = TagEvidence::default();
-                let sight = labeller.sight((0, false, false), readings, &mut evidence);
+                let sight = labeller.sight(AS_SEEN, readings, &mut evidence);
                 let found = labeller.decide(vec![sight], &grid, evidence).found;
                 found.into_iter().find(|found| !found.mirrored)
             };
@@ -1383,7 +1396,7 @@ mod tests {
         for tags in tags {
             let family = Family::shipped(&tags.family).unwrap();
             let bits = family.dimension().bits();
-            let target = board_of(&family, (8, 9), tags).unwrap();
+            let target = board_of(&family, [8, 9], tags).unwrap();
             let labeller = TagLabeller::new(&target, &family, None).unwrap();
             let panel = &target.panels[0];
             let grid: SaddleGrid = panel_vertices(panel).into_iter().map(|v| (v, placed)).collect();
@@ -1398,7 +1411,7 @@ mod tests {
                     })
                     .collect();
                 let mut evidence = TagEvidence::default();
-                let sight = labeller.sight((0, false, false), readings, &mut evidence);
+                let sight = labeller.sight(AS_SEEN, readings, &mut evidence);
                 !labeller.decide(vec![sight], &grid, evidence).found.is_empty()
             });
             assert_eq!(wrong.count(), 0, "{}", family.name());

@@ -86,6 +86,13 @@ impl TagPlace {
 /// Black and white beside edges of tiles that were looked at, by their vertex and direction.
 type EdgeLevels = BTreeMap<(Vertex, usize), Option<[f64; 2]>>;
 
+/// What reading a tile leaves for the next ones of its grid.
+#[derive(Default)]
+struct Known {
+    mixings: Mixings,
+    edges: EdgeLevels,
+}
+
 /// Reads the tags of one family that lie alike in their tiles.
 #[derive(Clone, Debug)]
 pub struct TagReader {
@@ -151,13 +158,11 @@ impl TagReader {
             .filter(|tile| tile.vertices().all(|v| grid.contains_key(&v)))
             .collect();
         let every = tiles.len().div_ceil(most.max(1)).max(1);
-        let (mut mixings, mut levels) = (Mixings::new(), BTreeMap::new());
+        let mut known = Known::default();
         let mut bits_px = Vec::new();
         let mut readings = Vec::new();
         for &tile in tiles.iter().step_by(every) {
-            if let Some((reading, bit_px)) =
-                self.read_tile(image, grid, tile, &light, (&mut mixings, &mut levels))
-            {
+            if let Some((reading, bit_px)) = self.read_tile(image, grid, tile, &light, &mut known) {
                 readings.push(reading);
                 bits_px.push(bit_px);
             }
@@ -189,10 +194,10 @@ impl TagReader {
         grid: &SaddleGrid,
         tile: Tile,
         light: &GridLight,
-        (mixings, edges): (&mut Mixings, &mut EdgeLevels),
+        known: &mut Known,
     ) -> Option<(Reading, f64)> {
         let map = TileMap::new(grid, tile, self.gap_edges)?;
-        let levels = light.levels(image, grid, tile, edges)?;
+        let levels = light.levels(image, grid, tile, &mut known.edges)?;
         let middle = self.kind.middle();
         let [_, contrast] = levels.at(middle);
         if contrast < MIN_CONTRAST * corner_contrast(image, grid, tile) {
@@ -203,7 +208,8 @@ impl TagReader {
         let along = [0.25 * DVec2::X, 0.25 * DVec2::Y].map(|by| (at(by) - at(-by)) / (0.5 * width));
         let (covariance, area_px2) = in_tile(light.blur_px2, along)?;
         let noise = light.noise;
-        let mixing = self.model.mixing(TileBlur { covariance, area_px2, noise }, mixings)?;
+        let mixing =
+            self.model.mixing(TileBlur { covariance, area_px2, noise }, &mut known.mixings)?;
         let (right, lower) = (image.width() as f64 - 1.0, image.height() as f64 - 1.0);
         // Cells of the colour around the border are 1, on inverted boards dark ones.
         let inverted = tile.is_dark() != (self.tags_in == TagsIn::Black);

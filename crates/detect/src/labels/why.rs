@@ -56,7 +56,7 @@ pub fn nothing_found(pyramid: &Pyramid, corners: usize) -> Reason {
 }
 
 /// Why the tags of a grid gave no labels.
-pub fn no_labels(evidence: &TagEvidence, grid: &SaddleGrid, size: (usize, usize)) -> Reason {
+pub fn no_labels(evidence: &TagEvidence, grid: &SaddleGrid, size: [usize; 2]) -> Reason {
     let corners = ("corners", grid.len() as f64);
     if evidence.is_ambiguous {
         return Reason::new(ReasonKind::Ambiguous, [corners]);
@@ -98,7 +98,7 @@ pub fn no_labels(evidence: &TagEvidence, grid: &SaddleGrid, size: (usize, usize)
 }
 
 /// Why a grid is not labelled by an outline of so many corners.
-pub fn no_outline(grid: &SaddleGrid, expected: usize, size: (usize, usize)) -> Reason {
+pub fn no_outline(grid: &SaddleGrid, expected: usize, size: [usize; 2]) -> Reason {
     let figures = [("corners", grid.len() as f64), ("expected", expected as f64)];
     let kind = if grid.len() < expected && ends_at_border(grid, size) {
         ReasonKind::CutByBorder
@@ -109,7 +109,7 @@ pub fn no_outline(grid: &SaddleGrid, expected: usize, size: (usize, usize)) -> R
 }
 
 /// Whether some corner lies less than an edge's length from the border of the picture.
-fn ends_at_border(grid: &SaddleGrid, (width, height): (usize, usize)) -> bool {
+fn ends_at_border(grid: &SaddleGrid, [width, height]: [usize; 2]) -> bool {
     let Some(edge_px) = edge_px(grid) else {
         return false;
     };

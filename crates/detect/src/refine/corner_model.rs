@@ -256,6 +256,15 @@ impl Window {
     }
 }
 
+/// The pixels of a window about a pixel of a picture.
+#[derive(Clone, Debug)]
+pub struct Patch {
+    /// The window.
+    pub window: Window,
+    /// The pixel in its middle.
+    pub centre: DVec2,
+}
+
 /// What all corners have in common is told by further rows: amplitude · (1 − S²), S, and derivatives by the two
 /// parameters of astigmatism, by the strength of the halo and by the ink.
 const RISE: usize = PARAMS + 1;
@@ -383,7 +392,8 @@ fn by_ink<const K: usize>(corner: &Corner<K>, sharpness: [f64; K]) -> [f64; K] {
 /// The triangle between three edges that ink displaces, with its derivatives by ln s, the angles and the ink; beside
 /// the corner the sines and cosines of its angles.
 fn triangle<const K: usize>(
-    (corner, turns): (&Corner<K>, [(f64, f64); K]),
+    corner: &Corner<K>,
+    turns: [(f64, f64); K],
     optics: &Optics,
     spread: &Spread,
 ) -> Triangle {
@@ -458,7 +468,7 @@ impl<const K: usize> Look<K> {
         let by_ink = by_ink(corner, sharpness);
         let displaced = by_ink.map(|by| by * optics.ink);
         let is_inked = displaced.iter().any(|d| *d != 0.0);
-        let triangle = is_inked.then(|| triangle((corner, turns), optics, &spread));
+        let triangle = is_inked.then(|| triangle(corner, turns, optics, &spread));
         Self {
             turns,
             by_astigmatism,
@@ -508,15 +518,16 @@ impl CornerFitter {
         image: ImageView,
         window: &Window,
         start: &Corner<K>,
-        (optics, accuracy): (&Optics, Accuracy),
+        optics: &Optics,
+        accuracy: Accuracy,
     ) -> Option<Fitted<K>> {
         let centre = self.load(image, window, start.position)?;
         let start = Corner { position: start.position - centre, ..*start };
-        let mut fitted = self.descend(window, &start, (optics, accuracy));
+        let mut fitted = self.descend(window, &start, optics, accuracy);
         if fitted.is_none() && self.limits != UNLIMITED {
             // Black and white may lie just there: a drawn page has no others, and nothing but them.
             self.limits = UNLIMITED;
-            fitted = self.descend(window, &start, (optics, accuracy));
+            fitted = self.descend(window, &start, optics, accuracy);
         }
         fitted.map(|fitted| {
             let position = fitted.corner.position + centre;
@@ -529,7 +540,8 @@ impl CornerFitter {
         &mut self,
         window: &Window,
         start: &Corner<K>,
-        (optics, accuracy): (&Optics, Accuracy),
+        optics: &Optics,
+        accuracy: Accuracy,
     ) -> Option<Fitted<K>> {
         let start = *start;
         let freedom = (window.count - (ANGLE + K)) as f64;
@@ -539,7 +551,7 @@ impl CornerFitter {
         // step, which finds the light, and for what came of them all.
         let mut toned = start;
         let mut piece = optics.piece(toned.level, toned.amplitude);
-        let mut normal = self.normal(window, &corner, (optics, piece));
+        let mut normal = self.normal(window, &corner, optics, piece);
         let mut converged = false;
         for evaluations in 1..MAX_EVALUATIONS {
             let noise = noise(&normal, &corner, freedom);
@@ -580,14 +592,14 @@ impl CornerFitter {
                 }
                 toned = moved;
                 piece = optics.piece(toned.level, toned.amplitude);
-                normal = self.normal(window, &corner, (optics, piece));
+                normal = self.normal(window, &corner, optics, piece);
                 continue;
             }
             if evaluations == 1 && is_toned_anew(SAME_LIGHT) {
                 toned = moved;
                 piece = optics.piece(toned.level, toned.amplitude);
             }
-            let there = self.normal(window, &moved, (optics, piece));
+            let there = self.normal(window, &moved, optics, piece);
             let weight = (noise / SLOPE_PRIOR).powi(2);
             let prior = |c: &Corner<K>| weight * c.slope.length_squared();
             if there.cost + prior(&moved) <= normal.cost + prior(&corner) {
@@ -668,9 +680,10 @@ impl CornerFitter {
         &mut self,
         window: &Window,
         corner: &Corner<K>,
-        optics: (&Optics, Piece),
+        optics: &Optics,
+        piece: Piece,
     ) -> Normal {
-        self.fill::<K, false>(window, corner, optics);
+        self.fill::<K, false>(window, corner, optics, piece);
         let products = products::<BLOCKED>(&mut self.columns, window.count);
         let mut normal = Normal {
             matrix: SMatrix::identity(),
@@ -687,22 +700,23 @@ impl CornerFitter {
         normal
     }
 
-    /// The normal equations at a corner in picture coordinates, from the window around the pixel `centre`, with
-    /// the parameters of the optics behind its own; `None` outside the image.
+    /// The normal equations at a corner in picture coordinates, from the pixels of a patch, with the parameters of
+    /// the optics behind its own; `None` outside the image.
     pub(crate) fn joint<const K: usize>(
         &mut self,
         image: ImageView,
-        (window, centre): (&Window, DVec2),
+        patch: &Patch,
         corner: &Corner<K>,
         optics: &Optics,
         common: &[Common],
     ) -> Option<Joint> {
-        self.load(image, window, centre)?;
+        let Patch { window, centre } = patch;
+        self.load(image, window, *centre)?;
         let corner = Corner { position: corner.position - centre, ..*corner };
         let params = ANGLE + K;
         let toned = |optics: &Optics| optics.piece(corner.level, corner.amplitude);
         let piece = toned(optics);
-        self.fill::<K, true>(window, &corner, (optics, piece));
+        self.fill::<K, true>(window, &corner, optics, piece);
         let columns = &mut *self.columns;
         let mut rows = [None; UNKNOWNS];
         (0..params).for_each(|i| rows[i] = Some(i));
@@ -754,14 +768,15 @@ impl CornerFitter {
     pub(crate) fn influence<const K: usize>(
         &mut self,
         image: ImageView,
-        (window, centre): (&Window, DVec2),
+        patch: &Patch,
         corner: &Corner<K>,
         optics: &Optics,
     ) -> Option<Influence> {
-        self.load(image, window, centre)?;
+        let Patch { window, centre } = patch;
+        self.load(image, window, *centre)?;
         let corner = Corner { position: corner.position - centre, ..*corner };
         let piece = optics.piece(corner.level, corner.amplitude);
-        let normal = self.normal(window, &corner, (optics, piece));
+        let normal = self.normal(window, &corner, optics, piece);
         let freedom = (window.count - (ANGLE + K)) as f64;
         let noise = noise(&normal, &corner, freedom);
         let factor = with_prior(&normal, &corner, noise).0.cholesky()?;
@@ -796,7 +811,8 @@ impl CornerFitter {
         &mut self,
         window: &Window,
         corner: &Corner<K>,
-        (optics, piece): (&Optics, Piece),
+        optics: &Optics,
+        piece: Piece,
     ) {
         let look = Look::of(corner, optics, piece, self.limits);
         let (columns, pixels) = (&mut *self.columns, &*self.pixels);
@@ -805,12 +821,16 @@ impl CornerFitter {
             let is_square = look.rho.abs() <= FEW_NODES_RHO;
             match (look.way, is_square) {
                 (Some(way), true) => {
-                    let with = (Orthant::of_few_nodes(look.rho), [way[0], way[1]]);
-                    fill_swept_checker::<K, JOINT, 3>(columns, pixels, window, corner, &look, with);
+                    let (still, way) = (Orthant::of_few_nodes(look.rho), [way[0], way[1]]);
+                    fill_swept_checker::<K, JOINT, 3>(
+                        columns, pixels, window, corner, &look, still, way,
+                    );
                 }
                 (Some(way), false) => {
-                    let with = (Orthant::new(look.rho), [way[0], way[1]]);
-                    fill_swept_checker::<K, JOINT, 6>(columns, pixels, window, corner, &look, with);
+                    let (still, way) = (Orthant::new(look.rho), [way[0], way[1]]);
+                    fill_swept_checker::<K, JOINT, 6>(
+                        columns, pixels, window, corner, &look, still, way,
+                    );
                 }
                 (None, true) => {
                     fill_square::<K, JOINT>(columns, pixels, window, corner, &look);
@@ -826,8 +846,9 @@ impl CornerFitter {
                     fill_swept_deltille::<K, JOINT>(columns, pixels, window, corner, &look, way);
                 }
                 (None, Some(triangle)) => {
-                    let look = (&look, triangle);
-                    fill_inked_deltille::<K, JOINT>(columns, pixels, window, corner, look);
+                    fill_inked_deltille::<K, JOINT>(
+                        columns, pixels, window, corner, &look, triangle,
+                    );
                 }
                 (None, None) => {
                     fill_deltille::<K, JOINT>(columns, pixels, window, corner, &look);
@@ -999,7 +1020,8 @@ fn fill_inked_deltille<const C: usize, const JOINT: bool>(
     pixels: &[f32; MAX_PIXELS],
     window: &Window,
     corner: &Corner<C>,
-    (look, triangle): (&Look<C>, Triangle),
+    look: &Look<C>,
+    triangle: Triangle,
 ) {
     if JOINT || look.has_halo() {
         let pattern = Inked { edges: look.haloed(Deltille), triangle };
@@ -1017,7 +1039,8 @@ fn fill_swept_checker<const C: usize, const JOINT: bool, const NODES: usize>(
     window: &Window,
     corner: &Corner<C>,
     look: &Look<C>,
-    (still, [across, along]): (Orthant<NODES>, [f32; 2]),
+    still: Orthant<NODES>,
+    [across, along]: [f32; 2],
 ) {
     let swept = |by: f32| SweptChecker { pattern: still, way: [across * by, along * by] };
     if JOINT || look.has_halo() {
@@ -1258,7 +1281,7 @@ mod tests {
     fn shown<const K: usize>(window: &Window, corner: &Corner<K>, optics: &Optics) -> Vec<f32> {
         let mut fitter = CornerFitter::default();
         let piece = optics.piece(corner.level, corner.amplitude);
-        fitter.fill::<K, false>(window, corner, (optics, piece));
+        fitter.fill::<K, false>(window, corner, optics, piece);
         fitter.columns[PARAMS][..window.count].iter().map(|residual| -residual).collect()
     }
 
@@ -1268,7 +1291,7 @@ mod tests {
             let window = Window::new(8);
             let mut fitter = CornerFitter::default();
             let piece = optics.piece(corner.level, corner.amplitude);
-            fitter.fill::<K, false>(&window, corner, (optics, piece));
+            fitter.fill::<K, false>(&window, corner, optics, piece);
             for parameter in 0..ANGLE + K {
                 let size = if (SLOPE..ANGLE).contains(&parameter) { 1e-3 } else { 4e-3 };
                 let [after, before] = [size, -size].map(|by| {
@@ -1313,8 +1336,8 @@ mod tests {
                 ..*truth
             };
             let mut fitter = CornerFitter::default();
-            let with = (optics, Accuracy::Full);
-            let found = fitter.fit((&picture).into(), &window, &start, with).expect("a corner");
+            let found = fitter.fit((&picture).into(), &window, &start, optics, Accuracy::Full);
+            let found = found.expect("a corner");
             assert!(found.noise < 1e-3 * truth.amplitude.abs(), "{K} edges: {found:?}");
             let found = found.corner;
             let off = found.position - position;

@@ -21,7 +21,7 @@ use std::borrow::Cow;
 use glam::DVec2;
 
 use super::clearance::{Edge, NOTHING, Surroundings};
-use super::corner_model::{Accuracy, Corner, CornerFitter, Fitted, MAX_RADIUS, Window};
+use super::corner_model::{Accuracy, Corner, CornerFitter, Fitted, MAX_RADIUS, Patch, Window};
 use super::corner_start::{start, start_along};
 use super::optics::Optics;
 use super::shared_optics::{SAMPLES, Sample};
@@ -119,6 +119,15 @@ impl From<ModelFit> for Refined {
     }
 }
 
+/// How a picture shows the corners of a grid.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Sharpness<'a> {
+    /// Standard deviation of the blur, px.
+    pub blur_px: f64,
+    /// What all corners of the picture share.
+    pub optics: &'a Optics,
+}
+
 /// What is known of the surroundings of a corner.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Room<'a> {
@@ -155,8 +164,8 @@ impl Room<'_> {
     }
 }
 
-/// The window, what the model found in it, and the pixel in its middle.
-type Fit = (Window, ModelFit, DVec2);
+/// What the model found, and the pixels that it was fitted to.
+type Fit = (Patch, ModelFit);
 
 /// Refines corners of one kind.
 #[derive(Clone, Debug)]
@@ -242,12 +251,7 @@ impl Refiner {
         let every = first.len().div_ceil(SAMPLES).max(1);
         let samples: Vec<Sample> = samples
             .step_by(every)
-            .map(|(window, fit, centre)| Sample {
-                window,
-                centre,
-                corner: fit.corner,
-                residual: fit.residual,
-            })
+            .map(|(patch, fit)| Sample { patch, corner: fit.corner, residual: fit.residual })
             .collect();
         let optics = self.joint_optics(&mut fitter, image, samples, &self.known);
         let again = |(i, (refined, fit)): (usize, (Refined, Option<_>))| match fit {
@@ -285,7 +289,10 @@ impl Refiner {
             Polynomial::Quadric(_) => self.alone::<2>(fitter, image, position, optics),
         };
         match (self.method == Refinement::Model).then(model).flatten() {
-            Some((window, fit)) => (fit.into(), Some((window.clone(), fit, position.round()))),
+            Some((window, fit)) => {
+                let patch = Patch { window: window.clone(), centre: position.round() };
+                (fit.into(), Some((patch, fit)))
+            }
             None => (self.without_model(start, found), None),
         }
     }
@@ -338,7 +345,7 @@ impl Refiner {
         let reach = distance_to_rim(image, position);
         let window = self.windows.iter().rev().find(|w| w.radius() as f64 <= reach)?;
         let first = start::<K>(image, position, window.radius())?;
-        Some((window, fitter.fit(image, window, &first, (optics, Accuracy::Full))?.into()))
+        Some((window, fitter.fit(image, window, &first, optics, Accuracy::Full)?.into()))
     }
 
     /// The model of a corner of a grid, in all of its room that is clear and lies in the image, with
@@ -383,8 +390,8 @@ impl Refiner {
         let first = Corner { bends, across_px, ..first };
         // What a picture has in common may not be common to its rim.
         let fit = fitter
-            .fit(image, window, &first, (room.optics, accuracy))
-            .or_else(|| fitter.fit(image, window, &first, (&self.known, accuracy)))?;
+            .fit(image, window, &first, room.optics, accuracy)
+            .or_else(|| fitter.fit(image, window, &first, &self.known, accuracy))?;
         Some(fit.into())
     }
 

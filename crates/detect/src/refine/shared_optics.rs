@@ -8,10 +8,9 @@
 //! significant are omitted; significance is judged by the scatter of the gradients of the corners,
 //! so that correlated pixels, or a model that holds only approximately, are not taken for evidence.
 
-use glam::DVec2;
 use nalgebra::{DMatrix, DVector, SMatrix, SVector};
 
-use super::corner_model::{Common, Corner, CornerFitter, Joint, OWN, Window};
+use super::corner_model::{Common, Corner, CornerFitter, Joint, OWN, Patch};
 use super::correlation::{self, Influence};
 use super::optics::{HALO, INK, INK_UNIT, LEAST_MOTION, Optics, PARAMS, STEP};
 use super::small_systems::solved;
@@ -81,9 +80,7 @@ const MAX_RESIDUAL_RATIO: f64 = 3.0;
 #[derive(Clone, Debug)]
 pub struct Sample {
     /// The pixels that show only this corner.
-    pub window: Window,
-    /// The pixel in its middle.
-    pub centre: DVec2,
+    pub patch: Patch,
     /// Its estimate by itself.
     pub corner: Corner<3>,
     /// Its residual, over half the contrast.
@@ -134,7 +131,7 @@ impl Optics {
         let active = all.clone();
         let mut problem = Problem::<K> { fitter, image, members, greys, all, active };
         let reported = |problem: &Problem<K>, optics: &Self, cov: &DMatrix<f64>, used| Reported {
-            tone: optics.tone_between(greys, (cov, &problem.active), used),
+            tone: optics.tone_between(greys, cov, &problem.active, used),
             ink: problem.ink(optics, cov, used),
         };
         let mut optics = known.clone();
@@ -175,7 +172,8 @@ impl Optics {
     fn tone_between(
         &self,
         greys: [f64; 2],
-        (cov, active): (&DMatrix<f64>, &[usize]),
+        cov: &DMatrix<f64>,
+        active: &[usize],
         used: bool,
     ) -> Option<ToneEstimate> {
         active.contains(&0).then(|| {
@@ -314,14 +312,13 @@ impl Estimate {
 /// A corner of K edges in the joint fit.
 #[derive(Clone)]
 struct Member<const K: usize> {
-    window: Window,
-    centre: DVec2,
+    patch: Patch,
     corner: Corner<K>,
 }
 
 impl<const K: usize> From<Sample> for Member<K> {
     fn from(sample: Sample) -> Self {
-        Self { window: sample.window, centre: sample.centre, corner: sample.corner.with_edges() }
+        Self { patch: sample.patch, corner: sample.corner.with_edges() }
     }
 }
 
@@ -403,7 +400,7 @@ impl<const K: usize> Problem<'_, K> {
         let inverse = cov.clone().cholesky().map(|factor| factor.inverse());
         let information = inverse.unwrap_or_else(|| DMatrix::zeros(active.len(), active.len()));
         let kappa_slopes = [0, 1, 2].map(|p| optics.kappa_slope(self.greys, p));
-        let pixels = self.members.iter().map(|member| member.window.count()).sum();
+        let pixels = self.members.iter().map(|member| member.patch.window.count()).sum();
         Estimate { vector, active, information, kappa_slopes, pixels }
     }
 
@@ -555,10 +552,7 @@ impl<const K: usize> Problem<'_, K> {
         // Those of the least noise: what others show beside the corner counts in their own residuals.
         let mut found: Vec<Influence> = members
             .iter()
-            .filter_map(|member| {
-                let window = (&member.window, member.centre);
-                fitter.influence(*image, window, &member.corner, optics)
-            })
+            .filter_map(|member| fitter.influence(*image, &member.patch, &member.corner, optics))
             .collect();
         found.sort_by(|a, b| a.noise.total_cmp(&b.noise));
         correlation::inflation(&found)
@@ -571,10 +565,7 @@ impl<const K: usize> Problem<'_, K> {
         let common: Vec<Common> = all.iter().map(|&p| optics.common(p)).collect();
         let equations = members
             .iter()
-            .map(|member| {
-                let window = (&member.window, member.centre);
-                fitter.joint(*image, window, &member.corner, &optics, &common)
-            })
+            .map(|member| fitter.joint(*image, &member.patch, &member.corner, &optics, &common))
             .collect();
         Linearised { optics, corners, equations }
     }
@@ -678,12 +669,13 @@ fn covariance(reduced: &Reduced) -> Option<DMatrix<f64>> {
 mod tests {
     use std::f64::consts::PI;
 
+    use glam::DVec2;
     use rand::{Rng, SeedableRng};
     use rand_chacha::ChaCha8Rng;
     use rand_distr::{Distribution, Normal};
 
     use super::*;
-    use crate::refine::corner_model::{Accuracy, Fitted};
+    use crate::refine::corner_model::{Accuracy, Fitted, Window};
     use deltille_core::detection::Tone;
     use deltille_core::raster::Gray;
 
@@ -786,6 +778,11 @@ mod tests {
         pass(&pass(fine, side), COUNT * SIDE)
     }
 
+    /// The pixels around a corner.
+    fn around<const K: usize>(corner: &Corner<K>) -> Patch {
+        Patch { window: Window::new(9), centre: corner.position.round() }
+    }
+
     fn fitted(
         fitter: &mut CornerFitter,
         image: &Gray<f32>,
@@ -793,7 +790,7 @@ mod tests {
         optics: &Optics,
     ) -> Fitted<3> {
         let start = Corner { position: corner.position.round(), ..*corner };
-        fitter.fit(image.into(), &Window::new(9), &start, (optics, Accuracy::Full)).unwrap()
+        fitter.fit(image.into(), &Window::new(9), &start, optics, Accuracy::Full).unwrap()
     }
 
     /// Of all parameters, a corner's own and the common ones, under a halo, ink, a motion and a curve.
@@ -813,11 +810,11 @@ mod tests {
     fn compare_gradients<const K: usize>(image: &Gray<f32>, corner: &Corner<K>, optics: &Optics) {
         /// A corner's black and white, between which a piece of the curve is held.
         const LIGHT: [usize; 2] = [3, 4];
-        let (window, centre) = (Window::new(9), corner.position.round());
+        let patch = around(corner);
         let common: Vec<Common> = (0..PARAMS).map(|p| optics.common(p)).collect();
         let mut fitter = CornerFitter::default();
         let mut joint = |corner: &Corner<K>, optics: &Optics| {
-            fitter.joint(image.into(), (&window, centre), corner, optics, &common).unwrap()
+            fitter.joint(image.into(), &patch, corner, optics, &common).unwrap()
         };
         let here = joint(corner, optics);
         for i in 0..OWN + PARAMS {
@@ -857,8 +854,7 @@ mod tests {
                 let Fitted { corner: found, noise, .. } =
                     fitted(&mut fitter, &image, corner, &known);
                 Sample {
-                    window: Window::new(9),
-                    centre: corner.position.round(),
+                    patch: around(corner),
                     corner: found,
                     residual: noise / found.amplitude.abs(),
                 }
