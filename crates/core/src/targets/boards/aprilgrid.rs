@@ -166,9 +166,9 @@ pub(in crate::targets) fn tagged(
         let problem = format!("{} has triangular tags, not square ones", family.name());
         return Err(TargetError::invalid("TagSpec::family", problem));
     }
-    let ids = (spec.first_id, spec.count().into());
-    let family =
-        check_ids(Setting::TAGS, ids, family, || "make fewer `AprilGridSpec::tags`".to_owned())?;
+    let family = check_ids(Setting::TAGS, spec.first_id, spec.count().into(), family, || {
+        "make fewer `AprilGridSpec::tags`".to_owned()
+    })?;
     Ok((panels, family))
 }
 

@@ -179,10 +179,8 @@ impl BoardSpec {
                         );
                         return Err(TargetError::invalid("BoardSpec::rows", problem));
                     }
-                    tags.check_places(
-                        ("BoardSpec::board_id", boards),
-                        ("BoardSpec::rows", rows, cols),
-                    )?;
+                    let (ids, size) = ("BoardSpec::board_id", "BoardSpec::rows");
+                    tags.check_places(ids, boards, size, [rows, cols])?;
                 }
                 Ok(())
             }

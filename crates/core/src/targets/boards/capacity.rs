@@ -38,7 +38,8 @@ impl Setting {
 /// Checks that a family has `count` codes from the first id on; `instead` says what else to change.
 pub(in crate::targets) fn check_ids(
     setting: Setting,
-    (first, count): (u32, u64),
+    first: u32,
+    count: u64,
     family: &Family,
     instead: impl FnOnce() -> String,
 ) -> Result<FamilyRef, TargetError> {
@@ -91,7 +92,7 @@ pub(in crate::targets) fn check_family(
     {
         return Err(TargetError::invalid("TagSpec::hole_mm", problem));
     }
-    check_ids(setting, (tags.first_id, needed), family, || {
+    check_ids(setting, tags.first_id, needed, family, || {
         let (there, first) = (family.len() as u64, u64::from(tags.first_id));
         let mut proposals = Vec::new();
         if let Some(highest) = there.checked_sub(needed) {

@@ -190,8 +190,7 @@ pub(in crate::targets) fn tagged(
         let given = format!("{} is given", family.name());
         return Err(TargetError::Family { wanted: spec.dictionary.clone(), given });
     }
-    let ids = (spec.first_id, spec.markers().into());
-    let family = check_ids(Setting::TAGS, ids, family, || {
+    let family = check_ids(Setting::TAGS, spec.first_id, spec.markers().into(), family, || {
         "take a larger `CharucoSpec::dictionary`, or fewer `CharucoSpec::squares`".to_owned()
     })?;
     Ok((panels, family))

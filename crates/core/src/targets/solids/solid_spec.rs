@@ -277,8 +277,8 @@ impl SolidSpec {
             let boards = self.board_id..self.board_id + self.polyhedron().faces.len() as u32;
             // Faces of other shapes than triangles have up to twice as many rows.
             let rows = if matches!(self.shape, SolidShape::Mesh(_)) { 2 } else { 1 } * self.tiles;
-            let size = ("SolidSpec::tiles", rows, rows);
-            tags.check_places(("SolidSpec::board_id", boards), size)?;
+            let (ids, size) = ("SolidSpec::board_id", "SolidSpec::tiles");
+            tags.check_places(ids, boards, size, [rows, rows])?;
         }
         let kind = match (self.shape.tilings(), &self.square_tags) {
             ([true, true], Some(tags)) => {
