@@ -56,6 +56,9 @@ const MIN_COARSE_EDGE_PX: f64 = 7.0;
 /// Radius of the polynomial that refines, px: the reference detector's.
 const POLYNOMIAL_RADIUS: usize = 3;
 
+/// Micrometres in a millimetre.
+const UM_IN_MM: f64 = 1e3;
+
 /// Largest radius of the model that refines, px: beyond, lenses bend edges more than a wider
 /// window gains.
 const MODEL_RADIUS: usize = 10;
@@ -659,7 +662,9 @@ fn refuse_patterns(pyramid: &Pyramid, grids: &mut Judged) {
 /// The edge of the tiles, px, of a grid that shows in the part of a picture with the most contrast if that is enlarged to
 /// twice its size, and is too small as it is.
 fn edge_of_small_tiles<const N: usize>(level: &Gray<i16>) -> Option<f64> {
+    /// Width and height of the part, px: enlarged it has half a megapixel, and twenty corners 7 px apart fill a hundredth of it.
     const PART: [usize; 2] = [400, 300];
+    /// Tiles half as large as the least are seen so.
     const TIMES: usize = 2;
     let size = [level.width().min(PART[0]), level.height().min(PART[1])];
     let [left, top] = busiest_part(level, size);
@@ -678,6 +683,7 @@ fn edge_of_small_tiles<const N: usize>(level: &Gray<i16>) -> Option<f64> {
 
 /// The first pixel of the part of so many columns and rows around the square with the most contrast.
 fn busiest_part(level: &Gray<i16>, size: [usize; 2]) -> [usize; 2] {
+    /// Side of the square, px: twenty corners of tiles that are too small fit into it.
     const SQUARE: usize = 64;
     let contrast = |[x, y]: [usize; 2]| {
         let [right, bottom] = [(x + SQUARE).min(level.width()), (y + SQUARE).min(level.height())];
@@ -704,7 +710,7 @@ fn most_corners<const N: usize>(finder: &SaddleFinder<N>, pyramid: &Pyramid) -> 
 fn refiner(kind: GridKind, config: DetectorConfig, edge_mm: Option<f64>) -> Refiner {
     let ink = match config.ink {
         Ink::Auto => None,
-        Ink::Um(um) => Some(edge_mm.map_or(0.0, |edge_mm| um / 1e3 / edge_mm)),
+        Ink::Um(um) => Some(edge_mm.map_or(0.0, |edge_mm| um / UM_IN_MM / edge_mm)),
     };
     Refiner::with_radii(kind, config.refinement, POLYNOMIAL_RADIUS, MODEL_RADIUS)
         .with_tone(config.tone)

@@ -28,6 +28,10 @@ pub struct ConeFit<const N: usize> {
     kernels: Vec<[[f32; LANES]; N]>,
 }
 
+/// Singular values smaller than this are those of a design that lacks rank, which none does: above rounding, and below all
+/// that there are.
+const RANK: f64 = 1e-12;
+
 impl<const N: usize> ConeFit<N> {
     /// A fit of all `monomials`, over offsets within `radius` + 1 px after smoothing with a cone
     /// of that radius; the coefficients of the first N are kept.
@@ -40,7 +44,7 @@ impl<const N: usize> ConeFit<N> {
             let (u, v) = (points[i].0 as f64, points[i].1 as f64);
             u.powi(monomials[j].0) * v.powi(monomials[j].1)
         });
-        let fit = design.pseudo_inverse(1e-12).expect("a non-negative tolerance");
+        let fit = design.pseudo_inverse(RANK).expect("a non-negative tolerance");
         let volume: f64 = offsets(r).map(|(u, v)| cone(u, v)).sum();
         let side = 4 * radius + 1;
         let groups = side.div_ceil(LANES);

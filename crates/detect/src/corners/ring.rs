@@ -94,7 +94,8 @@ struct Threshold {
 
 impl Threshold {
     fn new(min_amplitude: f32) -> Self {
-        // The bounds are rounded down by up to a half.
+        // Of harmonics six and twelve times α, as [`odd_may_reach`] and [`even_may_reach`] have them. The bounds are rounded
+        // down by up to a half.
         let below = |harmonic: f32| (harmonic.floor() - 1.0) as i16;
         Self {
             response: PER_AMPLITUDE * min_amplitude * min_amplitude,
@@ -497,8 +498,10 @@ fn odd_response(at: impl Fn(usize, usize) -> i16) -> f32 {
         squares += i32::from(even) * i32::from(even);
     }
     let sum = i32::from(sum);
+    // |α|² and |β|² are these over 6² and 48².
     let alpha = (c3 * c3 + s3 * s3) as f32 * (PER_AMPLITUDE / 36.0);
     let beta = (c1 * c1 + s1 * s1) as f32 * (1.0 / 2304.0);
+    // Six times the variance of the six sums.
     let variance = squares as f32 - (sum * sum) as f32 * (1.0 / 6.0);
     alpha - beta - 0.5 * variance
 }
@@ -519,8 +522,9 @@ fn even_response(at: impl Fn(usize, usize) -> i16, centre: i16) -> f32 {
         sum += even[k];
         squares += i32::from(odd[k]) * i32::from(odd[k]);
     }
+    // |α|² is this over 12².
     let alpha = (c2 * c2 + 3 * (s2 * s2)) as f32 * (PER_AMPLITUDE / 144.0);
-    // 12(c − m)
+    // 12(c − m), of which R takes 9(c − m)² away.
     let off = f32::from(12 * centre - sum);
     alpha - 0.5 * squares as f32 - off * off * (9.0 / 144.0)
 }

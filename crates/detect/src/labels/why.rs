@@ -31,6 +31,12 @@ const LEAST_BIT_BLURS: f64 = 1.0;
 /// Single tags are read where cells are so many times as long as a board of them needs.
 const TAG_FOR_TAG: f64 = 2.0;
 
+/// One pixel in so many may be darker or brighter than all that the picture shows: dead, hot, or a spark. @DEAD@
+const PIXELS_A_DEAD_ONE: usize = 1000;
+
+/// One pixel in so many may be steeper than the sharpest edges. @STEEP@
+const PIXELS_A_STEEP_ONE: usize = 5000;
+
 /// Why nothing was found in a picture with so many corners of its tiling.
 pub fn nothing_found(pyramid: &Pyramid, corners: usize) -> Reason {
     let level = &pyramid.levels()[0];
@@ -131,13 +137,13 @@ pub fn edge_px(grid: &SaddleGrid) -> Option<f64> {
     median(lengths.collect())
 }
 
-/// Darkest and brightest pixels, but for one in a thousand.
+/// Darkest and brightest pixels, but for one in [`PIXELS_A_DEAD_ONE`].
 fn range(level: &Gray<i16>) -> [f64; 2] {
     let mut counts = vec![0usize; PYRAMID_FULL_SCALE as usize + 1];
     for &value in level.pixels() {
         counts[(value.max(0) as usize).min(PYRAMID_FULL_SCALE as usize)] += 1;
     }
-    let few = level.pixels().len() / 1000;
+    let few = level.pixels().len() / PIXELS_A_DEAD_ONE;
     let reaches = |sum: &mut usize, value: usize| {
         *sum += counts[value];
         *sum > few
@@ -160,7 +166,7 @@ fn sharpest_edge_px(level: &Gray<i16>, contrast: f64) -> f64 {
     });
     let mut counts = vec![0usize; PYRAMID_FULL_SCALE as usize + 1];
     steps.for_each(|step| counts[(step as usize).min(PYRAMID_FULL_SCALE as usize)] += 1);
-    let few = level.pixels().len() / 5000;
+    let few = level.pixels().len() / PIXELS_A_STEEP_ONE;
     let mut sum = 0;
     let steepest = (0..counts.len()).rev().find(|&step| {
         sum += counts[step];

@@ -55,13 +55,19 @@ const PARAMS: usize = 10;
 /// Columns that are multiplied with each other: parameters, residual, and what fills blocks of four.
 const BLOCKED: usize = (PARAMS + 1usize).next_multiple_of(4);
 
-/// Places of the parameters: x, y, ln s, amplitude, level, g_u, g_v, then the angles.
+/// Places of the parameters: the position's x.
 const X: usize = 0;
+/// Its y.
 const Y: usize = 1;
+/// ln s.
 const LN_BLUR: usize = 2;
+/// The amplitude.
 const AMPLITUDE: usize = 3;
+/// The level.
 const LEVEL: usize = 4;
+/// g_u, and g_v behind it.
 const SLOPE: usize = 5;
+/// The first angle; the others follow.
 const ANGLE: usize = 7;
 
 /// Prior standard deviation of the illumination's relative slope, 1/px: 10 % across 200 px.
@@ -71,9 +77,10 @@ pub const SLOPE_PRIOR: f64 = 0.0005;
 /// Most evaluations of the model; five are usual.
 const MAX_EVALUATIONS: usize = 25;
 
-/// Damping of the first step, which starts from a fit to grey values without blur, and the least later on: less than that
-/// changes no digit of a step.
+/// Damping of the first step, which starts from a fit to grey values without blur.
 const DAMPING: f64 = 1e-3;
+
+/// The least damping later on: less than that changes no digit of a step.
 const LEAST_DAMPING: f64 = 1e-6;
 
 /// With less damping than this a small step says that the minimum is near, and not that steps are kept short.
@@ -94,7 +101,16 @@ const ROUGH: f64 = 0.15;
 /// Black and white that differ by less than this part of the contrast have the same piece of a tone curve:
 /// its curvature, at most a third, changes by as small a part of itself.
 const SAME_LIGHT: f64 = 0.01;
+
+/// The same for a start, whose light another fit finds anew.
 const ROUGHLY_SAME_LIGHT: f64 = 0.1;
+
+/// The logarithm of the blur changes by no more than this in one step: linear equations tell little of a blur that is e times
+/// as wide.
+const MOST_LN_BLUR: f64 = 1.0;
+
+/// An angle moves its edge as much as the position does at this distance from the corner, px: where the smallest window ends.
+const ARM_PX: f64 = 3.0;
 
 /// Noise assumed at least, of the amplitude, so that noiseless images converge too.
 const MIN_NOISE: f64 = 2e-5;
@@ -265,12 +281,15 @@ pub struct Patch {
     pub centre: DVec2,
 }
 
-/// What all corners have in common is told by further rows: amplitude · (1 − S²), S, and derivatives by the two
-/// parameters of astigmatism, by the strength of the halo and by the ink.
+/// What all corners have in common is told by further rows, behind the residual: amplitude · (1 − S²).
 const RISE: usize = PARAMS + 1;
+/// S.
 const SHADE: usize = PARAMS + 2;
+/// Derivatives by the two parameters of astigmatism.
 const ASTIGMATISM: usize = PARAMS + 3;
+/// Derivatives by the strength of the halo.
 const HALO: usize = PARAMS + 5;
+/// Derivatives by the ink.
 const INK: usize = PARAMS + 6;
 /// Derivatives by the parameters of the tone curve.
 const TONE: usize = PARAMS + 7;
@@ -314,9 +333,11 @@ pub(crate) enum Common {
     Ink,
 }
 
-/// Parameters that are the corner's, and those of the optics behind them.
+/// Parameters that are the corner's.
 pub(crate) const OWN: usize = PARAMS;
+/// Those of the optics, behind them.
 pub(crate) const COMMON: usize = COMMON_PARAMS;
+/// All of them.
 const UNKNOWNS: usize = OWN + COMMON;
 
 /// The normal equations of a corner and the optics.
@@ -397,6 +418,7 @@ fn triangle<const K: usize>(
     optics: &Optics,
     spread: &Spread,
 ) -> Triangle {
+    /// Of the logarithm of the blur, radians and units of ink: a quotient neglects some ten-thousandth.
     const STEP: f64 = 1e-4;
     let core = optics.core();
     let overlap = |blur_px: f64, turns: [(f64, f64); K], ink: f64| {
@@ -414,6 +436,7 @@ fn triangle<const K: usize>(
         let c = a * displaced[0] + b * displaced[1] - displaced[2];
         let [x, y] = [0, 1]
             .map(|k| (spread.way[0] * normals[k][0] + spread.way[1] * normals[k][1]) / lengths[k]);
+        // A box of half the length x has the variance x²/3.
         let cov = [1.0 + x * x / 3.0, rho + x * y / 3.0, 1.0 + y * y / 3.0];
         Overlap::between([a, b, c], cov, displaced[0].signum())
     };
@@ -858,11 +881,12 @@ impl CornerFitter {
     }
 }
 
-/// Whether a step in position, px, and blur, by its logarithm, is shorter than this, and one in angles than a third.
+/// Whether a step in position, px, and blur, by its logarithm, is shorter than this, and what one in angles moves at
+/// [`ARM_PX`].
 fn is_within(step: &SVector<f64, PARAMS>, limit: f64) -> bool {
     step[X].hypot(step[Y]) < limit
         && step[LN_BLUR].abs() < limit
-        && step.iter().skip(ANGLE).all(|turn| turn.abs() < limit / 3.0)
+        && step.iter().skip(ANGLE).all(|turn| turn.abs() < limit / ARM_PX)
 }
 
 /// The least and the greatest.
@@ -895,6 +919,7 @@ fn ends(values: &[f32]) -> (f32, f32) {
 /// Sums of the squares of the values, and of the differences between those that follow each other.
 #[multiversion(targets("x86_64+avx2"))]
 fn squares(values: &[f32]) -> [f32; 2] {
+    /// Of two sums, each in one vector of the processors that this is compiled for.
     const WIDTH: usize = LANES / 2;
     let (mut sums, mut sums_of_steps) = ([0.0f32; WIDTH], [0.0f32; WIDTH]);
     let count = values.len().saturating_sub(1) / WIDTH;
@@ -939,7 +964,8 @@ impl<const K: usize> Corner<K> {
     fn moved(&self, step: &SVector<f64, PARAMS>, radius: usize) -> Option<Self> {
         let mut corner = *self;
         corner.position += DVec2::new(step[X], step[Y]);
-        corner.blur_px = (corner.blur_px * step[LN_BLUR].clamp(-1.0, 1.0).exp()).max(MIN_BLUR_PX);
+        corner.blur_px = (corner.blur_px * step[LN_BLUR].clamp(-MOST_LN_BLUR, MOST_LN_BLUR).exp())
+            .max(MIN_BLUR_PX);
         corner.amplitude += step[AMPLITUDE];
         corner.level += step[LEVEL];
         corner.slope += DVec2::new(step[SLOPE], step[SLOPE + 1]);

@@ -25,9 +25,10 @@ use deltille_core::lattice::Vertex;
 use deltille_core::raster::{Gray, ImageView, Pyramid};
 use deltille_core::statistics::median;
 
-/// Number of corners from which the blur is estimated, those with the most room of [`LOOKED_AT`]
-/// times as many, from all over the grid.
+/// Number of corners from which the blur is estimated, those with the most room.
 const BLUR_CORNERS: usize = 15;
+
+/// Of so many times as many, from all over the grid: among four some lie clear of tags and of the rim.
 const LOOKED_AT: usize = 4;
 
 /// Blur that is assumed before it is estimated, px: that of a good photograph.

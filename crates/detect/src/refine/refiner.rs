@@ -40,6 +40,9 @@ pub(crate) const MIN_PIXELS: usize = 30;
 /// what its usual window reads, where nearly all of its weight lies.
 const MIN_POLYNOMIAL_CLEAR_PX: f64 = 2.0;
 
+/// Smallest side of a window, px: what the smallest polynomial reads, 4r + 1 with r = 2.
+const MIN_WINDOW_PX: usize = 9;
+
 /// Largest side of a window, px.
 pub const MAX_WINDOW_PX: usize = 2 * MAX_RADIUS + 1;
 
@@ -184,7 +187,7 @@ impl Refiner {
     /// A refiner that reads at most `window_px` × `window_px` pixels, an odd number from 9 to
     /// [`MAX_WINDOW_PX`]; the polynomial reads 4r + 1 pixels for a whole r, the largest that fits.
     pub fn new(kind: GridKind, method: Refinement, window_px: usize) -> Self {
-        let window_px = window_px.clamp(9, MAX_WINDOW_PX);
+        let window_px = window_px.clamp(MIN_WINDOW_PX, MAX_WINDOW_PX);
         Self::with_radii(kind, method, (window_px - 1) / 4, (window_px - 1) / 2)
     }
 

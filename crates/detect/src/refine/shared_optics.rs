@@ -24,9 +24,10 @@ use deltille_core::statistics::median;
 /// corners can use it.
 pub const SAMPLES: usize = 16;
 
-/// Radius of the windows of these corners, px, and its limit in standard deviations of the blur:
-/// the common parameters show at the edges, and near the corner.
+/// Radius of the windows of these corners, px: the common parameters show at the edges, and near the corner.
 pub const REACH_PX: f64 = 7.0;
+
+/// Where the picture is blurred the radius is so many standard deviations of the blur instead.
 pub const REACH_SIGMAS: f64 = 5.0;
 
 /// The least strength of a halo: blur with wide tails. Beyond it the tails are no more than a wider
@@ -67,9 +68,11 @@ const MAX_ITERATIONS: usize = 10;
 const FIRST_DAMPING: f64 = 0.01;
 
 /// The iteration ends where it lacks less than this fraction of the standard deviations of the parameters,
-/// as a series of steps that go on to shrink as the last one did would; earlier where it only decides which
-/// groups are significant. A first step may be twice as long, as no step is half as long as the one before.
+/// as a series of steps that go on to shrink as the last one did would. A first step may be twice as long, as no step is
+/// half as long as the one before.
 const CONVERGED: f64 = 0.25;
+
+/// It ends earlier where it only decides which groups are significant.
 const ROUGHLY_CONVERGED: f64 = 0.5;
 
 /// Corners whose residuals exceed this many times the median have no weight: they show something
@@ -547,6 +550,7 @@ impl<const K: usize> Problem<'_, K> {
     fn inflation(&mut self, optics: &Optics) -> f64 {
         let Self { fitter, image, members, .. } = self;
         if members.len() < correlation::CORNERS / 2 {
+            // Too few to tell correlations.
             return 1.0;
         }
         // Those of the least noise: what others show beside the corner counts in their own residuals.
@@ -581,6 +585,7 @@ impl<const K: usize> Problem<'_, K> {
         let mut own = Vec::with_capacity(at.equations.len());
         for (joint, weight) in at.equations.iter().zip(weights) {
             own.push(joint.as_ref().and_then(|joint| {
+                /// Unknowns of a corner with the optics.
                 const ALL: usize = OWN + PARAMS;
                 let mut shared = SMatrix::<f64, OWN, PARAMS>::zeros();
                 let mut block = SMatrix::<f64, PARAMS, PARAMS>::zeros();
@@ -655,6 +660,7 @@ fn covariance(reduced: &Reduced) -> Option<DMatrix<f64>> {
     let members = reduced.own.iter().flatten().count();
     let count = reduced.gradient.len();
     if members <= 2 * count {
+        // The scatter of so few is as uncertain as what it is to correct.
         return Some(inverse);
     }
     let correction = members as f64 / (members - count) as f64;
