@@ -17,7 +17,7 @@ use crate::grid::tile_shape::is_of_squares;
 use crate::labels::assignment::{FoundGrid, Labels, MOST_CORNERS, report_once};
 use crate::labels::evidence::Budget;
 use crate::refine::clearance::TagAreas;
-use crate::refine::corner_model::CornerFitter;
+use crate::refine::model::fitter::CornerFitter;
 use crate::refine::optics::Optics;
 use crate::refine::refine_grid::{Level, is_sampled, sharp_level};
 use crate::refine::refiner::Refiner;

@@ -35,6 +35,6 @@ pub use deltille_core::detection::{
 };
 pub use detector::Detector;
 pub use recognise::{Recognised, Recogniser};
-pub use refine::corner_model::SLOPE_PRIOR;
+pub use refine::model::fitter::SLOPE_PRIOR;
 pub use refine::refiner::{MAX_WINDOW_PX, RefineStatus, Refined, Refinement, Refiner};
 pub use scene::{SceneError, check_distinct};

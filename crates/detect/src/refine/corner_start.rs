@@ -10,7 +10,8 @@ use std::f64::consts::PI;
 use glam::DVec2;
 use multiversion::multiversion;
 
-use super::corner_model::{Corner, Window};
+use super::model::corner::Corner;
+use super::model::window::Window;
 use crate::lanes;
 use crate::lanes::LANES;
 use deltille_core::raster::ImageView;

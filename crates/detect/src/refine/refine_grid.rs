@@ -14,7 +14,8 @@ use glam::DVec2;
 use rayon::prelude::*;
 
 use super::clearance::{Surroundings, TagAreas, crossing, surroundings, surroundings_of};
-use super::corner_model::{CornerFitter, MAX_WAY_PX, Patch};
+use super::model::fitter::{CornerFitter, MAX_WAY_PX};
+use super::model::window::Patch;
 use super::optics::Optics;
 use super::refiner::{
     MIN_MODEL_RADIUS, MIN_PIXELS, ModelFit, Refined, Refinement, Refiner, Room, Sharpness,

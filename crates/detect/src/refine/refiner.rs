@@ -1,6 +1,6 @@
 //! The last word on a corner's position, from the raw pixels.
 //!
-//! The paper's polynomial walks to the corner; the model ([`super::corner_model`]) starts there
+//! The paper's polynomial walks to the corner; the model ([`super::model`]) starts there
 //! and adds a covariance. Where the model does not hold, the polynomial's result stays.
 //!
 //! ```
@@ -21,8 +21,10 @@ use std::borrow::Cow;
 use glam::DVec2;
 
 use super::clearance::{Edge, NOTHING, Surroundings};
-use super::corner_model::{Accuracy, Corner, CornerFitter, Fitted, MAX_RADIUS, Patch, Window};
 use super::corner_start::{start, start_along};
+use super::model::corner::Corner;
+use super::model::fitter::{Accuracy, CornerFitter, Fitted};
+use super::model::window::{MAX_RADIUS, Patch, Window};
 use super::optics::Optics;
 use super::shared_optics::{SAMPLES, Sample};
 use crate::corners::polynomial::Polynomial;

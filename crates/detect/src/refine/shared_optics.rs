@@ -10,8 +10,11 @@
 
 use nalgebra::{DMatrix, DVector, SMatrix, SVector};
 
-use super::corner_model::{Common, Corner, CornerFitter, Joint, OWN, Patch};
 use super::correlation::{self, Influence};
+use super::model::corner::{Corner, OWN};
+use super::model::fitter::CornerFitter;
+use super::model::joint::{Common, Joint};
+use super::model::window::Patch;
 use super::optics::{HALO, INK, INK_UNIT, LEAST_MOTION, Optics, PARAMS, STEP};
 use super::small_systems::solved;
 use deltille_core::damping::Damping;
@@ -681,7 +684,8 @@ mod tests {
     use rand_distr::{Distribution, Normal};
 
     use super::*;
-    use crate::refine::corner_model::{Accuracy, Fitted, Window};
+    use crate::refine::model::fitter::{Accuracy, Fitted};
+    use crate::refine::model::window::Window;
     use deltille_core::detection::Tone;
     use deltille_core::raster::Gray;
 
