@@ -238,4 +238,20 @@ impl Optics {
             ..self.clone()
         }
     }
+
+    /// κ₀ and κ₁ between black and white.
+    pub(super) fn kappas(&self, [black, white]: [f64; 2]) -> [f64; 2] {
+        let piece = self.piece((white + black) / 2.0, (white - black) / 2.0);
+        [0, 1].map(|i| f64::from(piece.terms[i]))
+    }
+
+    /// The derivative of κ₀ by a parameter.
+    pub(super) fn kappa_slope(&self, greys: [f64; 2], parameter: usize) -> f64 {
+        match parameter {
+            0..TONE_PARAMS => {
+                (self.moved(parameter).kappas(greys)[0] - self.kappas(greys)[0]) / STEP
+            }
+            _ => 0.0,
+        }
+    }
 }

@@ -14,13 +14,14 @@ use glam::DVec2;
 use rayon::prelude::*;
 
 use super::clearance::{Surroundings, TagAreas, crossing, surroundings, surroundings_of};
+use super::joint_fit::Sample;
 use super::model::fitter::{CornerFitter, MAX_WAY_PX};
 use super::model::window::Patch;
 use super::optics::Optics;
 use super::refiner::{
     MIN_MODEL_RADIUS, MIN_PIXELS, ModelFit, Refined, Refinement, Refiner, Room, Sharpness,
 };
-use super::shared_optics::{REACH_PX, REACH_SIGMAS, SAMPLES, Sample};
+use super::shared_optics::{REACH_PX, REACH_SIGMAS, SAMPLES};
 use deltille_core::detection::{Grid, GridCorner};
 use deltille_core::lattice::Vertex;
 use deltille_core::raster::{Gray, ImageView, Pyramid};

@@ -22,11 +22,12 @@ use glam::DVec2;
 
 use super::clearance::{Edge, NOTHING, Surroundings};
 use super::corner_start::{start, start_along};
+use super::joint_fit::Sample;
 use super::model::corner::Corner;
 use super::model::fitter::{Accuracy, CornerFitter, Fitted};
 use super::model::window::{MAX_RADIUS, Patch, Window};
 use super::optics::Optics;
-use super::shared_optics::{SAMPLES, Sample};
+use super::shared_optics::SAMPLES;
 use crate::corners::polynomial::Polynomial;
 use deltille_core::detection::Tone;
 use deltille_core::lattice::GridKind;
