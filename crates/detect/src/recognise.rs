@@ -14,7 +14,7 @@ use super::tiling::{CHECKER, DELTILLE, kind};
 use crate::corners::saddles::SaddleFinder;
 use crate::grid::grow::grids;
 use crate::grid::saddle_grid::SaddleGrid;
-use crate::labels::evidence::panel_from_grid;
+use crate::labels::placement::motion::panel_from_grid;
 use crate::labels::tags::{Read, TagPlace, TagReader};
 use deltille_core::family::{Decoder, Family};
 use deltille_core::lattice::{GridKind, LatticeMap, Tile, Vertex};

@@ -8,7 +8,7 @@
 //! the square up and right is dark.
 //!
 //! Every grid has a lattice frame of its own, known up to a motion of the lattice;
-//! [`label`](crate::labels::evidence) finds what it is on the target.
+//! [`label`](crate::labels::placement) finds what it is on the target.
 
 use std::collections::{BTreeMap, BTreeSet, HashSet, VecDeque};
 

@@ -2,7 +2,7 @@
 
 use glam::DVec2;
 
-use super::evidence::TagEvidence;
+use super::placement::labeller::TagEvidence;
 use crate::grid::saddle_grid::SaddleGrid;
 use deltille_core::detection::{Reason, ReasonKind};
 use deltille_core::lattice::GridKind;

@@ -7,7 +7,7 @@
 use std::collections::btree_map::Entry;
 use std::collections::{BTreeMap, BTreeSet};
 
-use super::evidence::{Budget, Labelled, TagLabeller};
+use super::placement::labeller::{Budget, Labelled, TagLabeller};
 use super::why;
 use crate::config::DetectorConfig;
 use crate::grid::outline::{WholeBoard, fit_outline, fit_rectangle};
