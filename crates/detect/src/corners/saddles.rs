@@ -3,8 +3,9 @@
 use glam::DVec2;
 
 use super::buckets::Buckets;
+use super::candidates::{Candidate, candidates, maxima_near};
 use super::polynomial::{FittedCorner, Polynomial};
-use super::ring::{Candidate, PER_AMPLITUDE, candidates, maxima_near};
+use super::ring::PER_AMPLITUDE;
 use super::sectors::{Sectors, contrast_around};
 use crate::tiling::kind;
 use deltille_core::lattice::GridKind;
