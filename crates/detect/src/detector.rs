@@ -11,7 +11,7 @@ use super::tiling::{CHECKER, DELTILLE, kind, step};
 use crate::corners::saddles::{SaddleFinder, too_many};
 use crate::grid::beyond::go_on;
 use crate::grid::foreshortened::foreshortened_grids;
-use crate::grid::grow::grids;
+use crate::grid::grids::grids;
 use crate::grid::saddle_grid::SaddleGrid;
 use crate::grid::tile_shape::is_of_squares;
 use crate::labels::grid_labels::{FoundGrid, Labels, MOST_CORNERS, report_once};

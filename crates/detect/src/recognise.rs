@@ -12,7 +12,7 @@ use super::detector::Detector;
 use super::levels::{MIN_LEVEL_SIDE, levels_of};
 use super::tiling::{CHECKER, DELTILLE, kind};
 use crate::corners::saddles::SaddleFinder;
-use crate::grid::grow::grids;
+use crate::grid::grids::grids;
 use crate::grid::saddle_grid::SaddleGrid;
 use crate::labels::placement::motion::panel_from_grid;
 use crate::labels::tags::{Read, TagPlace, TagReader};

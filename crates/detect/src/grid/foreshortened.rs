@@ -15,7 +15,7 @@ use glam::DVec2;
 use nalgebra::{Matrix2, Vector2};
 use rayon::prelude::*;
 
-use super::grow::grids;
+use super::grids::grids;
 use super::saddle_grid::SaddleGrid;
 use crate::corners::saddles::{SaddleFinder, is_all_noise};
 use crate::levels::MIN_LEVEL_SIDE;
