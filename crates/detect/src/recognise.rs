@@ -36,6 +36,10 @@ const MOST_TILES: usize = 600;
 /// Evidence from which tags are there by no chance, nats: once in a million, for each of the ways to read them.
 const LEAST_EVIDENCE: f64 = 18.0;
 
+/// A corner that is seen beyond a board costs as much as so many that are not seen on it: a cover hides corners, and nothing
+/// makes them. @BEYOND@
+const COST_BEYOND: usize = 3;
+
 /// Rows and columns that a board may have beyond what is seen.
 const MOST_BEYOND: u32 = 12;
 
@@ -279,7 +283,8 @@ impl Sighting<'_> {
                     let on_board =
                         self.corners.iter().filter(|&&v| board.contains(&(v + shift))).count();
                     // What is seen beyond the board is no corner of it, and speaks against it.
-                    let cost = board.len() - on_board + 3 * (self.corners.len() - on_board);
+                    let cost =
+                        board.len() - on_board + COST_BEYOND * (self.corners.len() - on_board);
                     if best.as_ref().is_none_or(|(least, _)| cost < *least) {
                         let spec = BoardSpec {
                             tags: Some(self.tag_spec(spacing as u32, first_id)),

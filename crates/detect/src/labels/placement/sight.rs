@@ -118,8 +118,13 @@ impl TagLabeller {
 fn is_word(reading: &Reading) -> bool {
     /// Half odds of a cell that is read right 19 times of 20.
     const SURE: f32 = 1.5;
+    /// So many of so many cells are read so: of those of a tag that is seen well, one in two hundred is dirty.
+    const SURE_CELLS: [usize; 2] = [9, 10];
+    /// One cell in so many has the other colour. @OTHER@
+    const LEAST_OTHER: usize = 6;
     // Of free cells nothing is known.
     let n = reading.half_odds.iter().filter(|odds| odds.abs() > 0.0).count();
     let sure = |sign: f32| reading.half_odds.iter().filter(|&&odds| sign * odds > SURE).count();
-    10 * (sure(1.0) + sure(-1.0)) >= 9 * n && sure(1.0).min(sure(-1.0)) * 6 >= n
+    let (white, black) = (sure(1.0), sure(-1.0));
+    SURE_CELLS[1] * (white + black) >= SURE_CELLS[0] * n && LEAST_OTHER * white.min(black) >= n
 }
