@@ -173,12 +173,18 @@ impl Detector {
         self.main.ink
     }
 
-    /// The same detector for a second look at pictures of one print, with what they say together of the ink: pictures
-    /// that say little of it are seen with what all say. `None` where a second look would find nothing else.
-    pub fn with_ink_of(&self, found: &[Option<InkEstimate>]) -> Option<Self> {
+    /// What pictures of one print say together of its ink, given what each says: `None` where the ink was given, and where
+    /// a second look with it would find nothing else.
+    pub fn ink_of_all(&self, found: &[Option<InkEstimate>]) -> Option<InkEstimate> {
         let known: Vec<InkEstimate> = found.iter().copied().flatten().collect();
-        let ink = InkEstimate::of_all(&known).filter(|ink| ink.used && found.len() > 1)?;
-        Some(self.clone().with_ink(ink))
+        let is_worth = self.main.is_ink_asked() && found.len() > 1;
+        InkEstimate::of_all(&known).filter(|ink| ink.used && is_worth)
+    }
+
+    /// The same detector for a second look at these pictures: those that say little of the ink are seen with what all say,
+    /// [`Self::ink_of_all`].
+    pub fn with_ink_of(&self, found: &[Option<InkEstimate>]) -> Option<Self> {
+        Some(self.clone().with_ink(self.ink_of_all(found)?))
     }
 
     /// Finds the grids in one image and labels their corners; `name` is only noted in the result.

@@ -105,6 +105,8 @@ pub(super) struct OneTiling {
     labels: Labels,
     /// Edge of the tiles, mm, where all panels have the same.
     pub(super) edge_mm: Option<f64>,
+    /// Whether the ink was given.
+    is_ink_given: bool,
     /// What is known of the ink from other pictures.
     pub(super) ink: Option<InkEstimate>,
     /// What the stages are timed with, if at all.
@@ -119,8 +121,9 @@ impl OneTiling {
         edge_mm: Option<f64>,
         config: DetectorConfig,
     ) -> Self {
+        let is_ink_given = config.ink != Ink::Auto;
         let (finder, refiner) = (Finder::of(kind), refiner(kind, config, edge_mm));
-        Self { finder, refiner, tag_areas, labels, edge_mm, ink: None, clock: None }
+        Self { finder, refiner, tag_areas, labels, edge_mm, is_ink_given, ink: None, clock: None }
     }
 
     /// The same with a clock, by which it notes how long each stage took.
@@ -131,6 +134,11 @@ impl OneTiling {
     /// The same for a print whose spread of ink was estimated before.
     pub(super) fn with_ink(self, ink: InkEstimate) -> Self {
         Self { refiner: self.refiner.with_ink(Some(ink.edges)), ink: Some(ink), ..self }
+    }
+
+    /// Whether pictures are asked for the ink.
+    pub(super) fn is_ink_asked(&self) -> bool {
+        !self.is_ink_given
     }
 
     /// What a picture shows; `name` is only noted in the result.

@@ -37,7 +37,7 @@ const MOST_TILES: usize = 600;
 const LEAST_EVIDENCE: f64 = 18.0;
 
 /// A corner that is seen beyond a board costs as much as so many that are not seen on it: a cover hides corners, and nothing
-/// makes them. @BEYOND@
+/// makes them. Three is not derived.
 const COST_BEYOND: usize = 3;
 
 /// Rows and columns that a board may have beyond what is seen.

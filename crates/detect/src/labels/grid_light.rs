@@ -442,7 +442,7 @@ fn clipped_share(by_direction: &[Vec<Profile>], deviation: f64) -> f64 {
 fn covariance(widths: &[([f64; 3], f64)]) -> [f64; 3] {
     /// Weight of being round, against one direction's equation.
     const ROUND: f64 = 0.01;
-    /// Least variance in any direction, over that of the sharpest edges. @SHARPEST@
+    /// Least variance in any direction, over that of the sharpest edges. It stays a covariance so; the value itself is not derived.
     const SHARPEST: f64 = 0.3;
     let mean = widths.iter().map(|w| w.1).sum::<f64>() / widths.len().max(1) as f64;
     let mut normal = Matrix3::<f64>::identity() * ROUND;

@@ -35,7 +35,7 @@ const LEAST_DEPTH: f64 = 0.06;
 /// stays inside.
 const BESIDE: f64 = 0.25;
 
-/// Shares of white that are taken for what they are. @SHARES@
+/// Shares of white that are taken for what they are. What is farther off is no noise; how far is not derived.
 const SHARES: [f64; 2] = [-0.5, 1.5];
 
 /// The cells of a tile.

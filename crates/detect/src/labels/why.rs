@@ -31,10 +31,10 @@ const LEAST_BIT_BLURS: f64 = 1.0;
 /// Single tags are read where cells are so many times as long as a board of them needs.
 const TAG_FOR_TAG: f64 = 2.0;
 
-/// One pixel in so many may be darker or brighter than all that the picture shows: dead, hot, or a spark. @DEAD@
+/// One pixel in so many may be darker or brighter than all that the picture shows: dead, hot, or a spark.
 const PIXELS_A_DEAD_ONE: usize = 1000;
 
-/// One pixel in so many may be steeper than the sharpest edges. @STEEP@
+/// One pixel in so many may be steeper than the sharpest edges. The edges of a single tile of a board, 100 px long, are as many in two megapixels.
 const PIXELS_A_STEEP_ONE: usize = 5000;
 
 /// Why nothing was found in a picture with so many corners of its tiling.

@@ -32,7 +32,7 @@ const CIRCLES: [f64; 3] = [0.5, 0.7, 0.9];
 /// The mean of them.
 const MEAN_CIRCLE: f64 = CIRCLES[1];
 
-/// Least blur of a start, px. @LEASTBLUR@
+/// Least blur of a start, px. The fit finds the blur anew; the value is not derived.
 const MIN_START_BLUR_PX: f64 = 0.6;
 
 /// Largest blur of a start, as a part of the window's radius: of a larger one the window shows the middle alone.

@@ -118,9 +118,9 @@ impl TagLabeller {
 fn is_word(reading: &Reading) -> bool {
     /// Half odds of a cell that is read right 19 times of 20.
     const SURE: f32 = 1.5;
-    /// So many of so many cells are read so: of those of a tag that is seen well, one in two hundred is dirty.
+    /// So many of so many cells are read so, or the tile does not count.
     const SURE_CELLS: [usize; 2] = [9, 10];
-    /// One cell in so many has the other colour. @OTHER@
+    /// One cell in so many has the other colour. A tile without a tag is of one colour; the part itself is not derived.
     const LEAST_OTHER: usize = 6;
     // Of free cells nothing is known.
     let n = reading.half_odds.iter().filter(|odds| odds.abs() > 0.0).count();
