@@ -58,7 +58,6 @@ pub struct Detector {
     detector: Arc<detect::Detector>,
     targets: Vec<Target>,
     limits: Limits,
-    is_ink_open: bool,
     asked: Arc<Asked>,
 }
 
@@ -171,7 +170,6 @@ impl Detector {
             });
         let mut limits = Limits::default();
         limits.max_pixels = max_pixels;
-        let is_ink_open = ink == Ink::Auto;
         let targets = target.map(|targets| targets.0).unwrap_or_default();
         let size = size(rows, cols)?;
         let detector = match (targets.as_slice(), grid) {
@@ -209,7 +207,7 @@ impl Detector {
             }
         };
         let asked = Arc::new(asked);
-        Ok(Self { detector: Arc::new(detector), targets, limits, is_ink_open, asked })
+        Ok(Self { detector: Arc::new(detector), targets, limits, asked })
     }
 
     /// Finds what is looked for in a picture.
@@ -331,7 +329,7 @@ impl Detector {
     ///     ``None`` where a second look would find nothing else.
     fn with_ink_of(&self, detections: Vec<PyRef<'_, Detection>>) -> Option<Self> {
         let found: Vec<_> = detections.iter().map(|seen| seen.found.ink).collect();
-        let detector = self.is_ink_open.then(|| self.detector.with_ink_of(&found)).flatten()?;
+        let detector = self.detector.with_ink_of(&found)?;
         Some(Self { detector: Arc::new(detector), ..self.clone() })
     }
 

@@ -1,78 +1,16 @@
-//! The stages in their order.
-
-use std::collections::BTreeMap;
-use std::time::Duration;
+//! The detector of targets: what it looks for, and what it finds in a picture, of one tiling or of both.
 
 use super::config::DetectorConfig;
-use super::labels::why;
-use super::levels::{MIN_LEVEL_SIDE, PYRAMID_LEVELS, levels_of};
+use super::one_tiling::OneTiling;
 use super::scene::{SceneError, check_detectable, check_distinct};
-use super::tiling::{CHECKER, DELTILLE, kind, step};
-use crate::corners::saddles::{SaddleFinder, too_many};
-use crate::grid::beyond::go_on;
-use crate::grid::foreshortened::foreshortened_grids;
-use crate::grid::grow::grids;
-use crate::grid::saddle_grid::SaddleGrid;
-use crate::grid::tile_shape::is_of_squares;
-use crate::labels::assignment::{FoundGrid, Labels, MOST_CORNERS, report_once};
-use crate::labels::evidence::Budget;
+use crate::labels::grid_labels::Labels;
 use crate::refine::clearance::TagAreas;
-use crate::refine::corner_model::CornerFitter;
-use crate::refine::optics::Optics;
-use crate::refine::refine_grid::{is_sampled, sharp_level};
-use crate::refine::refiner::Refiner;
 use deltille_core::Clock;
-use deltille_core::detection::{
-    Detection, Grid, Ink, InkEstimate, MIN_UNTAGGED_EDGE_PX, Reason, ReasonKind,
-};
+use deltille_core::detection::{Detection, InkEstimate, ReasonKind};
 use deltille_core::family::{Family, FamilyError};
 use deltille_core::lattice::GridKind;
-use deltille_core::raster::{Gray, ImageView, PYRAMID_FULL_SCALE, Pyramid};
-use deltille_core::targets::{Target, TargetIdentity, least_untagged_corners};
-
-/// Nor is its blur a larger part of the edge. It leaves less than a tenth of the next wave, and in the
-/// wave by itself the model reads a blur of 0.25 of the edge, of three waves 0.155.
-const fn max_untagged_blur(kind: GridKind) -> f64 {
-    match kind {
-        GridKind::Deltille => 0.14,
-        GridKind::Checker => 0.2,
-    }
-}
-
-/// Grids that are told why they have no labels: the largest ones.
-const MOST_REASONS: usize = 3;
-
-/// A grid of the other tiling with fewer corners is no reason to ask whether that was meant.
-const LEAST_OTHER_CORNERS: usize = 20;
-
-/// A level on which the whole board is looked for has so many pixels for each of its corners: where the board covers a
-/// third of the picture, its edges are 18 px long there.
-const LEAST_PX2_A_CORNER: usize = 1000;
-
-/// Edges on such a level are no shorter than this, px: the fit of a corner reads as far, and what it reads of the next
-/// corners displaces it.
-const MIN_COARSE_EDGE_PX: f64 = 7.0;
-
-/// Radius of the polynomial that refines, px: the reference detector's.
-const POLYNOMIAL_RADIUS: usize = 3;
-
-/// Largest radius of the model that refines, px: beyond, lenses bend edges more than a wider
-/// window gains.
-const MODEL_RADIUS: usize = 10;
-
-/// Grids, each with why it has no labels.
-type Judged = Vec<(Grid, Option<Reason>)>;
-
-/// What a picture shows.
-struct Found {
-    grids: Judged,
-    /// What the grids have in common.
-    optics: Optics,
-    /// Why others are left out.
-    left_out: Vec<Reason>,
-    /// How many corners were seen.
-    saddles: usize,
-}
+use deltille_core::raster::ImageView;
+use deltille_core::targets::{Target, TargetIdentity};
 
 /// Finds grids in images and labels their corners.
 ///
@@ -87,37 +25,11 @@ struct Found {
 /// ```
 #[derive(Clone, Debug)]
 pub struct Detector {
-    finder: Finder,
-    refiner: Refiner,
-    /// Where tiles show something else than their colour.
-    tag_areas: TagAreas,
-    labels: Labels,
+    main: OneTiling,
+    /// That of the targets of the other tiling, where there are such.
+    other: Option<Box<OneTiling>>,
     /// The targets that are looked for.
     targets: Vec<TargetIdentity>,
-    /// Edge of the tiles, mm, where all panels have the same.
-    edge_mm: Option<f64>,
-    /// What is known of the ink from other pictures.
-    ink: Option<InkEstimate>,
-    /// What the stages are timed with, if at all.
-    clock: Option<Clock>,
-    /// That of the targets of the other tiling, where there are such.
-    other: Option<Box<Self>>,
-}
-
-/// Finds the corners of a tiling.
-#[derive(Clone, Debug)]
-enum Finder {
-    Deltille(SaddleFinder<DELTILLE>),
-    Checker(SaddleFinder<CHECKER>),
-}
-
-impl Finder {
-    fn of(kind: GridKind) -> Self {
-        match kind {
-            GridKind::Deltille => Self::Deltille(SaddleFinder::new()),
-            GridKind::Checker => Self::Checker(SaddleFinder::new()),
-        }
-    }
 }
 
 impl Detector {
@@ -149,12 +61,8 @@ impl Detector {
     /// looks the same after half a turn; the lowest such corner in the image is then taken.
     pub fn for_grid(kind: GridKind, size: Option<(u32, u32)>, config: DetectorConfig) -> Self {
         let labels = Labels::of_size(kind, size, &config);
-        let refiner = refiner(kind, config, None);
-        let tag_areas = TagAreas::default();
-        let finder = Finder::of(kind);
-        let (edge_mm, ink, clock, other) = (None, None, None, None);
-        let targets = Vec::new();
-        Self { finder, refiner, tag_areas, labels, targets, edge_mm, ink, clock, other }
+        let main = OneTiling::new(kind, labels, TagAreas::default(), None, config);
+        Self { main, other: None, targets: Vec::new() }
     }
 
     /// A detector of a target; `family` is the family that the target names.
@@ -165,20 +73,14 @@ impl Detector {
         let mut of_tilings = target.tilings().map(|kind| {
             let family = family.and_then(|family| family.of_tiling(kind));
             match target.tilings().count() {
-                1 => Self::of_one_tiling(target, family, config.clone()),
-                _ => Self::of_one_tiling(&target.of_tiling(kind), family, config.clone()),
+                1 => of_one_tiling(target, family, config.clone()),
+                _ => of_one_tiling(&target.of_tiling(kind), family, config.clone()),
             }
         });
         let first = of_tilings.next();
         let other = of_tilings.next().map(Box::new);
-        let first = first.unwrap_or_else(|| Self::of_one_tiling(target, family, config));
-        Self { other, targets: vec![target.identity()], ..first }
-    }
-
-    fn of_one_tiling(target: &Target, family: Option<&Family>, config: DetectorConfig) -> Self {
-        let labels = Labels::of_target(target, family, &config);
-        let tag_areas = family.map(|family| TagAreas::of(target, family)).unwrap_or_default();
-        Self::with(kind_of(target), labels, tag_areas, edge_of(&[target]), config)
+        let main = first.unwrap_or_else(|| of_one_tiling(target, family, config));
+        Self { main, other, targets: vec![target.identity()] }
     }
 
     /// A detector of several targets, each with its family, which looks for all in one pass over a picture;
@@ -233,36 +135,25 @@ impl Detector {
             let edge_mm = edge_of(&own.iter().map(|(target, _)| target).collect::<Vec<_>>());
             let (labels, tag_areas) =
                 (Labels::of_scene(labels.collect()), TagAreas::of_scene(tag_areas));
-            (!own.is_empty()).then(|| Self::with(kind, labels, tag_areas, edge_mm, config.clone()))
+            (!own.is_empty())
+                .then(|| OneTiling::new(kind, labels, tag_areas, edge_mm, config.clone()))
         };
         let mut of_kinds = [GridKind::Deltille, GridKind::Checker].into_iter().filter_map(of_kind);
-        let first = of_kinds.next().ok_or(SceneError::Empty)?;
+        let main = of_kinds.next().ok_or(SceneError::Empty)?;
         let targets = all.iter().map(|target| target.identity()).collect();
-        Ok(Self { other: of_kinds.next().map(Box::new), targets, ..first })
-    }
-
-    fn with(
-        kind: GridKind,
-        labels: Labels,
-        tag_areas: TagAreas,
-        edge_mm: Option<f64>,
-        config: DetectorConfig,
-    ) -> Self {
-        let (finder, refiner) = (Finder::of(kind), refiner(kind, config, edge_mm));
-        let (targets, ink, clock, other) = (Vec::new(), None, None, None);
-        Self { finder, refiner, tag_areas, labels, targets, edge_mm, ink, clock, other }
+        Ok(Self { main, other: of_kinds.next().map(Box::new), targets })
     }
 
     /// The same detector with a clock, by which it notes how long each stage took, see [`Detection::timing_ms`].
     pub fn with_clock(self, clock: Clock) -> Self {
         let other = self.other.map(|other| Box::new(other.with_clock(clock)));
-        Self { clock: Some(clock), other, ..self }
+        Self { main: self.main.with_clock(clock), other, ..self }
     }
 
     /// The same detector for a print whose spread of ink was estimated before.
     pub fn with_ink(self, ink: InkEstimate) -> Self {
-        let edge_mm = self.edge_mm;
-        let of_other = |other: Box<Self>| match (edge_mm, other.edge_mm) {
+        let edge_mm = self.main.edge_mm;
+        let of_other = |other: Box<OneTiling>| match (edge_mm, other.edge_mm) {
             // As far on tiles of another size.
             (Some(edge_mm), Some(other_mm)) => {
                 let mut ink = ink;
@@ -274,20 +165,26 @@ impl Detector {
             _ => other,
         };
         let other = self.other.map(of_other);
-        Self { refiner: self.refiner.with_ink(Some(ink.edges)), ink: Some(ink), other, ..self }
+        Self { main: self.main.with_ink(ink), other, ..self }
     }
 
     /// What is known of the ink from other pictures, see [`Self::with_ink`].
     pub fn known_ink(&self) -> Option<InkEstimate> {
-        self.ink
+        self.main.ink
     }
 
-    /// The same detector for a second look at pictures of one print, with what they say together of the ink: pictures
-    /// that say little of it are seen with what all say. `None` where a second look would find nothing else.
-    pub fn with_ink_of(&self, found: &[Option<InkEstimate>]) -> Option<Self> {
+    /// What pictures of one print say together of its ink, given what each says: `None` where the ink was given, and where
+    /// a second look with it would find nothing else.
+    pub fn ink_of_all(&self, found: &[Option<InkEstimate>]) -> Option<InkEstimate> {
         let known: Vec<InkEstimate> = found.iter().copied().flatten().collect();
-        let ink = InkEstimate::of_all(&known).filter(|ink| ink.used && found.len() > 1)?;
-        Some(self.clone().with_ink(ink))
+        let is_worth = self.main.is_ink_asked() && found.len() > 1;
+        InkEstimate::of_all(&known).filter(|ink| ink.used && is_worth)
+    }
+
+    /// The same detector for a second look at these pictures: those that say little of the ink are seen with what all say,
+    /// [`Self::ink_of_all`].
+    pub fn with_ink_of(&self, found: &[Option<InkEstimate>]) -> Option<Self> {
+        Some(self.clone().with_ink(self.ink_of_all(found)?))
     }
 
     /// Finds the grids in one image and labels their corners; `name` is only noted in the result.
@@ -299,295 +196,21 @@ impl Detector {
 
     /// [`Self::detect`], compiled here and not in every crate that uses it.
     fn detect_view(&self, image: ImageView, name: &str) -> Detection {
-        let found = match &self.finder {
-            Finder::Deltille(finder) => self.detect_with(finder, image, name),
-            Finder::Checker(finder) => self.detect_with(finder, image, name),
-        };
+        let found = self.main.detect(image, name);
         let mut found = match &self.other {
-            Some(other) => both(found, other.detect_view(image, name)),
+            Some(other) => both(found, other.detect(image, name)),
             None => found,
         };
         found.targets = self.targets.clone();
         found
     }
-
-    fn detect_with<const N: usize>(
-        &self,
-        finder: &SaddleFinder<N>,
-        image: ImageView,
-        name: &str,
-    ) -> Detection {
-        let mut timing = Timing::start(self.clock);
-        let pyramid = Pyramid::new(image, levels_of(image), MIN_LEVEL_SIDE);
-        timing.lap("pyramid");
-        let whole = self.whole_on_coarser_level(finder, (image, &pyramid), &mut timing);
-        let Found { grids, optics, left_out, saddles } = match whole {
-            Some((grids, optics)) => Found { grids, optics, left_out: Vec::new(), saddles: 0 },
-            None => self.all_grids(finder, (image, &pyramid), &mut timing),
-        };
-        let mut reasons = if grids.is_empty() {
-            let nothing = || self.nothing_found::<N>(&pyramid, saddles);
-            vec![left_out.first().cloned().unwrap_or_else(nothing)]
-        } else if self.labels.are_wanted() && grids.iter().all(|(_, reason)| reason.is_some()) {
-            let of_grid = |(i, (_, reason)): (usize, &(Grid, Option<Reason>))| {
-                let mut reason = reason.clone()?;
-                reason.grid = Some(i);
-                Some(reason)
-            };
-            grids.iter().enumerate().filter_map(of_grid).take(MOST_REASONS).collect()
-        } else {
-            Vec::new()
-        };
-        let is_of_others = |reason: &Reason| {
-            matches!(reason.kind, ReasonKind::SeenTwice | ReasonKind::TooManyGrids)
-        };
-        reasons.extend(
-            left_out.into_iter().filter(|reason| !grids.is_empty() && is_of_others(reason)),
-        );
-        let size = [image.width() as u32, image.height() as u32];
-        let grids = grids.into_iter().map(|(grid, _)| grid).collect();
-        let mut found = Detection::new(name, size, grids);
-        found.tone = optics.tone;
-        found.ink = self.ink.or_else(|| {
-            let ink = optics.ink_found?;
-            Some(self.edge_mm.map_or(ink, |edge_mm| ink.on_print(edge_mm)))
-        });
-        found.reasons = reasons;
-        found.timing_ms = timing.laps;
-        found
-    }
-
-    /// The board, where one alone is looked for, if a coarser level of the pyramid shows all of it and nothing else
-    /// that is like it. What finer levels would add is the places of its corners, and these are refined: if one of them
-    /// is not found then, the finer levels are searched too.
-    fn whole_on_coarser_level<const N: usize>(
-        &self,
-        finder: &SaddleFinder<N>,
-        (image, pyramid): (ImageView, &Pyramid),
-        timing: &mut Timing,
-    ) -> Option<(Judged, Optics)> {
-        let whole = self.labels.whole()?;
-        let levels = pyramid.levels();
-        let least = LEAST_PX2_A_CORNER * whole.corners();
-        let coarsest = levels.iter().rposition(|level| level.pixels().len() >= least)?;
-        let seen = (1..=coarsest).rev().find_map(|level| {
-            let coarse = pyramid.from_level(level);
-            let saddles = finder.find(&coarse);
-            if saddles.len() < whole.corners() {
-                return None;
-            }
-            let mut found = grids(finder, &coarse, &saddles, Some(whole));
-            let is_seen = |grid: &SaddleGrid| {
-                whole.is_shown_by(grid) && shortest_edge_px::<N>(grid) >= MIN_COARSE_EDGE_PX
-            };
-            if !found.first().is_some_and(is_seen) {
-                return None;
-            }
-            for placed in found.iter_mut().flat_map(|grid| grid.values_mut()) {
-                placed.position = Pyramid::to_level_0(level, placed.position);
-            }
-            let mut left_out = Vec::new();
-            let labelled = self.plausible::<N>(image, pyramid, &found, &mut left_out);
-            let is_alone = labelled.len() == 1 && labelled[0].1.is_none() && left_out.is_empty();
-            is_alone.then_some(labelled)
-        });
-        timing.lap("coarse");
-        let refined = seen.map(|seen| self.refined::<N>((image, pyramid), seen));
-        timing.lap("refine");
-        refined.filter(|(grids, _)| {
-            grids.first().is_some_and(|(grid, _)| grid.corners.len() == whole.corners())
-        })
-    }
-
-    /// All grids of a picture with their labels, refined.
-    fn all_grids<const N: usize>(
-        &self,
-        finder: &SaddleFinder<N>,
-        (image, pyramid): (ImageView, &Pyramid),
-        timing: &mut Timing,
-    ) -> Found {
-        let saddles = finder.find(pyramid);
-        timing.lap("saddles");
-        let found = grids(finder, pyramid, &saddles, self.labels.whole());
-        let mut left_out = Vec::new();
-        if too_many(pyramid, saddles.len()) {
-            let edge_px = ((image.width() * image.height()) as f64 / saddles.len() as f64).sqrt();
-            let figures = [("edge_px", edge_px), ("needed_edge_px", MIN_UNTAGGED_EDGE_PX)];
-            left_out.push(match edge_px < MIN_UNTAGGED_EDGE_PX {
-                true => Reason::new(ReasonKind::TooSmall, figures),
-                false => Reason::new(ReasonKind::TooManyGrids, []),
-            });
-        }
-        timing.lap("grids");
-        let mut grids = self.plausible::<N>(image, pyramid, &found, &mut left_out);
-        timing.lap("labels");
-        if grids.is_empty() && self.labels.are_wanted() {
-            let found = foreshortened_grids(finder, pyramid);
-            grids = self.plausible::<N>(image, pyramid, &found, &mut left_out);
-            // Compressed patterns of all kinds have triangles and squares too.
-            grids.retain(|(grid, _)| is_labelled(grid));
-            timing.lap("foreshortened");
-        }
-        let (grids, optics) = self.refined::<N>((image, pyramid), grids);
-        timing.lap("refine");
-        Found { grids, optics, left_out, saddles: saddles.len() }
-    }
-
-    /// Grids with their corners refined, those that are still grids, and what they have in common.
-    fn refined<const N: usize>(
-        &self,
-        (image, pyramid): (ImageView, &Pyramid),
-        grids: Judged,
-    ) -> (Judged, Optics) {
-        let least = least_untagged_corners(kind::<N>()) as usize;
-        let mut fitter = CornerFitter::default();
-        let (mut refined, reasons): (Vec<Grid>, Vec<Option<Reason>>) = grids.into_iter().unzip();
-        let (optics, are_waves) = self.refine(&mut fitter, (image, pyramid), &mut refined);
-        let refined = refined.into_iter().zip(reasons).zip(are_waves);
-        let mut grids: Judged = refined
-            .filter(|((grid, _), is_wave)| {
-                is_vouched_for(grid) || grid.corners.len() >= least && !is_wave
-            })
-            .map(|(grid, _)| grid)
-            .collect();
-        let may_have_tags = !self.tag_areas.is_empty();
-        grids.retain(|(grid, _)| is_labelled(grid) || is_of_squares(image, grid, may_have_tags));
-        // Of what was no corner, some is gone.
-        refuse_patterns(pyramid, &mut grids);
-        (grids, optics)
-    }
-
-    /// The grids with their labels that may be what is looked for, and why others are left out.
-    fn plausible<const N: usize>(
-        &self,
-        image: ImageView,
-        pyramid: &Pyramid,
-        found: &[SaddleGrid],
-        left_out: &mut Vec<Reason>,
-    ) -> Judged {
-        let mut budget = Budget::default();
-        let found = found.iter().map(|corners| FoundGrid { kind: kind::<N>(), corners });
-        let mut grids: Judged =
-            found.flat_map(|grid| self.labels.label(image, grid, &mut budget)).collect();
-        let least = least_untagged_corners(kind::<N>()) as usize;
-        let most = self.labels.most_corners();
-        let mut refused = None;
-        grids.retain(|(grid, no_labels)| {
-            let (corners, edge_px) = (grid.corners.len(), grid.edge_px().unwrap_or(0.0));
-            let is_large = corners >= least;
-            let why = if edge_px < MIN_UNTAGGED_EDGE_PX {
-                let figures = [("edge_px", edge_px), ("needed_edge_px", MIN_UNTAGGED_EDGE_PX)];
-                Some(Reason::new(ReasonKind::TooSmall, figures))
-            } else if corners > most {
-                let figures = [("corners", corners as f64), ("expected", most as f64)];
-                // Tags that were read tell more.
-                let by_tags = no_labels.clone().filter(|reason| reason.kind.is_of_tags_read());
-                let kind = match self.labels.are_wanted() {
-                    true => ReasonKind::NotWhole,
-                    false => ReasonKind::TooManyCorners,
-                };
-                by_tags.or_else(|| Some(Reason::new(kind, figures)))
-            } else {
-                None
-            };
-            let is_plausible = is_large && why.is_none();
-            refused = refused.take().or(why.filter(|_| is_large && !is_vouched_for(grid)));
-            is_vouched_for(grid) || is_plausible
-        });
-        left_out.extend(refused);
-        refuse_patterns(pyramid, &mut grids);
-        left_out.extend(report_once(&mut grids));
-        let (count, mut corners) = (grids.len(), 0);
-        grids.retain(|(grid, _)| {
-            corners += grid.corners.len();
-            is_vouched_for(grid) || corners <= MOST_CORNERS
-        });
-        left_out.extend((grids.len() < count).then(|| Reason::new(ReasonKind::TooManyGrids, [])));
-        // Labelled grids by panel, then the others; a stable sort keeps the largest first.
-        grids.sort_by_cached_key(|(grid, _)| {
-            (grid.panel.is_none(), grid.target.clone(), grid.panel.unwrap_or(u32::MAX))
-        });
-        grids
-    }
-
-    /// Refines all grids on the level of the pyramid that suits their blur; what they have in common, and for
-    /// each grid whether the blur leaves of it but a wave.
-    fn refine(
-        &self,
-        fitter: &mut CornerFitter,
-        (image, pyramid): (ImageView, &Pyramid),
-        grids: &mut [Grid],
-    ) -> (Optics, Vec<bool>) {
-        let levels = pyramid.levels();
-        let blurs = self.refiner.blurs(fitter, (image, levels), grids, &self.tag_areas);
-        for level in (1..=sharp_level(&blurs, levels.len())).rev() {
-            let image = ImageView::from(&levels[level]);
-            grids.iter_mut().for_each(|grid| grid.moved_to_level(level));
-            let blurs =
-                self.refiner.blurs(fitter, (image, &levels[level..]), grids, &self.tag_areas);
-            let optics =
-                self.refiner.optics(fitter, (image, level), (grids, &blurs), &self.tag_areas);
-            // A picture that moved is as sharp as ever across its way.
-            let found = is_sampled(&blurs, optics.narrowest())
-                .then(|| self.refine_under(fitter, image, grids, (&optics, &blurs)));
-            grids.iter_mut().for_each(|grid| grid.moved_from_level(level));
-            if let Some(are_waves) = found {
-                return (optics, are_waves);
-            }
-        }
-        let optics = self.refiner.optics(fitter, (image, 0), (grids, &blurs), &self.tag_areas);
-        let are_waves = self.refine_under(fitter, image, grids, (&optics, &blurs));
-        (optics, are_waves)
-    }
-
-    /// [`Self::refine`] in an image that shows the grids under these optics and blurs, px.
-    fn refine_under(
-        &self,
-        fitter: &mut CornerFitter,
-        image: ImageView,
-        grids: &mut [Grid],
-        (optics, blurs): (&Optics, &[Option<f64>]),
-    ) -> Vec<bool> {
-        let refine = |(grid, &blur_px): (&mut Grid, &Option<f64>)| {
-            let edge_px = grid.edge_px().unwrap_or(0.0);
-            self.refiner.refine_grid(fitter, image, grid, &self.tag_areas, (optics, blur_px));
-            blur_px.is_some_and(|blur_px| blur_px > max_untagged_blur(grid.kind) * edge_px)
-        };
-        grids.iter_mut().zip(blurs).map(refine).collect()
-    }
-
-    /// Why there are no grids in a picture with so many corners.
-    fn nothing_found<const N: usize>(&self, pyramid: &Pyramid, corners: usize) -> Reason {
-        // At half the size, which takes a quarter of the time.
-        let half = pyramid.levels().get(1).map(|level| {
-            let to_one = 1.0 / PYRAMID_FULL_SCALE;
-            Pyramid::new(&level.map(|v| f32::from(v) * to_one), PYRAMID_LEVELS - 1, MIN_LEVEL_SIDE)
-        });
-        let others = half.map_or(0, |half| match kind::<N>() {
-            GridKind::Deltille => most_corners(&SaddleFinder::<CHECKER>::new(), &half),
-            GridKind::Checker => most_corners(&SaddleFinder::<DELTILLE>::new(), &half),
-        });
-        if others >= LEAST_OTHER_CORNERS {
-            return Reason::new(ReasonKind::OtherTiling, [("corners", others as f64)]);
-        }
-        let reason = why::nothing_found(pyramid, corners);
-        if matches!(reason.kind, ReasonKind::NoCorners | ReasonKind::NoGrid)
-            && let Some(edge_px) = edge_of_small_tiles::<N>(&pyramid.levels()[0])
-        {
-            let figures = [("edge_px", edge_px), ("needed_edge_px", MIN_UNTAGGED_EDGE_PX)];
-            return Reason::new(ReasonKind::TooSmall, figures);
-        }
-        reason
-    }
 }
 
-/// The shortest distance between neighbours in a grid, px.
-fn shortest_edge_px<const N: usize>(grid: &SaddleGrid) -> f64 {
-    let edges = grid.iter().flat_map(|(&vertex, placed)| {
-        let next = (0..N / 2).filter_map(move |k| grid.get(&(vertex + step::<N>(k))));
-        next.map(|next| next.position.distance(placed.position))
-    });
-    edges.fold(f64::INFINITY, f64::min)
+/// What looks for a target of one tiling.
+fn of_one_tiling(target: &Target, family: Option<&Family>, config: DetectorConfig) -> OneTiling {
+    let labels = Labels::of_target(target, family, &config);
+    let tag_areas = family.map(|family| TagAreas::of(target, family)).unwrap_or_default();
+    OneTiling::new(kind_of(target), labels, tag_areas, edge_of(&[target]), config)
 }
 
 /// The tiling of a target.
@@ -622,105 +245,4 @@ fn both(deltille: Detection, checker: Detection) -> Detection {
     found.tone = found.tone.or(other.tone);
     found.ink = found.ink.or(other.ink);
     found
-}
-
-/// Whether tags, or the outline of a mirrored board, tell that a grid is one.
-fn is_vouched_for(grid: &Grid) -> bool {
-    !grid.tags.is_empty() || grid.mirrored
-}
-
-/// Whether a grid is known to be one, by tags or as a whole.
-fn is_labelled(grid: &Grid) -> bool {
-    is_vouched_for(grid) || grid.panel.is_some()
-}
-
-/// Leaves out grids that go on where they end, unless they are known.
-fn refuse_patterns(pyramid: &Pyramid, grids: &mut Judged) {
-    loop {
-        let all: Vec<&Grid> = grids.iter().map(|(grid, _)| grid).collect();
-        let mut goes_on = go_on(&pyramid.levels()[0], &all).into_iter();
-        let count = grids.len();
-        grids.retain(|(grid, _)| goes_on.next() != Some(true) || is_labelled(grid));
-        // What is refused is part of the pattern that others end at.
-        if grids.len() == count {
-            return;
-        }
-    }
-}
-
-/// The edge of the tiles, px, of a grid that shows in the part of a picture with the most contrast if that is enlarged to
-/// twice its size, and is too small as it is.
-fn edge_of_small_tiles<const N: usize>(level: &Gray<i16>) -> Option<f64> {
-    const PART: [usize; 2] = [400, 300];
-    const TIMES: usize = 2;
-    let size = [level.width().min(PART[0]), level.height().min(PART[1])];
-    let [left, top] = busiest_part(level, size);
-    let to_one = 1.0 / PYRAMID_FULL_SCALE;
-    let enlarged = Gray::from_fn(TIMES * size[0], TIMES * size[1], |x, y| {
-        let [u, v] = [(left, x), (top, y)].map(|(from, i)| from as f64 + i as f64 / TIMES as f64);
-        level.bilinear(u, v) * to_one
-    });
-    let pyramid = Pyramid::new(&enlarged, 1, MIN_LEVEL_SIDE);
-    let finder = SaddleFinder::<N>::new();
-    let found = grids(&finder, &pyramid, &finder.find(&pyramid), None);
-    let largest = found.iter().max_by_key(|grid| grid.len())?;
-    let edge_px = why::edge_px(largest)? / TIMES as f64;
-    (largest.len() >= LEAST_OTHER_CORNERS && edge_px < MIN_UNTAGGED_EDGE_PX).then_some(edge_px)
-}
-
-/// The first pixel of the part of so many columns and rows around the square with the most contrast.
-fn busiest_part(level: &Gray<i16>, size: [usize; 2]) -> [usize; 2] {
-    const SQUARE: usize = 64;
-    let contrast = |[x, y]: [usize; 2]| {
-        let [right, bottom] = [(x + SQUARE).min(level.width()), (y + SQUARE).min(level.height())];
-        let rows = (y..bottom).map(|v| &level.row(v)[x..right]);
-        rows.flat_map(|row| row.windows(2))
-            .map(|two| two[0].abs_diff(two[1]) as usize)
-            .sum::<usize>()
-    };
-    let columns = (0..level.width()).step_by(SQUARE);
-    let squares = columns.flat_map(|x| (0..level.height()).step_by(SQUARE).map(move |y| [x, y]));
-    let [x, y] = squares.max_by_key(|&square| contrast(square)).unwrap_or_default();
-    let around = |at: usize, part: usize, side: usize| {
-        (at + SQUARE / 2).saturating_sub(part / 2).min(side - part)
-    };
-    [around(x, size[0], level.width()), around(y, size[1], level.height())]
-}
-
-/// Corners of the largest grid of a tiling.
-fn most_corners<const N: usize>(finder: &SaddleFinder<N>, pyramid: &Pyramid) -> usize {
-    let saddles = finder.find(pyramid);
-    grids(finder, pyramid, &saddles, None).iter().map(|grid| grid.len()).max().unwrap_or(0)
-}
-
-fn refiner(kind: GridKind, config: DetectorConfig, edge_mm: Option<f64>) -> Refiner {
-    let ink = match config.ink {
-        Ink::Auto => None,
-        Ink::Um(um) => Some(edge_mm.map_or(0.0, |edge_mm| um / 1e3 / edge_mm)),
-    };
-    Refiner::with_radii(kind, config.refinement, POLYNOMIAL_RADIUS, MODEL_RADIUS)
-        .with_tone(config.tone)
-        .with_ink(ink)
-}
-
-/// Stopwatch of the stages.
-struct Timing {
-    /// The clock, and when the last stage ended.
-    last: Option<(Clock, Duration)>,
-    laps: BTreeMap<String, f64>,
-}
-
-impl Timing {
-    fn start(clock: Option<Clock>) -> Self {
-        Self { last: clock.map(|clock| (clock, clock())), laps: BTreeMap::new() }
-    }
-
-    fn lap(&mut self, stage: &str) {
-        if let Some((clock, last)) = &mut self.last {
-            let now = clock();
-            *self.laps.entry(stage.to_owned()).or_default() +=
-                now.saturating_sub(*last).as_secs_f64() * 1e3;
-            *last = now;
-        }
-    }
 }

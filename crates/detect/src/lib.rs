@@ -11,7 +11,8 @@
 //!
 //! The result is [`deltille_core::detection`].
 //!
-//! `detector` runs these stages with the settings of `config`, `recognise` guesses the target where none is given, `scene`
+//! `one_tiling` runs these stages, `nothing_seen` says why they end without a grid. `detector` looks for targets of both
+//! tilings with the settings of `config`, `recognise` guesses the target where none is given, `scene`
 //! tells whether several targets can be distinguished. A module imports from chapters above it in this list, never in a circle.
 //!
 //! Both tilings go the same way; `tiling` says where they differ, and `lanes` how many numbers a processor works on at once.
@@ -23,6 +24,8 @@ mod grid;
 mod labels;
 mod lanes;
 mod levels;
+mod nothing_seen;
+mod one_tiling;
 mod recognise;
 mod refine;
 mod scene;
@@ -35,6 +38,6 @@ pub use deltille_core::detection::{
 };
 pub use detector::Detector;
 pub use recognise::{Recognised, Recogniser};
-pub use refine::corner_model::SLOPE_PRIOR;
+pub use refine::model::fitter::SLOPE_PRIOR;
 pub use refine::refiner::{MAX_WINDOW_PX, RefineStatus, Refined, Refinement, Refiner};
 pub use scene::{SceneError, check_distinct};

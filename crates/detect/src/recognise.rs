@@ -12,9 +12,9 @@ use super::detector::Detector;
 use super::levels::{MIN_LEVEL_SIDE, levels_of};
 use super::tiling::{CHECKER, DELTILLE, kind};
 use crate::corners::saddles::SaddleFinder;
-use crate::grid::grow::grids;
+use crate::grid::grids::grids;
 use crate::grid::saddle_grid::SaddleGrid;
-use crate::labels::evidence::panel_from_grid;
+use crate::labels::placement::motion::panel_from_grid;
 use crate::labels::tags::{Read, TagPlace, TagReader};
 use deltille_core::family::{Decoder, Family};
 use deltille_core::lattice::{GridKind, LatticeMap, Tile, Vertex};
@@ -35,6 +35,10 @@ const MOST_TILES: usize = 600;
 
 /// Evidence from which tags are there by no chance, nats: once in a million, for each of the ways to read them.
 const LEAST_EVIDENCE: f64 = 18.0;
+
+/// A corner that is seen beyond a board costs as much as so many that are not seen on it: a cover hides corners, and nothing
+/// makes them. Three is not derived.
+const COST_BEYOND: usize = 3;
 
 /// Rows and columns that a board may have beyond what is seen.
 const MOST_BEYOND: u32 = 12;
@@ -279,7 +283,8 @@ impl Sighting<'_> {
                     let on_board =
                         self.corners.iter().filter(|&&v| board.contains(&(v + shift))).count();
                     // What is seen beyond the board is no corner of it, and speaks against it.
-                    let cost = board.len() - on_board + 3 * (self.corners.len() - on_board);
+                    let cost =
+                        board.len() - on_board + COST_BEYOND * (self.corners.len() - on_board);
                     if best.as_ref().is_none_or(|(least, _)| cost < *least) {
                         let spec = BoardSpec {
                             tags: Some(self.tag_spec(spacing as u32, first_id)),

@@ -113,11 +113,8 @@ impl Printing {
             tag_ids::add(&printing.target, &mut printing.sheets)?;
         }
         if paper.guide_page {
-            printing.sheets.push(guide::sheet(
-                &title,
-                (&printing.target, &printing.sheets),
-                paper,
-            )?);
+            let guide = guide::sheet(&title, &printing.target, &printing.sheets, paper)?;
+            printing.sheets.push(guide);
         }
         Ok(printing)
     }
@@ -204,7 +201,7 @@ fn poster(
 ) -> Result<SheetLayout, TargetError> {
     let corners = rectangle(panel.field_mm());
     let poster = Poster::new(&corners, paper)?;
-    poster.check("the board", (BoardEdgeMm, board.edge_mm), None, paper)?;
+    poster.check("the board", BoardEdgeMm, board.edge_mm, None, paper)?;
     let mut sheet = poster.sheet();
     let motion = poster.sheet_from_points();
     sheet.placements.push(Placement {
@@ -228,7 +225,7 @@ fn poster(
         (_, id) => format!("board {id} · "),
     };
     let tiles = vec![field.to_vec()];
-    poster.add_pages(&mut sheet, tiles, &outline, (label, &of), |_, _| Vec::new());
+    poster.add_pages(&mut sheet, tiles, &outline, label, &of, |_, _| Vec::new());
     Ok(sheet)
 }
 

@@ -147,7 +147,7 @@ fn pages_together(
         let mut verdict = SheetVerdict::new(index, &page, wrong);
         whole::check_bars(&page, marks, &AffineMap::IDENTITY, &mut verdict);
         let logo = verifier.printing.logo.as_ref();
-        marks::check(&page, (marks, logo), &[], Some(*window_mm), &mut verdict);
+        marks::check(&page, marks, logo, &[], Some(*window_mm), &mut verdict);
         let of_page = verdict.findings.into_iter();
         findings.extend(of_page.map(|finding| finding.on_page(label.clone())));
         check_bars_mm.extend(verdict.check_bars_mm);

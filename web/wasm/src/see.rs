@@ -128,7 +128,7 @@ impl Finder {
     /// In words, where it is no such list.
     pub fn ink_of_all(&self, found: &str) -> Result<Option<Vec<String>>, JsError> {
         let found: Vec<Option<InkEstimate>> = serde_json::from_str(found).raise()?;
-        let ink = self.detector.with_ink_of(&found).and_then(|detector| detector.known_ink());
+        let ink = self.detector.ink_of_all(&found);
         ink.map(|ink| Ok(vec![serde_json::to_string(&ink).raise()?, ink.to_string()])).transpose()
     }
 

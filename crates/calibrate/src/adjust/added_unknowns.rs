@@ -90,13 +90,13 @@ impl Calibration {
             let Minimum { problem, normal, layout, .. } = &settled.minimum;
             let Some(map) = &problem.map else { break };
             let found = normal.covariances(layout).ok_or(CalibrationError::NoStart)?;
-            let fitted = map.fitted_prior(&found.corners, settled.whitening.sigma);
-            let change = (fitted.0 - map.prior_mm).abs() / map.prior_mm;
+            let (prior_mm, determined) = map.fitted_prior(&found.corners, settled.whitening.sigma);
+            let change = (prior_mm - map.prior_mm).abs() / map.prior_mm;
             if change.max_element() < SAME_PRIOR {
                 break;
             }
             let mut problem = settled.problem.clone();
-            problem.map = Some(map.clone().expecting(fitted));
+            problem.map = Some(map.clone().expecting(prior_mm, determined));
             settled = settle(Kept { problem, ..gross.kept() }, self.weights, self.loss)?;
         }
         Ok(settled)

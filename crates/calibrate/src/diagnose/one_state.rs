@@ -167,9 +167,9 @@ impl State {
                 return None;
             }
             // Of the first group the camera is that of the fit.
-            let unit = (intrinsic.candidate(), scale);
-            let before =
-                intrinsic.of(camera) + equations.change_px(fit, intrinsic.parameter(), unit);
+            let parameter = intrinsic.parameter();
+            let change_px = equations.change_px(fit, parameter, intrinsic.candidate(), scale);
+            let before = intrinsic.of(camera) + change_px;
             Some(CameraChange {
                 intrinsic,
                 from_view: name(equations.views.get(first)?.frame),

@@ -84,7 +84,8 @@ impl Normal {
         normal.a.fill_upper_triangle_with_lower_triangle();
         for (panel, first) in problem.panels.iter().zip(&layout.panels) {
             if let (Some(prior), Some(first)) = (&panel.prior, *first) {
-                normal.add_prior(prior.off(&panel.target_from_panel), first, whitening.sigma);
+                let (off, information) = prior.off(&panel.target_from_panel);
+                normal.add_prior(off, information, first, whitening.sigma);
             }
         }
         for (camera, parameters) in problem.cameras.iter().zip(&layout.parameters) {
@@ -101,7 +102,8 @@ impl Normal {
     /// the unit in which costs are counted.
     fn add_prior(
         &mut self,
-        (off, information): (Vector6<f64>, Matrix6<f64>),
+        off: Vector6<f64>,
+        information: Matrix6<f64>,
         first: usize,
         sigma: f64,
     ) {

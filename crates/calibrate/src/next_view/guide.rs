@@ -285,7 +285,7 @@ impl Guide {
             judged.filter_map(|(placing, px)| Some((placing, px?))).collect();
         judged.sort_by(|a, b| a.1.total_cmp(&b.1));
         judged.truncate(KEPT);
-        let refined = judged.into_par_iter().map(|start| self.refined(gain, start));
+        let refined = judged.into_par_iter().map(|(start, px)| self.refined(gain, start, px));
         let mut refined: Vec<(Placing, f64)> = refined.collect();
         refined.sort_by(|a, b| a.1.total_cmp(&b.1));
         // They were judged by some corners; a board without tags needs all.
@@ -335,8 +335,8 @@ impl Guide {
         all
     }
 
-    /// The best near a candidate, by steps along one coordinate after the other.
-    fn refined(&self, gain: &Gain, (start, px): (Placing, f64)) -> (Placing, f64) {
+    /// The best near a candidate, after which projections are this sure, by steps along one coordinate after the other.
+    fn refined(&self, gain: &Gain, start: Placing, px: f64) -> (Placing, f64) {
         let mut best = (start, px);
         for halving in 0..=HALVINGS {
             let size = 0.5f64.powi(halving as i32);

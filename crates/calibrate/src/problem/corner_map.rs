@@ -72,7 +72,7 @@ impl CornerMap {
     }
 
     /// The same map with another prior, mm, and the number of offsets that the views determine.
-    pub fn expecting(self, (prior_mm, determined): (DVec3, f64)) -> Self {
+    pub fn expecting(self, prior_mm: DVec3, determined: f64) -> Self {
         Self { prior_mm, determined, ..self }
     }
 

@@ -153,7 +153,7 @@ impl Symmetries {
             };
             let Some(found) = found else { break };
             let to_rig = found.pose.after(&from_rig);
-            let (frames, of) = self.rotate(seen, &placed, (to, to_rig));
+            let (frames, of) = self.rotate(seen, &placed, to, to_rig);
             let degrees = self.least_degrees(&seen[to]);
             let is_of_note = degrees.is_some() && (frames > 0 || !found.is_sure);
             said[to] = degrees.filter(|_| is_of_note).map(|degrees| LabelRotation {
@@ -192,7 +192,8 @@ impl Symmetries {
         &self,
         seen: &mut ByFrame,
         placed: &[(usize, Pose)],
-        (to, to_rig): (usize, Pose),
+        to: usize,
+        to_rig: Pose,
     ) -> (usize, usize) {
         let (mut rotated, mut all) = (0, 0);
         let mut own = std::mem::take(&mut seen[to]);

@@ -183,7 +183,8 @@ impl StateEquations {
         &self,
         fit: &Fit,
         parameter: usize,
-        (candidate, px): (Candidate, f64),
+        candidate: Candidate,
+        px: f64,
     ) -> f64 {
         if self.free.is_empty() {
             let column = Candidate::CAMERA.iter().position(|&of| of == candidate);

@@ -195,12 +195,11 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     // In the order of the images, whichever was done first.
     seen.sort_unstable_by_key(|seen| seen.index);
     let mut again = None;
-    if !args.stream && args.finder.ink_is_open() && !interrupt::is_raised() {
+    if args.stream {
+        tell_ink_of_all(&detector, &seen);
+    } else if !interrupt::is_raised() {
         let unseen = unseen.into_inner().expect("no thread panics here");
-        again = see_again(&args, &targets, detector, &seen, unseen, &threads, &report)?;
-    }
-    if args.stream && args.finder.ink_is_open() {
-        tell_ink_of_all(&seen);
+        again = see_again(&args, &targets, &detector, &seen, unseen, &threads, &report)?;
     }
     if let Some(tables) = tables {
         let is_left = interrupt::is_raised();
@@ -223,10 +222,9 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
 }
 
 /// Says, after each image was printed with its own ink, that all together have one by which corners are others.
-fn tell_ink_of_all(seen: &[Seen]) {
-    let known: Vec<InkEstimate> = seen.iter().filter_map(|seen| seen.ink).collect();
-    let of_all = InkEstimate::of_all(&known).filter(|ink| ink.used && known.len() > 1);
-    if let Some(ink) = of_all {
+fn tell_ink_of_all(detector: &Detector, seen: &[Seen]) {
+    let found: Vec<Option<InkEstimate>> = seen.iter().map(|seen| seen.ink).collect();
+    if let Some(ink) = detector.ink_of_all(&found) {
         let images = counted(ink.pictures as usize, "image");
         tell!(
             "note: --stream located the corners of each image with the ink of that image; without it they are located \
@@ -240,7 +238,7 @@ fn tell_ink_of_all(seen: &[Seen]) {
 fn see_again(
     args: &Args,
     targets: &[Target],
-    detector: Detector,
+    detector: &Detector,
     seen: &[Seen],
     unseen: Vec<(usize, Option<Picture>)>,
     threads: &rayon::ThreadPool,

@@ -63,11 +63,6 @@ enum Kind {
 }
 
 impl FinderArgs {
-    /// Whether the ink of the print is not known.
-    pub fn ink_is_open(&self) -> bool {
-        self.ink == Ink::Auto
-    }
-
     /// What is read of a file.
     pub fn limits(&self) -> Limits {
         self.limits.limits()

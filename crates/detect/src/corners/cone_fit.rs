@@ -28,6 +28,10 @@ pub struct ConeFit<const N: usize> {
     kernels: Vec<[[f32; LANES]; N]>,
 }
 
+/// Singular values smaller than this are those of a design that lacks rank, which none does: above rounding, and below all
+/// that there are.
+const RANK: f64 = 1e-12;
+
 impl<const N: usize> ConeFit<N> {
     /// A fit of all `monomials`, over offsets within `radius` + 1 px after smoothing with a cone
     /// of that radius; the coefficients of the first N are kept.
@@ -40,7 +44,7 @@ impl<const N: usize> ConeFit<N> {
             let (u, v) = (points[i].0 as f64, points[i].1 as f64);
             u.powi(monomials[j].0) * v.powi(monomials[j].1)
         });
-        let fit = design.pseudo_inverse(1e-12).expect("a non-negative tolerance");
+        let fit = design.pseudo_inverse(RANK).expect("a non-negative tolerance");
         let volume: f64 = offsets(r).map(|(u, v)| cone(u, v)).sum();
         let side = 4 * radius + 1;
         let groups = side.div_ceil(LANES);
@@ -96,7 +100,7 @@ fn products<const N: usize, T: Intensity>(
     let mut sums = [[0.0f32; LANES]; N];
     for half in 0..2 {
         let first = half * HALF;
-        let part = half_sums(kernels, (side, first), image, ([left + first, top], [fx, fy], level));
+        let part = half_sums(kernels, side, first, image, [left + first, top], [fx, fy], level);
         for k in 0..N {
             sums[k][first..first + HALF].copy_from_slice(&part[k]);
         }
@@ -104,13 +108,16 @@ fn products<const N: usize, T: Intensity>(
     sums.each_ref().map(lanes::sum)
 }
 
-/// The sums of half of the lanes, from one on: so many stay in registers.
+/// The sums of half of the lanes, from `first` on, less `level`: so many stay in registers.
 #[inline(always)]
 fn half_sums<const N: usize, T: Intensity>(
     kernels: &[[[f32; LANES]; N]],
-    (side, first): (usize, usize),
+    side: usize,
+    first: usize,
     image: View<T>,
-    ([left, top], [fx, fy], level): ([usize; 2], [f32; 2], f32),
+    [left, top]: [usize; 2],
+    [fx, fy]: [f32; 2],
+    level: f32,
 ) -> [[f32; HALF]; N] {
     let groups = side.div_ceil(LANES);
     let mut sums = [[0.0f32; HALF]; N];

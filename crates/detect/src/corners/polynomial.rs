@@ -8,8 +8,10 @@ use super::quadric::{QuadricFit, QuadricSaddle};
 use deltille_core::lattice::GridKind;
 use deltille_core::raster::ImageView;
 
-/// Most iterations of the fits; the reference detector's.
+/// Most iterations of the cubic; the reference detector's.
 const CUBIC_ITERATIONS: usize = 5;
+
+/// Most iterations of the quadric; the reference detector's.
 const QUADRIC_ITERATIONS: usize = 20;
 
 /// Most iterations of a first look; the paper's.

@@ -3,8 +3,9 @@
 use glam::DVec2;
 
 use super::buckets::Buckets;
+use super::candidates::{Candidate, candidates, maxima_near};
 use super::polynomial::{FittedCorner, Polynomial};
-use super::ring::{Candidate, PER_AMPLITUDE, candidates, maxima_near};
+use super::ring::PER_AMPLITUDE;
 use super::sectors::{Sectors, contrast_around};
 use crate::tiling::kind;
 use deltille_core::lattice::GridKind;
@@ -33,9 +34,11 @@ const NOISE_FACTOR: f32 = 5.0;
 /// from waves. Noise has twice as many candidates.
 const LEAST_TILE_PX2: usize = 40;
 
-/// Nor more than a hundred thousand: five times as many as are refined of a picture. Of the candidates of a level,
-/// this many times as many are looked at; nine in ten are none in pictures of leaves or grass.
+/// Nor more than a hundred thousand: five times as many as are refined of a picture.
 const MOST_CORNERS: usize = 100_000;
+
+/// Of the candidates of a level two and a half times as many are looked at; nine in ten are none in pictures of leaves or
+/// grass.
 const MOST_CANDIDATES: usize = 250_000;
 
 /// A corner with N rays in the image: a monkey saddle, or a saddle.
@@ -55,8 +58,10 @@ pub struct Saddle<const N: usize> {
 const MAX_BLURRED_CONTRAST: f64 = 0.5;
 
 /// And its middle leaves the level between dark and bright by less than this part of the contrast that one of the next
-/// coarser levels, so many, shows. Ink that has spread darkens the middle, the more the larger it is seen.
+/// [`LEVELS_OF_CONTRAST`] shows. Ink that has spread darkens the middle, the more the larger it is seen.
 const MAX_BLURRED_SHIFT: f64 = 0.3;
+
+/// Coarser levels whose contrast counts: all of a picture whose shorter side is below 2400 px.
 const LEVELS_OF_CONTRAST: usize = 3;
 
 /// A corner moves by less than this when the window grows by one, px: it looks the same at every
@@ -251,7 +256,9 @@ impl<const N: usize> SaddleFinder<N> {
 /// ninth strongest where this is less: an image that is all board has no plain part to tell its noise
 /// from, but then it has at least as many corners as a grid. (An image that is all noise tells it.)
 fn candidates_above_noise<const N: usize>(level: &Gray<i16>, noise: f32) -> Vec<Candidate> {
+    /// A grid of 3 × 3 corners has so many.
     const STRONGEST: usize = 9;
+    /// Part of the harmonic of the ninth strongest that weaker corners of a grid have at least; not derived.
     const PART: f32 = 0.25;
     let ninth = |candidates: &[Candidate]| {
         let mut responses: Vec<f32> = candidates.iter().map(|c| c.response).collect();
@@ -387,24 +394,30 @@ struct SampleNoise {
 /// estimation" (1996), which vanishes on planes and weakly curved surfaces, drawn out so that its
 /// nine samples are as far apart as those of the ring.
 fn sample_noise(image: &Gray<i16>) -> SampleNoise {
-    /// So many samples are plenty for a quantile, and one pixel in 64 for a small image.
+    /// So many samples tell the quiet quantile to 3 %.
     const PLENTY: usize = 8000;
+    /// Pixels from one sample to the next, at least: the mask's nine are 8 px wide.
     const LEAST_STRIDE: usize = 8;
     /// Distance of the mask's samples: the ring's radius.
     const STEP: usize = 4;
-    /// The part of the image that is taken to be plain, and the quantile of |x| there for Gaussian
-    /// noise: boards and houses leave little without an edge.
+    /// The part of the image that is taken to be plain: boards and houses leave little without an edge.
     const QUIET: f64 = 0.1;
+    /// σ over that quantile of |x| in Gaussian noise.
     const QUIET_TO_SIGMA: f32 = 1.0 / 0.1257;
     /// Fewer samples tell quantiles no better than to a tenth.
     const MANY: f64 = 4000.0;
-    /// The quantile that edges change first, and what it is of the median in Gaussian noise, and the median of
-    /// the quiet quantile; with their deviations over so many samples, times the root of that number.
+    /// The quantile that edges change first.
     const LOUD: f64 = 0.99;
+    /// It over the median of |x| in Gaussian noise.
     const LOUD_TO_MIDDLE: f32 = 3.819;
+    /// The relative deviation of that ratio, times the root of the number of samples.
     const LOUD_DEVIATION: f64 = 1.7;
+    /// The median over the quiet quantile.
     const MIDDLE_TO_QUIET: f32 = 5.367;
+    /// The relative deviation of that ratio alike.
     const QUIET_DEVIATION: f64 = 3.0;
+    /// Ratios of Gaussian noise are off by more deviations than these once in four hundred.
+    const SURE: f64 = 3.0;
     /// The mask's gain: √(1+4+1+4+16+4+1+4+1).
     const GAIN: f32 = 6.0;
     let (width, height) = (image.width(), image.height());
@@ -434,7 +447,7 @@ fn sample_noise(image: &Gray<i16>) -> SampleNoise {
         f64::from(ratio / usual - 1.0).abs() <= deviations / count.sqrt()
     };
     let is_all = count >= MANY
-        && is_as(middle / quiet, MIDDLE_TO_QUIET, 3.0 * QUIET_DEVIATION)
-        && is_as(loud / middle, LOUD_TO_MIDDLE, 3.0 * LOUD_DEVIATION);
+        && is_as(middle / quiet, MIDDLE_TO_QUIET, SURE * QUIET_DEVIATION)
+        && is_as(loud / middle, LOUD_TO_MIDDLE, SURE * LOUD_DEVIATION);
     SampleNoise { sigma: quiet * QUIET_TO_SIGMA / GAIN, is_all }
 }

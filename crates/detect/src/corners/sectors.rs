@@ -342,6 +342,7 @@ fn between_classes(values: &[f64; SAMPLES], mean: f64) -> f64 {
 /// Sum and number of the values above a level.
 #[multiversion(targets("x86_64+avx2"))]
 fn above_level(values: &[f64; SAMPLES], level: f64) -> [f64; 2] {
+    /// Two vectors of four, which do not wait for each other.
     const LANES: usize = 8;
     let (mut sums, mut counts) = ([0.0; LANES], [0.0; LANES]);
     for group in values.as_chunks::<LANES>().0 {
@@ -395,7 +396,7 @@ fn ordered_rays<const N: usize>(crossings: &[Crossing; N]) -> Option<[f64; N]> {
 /// The turn from `from` to `to`, −π to π.
 pub fn turn(from: f64, to: f64) -> f64 {
     let turn = to - from;
-    // Most angles need no division to be brought into range.
+    // Most angles need no division to be brought into range: less than 3π is in it after one turn.
     let turn = if turn.abs() < 3.0 * PI { turn } else { turn.rem_euclid(TAU) };
     if turn > PI {
         turn - TAU

@@ -115,6 +115,7 @@ impl<'a> CheckerTiles<'a> {
 
     /// Brightness about the middle of a square; `None` where it lies outside the picture.
     pub fn value(&self, Square { middle, edges }: Square) -> Option<f64> {
+        /// In edges: the middle, and about it along rows and columns.
         const PLACES: [[f64; 2]; 5] =
             [[0.0, 0.0], [AROUND, 0.0], [-AROUND, 0.0], [0.0, AROUND], [0.0, -AROUND]];
         let values = PLACES.map(|place| self.brightness(moved(middle, edges, place.into())));

@@ -38,33 +38,37 @@ const MIN_DEVIATION: f64 = 0.25;
 /// Stations that may fail: a scratch or a highlight, not a gap.
 const ALLOWED_FAILURES: usize = 1;
 
-/// Follows the edge that leaves `a` along ray `i` and arrives at `b` along ray `j`, and tells
-/// whether the sides keep their colours.
+/// An end of an edge: a corner, and its ray along the edge.
+#[derive(Clone, Copy, Debug)]
+pub struct End<'a, const N: usize> {
+    /// The corner.
+    pub corner: &'a Saddle<N>,
+    /// Index of its ray.
+    pub ray: usize,
+}
+
+impl<'a, const N: usize> End<'a, N> {
+    /// The end at a corner whose ray has this index.
+    #[inline]
+    pub fn of(corner: &'a Saddle<N>, ray: usize) -> Self {
+        Self { corner, ray }
+    }
+}
+
+/// Follows the edge between two ends and tells whether its sides keep their colours.
 ///
 /// The edge is taken as the cubic through both corners with the directions of both rays, which is
 /// the circular arc of the paper where the rays agree with one.
-pub fn is_clean<const N: usize>(
-    pyramid: &Pyramid,
-    a: &Saddle<N>,
-    i: usize,
-    b: &Saddle<N>,
-    j: usize,
-) -> bool {
-    is_clean_along(pyramid, (a, i), (b, j), |ends| ends)
+pub fn is_clean<const N: usize>(pyramid: &Pyramid, from: End<N>, to: End<N>) -> bool {
+    is_clean_along(pyramid, from, to, |ends| ends)
 }
 
 /// [`is_clean`] of an edge that may also be the circular arc along one of the rays, or straight: of narrow
 /// sectors blur draws the rays apart.
-pub fn is_clean_somehow<const N: usize>(
-    pyramid: &Pyramid,
-    a: &Saddle<N>,
-    i: usize,
-    b: &Saddle<N>,
-    j: usize,
-) -> bool {
+pub fn is_clean_somehow<const N: usize>(pyramid: &Pyramid, from: End<N>, to: End<N>) -> bool {
     let shapes: [fn(Slopes) -> Slopes; 4] =
         [|ends| ends, |[start, _]| [start, -start], |[_, end]| [-end, end], |_| [0.0; 2]];
-    shapes.into_iter().any(|shape| is_clean_along(pyramid, (a, i), (b, j), shape))
+    shapes.into_iter().any(|shape| is_clean_along(pyramid, from, to, shape))
 }
 
 /// Slopes of an edge against its chord at either end.
@@ -73,8 +77,8 @@ type Slopes = [f64; 2];
 /// [`is_clean`] of an edge whose slopes follow from those of the rays.
 fn is_clean_along<const N: usize>(
     pyramid: &Pyramid,
-    (a, i): (&Saddle<N>, usize),
-    (b, j): (&Saddle<N>, usize),
+    End { corner: a, ray: i }: End<N>,
+    End { corner: b, ray: j }: End<N>,
     shape: impl Fn(Slopes) -> Slopes,
 ) -> bool {
     // The coarser of the levels that show the corners sharply shows the edge between them.
@@ -178,8 +182,8 @@ mod tests {
         for bulge in [-6.0, 0.0, 6.0] {
             let (image, a, b) = scene(bulge);
             let image = Pyramid::new(&image, 1, 8);
-            assert!(is_clean(&image, &a, 0, &b, 3), "bulge {bulge}");
-            assert!(is_clean(&image, &b, 3, &a, 0), "bulge {bulge}, backwards");
+            assert!(is_clean(&image, End::of(&a, 0), End::of(&b, 3)), "bulge {bulge}");
+            assert!(is_clean(&image, End::of(&b, 3), End::of(&a, 0)), "bulge {bulge}, backwards");
         }
     }
 
@@ -187,7 +191,8 @@ mod tests {
     fn wrong_colours_and_flat_images_are_not() {
         let (image, a, b) = scene(0.0);
         for image in [image.map(|v| 51200 - v), Gray::new(100, 100)] {
-            assert!(!is_clean(&Pyramid::new(&image, 1, 8), &a, 0, &b, 3));
+            let image = Pyramid::new(&image, 1, 8);
+            assert!(!is_clean(&image, End::of(&a, 0), End::of(&b, 3)));
         }
     }
 }

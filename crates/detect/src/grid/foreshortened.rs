@@ -15,7 +15,7 @@ use glam::DVec2;
 use nalgebra::{Matrix2, Vector2};
 use rayon::prelude::*;
 
-use super::grow::grids;
+use super::grids::grids;
 use super::saddle_grid::SaddleGrid;
 use crate::corners::saddles::{SaddleFinder, is_all_noise};
 use crate::levels::MIN_LEVEL_SIDE;
@@ -31,7 +31,13 @@ const WIDTH: f64 = 0.5;
 /// The finest level of a pyramid that has no more pixels than this is looked at: tiles of larger pictures are larger.
 const MOST_PIXELS: usize = 2_500_000;
 
-/// What is outside of a picture, of 1023.
+/// Steps are rounded: within a row that adds up to less than a tenth of a pixel.
+const SLACK_PX: f64 = 0.1;
+
+/// A row of a view with smaller steps than this, px, is level: it rises by less than the slack in a hundred million pixels.
+const LEVEL_STEP: f64 = 1e-9;
+
+/// What is outside of a picture, of 1023: neither dark nor bright.
 const OUTSIDE: i16 = 512;
 
 /// The grids of the direction in which the largest is seen, in px of level 0.
@@ -95,8 +101,8 @@ impl View {
     /// The picture as the view shows it, grey where it ends. (A pyramid's level is smooth enough to be
     /// sampled at every second pixel.)
     fn drawn(&self, image: &Gray<i16>) -> Gray<i16> {
-        // Steps are rounded: within a row that adds up to less than a tenth of a pixel.
-        let last = [image.width() as f64 - 2.1, image.height() as f64 - 2.1];
+        // The last place has a pixel behind it.
+        let last = [image.width(), image.height()].map(|side| side as f64 - (2.0 + SLACK_PX));
         let [width, height] = self.size;
         let step = DVec2::from_slice(self.picture_from_view.column(0).as_slice());
         let mut drawn = Gray::new(width, height);
@@ -106,8 +112,8 @@ impl View {
             // The part of the row that lies in the picture.
             let (mut from, mut to) = (0.0, width as f64);
             for i in 0..2 {
-                let ends = [(0.1 - first[i]) / step[i], (last[i] - first[i]) / step[i]];
-                if step[i].abs() > 1e-9 {
+                let ends = [(SLACK_PX - first[i]) / step[i], (last[i] - first[i]) / step[i]];
+                if step[i].abs() > LEVEL_STEP {
                     from = f64::max(from, ends[0].min(ends[1]));
                     to = f64::min(to, ends[0].max(ends[1]));
                 } else if !(0.0..=last[i]).contains(&first[i]) {
@@ -125,20 +131,25 @@ impl View {
 
 /// Bilinear samples along a line that lies inside of an image.
 fn sample(image: &Gray<i16>, first: DVec2, step: DVec2, out: &mut [i16]) {
-    /// Steps of a coordinate in a pixel, and weights of an interpolation.
-    const FINE: f64 = 65536.0;
-    const WEIGHTS: i32 = 256;
+    /// Bits of a coordinate behind the point: rounded, a row of ten thousand steps is off by less than a tenth of a pixel.
+    const FINE_BITS: u32 = 16;
+    const FINE: f64 = (1u32 << FINE_BITS) as f64;
+    /// Bits of a weight: two weights and a grey value of 10 bits fit into 32.
+    const WEIGHT_BITS: u32 = 8;
+    const WEIGHTS: i32 = 1 << WEIGHT_BITS;
+    /// Of the product of two weights.
+    const SUM_BITS: u32 = 2 * WEIGHT_BITS;
     let (data, width) = (image.pixels(), image.width());
     let [mut x, mut y] = (first * FINE).round().as_i64vec2().to_array();
     let [dx, dy] = (step * FINE).round().as_i64vec2().to_array();
     for pixel in out {
-        let [col, row] = [x, y].map(|c| (c.max(0) >> 16) as usize);
-        let [fx, fy] = [x, y].map(|c| (c >> 8) as i32 & (WEIGHTS - 1));
+        let [col, row] = [x, y].map(|c| (c.max(0) >> FINE_BITS) as usize);
+        let [fx, fy] = [x, y].map(|c| (c >> (FINE_BITS - WEIGHT_BITS)) as i32 & (WEIGHTS - 1));
         let at = row * width + col;
         let (upper, lower) = (&data[at..at + 2], &data[at + width..at + width + 2]);
         let across = |pair: &[i16]| i32::from(pair[0]) * (WEIGHTS - fx) + i32::from(pair[1]) * fx;
         let sum = across(upper) * (WEIGHTS - fy) + across(lower) * fy;
-        *pixel = ((sum + (1 << 15)) >> 16) as i16;
+        *pixel = ((sum + (1 << (SUM_BITS - 1))) >> SUM_BITS) as i16;
         (x, y) = (x + dx, y + dy);
     }
 }

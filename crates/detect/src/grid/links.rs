@@ -2,7 +2,7 @@
 
 use glam::DVec2;
 
-use super::edge::{MAX_CHORD_RAD, is_clean};
+use super::edge::{End, MAX_CHORD_RAD, is_clean};
 use super::places::Places;
 use crate::corners::saddles::Saddle;
 use crate::corners::sectors::turn;
@@ -94,7 +94,7 @@ impl<const N: usize> Corners<'_, N> {
                 // What has been followed from the other end is clean.
                 let back = Some(Link { corner: index, ray: i });
                 let is_known = corner < index && found[corner][ray] == back;
-                if is_known || is_clean(self.pyramid, saddle, i, other, ray) {
+                if is_known || is_clean(self.pyramid, End::of(saddle, i), End::of(other, ray)) {
                     links[i] = Some(Link { corner, ray });
                 }
             }

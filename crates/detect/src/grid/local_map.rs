@@ -27,6 +27,9 @@ const USUAL_BEND: f64 = 0.1;
 /// So many lines of three corners tell as much as [`USUAL_BEND`] does.
 const USUAL_WEIGHT: f64 = 0.25;
 
+/// Information, in edges⁻², that is less than a billionth of what a corner tells.
+const NO_PRIOR: f64 = 1e-9;
+
 /// Deviation of a corner from the smooth map, px of its level: fits wander by no more than that.
 const PLACE_PX: f64 = 0.3;
 
@@ -119,9 +122,10 @@ impl LocalMap {
         let known = steps.iter().filter_map(|&(far, step)| Some((far, step, at(vertex + step)?)));
         let known: Vec<(f64, Vertex, DVec2)> = known.take(MOST).collect();
         let edge_px = edge_px(&known, |step| length(kind::<N>(), step))?;
-        // The prior of the second derivatives; next to none of the others.
+        // The prior of the second derivatives; next to none of the others, so that the equations of corners in one line
+        // have a solution.
         let mut normal = Matrix6::from_diagonal(&Vector6::from_fn(|i, _| match i {
-            0..3 => 1e-9,
+            0..3 => NO_PRIOR,
             _ => bend.second.powi(-2),
         }));
         let mut right = [Vector6::zeros(); 2];
@@ -129,7 +133,7 @@ impl LocalMap {
         for (distance, step, place) in known {
             let (c, r) = (f64::from(step.col), f64::from(step.row));
             let phi = Vector6::new(1.0, c, r, 0.5 * c * c, c * r, 0.5 * r * r);
-            // Third derivatives are of the order of the square of the second ones.
+            // Third derivatives are of the order of the square of the second ones; Taylor's term has d³/3!.
             let sigma = bend.place_px / edge_px + bend.second.powi(2) * distance.powi(3) / 6.0;
             let weight = sigma.powi(-2);
             normal += weight * phi * phi.transpose();

@@ -72,7 +72,7 @@ pub fn fit_outline(
 /// `inverted` board that square is bright.
 pub fn fit_rectangle(
     grid: &SaddleGrid,
-    (rows, cols): (u32, u32),
+    [rows, cols]: [u32; 2],
     inverted: bool,
 ) -> Option<LatticeMap> {
     let (rows, cols) = (i32::try_from(rows).ok()?, i32::try_from(cols).ok()?);
@@ -137,7 +137,7 @@ mod tests {
             inverted: bool,
         ) {
             let grid = board(rows, cols, Vertex::new(row, col), turns);
-            let size = (rows as u32, cols as u32);
+            let size = [rows as u32, cols as u32];
             let motion = fit_rectangle(&grid, size, inverted).unwrap();
             let map = |v| motion.apply(v);
             let labels: BTreeSet<Vertex> = grid.keys().map(|&v| map(v)).collect();
@@ -166,7 +166,7 @@ mod tests {
                 prop_assert_eq!(dark, of_square(Vertex::new(rows - 2, cols - 2)));
                 prop_assert_eq!(o[1], 0.0, "the lower of the two");
             }
-            prop_assert!(fit_rectangle(&grid, (size.0 + 1, size.1), inverted).is_none());
+            prop_assert!(fit_rectangle(&grid, [size[0] + 1, size[1]], inverted).is_none());
         }
     }
 }

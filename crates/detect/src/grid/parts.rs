@@ -10,7 +10,7 @@ use std::collections::BTreeMap;
 
 use glam::DVec2;
 
-use super::edge::{MAX_CHORD_RAD, is_clean};
+use super::edge::{End, MAX_CHORD_RAD, is_clean};
 use super::effort::Effort;
 use super::links::MAX_CONTRAST_RATIO;
 use super::local_map::{Bend, LocalMap};
@@ -55,8 +55,9 @@ type Owners = BTreeMap<usize, (usize, Vertex)>;
 /// grown.
 pub fn join<const N: usize>(
     pyramid: &Pyramid,
-    (saddles, places): (&[Saddle<N>], &Buckets),
-    mut grids: Vec<Growing<N>>,
+    saddles: &[Saddle<N>],
+    places: &Buckets,
+    grids: Vec<Growing<N>>,
     members: Vec<BTreeMap<usize, Vertex>>,
     effort: &mut Effort,
 ) -> Vec<(Growing<N>, bool)> {
@@ -67,77 +68,127 @@ pub fn join<const N: usize>(
     let mut order: Vec<usize> = (0..grids.len()).collect();
     order.sort_by_key(|&i| std::cmp::Reverse(grids[i].len()));
     let mut has_grown = vec![false; grids.len()];
+    let mut joining = Joining { pyramid, saddles, places, grids, owners, effort };
     for base in order {
-        while grids[base].len() >= LEAST {
-            let bend = bend(&grids[base]);
-            let candidates = candidates((saddles, places), &grids[base], &owners, base, bend);
-            if !effort.spend(grids[base].len() + candidates.len()) {
+        while joining.grids[base].len() >= LEAST {
+            let bend = bend(&joining.grids[base]);
+            let candidates = joining.candidates(base, bend);
+            if !joining.effort.spend(joining.grids[base].len() + candidates.len()) {
                 break;
             }
             // Nothing changes before something is adopted.
-            let mut adopt = |sigma| {
-                let given = (&candidates[..], bend, sigma);
-                adopt((pyramid, saddles), &mut grids, &mut owners, base, given, effort)
-            };
-            if !SIGMAS.into_iter().any(&mut adopt) {
+            if !SIGMAS.into_iter().any(|sigma| joining.adopt(base, &candidates, bend, sigma)) {
                 break;
             }
             has_grown[base] = true;
         }
     }
-    grids.into_iter().zip(has_grown).filter(|(grid, _)| !grid.is_empty()).collect()
+    joining.grids.into_iter().zip(has_grown).filter(|(grid, _)| !grid.is_empty()).collect()
 }
 
-/// Adds to a grid the candidates that its map confirms, with a standard deviation of the prediction
-/// of at most `sigma` edges; returns whether there were any.
-fn adopt<const N: usize>(
-    (pyramid, saddles): (&Pyramid, &[Saddle<N>]),
-    grids: &mut [Growing<N>],
-    owners: &mut Owners,
-    base: usize,
-    (candidates, bend, sigma): (&[(usize, Vertex)], Bend, f64),
-    effort: &mut Effort,
-) -> bool {
-    let mut adopted = false;
-    for &(index, vertex) in candidates {
-        // The nearest corner of the grid is sought among all.
-        if !effort.spend(1 + grids[base].len() / CORNERS_IN_A_LOOK) {
-            break;
-        }
-        if grids[base].contains_key(&vertex) {
-            continue;
-        }
-        let Some(grown) = belongs(&grids[base], vertex, &saddles[index], bend, sigma) else {
-            continue;
-        };
-        if !is_joined(pyramid, &grids[base], vertex, &grown) {
-            continue;
-        }
-        match owners.get(&index).copied() {
-            Some((part, _)) if part == base => {}
-            Some((part, from)) => {
-                let turned = (grown.turn + N - grids[part][&from].turn) % N;
-                let map = LatticeMap::taking(kind::<N>(), from, vertex, turned as i32);
-                let is_worth = effort.spend(grids[part].len() + owners.len() / CORNERS_IN_A_LOOK);
-                if is_worth && is_part(&grids[base], &grids[part], map, bend, sigma) {
-                    for (from, corner) in std::mem::take(&mut grids[part]) {
-                        let turn = (corner.turn + turned) % N;
-                        grids[base].insert(map.apply(from), GrownSaddle { turn, ..corner });
+/// Grids that are being joined.
+struct Joining<'a, const N: usize> {
+    pyramid: &'a Pyramid<'a>,
+    /// All saddle points, and where to find them.
+    saddles: &'a [Saddle<N>],
+    places: &'a Buckets,
+    grids: Vec<Growing<N>>,
+    /// Which of the saddle points are in them.
+    owners: Owners,
+    effort: &'a mut Effort,
+}
+
+impl<const N: usize> Joining<'_, N> {
+    /// Adds to a grid the candidates that its map confirms, with a standard deviation of the prediction
+    /// of at most `sigma` edges; returns whether there were any.
+    fn adopt(
+        &mut self,
+        base: usize,
+        candidates: &[(usize, Vertex)],
+        bend: Bend,
+        sigma: f64,
+    ) -> bool {
+        let Self { pyramid, saddles, grids, owners, effort, .. } = self;
+        let mut adopted = false;
+        for &(index, vertex) in candidates {
+            // The nearest corner of the grid is sought among all.
+            if !effort.spend(1 + grids[base].len() / CORNERS_IN_A_LOOK) {
+                break;
+            }
+            if grids[base].contains_key(&vertex) {
+                continue;
+            }
+            let Some(grown) = belongs(&grids[base], vertex, &saddles[index], bend, sigma) else {
+                continue;
+            };
+            if !is_joined(pyramid, &grids[base], vertex, &grown) {
+                continue;
+            }
+            match owners.get(&index).copied() {
+                Some((part, _)) if part == base => {}
+                Some((part, from)) => {
+                    let turned = (grown.turn + N - grids[part][&from].turn) % N;
+                    let map = LatticeMap::taking(kind::<N>(), from, vertex, turned as i32);
+                    let is_worth =
+                        effort.spend(grids[part].len() + owners.len() / CORNERS_IN_A_LOOK);
+                    if is_worth && is_part(&grids[base], &grids[part], map, bend, sigma) {
+                        for (from, corner) in std::mem::take(&mut grids[part]) {
+                            let turn = (corner.turn + turned) % N;
+                            grids[base].insert(map.apply(from), GrownSaddle { turn, ..corner });
+                        }
+                        for owner in owners.values_mut().filter(|owner| owner.0 == part) {
+                            *owner = (base, map.apply(owner.1));
+                        }
+                        adopted = true;
                     }
-                    for owner in owners.values_mut().filter(|owner| owner.0 == part) {
-                        *owner = (base, map.apply(owner.1));
-                    }
+                }
+                None => {
+                    grids[base].insert(vertex, grown);
+                    owners.insert(index, (base, vertex));
                     adopted = true;
                 }
             }
-            None => {
-                grids[base].insert(vertex, grown);
-                owners.insert(index, (base, vertex));
-                adopted = true;
+        }
+        adopted
+    }
+
+    /// Saddle points near a vertex without a corner, with that vertex, the nearest to the grid first.
+    fn candidates(&self, base: usize, bend: Bend) -> Vec<(usize, Vertex)> {
+        let grid = &self.grids[base];
+        let Some((middle, reach_px)) = surroundings(grid) else {
+            return Vec::new();
+        };
+        let corners: Vec<DVec2> = grid.values().map(|grown| grown.saddle.position).collect();
+        let (vertices, corners): (Vec<Vertex>, _) =
+            (grid.keys().copied().collect(), Buckets::of(&corners));
+        let mut maps: BTreeMap<Vertex, Option<LocalMap>> = BTreeMap::new();
+        let mut found: Vec<(f64, usize, Vertex)> = Vec::new();
+        for (index, _) in self.places.within(middle, reach_px) {
+            let saddle = &self.saddles[index];
+            if self.owners.get(&index).is_some_and(|&(grid, _)| grid == base) {
+                continue;
+            }
+            let Some(nearest) = corners.nearest(saddle.position).map(|index| vertices[index])
+            else {
+                continue;
+            };
+            let map = maps
+                .entry(nearest)
+                .or_insert_with(|| LocalMap::about::<N>(nearest, at(grid), bend));
+            let Some(DVec2 { x: col, y: row }) = map.and_then(|map| map.steps_to(saddle.position))
+            else {
+                continue;
+            };
+            let way = kind::<N>().position(row, col);
+            let step = Vertex::new(row.round() as i32, col.round() as i32);
+            let vertex = nearest + step;
+            if way.x.hypot(way.y) <= MAX_REACH && !grid.contains_key(&vertex) {
+                found.push((way.x.hypot(way.y), index, vertex));
             }
         }
+        found.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+        found.into_iter().map(|(_, index, vertex)| (index, vertex)).collect()
     }
-    adopted
 }
 
 fn at<const N: usize>(grid: &Growing<N>) -> impl Fn(Vertex) -> Option<DVec2> + Copy {
@@ -147,47 +198,6 @@ fn at<const N: usize>(grid: &Growing<N>) -> impl Fn(Vertex) -> Option<DVec2> + C
 fn bend<const N: usize>(grid: &Growing<N>) -> Bend {
     let level = grid.values().map(|grown| grown.saddle.level).max().unwrap_or(0);
     Bend::of::<N>(grid.keys().copied(), at(grid), level)
-}
-
-/// Saddle points near a vertex without a corner, with that vertex, the nearest to the grid first.
-fn candidates<const N: usize>(
-    (saddles, places): (&[Saddle<N>], &Buckets),
-    grid: &Growing<N>,
-    owners: &Owners,
-    base: usize,
-    bend: Bend,
-) -> Vec<(usize, Vertex)> {
-    let Some((middle, reach_px)) = surroundings(grid) else {
-        return Vec::new();
-    };
-    let corners: Vec<DVec2> = grid.values().map(|grown| grown.saddle.position).collect();
-    let (vertices, corners): (Vec<Vertex>, _) =
-        (grid.keys().copied().collect(), Buckets::of(&corners));
-    let mut maps: BTreeMap<Vertex, Option<LocalMap>> = BTreeMap::new();
-    let mut found: Vec<(f64, usize, Vertex)> = Vec::new();
-    for (index, _) in places.within(middle, reach_px) {
-        let saddle = &saddles[index];
-        if owners.get(&index).is_some_and(|&(grid, _)| grid == base) {
-            continue;
-        }
-        let Some(nearest) = corners.nearest(saddle.position).map(|index| vertices[index]) else {
-            continue;
-        };
-        let map =
-            maps.entry(nearest).or_insert_with(|| LocalMap::about::<N>(nearest, at(grid), bend));
-        let Some(DVec2 { x: col, y: row }) = map.and_then(|map| map.steps_to(saddle.position))
-        else {
-            continue;
-        };
-        let way = kind::<N>().position(row, col);
-        let step = Vertex::new(row.round() as i32, col.round() as i32);
-        let vertex = nearest + step;
-        if way.x.hypot(way.y) <= MAX_REACH && !grid.contains_key(&vertex) {
-            found.push((way.x.hypot(way.y), index, vertex));
-        }
-    }
-    found.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
-    found.into_iter().map(|(_, index, vertex)| (index, vertex)).collect()
 }
 
 /// A circle (centre and radius, px) around all places that a grid predicts.
@@ -250,7 +260,11 @@ fn is_joined<const N: usize>(
         };
         let (ray, back) = (corner.ray(k), other.ray(k + N / 2));
         beside += 1;
-        clean += usize::from(is_clean(pyramid, &corner.saddle, ray, &other.saddle, back));
+        clean += usize::from(is_clean(
+            pyramid,
+            End::of(&corner.saddle, ray),
+            End::of(&other.saddle, back),
+        ));
     }
     MOST_COVERED * clean >= beside
 }

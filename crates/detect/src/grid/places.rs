@@ -70,6 +70,7 @@ impl<'a> Places<'a> {
     ) -> Vec<usize> {
         let here = self.points[index];
         let [col, row] = self.cell(here).map(|c| c as isize);
+        // Rings hold more than is wanted; a longer list would grow.
         let mut near: Vec<(f64, usize)> = Vec::with_capacity(4 * count);
         let reach = self.cols.max(self.rows) as isize;
         for ring in 0..=reach {

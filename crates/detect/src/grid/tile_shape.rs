@@ -38,8 +38,10 @@ const LEAST_PRODUCT: f64 = 0.5;
 /// But for so many deviations, as waves tell that tiles of boards and dots do not have.
 const DEVIATIONS: f64 = 3.0;
 
-/// Fewer single squares of the wrong colour than this, or than a part of the whole ones, are dirt.
+/// Fewer single squares of the wrong colour than this are dirt, however few the whole ones are.
 const LEAST_WRONG: usize = 3;
+
+/// And so are fewer than this part of the whole ones.
 const WRONG_PART: f64 = 1.0 / 16.0;
 
 /// A square of the wrong colour is at least this near to it, as a part of the way from the right one.

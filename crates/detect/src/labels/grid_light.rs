@@ -32,10 +32,13 @@ const ALONG: [f64; 3] = [0.38, 0.5, 0.62];
 /// Edges that tell the blur: more of them would tell it no better than the model of the blur is.
 const BLUR_EDGES: usize = 150;
 
-/// Deviations of the blur that are tried, px: from sharper than pixels are to half a tile, each a tenth
-/// greater than the last.
+/// Each deviation of the blur that is tried is a tenth greater than the last, so that the true one is off by 6 % at most.
 const BLUR_STEP: f64 = 1.12;
+
+/// The least of them, px: sharper than pixels and their interpolation are.
 const LEAST_BLUR_PX: f64 = 0.35;
+
+/// How many there are: the last has 6 px, half a tile.
 const BLUR_STEPS: i32 = 26;
 
 /// Every so manieth of them is tried first, then those around the best.
@@ -65,6 +68,19 @@ const SLOPE: f64 = 0.2;
 
 /// Largest curvature of a tone curve: that of gamma 2.6 between white and a black of a twentieth is 0.4.
 const MOST_CURVATURE: f64 = 0.45;
+
+/// A smaller curvature changes a share of white by less than half a thousandth, a quarter of what rounding to 8 bits does.
+const STRAIGHT: f64 = 1e-3;
+
+/// Of S = ±1 the determinant of an edge's equations is of the order of the square of the number of samples; this is one
+/// whose S are all the same.
+const NO_EDGE: f64 = 1e-6;
+
+/// Prior information on the curvature where it is not told, over what a sample half-way up an edge tells: it stays 0.
+const HELD: f64 = 1e6;
+
+/// The same where it is told: a tenth of a sample.
+const HARDLY_HELD: f64 = 0.1;
 
 /// How far from the edges tiles are plain, in the units of tile coordinates.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -198,7 +214,7 @@ impl GridLight {
             return brightness * self.clipped_share;
         }
         let (kappa, v) = (self.tone, 2.0 * brightness - 1.0);
-        if kappa.abs() < 1e-3 {
+        if kappa.abs() < STRAIGHT {
             return brightness;
         }
         // v = S + κ(1 − S²).
@@ -273,7 +289,7 @@ impl GridLight {
             v2 += s * value;
         }
         let determinant = n * s2 - s1 * s1;
-        if determinant < 1e-6 {
+        if determinant < NO_EDGE {
             return None;
         }
         let half = (n * v2 - s1 * v1) / determinant;
@@ -371,7 +387,7 @@ impl Profile {
             power += value * value;
         }
         // Sharp edges have no samples that tell the curvature, and what is cut off looks like it.
-        normal[(2, 2)] += if clipped_share < 1.0 { 1e6 } else { 0.1 };
+        normal[(2, 2)] += if clipped_share < 1.0 { HELD } else { HARDLY_HELD };
         let solution = normal.cholesky()?.solve(&right);
         let squares = (power - solution.dot(&right)).max(0.0);
         Some(ProfileFit { half_contrast: solution[1], curved: solution[2], squares })
@@ -426,6 +442,8 @@ fn clipped_share(by_direction: &[Vec<Profile>], deviation: f64) -> f64 {
 fn covariance(widths: &[([f64; 3], f64)]) -> [f64; 3] {
     /// Weight of being round, against one direction's equation.
     const ROUND: f64 = 0.01;
+    /// Least variance in any direction, over that of the sharpest edges. It stays a covariance so; the value itself is not derived.
+    const SHARPEST: f64 = 0.3;
     let mean = widths.iter().map(|w| w.1).sum::<f64>() / widths.len().max(1) as f64;
     let mut normal = Matrix3::<f64>::identity() * ROUND;
     let mut right = Vector3::new(mean, 0.0, mean) * ROUND;
@@ -437,7 +455,7 @@ fn covariance(widths: &[([f64; 3], f64)]) -> [f64; 3] {
     let solution =
         normal.try_inverse().map_or(Vector3::new(mean, 0.0, mean), |inverse| inverse * right);
     // Never sharper than the sharpest direction, so that it stays a covariance.
-    let least = widths.iter().map(|w| w.1).fold(mean, f64::min) * 0.3;
+    let least = widths.iter().map(|w| w.1).fold(mean, f64::min) * SHARPEST;
     let (half_sum, half_difference) =
         (0.5 * (solution.x + solution.z), 0.5 * (solution.x - solution.z));
     let radius = half_difference.hypot(solution.y);

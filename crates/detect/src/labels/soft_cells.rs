@@ -35,9 +35,10 @@ const DIVISIONS: usize = 3;
 /// which is represented by its middle.
 const PART_BLUR_BITS: f64 = 0.14;
 
-/// Steps by which blurs are distinguished: a seventh of their standard deviation, and a fifth in
-/// correlation.
+/// Step by which blurs are distinguished: a seventh of their standard deviation.
 const LOG_VARIANCE_STEP: f64 = 0.3;
+
+/// Step by which their correlations are: a fifth.
 const CORRELATION_STEP: f64 = 0.2;
 
 /// Standard deviation of a sample by model errors, over the contrast: positions, the shape of the
@@ -51,12 +52,34 @@ const SAMPLE_PX2: f64 = 2.25;
 /// with the same noise.
 const NOISE_WEIGHT: f64 = 1.5;
 
-/// Standard deviation of the grey levels, over the contrast, and of their slopes over a tile.
+/// Largest correlation of a blur in tile coordinates: the middle of what is rounded to 1, which no covariance has.
+const MOST_CORRELATION: f64 = 0.95;
+
+/// Squared distance, in deviations of the blur, beyond which a part of a cell does not count: e⁻⁸ of what it would in the
+/// middle.
+const FAR_SIGMAS2: f64 = 16.0;
+
+/// Least variance of a cell: with less its odds are beyond [`MOST_HALF_ODDS`] anyhow.
+const LEAST_VARIANCE: f64 = 1e-3;
+
+/// Least deviation of what a sample would show, over the contrast: a fiftieth of [`MODEL_ERROR`].
+const LEAST_SPREAD: f32 = 1e-3;
+
+/// Where less of a distribution lies above its bound, the mean is within a quarter deviation of the bound, and the error
+/// function is off by a part in a thousand of what is left.
+const LEAST_ABOVE: f32 = 1e-4;
+
+/// Standard deviation of the grey levels, over the contrast.
 const LEVEL_ERROR: f64 = 0.15;
+
+/// Standard deviation of their slopes over a tile.
 const SLOPE_ERROR: f64 = 0.2;
 
 /// Greatest half log-odds of a cell: one in two hundred is dirty on the print.
 const MOST_HALF_ODDS: f64 = 2.6;
+
+/// Unknowns beside the cells: the level and its slopes along u and v.
+const LEVELS: usize = 3;
 
 /// Rounds in which saturated or missing samples are replaced by the expectation from the others.
 const ROUNDS: usize = 6;
@@ -162,7 +185,7 @@ impl CellModel {
     /// `None` where the equations cannot be solved.
     pub fn mixing(&self, blur: TileBlur, known: &mut Mixings) -> Option<Rc<Mixing>> {
         let [uu, uv, vv] = blur.covariance;
-        // Isotropic on the print.
+        // Isotropic on the print: steps along u and v lie 60° apart there, so that uu = vv = 1/sin² 60° and uv = −cos 60° of that.
         let [puu, puv] = match self.kind {
             GridKind::Deltille => [4.0 / 3.0, -2.0 / 3.0],
             GridKind::Checker => [1.0, 0.0],
@@ -178,7 +201,8 @@ impl CellModel {
             return Some(Rc::clone(mixing));
         }
         let [uu, vv] = [key[0], key[1]].map(|k| (f64::from(k) * LOG_VARIANCE_STEP).exp());
-        let correlation = (f64::from(key[2]) * CORRELATION_STEP).clamp(-0.95, 0.95);
+        let correlation =
+            (f64::from(key[2]) * CORRELATION_STEP).clamp(-MOST_CORRELATION, MOST_CORRELATION);
         let covariance = [uu, correlation * (uu * vv).sqrt(), vv];
         let mixing = Rc::new(self.make(covariance, blur.area_px2, blur.noise)?);
         known.insert(key, Rc::clone(&mixing));
@@ -191,14 +215,14 @@ impl CellModel {
             return None;
         }
         let (n, bits) = (self.points.len(), self.bits);
-        let mut design = DMatrix::<f64>::zeros(n, bits + 3);
+        let mut design = DMatrix::<f64>::zeros(n, bits + LEVELS);
         let part_area = 1.0 / (self.parts.len() / bits) as f64 * self.cell_area();
         let gain = part_area / (std::f64::consts::TAU * determinant.sqrt());
         for (i, point) in self.points.iter().enumerate() {
             for &(bit, part) in &self.parts {
                 let DVec2 { x: du, y: dv } = (point - part) * self.width;
                 let distance2 = (vv * du * du - 2.0 * uv * du * dv + uu * dv * dv) / determinant;
-                if distance2 < 16.0 {
+                if distance2 < FAR_SIGMAS2 {
                     design[(i, bit)] += 0.5 * gain * (-0.5 * distance2).exp();
                 }
             }
@@ -214,7 +238,7 @@ impl CellModel {
         let variance = NOISE_WEIGHT * noise * noise * (SAMPLE_PX2 * samples_px2).max(1.0)
             + MODEL_ERROR * MODEL_ERROR * samples_px2.max(1.0);
         let mut normal = design.tr_mul(&design) / variance;
-        for i in 0..bits + 3 {
+        for i in 0..bits + LEVELS {
             normal[(i, i)] += 1.0;
         }
         let inverse = normal.cholesky()?.inverse();
@@ -224,7 +248,7 @@ impl CellModel {
         let middle =
             (0..n).map(|i| (white[i] + (0..bits).map(|c| design[(i, c)]).sum::<f64>()) as f32);
         let row = |c: usize| (0..n).map(|i| gain[(c, i)] as f32).collect();
-        let inverse_variance = |c: usize| (1.0 / inverse[(c, c)].max(1e-3)) as f32;
+        let inverse_variance = |c: usize| (1.0 / inverse[(c, c)].max(LEAST_VARIANCE)) as f32;
         let spread =
             half_shares.iter().map(|row| row.iter().map(|w| w * w).sum::<f32>().sqrt()).collect();
         Some(Mixing {
@@ -299,11 +323,13 @@ impl Mixing {
     }
 
     fn means(&self, off_middle: &[f32]) -> Vec<f32> {
+        /// Sums that do not wait for each other.
+        const EIGHT: usize = 8;
         let of_bit = |gain: &Vec<f32>| {
-            let mut lanes = [0.0f32; 8];
-            let (whole, rest) = (gain.chunks_exact(8), gain.len() / 8 * 8);
-            for (gain, off) in whole.zip(off_middle.chunks_exact(8)) {
-                for k in 0..8 {
+            let mut lanes = [0.0f32; EIGHT];
+            let (whole, rest) = (gain.chunks_exact(EIGHT), gain.len() / EIGHT * EIGHT);
+            for (gain, off) in whole.zip(off_middle.chunks_exact(EIGHT)) {
+                for k in 0..EIGHT {
                     lanes[k] += gain[k] * off[k];
                 }
             }
@@ -316,10 +342,10 @@ impl Mixing {
 
 /// Mean of a normal distribution with this mean and standard deviation, truncated below at `least`.
 fn mean_above(least: f32, mean: f32, deviation: f32) -> f32 {
-    let deviation = deviation.max(1e-3);
+    let deviation = deviation.max(LEAST_SPREAD);
     let at = (least - mean) / deviation;
     let above = 0.5 - 0.5 * erf_sqrt_half(at);
-    if above < 1e-4 {
+    if above < LEAST_ABOVE {
         return least;
     }
     let density = (-0.5 * at * at).exp() / std::f32::consts::TAU.sqrt();

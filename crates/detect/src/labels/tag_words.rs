@@ -84,7 +84,7 @@ impl TargetWords {
     /// drawn by the cells' frequencies.
     pub fn evidence(&self, half_odds: &[f32]) -> Vec<f32> {
         let bytes = half_odds.len().div_ceil(8);
-        // Sum of the half odds of the white cells, byte by byte.
+        // Sum of the half odds of the white cells, for each value of each byte of 8 cells.
         let mut sums = vec![[0.0f32; 256]; bytes];
         for (byte, sums) in sums.iter_mut().enumerate() {
             for value in 1..256usize {

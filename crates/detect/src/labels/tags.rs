@@ -16,9 +16,10 @@ use deltille_core::targets::{Panel, TagsIn};
 /// The contrast at the edges of a tile must be this part of that at its corners.
 const MIN_CONTRAST: f64 = 0.4;
 
-/// Samples this much brighter than the white around are no paper, in contrasts, and by so many deviations of the noise
-/// more: without these, noise would take away white cells alone.
+/// Samples this much brighter than the white around, in contrasts, and [`GLARE_NOISE`] deviations more are no paper.
 const GLARE: f64 = 0.35;
+
+/// Without these deviations of the noise, it would take away white cells alone; beyond three it seldom lies.
 const GLARE_NOISE: f64 = 3.0;
 
 /// The part of the image's full scale from which a pixel may be saturated.
@@ -29,6 +30,13 @@ const PLAIN_DEPTH: f64 = 0.2;
 
 /// The least depth, where a tag leaves no more.
 const LEAST_DEPTH: f64 = 0.06;
+
+/// Half the way over which a tile's map is differentiated, in tile coordinates: from the middle, a third of a triangle, it
+/// stays inside.
+const BESIDE: f64 = 0.25;
+
+/// Shares of white that are taken for what they are. What is farther off is no noise; how far is not derived.
+const SHARES: [f64; 2] = [-0.5, 1.5];
 
 /// The cells of a tile.
 #[derive(Clone, Debug, PartialEq)]
@@ -85,6 +93,13 @@ impl TagPlace {
 
 /// Black and white beside edges of tiles that were looked at, by their vertex and direction.
 type EdgeLevels = BTreeMap<(Vertex, usize), Option<[f64; 2]>>;
+
+/// What reading a tile leaves for the next ones of its grid.
+#[derive(Default)]
+struct Known {
+    mixings: Mixings,
+    edges: EdgeLevels,
+}
 
 /// Reads the tags of one family that lie alike in their tiles.
 #[derive(Clone, Debug)]
@@ -151,13 +166,11 @@ impl TagReader {
             .filter(|tile| tile.vertices().all(|v| grid.contains_key(&v)))
             .collect();
         let every = tiles.len().div_ceil(most.max(1)).max(1);
-        let (mut mixings, mut levels) = (Mixings::new(), BTreeMap::new());
+        let mut known = Known::default();
         let mut bits_px = Vec::new();
         let mut readings = Vec::new();
         for &tile in tiles.iter().step_by(every) {
-            if let Some((reading, bit_px)) =
-                self.read_tile(image, grid, tile, &light, (&mut mixings, &mut levels))
-            {
+            if let Some((reading, bit_px)) = self.read_tile(image, grid, tile, &light, &mut known) {
                 readings.push(reading);
                 bits_px.push(bit_px);
             }
@@ -189,10 +202,10 @@ impl TagReader {
         grid: &SaddleGrid,
         tile: Tile,
         light: &GridLight,
-        (mixings, edges): (&mut Mixings, &mut EdgeLevels),
+        known: &mut Known,
     ) -> Option<(Reading, f64)> {
         let map = TileMap::new(grid, tile, self.gap_edges)?;
-        let levels = light.levels(image, grid, tile, edges)?;
+        let levels = light.levels(image, grid, tile, &mut known.edges)?;
         let middle = self.kind.middle();
         let [_, contrast] = levels.at(middle);
         if contrast < MIN_CONTRAST * corner_contrast(image, grid, tile) {
@@ -200,10 +213,14 @@ impl TagReader {
         }
         let width = self.model.width();
         let at = |by: DVec2| map.image_from_tile(middle + by);
-        let along = [0.25 * DVec2::X, 0.25 * DVec2::Y].map(|by| (at(by) - at(-by)) / (0.5 * width));
+        let along = [DVec2::X, DVec2::Y].map(|axis| {
+            let by = BESIDE * axis;
+            (at(by) - at(-by)) / (2.0 * BESIDE * width)
+        });
         let (covariance, area_px2) = in_tile(light.blur_px2, along)?;
         let noise = light.noise;
-        let mixing = self.model.mixing(TileBlur { covariance, area_px2, noise }, mixings)?;
+        let mixing =
+            self.model.mixing(TileBlur { covariance, area_px2, noise }, &mut known.mixings)?;
         let (right, lower) = (image.width() as f64 - 1.0, image.height() as f64 - 1.0);
         // Cells of the colour around the border are 1, on inverted boards dark ones.
         let inverted = tile.is_dark() != (self.tags_in == TagsIn::Black);
@@ -220,7 +237,7 @@ impl TagReader {
             let value = f64::from(image.bilinear(x, y));
             let [dark, contrast] = levels.at(point);
             let brightness = (value - dark) / contrast;
-            let share = light.share(brightness).clamp(-0.5, 1.5) as f32;
+            let share = light.share(brightness).clamp(SHARES[0], SHARES[1]) as f32;
             let saturated = value >= full;
             samples.push(if contrast <= 0.0 || contrast.is_nan() || brightness > brightest {
                 Sample::Erased

@@ -2,7 +2,7 @@
 
 use glam::DVec2;
 
-use super::evidence::TagEvidence;
+use super::placement::labeller::TagEvidence;
 use crate::grid::saddle_grid::SaddleGrid;
 use deltille_core::detection::{Reason, ReasonKind};
 use deltille_core::lattice::GridKind;
@@ -31,6 +31,12 @@ const LEAST_BIT_BLURS: f64 = 1.0;
 /// Single tags are read where cells are so many times as long as a board of them needs.
 const TAG_FOR_TAG: f64 = 2.0;
 
+/// One pixel in so many may be darker or brighter than all that the picture shows: dead, hot, or a spark.
+const PIXELS_A_DEAD_ONE: usize = 1000;
+
+/// One pixel in so many may be steeper than the sharpest edges. The edges of a single tile of a board, 100 px long, are as many in two megapixels.
+const PIXELS_A_STEEP_ONE: usize = 5000;
+
 /// Why nothing was found in a picture with so many corners of its tiling.
 pub fn nothing_found(pyramid: &Pyramid, corners: usize) -> Reason {
     let level = &pyramid.levels()[0];
@@ -56,7 +62,7 @@ pub fn nothing_found(pyramid: &Pyramid, corners: usize) -> Reason {
 }
 
 /// Why the tags of a grid gave no labels.
-pub fn no_labels(evidence: &TagEvidence, grid: &SaddleGrid, size: (usize, usize)) -> Reason {
+pub fn no_labels(evidence: &TagEvidence, grid: &SaddleGrid, size: [usize; 2]) -> Reason {
     let corners = ("corners", grid.len() as f64);
     if evidence.is_ambiguous {
         return Reason::new(ReasonKind::Ambiguous, [corners]);
@@ -98,7 +104,7 @@ pub fn no_labels(evidence: &TagEvidence, grid: &SaddleGrid, size: (usize, usize)
 }
 
 /// Why a grid is not labelled by an outline of so many corners.
-pub fn no_outline(grid: &SaddleGrid, expected: usize, size: (usize, usize)) -> Reason {
+pub fn no_outline(grid: &SaddleGrid, expected: usize, size: [usize; 2]) -> Reason {
     let figures = [("corners", grid.len() as f64), ("expected", expected as f64)];
     let kind = if grid.len() < expected && ends_at_border(grid, size) {
         ReasonKind::CutByBorder
@@ -109,7 +115,7 @@ pub fn no_outline(grid: &SaddleGrid, expected: usize, size: (usize, usize)) -> R
 }
 
 /// Whether some corner lies less than an edge's length from the border of the picture.
-fn ends_at_border(grid: &SaddleGrid, (width, height): (usize, usize)) -> bool {
+fn ends_at_border(grid: &SaddleGrid, [width, height]: [usize; 2]) -> bool {
     let Some(edge_px) = edge_px(grid) else {
         return false;
     };
@@ -131,13 +137,13 @@ pub fn edge_px(grid: &SaddleGrid) -> Option<f64> {
     median(lengths.collect())
 }
 
-/// Darkest and brightest pixels, but for one in a thousand.
+/// Darkest and brightest pixels, but for one in [`PIXELS_A_DEAD_ONE`].
 fn range(level: &Gray<i16>) -> [f64; 2] {
     let mut counts = vec![0usize; PYRAMID_FULL_SCALE as usize + 1];
     for &value in level.pixels() {
         counts[(value.max(0) as usize).min(PYRAMID_FULL_SCALE as usize)] += 1;
     }
-    let few = level.pixels().len() / 1000;
+    let few = level.pixels().len() / PIXELS_A_DEAD_ONE;
     let reaches = |sum: &mut usize, value: usize| {
         *sum += counts[value];
         *sum > few
@@ -160,7 +166,7 @@ fn sharpest_edge_px(level: &Gray<i16>, contrast: f64) -> f64 {
     });
     let mut counts = vec![0usize; PYRAMID_FULL_SCALE as usize + 1];
     steps.for_each(|step| counts[(step as usize).min(PYRAMID_FULL_SCALE as usize)] += 1);
-    let few = level.pixels().len() / 5000;
+    let few = level.pixels().len() / PIXELS_A_STEEP_ONE;
     let mut sum = 0;
     let steepest = (0..counts.len()).rev().find(|&step| {
         sum += counts[step];

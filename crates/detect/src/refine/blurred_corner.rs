@@ -24,8 +24,7 @@ use std::f64::consts::PI;
 /// √(2/π): the slope of erf(h/√2) at 0.
 const SLOPE: f32 = 0.797_884_6;
 
-/// Nodes and weights of Gauss–Legendre rules on −1 … 1. Six points are enough for 10⁻⁶ up to |ρ| = 0.9, edges 25°
-/// apart, and three for 2·10⁻⁵ up to [`FEW_NODES_RHO`].
+/// Nodes and weights of the Gauss–Legendre rule of six points on −1 … 1, enough for 10⁻⁶ up to |ρ| = 0.9, edges 25° apart.
 const RULE_OF_SIX: [(f64, f64); 6] = [
     (0.238_619_186, 0.467_913_935),
     (-0.238_619_186, 0.467_913_935),
@@ -34,6 +33,8 @@ const RULE_OF_SIX: [(f64, f64); 6] = [
     (0.932_469_514, 0.171_324_492),
     (-0.932_469_514, 0.171_324_492),
 ];
+
+/// Of three points, enough for 2·10⁻⁵ up to [`FEW_NODES_RHO`].
 const RULE_OF_THREE: [(f64, f64); 3] =
     [(0.0, 0.888_888_889), (0.774_596_669, 0.555_555_556), (-0.774_596_669, 0.555_555_556)];
 
@@ -134,6 +135,7 @@ impl Overlap {
     /// normals.
     pub fn between([a, b, c]: [f64; 3], [xx, xy, yy]: [f64; 3], sign: f64) -> Self {
         let [x, y] = [-c / a, -c / b];
+        // The covariance of a triangle with the sides x and y along the axes: x²/18, −xy/36, y²/18.
         let [xx, xy, yy] = [xx + x * x / 18.0, xy - x * y / 36.0, yy + y * y / 18.0];
         let determinant = xx * yy - xy * xy;
         let area = 0.5 * (x * y).abs();
@@ -283,6 +285,7 @@ pub const PLACES_OF_FOUR: f64 = 15.0 / 16.0;
 impl<P: Pattern<2>> Pattern<2> for SweptChecker<P> {
     #[inline(always)]
     fn at(&self, h: [f32; 2]) -> Shade<2> {
+        // The middles of four equal parts.
         let (outer, inner) = (self.pair(h, 0.75), self.pair(h, 0.25));
         Shade {
             f: 0.5 * (outer.f + inner.f),
@@ -417,7 +420,7 @@ fn exp_negative(x: f32) -> f32 {
     let y = (x * LOG2_E).max(-60.0);
     let rounded = y + ROUND;
     let fraction = y - (rounded - ROUND);
-    // Taylor's series of 2^x up to x⁶, |x| ≤ 1/2.
+    /// Taylor's series of 2^x, |x| ≤ 1/2, from x⁶ down: (ln 2)^k / k!.
     const SERIES: [f32; 6] =
         [0.000_154_035_3, 0.001_333_355_8, 0.009_618_129, 0.055_504_11, 0.240_226_5, LN_2];
     let mut mantissa = 0.0;
@@ -425,6 +428,7 @@ fn exp_negative(x: f32) -> f32 {
         mantissa = (mantissa + coefficient) * fraction;
     }
     mantissa += 1.0;
+    // 2^x of the whole part: its bits, 127 added, above the 23 of the mantissa.
     let exponent = rounded.to_bits().wrapping_sub(ROUND.to_bits()).wrapping_add(127) << 23;
     mantissa * f32::from_bits(exponent)
 }

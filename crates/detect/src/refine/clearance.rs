@@ -364,6 +364,7 @@ fn edges(
 /// The sum of the distances of all neighbours from the line along one of them, in edges.
 fn rows_apart(kind: GridKind) -> f64 {
     match kind {
+        // Four of six lie beside the line, by the height of a triangle.
         GridKind::Deltille => 4.0 * 3f64.sqrt() / 2.0,
         GridKind::Checker => 2.0,
     }

@@ -10,7 +10,8 @@ use std::f64::consts::PI;
 use glam::DVec2;
 use multiversion::multiversion;
 
-use super::corner_model::{Corner, Window};
+use super::model::corner::Corner;
+use super::model::window::Window;
 use crate::lanes;
 use crate::lanes::LANES;
 use deltille_core::raster::ImageView;
@@ -27,6 +28,15 @@ const MIN_START_RAD: f64 = 15.0 * PI / 180.0;
 
 /// Circles, as parts of the window's radius.
 const CIRCLES: [f64; 3] = [0.5, 0.7, 0.9];
+
+/// The mean of them.
+const MEAN_CIRCLE: f64 = CIRCLES[1];
+
+/// Least blur of a start, px. The fit finds the blur anew; the value is not derived.
+const MIN_START_BLUR_PX: f64 = 0.6;
+
+/// Largest blur of a start, as a part of the window's radius: of a larger one the window shows the middle alone.
+const MAX_START_BLUR: f64 = 0.5;
 
 /// The start of a corner whose edges have these directions, rising within a half-turn, under a blur of `blur_px`,
 /// from the pixels of a window; `None` when it shows one side of the edges alone.
@@ -152,14 +162,14 @@ pub fn start<const K: usize>(
         angles[k] += lack / 2.0;
     }
     // The slope of erf(h/√2s) in its middle is √(2/π)/s; the profile's step is an arc.
-    let arc = 0.7 * radius_px * PI / DIRECTIONS as f64;
+    let arc = MEAN_CIRCLE * radius_px * PI / DIRECTIONS as f64;
     let steepness = slope / (K as f64 * signed.abs());
     let blur = (2.0 / PI).sqrt() * arc / steepness;
     // f is +1 between the first two of three edges, −1 between two.
     let amplitude = if odd { signed } else { -signed };
     (amplitude.abs() > f64::EPSILON).then_some(Corner {
         position,
-        blur_px: blur.clamp(0.6, 0.5 * radius_px),
+        blur_px: blur.clamp(MIN_START_BLUR_PX, MAX_START_BLUR * radius_px),
         amplitude,
         level: if odd { mean } else { middle },
         slope: DVec2::ZERO,

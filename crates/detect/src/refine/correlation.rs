@@ -47,6 +47,9 @@ const WIDE: f64 = 0.05;
 /// six gives 36.
 const FACTORS: [f64; 2] = [0.02, 40.0];
 
+/// Least part of a pixel's noise that a fit leaves in its residual. What a fit follows more closely has a residual that tells nothing of its noise; the bound itself is not derived.
+const LEAST_LEFT: f32 = 0.1;
+
 /// Corners from which correlations are told; the sums of ten vary by some per cent.
 pub const CORNERS: usize = 10;
 
@@ -170,7 +173,7 @@ fn uneven(corners: &[Part]) -> f64 {
     let (mut seen, mut white) = (0.0, 0.0);
     for corner in corners {
         for i in 0..corner.residuals.len() {
-            let rest = (1.0 - corner.diagonal[i]).max(0.1);
+            let rest = (1.0 - corner.diagonal[i]).max(LEAST_LEFT);
             let square = f64::from(corner.residuals[i].powi(2) / rest);
             let influence: f32 = corner.on_position.iter().map(|c| c[i] * c[i]).sum();
             seen += f64::from(influence) * square / corner.noise.powi(2);

@@ -7,10 +7,13 @@ use deltille_core::detection::{Curve, Piece, TONE_PARAMS, Tone, ToneEstimate};
 
 /// The number of parameters: three of the tone curve, two of the astigmatism, the halo, and the ink.
 pub(super) const PARAMS: usize = TONE_PARAMS + 4;
+/// The place of the halo among them.
 pub(super) const HALO: usize = PARAMS - 2;
+/// The place of the ink.
 pub(super) const INK: usize = PARAMS - 1;
 
-/// Step of difference quotients.
+/// Step of difference quotients by a parameter of the tone curve, whose terms have seven digits: some four are left of the
+/// difference.
 pub(super) const STEP: f64 = 0.01;
 
 /// Width of a halo over that of the blur: masks of 1 to 2 px on pictures of 0.7 to 1 px of blur.
@@ -155,6 +158,8 @@ impl Optics {
         if !is_swept {
             return still;
         }
+        // A box of half the length has a third of its square as variance, which is what the blur along the way has more than
+        // across it: 2 · length, as M has the trace 2.
         let (far, turn) = ((6.0 * length).sqrt(), e2.atan2(e1) / 2.0);
         let way = [far * turn.cos(), far * turn.sin()];
         let square = 2.0 * length * length;
@@ -231,6 +236,22 @@ impl Optics {
             halo: [halo, self.halo[1]],
             ink,
             ..self.clone()
+        }
+    }
+
+    /// κ₀ and κ₁ between black and white.
+    pub(super) fn kappas(&self, [black, white]: [f64; 2]) -> [f64; 2] {
+        let piece = self.piece((white + black) / 2.0, (white - black) / 2.0);
+        [0, 1].map(|i| f64::from(piece.terms[i]))
+    }
+
+    /// The derivative of κ₀ by a parameter.
+    pub(super) fn kappa_slope(&self, greys: [f64; 2], parameter: usize) -> f64 {
+        match parameter {
+            0..TONE_PARAMS => {
+                (self.moved(parameter).kappas(greys)[0] - self.kappas(greys)[0]) / STEP
+            }
+            _ => 0.0,
         }
     }
 }

@@ -14,18 +14,23 @@ use glam::DVec2;
 use rayon::prelude::*;
 
 use super::clearance::{Surroundings, TagAreas, crossing, surroundings, surroundings_of};
-use super::corner_model::{CornerFitter, MAX_WAY_PX};
+use super::joint_fit::Sample;
+use super::model::fitter::{CornerFitter, MAX_WAY_PX};
+use super::model::window::Patch;
 use super::optics::Optics;
-use super::refiner::{MIN_MODEL_RADIUS, MIN_PIXELS, ModelFit, Refined, Refinement, Refiner, Room};
-use super::shared_optics::{REACH_PX, REACH_SIGMAS, SAMPLES, Sample};
+use super::refiner::{
+    MIN_MODEL_RADIUS, MIN_PIXELS, ModelFit, Refined, Refinement, Refiner, Room, Sharpness,
+};
+use super::shared_optics::{REACH_PX, REACH_SIGMAS, SAMPLES};
 use deltille_core::detection::{Grid, GridCorner};
 use deltille_core::lattice::Vertex;
 use deltille_core::raster::{Gray, ImageView, Pyramid};
 use deltille_core::statistics::median;
 
-/// Number of corners from which the blur is estimated, those with the most room of [`LOOKED_AT`]
-/// times as many, from all over the grid.
+/// Number of corners from which the blur is estimated, those with the most room.
 const BLUR_CORNERS: usize = 15;
+
+/// Of so many times as many, from all over the grid: among four some lie clear of tags and of the rim.
 const LOOKED_AT: usize = 4;
 
 /// Blur that is assumed before it is estimated, px: that of a good photograph.
@@ -68,16 +73,27 @@ const WORST_SIGMA_PX: f64 = 3.0;
 /// A window is followed by one that is smaller by this factor.
 const NEXT_WINDOW: f64 = 0.7;
 
+/// A level of a picture's pyramid, or the picture itself in place of the finest one.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Level<'a> {
+    /// What is seen on it.
+    pub image: ImageView<'a>,
+    /// How many finer levels there are.
+    pub number: usize,
+    /// The coarser levels, finest first.
+    pub coarser: &'a [Gray<i16>],
+}
+
 impl Refiner {
     /// The blur of each grid in px, where the model can tell it.
     pub(crate) fn blurs(
         &self,
         fitter: &mut CornerFitter,
-        images: (ImageView, &[Gray<i16>]),
+        level: Level,
         grids: &[Grid],
         tags: &TagAreas,
     ) -> Vec<Option<f64>> {
-        grids.iter().map(|grid| self.blur_of_grid(fitter, images, grid, tags)).collect()
+        grids.iter().map(|grid| self.blur_of_grid(fitter, level, grid, tags)).collect()
     }
 
     /// The optics that the grids of a picture share, given their blurs, as one level of the pyramid
@@ -85,15 +101,16 @@ impl Refiner {
     pub(crate) fn optics(
         &self,
         fitter: &mut CornerFitter,
-        (image, level): (ImageView, usize),
-        (grids, blurs): (&[Grid], &[Option<f64>]),
+        Level { image, number, .. }: Level,
+        grids: &[Grid],
+        blurs: &[Option<f64>],
         tags: &TagAreas,
     ) -> Optics {
         let mut known = self.known.clone();
         if self.method() == Refinement::Polynomial {
             return known;
         }
-        if level > 0 {
+        if number > 0 {
             // The blur of an enlarged picture is no Gaussian, which ink would explain.
             known = known.with_ink_as_known();
         }
@@ -118,16 +135,13 @@ impl Refiner {
         let count = places.len();
         let taken = (0..count.min(SAMPLES)).map(|i| &places[i * count / SAMPLES.min(count)]);
         let samples = taken.filter_map(|(_, _, blur_px, corner, around)| {
-            let room = self.near(around, *blur_px, &self.known);
+            let as_known = Sharpness { blur_px: *blur_px, optics: &self.known };
+            let room = self.near(around, as_known);
             let place = corner.position();
             let fit = self.model(fitter, image, place, room, None)?;
             let window = self.window(image, place, room).into_owned();
-            Some(Sample {
-                window,
-                centre: place.round(),
-                corner: fit.corner,
-                residual: fit.residual,
-            })
+            let patch = Patch { window, centre: place.round() };
+            Some(Sample { patch, corner: fit.corner, residual: fit.residual })
         });
         let samples = samples.collect();
         self.joint_optics(fitter, image, samples, &known)
@@ -141,15 +155,16 @@ impl Refiner {
         image: ImageView,
         grid: &mut Grid,
         tags: &TagAreas,
-        (optics, blur_px): (&Optics, Option<f64>),
+        optics: &Optics,
+        blur_px: Option<f64>,
     ) {
-        let known_px = blur_px.unwrap_or(USUAL_BLUR_PX);
+        let sharpness = Sharpness { blur_px: blur_px.unwrap_or(USUAL_BLUR_PX), optics };
         let mut around = surroundings(grid, tags, 1.0);
-        let mut refined = self.refine_each(image, grid, &around, (known_px, optics));
+        let mut refined = self.refine_each(image, grid, &around, sharpness);
         let displaced = self.put_back(grid, &refined);
         if displaced.contains(&true) {
             around = surroundings(grid, tags, 1.0);
-            refined = self.refine_each(image, grid, &around, (known_px, optics));
+            refined = self.refine_each(image, grid, &around, sharpness);
         }
         let residuals: Vec<f64> =
             refined.iter().filter_map(|(_, fit)| Some((*fit)?.residual)).collect();
@@ -162,7 +177,7 @@ impl Refiner {
             if displaced[i] && fit.is_none() {
                 continue;
             }
-            let room = self.whole(&around[i], known_px, optics);
+            let room = self.whole(&around[i], sharpness);
             let clean = fit.is_some_and(|fit| fit.residual <= limit);
             let modelled =
                 || self.method() == Refinement::Model && self.has_room(image, corner, room);
@@ -180,7 +195,7 @@ impl Refiner {
             }
         }
         grid.corners = kept;
-        self.follow_bends(image, grid, &fits, limit, (tags, known_px, optics));
+        self.follow_bends(image, grid, tags, &fits, limit, sharpness);
     }
 
     /// Fits the corners again with the curvature of the edges, which follows from their positions;
@@ -189,14 +204,15 @@ impl Refiner {
         &self,
         image: ImageView,
         grid: &mut Grid,
+        tags: &TagAreas,
         fits: &[Option<ModelFit>],
         limit: f64,
-        (tags, blur_px, optics): (&TagAreas, f64, &Optics),
+        sharpness: Sharpness,
     ) {
         let around = surroundings(grid, tags, 1.0);
         let fits = each(fits.len(), |fitter, i| {
             let fit = fits[i].as_ref()?;
-            let room = self.whole(&around[i], blur_px, optics);
+            let room = self.whole(&around[i], sharpness);
             let bent = self.model(fitter, image, fit.position(), room, Some(fit));
             bent.filter(|fit| fit.residual <= limit).or(Some(*fit))
         });
@@ -234,10 +250,10 @@ impl Refiner {
         image: ImageView,
         grid: &Grid,
         around: &[Surroundings],
-        (blur_px, optics): (f64, &Optics),
+        sharpness: Sharpness,
     ) -> Vec<(Refined, Option<ModelFit>)> {
         each(grid.corners.len(), |fitter, i| {
-            let room = self.near(&around[i], blur_px, optics);
+            let room = self.near(&around[i], sharpness);
             self.refine_within(fitter, image, grid.corners[i].position(), room)
         })
     }
@@ -260,21 +276,23 @@ impl Refiner {
     }
 
     /// All of the clear area around a corner, in the largest window.
-    fn whole<'a>(&self, around: &'a Surroundings, blur_px: f64, optics: &'a Optics) -> Room<'a> {
+    fn whole<'a>(&self, around: &'a Surroundings, sharpness: Sharpness<'a>) -> Room<'a> {
+        let Sharpness { blur_px, optics } = sharpness;
         Room { around, blur_px, reach_px: self.largest_radius(), optics }
     }
 
     /// The immediate surroundings of a corner, from which the edges are initialised.
-    fn near<'a>(&self, around: &'a Surroundings, blur_px: f64, optics: &'a Optics) -> Room<'a> {
-        let reach_px = REACH_PX.max(REACH_SIGMAS * blur_px).round().min(self.largest_radius());
-        Room { reach_px, ..self.whole(around, blur_px, optics) }
+    fn near<'a>(&self, around: &'a Surroundings, sharpness: Sharpness<'a>) -> Room<'a> {
+        let reach_px = REACH_PX.max(REACH_SIGMAS * sharpness.blur_px);
+        let reach_px = reach_px.round().min(self.largest_radius());
+        Room { reach_px, ..self.whole(around, sharpness) }
     }
 
     /// The blur of a grid, px: as the finest level of the pyramid shows it that shows enough of it.
     fn blur_of_grid(
         &self,
         fitter: &mut CornerFitter,
-        (image, levels): (ImageView, &[Gray<i16>]),
+        level: Level,
         grid: &Grid,
         tags: &TagAreas,
     ) -> Option<f64> {
@@ -282,8 +300,8 @@ impl Refiner {
         let plain = TagAreas::default();
         let shown = if grid.tags.is_empty() { &plain } else { tags };
         let most_px = MAX_BLUR * self.largest_radius();
-        let mut known = self.blur(fitter, image, 0, grid, shown);
-        for (n, level) in levels.iter().enumerate().skip(1) {
+        let mut known = self.blur(fitter, level.image, 0, grid, shown);
+        for (n, level) in (1..).zip(level.coarser) {
             if known.is_some_and(|blur_px| blur_px <= most_px * f64::from(1u32 << (n - 1))) {
                 break;
             }

@@ -1,6 +1,6 @@
 //! The last word on a corner's position, from the raw pixels.
 //!
-//! The paper's polynomial walks to the corner; the model ([`super::corner_model`]) starts there
+//! The paper's polynomial walks to the corner; the model ([`super::model`]) starts there
 //! and adds a covariance. Where the model does not hold, the polynomial's result stays.
 //!
 //! ```
@@ -21,10 +21,13 @@ use std::borrow::Cow;
 use glam::DVec2;
 
 use super::clearance::{Edge, NOTHING, Surroundings};
-use super::corner_model::{Accuracy, Corner, CornerFitter, Fitted, MAX_RADIUS, Window};
 use super::corner_start::{start, start_along};
+use super::joint_fit::Sample;
+use super::model::corner::Corner;
+use super::model::fitter::{Accuracy, CornerFitter, Fitted};
+use super::model::window::{MAX_RADIUS, Patch, Window};
 use super::optics::Optics;
-use super::shared_optics::{SAMPLES, Sample};
+use super::shared_optics::SAMPLES;
 use crate::corners::polynomial::Polynomial;
 use deltille_core::detection::Tone;
 use deltille_core::lattice::GridKind;
@@ -39,6 +42,9 @@ pub(crate) const MIN_PIXELS: usize = 30;
 /// Half the side of the square around a corner that must be clear for the polynomial, px: a third of
 /// what its usual window reads, where nearly all of its weight lies.
 const MIN_POLYNOMIAL_CLEAR_PX: f64 = 2.0;
+
+/// Smallest side of a window, px: what the smallest polynomial reads, 4r + 1 with r = 2.
+const MIN_WINDOW_PX: usize = 9;
 
 /// Largest side of a window, px.
 pub const MAX_WINDOW_PX: usize = 2 * MAX_RADIUS + 1;
@@ -119,6 +125,15 @@ impl From<ModelFit> for Refined {
     }
 }
 
+/// How a picture shows the corners of a grid.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Sharpness<'a> {
+    /// Standard deviation of the blur, px.
+    pub blur_px: f64,
+    /// What all corners of the picture share.
+    pub optics: &'a Optics,
+}
+
 /// What is known of the surroundings of a corner.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Room<'a> {
@@ -155,8 +170,8 @@ impl Room<'_> {
     }
 }
 
-/// The window, what the model found in it, and the pixel in its middle.
-type Fit = (Window, ModelFit, DVec2);
+/// What the model found, and the pixels that it was fitted to.
+type Fit = (Patch, ModelFit);
 
 /// Refines corners of one kind.
 #[derive(Clone, Debug)]
@@ -175,7 +190,7 @@ impl Refiner {
     /// A refiner that reads at most `window_px` × `window_px` pixels, an odd number from 9 to
     /// [`MAX_WINDOW_PX`]; the polynomial reads 4r + 1 pixels for a whole r, the largest that fits.
     pub fn new(kind: GridKind, method: Refinement, window_px: usize) -> Self {
-        let window_px = window_px.clamp(9, MAX_WINDOW_PX);
+        let window_px = window_px.clamp(MIN_WINDOW_PX, MAX_WINDOW_PX);
         Self::with_radii(kind, method, (window_px - 1) / 4, (window_px - 1) / 2)
     }
 
@@ -242,12 +257,7 @@ impl Refiner {
         let every = first.len().div_ceil(SAMPLES).max(1);
         let samples: Vec<Sample> = samples
             .step_by(every)
-            .map(|(window, fit, centre)| Sample {
-                window,
-                centre,
-                corner: fit.corner,
-                residual: fit.residual,
-            })
+            .map(|(patch, fit)| Sample { patch, corner: fit.corner, residual: fit.residual })
             .collect();
         let optics = self.joint_optics(&mut fitter, image, samples, &self.known);
         let again = |(i, (refined, fit)): (usize, (Refined, Option<_>))| match fit {
@@ -285,7 +295,10 @@ impl Refiner {
             Polynomial::Quadric(_) => self.alone::<2>(fitter, image, position, optics),
         };
         match (self.method == Refinement::Model).then(model).flatten() {
-            Some((window, fit)) => (fit.into(), Some((window.clone(), fit, position.round()))),
+            Some((window, fit)) => {
+                let patch = Patch { window: window.clone(), centre: position.round() };
+                (fit.into(), Some((patch, fit)))
+            }
             None => (self.without_model(start, found), None),
         }
     }
@@ -338,7 +351,7 @@ impl Refiner {
         let reach = distance_to_rim(image, position);
         let window = self.windows.iter().rev().find(|w| w.radius() as f64 <= reach)?;
         let first = start::<K>(image, position, window.radius())?;
-        Some((window, fitter.fit(image, window, &first, (optics, Accuracy::Full))?.into()))
+        Some((window, fitter.fit(image, window, &first, optics, Accuracy::Full)?.into()))
     }
 
     /// The model of a corner of a grid, in all of its room that is clear and lies in the image, with
@@ -383,8 +396,8 @@ impl Refiner {
         let first = Corner { bends, across_px, ..first };
         // What a picture has in common may not be common to its rim.
         let fit = fitter
-            .fit(image, window, &first, (room.optics, accuracy))
-            .or_else(|| fitter.fit(image, window, &first, (&self.known, accuracy)))?;
+            .fit(image, window, &first, room.optics, accuracy)
+            .or_else(|| fitter.fit(image, window, &first, &self.known, accuracy))?;
         Some(fit.into())
     }
 

@@ -76,7 +76,7 @@ pub fn advice(report: &Report, surveys: &[Survey]) -> Vec<Advice> {
         let mut add = |weight, text: String| {
             found.push(Advice { weight, text: of_camera(report, camera, text) });
         };
-        views(report, (index, camera), survey, &mut add);
+        views(report, index, camera, survey, &mut add);
         coverage(report, camera, survey, &mut add);
         told(report, &mut add, Topic::Lens(index));
         superfluous(camera, &mut add);
@@ -187,7 +187,8 @@ fn told(report: &Report, add: &mut impl FnMut(Weight, String), topic: Topic) {
 
 fn views(
     report: &Report,
-    (index, camera): (usize, &CameraEstimate),
+    index: usize,
+    camera: &CameraEstimate,
     survey: &Survey,
     add: &mut impl FnMut(Weight, String),
 ) {

@@ -21,8 +21,8 @@ pub fn white_outlines(cells: &TagCells, word: u64) -> Vec<Vec<Vertex>> {
     let mut edges = boundary_edges(cells.kind(), white_cells(cells, word));
     let mut loops = Vec::new();
     while let Some((&start, directions)) = edges.first_key_value() {
-        let first = (start, directions[0]);
-        trace(cells.kind(), &mut edges, first, &mut loops);
+        let heading = directions[0];
+        trace(cells.kind(), &mut edges, start, heading, &mut loops);
     }
     loops
 }
@@ -133,16 +133,17 @@ fn remove(edges: &mut BTreeMap<Vertex, Vec<usize>>, from: Vertex, direction: usi
     true
 }
 
-/// Follows an outline from its first step, turning left as sharply as possible at every vertex,
+/// Follows an outline from where it starts with a heading, turning left as sharply as possible at every vertex,
 /// which keeps to the same white area where several meet. When the walk reaches a vertex for the
 /// second time, the part in between is cut off as a loop of its own.
 fn trace(
     kind: GridKind,
     edges: &mut BTreeMap<Vertex, Vec<usize>>,
-    (start, first): (Vertex, usize),
+    start: Vertex,
+    heading: usize,
     loops: &mut Vec<Vec<Vertex>>,
 ) {
-    let mut steps = vec![(start, first)];
+    let mut steps = vec![(start, heading)];
     while let Some(&(from, heading)) = steps.last() {
         remove(edges, from, heading);
         let at = from + kind.steps()[heading];

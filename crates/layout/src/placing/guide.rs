@@ -72,7 +72,8 @@ const BOARD_FROM: DVec3 = DVec3::new(-0.3, 0.4, 0.85);
 /// The page for a target that was laid out on `paper`.
 pub(crate) fn sheet(
     title: &str,
-    (target, sheets): (&Target, &[SheetLayout]),
+    target: &Target,
+    sheets: &[SheetLayout],
     paper: &PaperSpec,
 ) -> Result<SheetLayout, TargetError> {
     let paper = PaperSpec {
@@ -97,7 +98,7 @@ pub(crate) fn sheet(
     sheet.placements.clear();
     let [left, lower, right, upper] = arrangement.clear_mm();
     let (least, most) = (DVec2::new(left, lower + BLANK_MM), DVec2::new(right - BLANK_MM, upper));
-    Ok(Page { sheet, least, most }.filled((target, sheets), &paper))
+    Ok(Page { sheet, least, most }.filled(target, sheets, &paper))
 }
 
 /// The paper itself where it is printed at a desk, else an A4.
@@ -133,16 +134,12 @@ struct Page {
 }
 
 impl Page {
-    fn filled(
-        mut self,
-        (target, sheets): (&Target, &[SheetLayout]),
-        paper: &PaperSpec,
-    ) -> SheetLayout {
+    fn filled(mut self, target: &Target, sheets: &[SheetLayout], paper: &PaperSpec) -> SheetLayout {
         self.most.y -= NAME_CAP_MM;
         self.text(target.name.to_string(), DVec2::new(self.least.x, self.most.y), NAME_CAP_MM);
         self.most.y -= BLANK_MM;
         self.ruler();
-        let steps = self.wrapped(&steps((target, sheets), paper));
+        let steps = self.wrapped(&steps(target, sheets, paper));
         let room = self.most.y - self.least.y;
         let height = (room - height(&steps) - BLANK_MM)
             .clamp(PICTURE_SHARE.0 * room, PICTURE_SHARE.1 * room);
@@ -450,7 +447,7 @@ fn tile_lines(panel: &Panel) -> Vec<[DVec2; 2]> {
 }
 
 /// What to do with the sheets of a target.
-fn steps((target, sheets): (&Target, &[SheetLayout]), paper: &PaperSpec) -> Vec<String> {
+fn steps(target: &Target, sheets: &[SheetLayout], paper: &PaperSpec) -> Vec<String> {
     let name = &target.name;
     let mut steps = vec![
         "Print at 100 %, without \"fit to page\", on matt paper. Measure the lines of stated length on each sheet, \
@@ -580,7 +577,7 @@ mod tests {
 
     fn guide(spec: impl Into<TargetSpec>) -> SheetLayout {
         let target = Printing::new("target", spec).unwrap();
-        sheet("target", (&target.target, &target.sheets), &PaperSpec::default()).unwrap()
+        sheet("target", &target.target, &target.sheets, &PaperSpec::default()).unwrap()
     }
 
     /// Of an icosahedron that hides nothing but its own back, every edge of a face towards the eye is seen, whole, and

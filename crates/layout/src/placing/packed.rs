@@ -136,7 +136,8 @@ pub(crate) fn sheets(
         if count > 1 {
             words += &format!(" · page {} of {count}", index + 1);
         }
-        sheet(&cell, grid, &arrangement, (panels, spec, family, note), words)
+        let boards = Boards { panels, spec, family, note };
+        sheet(&cell, grid, &arrangement, &boards, words)
     });
     Ok(sheets.collect())
 }
@@ -183,12 +184,21 @@ fn arrange(
     Ok(paper.sizes().iter().find_map(on_size))
 }
 
+/// The boards of a sheet.
+struct Boards<'a> {
+    panels: &'a [Panel],
+    spec: &'a BoardSpec,
+    family: Option<&'a FamilyRef>,
+    /// What stands below each.
+    note: Option<&'a str>,
+}
+
 /// One sheet: boards from the upper left, row by row, each with its logo, and the lines between them.
 fn sheet(
     cell: &Cell,
     [columns, rows]: [usize; 2],
     arrangement: &Arrangement,
-    (panels, spec, family, note): (&[Panel], &BoardSpec, Option<&FamilyRef>, Option<&str>),
+    &Boards { panels, spec, family, note }: &Boards,
     words: String,
 ) -> SheetLayout {
     let size = cell.size;

@@ -140,7 +140,8 @@ impl Poster {
     pub fn check(
         &self,
         what: &str,
-        (setting, edge_mm): (Setting, f64),
+        setting: Setting,
+        edge_mm: f64,
         instead: Option<Setting>,
         paper: &PaperSpec,
     ) -> Result<(), TargetError> {
@@ -203,13 +204,14 @@ impl Poster {
     /// Adds crosses to a sheet that holds everything else, and its pages.
     ///
     /// `areas` are convex polygons of the sheet that no cross may meet, beside its lines and texts; the `overview` is drawn
-    /// small on every page, whose number stands in large type after what it is `of`; the `words` are set from a place on, in a room of some width.
+    /// small on every page, which has this `label` in small type, and its number in large type after what it is `of`; the `words` are set from a place on, in a room of some width.
     pub fn add_pages(
         &self,
         sheet: &mut SheetLayout,
         areas: Vec<Vec<DVec2>>,
         overview: &[SheetLine],
-        (label, of): (&str, &str),
+        label: &str,
+        of: &str,
         words: impl Fn(DVec2, f64) -> Vec<SheetText>,
     ) {
         let mut obstacles = obstacles(sheet, areas);

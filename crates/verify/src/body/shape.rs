@@ -116,7 +116,7 @@ pub(super) fn compare(
     } else {
         findings = check_surface(facets);
         let wrong_seats = skeleton.map_or_else(Vec::new, |(skeleton, spec)| {
-            check_seats(facets, &solid, (&skeleton, spec), &mut body)
+            check_seats(facets, &solid, &skeleton, spec, &mut body)
         });
         // Where a seat is wrong, its triangles would only repeat that.
         if wrong_seats.is_empty() {
@@ -203,7 +203,8 @@ fn check_triangles(
 fn check_seats(
     facets: &[Facet],
     solid: &Polyhedron,
-    (skeleton, spec): (&Skeleton, &SkeletonSpec),
+    skeleton: &Skeleton,
+    spec: &SkeletonSpec,
     body: &mut BodyVerdict,
 ) -> Vec<Finding> {
     let (thickness, through) = (spec.panel_thickness_mm, spec.panel_thickness_mm + spec.wall_mm);

@@ -34,7 +34,7 @@ pub(super) fn check_face(verifier: &Verifier, model: &Model, panel: &Panel) -> F
                 let seen = view.camera_from_target.apply(panel.pose.target_from_panel(place));
                 view.camera.project(seen)
             });
-            detect_alone(panel, (image.clone(), u8::MAX), &outline.collect::<Vec<_>>())
+            detect_alone(panel, image.clone(), u8::MAX, &outline.collect::<Vec<_>>())
         }
         false => verifier.detector.detect(&image, "face"),
     };

@@ -7,7 +7,7 @@ use glam::{DMat3, DVec2, DVec3};
 
 use crate::finding::fold::FoldFinding;
 use crate::net::motion::{FOLD_TOLERANCE_MM, SpaceFromPage};
-use crate::net::printed_net::Net;
+use crate::net::printed_net::{Net, Side};
 
 /// Most roots tried where the first leads to a contradiction: it may be the misprinted face itself.
 const MOST_ROOTS: usize = 32;
@@ -45,7 +45,7 @@ impl Net {
             let mut next = 0;
             while let Some(&face) = piece.get(next) {
                 let beside = self.sides_of(face).filter_map(|side| self.folds.get(&side));
-                piece.extend(beside.filter(|(face, _)| left.remove(face)).map(|(face, _)| *face));
+                piece.extend(beside.map(|side| side.face).filter(|face| left.remove(face)));
                 next += 1;
             }
             piece.sort_unstable();
@@ -59,8 +59,8 @@ impl Net {
     /// numbered.
     pub fn is_broken_off(&self, members: &[usize]) -> bool {
         let mut sides = members.iter().flat_map(|&face| self.sides_of(face));
-        sides.any(|(face, side)| {
-            !self.folds.contains_key(&(face, side)) && self.faces[face].numbers[side].is_empty()
+        sides.any(|at| {
+            !self.folds.contains_key(&at) && self.faces[at.face].numbers[at.side].is_empty()
         })
     }
 
@@ -103,40 +103,35 @@ impl Net {
         let mut queue = VecDeque::from([root]);
         while let Some(parent) = queue.pop_front() {
             for side in self.sides_of(parent) {
-                let Some(&(child, own)) = self.folds.get(&side) else { continue };
-                if !places.contains_key(&child)
-                    && let Some(place) = self.across(&places[&parent], side, (child, own))
+                let Some(&own) = self.folds.get(&side) else { continue };
+                if !places.contains_key(&own.face)
+                    && let Some(place) = self.across(&places[&parent], side, own)
                 {
-                    places.insert(child, place);
-                    queue.push_back(child);
+                    places.insert(own.face, place);
+                    queue.push_back(own.face);
                 }
             }
         }
         self.judge(members, places)
     }
 
-    /// The place of a face `child` whose side `own` is folded against a side of a face that lies in the
+    /// The place of the face whose side `own` is folded against a `side` of a face that lies in the
     /// place `parent`; `None` where the solid has no face across that edge. The fold is turned by the
     /// angle between the stated normals of the two places about their edge.
-    fn across(
-        &self,
-        parent: &Place,
-        (face, side): (usize, usize),
-        (child, own): (usize, usize),
-    ) -> Option<Place> {
-        let [a, b] = [0, 1].map(|end| parent.vertices[(side + end) % parent.vertices.len()]);
-        let &(slot, slot_side) = self.along.get(&[b, a])?;
+    fn across(&self, parent: &Place, side: Side, own: Side) -> Option<Place> {
+        let [a, b] = [0, 1].map(|end| parent.vertices[(side.side + end) % parent.vertices.len()]);
+        let &Side { face: slot, side: slot_side } = self.along.get(&[b, a])?;
         // The child's side runs from b to a, as that of the slot does, if that has as many corners.
-        let (there, count) = (&self.faces[slot].vertices, self.faces[child].vertices.len());
+        let (there, count) = (&self.faces[slot].vertices, self.faces[own.face].vertices.len());
         if there.len() != count {
             return None;
         }
-        let at = |corner: usize| there[(slot_side + corner + count - own) % count];
+        let at = |corner: usize| there[(slot_side + corner + count - own.side) % count];
         let vertices = (0..count).map(at).collect();
         let axis = (self.vertices_mm[&b] - self.vertices_mm[&a]).normalize_or(DVec3::X);
         let [from, to] = [parent.slot, slot].map(|slot| self.poses[slot].linear.z_axis);
         let angle_rad = axis.dot(from.cross(to)).atan2(from.dot(to));
-        let ([p, q], [q_own, p_own]) = (self.ends((face, side)), self.ends((child, own)));
+        let ([p, q], [q_own, p_own]) = (self.ends(side), self.ends(own));
         let edge = [(p + p_own) / 2.0, (q + q_own) / 2.0];
         let space_from_page = parent.space_from_page.folded(edge, angle_rad);
         Some(Place { slot, vertices, space_from_page })

@@ -35,7 +35,7 @@ pub(crate) fn check(printing: &Printing, seen: &[Seen], verdicts: &mut [SheetVer
     let mut edges = vec![0; verdicts.len()];
     if !misplaced {
         for edge in net.edges() {
-            let sheet = net.faces[edge.sides[1].0].sheet;
+            let sheet = net.faces[edge.sides[1].face].sheet;
             match net.check_edge(&edge, &carried) {
                 Ok(gap_mm) => {
                     edges[sheet] += 1;

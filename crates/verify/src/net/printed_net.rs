@@ -44,8 +44,16 @@ pub(super) struct PrintedFace {
     pub names: Vec<usize>,
 }
 
-/// The net as it was detected, and the solid that is to come of it. A side is the index of a face and
-/// the number of its side.
+/// A side of a face of the net.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub(super) struct Side {
+    /// Index of the face.
+    pub face: usize,
+    /// Number of the side.
+    pub side: usize,
+}
+
+/// The net as it was detected, and the solid that is to come of it.
 pub(super) struct Net {
     /// All faces, in the order of the target's panels.
     pub faces: Vec<PrintedFace>,
@@ -54,11 +62,11 @@ pub(super) struct Net {
     /// Stated pose of each panel in the target frame.
     pub poses: Vec<SpaceFromPage>,
     /// The side that runs from one vertex of the solid to another.
-    pub along: BTreeMap<[usize; 2], (usize, usize)>,
+    pub along: BTreeMap<[usize; 2], Side>,
     /// The side of another face from which each side is separated by a fold only.
-    pub folds: BTreeMap<(usize, usize), (usize, usize)>,
+    pub folds: BTreeMap<Side, Side>,
     /// Sides along which a tab is folded.
-    pub tabs: BTreeSet<(usize, usize)>,
+    pub tabs: BTreeSet<Side>,
 }
 
 impl Net {
@@ -87,7 +95,7 @@ impl Net {
             let vertices = solid.faces.get(index)?.clone();
             for side in 0..vertices.len() {
                 let ends = [vertices[side], vertices[(side + 1) % vertices.len()]];
-                net.along.insert(ends, (index, side));
+                net.along.insert(ends, Side { face: index, side });
             }
             for (&vertex, &corner) in vertices.iter().zip(&face.outline_mm) {
                 net.vertices_mm.insert(vertex, panel.pose.target_from_panel(corner));
@@ -116,18 +124,18 @@ impl Net {
     }
 
     /// Ends of a side on the page, mm.
-    pub fn ends(&self, (face, side): (usize, usize)) -> [DVec2; 2] {
+    pub fn ends(&self, Side { face, side }: Side) -> [DVec2; 2] {
         let outline = &self.faces[face].outline_mm;
         [outline[side], outline[(side + 1) % outline.len()]]
     }
 
     /// The sides of a face.
-    pub fn sides_of(&self, face: usize) -> impl Iterator<Item = (usize, usize)> + use<> {
-        (0..self.faces[face].vertices.len()).map(move |side| (face, side))
+    pub fn sides_of(&self, face: usize) -> impl Iterator<Item = Side> + use<> {
+        (0..self.faces[face].vertices.len()).map(move |side| Side { face, side })
     }
 
     /// The sides of all faces on a sheet.
-    fn sides_on(&self, sheet: usize) -> impl Iterator<Item = (usize, usize)> {
+    fn sides_on(&self, sheet: usize) -> impl Iterator<Item = Side> {
         let faces = (0..self.faces.len()).filter(move |&face| self.faces[face].sheet == sheet);
         faces.flat_map(|face| self.sides_of(face))
     }
@@ -169,7 +177,7 @@ impl Net {
                     (q - p).perp_dot(at - p) > 0.0
                 })
             };
-            let within = self.sides_on(sheet).map(|(face, _)| face).find(|&face| inside(face));
+            let within = self.sides_on(sheet).map(|side| side.face).find(|&face| inside(face));
             let (number, under) = match text.text {
                 Label::Face(number) => {
                     within.into_iter().for_each(|face| self.faces[face].names.push(number));
@@ -180,12 +188,12 @@ impl Net {
                 Label::Beyond { .. } | Label::Words(_) => continue,
             };
             let sides = self.sides_on(sheet).filter(|side| match within {
-                Some(face) => side.0 == face,
+                Some(face) => side.face == face,
                 None => !self.folds.contains_key(side),
             });
-            let distance = |side: &(usize, usize)| distance(at, self.ends(*side));
+            let distance = |side: &Side| distance(at, self.ends(*side));
             let nearest = sides.min_by(|a, b| distance(a).total_cmp(&distance(b)));
-            if let Some((face, side)) = nearest {
+            if let Some(Side { face, side }) = nearest {
                 self.faces[face].numbers[side].push(number);
                 self.faces[face].under.extend(under.map(|under| (side, under)));
             }

@@ -4,11 +4,11 @@ use std::collections::BTreeMap;
 
 use crate::finding::fold::FoldFinding;
 use crate::net::motion::{FOLD_TOLERANCE_MM, SpaceFromPage};
-use crate::net::printed_net::Net;
+use crate::net::printed_net::{Net, Side};
 
-/// An edge of the solid with the two sides that run along it: face and side.
+/// An edge of the solid with the two sides that run along it.
 pub(super) struct Edge {
-    pub sides: [(usize, usize); 2],
+    pub sides: [Side; 2],
 }
 
 impl Net {
@@ -31,9 +31,9 @@ impl Net {
         carried: &[Option<SpaceFromPage>],
     ) -> Result<f64, FoldFinding> {
         let [one, other] = edge.sides;
-        let panels = [self.faces[one.0].panel, self.faces[other.0].panel];
-        let ends = |side: (usize, usize)| {
-            let place = carried[side.0]?;
+        let panels = [self.faces[one.face].panel, self.faces[other.face].panel];
+        let ends = |side: Side| {
+            let place = carried[side.face]?;
             Some(self.ends(side).map(|end| place.apply(end)))
         };
         let (Some([a, b]), Some([d, c])) = (ends(one), ends(other)) else {
@@ -43,7 +43,7 @@ impl Net {
         if gap_mm > FOLD_TOLERANCE_MM {
             return Err(FoldFinding::EdgeOpen { panels, gap_mm });
         }
-        let numbers = edge.sides.map(|(face, side)| self.faces[face].numbers[side].as_slice());
+        let numbers = edge.sides.map(|at| self.faces[at.face].numbers[at.side].as_slice());
         let folded = self.folds.get(&one) == Some(&other);
         let tabs = edge.sides.iter().filter(|side| self.tabs.contains(side)).count();
         match numbers {
@@ -64,7 +64,7 @@ impl Net {
         }
         for &(side, named) in &face.under {
             let [a, b] = [0, 1].map(|end| face.vertices[(side + end) % face.vertices.len()]);
-            let beyond = self.along.get(&[b, a]).map(|&(other, _)| other);
+            let beyond = self.along.get(&[b, a]).map(|other| other.face);
             if let Some(stated) = beyond.filter(|&other| other != named) {
                 findings.push(FoldFinding::TabNames { panel: face.panel, named, stated });
             }

@@ -25,7 +25,8 @@ pub(crate) fn outline_alone(panel: &Panel) -> Vec<DVec2> {
 /// faces apart. `outline_px` is convex.
 pub(crate) fn detect_alone<T: Intensity>(
     panel: &Panel,
-    (mut image, white): (Gray<T>, T),
+    mut image: Gray<T>,
+    white: T,
     outline_px: &[DVec2],
 ) -> Detection
 where

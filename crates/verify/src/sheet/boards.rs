@@ -76,7 +76,7 @@ pub(super) fn check(
     }
     let mut seen = Seen::new();
     for panel in &mut placed {
-        let found = check_panel(verifier, (&blurred, &detection), panel, verdict);
+        let found = check_panel(verifier, &blurred, &detection, panel, verdict);
         if !found.is_empty() {
             seen.insert(panel.panel.id, found);
         }
@@ -120,12 +120,13 @@ fn another_board(verifier: &Verifier, page: &Page, verdict: &mut SheetVerdict) {
 /// the corners were found.
 fn check_panel(
     verifier: &Verifier,
-    (blurred, detection): (&Gray<u16>, &Detection),
+    blurred: &Gray<u16>,
+    detection: &Detection,
     placed: &mut PlacedPanel,
     verdict: &mut SheetVerdict,
 ) -> BTreeMap<u32, DVec2> {
     let panel = placed.panel;
-    let found = found_corners((blurred, detection), placed);
+    let found = found_corners(blurred, detection, placed);
     if found.is_empty() {
         verdict.findings.push(BoardFinding::PanelMissing { panel: panel.id }.into());
     } else {
@@ -153,7 +154,8 @@ fn check_panel(
 /// Corners of a tagged panel must be labelled by its tags. An untagged panel has nothing but its
 /// outline, which tells nothing once a corner is missing; then position decides.
 fn found_corners(
-    (blurred, detection): (&Gray<u16>, &Detection),
+    blurred: &Gray<u16>,
+    detection: &Detection,
     placed: &PlacedPanel,
 ) -> BTreeMap<u32, DVec2> {
     let (page, panel) = (placed.page, placed.panel);
@@ -183,7 +185,7 @@ fn found_corners(
     if panel.tags.is_empty() && found.len() < panel.corners.len() {
         let outline = outline_alone(panel);
         let outline = outline.into_iter().map(|p| page.px_from_page(placed.page_from_panel(p)));
-        let alone = detect_alone(panel, (blurred.clone(), u16::MAX), &outline.collect::<Vec<_>>());
+        let alone = detect_alone(panel, blurred.clone(), u16::MAX, &outline.collect::<Vec<_>>());
         let alone = near(&alone);
         found = if alone.len() > found.len() { alone } else { found };
     }

@@ -35,7 +35,8 @@ const WINDOW_BLANK_PX: f64 = 3.0;
 /// (left, lower, right, upper end, mm), the part of a larger sheet, is left to others.
 pub(crate) fn check(
     page: &Page,
-    (layout, logo): (&SheetLayout, Option<&Logo>),
+    layout: &SheetLayout,
+    logo: Option<&Logo>,
     panels: &[PlacedPanel],
     window: Option<[f64; 4]>,
     verdict: &mut SheetVerdict,

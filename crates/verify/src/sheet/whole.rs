@@ -38,7 +38,7 @@ pub(crate) fn compare(
     check_bars(page, layout, &found_from_stated, verdict);
     if in_place {
         let logo = verifier.printing.logo.as_ref();
-        marks::check(page, (layout, logo), &placed, None, verdict);
+        marks::check(page, layout, logo, &placed, None, verdict);
     }
     seen
 }

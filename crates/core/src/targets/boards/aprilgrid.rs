@@ -169,9 +169,9 @@ pub(in crate::targets) fn tagged(
         let problem = format!("{} has triangular tags, not square ones", family.name());
         return Err(TargetError::invalid(TagFamily, problem));
     }
-    let ids = (spec.first_id, spec.count().into());
-    let family =
-        check_ids(TagSettings::TAGS, ids, family, || format!("make fewer {AprilGridTags}"))?;
+    let family = check_ids(TagSettings::TAGS, spec.first_id, spec.count().into(), family, || {
+        format!("make fewer {AprilGridTags}")
+    })?;
     Ok((panels, family))
 }
 

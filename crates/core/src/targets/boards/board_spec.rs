@@ -183,7 +183,7 @@ impl BoardSpec {
                         );
                         return Err(TargetError::invalid(BoardRows, problem));
                     }
-                    tags.check_places((BoardBoardId, boards), (BoardRows, rows, cols))?;
+                    tags.check_places(BoardBoardId, boards, BoardRows, [rows, cols])?;
                 }
                 Ok(())
             }

@@ -40,7 +40,8 @@ impl TagSettings {
 /// Checks that a family has `count` codes from the first id on; `instead` says what else to change.
 pub(in crate::targets) fn check_ids(
     settings: TagSettings,
-    (first, count): (u32, u64),
+    first: u32,
+    count: u64,
     family: &Family,
     instead: impl FnOnce() -> String,
 ) -> Result<FamilyRef, TargetError> {
@@ -92,7 +93,7 @@ pub(in crate::targets) fn check_family(
     {
         return Err(TargetError::invalid(TagHoleMm, problem));
     }
-    check_ids(settings, (tags.first_id, needed), family, || {
+    check_ids(settings, tags.first_id, needed, family, || {
         let (there, first) = (family.len() as u64, u64::from(tags.first_id));
         let mut proposals = Vec::new();
         if let Some(highest) = there.checked_sub(needed) {

@@ -193,10 +193,10 @@ pub(in crate::targets) fn tagged(
         let given = format!("{} is given", family.name());
         return Err(TargetError::Family { wanted: spec.dictionary.clone(), given });
     }
-    let ids = (spec.first_id, spec.markers().into());
-    let family = check_ids(TagSettings::TAGS, ids, family, || {
-        format!("take a larger {CharucoDictionary}, or fewer {CharucoSquares}")
-    })?;
+    let family =
+        check_ids(TagSettings::TAGS, spec.first_id, spec.markers().into(), family, || {
+            format!("take a larger {CharucoDictionary}, or fewer {CharucoSquares}")
+        })?;
     Ok((panels, family))
 }
 

@@ -106,11 +106,14 @@ impl TagSpec {
         tiles.map(of_tile).collect()
     }
 
-    /// Checks that there are place codes for panels with these ids, whose tiles lie in so many rows and columns.
+    /// Checks that there are place codes for panels with these ids, whose tiles lie in so many rows and columns; `ids`
+    /// and `size` are the settings that these follow from.
     pub(crate) fn check_places(
         &self,
-        (setting, panels): (Setting, std::ops::Range<u32>),
-        (size, rows, cols): (Setting, u32, u32),
+        ids: Setting,
+        panels: std::ops::Range<u32>,
+        size: Setting,
+        [rows, cols]: [u32; 2],
     ) -> Result<(), TargetError> {
         let last = places::BOARDS - 1;
         if panels.end > places::BOARDS {
@@ -120,7 +123,7 @@ impl TagSpec {
                 panels.end - 1,
                 places::NAME
             );
-            return Err(TargetError::invalid(setting, problem));
+            return Err(TargetError::invalid(ids, problem));
         }
         if !places::are_different(rows, cols) {
             let problem = format!(

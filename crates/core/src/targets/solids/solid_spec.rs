@@ -281,8 +281,7 @@ impl SolidSpec {
             let boards = self.board_id..self.board_id + self.polyhedron().faces.len() as u32;
             // Faces of other shapes than triangles have up to twice as many rows.
             let rows = if matches!(self.shape, SolidShape::Mesh(_)) { 2 } else { 1 } * self.tiles;
-            let size = (SolidTiles, rows, rows);
-            tags.check_places((SolidBoardId, boards), size)?;
+            tags.check_places(SolidBoardId, boards, SolidTiles, [rows, rows])?;
         }
         let kind = match (self.shape.tilings(), &self.square_tags) {
             ([true, true], Some(tags)) => {

@@ -148,13 +148,12 @@ fn seamed(
         return Err(TargetError::invalid(SolidEdgeMm, problem));
     };
     let what = format!("the net of a solid with {} edges", format_mm(spec.edge_mm));
-    let edge = (SolidEdgeMm, spec.edge_mm);
     let count = net.pieces.len();
     let pieces = net.pieces.iter().zip(&net.tabs).enumerate();
     pieces
         .map(|(index, (piece, tabs))| {
             let poster = Poster::new(&points(piece, tabs), paper)?;
-            poster.check(&what, edge, Some(SolidSheetsPerFace), paper)?;
+            poster.check(&what, SolidEdgeMm, spec.edge_mm, Some(SolidSheetsPerFace), paper)?;
             let mut sheet = poster.sheet();
             drawing.draw(&mut sheet, piece, tabs, &poster.sheet_from_points());
             let of = match count {
@@ -167,7 +166,7 @@ fn seamed(
             });
             let (tiles, lines) = (tiles.collect(), sheet.lines.clone());
             let words = |at: DVec2, room: f64| instructions(&lines, at, room).to_vec();
-            poster.add_pages(&mut sheet, tiles, &lines, (&drawing.label(&of), ""), words);
+            poster.add_pages(&mut sheet, tiles, &lines, &drawing.label(&of), "", words);
             Ok(sheet)
         })
         .collect()

@@ -284,16 +284,17 @@ fn grow_all(
         let root = if seed == 0 { first } else { free[random.random_range(0..free.len())] };
         // Half of the orders keep the piece round, the others are free.
         let round = seed.is_multiple_of(2);
-        pieces.push(grow(flat, sides, (root, round), &may, &mut placed, &mut random));
+        pieces.push(grow(flat, sides, root, round, &may, &mut placed, &mut random));
     }
     pieces
 }
 
-/// Grows one piece; `placed` tells the faces that are taken.
+/// Grows one piece from its `root`, which stays `round` or not; `placed` tells the faces that are taken.
 fn grow(
     flat: &[Vec<DVec2>],
     sides: &Sides,
-    (root, round): (usize, bool),
+    root: usize,
+    round: bool,
     may: &impl Fn(&[FlatFace], &FlatFace) -> bool,
     placed: &mut [bool],
     random: &mut ChaCha8Rng,

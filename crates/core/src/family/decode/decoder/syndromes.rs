@@ -142,20 +142,21 @@ impl PatternTable {
         let count = ball(count, weight) / 3.0 + ball(count / 3, weight / 3);
         let slots = ((1.5 * count) as usize + 2).next_power_of_two();
         let mut table = Self { slots: vec![EMPTY; slots], shift: 32 - slots.ilog2() };
-        table.insert_all(cells, weight, (0, [0; 3])).then_some(table)
+        table.insert_all(cells, weight, 0, [0; 3]).then_some(table)
     }
 
     fn insert_all(
         &mut self,
         cells: &[(u64, [u32; 3])],
         weight: u32,
-        (pattern, syndromes): (u64, [u32; 3]),
+        pattern: u64,
+        syndromes: [u32; 3],
     ) -> bool {
         self.insert(pattern, syndromes)
             && (weight == 0
                 || cells.iter().enumerate().all(|(i, (bit, columns))| {
                     let sums = std::array::from_fn(|turn| syndromes[turn] ^ columns[turn]);
-                    self.insert_all(&cells[i + 1..], weight - 1, (pattern | bit, sums))
+                    self.insert_all(&cells[i + 1..], weight - 1, pattern | bit, sums)
                 }))
     }
 

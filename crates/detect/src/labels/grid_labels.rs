@@ -7,7 +7,7 @@
 use std::collections::btree_map::Entry;
 use std::collections::{BTreeMap, BTreeSet};
 
-use super::evidence::{Budget, Labelled, TagLabeller};
+use super::placement::labeller::{Budget, Labelled, TagLabeller};
 use super::why;
 use crate::config::DetectorConfig;
 use crate::grid::outline::{WholeBoard, fit_outline, fit_rectangle};
@@ -42,7 +42,7 @@ enum Source {
     /// By the outline of a board that is seen whole.
     Outline(BTreeSet<Vertex>),
     /// By the rows and columns of a checkerboard that is seen whole.
-    Rectangle((u32, u32)),
+    Rectangle([u32; 2]),
     /// By the tags of a target, or by the outlines of its untagged panels.
     Target { tags: Option<Box<TagLabeller>>, panels: Vec<TargetPanel> },
     /// By whichever of several targets a grid belongs to, by their names.
@@ -55,7 +55,7 @@ struct TargetPanel {
     id: u32,
     kind: GridKind,
     /// Rows and columns.
-    size: (u32, u32),
+    size: [u32; 2],
     inverted: bool,
     tagged: bool,
     corner_ids: BTreeMap<Vertex, u32>,
@@ -74,7 +74,7 @@ impl Labels {
             (Some(_), GridKind::Deltille) => {
                 Source::Outline(outline.into_iter().flatten().collect())
             }
-            (Some(size), GridKind::Checker) => Source::Rectangle(size),
+            (Some((rows, cols)), GridKind::Checker) => Source::Rectangle([rows, cols]),
             (None, _) => Source::None,
         };
         Self { source, whole, allow_mirrored: config.allow_mirrored }
@@ -94,7 +94,7 @@ impl Labels {
         let panels = target.panels.iter().map(|panel| TargetPanel {
             id: panel.id,
             kind: panel.kind,
-            size: (panel.matrix[1], panel.matrix[0]),
+            size: [panel.matrix[1], panel.matrix[0]],
             inverted: panel.inverted,
             tagged: !panel.tags.is_empty(),
             corner_ids: panel.corners.iter().map(|c| (Vertex::new(c.row, c.col), c.id)).collect(),
@@ -118,16 +118,16 @@ impl Labels {
         budget: &mut Budget,
     ) -> Vec<(Grid, Option<Reason>)> {
         let grid = found.corners;
-        let size = (image.width(), image.height());
+        let size = [image.width(), image.height()];
         match &self.source {
             Source::None => vec![(unlabelled(found), None)],
             Source::Outline(outline) => {
                 let fit = |grid: &SaddleGrid| fit_outline(grid, outline, false);
                 vec![self.on_outline(found, outline.len(), size, fit)]
             }
-            Source::Rectangle(rectangle) => {
-                let fit = |grid: &SaddleGrid| fit_rectangle(grid, *rectangle, false);
-                let expected = rectangle.0 as usize * rectangle.1 as usize;
+            Source::Rectangle([rows, cols]) => {
+                let fit = |grid: &SaddleGrid| fit_rectangle(grid, [*rows, *cols], false);
+                let expected = *rows as usize * *cols as usize;
                 vec![self.on_outline(found, expected, size, fit)]
             }
             Source::Scene(targets) => in_scene(targets, image, found, budget),
@@ -176,7 +176,7 @@ impl Labels {
         match &self.source {
             Source::None => MOST_CORNERS,
             Source::Outline(outline) => outline.len(),
-            Source::Rectangle((rows, cols)) => *rows as usize * *cols as usize,
+            Source::Rectangle([rows, cols]) => *rows as usize * *cols as usize,
             Source::Target { panels, .. } => {
                 // Faces without tags may be seen side by side as one grid.
                 let untagged = panels.iter().filter(|panel| !panel.tagged);
@@ -194,7 +194,7 @@ impl Labels {
         &self,
         found: FoundGrid,
         expected: usize,
-        size: (usize, usize),
+        size: [usize; 2],
         fit: impl Fn(&SaddleGrid) -> Option<LatticeMap>,
     ) -> (Grid, Option<Reason>) {
         if let Some(map) = fit(found.corners) {

@@ -1,0 +1,175 @@
+//! Corners that were not detected, at empty vertices of a grid and around it, where their neighbours predict them.
+
+use std::collections::BTreeSet;
+
+use glam::DVec2;
+
+use super::edge::{End, MAX_CHORD_RAD, is_clean_somehow};
+use super::effort::Effort;
+use super::links::facing_ray;
+use super::local_map::{Bend, LocalMap};
+use super::rectified::Rectified;
+use super::saddle_grid::{Growing, GrownSaddle};
+use crate::corners::saddles::{Saddle, SaddleFinder};
+use crate::corners::sectors::turn;
+use crate::tiling::{neighbours, step};
+use deltille_core::lattice::Vertex;
+use deltille_core::raster::Pyramid;
+
+/// Greatest distance of a missing corner from the position that its neighbours predict, as a fraction
+/// of the edge length there.
+const MAX_SURPRISE: f64 = 0.2;
+
+/// Effort for a missing corner, which is sought in the picture and in several rectified views of it.
+const LOOKS_FOR_CORNER: usize = 20;
+
+/// Seeks corners at empty vertices beside those of a grid, within it and around it, where neighbours
+/// predict them, until no more are found.
+pub(super) fn fill_gaps<const N: usize>(
+    finder: &SaddleFinder<N>,
+    pyramid: &Pyramid,
+    grid: &mut Growing<N>,
+    effort: &mut Effort,
+) {
+    let mut tried = BTreeSet::new();
+    loop {
+        let empty: BTreeSet<Vertex> = grid
+            .keys()
+            .flat_map(|&v| neighbours::<N>(v))
+            .filter(|v| !grid.contains_key(v) && !tried.contains(v))
+            .collect();
+        let mut grown = false;
+        for vertex in empty {
+            let Some(predicted) = predict(grid, vertex) else {
+                continue;
+            };
+            if let Some(placed) = corner_near(finder, pyramid, grid, vertex, predicted, effort) {
+                grid.insert(vertex, placed);
+                grown = true;
+                // The vertices around it are predicted anew, so they are tried again.
+                tried.retain(|v: &Vertex| !neighbours::<N>(vertex).contains(v));
+            } else {
+                tried.insert(vertex);
+            }
+        }
+        if !grown {
+            return;
+        }
+    }
+}
+
+/// Where a missing corner is sought.
+#[derive(Clone, Copy, Debug)]
+struct Predicted {
+    /// Its position, px.
+    position: DVec2,
+    /// Length of an edge there, px.
+    edge_px: f64,
+}
+
+/// Where a missing corner is: the mean of what the rows through `vertex` predict. With the next three corners p, q, r of a row, the position is
+///
+/// ```text
+///     3 p − 3 q + r        a row that bends evenly (its second difference is constant)
+///     2 p − q              where r is missing: a straight row with equal edges
+/// ```
+///
+/// Where fewer than two rows predict it, a local map of the corners around does, if there are two
+/// neighbours; else the result is `None`.
+fn predict<const N: usize>(grid: &Growing<N>, vertex: Vertex) -> Option<Predicted> {
+    let at = |v: Vertex| grid.get(&v).map(|grown| grown.saddle.position);
+    let mut sum = DVec2::ZERO;
+    let (mut count, mut edge) = (0.0, 0.0);
+    for step in (0..N).map(step::<N>) {
+        let first = vertex + step;
+        let second = first + step;
+        let (Some(p), Some(q)) = (at(first), at(second)) else {
+            continue;
+        };
+        sum += match at(second + step) {
+            Some(r) => 3.0 * p - 3.0 * q + r,
+            None => 2.0 * p - q,
+        };
+        edge += (p.x - q.x).hypot(p.y - q.y);
+        count += 1.0;
+    }
+    if count >= 2.0 {
+        return Some(Predicted { position: sum / count, edge_px: edge / count });
+    }
+    // The seed of a grid has no rows yet, but two of its corners beside the vertex.
+    let beside: Vec<DVec2> = neighbours::<N>(vertex).into_iter().filter_map(at).collect();
+    let map = (beside.len() >= 2).then(|| LocalMap::about::<N>(vertex, at, Bend::usual()))??;
+    let px = |p: &DVec2| (p.x - map.place.x).hypot(p.y - map.place.y);
+    let edge_px = beside.iter().map(px).sum::<f64>() / beside.len() as f64;
+    Some(Predicted { position: map.place, edge_px })
+}
+
+/// The corner at `vertex`, if one is found near where it is predicted: in the picture, or, where the
+/// board is seen at a steep angle, in a view that is rectified by the edges to its neighbours.
+fn corner_near<const N: usize>(
+    finder: &SaddleFinder<N>,
+    pyramid: &Pyramid,
+    grid: &Growing<N>,
+    vertex: Vertex,
+    Predicted { position, edge_px }: Predicted,
+    effort: &mut Effort,
+) -> Option<GrownSaddle<N>> {
+    if !effort.spend(LOOKS_FOR_CORNER) {
+        return None;
+    }
+    let reach = (MAX_SURPRISE * edge_px).max(1.0);
+    let neighbours = neighbours::<N>(vertex);
+    // A blurred corner is found best on the pyramid level on which its neighbours were found.
+    let levels = neighbours.iter().filter_map(|v| Some(grid.get(v)?.saddle.level));
+    let level = levels.max().unwrap_or(0);
+    let at_place = |saddle| placed_at(pyramid, grid, vertex, saddle);
+    finder.near(pyramid, level, position, reach, at_place).or_else(|| {
+        let seen = |k: usize| grid.get(&(vertex + step::<N>(k))).map(|g| g.saddle.position);
+        let edge = |k: usize| seen(k).map(|place| place - position);
+        (0..N).find_map(|k| {
+            let edges = [edge(k)?, edge(k + 1)?];
+            Rectified::views::<N>(position, k, edges)
+                .into_iter()
+                .find_map(|view| view?.find(finder, pyramid, level, at_place))
+        })
+    })
+}
+
+/// A saddle point as the corner at `vertex` of a grid, if it has clean edges to two neighbours at least
+/// that agree on its turn, and rays parallel to theirs.
+fn placed_at<const N: usize>(
+    pyramid: &Pyramid,
+    grid: &Growing<N>,
+    vertex: Vertex,
+    saddle: Saddle<N>,
+) -> Option<GrownSaddle<N>> {
+    // The turn that the neighbours agree on.
+    let mut votes = [0usize; N];
+    for (k, neighbour) in neighbours::<N>(vertex).into_iter().enumerate() {
+        let Some(other) = grid.get(&neighbour) else {
+            continue;
+        };
+        let back = other.ray(k + N / 2);
+        if let Some(ray) = facing_ray(&other.saddle, back, &saddle)
+            && is_clean_somehow(pyramid, End::of(&other.saddle, back), End::of(&saddle, ray))
+        {
+            votes[(k + N - ray) % N] += 1;
+        }
+    }
+    let turn = (0..N).max_by_key(|&t| votes[t])?;
+    let grown = GrownSaddle { saddle, turn };
+    (votes[turn] >= 2 && parallel_to_neighbours(grid, vertex, &grown)).then_some(grown)
+}
+
+/// Whether all rays of a corner are parallel to those of each neighbour, within the angle by which
+/// distortion and perspective may bend a tile.
+fn parallel_to_neighbours<const N: usize>(
+    grid: &Growing<N>,
+    vertex: Vertex,
+    grown: &GrownSaddle<N>,
+) -> bool {
+    let along = |corner: &GrownSaddle<N>, k: usize| corner.saddle.sectors.rays[corner.ray(k)];
+    neighbours::<N>(vertex).iter().filter_map(|v| grid.get(v)).all(|other| {
+        (0..N).all(|k| turn(along(grown, k), along(other, k)).abs() <= 2.0 * MAX_CHORD_RAD)
+    })
+}

@@ -1,0 +1,149 @@
+//! How well a placement explains the tiles of a grid.
+
+use std::collections::BTreeSet;
+
+use super::alternatives::{DIRTY, PLAIN_PARTS, SPOILT, add, greatest, mean, or_spoilt};
+use super::labeller::{LabelTag, TagLabeller};
+use super::motion::turns_of;
+use super::sight::Sight;
+use crate::grid::saddle_grid::mirrored;
+use deltille_core::lattice::{LatticeMap, Tile, Vertex};
+
+/// Least evidence of a single tile that proposes a placement, nats.
+pub(super) const PROPOSING: f64 = 1.0;
+
+/// A tile under a placement: log-likelihood ratios, nats, over cells drawn at random.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Judged {
+    /// If it is as the placement predicts, for each probability in [`DIRTY`].
+    pub(super) predicted: [f64; DIRTY.len()],
+    /// If the board has tags in the same tiles, but another code in this one.
+    pub(super) other_code: [f64; DIRTY.len()],
+    /// If the board shows plain tiles and codes as it likes, for each fraction in [`PLAIN_PARTS`]; `None`
+    /// for tiles beyond the panel.
+    pub(super) of_board: Option<[f64; PLAIN_PARTS.len()]>,
+}
+
+/// A placement of a grid on a panel.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Placement {
+    /// Index of the sight.
+    pub(super) sight: usize,
+    /// Index of the panel.
+    pub(super) panel: usize,
+    /// Motion of the lattice from the grid, mirrored if the sight is, to the panel.
+    pub(super) map: LatticeMap,
+    /// Evidence for it, nats; of a proposal the sum over the tiles that speak for it.
+    pub(super) evidence: f64,
+}
+
+impl TagLabeller {
+    /// Evidence for a placement, nats, from tiles none of whose corners is taken: the log-likelihood of
+    /// its prediction, less that of the better of the two boards that are not the target.
+    pub(super) fn evidence(
+        &self,
+        sight: &Sight,
+        placement: &Placement,
+        taken: &BTreeSet<Vertex>,
+    ) -> f64 {
+        let mut predicted = [0.0; DIRTY.len()];
+        let mut other_codes = [0.0; DIRTY.len()];
+        let mut of_board = [0.0; PLAIN_PARTS.len()];
+        for tile in self.judged(sight, placement, taken) {
+            add(&mut predicted, tile.predicted);
+            add(&mut other_codes, tile.other_code);
+            add(&mut of_board, tile.of_board.unwrap_or_default());
+        }
+        mean(predicted) - greatest(of_board).max(mean(other_codes))
+    }
+
+    /// Evidence for a placement over natural pictures, nats, where a single tag speaks for it.
+    pub(super) fn over_nature(&self, sight: &Sight, placement: &Placement) -> Option<f64> {
+        let natural = self.natural.as_ref()?;
+        let mut speaking = self.expected(placement).filter_map(|(tile, tag, turns)| {
+            let reading = *sight.index.get(&tile)?;
+            let word = self.words.turns() * tag.code + turns;
+            (f64::from(sight.evidence[reading][word]) > PROPOSING).then_some((reading, word))
+        });
+        let (Some((reading, word)), None) = (speaking.next(), speaking.next()) else { return None };
+        let half_odds = &sight.readings[reading].half_odds;
+        let white = |bit: usize| self.words.word(word) >> bit & 1 == 1;
+        let sum = |(bit, &odds): (usize, &f32)| f64::from(if white(bit) { odds } else { -odds });
+        let of_code: f64 = half_odds.iter().enumerate().map(sum).sum();
+        Some(of_code - natural.log_likelihood(half_odds))
+    }
+
+    /// Numbers of tiles that agree and that disagree with a placement; a tile disagrees if a board that
+    /// shows what it likes explains it clearly better.
+    pub(super) fn agreement(&self, sight: &Sight, placement: &Placement) -> [usize; 2] {
+        let against = |tile: &Judged| {
+            greatest(tile.predicted) < tile.of_board.map_or(0.0, greatest) - PROPOSING
+        };
+        let (against, agreeing): (Vec<Judged>, Vec<Judged>) =
+            self.judged(sight, placement, &BTreeSet::new()).partition(against);
+        [agreeing.len(), against.len()]
+    }
+
+    /// The tiles of a sight under a placement, without those that have a corner which is taken.
+    pub(super) fn judged(
+        &self,
+        sight: &Sight,
+        placement: &Placement,
+        taken: &BTreeSet<Vertex>,
+    ) -> impl Iterator<Item = Judged> {
+        let free = |tile: Tile| {
+            let side = |v: Vertex| if sight.way.mirrored { mirrored(v) } else { v };
+            taken.is_empty() || tile.vertices().all(|v| !taken.contains(&side(v)))
+        };
+        let tiles = (0..sight.readings.len()).filter(move |&i| free(sight.readings[i].tile));
+        tiles.filter_map(move |index| self.judge(sight, placement, index))
+    }
+
+    /// A reading under a placement; `None` where this predicts nothing of its tile.
+    pub(super) fn judge(
+        &self,
+        sight: &Sight,
+        placement: &Placement,
+        index: usize,
+    ) -> Option<Judged> {
+        let panel = &self.panels[placement.panel];
+        let (tile, shown) = (sight.readings[index].tile, &sight.shown[index]);
+        let on_panel = placement.map.apply_tile(tile);
+        if let Some(tag) = panel.tags.get(&on_panel) {
+            let word = self.words.turns() * tag.code + turns_of(placement.map, tile);
+            // The boards that it is compared with have the best code other than the predicted one.
+            let but = usize::from(shown.word == word);
+            let evidence = sight.evidence[index][word].into();
+            // Where every tile has a tag, no plain ones tell how many are hidden.
+            let hidden = |chance| if self.is_dense { chance } else { SPOILT };
+            let predicted = DIRTY.map(|chance| or_spoilt(evidence, hidden(chance)));
+            let other_code = [shown.code[but]; DIRTY.len()];
+            let of_board = Some(shown.of_board[but]);
+            Some(Judged { predicted, other_code, of_board })
+        } else if panel.tiles.contains(&on_panel) {
+            let predicted = shown.if_plain;
+            let of_board = Some(shown.of_board[0]);
+            Some(Judged { predicted, other_code: predicted, of_board })
+        } else if self.panels_abut {
+            None
+        } else {
+            let predicted = [SPOILT.ln(); DIRTY.len()];
+            Some(Judged { predicted, other_code: predicted, of_board: None })
+        }
+    }
+
+    /// The tags of the panel under a placement: tile of the grid (mirrored if its sight is), tag, and the number of
+    /// counter-clockwise turns of the tag in that tile.
+    pub(super) fn expected(
+        &self,
+        placement: &Placement,
+    ) -> impl Iterator<Item = (Tile, LabelTag, usize)> {
+        let grid_from_panel = placement.map.inverse();
+        self.panels[placement.panel].tags.iter().map(move |(&tile, &tag)| {
+            let on_grid = grid_from_panel.apply_tile(tile);
+            let a = grid_from_panel.apply(tile.frame()[0]);
+            let turns = on_grid.vertices().position(|v| v == a).unwrap_or(0);
+            (on_grid, tag, turns)
+        })
+    }
+}

@@ -1,0 +1,85 @@
+//! Why a picture shows no grid of a tiling: it shows one of the other, or too small a one, or neither.
+
+use super::labels::why;
+use super::levels::{MIN_LEVEL_SIDE, PYRAMID_LEVELS};
+use super::tiling::{CHECKER, DELTILLE, kind};
+use crate::corners::saddles::SaddleFinder;
+use crate::grid::grids::grids;
+use deltille_core::detection::{MIN_UNTAGGED_EDGE_PX, Reason, ReasonKind};
+use deltille_core::lattice::GridKind;
+use deltille_core::raster::{Gray, PYRAMID_FULL_SCALE, Pyramid};
+
+/// A grid of the other tiling with fewer corners is no reason to ask whether that was meant.
+const LEAST_OTHER_CORNERS: usize = 20;
+
+/// Why there are no grids in a picture with so many corners.
+pub(super) fn nothing_found<const N: usize>(pyramid: &Pyramid, corners: usize) -> Reason {
+    // At half the size, which takes a quarter of the time.
+    let half = pyramid.levels().get(1).map(|level| {
+        let to_one = 1.0 / PYRAMID_FULL_SCALE;
+        Pyramid::new(&level.map(|v| f32::from(v) * to_one), PYRAMID_LEVELS - 1, MIN_LEVEL_SIDE)
+    });
+    let others = half.map_or(0, |half| match kind::<N>() {
+        GridKind::Deltille => most_corners(&SaddleFinder::<CHECKER>::new(), &half),
+        GridKind::Checker => most_corners(&SaddleFinder::<DELTILLE>::new(), &half),
+    });
+    if others >= LEAST_OTHER_CORNERS {
+        return Reason::new(ReasonKind::OtherTiling, [("corners", others as f64)]);
+    }
+    let reason = why::nothing_found(pyramid, corners);
+    if matches!(reason.kind, ReasonKind::NoCorners | ReasonKind::NoGrid)
+        && let Some(edge_px) = edge_of_small_tiles::<N>(&pyramid.levels()[0])
+    {
+        let figures = [("edge_px", edge_px), ("needed_edge_px", MIN_UNTAGGED_EDGE_PX)];
+        return Reason::new(ReasonKind::TooSmall, figures);
+    }
+    reason
+}
+
+/// The edge of the tiles, px, of a grid that shows in the part of a picture with the most contrast if that is enlarged to
+/// twice its size, and is too small as it is.
+fn edge_of_small_tiles<const N: usize>(level: &Gray<i16>) -> Option<f64> {
+    /// Width and height of the part, px: enlarged it has half a megapixel, and twenty corners 7 px apart fill a hundredth of it.
+    const PART: [usize; 2] = [400, 300];
+    /// Tiles half as large as the least are seen so.
+    const TIMES: usize = 2;
+    let size = [level.width().min(PART[0]), level.height().min(PART[1])];
+    let [left, top] = busiest_part(level, size);
+    let to_one = 1.0 / PYRAMID_FULL_SCALE;
+    let enlarged = Gray::from_fn(TIMES * size[0], TIMES * size[1], |x, y| {
+        let [u, v] = [(left, x), (top, y)].map(|(from, i)| from as f64 + i as f64 / TIMES as f64);
+        level.bilinear(u, v) * to_one
+    });
+    let pyramid = Pyramid::new(&enlarged, 1, MIN_LEVEL_SIDE);
+    let finder = SaddleFinder::<N>::new();
+    let found = grids(&finder, &pyramid, &finder.find(&pyramid), None);
+    let largest = found.iter().max_by_key(|grid| grid.len())?;
+    let edge_px = why::edge_px(largest)? / TIMES as f64;
+    (largest.len() >= LEAST_OTHER_CORNERS && edge_px < MIN_UNTAGGED_EDGE_PX).then_some(edge_px)
+}
+
+/// The first pixel of the part of so many columns and rows around the square with the most contrast.
+fn busiest_part(level: &Gray<i16>, size: [usize; 2]) -> [usize; 2] {
+    /// Side of the square, px: twenty corners of tiles that are too small fit into it.
+    const SQUARE: usize = 64;
+    let contrast = |[x, y]: [usize; 2]| {
+        let [right, bottom] = [(x + SQUARE).min(level.width()), (y + SQUARE).min(level.height())];
+        let rows = (y..bottom).map(|v| &level.row(v)[x..right]);
+        rows.flat_map(|row| row.windows(2))
+            .map(|two| two[0].abs_diff(two[1]) as usize)
+            .sum::<usize>()
+    };
+    let columns = (0..level.width()).step_by(SQUARE);
+    let squares = columns.flat_map(|x| (0..level.height()).step_by(SQUARE).map(move |y| [x, y]));
+    let [x, y] = squares.max_by_key(|&square| contrast(square)).unwrap_or_default();
+    let around = |at: usize, part: usize, side: usize| {
+        (at + SQUARE / 2).saturating_sub(part / 2).min(side - part)
+    };
+    [around(x, size[0], level.width()), around(y, size[1], level.height())]
+}
+
+/// Corners of the largest grid of a tiling.
+fn most_corners<const N: usize>(finder: &SaddleFinder<N>, pyramid: &Pyramid) -> usize {
+    let saddles = finder.find(pyramid);
+    grids(finder, pyramid, &saddles, None).iter().map(|grid| grid.len()).max().unwrap_or(0)
+}

@@ -1,0 +1,462 @@
+//! The stages of detection in their order, for the targets of one tiling.
+
+use std::collections::BTreeMap;
+use std::time::Duration;
+
+use super::config::DetectorConfig;
+use super::levels::{MIN_LEVEL_SIDE, levels_of};
+use super::nothing_seen::nothing_found;
+use super::tiling::{CHECKER, DELTILLE, kind, step};
+use crate::corners::saddles::{SaddleFinder, too_many};
+use crate::grid::beyond::go_on;
+use crate::grid::foreshortened::foreshortened_grids;
+use crate::grid::grids::grids;
+use crate::grid::saddle_grid::SaddleGrid;
+use crate::grid::tile_shape::is_of_squares;
+use crate::labels::grid_labels::{FoundGrid, Labels, MOST_CORNERS, report_once};
+use crate::labels::placement::labeller::Budget;
+use crate::refine::clearance::TagAreas;
+use crate::refine::model::fitter::CornerFitter;
+use crate::refine::optics::Optics;
+use crate::refine::refine_grid::{Level, is_sampled, sharp_level};
+use crate::refine::refiner::Refiner;
+use deltille_core::Clock;
+use deltille_core::detection::{
+    Detection, Grid, Ink, InkEstimate, MIN_UNTAGGED_EDGE_PX, Reason, ReasonKind,
+};
+use deltille_core::lattice::GridKind;
+use deltille_core::raster::{ImageView, Pyramid};
+use deltille_core::targets::least_untagged_corners;
+
+/// Largest blur of a grid that no tag vouches for, as a part of the edge: it leaves less than a tenth of the wave after the
+/// fundamental one, in which the model reads a blur of 0.25 of the edge, of three waves 0.155.
+const fn max_untagged_blur(kind: GridKind) -> f64 {
+    match kind {
+        GridKind::Deltille => 0.14,
+        GridKind::Checker => 0.2,
+    }
+}
+
+/// Grids that are told why they have no labels: the largest ones.
+const MOST_REASONS: usize = 3;
+
+/// A level on which the whole board is looked for has so many pixels for each of its corners: where the board covers a
+/// third of the picture, its edges are 18 px long there.
+const LEAST_PX2_A_CORNER: usize = 1000;
+
+/// Edges on such a level are no shorter than this, px: the fit of a corner reads as far, and what it reads of the next
+/// corners displaces it.
+const MIN_COARSE_EDGE_PX: f64 = 7.0;
+
+/// Radius of the polynomial that refines, px: the reference detector's.
+const POLYNOMIAL_RADIUS: usize = 3;
+
+/// Micrometres in a millimetre.
+const UM_IN_MM: f64 = 1e3;
+
+/// Largest radius of the model that refines, px: beyond, lenses bend edges more than a wider
+/// window gains.
+const MODEL_RADIUS: usize = 10;
+
+/// A picture and its pyramid.
+#[derive(Clone, Copy)]
+struct Frame<'a> {
+    image: ImageView<'a>,
+    pyramid: &'a Pyramid<'a>,
+}
+
+/// Grids, each with why it has no labels.
+type Judged = Vec<(Grid, Option<Reason>)>;
+
+/// What a picture shows.
+struct Found {
+    grids: Judged,
+    /// What the grids have in common.
+    optics: Optics,
+    /// Why others are left out.
+    left_out: Vec<Reason>,
+    /// How many corners were seen.
+    saddles: usize,
+}
+
+/// Finds the corners of a tiling.
+#[derive(Clone, Debug)]
+enum Finder {
+    Deltille(SaddleFinder<DELTILLE>),
+    Checker(SaddleFinder<CHECKER>),
+}
+
+impl Finder {
+    fn of(kind: GridKind) -> Self {
+        match kind {
+            GridKind::Deltille => Self::Deltille(SaddleFinder::new()),
+            GridKind::Checker => Self::Checker(SaddleFinder::new()),
+        }
+    }
+}
+
+/// Finds and labels the grids of one tiling.
+#[derive(Clone, Debug)]
+pub(super) struct OneTiling {
+    finder: Finder,
+    refiner: Refiner,
+    /// Where tiles show something else than their colour.
+    tag_areas: TagAreas,
+    labels: Labels,
+    /// Edge of the tiles, mm, where all panels have the same.
+    pub(super) edge_mm: Option<f64>,
+    /// Whether the ink was given.
+    is_ink_given: bool,
+    /// What is known of the ink from other pictures.
+    pub(super) ink: Option<InkEstimate>,
+    /// What the stages are timed with, if at all.
+    clock: Option<Clock>,
+}
+
+impl OneTiling {
+    pub(super) fn new(
+        kind: GridKind,
+        labels: Labels,
+        tag_areas: TagAreas,
+        edge_mm: Option<f64>,
+        config: DetectorConfig,
+    ) -> Self {
+        let is_ink_given = config.ink != Ink::Auto;
+        let (finder, refiner) = (Finder::of(kind), refiner(kind, config, edge_mm));
+        Self { finder, refiner, tag_areas, labels, edge_mm, is_ink_given, ink: None, clock: None }
+    }
+
+    /// The same with a clock, by which it notes how long each stage took.
+    pub(super) fn with_clock(self, clock: Clock) -> Self {
+        Self { clock: Some(clock), ..self }
+    }
+
+    /// The same for a print whose spread of ink was estimated before.
+    pub(super) fn with_ink(self, ink: InkEstimate) -> Self {
+        Self { refiner: self.refiner.with_ink(Some(ink.edges)), ink: Some(ink), ..self }
+    }
+
+    /// Whether pictures are asked for the ink.
+    pub(super) fn is_ink_asked(&self) -> bool {
+        !self.is_ink_given
+    }
+
+    /// What a picture shows; `name` is only noted in the result.
+    pub(super) fn detect(&self, image: ImageView, name: &str) -> Detection {
+        match &self.finder {
+            Finder::Deltille(finder) => self.detect_with(finder, image, name),
+            Finder::Checker(finder) => self.detect_with(finder, image, name),
+        }
+    }
+
+    fn detect_with<const N: usize>(
+        &self,
+        finder: &SaddleFinder<N>,
+        image: ImageView,
+        name: &str,
+    ) -> Detection {
+        let mut timing = Timing::start(self.clock);
+        let pyramid = Pyramid::new(image, levels_of(image), MIN_LEVEL_SIDE);
+        let frame = Frame { image, pyramid: &pyramid };
+        timing.lap("pyramid");
+        let whole = self.whole_on_coarser_level(finder, frame, &mut timing);
+        let Found { grids, optics, left_out, saddles } = match whole {
+            Some((grids, optics)) => Found { grids, optics, left_out: Vec::new(), saddles: 0 },
+            None => self.all_grids(finder, frame, &mut timing),
+        };
+        let mut reasons = if grids.is_empty() {
+            let nothing = || nothing_found::<N>(&pyramid, saddles);
+            vec![left_out.first().cloned().unwrap_or_else(nothing)]
+        } else if self.labels.are_wanted() && grids.iter().all(|(_, reason)| reason.is_some()) {
+            let of_grid = |(i, (_, reason)): (usize, &(Grid, Option<Reason>))| {
+                let mut reason = reason.clone()?;
+                reason.grid = Some(i);
+                Some(reason)
+            };
+            grids.iter().enumerate().filter_map(of_grid).take(MOST_REASONS).collect()
+        } else {
+            Vec::new()
+        };
+        let is_of_others = |reason: &Reason| {
+            matches!(reason.kind, ReasonKind::SeenTwice | ReasonKind::TooManyGrids)
+        };
+        reasons.extend(
+            left_out.into_iter().filter(|reason| !grids.is_empty() && is_of_others(reason)),
+        );
+        let size = [image.width() as u32, image.height() as u32];
+        let grids = grids.into_iter().map(|(grid, _)| grid).collect();
+        let mut found = Detection::new(name, size, grids);
+        found.tone = optics.tone;
+        found.ink = self.ink.or_else(|| {
+            let ink = optics.ink_found?;
+            Some(self.edge_mm.map_or(ink, |edge_mm| ink.on_print(edge_mm)))
+        });
+        found.reasons = reasons;
+        found.timing_ms = timing.laps;
+        found
+    }
+
+    /// The board, where one alone is looked for, if a coarser level of the pyramid shows all of it and nothing else
+    /// that is like it. What finer levels would add is the places of its corners, and these are refined: if one of them
+    /// is not found then, the finer levels are searched too.
+    fn whole_on_coarser_level<const N: usize>(
+        &self,
+        finder: &SaddleFinder<N>,
+        frame: Frame,
+        timing: &mut Timing,
+    ) -> Option<(Judged, Optics)> {
+        let whole = self.labels.whole()?;
+        let pyramid = frame.pyramid;
+        let levels = pyramid.levels();
+        let least = LEAST_PX2_A_CORNER * whole.corners();
+        let coarsest = levels.iter().rposition(|level| level.pixels().len() >= least)?;
+        let seen = (1..=coarsest).rev().find_map(|level| {
+            let coarse = pyramid.from_level(level);
+            let saddles = finder.find(&coarse);
+            if saddles.len() < whole.corners() {
+                return None;
+            }
+            let mut found = grids(finder, &coarse, &saddles, Some(whole));
+            let is_seen = |grid: &SaddleGrid| {
+                whole.is_shown_by(grid) && shortest_edge_px::<N>(grid) >= MIN_COARSE_EDGE_PX
+            };
+            if !found.first().is_some_and(is_seen) {
+                return None;
+            }
+            for placed in found.iter_mut().flat_map(|grid| grid.values_mut()) {
+                placed.position = Pyramid::to_level_0(level, placed.position);
+            }
+            let mut left_out = Vec::new();
+            let labelled = self.plausible::<N>(frame, &found, &mut left_out);
+            let is_alone = labelled.len() == 1 && labelled[0].1.is_none() && left_out.is_empty();
+            is_alone.then_some(labelled)
+        });
+        timing.lap("coarse");
+        let refined = seen.map(|seen| self.refined::<N>(frame, seen));
+        timing.lap("refine");
+        refined.filter(|(grids, _)| {
+            grids.first().is_some_and(|(grid, _)| grid.corners.len() == whole.corners())
+        })
+    }
+
+    /// All grids of a picture with their labels, refined.
+    fn all_grids<const N: usize>(
+        &self,
+        finder: &SaddleFinder<N>,
+        frame: Frame,
+        timing: &mut Timing,
+    ) -> Found {
+        let Frame { image, pyramid } = frame;
+        let saddles = finder.find(pyramid);
+        timing.lap("saddles");
+        let found = grids(finder, pyramid, &saddles, self.labels.whole());
+        let mut left_out = Vec::new();
+        if too_many(pyramid, saddles.len()) {
+            let edge_px = ((image.width() * image.height()) as f64 / saddles.len() as f64).sqrt();
+            let figures = [("edge_px", edge_px), ("needed_edge_px", MIN_UNTAGGED_EDGE_PX)];
+            left_out.push(match edge_px < MIN_UNTAGGED_EDGE_PX {
+                true => Reason::new(ReasonKind::TooSmall, figures),
+                false => Reason::new(ReasonKind::TooManyGrids, []),
+            });
+        }
+        timing.lap("grids");
+        let mut grids = self.plausible::<N>(frame, &found, &mut left_out);
+        timing.lap("labels");
+        if grids.is_empty() && self.labels.are_wanted() {
+            let found = foreshortened_grids(finder, pyramid);
+            grids = self.plausible::<N>(frame, &found, &mut left_out);
+            // Compressed patterns of all kinds have triangles and squares too.
+            grids.retain(|(grid, _)| is_labelled(grid));
+            timing.lap("foreshortened");
+        }
+        let (grids, optics) = self.refined::<N>(frame, grids);
+        timing.lap("refine");
+        Found { grids, optics, left_out, saddles: saddles.len() }
+    }
+
+    /// Grids with their corners refined, those that are still grids, and what they have in common.
+    fn refined<const N: usize>(&self, frame: Frame, grids: Judged) -> (Judged, Optics) {
+        let least = least_untagged_corners(kind::<N>()) as usize;
+        let mut fitter = CornerFitter::default();
+        let (mut refined, reasons): (Vec<Grid>, Vec<Option<Reason>>) = grids.into_iter().unzip();
+        let (optics, are_waves) = self.refine(&mut fitter, frame, &mut refined);
+        let refined = refined.into_iter().zip(reasons).zip(are_waves);
+        let mut grids: Judged = refined
+            .filter(|((grid, _), is_wave)| {
+                is_vouched_for(grid) || grid.corners.len() >= least && !is_wave
+            })
+            .map(|(grid, _)| grid)
+            .collect();
+        let may_have_tags = !self.tag_areas.is_empty();
+        grids.retain(|(grid, _)| {
+            is_labelled(grid) || is_of_squares(frame.image, grid, may_have_tags)
+        });
+        // Of what was no corner, some is gone.
+        refuse_patterns(frame.pyramid, &mut grids);
+        (grids, optics)
+    }
+
+    /// The grids with their labels that may be what is looked for, and why others are left out.
+    fn plausible<const N: usize>(
+        &self,
+        frame: Frame,
+        found: &[SaddleGrid],
+        left_out: &mut Vec<Reason>,
+    ) -> Judged {
+        let mut budget = Budget::default();
+        let found = found.iter().map(|corners| FoundGrid { kind: kind::<N>(), corners });
+        let mut grids: Judged =
+            found.flat_map(|grid| self.labels.label(frame.image, grid, &mut budget)).collect();
+        let least = least_untagged_corners(kind::<N>()) as usize;
+        let most = self.labels.most_corners();
+        let mut refused = None;
+        grids.retain(|(grid, no_labels)| {
+            let (corners, edge_px) = (grid.corners.len(), grid.edge_px().unwrap_or(0.0));
+            let is_large = corners >= least;
+            let why = if edge_px < MIN_UNTAGGED_EDGE_PX {
+                let figures = [("edge_px", edge_px), ("needed_edge_px", MIN_UNTAGGED_EDGE_PX)];
+                Some(Reason::new(ReasonKind::TooSmall, figures))
+            } else if corners > most {
+                let figures = [("corners", corners as f64), ("expected", most as f64)];
+                // Tags that were read tell more.
+                let by_tags = no_labels.clone().filter(|reason| reason.kind.is_of_tags_read());
+                let kind = match self.labels.are_wanted() {
+                    true => ReasonKind::NotWhole,
+                    false => ReasonKind::TooManyCorners,
+                };
+                by_tags.or_else(|| Some(Reason::new(kind, figures)))
+            } else {
+                None
+            };
+            let is_plausible = is_large && why.is_none();
+            refused = refused.take().or(why.filter(|_| is_large && !is_vouched_for(grid)));
+            is_vouched_for(grid) || is_plausible
+        });
+        left_out.extend(refused);
+        refuse_patterns(frame.pyramid, &mut grids);
+        left_out.extend(report_once(&mut grids));
+        let (count, mut corners) = (grids.len(), 0);
+        grids.retain(|(grid, _)| {
+            corners += grid.corners.len();
+            is_vouched_for(grid) || corners <= MOST_CORNERS
+        });
+        left_out.extend((grids.len() < count).then(|| Reason::new(ReasonKind::TooManyGrids, [])));
+        // Labelled grids by panel, then the others; a stable sort keeps the largest first.
+        grids.sort_by_cached_key(|(grid, _)| {
+            (grid.panel.is_none(), grid.target.clone(), grid.panel.unwrap_or(u32::MAX))
+        });
+        grids
+    }
+
+    /// Refines all grids on the level of the pyramid that suits their blur; what they have in common, and for
+    /// each grid whether the blur leaves of it but a wave.
+    fn refine(
+        &self,
+        fitter: &mut CornerFitter,
+        frame: Frame,
+        grids: &mut [Grid],
+    ) -> (Optics, Vec<bool>) {
+        let levels = frame.pyramid.levels();
+        let finest = Level { image: frame.image, number: 0, coarser: &levels[1..] };
+        let blurs = self.refiner.blurs(fitter, finest, grids, &self.tag_areas);
+        for number in (1..=sharp_level(&blurs, levels.len())).rev() {
+            let image = ImageView::from(&levels[number]);
+            let level = Level { image, number, coarser: &levels[number + 1..] };
+            grids.iter_mut().for_each(|grid| grid.moved_to_level(number));
+            let blurs = self.refiner.blurs(fitter, level, grids, &self.tag_areas);
+            let optics = self.refiner.optics(fitter, level, grids, &blurs, &self.tag_areas);
+            // A picture that moved is as sharp as ever across its way.
+            let found = is_sampled(&blurs, optics.narrowest())
+                .then(|| self.refine_under(fitter, image, grids, &optics, &blurs));
+            grids.iter_mut().for_each(|grid| grid.moved_from_level(number));
+            if let Some(are_waves) = found {
+                return (optics, are_waves);
+            }
+        }
+        let optics = self.refiner.optics(fitter, finest, grids, &blurs, &self.tag_areas);
+        let are_waves = self.refine_under(fitter, frame.image, grids, &optics, &blurs);
+        (optics, are_waves)
+    }
+
+    /// [`Self::refine`] in an image that shows the grids under these optics and blurs, px.
+    fn refine_under(
+        &self,
+        fitter: &mut CornerFitter,
+        image: ImageView,
+        grids: &mut [Grid],
+        optics: &Optics,
+        blurs: &[Option<f64>],
+    ) -> Vec<bool> {
+        let refine = |(grid, &blur_px): (&mut Grid, &Option<f64>)| {
+            let edge_px = grid.edge_px().unwrap_or(0.0);
+            self.refiner.refine_grid(fitter, image, grid, &self.tag_areas, optics, blur_px);
+            blur_px.is_some_and(|blur_px| blur_px > max_untagged_blur(grid.kind) * edge_px)
+        };
+        grids.iter_mut().zip(blurs).map(refine).collect()
+    }
+}
+
+/// The shortest distance between neighbours in a grid, px.
+fn shortest_edge_px<const N: usize>(grid: &SaddleGrid) -> f64 {
+    let edges = grid.iter().flat_map(|(&vertex, placed)| {
+        let next = (0..N / 2).filter_map(move |k| grid.get(&(vertex + step::<N>(k))));
+        next.map(|next| next.position.distance(placed.position))
+    });
+    edges.fold(f64::INFINITY, f64::min)
+}
+
+/// Whether tags, or the outline of a mirrored board, tell that a grid is one.
+fn is_vouched_for(grid: &Grid) -> bool {
+    !grid.tags.is_empty() || grid.mirrored
+}
+
+/// Whether a grid is known to be one, by tags or as a whole.
+fn is_labelled(grid: &Grid) -> bool {
+    is_vouched_for(grid) || grid.panel.is_some()
+}
+
+/// Leaves out grids that go on where they end, unless they are known.
+fn refuse_patterns(pyramid: &Pyramid, grids: &mut Judged) {
+    loop {
+        let all: Vec<&Grid> = grids.iter().map(|(grid, _)| grid).collect();
+        let mut goes_on = go_on(&pyramid.levels()[0], &all).into_iter();
+        let count = grids.len();
+        grids.retain(|(grid, _)| goes_on.next() != Some(true) || is_labelled(grid));
+        // What is refused is part of the pattern that others end at.
+        if grids.len() == count {
+            return;
+        }
+    }
+}
+
+fn refiner(kind: GridKind, config: DetectorConfig, edge_mm: Option<f64>) -> Refiner {
+    let ink = match config.ink {
+        Ink::Auto => None,
+        Ink::Um(um) => Some(edge_mm.map_or(0.0, |edge_mm| um / UM_IN_MM / edge_mm)),
+    };
+    Refiner::with_radii(kind, config.refinement, POLYNOMIAL_RADIUS, MODEL_RADIUS)
+        .with_tone(config.tone)
+        .with_ink(ink)
+}
+
+/// Stopwatch of the stages.
+struct Timing {
+    /// The clock, and when the last stage ended.
+    last: Option<(Clock, Duration)>,
+    laps: BTreeMap<String, f64>,
+}
+
+impl Timing {
+    fn start(clock: Option<Clock>) -> Self {
+        Self { last: clock.map(|clock| (clock, clock())), laps: BTreeMap::new() }
+    }
+
+    fn lap(&mut self, stage: &str) {
+        if let Some((clock, last)) = &mut self.last {
+            let now = clock();
+            *self.laps.entry(stage.to_owned()).or_default() +=
+                now.saturating_sub(*last).as_secs_f64() * 1e3;
+            *last = now;
+        }
+    }
+}

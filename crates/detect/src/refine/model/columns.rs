@@ -1,0 +1,271 @@
+//! What the model shows at every pixel of a window, its derivatives, and what it leaves of the picture.
+
+use multiversion::multiversion;
+
+use super::corner::{AMPLITUDE, ANGLE, Corner, LEVEL, LN_BLUR, PARAMS, SLOPE, X, Y};
+use super::look::Look;
+use super::window::{MAX_PIXELS, Window};
+use crate::refine::blurred_corner::{
+    Deltille, FEW_NODES_RHO, Inked, Orthant, Pattern, Shade, SweptChecker, SweptDeltille, Triangle,
+};
+use deltille_core::detection::TONE_PARAMS;
+
+/// What all corners have in common is told by further rows, behind the residual: amplitude · (1 − S²).
+pub(super) const RISE: usize = PARAMS + 1;
+/// S.
+pub(super) const SHADE: usize = PARAMS + 2;
+/// Derivatives by the two parameters of astigmatism.
+pub(super) const ASTIGMATISM: usize = PARAMS + 3;
+/// Derivatives by the strength of the halo.
+pub(super) const HALO: usize = PARAMS + 5;
+/// Derivatives by the ink.
+pub(super) const INK: usize = PARAMS + 6;
+/// Derivatives by the parameters of the tone curve.
+pub(super) const TONE: usize = PARAMS + 7;
+
+/// All of them, in blocks of four.
+pub(super) const ALL: usize = (TONE + TONE_PARAMS).next_multiple_of(4);
+
+/// One row a parameter, then the residual; a column a pixel.
+pub(super) type Columns = [[f32; MAX_PIXELS]; ALL];
+
+/// Fills the columns of a corner in window coordinates; those of what corners have in common where it is
+/// `JOINT`ly fitted.
+pub(super) fn fill_columns<const K: usize, const JOINT: bool>(
+    columns: &mut Columns,
+    pixels: &[f32; MAX_PIXELS],
+    window: &Window,
+    corner: &Corner<K>,
+    look: &Look<K>,
+) {
+    // By constants first: what they rule out is not compiled.
+    if K == 2 {
+        let is_square = look.rho.abs() <= FEW_NODES_RHO;
+        match (look.way, is_square) {
+            (Some(way), true) => {
+                let (still, way) = (Orthant::of_few_nodes(look.rho), [way[0], way[1]]);
+                fill_swept_checker::<K, JOINT, 3>(
+                    columns, pixels, window, corner, look, still, way,
+                );
+            }
+            (Some(way), false) => {
+                let (still, way) = (Orthant::new(look.rho), [way[0], way[1]]);
+                fill_swept_checker::<K, JOINT, 6>(
+                    columns, pixels, window, corner, look, still, way,
+                );
+            }
+            (None, true) => {
+                fill_square::<K, JOINT>(columns, pixels, window, corner, look);
+            }
+            (None, false) => {
+                fill_checker::<K, JOINT>(columns, pixels, window, corner, look);
+            }
+        }
+    } else {
+        match (look.way, look.triangle) {
+            (Some(way), _) => {
+                let way = std::array::from_fn(|k| way.get(k).copied().unwrap_or(0.0));
+                fill_swept_deltille::<K, JOINT>(columns, pixels, window, corner, look, way);
+            }
+            (None, Some(triangle)) => {
+                fill_inked_deltille::<K, JOINT>(columns, pixels, window, corner, look, triangle);
+            }
+            (None, None) => {
+                fill_deltille::<K, JOINT>(columns, pixels, window, corner, look);
+            }
+        }
+    }
+}
+
+#[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
+fn fill_checker<const C: usize, const JOINT: bool>(
+    columns: &mut Columns,
+    pixels: &[f32; MAX_PIXELS],
+    window: &Window,
+    corner: &Corner<C>,
+    look: &Look<C>,
+) {
+    let still = Orthant::new(look.rho);
+    if JOINT || look.has_halo() {
+        fill::<2, C, JOINT>(columns, pixels, window, corner, look, look.haloed(still));
+    } else {
+        fill::<2, C, JOINT>(columns, pixels, window, corner, look, still);
+    }
+}
+
+#[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
+fn fill_square<const C: usize, const JOINT: bool>(
+    columns: &mut Columns,
+    pixels: &[f32; MAX_PIXELS],
+    window: &Window,
+    corner: &Corner<C>,
+    look: &Look<C>,
+) {
+    let still = Orthant::of_few_nodes(look.rho);
+    if JOINT || look.has_halo() {
+        fill::<2, C, JOINT>(columns, pixels, window, corner, look, look.haloed(still));
+    } else {
+        fill::<2, C, JOINT>(columns, pixels, window, corner, look, still);
+    }
+}
+
+#[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
+fn fill_deltille<const C: usize, const JOINT: bool>(
+    columns: &mut Columns,
+    pixels: &[f32; MAX_PIXELS],
+    window: &Window,
+    corner: &Corner<C>,
+    look: &Look<C>,
+) {
+    let still = Deltille;
+    if JOINT || look.has_halo() {
+        fill::<3, C, JOINT>(columns, pixels, window, corner, look, look.haloed(still));
+    } else {
+        fill::<3, C, JOINT>(columns, pixels, window, corner, look, still);
+    }
+}
+
+#[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
+fn fill_inked_deltille<const C: usize, const JOINT: bool>(
+    columns: &mut Columns,
+    pixels: &[f32; MAX_PIXELS],
+    window: &Window,
+    corner: &Corner<C>,
+    look: &Look<C>,
+    triangle: Triangle,
+) {
+    if JOINT || look.has_halo() {
+        let pattern = Inked { edges: look.haloed(Deltille), triangle };
+        fill::<3, C, JOINT>(columns, pixels, window, corner, look, pattern);
+    } else {
+        let pattern = Inked { edges: Deltille, triangle };
+        fill::<3, C, JOINT>(columns, pixels, window, corner, look, pattern);
+    }
+}
+
+#[multiversion(targets("x86_64+avx2"))]
+fn fill_swept_checker<const C: usize, const JOINT: bool, const NODES: usize>(
+    columns: &mut Columns,
+    pixels: &[f32; MAX_PIXELS],
+    window: &Window,
+    corner: &Corner<C>,
+    look: &Look<C>,
+    still: Orthant<NODES>,
+    [across, along]: [f32; 2],
+) {
+    let swept = |by: f32| SweptChecker { pattern: still, way: [across * by, along * by] };
+    if JOINT || look.has_halo() {
+        fill::<2, C, JOINT>(columns, pixels, window, corner, look, look.haloed_of(swept));
+    } else {
+        fill::<2, C, JOINT>(columns, pixels, window, corner, look, swept(1.0));
+    }
+}
+
+#[multiversion(targets("x86_64+avx2"))]
+fn fill_swept_deltille<const C: usize, const JOINT: bool>(
+    columns: &mut Columns,
+    pixels: &[f32; MAX_PIXELS],
+    window: &Window,
+    corner: &Corner<C>,
+    look: &Look<C>,
+    way: [f32; 3],
+) {
+    let swept = |by: f32| SweptDeltille::new(way.map(|way| way * by));
+    if let Some(triangle) = look.triangle {
+        let pattern = Inked { edges: look.haloed_of(swept), triangle };
+        fill::<3, C, JOINT>(columns, pixels, window, corner, look, pattern);
+    } else if JOINT || look.has_halo() {
+        fill::<3, C, JOINT>(columns, pixels, window, corner, look, look.haloed_of(swept));
+    } else {
+        fill::<3, C, JOINT>(columns, pixels, window, corner, look, swept(1.0));
+    }
+}
+
+/// Fills the columns of derivatives and residuals.
+#[inline(always)]
+fn fill<const K: usize, const C: usize, const JOINT: bool>(
+    columns: &mut Columns,
+    pixels: &[f32; MAX_PIXELS],
+    window: &Window,
+    corner: &Corner<C>,
+    look: &Look<C>,
+    pattern: impl Pattern<K>,
+) {
+    let [x, y] = corner.position.as_vec2().to_array();
+    // Directions of the edges, in units of the blur across them.
+    let sines: [f32; K] = std::array::from_fn(|k| (look.turns[k].0 * look.sharpness[k]) as f32);
+    let cosines: [f32; K] = std::array::from_fn(|k| (look.turns[k].1 * look.sharpness[k]) as f32);
+    let bends: [f32; K] = std::array::from_fn(|k| (corner.bends[k] / look.sharpness[k]) as f32);
+    let by_turn: [f32; K] = std::array::from_fn(|k| look.by_turn[k] as f32);
+    let by_angle: [f32; K] =
+        std::array::from_fn(|k| look.rho_by_angle.get(k).map_or(0.0, |&by| by as f32));
+    let by_astigmatism: [[f32; K]; 2] =
+        [0, 1].map(|e| std::array::from_fn(|k| look.by_astigmatism[e][k] as f32));
+    let rho_by_astigmatism = look.rho_by_astigmatism.map(|by| by as f32);
+    let way_by_turn: [f32; K] = std::array::from_fn(|k| look.way_by_turn[k] as f32);
+    let way_by_astigmatism: [[f32; K]; 2] =
+        [0, 1].map(|e| std::array::from_fn(|k| look.way_by_astigmatism[e][k] as f32));
+    let displaced: [f32; K] = std::array::from_fn(|k| look.displaced[k] as f32);
+    let by_ink: [f32; K] = std::array::from_fn(|k| look.by_ink[k] as f32);
+    let (amplitude, level) = (corner.amplitude as f32, corner.level as f32);
+    let [gu, gv] = corner.slope.as_vec2().to_array();
+    let (piece, [low, high]) = (look.piece, look.limits);
+    let n = window.u.len().min(MAX_PIXELS);
+    let (us, vs) = (&window.u[..n], &window.v[..n]);
+    for i in 0..n {
+        let (u, v) = (us[i], vs[i]);
+        let (du, dv) = (u - x, v - y);
+        let along: [f32; K] = std::array::from_fn(|k| cosines[k] * du + sines[k] * dv);
+        let h: [f32; K] = std::array::from_fn(|k| {
+            cosines[k] * dv - sines[k] * du - 0.5 * bends[k] * along[k] * along[k] - displaced[k]
+        });
+        let Shade { f, slopes, correlation, halo, triangle, way } = pattern.at(h);
+        let change = gu * u + gv * v;
+        let gain = 1.0 + change;
+        let shade = f * gain + change * piece.ratio;
+        let (tone, steepness) = piece.at(shade);
+        let model = level + amplitude * tone;
+        let seen = if model > low && model < high { 1.0 } else { 0.0 };
+        let by_shade = amplitude * steepness * seen;
+        let light = by_shade * gain;
+        let (mut by_x, mut by_y, mut by_scale) = (0.0, 0.0, triangle[0]);
+        for k in 0..K {
+            let bent = bends[k] * along[k];
+            by_x += slopes[k] * (sines[k] + bent * cosines[k]);
+            by_y -= slopes[k] * (cosines[k] - bent * sines[k]);
+            by_scale -= slopes[k] * h[k];
+            let across = cosines[k] * dv - sines[k] * du;
+            let turned = along[k] + bent * across + h[k] * by_turn[k];
+            let by = correlation * by_angle[k] - slopes[k] * turned + triangle[1 + k];
+            let by = by + way[k] * way_by_turn[k];
+            columns[ANGLE + k][i] = light * by;
+        }
+        let by_light = by_shade * (f + piece.ratio);
+        columns[X][i] = light * by_x;
+        columns[Y][i] = light * by_y;
+        columns[LN_BLUR][i] = light * by_scale;
+        columns[AMPLITUDE][i] = seen * (tone - steepness * change * piece.ratio);
+        columns[LEVEL][i] = seen * (1.0 + steepness * change);
+        columns[SLOPE][i] = u * by_light;
+        columns[SLOPE + 1][i] = v * by_light;
+        columns[PARAMS][i] = pixels[i] - model.max(low).min(high);
+        if JOINT {
+            columns[RISE][i] = amplitude * seen * (1.0 - shade * shade);
+            columns[SHADE][i] = shade;
+            columns[HALO][i] = light * (halo + by_scale * look.core_by_halo);
+            let mut by = triangle[4];
+            for k in 0..K {
+                by -= slopes[k] * by_ink[k];
+            }
+            columns[INK][i] = light * by;
+            for e in 0..2 {
+                let mut by = correlation * rho_by_astigmatism[e];
+                for k in 0..K {
+                    by -= slopes[k] * h[k] * by_astigmatism[e][k];
+                    by += way[k] * way_by_astigmatism[e][k];
+                }
+                columns[ASTIGMATISM + e][i] = light * by;
+            }
+        }
+    }
+}

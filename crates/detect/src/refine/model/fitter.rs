@@ -1,0 +1,473 @@
+//! A corner fitted by itself, by Levenberg–Marquardt.
+
+use glam::DVec2;
+use nalgebra::{SMatrix, SVector};
+
+use super::columns::{ALL, Columns, fill_columns};
+use super::corner::{ANGLE, Corner, LN_BLUR, MIN_BLUR_PX, PARAMS, SLOPE, X, Y};
+use super::look::Look;
+use super::sums::{ends, products, squares};
+use super::window::{MAX_PIXELS, Window};
+use crate::refine::optics::Optics;
+use crate::refine::small_systems::solved;
+use deltille_core::damping::Damping;
+use deltille_core::detection::Piece;
+use deltille_core::raster::ImageView;
+
+/// Columns that are multiplied with each other: parameters, residual, and what fills blocks of four.
+const BLOCKED: usize = (PARAMS + 1usize).next_multiple_of(4);
+
+/// Prior standard deviation of the illumination's relative slope, 1/px: 10 % across 200 px.
+/// Light that falls to a tenth across 1600 px has 0.0014, which a window of 21 px still tells.
+pub const SLOPE_PRIOR: f64 = 0.0005;
+
+/// Most evaluations of the model; five are usual.
+const MAX_EVALUATIONS: usize = 25;
+
+/// Damping of the first step, which starts from a fit to grey values without blur.
+const DAMPING: f64 = 1e-3;
+
+/// The least damping later on: less than that changes no digit of a step.
+const LEAST_DAMPING: f64 = 1e-6;
+
+/// With less damping than this a small step says that the minimum is near, and not that steps are kept short.
+const HARDLY_DAMPED: f64 = 0.1;
+
+/// The iteration ends with a step whose squared length, in standard deviations of the estimate, is
+/// below this; the next would be smaller by orders of magnitude.
+const CONVERGED: f64 = 0.25;
+
+/// Or with one as short as this, in px, the logarithm of the blur and three times the angles: what it neglects is of the
+/// order of its square, a fiftieth of a deviation in photographs.
+const FINE: f64 = 0.03;
+
+/// A rough fit ends with a step below this, in px and the logarithm of the blur; what is neglected is of the order of
+/// its square.
+const ROUGH: f64 = 0.15;
+
+/// Black and white that differ by less than this part of the contrast have the same piece of a tone curve:
+/// its curvature, at most a third, changes by as small a part of itself.
+const SAME_LIGHT: f64 = 0.01;
+
+/// The same for a start, whose light another fit finds anew.
+const ROUGHLY_SAME_LIGHT: f64 = 0.1;
+
+/// An angle moves its edge as much as the position does at this distance from the corner, px: where the smallest window ends.
+const ARM_PX: f64 = 3.0;
+
+/// Noise assumed at least, of the amplitude, so that noiseless images converge too.
+pub(super) const MIN_NOISE: f64 = 2e-5;
+
+/// A corner may not leave its start by more than this, px: the start is the polynomial's result.
+pub const MAX_WAY_PX: f64 = 1.5;
+
+/// Residuals larger than this part of the amplitude: the window shows something else, unless they differ from
+/// pixel to pixel as much as noise does.
+const MAX_RESIDUAL: f64 = 0.35;
+
+/// Mean squared difference of neighbouring residuals over that of white noise, von Neumann's ratio, above which they
+/// are noise; of what has a shape it is a fraction.
+const MIN_WHITENESS: f64 = 0.7;
+
+/// A position less certain than this is none, px.
+const MAX_SIGMA_PX: f64 = 1.0;
+
+/// Limits of a sensor that nothing reaches.
+const UNLIMITED: [f32; 2] = [f32::NEG_INFINITY, f32::INFINITY];
+
+/// How far a fit goes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Accuracy {
+    /// To some hundredths of a pixel: a start for another fit.
+    Rough,
+    /// As far as the noise allows.
+    Full,
+}
+
+/// A fitted corner and what is known about its errors.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Fitted<const K: usize> {
+    /// The corner.
+    pub corner: Corner<K>,
+    /// Covariance xx, xy, yy of the position, px².
+    pub cov: [f64; 3],
+    /// Standard deviation of the noise, of full scale.
+    pub noise: f64,
+    /// Mean squared difference of neighbouring residuals over that of white noise: less where they have a shape.
+    pub whiteness: f64,
+}
+
+/// Fits corners; holds the work space, so one fitter serves one thread.
+#[derive(Clone, Debug)]
+pub struct CornerFitter {
+    /// Pixels of full scale 1.
+    pub(super) pixels: Box<[f32; MAX_PIXELS]>,
+    /// Derivatives by the parameters, then the residual.
+    pub(super) columns: Box<Columns>,
+    /// Black and white that pixels have reached, or beyond all.
+    pub(super) limits: [f32; 2],
+}
+
+impl Default for CornerFitter {
+    fn default() -> Self {
+        Self {
+            pixels: Box::new([0.0; MAX_PIXELS]),
+            columns: Box::new([[0.0; MAX_PIXELS]; ALL]),
+            limits: UNLIMITED,
+        }
+    }
+}
+
+/// The normal equations at one place.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Normal {
+    /// JᵀJ, with ones for parameters that are not there.
+    pub(super) matrix: SMatrix<f64, PARAMS, PARAMS>,
+    /// Jᵀr.
+    pub(super) gradient: SVector<f64, PARAMS>,
+    /// rᵀr.
+    pub(super) cost: f64,
+}
+
+impl CornerFitter {
+    /// The corner near `start`; `None` when the window leaves the image or the fit is no corner.
+    pub fn fit<const K: usize>(
+        &mut self,
+        image: ImageView,
+        window: &Window,
+        start: &Corner<K>,
+        optics: &Optics,
+        accuracy: Accuracy,
+    ) -> Option<Fitted<K>> {
+        let centre = self.load(image, window, start.position)?;
+        let start = Corner { position: start.position - centre, ..*start };
+        let mut fitted = self.descend(window, &start, optics, accuracy);
+        if fitted.is_none() && self.limits != UNLIMITED {
+            // Black and white may lie just there: a drawn page has no others, and nothing but them.
+            self.limits = UNLIMITED;
+            fitted = self.descend(window, &start, optics, accuracy);
+        }
+        fitted.map(|fitted| {
+            let position = fitted.corner.position + centre;
+            Fitted { corner: Corner { position, ..fitted.corner }, ..fitted }
+        })
+    }
+
+    /// [`Self::fit`] to the pixels that are loaded, in window coordinates.
+    fn descend<const K: usize>(
+        &mut self,
+        window: &Window,
+        start: &Corner<K>,
+        optics: &Optics,
+        accuracy: Accuracy,
+    ) -> Option<Fitted<K>> {
+        let start = *start;
+        let freedom = (window.count - (ANGLE + K)) as f64;
+        let mut corner = start;
+        let mut damping = Damping::from(DAMPING).at_least(LEAST_DAMPING, 0.0);
+        // The curve's piece is held, so that steps know all that they change, and made anew after the first
+        // step, which finds the light, and for what came of them all.
+        let mut toned = start;
+        let mut piece = optics.piece(toned.level, toned.amplitude);
+        let mut normal = self.normal(window, &corner, optics, piece);
+        let mut converged = false;
+        for evaluations in 1..MAX_EVALUATIONS {
+            let noise = noise(&normal, &corner, freedom);
+            let (mut matrix, mut gradient) = with_prior(&normal, &corner, noise);
+            if corner.blur_px <= MIN_BLUR_PX && gradient[LN_BLUR] < 0.0 {
+                // No sharper than that.
+                (0..PARAMS).for_each(|i| (matrix[(i, LN_BLUR)], matrix[(LN_BLUR, i)]) = (0.0, 0.0));
+                (matrix[(LN_BLUR, LN_BLUR)], gradient[LN_BLUR]) = (1.0, 0.0);
+            }
+            let mut damped = matrix;
+            for i in 0..PARAMS {
+                damped[(i, i)] = damping.grown(damped[(i, i)]);
+            }
+            let rows = std::array::from_fn::<[f64; PARAMS + 1], PARAMS, _>(|i| {
+                std::array::from_fn(|j| if j < PARAMS { damped[(i, j)] } else { gradient[i] })
+            });
+            let solution = solved(rows)?;
+            let step = SVector::from_fn(|i, _| solution[i][PARAMS]);
+            let Some(moved) = corner.moved(&step, window.radius) else {
+                damping.stiffen();
+                continue;
+            };
+            let is_toned_anew =
+                |tolerance| optics.is_toned() && !moved.is_lit_like(&toned, tolerance);
+            let (is_last, tolerance) = match accuracy {
+                Accuracy::Full => {
+                    let small = step.dot(&(matrix * step)) < CONVERGED * noise * noise;
+                    (small || is_within(&step, FINE), SAME_LIGHT)
+                }
+                Accuracy::Rough => (is_within(&step, ROUGH), ROUGHLY_SAME_LIGHT),
+            };
+            if is_last && damping.part() < HARDLY_DAMPED {
+                converged = true;
+                corner = moved;
+                if !is_toned_anew(tolerance) {
+                    normal.cost = (normal.cost - gradient.dot(&step)).max(0.0);
+                    break;
+                }
+                toned = moved;
+                piece = optics.piece(toned.level, toned.amplitude);
+                normal = self.normal(window, &corner, optics, piece);
+                continue;
+            }
+            if evaluations == 1 && is_toned_anew(SAME_LIGHT) {
+                toned = moved;
+                piece = optics.piece(toned.level, toned.amplitude);
+            }
+            let there = self.normal(window, &moved, optics, piece);
+            let weight = (noise / SLOPE_PRIOR).powi(2);
+            let prior = |c: &Corner<K>| weight * c.slope.length_squared();
+            if there.cost + prior(&moved) <= normal.cost + prior(&corner) {
+                (corner, normal) = (moved, there);
+                damping.ease();
+            } else {
+                damping.stiffen();
+            }
+        }
+        let noise = noise(&normal, &corner, freedom);
+        let matrix = with_prior(&normal, &corner, noise).0;
+        let rows = std::array::from_fn::<[f64; PARAMS + 2], PARAMS, _>(|i| {
+            std::array::from_fn(|j| match j.checked_sub(PARAMS) {
+                None => matrix[(i, j)],
+                Some(column) => f64::from(i == column),
+            })
+        });
+        let solution = solved(rows)?;
+        let cov = |i: usize, j: usize| noise * noise * solution[i][PARAMS + j];
+        let way = corner.position.distance(start.position);
+        let whiteness = self.whiteness(window);
+        let trusted = converged
+            && way <= MAX_WAY_PX
+            && corner.edges_are_apart()
+            && (noise < MAX_RESIDUAL * corner.amplitude.abs() || whiteness > MIN_WHITENESS)
+            && cov(X, X) + cov(Y, Y) < MAX_SIGMA_PX * MAX_SIGMA_PX;
+        trusted.then_some(Fitted {
+            corner,
+            cov: std::array::from_fn(|i| {
+                let (row, column) = [(X, X), (X, Y), (Y, Y)][i];
+                optics.inflation * cov(row, column) + optics.shift[i]
+            }),
+            noise,
+            whiteness,
+        })
+    }
+
+    /// Takes the pixels around a position; the centre of the window, or `None` outside the image.
+    pub(super) fn load(
+        &mut self,
+        image: ImageView,
+        window: &Window,
+        position: DVec2,
+    ) -> Option<DVec2> {
+        let centre = position.round();
+        window.read(image, centre, &mut self.pixels)?;
+        let (low, high) = ends(&self.pixels[..window.count]);
+        self.limits = [
+            if low <= 0.0 { low } else { UNLIMITED[0] },
+            if high >= 1.0 { high } else { UNLIMITED[1] },
+        ];
+        Some(centre)
+    }
+
+    /// The pixels around a position, full scale 1; `None` where one lies outside the image.
+    pub(crate) fn pixels(
+        &mut self,
+        image: ImageView,
+        window: &Window,
+        position: DVec2,
+    ) -> Option<&[f32]> {
+        self.load(image, window, position)?;
+        Some(&self.pixels[..window.count])
+    }
+
+    /// Von Neumann's ratio of the residuals along the rows: 1 for white noise.
+    fn whiteness(&self, window: &Window) -> f64 {
+        let mut rest = &self.columns[PARAMS][..window.count];
+        let (mut sum, mut of_steps, mut steps) = (0.0, 0.0, 0);
+        for &(_, length) in &window.runs {
+            let (run, after) = rest.split_at(length);
+            let [square, of_step] = squares(run).map(f64::from);
+            sum += square;
+            of_steps += of_step;
+            steps += length - 1;
+            rest = after;
+        }
+        of_steps / (2 * steps) as f64 / (sum / window.count as f64)
+    }
+
+    /// The normal equations of the pixels at a corner in window coordinates.
+    pub(super) fn normal<const K: usize>(
+        &mut self,
+        window: &Window,
+        corner: &Corner<K>,
+        optics: &Optics,
+        piece: Piece,
+    ) -> Normal {
+        self.fill::<K, false>(window, corner, optics, piece);
+        let products = products::<BLOCKED>(&mut self.columns, window.count);
+        let mut normal = Normal {
+            matrix: SMatrix::identity(),
+            gradient: SVector::zeros(),
+            cost: products[PARAMS][PARAMS],
+        };
+        for (i, row) in products.iter().enumerate().take(ANGLE + K) {
+            normal.gradient[i] = row[PARAMS];
+            for (j, &product) in row.iter().enumerate().take(ANGLE + K).skip(i) {
+                normal.matrix[(i, j)] = product;
+                normal.matrix[(j, i)] = product;
+            }
+        }
+        normal
+    }
+
+    /// [`fill_columns`] of a corner in window coordinates.
+    pub(super) fn fill<const K: usize, const JOINT: bool>(
+        &mut self,
+        window: &Window,
+        corner: &Corner<K>,
+        optics: &Optics,
+        piece: Piece,
+    ) {
+        let look = Look::of(corner, optics, piece, self.limits);
+        fill_columns::<K, JOINT>(&mut self.columns, &self.pixels, window, corner, &look);
+    }
+}
+
+/// Whether a step in position, px, and blur, by its logarithm, is shorter than this, and what one in angles moves at
+/// [`ARM_PX`].
+fn is_within(step: &SVector<f64, PARAMS>, limit: f64) -> bool {
+    step[X].hypot(step[Y]) < limit
+        && step[LN_BLUR].abs() < limit
+        && step.iter().skip(ANGLE).all(|turn| turn.abs() < limit / ARM_PX)
+}
+
+/// The noise that the residuals show.
+pub(super) fn noise<const K: usize>(normal: &Normal, corner: &Corner<K>, freedom: f64) -> f64 {
+    (normal.cost / freedom).sqrt().max(MIN_NOISE * corner.amplitude.abs())
+}
+
+/// The normal equations with the prior on the slopes.
+pub(super) fn with_prior<const K: usize>(
+    normal: &Normal,
+    corner: &Corner<K>,
+    noise: f64,
+) -> (SMatrix<f64, PARAMS, PARAMS>, SVector<f64, PARAMS>) {
+    let weight = (noise / SLOPE_PRIOR).powi(2);
+    let (mut matrix, mut gradient) = (normal.matrix, normal.gradient);
+    for (i, slope) in corner.slope.to_array().iter().enumerate() {
+        matrix[(SLOPE + i, SLOPE + i)] += weight;
+        gradient[SLOPE + i] -= weight * slope;
+    }
+    (matrix, gradient)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use deltille_core::raster::Gray;
+
+    /// A corner aside of its window's centre, in slanting light, whose edges are bent.
+    fn corner<const K: usize>(amplitude: f64) -> Corner<K> {
+        Corner {
+            position: DVec2::new(0.3, -0.2),
+            blur_px: 1.1,
+            amplitude,
+            level: 0.5,
+            slope: DVec2::new(0.0004, -0.0002),
+            angles: std::array::from_fn(|k| 0.4 + 1.1 * k as f64),
+            bends: std::array::from_fn(|k| 0.004 * k as f64 - 0.003),
+            across_px: std::array::from_fn(|k| 20.0 + k as f64),
+        }
+    }
+
+    /// A picture as it is, and one that is blurred unevenly, with a halo and ink.
+    fn optics() -> [Optics; 2] {
+        let mut all = Optics::default();
+        (all.astigmatism, all.halo, all.ink) = ([0.2, -0.15], [0.3, 2.5], 0.4);
+        [Optics::default(), all]
+    }
+
+    /// What the model shows of a corner at the pixels of a window.
+    fn shown<const K: usize>(window: &Window, corner: &Corner<K>, optics: &Optics) -> Vec<f32> {
+        let mut fitter = CornerFitter::default();
+        let piece = optics.piece(corner.level, corner.amplitude);
+        fitter.fill::<K, false>(window, corner, optics, piece);
+        fitter.columns[PARAMS][..window.count].iter().map(|residual| -residual).collect()
+    }
+
+    #[test]
+    fn derivatives_are_those_of_what_is_shown() {
+        fn check<const K: usize>(corner: &Corner<K>, optics: &Optics) {
+            let window = Window::new(8);
+            let mut fitter = CornerFitter::default();
+            let piece = optics.piece(corner.level, corner.amplitude);
+            fitter.fill::<K, false>(&window, corner, optics, piece);
+            for parameter in 0..ANGLE + K {
+                let size = if (SLOPE..ANGLE).contains(&parameter) { 1e-3 } else { 4e-3 };
+                let [after, before] = [size, -size].map(|by| {
+                    let mut step = SVector::zeros();
+                    step[parameter] = by;
+                    shown(&window, &corner.moved(&step, window.radius).unwrap(), optics)
+                });
+                let column = &fitter.columns[parameter][..window.count];
+                let scale = column.iter().fold(0.0f32, |most, by| most.max(by.abs()));
+                for ((by, after), before) in column.iter().zip(after).zip(before) {
+                    let quotient = (after - before) / (2.0 * size as f32);
+                    let off = (by - quotient).abs() / scale;
+                    // What ink leaves between three edges is told by difference quotients itself.
+                    let most = if optics.ink == 0.0 { 1e-3 } else { 2e-2 };
+                    assert!(off < most, "{K} edges, parameter {parameter}: {by} {quotient}");
+                }
+            }
+        }
+        for (optics, amplitude) in optics().iter().zip([0.35, -0.35]) {
+            check::<2>(&corner(amplitude), optics);
+            check::<3>(&corner(amplitude), optics);
+        }
+    }
+
+    /// Of what the model shows the fit leaves nothing, and finds every parameter, from a start beside it.
+    #[test]
+    fn a_corner_is_found_in_its_own_picture() {
+        fn check<const K: usize>(truth: &Corner<K>, optics: &Optics) {
+            const MIDDLE: usize = 12;
+            let window = Window::new(9);
+            let whole = Window::new(MIDDLE);
+            let pixels = shown(&whole, truth, optics);
+            let side = 2 * MIDDLE + 1;
+            let picture = Gray::from_fn(side, side, |x, y| pixels[y * side + x]);
+            let position = truth.position + MIDDLE as f64;
+            let start = Corner {
+                position: position + DVec2::new(-0.4, 0.3),
+                blur_px: 0.8 * truth.blur_px,
+                amplitude: 0.8 * truth.amplitude,
+                slope: DVec2::ZERO,
+                angles: truth.angles.map(|angle| angle + 0.05),
+                ..*truth
+            };
+            let mut fitter = CornerFitter::default();
+            let found = fitter.fit((&picture).into(), &window, &start, optics, Accuracy::Full);
+            let found = found.expect("a corner");
+            assert!(found.noise < 1e-3 * truth.amplitude.abs(), "{K} edges: {found:?}");
+            let found = found.corner;
+            let off = found.position - position;
+            assert!(off.length() < 1e-3, "{K} edges: {off:?}");
+            let pairs = [
+                (found.blur_px, truth.blur_px),
+                (found.amplitude, truth.amplitude),
+                (found.level, truth.level),
+            ];
+            let angles = found.angles.into_iter().zip(truth.angles);
+            for (found, truth) in pairs.into_iter().chain(angles) {
+                assert!((found - truth).abs() < 3e-3, "{K} edges: {found} {truth}");
+            }
+        }
+        for (optics, amplitude) in optics().iter().zip([0.35, -0.35]) {
+            check::<2>(&corner(amplitude), optics);
+            check::<3>(&corner(amplitude), optics);
+        }
+    }
+}

@@ -1,0 +1,108 @@
+//! Which groups of parameters differ from nothing by more than chance.
+
+use nalgebra::{DMatrix, DVector};
+
+use super::optics::{HALO, INK, PARAMS};
+use deltille_core::detection::TONE_PARAMS;
+
+/// Groups of parameters that are used together.
+const GROUPS: [&[usize]; 4] = [&[0, 1, 2], &[3, 4], &[HALO], &[INK]];
+
+/// A group is used when its probability by chance is below 1 : 1000: χ² of three, two and one
+/// degrees of freedom. Astigmatism is used from 1 : 10 on, because every picture is blurred a
+/// little more in one direction, and from a grazing angle that resembles a tone curve.
+const CHI2: [f64; 4] = [16.3, 4.6, 10.8, 10.8];
+
+/// The threshold of one degree of freedom, 1 : 1000.
+const CHI2_OF_ONE: f64 = 10.8;
+
+/// A curve that displaces no corner is used where it explains this fraction of the noise.
+const NOTICED: f64 = 0.05;
+
+/// Values of all parameters, with the information on the active ones.
+pub(super) struct Estimate {
+    pub(super) vector: [f64; PARAMS],
+    pub(super) active: Vec<usize>,
+    /// The inverse of their covariance.
+    pub(super) information: DMatrix<f64>,
+    /// Derivatives of κ₀ by the parameters of the curve.
+    pub(super) kappa_slopes: [f64; TONE_PARAMS],
+    /// Number of corners from which they come.
+    pub(super) pixels: usize,
+}
+
+impl Estimate {
+    pub(super) fn values(&self) -> DVector<f64> {
+        DVector::from_iterator(self.active.len(), self.active.iter().map(|&p| self.vector[p]))
+    }
+
+    /// The estimate without the groups whose evidence is below this fraction of the threshold,
+    /// removed one by one from the weakest on, since one group may explain another.
+    pub(super) fn supported(mut self, part: f64) -> Self {
+        loop {
+            let present =
+                GROUPS.iter().zip(CHI2).filter(|(group, _)| self.active.contains(&group[0]));
+            let present = present.map(|(group, limit)| (self.evidence(group) / limit, group));
+            match present.min_by(|a, b| a.0.total_cmp(&b.0)) {
+                Some((ratio, group)) if ratio <= part => self = self.without(group),
+                _ => return self,
+            }
+        }
+    }
+
+    /// Evidence against a group being zero, in squared standard deviations.
+    ///
+    /// The part of a curve besides κ₀ displaces no corner, and occurs in every picture whose blur
+    /// differs a little from the model. It counts where it is more than a twentieth of the noise.
+    fn evidence(&self, group: &[usize]) -> f64 {
+        let places = |inside: bool| -> Vec<usize> {
+            let all = 0..self.active.len();
+            all.filter(|&i| group.contains(&self.active[i]) == inside).collect()
+        };
+        let (own, others) = (places(true), places(false));
+        let between = |a: &[usize], b: &[usize]| self.information.select_rows(a).select_columns(b);
+        let value = self.values().select_rows(&own);
+        let shared = match between(&others, &others).cholesky() {
+            _ if others.is_empty() => DMatrix::zeros(own.len(), own.len()),
+            Some(factor) => between(&own, &others) * factor.solve(&between(&others, &own)),
+            None => return 0.0,
+        };
+        let information = between(&own, &own) - shared;
+        let chi2 = value.dot(&(&information * &value));
+        if group[0] != 0 {
+            return chi2;
+        }
+        let slopes = DVector::from_column_slice(&self.kappa_slopes);
+        let Some(factor) = information.cholesky() else { return 0.0 };
+        let of_kappa = slopes.dot(&value).powi(2) / slopes.dot(&factor.solve(&slopes));
+        let of_noise = chi2 / (NOTICED * self.pixels as f64);
+        CHI2[0] * (of_kappa / CHI2_OF_ONE).max(of_noise)
+    }
+
+    /// The most likely values of these parameters if those of all other groups are zero.
+    pub(super) fn only(self, active: &[usize]) -> Self {
+        let others = GROUPS.iter().filter(|group| !active.contains(&group[0]));
+        let present = |all: &Self, group: &[usize]| all.active.contains(&group[0]);
+        others.fold(
+            self,
+            |rest, group| if present(&rest, group) { rest.without(group) } else { rest },
+        )
+    }
+
+    /// The most likely values of the other parameters if a group is zero.
+    fn without(&self, group: &[usize]) -> Self {
+        let kept: Vec<usize> =
+            (0..self.active.len()).filter(|&i| !group.contains(&self.active[i])).collect();
+        let right = (&self.information * self.values()).select_rows(&kept);
+        let information = self.information.select_rows(&kept).select_columns(&kept);
+        let values = match information.clone().cholesky() {
+            Some(factor) => factor.solve(&right),
+            None => DVector::zeros(kept.len()),
+        };
+        let active: Vec<usize> = kept.iter().map(|&i| self.active[i]).collect();
+        let mut vector = self.vector;
+        group.iter().for_each(|&p| vector[p] = 0.0);
+        active.iter().zip(&values).for_each(|(&p, value)| vector[p] = *value);
+        Self { vector, active, information, ..*self }
+    }
+}
