@@ -11,12 +11,12 @@ pub(super) struct Stop(Option<Arc<AtomicBool>>);
 
 impl Stop {
     /// A flag that may be raised.
-    pub fn by(flag: Arc<AtomicBool>) -> Self {
+    pub(crate) fn by(flag: Arc<AtomicBool>) -> Self {
         Self(Some(flag))
     }
 
     /// Whether the work is to end.
-    pub fn is_raised(&self) -> bool {
+    pub(crate) fn is_raised(&self) -> bool {
         self.0.as_ref().is_some_and(|flag| flag.load(Ordering::Relaxed))
     }
 }

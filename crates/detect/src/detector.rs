@@ -1,7 +1,8 @@
 //! The detector of targets: what it looks for, and what it finds in a picture, of one tiling or of both.
 
 use super::config::DetectorConfig;
-use super::one_tiling::OneTiling;
+use super::levels::{MIN_LEVEL_SIDE, levels_of};
+use super::one_tiling::{Frame, OneTiling};
 use super::scene::{SceneError, check_detectable, check_distinct};
 use crate::labels::grid_labels::Labels;
 use crate::refine::clearance::TagAreas;
@@ -9,7 +10,7 @@ use deltille_core::Clock;
 use deltille_core::detection::{Detection, InkEstimate, ReasonKind};
 use deltille_core::family::{Family, FamilyError};
 use deltille_core::lattice::GridKind;
-use deltille_core::raster::ImageView;
+use deltille_core::raster::{ImageView, Pyramid};
 use deltille_core::targets::{Target, TargetIdentity};
 
 /// Finds grids in images and labels their corners.
@@ -196,9 +197,13 @@ impl Detector {
 
     /// [`Self::detect`], compiled here and not in every crate that uses it.
     fn detect_view(&self, image: ImageView, name: &str) -> Detection {
-        let found = self.main.detect(image, name);
+        let mut timing = self.main.timing();
+        let pyramid = Pyramid::new(image, levels_of(image), MIN_LEVEL_SIDE);
+        let frame = Frame { image, pyramid: &pyramid };
+        timing.lap("pyramid");
+        let found = self.main.detect(frame, timing, name);
         let mut found = match &self.other {
-            Some(other) => both(found, other.detect(image, name)),
+            Some(other) => both(found, other.detect(frame, other.timing(), name)),
             None => found,
         };
         found.targets = self.targets.clone();

@@ -4,7 +4,6 @@ use std::collections::BTreeMap;
 use std::time::Duration;
 
 use super::config::DetectorConfig;
-use super::levels::{MIN_LEVEL_SIDE, levels_of};
 use super::nothing_seen::nothing_found;
 use super::tiling::{CHECKER, DELTILLE, kind, step};
 use crate::corners::saddles::{SaddleFinder, too_many};
@@ -60,9 +59,9 @@ const MODEL_RADIUS: usize = 10;
 
 /// A picture and its pyramid.
 #[derive(Clone, Copy)]
-struct Frame<'a> {
-    image: ImageView<'a>,
-    pyramid: &'a Pyramid<'a>,
+pub(super) struct Frame<'a> {
+    pub(super) image: ImageView<'a>,
+    pub(super) pyramid: &'a Pyramid<'a>,
 }
 
 /// Grids, each with why it has no labels.
@@ -142,30 +141,33 @@ impl OneTiling {
     }
 
     /// What a picture shows; `name` is only noted in the result.
-    pub(super) fn detect(&self, image: ImageView, name: &str) -> Detection {
+    pub(super) fn detect(&self, frame: Frame, timing: Timing, name: &str) -> Detection {
         match &self.finder {
-            Finder::Deltille(finder) => self.detect_with(finder, image, name),
-            Finder::Checker(finder) => self.detect_with(finder, image, name),
+            Finder::Deltille(finder) => self.detect_with(finder, frame, timing, name),
+            Finder::Checker(finder) => self.detect_with(finder, frame, timing, name),
         }
+    }
+
+    /// The durations of its stages, from now on.
+    pub(super) fn timing(&self) -> Timing {
+        Timing::start(self.clock)
     }
 
     fn detect_with<const N: usize>(
         &self,
         finder: &SaddleFinder<N>,
-        image: ImageView,
+        frame: Frame,
+        mut timing: Timing,
         name: &str,
     ) -> Detection {
-        let mut timing = Timing::start(self.clock);
-        let pyramid = Pyramid::new(image, levels_of(image), MIN_LEVEL_SIDE);
-        let frame = Frame { image, pyramid: &pyramid };
-        timing.lap("pyramid");
+        let Frame { image, pyramid } = frame;
         let whole = self.whole_on_coarser_level(finder, frame, &mut timing);
         let Found { grids, optics, left_out, saddles } = match whole {
             Some((grids, optics)) => Found { grids, optics, left_out: Vec::new(), saddles: 0 },
             None => self.all_grids(finder, frame, &mut timing),
         };
         let mut reasons = if grids.is_empty() {
-            let nothing = || nothing_found::<N>(&pyramid, saddles);
+            let nothing = || nothing_found::<N>(pyramid, saddles);
             vec![left_out.first().cloned().unwrap_or_else(nothing)]
         } else if self.labels.are_wanted() && grids.iter().all(|(_, reason)| reason.is_some()) {
             let of_grid = |(i, (_, reason)): (usize, &(Grid, Option<Reason>))| {
@@ -440,7 +442,7 @@ fn refiner(kind: GridKind, config: DetectorConfig, edge_mm: Option<f64>) -> Refi
 }
 
 /// Stopwatch of the stages.
-struct Timing {
+pub(super) struct Timing {
     /// The clock, and when the last stage ended.
     last: Option<(Clock, Duration)>,
     laps: BTreeMap<String, f64>,
@@ -451,7 +453,7 @@ impl Timing {
         Self { last: clock.map(|clock| (clock, clock())), laps: BTreeMap::new() }
     }
 
-    fn lap(&mut self, stage: &str) {
+    pub(super) fn lap(&mut self, stage: &str) {
         if let Some((clock, last)) = &mut self.last {
             let now = clock();
             *self.laps.entry(stage.to_owned()).or_default() +=

@@ -10,27 +10,27 @@
 use deltille_core::lattice::{GridKind, Vertex};
 
 /// Rays at a corner of a deltille grid.
-pub const DELTILLE: usize = 6;
+pub(crate) const DELTILLE: usize = 6;
 
 /// Rays at a corner of a checkerboard.
-pub const CHECKER: usize = 4;
+pub(crate) const CHECKER: usize = 4;
 
 /// The tiling with N rays at a corner.
-pub const fn kind<const N: usize>() -> GridKind {
+pub(crate) const fn kind<const N: usize>() -> GridKind {
     if N == DELTILLE { GridKind::Deltille } else { GridKind::Checker }
 }
 
 /// The step along direction `k` of the lattice, counted modulo N.
-pub fn step<const N: usize>(k: usize) -> Vertex {
+pub(crate) fn step<const N: usize>(k: usize) -> Vertex {
     kind::<N>().steps()[k % N]
 }
 
 /// The N neighbours of a vertex, counter-clockwise.
-pub fn neighbours<const N: usize>(vertex: Vertex) -> [Vertex; N] {
+pub(crate) fn neighbours<const N: usize>(vertex: Vertex) -> [Vertex; N] {
     std::array::from_fn(|k| vertex + step::<N>(k))
 }
 
 /// Vertices of the tiles whose first vertex is `vertex`, counter-clockwise.
-pub fn tiles_from<const N: usize>(vertex: Vertex) -> Vec<Vec<Vertex>> {
+pub(crate) fn tiles_from<const N: usize>(vertex: Vertex) -> Vec<Vec<Vertex>> {
     kind::<N>().tiles_from(vertex).map(|tile| tile.vertices().collect()).collect()
 }

@@ -15,14 +15,14 @@ use deltille_core::family::nearer;
 
 /// Which vertices exclude each other; lists in one array.
 #[derive(Clone, Debug)]
-pub struct ConflictGraph {
+pub(crate) struct ConflictGraph {
     starts: Vec<usize>,
     lists: Vec<u32>,
 }
 
 impl ConflictGraph {
     /// The graph of `n` vertices with the given neighbours of each, a symmetric relation.
-    pub fn new(n: usize, neighbours: impl Fn(usize) -> Vec<u32> + Sync + Send) -> Self {
+    pub(crate) fn new(n: usize, neighbours: impl Fn(usize) -> Vec<u32> + Sync + Send) -> Self {
         let rows: Vec<Vec<u32>> = (0..n).into_par_iter().map(neighbours).collect();
         let mut starts = vec![0];
         starts.extend(rows.iter().scan(0, |sum, row| {
@@ -34,7 +34,11 @@ impl ConflictGraph {
 
     /// Which words are too near to each other, in any turn. Where `halt` came first some
     /// conflicts are missing.
-    pub fn of_words(screen: &Screen, pool: &[u64], halt: impl Fn() -> bool + Sync + Send) -> Self {
+    pub(crate) fn of_words(
+        screen: &Screen,
+        pool: &[u64],
+        halt: impl Fn() -> bool + Sync + Send,
+    ) -> Self {
         let turned: Vec<u64> = pool.iter().flat_map(|&w| screen.words().turns(w)).collect();
         Self::new(pool.len(), |i| {
             if halt() {
@@ -61,7 +65,7 @@ impl ConflictGraph {
 
     /// A large independent set, grown from `initial` (itself independent). Stops after `steps`
     /// moves or when `stop` says so, which is asked now and then.
-    pub fn search(
+    pub(crate) fn search(
         &self,
         initial: &[u32],
         seed: u64,

@@ -20,14 +20,14 @@ const LISTED_BITS: u32 = 16;
 
 /// All words that the rules admit, one of each orbit, and their conflicts.
 #[derive(Clone, Debug)]
-pub struct AllWords {
+pub(crate) struct AllWords {
     words: Vec<u64>,
     graph: ConflictGraph,
 }
 
 impl AllWords {
     /// `None` where there are too many, or `halt` came first.
-    pub fn new(screen: &Screen, halt: &(dyn Fn() -> bool + Sync)) -> Option<Self> {
+    pub(crate) fn new(screen: &Screen, halt: &(dyn Fn() -> bool + Sync)) -> Option<Self> {
         let words = screen.words();
         if words.dimension().bits() > LISTED_BITS {
             return None;
@@ -49,7 +49,7 @@ impl AllWords {
 }
 
 /// Annealing of one union of cosets.
-pub struct Joint<'a> {
+pub(crate) struct Joint<'a> {
     pub screen: &'a Screen,
     pub union: &'a CosetUnion,
     pub arranger: &'a Arranger,
@@ -58,7 +58,7 @@ pub struct Joint<'a> {
 
 impl Joint<'_> {
     /// The best arrangement found from `start`, and its codes.
-    pub fn anneal(
+    pub(crate) fn anneal(
         &self,
         start: &Arrangement,
         seed: u64,

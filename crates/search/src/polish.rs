@@ -12,14 +12,14 @@ use super::independent::ConflictGraph;
 use deltille_core::family::{Control, Screen};
 
 /// Words are counted in a table of all of them up to this size.
-pub const MAX_BITS: u32 = 25;
+pub(crate) const MAX_BITS: u32 = 25;
 
 /// Candidates taken into one round: their conflicts must fit in memory.
 const POOL: usize = 24_000;
 
 /// How long and from where to search.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Effort {
+pub(crate) struct Effort {
     pub seed: u64,
     pub rounds: u32,
     /// Moves of the local search in a round.
@@ -30,7 +30,7 @@ pub struct Effort {
 
 /// A family at least as large as `codes`, which has to be valid. Every code of the result is
 /// admitted by the screen and its distance from all others holds.
-pub fn polish(
+pub(crate) fn polish(
     screen: &Screen,
     codes: Vec<u64>,
     effort: Effort,
@@ -54,7 +54,7 @@ pub fn polish(
 
 /// One round. It has random numbers of its own, so that the rounds after it do not depend on
 /// whether the search was interrupted in between.
-pub fn round(
+pub(crate) fn round(
     screen: &Screen,
     codes: &[u64],
     effort: Effort,

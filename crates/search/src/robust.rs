@@ -15,7 +15,7 @@ const STEPS: u64 = 4_000_000;
 
 /// A construction that lists more of its words, and the codes that it lists. What it lists by itself is taken in order,
 /// which is seldom the best.
-pub fn with_the_most_codes(
+pub(crate) fn with_the_most_codes(
     screen: &Screen,
     construction: AlgebraicConstruction,
     codes: Vec<u64>,

@@ -91,7 +91,7 @@ pub(super) struct Opinions {
 
 impl Opinions {
     /// Tests all frames at a minimum; `None` where cameras are known or frames are too few.
-    pub fn of(settled: &Settled, loss: Loss) -> Option<Self> {
+    pub(super) fn of(settled: &Settled, loss: Loss) -> Option<Self> {
         let pulls = pulls(settled, loss)?;
         let told = pulls.iter().flatten().filter(|pull| pull.freedom > 0.0);
         let told: Vec<Pull> = told.copied().collect();

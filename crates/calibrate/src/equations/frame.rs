@@ -18,7 +18,7 @@ pub(crate) struct OfFrame {
 
 impl OfFrame {
     /// From the blocks of the frame. `None` where the pose is open.
-    pub fn of(locals: Vec<Local>, shared: usize) -> Option<Self> {
+    pub(crate) fn of(locals: Vec<Local>, shared: usize) -> Option<Self> {
         let mut pose = Matrix6::<f64>::zeros();
         for local in &locals {
             for i in 0..6 {
@@ -31,7 +31,7 @@ impl OfFrame {
     }
 
     /// The right side of n unknowns. The pose is at its optimum, so that nothing is left of its own.
-    pub fn right(&self, n: usize) -> DVector<f64> {
+    pub(crate) fn right(&self, n: usize) -> DVector<f64> {
         let mut right = DVector::zeros(n);
         for local in &self.locals {
             local.columns.iter().zip(&local.right).for_each(|(&row, value)| right[row] += value);
@@ -61,7 +61,7 @@ impl OfFrame {
     }
 
     /// The product of the matrix with a vector of all unknowns.
-    pub fn times(&self, vector: &DVector<f64>) -> DVector<f64> {
+    pub(crate) fn times(&self, vector: &DVector<f64>) -> DVector<f64> {
         let mut product = DVector::zeros(vector.len());
         for local in &self.locals {
             for (i, &row) in local.columns.iter().enumerate() {
@@ -92,7 +92,7 @@ impl OfFrame {
     }
 
     /// Adds what is between the shared unknowns (rows) and the offsets of all corners (columns).
-    pub fn add_across(&self, across: &mut DMatrix<f64>) {
+    pub(crate) fn add_across(&self, across: &mut DMatrix<f64>) {
         for local in &self.locals {
             for corner in &local.corners {
                 for (&row, values) in local.columns.iter().zip(&corner.cross) {

@@ -29,7 +29,7 @@ pub(crate) struct LocalShare {
 impl LocalShare {
     /// From a frame's H (`own`, n × n, non-zero only in rows and columns of unknowns that it
     /// touches) and V (`covariance`, n × n). `None` where V is singular there.
-    pub fn of(own: &DMatrix<f64>, covariance: &DMatrix<f64>) -> Option<Self> {
+    pub(crate) fn of(own: &DMatrix<f64>, covariance: &DMatrix<f64>) -> Option<Self> {
         let touched: Vec<usize> = (0..own.nrows()).filter(|&i| own[(i, i)] > 0.0).collect();
         let n = touched.len();
         let sd = DVector::from_fn(n, |i, _| covariance[(touched[i], touched[i])].sqrt());
@@ -44,14 +44,14 @@ impl LocalShare {
 
     /// The components of Qᵀ W g along the eigenvectors, for a gradient g (`pull`, length n) that is
     /// zero outside the unknowns that the frame touches.
-    pub fn along(&self, pull: &DVector<f64>) -> DVector<f64> {
+    pub(crate) fn along(&self, pull: &DVector<f64>) -> DVector<f64> {
         let own = DVector::from_fn(self.touched.len(), |i, _| pull[self.touched[i]] * self.sd[i]);
         self.directions.tr_mul(&self.root.l().tr_mul(&own))
     }
 
     /// The sum Q E a of the eigenvectors E with the components a, where W is the transpose of
     /// `half`.
-    pub fn spread(&self, components: &DVector<f64>, half: &DMatrix<f64>) -> DVector<f64> {
+    pub(crate) fn spread(&self, components: &DVector<f64>, half: &DMatrix<f64>) -> DVector<f64> {
         let turned = &self.directions * components;
         let Some(mut own) = self.root.l().tr_solve_lower_triangular(&turned) else {
             return DVector::zeros(half.ncols());

@@ -34,17 +34,17 @@ pub(crate) struct Problem {
 impl Problem {
     /// Where the target of a panel is in the scene.
     #[inline]
-    pub fn scene_from_target(&self, panel: PanelRef) -> Pose {
+    pub(crate) fn scene_from_target(&self, panel: PanelRef) -> Pose {
         self.targets[self.panels[panel.index()].target].scene_from_target
     }
 
     /// Where a panel is in the scene.
-    pub fn scene_from_panel(&self, panel: PanelRef) -> Pose {
+    pub(crate) fn scene_from_panel(&self, panel: PanelRef) -> Pose {
         self.scene_from_target(panel).after(&self.panels[panel.index()].target_from_panel)
     }
 
     /// Where all panels are in the scene.
-    pub fn panel_places(&self) -> impl Iterator<Item = Pose> {
+    pub(crate) fn panel_places(&self) -> impl Iterator<Item = Pose> {
         self.panels.iter().map(|panel| {
             self.targets[panel.target].scene_from_target.after(&panel.target_from_panel)
         })
@@ -52,7 +52,7 @@ impl Problem {
 
     /// Where a corner is in the frame of its panel, mm.
     #[inline]
-    pub fn panel_point(&self, block: &Block, seen: &Observation) -> DVec3 {
+    pub(crate) fn panel_point(&self, block: &Block, seen: &Observation) -> DVec3 {
         let bent = self.shape.map_or(DVec3::ZERO, |shape| shape.offset(seen.panel_mm));
         let moved = self.map.as_ref().map_or(DVec3::ZERO, |map| map.offset(block.panel, seen));
         seen.panel_mm + bent + moved
@@ -60,7 +60,7 @@ impl Problem {
 
     /// Where a corner is in the frame of the camera that saw it, mm.
     #[inline]
-    pub fn camera_point(&self, block: &Block, observation: &Observation) -> DVec3 {
+    pub(crate) fn camera_point(&self, block: &Block, observation: &Observation) -> DVec3 {
         let at = self.panel_point(block, observation);
         let target = self.panels[block.panel.index()].target_from_panel.apply(at);
         let scene = self.scene_from_target(block.panel).apply(target);
@@ -70,7 +70,7 @@ impl Problem {
 
     /// Seen less predicted positions of a block's corners, px; `None` where one is out of the
     /// model's reach.
-    pub fn residuals(&self, block: &Block) -> Option<Vec<DVec2>> {
+    pub(crate) fn residuals(&self, block: &Block) -> Option<Vec<DVec2>> {
         block.observations.iter().map(|seen| self.residual(block, seen)).collect()
     }
 
@@ -82,7 +82,7 @@ impl Problem {
     }
 
     /// How many corners there are in all.
-    pub fn count(&self) -> usize {
+    pub(crate) fn count(&self) -> usize {
         self.blocks.iter().map(|block| block.observations.len()).sum()
     }
 

@@ -16,7 +16,7 @@ impl CornerMap {
     /// These directions are a translation and a rotation of the whole target, or of each panel by
     /// itself where panel poses are estimated, and a common scale where nothing else determines
     /// lengths.
-    pub fn without_gauge(
+    pub(crate) fn without_gauge(
         &self,
         covariances: &[Matrix3<f64>],
         sigma: f64,

@@ -50,7 +50,7 @@ pub(crate) struct MappedCorner {
 
 impl CornerMap {
     /// All corners that blocks have observations of, with zero offsets and the first prior.
-    pub fn flat(blocks: &[Block]) -> Self {
+    pub(crate) fn flat(blocks: &[Block]) -> Self {
         let mut index = BTreeMap::new();
         let mut corners: Vec<MappedCorner> = Vec::new();
         for block in blocks {
@@ -72,22 +72,22 @@ impl CornerMap {
     }
 
     /// The same map with another prior, mm, and the number of offsets that the views determine.
-    pub fn expecting(self, prior_mm: DVec3, determined: f64) -> Self {
+    pub(crate) fn expecting(self, prior_mm: DVec3, determined: f64) -> Self {
         Self { prior_mm, determined, ..self }
     }
 
     /// The distance of neighbours in a row, mm.
-    pub fn edge_mm(&self) -> f64 {
+    pub(crate) fn edge_mm(&self) -> f64 {
         nearest_mm(&self.corners)
     }
 
     /// Number of corners.
-    pub fn len(&self) -> usize {
+    pub(crate) fn len(&self) -> usize {
         self.corners.len()
     }
 
     /// For each corner the number of blocks that observe it.
-    pub fn views(&self, blocks: &[Block]) -> Vec<usize> {
+    pub(crate) fn views(&self, blocks: &[Block]) -> Vec<usize> {
         let mut views = vec![0; self.len()];
         for block in blocks {
             block.observations.iter().for_each(|seen| views[self.index(block.panel, seen)] += 1);
@@ -96,19 +96,19 @@ impl CornerMap {
     }
 
     /// The index of a corner, which the map must have.
-    pub fn index(&self, panel: PanelRef, seen: &Observation) -> usize {
+    pub(crate) fn index(&self, panel: PanelRef, seen: &Observation) -> usize {
         self.index[&(panel.index(), seen.row, seen.col)]
     }
 
     /// The offset of a corner, mm; zero for a corner that the map does not have.
-    pub fn offset(&self, panel: PanelRef, seen: &Observation) -> DVec3 {
+    pub(crate) fn offset(&self, panel: PanelRef, seen: &Observation) -> DVec3 {
         let index = self.index.get(&(panel.index(), seen.row, seen.col));
         index.map_or(DVec3::ZERO, |&index| self.offsets_mm[index])
     }
 
     /// The prior that maximises the marginal likelihood of the offsets, mm, and the number γ of offsets that
     /// the views determine; `covariances` and `sigma` are as in [`Self::without_gauge`].
-    pub fn fitted_prior(&self, covariances: &[Matrix3<f64>], sigma: f64) -> (DVec3, f64) {
+    pub(crate) fn fitted_prior(&self, covariances: &[Matrix3<f64>], sigma: f64) -> (DVec3, f64) {
         let of_axes = |axes: &[usize]| {
             let (mut squares, mut determined) = (0.0, 0.0);
             for (offset, covariance) in self.offsets_mm.iter().zip(covariances) {

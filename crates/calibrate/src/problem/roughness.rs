@@ -57,7 +57,7 @@ type Difference = [(usize, f64); 4];
 impl Roughness {
     /// A prior around a spline and all splines that differ from it by the `directions` of a family,
     /// each with one vector for each knot.
-    pub fn around(spline: &Spline, directions: &[Vec<DVec2>]) -> Self {
+    pub(crate) fn around(spline: &Spline, directions: &[Vec<DVec2>]) -> Self {
         let grid = spline.grid();
         let mut family: Vec<[Vec<f64>; 2]> = Vec::new();
         for direction in directions {
@@ -84,7 +84,7 @@ impl Roughness {
     }
 
     /// A prior around the spline of a camera that has free parameters; `None` for other cameras.
-    pub fn of(camera: &Camera, free: &[bool]) -> Option<Self> {
+    pub(crate) fn of(camera: &Camera, free: &[bool]) -> Option<Self> {
         match &camera.lens {
             Lens::Spline(spline) if free.contains(&true) => Some(Self::around(spline, &[])),
             _ => None,
@@ -93,7 +93,7 @@ impl Roughness {
 
     /// The rank r of the prior: all coordinates of knots, without the linear functions and the
     /// directions of the family.
-    pub fn rank(&self) -> usize {
+    pub(crate) fn rank(&self) -> usize {
         2 * (self.grid.count() - 3) - self.family.len()
     }
 
@@ -106,7 +106,7 @@ impl Roughness {
 
     /// Adds the prior to normal equations whose unit of cost is a residual of `sigma`; returns its
     /// cost. `parameters` lists the index of each unknown parameter of the camera and its column.
-    pub fn add(
+    pub(crate) fn add(
         &self,
         camera: &Camera,
         parameters: &[(usize, usize)],
@@ -147,7 +147,7 @@ impl Roughness {
 
     /// The prior with the standard deviation s that fits the knots; `covariance` is that of all
     /// columns for residuals of variance 1, `sigma` and `parameters` are as in [`Self::add`].
-    pub fn fitted(
+    pub(crate) fn fitted(
         &self,
         camera: &Camera,
         parameters: &[(usize, usize)],
@@ -187,7 +187,7 @@ impl Roughness {
     }
 
     /// Relative change of s from this prior to another.
-    pub fn change(&self, other: &Self) -> f64 {
+    pub(crate) fn change(&self, other: &Self) -> f64 {
         (other.size / self.size - 1.0).abs()
     }
 

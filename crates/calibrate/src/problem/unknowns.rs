@@ -55,7 +55,7 @@ pub(crate) struct Prior {
 
 impl Prior {
     /// A measured pose; `None` where the covariance has no inverse.
-    pub fn new(pose: Pose, covariance: [[f64; 6]; 6]) -> Option<Self> {
+    pub(crate) fn new(pose: Pose, covariance: [[f64; 6]; 6]) -> Option<Self> {
         let covariance = Matrix6::from_fn(|i, j| covariance[i][j]);
         // Turns and moves have different units: their scale must not look like a lack of rank.
         let scale = Vector6::from_fn(|i, _| covariance[(i, i)].sqrt().recip());
@@ -88,7 +88,7 @@ pub(crate) struct Block {
 
 impl CameraUnknowns {
     /// A single camera, which is the rig.
-    pub fn alone(camera: Camera, free: Vec<bool>) -> Self {
+    pub(crate) fn alone(camera: Camera, free: Vec<bool>) -> Self {
         let free = without_gauge(&camera.lens, free);
         let roughness = Roughness::of(&camera, &free);
         Self { camera, free, camera_from_rig: Pose::IDENTITY, pose_free: false, roughness }
@@ -102,5 +102,5 @@ impl CameraUnknowns {
 
 impl TargetUnknowns {
     /// The target that is the scene's frame.
-    pub const SCENE: Self = Self { scene_from_target: Pose::IDENTITY, pose_free: false };
+    pub(crate) const SCENE: Self = Self { scene_from_target: Pose::IDENTITY, pose_free: false };
 }

@@ -51,7 +51,7 @@ pub(crate) struct Observed {
 
 impl Observed {
     /// The same with what errors of the board add to it, and what is `drawn` to the plan of one that is measured.
-    pub fn with(self, of_board: Option<DMatrix<f64>>, drawn: Option<&DMatrix<f64>>) -> Self {
+    pub(crate) fn with(self, of_board: Option<DMatrix<f64>>, drawn: Option<&DMatrix<f64>>) -> Self {
         let mut covariance = self.covariance;
         covariance = of_board.iter().fold(covariance, |sum, of_board| sum + of_board);
         if let Some(drawn) = drawn {

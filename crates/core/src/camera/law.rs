@@ -29,7 +29,7 @@ pub struct Imaged {
 }
 
 /// What each model says about itself. Parameters are in the order of their names, everywhere.
-pub trait LensLaw {
+pub(super) trait LensLaw {
     /// The parameters' names, such as `k1`.
     fn names(&self) -> Vec<String>;
 

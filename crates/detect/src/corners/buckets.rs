@@ -11,7 +11,7 @@ const NONE: u32 = u32::MAX;
 
 /// Points in an image, to which more may be added.
 #[derive(Clone, Debug)]
-pub struct Buckets {
+pub(crate) struct Buckets {
     /// The corner of the first square, and the side of all, px.
     origin: DVec2,
     side_px: f64,
@@ -25,13 +25,13 @@ pub struct Buckets {
 
 impl Buckets {
     /// No points yet, of an image of some size, px; what lies outside is found too, if less quickly.
-    pub fn new(width: usize, height: usize) -> Self {
+    pub(crate) fn new(width: usize, height: usize) -> Self {
         let count = |px: usize| (px as f64 / SIDE_PX) as usize + 1;
         Self::squares(DVec2::ZERO, SIDE_PX, [count(width), count(height)])
     }
 
     /// These points, wherever they lie, numbered as they come.
-    pub fn of(points: &[DVec2]) -> Self {
+    pub(crate) fn of(points: &[DVec2]) -> Self {
         let least = points.iter().copied().fold(DVec2::INFINITY, DVec2::min);
         let span = points.iter().copied().fold(least, DVec2::max) - least;
         let few = (span.element_product() / points.len() as f64).sqrt();
@@ -48,7 +48,7 @@ impl Buckets {
     }
 
     /// Adds a point; they are numbered from 0 on.
-    pub fn insert(&mut self, point: DVec2) {
+    pub(crate) fn insert(&mut self, point: DVec2) {
         let [col, row] = self.square(point);
         let last = &mut self.last[row * self.cols + col];
         self.points.push((point, *last));
@@ -62,7 +62,7 @@ impl Buckets {
     }
 
     /// The number of the point nearest to a place; `None` where there are no points.
-    pub fn nearest(&self, place: DVec2) -> Option<usize> {
+    pub(crate) fn nearest(&self, place: DVec2) -> Option<usize> {
         let mut reach = self.side_px;
         while reach.is_finite() && !self.points.is_empty() {
             let near = self.within(place, reach).min_by(|a, b| a.1.total_cmp(&b.1));
@@ -75,7 +75,7 @@ impl Buckets {
     }
 
     /// The numbers of the points within a distance of a place, px, and their squared distances.
-    pub fn within(&self, place: DVec2, reach: f64) -> impl Iterator<Item = (usize, f64)> {
+    pub(crate) fn within(&self, place: DVec2, reach: f64) -> impl Iterator<Item = (usize, f64)> {
         let [left, top] = self.square(place - reach);
         let [right, bottom] = self.square(place + reach);
         let squares = (top..=bottom)

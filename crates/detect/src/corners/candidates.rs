@@ -18,7 +18,7 @@ const WINDOW_ROWS: usize = 2 * SUPPRESSION_RADIUS + 1;
 
 /// A pixel whose neighbourhood looks like a corner.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Candidate {
+pub(crate) struct Candidate {
     /// Column, px.
     pub x: usize,
     /// Row, px.
@@ -29,7 +29,7 @@ pub struct Candidate {
 
 /// All local maxima of R, for corners with N rays, above `4.5·min_amplitude²`, where `min_amplitude` is the smallest amplitude
 /// |α| of interest in units of the image (values of at most 10 bits). In reading order.
-pub fn candidates<const N: usize>(image: &Gray<i16>, min_amplitude: f32) -> Vec<Candidate> {
+pub(crate) fn candidates<const N: usize>(image: &Gray<i16>, min_amplitude: f32) -> Vec<Candidate> {
     let (width, height) = (image.width(), image.height());
     let margin = RADIUS + SUPPRESSION_RADIUS;
     if width <= 2 * margin || height <= 2 * margin {
@@ -69,7 +69,7 @@ const MAX_REACH: usize = 24;
 /// Places around a pixel, within `reach` px of it in either coordinate, from which a fit may reach a
 /// corner: the strongest of those where R, be it what it may, is the greatest of nine. The nearest
 /// come first.
-pub fn maxima_near<const N: usize>(
+pub(crate) fn maxima_near<const N: usize>(
     image: &Gray<i16>,
     place: [usize; 2],
     reach: usize,

@@ -13,14 +13,14 @@ use crate::lanes::LANES;
 use deltille_core::raster::{ImageView, Intensity, View, of_any};
 
 /// Powers (i, j) of a monomial uⁱvʲ.
-pub type Powers = (i32, i32);
+pub(crate) type Powers = (i32, i32);
 
 /// Rows of kernels are padded to whole vectors, of which so much is worked on at a time.
 const HALF: usize = LANES / 2;
 
 /// Kernels of the first N coefficients of a polynomial.
 #[derive(Clone, Debug)]
-pub struct ConeFit<const N: usize> {
+pub(crate) struct ConeFit<const N: usize> {
     radius: usize,
     /// Side of the window of pixels that is read: 4r + 1.
     side: usize,
@@ -35,7 +35,7 @@ const RANK: f64 = 1e-12;
 impl<const N: usize> ConeFit<N> {
     /// A fit of all `monomials`, over offsets within `radius` + 1 px after smoothing with a cone
     /// of that radius; the coefficients of the first N are kept.
-    pub fn new(radius: usize, monomials: &[Powers]) -> Self {
+    pub(crate) fn new(radius: usize, monomials: &[Powers]) -> Self {
         let r = radius as isize;
         let cone = |u: isize, v: isize| (radius as f64 + 1.0 - (u as f64).hypot(v as f64)).max(0.0);
         let offsets = |r: isize| (-r..=r).flat_map(move |v| (-r..=r).map(move |u| (u, v)));
@@ -63,12 +63,12 @@ impl<const N: usize> ConeFit<N> {
     }
 
     /// The radius of the fit, px.
-    pub fn radius(&self) -> usize {
+    pub(crate) fn radius(&self) -> usize {
         self.radius
     }
 
     /// The coefficients around a position; `None` where the window leaves the image.
-    pub fn coefficients(&self, image: ImageView, DVec2 { x, y }: DVec2) -> Option<[f64; N]> {
+    pub(crate) fn coefficients(&self, image: ImageView, DVec2 { x, y }: DVec2) -> Option<[f64; N]> {
         let reach = (2 * self.radius) as f64;
         let fits = x >= reach
             && y >= reach

@@ -23,20 +23,20 @@ const CONVERGED_PX: f64 = 0.001;
 
 /// The cubic and quadratic coefficients c1 … c7 of a fitted surface.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct CubicSurface {
+pub(crate) struct CubicSurface {
     /// c1 … c7 of Eq. 1.
     pub c: [f64; KEPT],
 }
 
 impl CubicSurface {
     /// J of Eq. 5; negative on star-shaped umbilics.
-    pub fn star_discriminant(&self) -> f64 {
+    pub(crate) fn star_discriminant(&self) -> f64 {
         let [c1, c2, c3, c4, ..] = self.c;
         3.0 * (c1 * c3 + c2 * c4) - (c2 * c2 + c3 * c3)
     }
 
     /// The offset at which all second derivatives vanish, in the least-squares sense (Eq. 3).
-    pub fn umbilic_point(&self) -> Option<DVec2> {
+    pub(crate) fn umbilic_point(&self) -> Option<DVec2> {
         let [c1, c2, c3, c4, c5, c6, c7] = self.c;
         let a = Matrix3x2::new(6.0 * c1, 2.0 * c2, 2.0 * c2, 2.0 * c3, 2.0 * c3, 6.0 * c4);
         let b = -Vector3::new(2.0 * c5, c6, 2.0 * c7);
@@ -47,7 +47,7 @@ impl CubicSurface {
     }
 
     /// The cubic terms c1 … c4.
-    pub fn form(&self) -> [f64; 4] {
+    pub(crate) fn form(&self) -> [f64; 4] {
         let [c1, c2, c3, c4, ..] = self.c;
         [c1, c2, c3, c4]
     }
@@ -59,13 +59,13 @@ const MONOMIALS: [Powers; 10] =
 
 /// Fits cubic surfaces in one fixed window.
 #[derive(Clone, Debug)]
-pub struct CubicFit {
+pub(crate) struct CubicFit {
     fit: ConeFit<KEPT>,
 }
 
 /// A corner found by iterating the fit.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Umbilic {
+pub(crate) struct Umbilic {
     /// Position, px.
     pub position: DVec2,
     /// The last surface, centred one (short) step before `position`.
@@ -74,24 +74,29 @@ pub struct Umbilic {
 
 impl CubicFit {
     /// A fit over offsets within `radius` + 1 px, after smoothing with a cone of that radius.
-    pub fn new(radius: usize) -> Self {
+    pub(crate) fn new(radius: usize) -> Self {
         Self { fit: ConeFit::new(radius, &MONOMIALS) }
     }
 
     /// The surface around `position`; `None` where the window leaves the image.
-    pub fn surface(&self, image: ImageView, position: DVec2) -> Option<CubicSurface> {
+    pub(crate) fn surface(&self, image: ImageView, position: DVec2) -> Option<CubicSurface> {
         Some(CubicSurface { c: self.fit.coefficients(image, position)? })
     }
 
     /// Iterates from `start`, at most `iterations` times. `None` when the surface is no
     /// star-shaped umbilic, a step or the whole way exceeds the radius, or the window leaves the
     /// image.
-    pub fn refine(&self, image: ImageView, start: DVec2, iterations: usize) -> Option<Umbilic> {
+    pub(crate) fn refine(
+        &self,
+        image: ImageView,
+        start: DVec2,
+        iterations: usize,
+    ) -> Option<Umbilic> {
         self.walk(image, start, iterations, CONVERGED_PX)
     }
 
     /// [`Self::refine`] that ends with a step shorter than `converged_px`.
-    pub fn walk(
+    pub(crate) fn walk(
         &self,
         image: ImageView,
         start: DVec2,
@@ -120,7 +125,7 @@ impl CubicFit {
     }
 
     /// The way from `start` to the umbilic point of the surface there; `None` when it is not star-shaped.
-    pub fn step(&self, image: ImageView, start: DVec2) -> Option<DVec2> {
+    pub(crate) fn step(&self, image: ImageView, start: DVec2) -> Option<DVec2> {
         let surface = self.surface(image, start)?;
         (surface.star_discriminant() < 0.0).then(|| surface.umbilic_point()).flatten()
     }

@@ -23,7 +23,7 @@ const FOUND_PX: f64 = 0.03;
 
 /// A fit of one degree in one window.
 #[derive(Clone, Debug)]
-pub enum Polynomial {
+pub(crate) enum Polynomial {
     /// Of deltille corners.
     Cubic(CubicFit),
     /// Of checkerboard corners.
@@ -32,7 +32,7 @@ pub enum Polynomial {
 
 /// The terms of the highest degree of a fitted surface, from u³ or u² to v³ or v².
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Form {
+pub(crate) enum Form {
     /// Of u³, u²v, uv², v³.
     Cubic([f64; 4]),
     /// Of u², uv, v².
@@ -41,7 +41,7 @@ pub enum Form {
 
 /// A corner that a fit has found.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct FittedCorner {
+pub(crate) struct FittedCorner {
     /// Position, px.
     pub position: DVec2,
     /// The form there.
@@ -63,7 +63,7 @@ impl From<QuadricSaddle> for FittedCorner {
 impl Form {
     /// The form along a unit vector: large where the image is bright. That of degree three is zero
     /// along the edges, that of degree two about there.
-    pub fn towards(&self, DVec2 { x: u, y: v }: DVec2) -> f64 {
+    pub(crate) fn towards(&self, DVec2 { x: u, y: v }: DVec2) -> f64 {
         match *self {
             Form::Cubic([a, b, c, d]) => {
                 a * u * u * u + b * u * u * v + c * u * v * v + d * v * v * v
@@ -75,7 +75,7 @@ impl Form {
 
 impl Polynomial {
     /// The fit for corners of a kind over offsets within `radius` + 1 px.
-    pub fn new(kind: GridKind, radius: usize) -> Self {
+    pub(crate) fn new(kind: GridKind, radius: usize) -> Self {
         match kind {
             GridKind::Deltille => Self::Cubic(CubicFit::new(radius)),
             GridKind::Checker => Self::Quadric(QuadricFit::new(radius)),
@@ -83,7 +83,7 @@ impl Polynomial {
     }
 
     /// The reference detector's number of iterations.
-    pub fn usual_iterations(&self) -> usize {
+    pub(crate) fn usual_iterations(&self) -> usize {
         match self {
             Self::Cubic(_) => CUBIC_ITERATIONS,
             Self::Quadric(_) => QUADRIC_ITERATIONS,
@@ -91,7 +91,7 @@ impl Polynomial {
     }
 
     /// The corner that the fit reaches from `start` in at most so many iterations.
-    pub fn refine(
+    pub(crate) fn refine(
         &self,
         image: ImageView,
         start: DVec2,
@@ -104,7 +104,7 @@ impl Polynomial {
     }
 
     /// [`Self::refine`] as closely as a first look needs.
-    pub fn find(&self, image: ImageView, start: DVec2) -> Option<FittedCorner> {
+    pub(crate) fn find(&self, image: ImageView, start: DVec2) -> Option<FittedCorner> {
         let (most, found_px) = (FIND_ITERATIONS, FOUND_PX);
         match self {
             Self::Cubic(fit) => fit.walk(image, start, most, found_px).map(FittedCorner::from),
@@ -113,7 +113,7 @@ impl Polynomial {
     }
 
     /// The first step of that fit, px; `None` where it sees no corner.
-    pub fn step(&self, image: ImageView, start: DVec2) -> Option<DVec2> {
+    pub(crate) fn step(&self, image: ImageView, start: DVec2) -> Option<DVec2> {
         match self {
             Self::Cubic(fit) => fit.step(image, start),
             Self::Quadric(fit) => fit.step(image, start),

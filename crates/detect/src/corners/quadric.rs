@@ -20,7 +20,7 @@ const CONVERGED_PX: f64 = 0.001;
 
 /// A saddle found by iterating the fit.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct QuadricSaddle {
+pub(crate) struct QuadricSaddle {
     /// Position, px.
     pub position: DVec2,
     /// c1 … c3 of the last surface.
@@ -29,19 +29,19 @@ pub struct QuadricSaddle {
 
 /// Fits quadrics in one fixed window.
 #[derive(Clone, Debug)]
-pub struct QuadricFit {
+pub(crate) struct QuadricFit {
     fit: ConeFit<5>,
 }
 
 impl QuadricFit {
     /// A fit over offsets within `radius` + 1 px, after smoothing with a cone of that radius.
-    pub fn new(radius: usize) -> Self {
+    pub(crate) fn new(radius: usize) -> Self {
         Self { fit: ConeFit::new(radius, &MONOMIALS) }
     }
 
     /// Iterates from `start`, at most `iterations` times. `None` when the surface is no saddle, a
     /// step or the whole way exceeds the radius, or the window leaves the image.
-    pub fn refine(
+    pub(crate) fn refine(
         &self,
         image: ImageView,
         start: DVec2,
@@ -51,7 +51,7 @@ impl QuadricFit {
     }
 
     /// [`Self::refine`] that ends with a step shorter than `converged_px`.
-    pub fn walk(
+    pub(crate) fn walk(
         &self,
         image: ImageView,
         start: DVec2,
@@ -77,7 +77,7 @@ impl QuadricFit {
     }
 
     /// The way from `start` to the saddle point of the surface there; `None` when it has none.
-    pub fn step(&self, image: ImageView, start: DVec2) -> Option<DVec2> {
+    pub(crate) fn step(&self, image: ImageView, start: DVec2) -> Option<DVec2> {
         stationary_point(self.fit.coefficients(image, start)?)
     }
 }

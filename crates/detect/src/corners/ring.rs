@@ -54,7 +54,7 @@ pub(super) const HALF_RING: [(isize, isize); 6] =
     [(4, 0), (3, 2), (2, 3), (0, 4), (-2, 3), (-3, 2)];
 
 /// R of a perfect corner, per |α|²: see above.
-pub const PER_AMPLITUDE: f32 = 4.5;
+pub(crate) const PER_AMPLITUDE: f32 = 4.5;
 
 /// Largest offset in [`HALF_RING`], px.
 pub(super) const RADIUS: usize = 4;

@@ -43,7 +43,7 @@ const MOST_CANDIDATES: usize = 250_000;
 
 /// A corner with N rays in the image: a monkey saddle, or a saddle.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Saddle<const N: usize> {
+pub(crate) struct Saddle<const N: usize> {
     /// Position, px.
     pub position: DVec2,
     /// Its edges and brightness.
@@ -71,19 +71,19 @@ const STABLE_PX: f64 = 0.3;
 
 /// Finds and describes saddles in a pyramid.
 #[derive(Clone, Debug)]
-pub struct SaddleFinder<const N: usize> {
+pub(crate) struct SaddleFinder<const N: usize> {
     /// By rising radius.
     fits: [Polynomial; FIT_RADII.len()],
 }
 
 impl<const N: usize> SaddleFinder<N> {
     /// A finder; computes the pseudo-inverses of its fits once.
-    pub fn new() -> Self {
+    pub(crate) fn new() -> Self {
         Self { fits: FIT_RADII.map(|radius| Polynomial::new(kind::<N>(), radius)) }
     }
 
     /// All saddles of an image, in reading order.
-    pub fn find(&self, pyramid: &Pyramid) -> Vec<Saddle<N>> {
+    pub(crate) fn find(&self, pyramid: &Pyramid) -> Vec<Saddle<N>> {
         let (mut noise, mut is_all_noise) = (0.0f32, true);
         let finest = &pyramid.levels()[0];
         let mut saddles = Merged::<N>::new(finest.width(), finest.height());
@@ -196,7 +196,7 @@ impl<const N: usize> SaddleFinder<N> {
     }
 
     /// [`Self::near_in`] a level of a pyramid; places and reach in px of level 0.
-    pub fn near<S>(
+    pub(crate) fn near<S>(
         &self,
         pyramid: &Pyramid,
         level: usize,
@@ -214,7 +214,7 @@ impl<const N: usize> SaddleFinder<N> {
 
     /// What `accept` makes of the first saddle that it takes of those within `reach_px` of `place`, which the fit
     /// reaches from starts further and further away.
-    pub fn near_in<S>(
+    pub(crate) fn near_in<S>(
         &self,
         image: &Gray<i16>,
         place: DVec2,
@@ -282,7 +282,7 @@ fn candidates_above_noise<const N: usize>(level: &Gray<i16>, noise: f32) -> Vec<
 }
 
 /// Whether a picture has more corners than any board would have in it.
-pub fn too_many(pyramid: &Pyramid, corners: usize) -> bool {
+pub(crate) fn too_many(pyramid: &Pyramid, corners: usize) -> bool {
     corners > (pyramid.levels()[0].pixels().len() / LEAST_TILE_PX2).min(MOST_CORNERS)
 }
 
@@ -328,7 +328,7 @@ struct Merged<const N: usize> {
 }
 
 /// The distance within which saddles of a level are the same, px of level 0.
-pub fn merge_px(level: usize) -> f64 {
+pub(crate) fn merge_px(level: usize) -> f64 {
     MERGE_PX * f64::from(1u32 << level)
 }
 
@@ -374,7 +374,7 @@ impl<const N: usize> Merged<N> {
 }
 
 /// Whether an image shows nothing but noise.
-pub fn is_all_noise(image: &Gray<i16>) -> bool {
+pub(crate) fn is_all_noise(image: &Gray<i16>) -> bool {
     sample_noise(image).is_all
 }
 

@@ -57,7 +57,7 @@ const LEVEL_STEPS: usize = 4;
 
 /// Directions and brightness around a corner.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Sectors<const N: usize> {
+pub(crate) struct Sectors<const N: usize> {
     /// Image angles of the N half-edges, counter-clockwise on the print, starting with one that
     /// has a dark sector on its counter-clockwise side. Radians.
     pub rays: [f64; N],
@@ -69,7 +69,7 @@ pub struct Sectors<const N: usize> {
 
 impl<const N: usize> Sectors<N> {
     /// Reads the sectors around `position`, from circles or else from the form's roots.
-    pub fn read(image: &Gray<i16>, position: DVec2, form: &Form) -> Option<Self> {
+    pub(crate) fn read(image: &Gray<i16>, position: DVec2, form: &Form) -> Option<Self> {
         let circles = RADII_PX.iter().filter_map(|&radius| {
             Circle::<N>::sample(image, position, radius).filter(Circle::has_its_mean_in_the_middle)
         });
@@ -87,7 +87,10 @@ impl<const N: usize> Sectors<N> {
 
 /// The level half-way between dark and bright and the mean deviation from it on the smallest circle around
 /// a place; `None` at the border.
-pub fn contrast_around<const N: usize>(image: &Gray<i16>, position: DVec2) -> Option<(f64, f64)> {
+pub(crate) fn contrast_around<const N: usize>(
+    image: &Gray<i16>,
+    position: DVec2,
+) -> Option<(f64, f64)> {
     let smallest = RADII_PX.into_iter().fold(f64::INFINITY, f64::min);
     let circle = Circle::<N>::sample(image, position, smallest)?;
     Some((circle.level, circle.amplitude()))
@@ -394,7 +397,7 @@ fn ordered_rays<const N: usize>(crossings: &[Crossing; N]) -> Option<[f64; N]> {
 }
 
 /// The turn from `from` to `to`, −π to π.
-pub fn turn(from: f64, to: f64) -> f64 {
+pub(crate) fn turn(from: f64, to: f64) -> f64 {
     let turn = to - from;
     // Most angles need no division to be brought into range: less than 3π is in it after one turn.
     let turn = if turn.abs() < 3.0 * PI { turn } else { turn.rem_euclid(TAU) };

@@ -48,7 +48,7 @@ const OTHER_GRID: f64 = 1.0;
 
 /// Tells of each grid of a picture, of which `image` is the finest level, whether its pattern goes on where
 /// it ends. Six sectors that alternate do not come by chance, so of deltille grids it tells nothing.
-pub fn go_on(image: &Gray<i16>, grids: &[&Grid]) -> Vec<bool> {
+pub(crate) fn go_on(image: &Gray<i16>, grids: &[&Grid]) -> Vec<bool> {
     let mut corners = Buckets::new(image.width(), image.height());
     let mut owners = Vec::new();
     let several = if grids.len() > 1 { grids } else { &[] };

@@ -19,18 +19,18 @@ const AROUND: f64 = 0.12;
 const COMPACT: f64 = 2.0 / 3.0;
 
 /// A place in the image, px.
-pub type Point = DVec2;
+pub(crate) type Point = DVec2;
 
 /// A square: its middle, and two of its edges.
 #[derive(Clone, Copy, Debug)]
-pub struct Square {
+pub(crate) struct Square {
     pub middle: Point,
     pub edges: [Point; 2],
 }
 
 /// A square of which all four corners are known.
 #[derive(Clone, Copy, Debug)]
-pub struct WholeSquare {
+pub(crate) struct WholeSquare {
     /// Its lowest, leftmost vertex on the print.
     pub vertex: Vertex,
     /// The corner there, the one to the right, the one above, and the one across.
@@ -39,7 +39,7 @@ pub struct WholeSquare {
 
 impl WholeSquare {
     /// The place at a part of the way to the right and a part of the way up.
-    pub fn place(&self, right: f64, up: f64) -> Point {
+    pub(crate) fn place(&self, right: f64, up: f64) -> Point {
         let [a, b, c, d] = self.corners;
         let (low, high) = (a + right * (b - a), c + right * (d - c));
         low + up * (high - low)
@@ -52,34 +52,34 @@ impl WholeSquare {
 }
 
 /// 0 for a square of one colour, 1 for one of the other.
-pub fn parity(vertex: Vertex) -> usize {
+pub(crate) fn parity(vertex: Vertex) -> usize {
     (vertex.row + vertex.col).rem_euclid(2) as usize
 }
 
 /// The corners of a grid in a picture.
 #[derive(Clone, Debug)]
-pub struct CheckerTiles<'a> {
+pub(crate) struct CheckerTiles<'a> {
     pub image: ImageView<'a>,
     pub corners: BTreeMap<Vertex, Point>,
 }
 
 impl<'a> CheckerTiles<'a> {
-    pub fn of(image: ImageView<'a>, grid: &Grid) -> Self {
+    pub(crate) fn of(image: ImageView<'a>, grid: &Grid) -> Self {
         let corner =
             |c: &deltille_core::detection::GridCorner| (Vertex::new(c.row, c.col), c.position());
         Self { image, corners: grid.corners.iter().map(corner).collect() }
     }
 
-    pub fn has(&self, vertex: Vertex) -> bool {
+    pub(crate) fn has(&self, vertex: Vertex) -> bool {
         self.corners.contains_key(&vertex)
     }
 
-    pub fn at(&self, vertex: Vertex) -> Option<Point> {
+    pub(crate) fn at(&self, vertex: Vertex) -> Option<Point> {
         self.corners.get(&vertex).copied()
     }
 
     /// The corners of whole squares.
-    pub fn without_loose_corners(&self) -> Self {
+    pub(crate) fn without_loose_corners(&self) -> Self {
         let is_in_one = |&(&v, _): &(&Vertex, &Point)| {
             (0..CHECKER).any(|k| {
                 let [a, b] = [k, k + 1].map(step::<CHECKER>);
@@ -90,7 +90,7 @@ impl<'a> CheckerTiles<'a> {
         Self { image: self.image, corners: corners.collect() }
     }
 
-    pub fn whole_squares(&self) -> impl Iterator<Item = WholeSquare> {
+    pub(crate) fn whole_squares(&self) -> impl Iterator<Item = WholeSquare> {
         self.corners.iter().filter_map(|(&vertex, &corner)| {
             let at = |row, col| self.at(vertex + Vertex::new(row, col));
             Some(WholeSquare { vertex, corners: [corner, at(0, 1)?, at(1, 0)?, at(1, 1)?] })
@@ -98,13 +98,13 @@ impl<'a> CheckerTiles<'a> {
     }
 
     /// Whether the whole squares are as many as in an area without holes; not so in rows of corners.
-    pub fn is_compact(&self) -> bool {
+    pub(crate) fn is_compact(&self) -> bool {
         let square = (self.corners.len() as f64).sqrt() - 1.0;
         self.whole_squares().count() as f64 >= COMPACT * square * square
     }
 
     /// Brightness of the middles of the whole squares of either parity.
-    pub fn levels(&self) -> Option<[f64; 2]> {
+    pub(crate) fn levels(&self) -> Option<[f64; 2]> {
         let mut values = [Vec::new(), Vec::new()];
         for square in self.whole_squares() {
             values[parity(square.vertex)].extend(self.value(square.square()));
@@ -114,7 +114,7 @@ impl<'a> CheckerTiles<'a> {
     }
 
     /// Brightness about the middle of a square; `None` where it lies outside the picture.
-    pub fn value(&self, Square { middle, edges }: Square) -> Option<f64> {
+    pub(crate) fn value(&self, Square { middle, edges }: Square) -> Option<f64> {
         /// In edges: the middle, and about it along rows and columns.
         const PLACES: [[f64; 2]; 5] =
             [[0.0, 0.0], [AROUND, 0.0], [-AROUND, 0.0], [0.0, AROUND], [0.0, -AROUND]];
@@ -123,7 +123,7 @@ impl<'a> CheckerTiles<'a> {
     }
 
     /// Brightness of a place in the picture.
-    pub fn brightness(&self, DVec2 { x, y }: Point) -> Option<f64> {
+    pub(crate) fn brightness(&self, DVec2 { x, y }: Point) -> Option<f64> {
         let (width, height) = (self.image.width() as f64, self.image.height() as f64);
         let inside = x >= 0.0 && y >= 0.0 && x + 1.0 < width && y + 1.0 < height;
         inside.then(|| self.image.bilinear_inside(x, y))
@@ -131,6 +131,6 @@ impl<'a> CheckerTiles<'a> {
 }
 
 /// A place moved by multiples of two edges.
-pub fn moved(place: Point, edges: [Point; 2], by: DVec2) -> Point {
+pub(crate) fn moved(place: Point, edges: [Point; 2], by: DVec2) -> Point {
     place + by.x * edges[0] + by.y * edges[1]
 }

@@ -10,7 +10,7 @@ use deltille_core::raster::Pyramid;
 
 /// Largest angle between the chord of an edge and the rays at its ends. Over one tile a fisheye
 /// bends an edge by up to 20°, half of it at either end; the rays add a few degrees of noise.
-pub const MAX_CHORD_RAD: f64 = 18.0 * std::f64::consts::PI / 180.0;
+pub(crate) const MAX_CHORD_RAD: f64 = 18.0 * std::f64::consts::PI / 180.0;
 
 /// Places along the edge that are looked at.
 const STATIONS: usize = 8;
@@ -40,7 +40,7 @@ const ALLOWED_FAILURES: usize = 1;
 
 /// An end of an edge: a corner, and its ray along the edge.
 #[derive(Clone, Copy, Debug)]
-pub struct End<'a, const N: usize> {
+pub(crate) struct End<'a, const N: usize> {
     /// The corner.
     pub corner: &'a Saddle<N>,
     /// Index of its ray.
@@ -50,7 +50,7 @@ pub struct End<'a, const N: usize> {
 impl<'a, const N: usize> End<'a, N> {
     /// The end at a corner whose ray has this index.
     #[inline]
-    pub fn of(corner: &'a Saddle<N>, ray: usize) -> Self {
+    pub(crate) fn of(corner: &'a Saddle<N>, ray: usize) -> Self {
         Self { corner, ray }
     }
 }
@@ -59,13 +59,17 @@ impl<'a, const N: usize> End<'a, N> {
 ///
 /// The edge is taken as the cubic through both corners with the directions of both rays, which is
 /// the circular arc of the paper where the rays agree with one.
-pub fn is_clean<const N: usize>(pyramid: &Pyramid, from: End<N>, to: End<N>) -> bool {
+pub(crate) fn is_clean<const N: usize>(pyramid: &Pyramid, from: End<N>, to: End<N>) -> bool {
     is_clean_along(pyramid, from, to, |ends| ends)
 }
 
 /// [`is_clean`] of an edge that may also be the circular arc along one of the rays, or straight: of narrow
 /// sectors blur draws the rays apart.
-pub fn is_clean_somehow<const N: usize>(pyramid: &Pyramid, from: End<N>, to: End<N>) -> bool {
+pub(crate) fn is_clean_somehow<const N: usize>(
+    pyramid: &Pyramid,
+    from: End<N>,
+    to: End<N>,
+) -> bool {
     let shapes: [fn(Slopes) -> Slopes; 4] =
         [|ends| ends, |[start, _]| [start, -start], |[_, end]| [-end, end], |_| [0.0; 2]];
     shapes.into_iter().any(|shape| is_clean_along(pyramid, from, to, shape))

@@ -7,7 +7,7 @@ const MOST_LOOKS: usize = 200_000;
 
 /// What is left of the looks that a picture is worth.
 #[derive(Clone, Copy, Debug)]
-pub struct Effort(usize);
+pub(crate) struct Effort(usize);
 
 impl Default for Effort {
     fn default() -> Self {
@@ -17,7 +17,7 @@ impl Default for Effort {
 
 impl Effort {
     /// Spends so many looks; whether there were as many.
-    pub fn spend(&mut self, looks: usize) -> bool {
+    pub(crate) fn spend(&mut self, looks: usize) -> bool {
         let is_worth = self.0 >= looks;
         self.0 = self.0.saturating_sub(looks);
         is_worth

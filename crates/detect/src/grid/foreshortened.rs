@@ -41,7 +41,7 @@ const LEVEL_STEP: f64 = 1e-9;
 const OUTSIDE: i16 = 512;
 
 /// The grids of the direction in which the largest is seen, in px of level 0.
-pub fn foreshortened_grids<const N: usize>(
+pub(crate) fn foreshortened_grids<const N: usize>(
     finder: &SaddleFinder<N>,
     pyramid: &Pyramid,
 ) -> Vec<SaddleGrid> {

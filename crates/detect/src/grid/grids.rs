@@ -24,7 +24,7 @@ const SAME_PART: f64 = 0.2;
 /// All grids among the saddle points, by lattice vertex, those with most corners first. There are none
 /// where there are more saddle points than any board has. Corners that were not detected are sought
 /// where a grid has gaps or goes on; not so in a grid that shows the `whole` board, if that is given.
-pub fn grids<const N: usize>(
+pub(crate) fn grids<const N: usize>(
     finder: &SaddleFinder<N>,
     pyramid: &Pyramid,
     saddles: &[Saddle<N>],

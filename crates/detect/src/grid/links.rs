@@ -19,11 +19,11 @@ const FIRST: usize = 12;
 
 /// Contrasts of neighbouring corners differ by less than this factor: light falls off slowly, and
 /// what is weaker is noise on the paper beside the board.
-pub const MAX_CONTRAST_RATIO: f64 = 3.0;
+pub(crate) const MAX_CONTRAST_RATIO: f64 = 3.0;
 
 /// The far end of an edge: a corner, and which of its rays looks back.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Link {
+pub(crate) struct Link {
     /// Index of the corner.
     pub corner: usize,
     /// Index of its ray.
@@ -31,10 +31,10 @@ pub struct Link {
 }
 
 /// The links of a corner along its rays.
-pub type Links<const N: usize> = [Option<Link>; N];
+pub(crate) type Links<const N: usize> = [Option<Link>; N];
 
 /// For every corner the links along its N rays; links are mutual.
-pub fn links<const N: usize>(pyramid: &Pyramid, saddles: &[Saddle<N>]) -> Vec<Links<N>> {
+pub(crate) fn links<const N: usize>(pyramid: &Pyramid, saddles: &[Saddle<N>]) -> Vec<Links<N>> {
     let positions: Vec<DVec2> = saddles.iter().map(|saddle| saddle.position).collect();
     let places = Places::new(&positions);
     let directions = |saddle: &Saddle<N>| saddle.sectors.rays.map(DVec2::from_angle);
@@ -117,7 +117,7 @@ impl<const N: usize> Corners<'_, N> {
 ///
 /// Opposite ends of an edge see its dark side on opposite hands, so the rays differ in parity, and
 /// their contrasts are alike.
-pub fn facing_ray<const N: usize>(a: &Saddle<N>, i: usize, b: &Saddle<N>) -> Option<usize> {
+pub(crate) fn facing_ray<const N: usize>(a: &Saddle<N>, i: usize, b: &Saddle<N>) -> Option<usize> {
     let chord = chord_rad(a, b);
     (are_alike(a, b) && is_along(a, i, chord)).then(|| ray_back(chord, i, b)).flatten()
 }

@@ -59,7 +59,7 @@ fn length(kind: GridKind, step: Vertex) -> f64 {
 
 /// How a grid is bent.
 #[derive(Clone, Copy, Debug)]
-pub struct Bend {
+pub(crate) struct Bend {
     /// Deviation of the second derivatives, in edges.
     second: f64,
     /// Deviation of a corner, px.
@@ -68,12 +68,12 @@ pub struct Bend {
 
 impl Bend {
     /// Of a grid of few corners.
-    pub fn usual() -> Self {
+    pub(crate) fn usual() -> Self {
         Self { second: USUAL_BEND, place_px: PLACE_PX }
     }
 
     /// Of a grid of corners with N rays, of which `at` tells the places, found on levels up to this.
-    pub fn of<const N: usize>(
+    pub(crate) fn of<const N: usize>(
         vertices: impl Iterator<Item = Vertex>,
         at: impl Fn(Vertex) -> Option<DVec2>,
         level: usize,
@@ -98,7 +98,7 @@ impl Bend {
 
 /// The map about a vertex.
 #[derive(Clone, Copy, Debug)]
-pub struct LocalMap {
+pub(crate) struct LocalMap {
     /// Where the vertex lies, px.
     pub place: DVec2,
     /// Derivatives of the place, px per step along a row and from row to row: columns.
@@ -110,7 +110,7 @@ pub struct LocalMap {
 impl LocalMap {
     /// The map about `vertex`, of corners with N rays whose places `at` tells; `None` when they lie in
     /// one line.
-    pub fn about<const N: usize>(
+    pub(crate) fn about<const N: usize>(
         vertex: Vertex,
         at: impl Fn(Vertex) -> Option<DVec2>,
         bend: Bend,
@@ -160,13 +160,13 @@ impl LocalMap {
     }
 
     /// The direction of a lattice step, px.
-    pub fn along(&self, step: Vertex) -> DVec2 {
+    pub(crate) fn along(&self, step: Vertex) -> DVec2 {
         let [col, row] = self.jacobian;
         f64::from(step.col) * col + f64::from(step.row) * row
     }
 
     /// Lattice coordinates (col, row) of a place, from the vertex; to first order.
-    pub fn steps_to(&self, place: DVec2) -> Option<DVec2> {
+    pub(crate) fn steps_to(&self, place: DVec2) -> Option<DVec2> {
         let [col, row] = self.jacobian;
         let determinant = col.perp_dot(row);
         let off = place - self.place;
@@ -174,7 +174,7 @@ impl LocalMap {
     }
 
     /// Distance of a place from the vertex in edges of the print; to first order.
-    pub fn distance<const N: usize>(&self, place: DVec2) -> Option<f64> {
+    pub(crate) fn distance<const N: usize>(&self, place: DVec2) -> Option<f64> {
         let DVec2 { x: col, y: row } = self.steps_to(place)?;
         let way = kind::<N>().position(row, col);
         Some(way.x.hypot(way.y))

@@ -9,24 +9,24 @@ use deltille_core::lattice::{GridKind, LatticeMap, Vertex};
 
 /// All corners of the one board that is looked for.
 #[derive(Clone, Debug)]
-pub struct WholeBoard {
+pub(crate) struct WholeBoard {
     kind: GridKind,
     vertices: BTreeSet<Vertex>,
 }
 
 impl WholeBoard {
     /// A board with corners at these vertices.
-    pub fn new(kind: GridKind, vertices: impl IntoIterator<Item = Vertex>) -> Self {
+    pub(crate) fn new(kind: GridKind, vertices: impl IntoIterator<Item = Vertex>) -> Self {
         Self { kind, vertices: vertices.into_iter().collect() }
     }
 
     /// How many corners it has.
-    pub fn corners(&self) -> usize {
+    pub(crate) fn corners(&self) -> usize {
         self.vertices.len()
     }
 
     /// Whether a grid has the board's corners and no others, however it is turned and shifted.
-    pub fn is_shown_by<S>(&self, grid: &BTreeMap<Vertex, S>) -> bool {
+    pub(crate) fn is_shown_by<S>(&self, grid: &BTreeMap<Vertex, S>) -> bool {
         grid.len() == self.vertices.len()
             && (0..self.kind.steps().len() as i32).any(|turns| {
                 let turned = LatticeMap::new(self.kind, turns, Vertex::new(0, 0));
@@ -42,7 +42,7 @@ impl WholeBoard {
 
 /// The motion that puts a whole grid exactly onto an outline, if just one does. `inverted` boards
 /// show their upright tiles bright, so they lie half a turn round.
-pub fn fit_outline(
+pub(crate) fn fit_outline(
     grid: &SaddleGrid,
     outline: &BTreeSet<Vertex>,
     inverted: bool,
@@ -70,7 +70,7 @@ pub fn fit_outline(
 /// this tells the two ways apart where rows + columns is odd. Where it does not, they look the
 /// same, and the corner (0, 0) is the one that lies lowest in the image (then leftmost). On an
 /// `inverted` board that square is bright.
-pub fn fit_rectangle(
+pub(crate) fn fit_rectangle(
     grid: &SaddleGrid,
     [rows, cols]: [u32; 2],
     inverted: bool,

@@ -53,7 +53,7 @@ type Owners = BTreeMap<usize, (usize, Vertex)>;
 /// Joins grids that are parts of one board, and lets them adopt single corners. `places` are those
 /// of all saddle points, `members` the indices of those in the grids. Returns which grids have
 /// grown.
-pub fn join<const N: usize>(
+pub(crate) fn join<const N: usize>(
     pyramid: &Pyramid,
     saddles: &[Saddle<N>],
     places: &Buckets,

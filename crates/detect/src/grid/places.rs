@@ -4,7 +4,7 @@ use glam::DVec2;
 
 /// Points in buckets about as many as they are, so that a bucket holds few.
 #[derive(Clone, Debug)]
-pub struct Places<'a> {
+pub(crate) struct Places<'a> {
     points: &'a [DVec2],
     origin: DVec2,
     side_px: f64,
@@ -18,7 +18,7 @@ pub struct Places<'a> {
 
 impl<'a> Places<'a> {
     /// An index of finite points.
-    pub fn new(points: &'a [DVec2]) -> Self {
+    pub(crate) fn new(points: &'a [DVec2]) -> Self {
         let bound = |pick: fn(DVec2, DVec2) -> DVec2| points.iter().copied().reduce(pick);
         let low = bound(DVec2::min).unwrap_or_default();
         let DVec2 { x: width, y: height } = bound(DVec2::max).unwrap_or_default() - low;
@@ -62,7 +62,7 @@ impl<'a> Places<'a> {
     }
 
     /// The `count` points nearest to one of them, nearest first, without itself, of those that are `wanted`.
-    pub fn nearest(
+    pub(crate) fn nearest(
         &self,
         index: usize,
         count: usize,

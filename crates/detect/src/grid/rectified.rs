@@ -37,7 +37,7 @@ const FIT_REACH_PX: f64 = 9.0;
 const LEAST_STRETCH: f64 = 1.5;
 
 /// An affine view of the surroundings of a place.
-pub struct Rectified {
+pub(crate) struct Rectified {
     place: DVec2,
     edge_px: f64,
     image_from_patch: Matrix2<f64>,
@@ -47,7 +47,11 @@ impl Rectified {
     /// The views around `place` in which edge `k` of the lattice, seen along `edges[0]`, and the next
     /// one counter-clockwise, along `edges[1]`, lie as on the print, smaller and larger. `None` when they are in
     /// line.
-    pub fn views<const N: usize>(place: DVec2, k: usize, edges: [DVec2; 2]) -> [Option<Self>; 2] {
+    pub(crate) fn views<const N: usize>(
+        place: DVec2,
+        k: usize,
+        edges: [DVec2; 2],
+    ) -> [Option<Self>; 2] {
         EDGES_PX.map(|edge_px| Self::new::<N>(place, k, edges, edge_px))
     }
 
@@ -78,7 +82,7 @@ impl Rectified {
 
     /// The nearest of the corners about the place that `accept` takes, as a level of the pyramid shows them, if
     /// the patch shows more than that.
-    pub fn find<const N: usize, S>(
+    pub(crate) fn find<const N: usize, S>(
         &self,
         finder: &SaddleFinder<N>,
         pyramid: &Pyramid,

@@ -9,7 +9,7 @@ use deltille_core::lattice::Vertex;
 
 /// A corner of either tiling, as later stages need it.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct PlacedSaddle {
+pub(crate) struct PlacedSaddle {
     /// Position, px.
     pub position: DVec2,
     /// Half the difference of the grey values of bright and dark tiles around it.
@@ -17,22 +17,22 @@ pub struct PlacedSaddle {
 }
 
 /// Corners by lattice vertex.
-pub type SaddleGrid = BTreeMap<Vertex, PlacedSaddle>;
+pub(crate) type SaddleGrid = BTreeMap<Vertex, PlacedSaddle>;
 
 /// Where a vertex lies in the mirror: rows and columns are exchanged, which leaves upright tiles upright and
 /// dark squares dark.
-pub fn mirrored(vertex: Vertex) -> Vertex {
+pub(crate) fn mirrored(vertex: Vertex) -> Vertex {
     Vertex::new(vertex.col, vertex.row)
 }
 
 /// A grid with the vertices that it has in a mirror: that of a flopped picture, turned the right way.
-pub fn mirror_image(grid: &SaddleGrid) -> SaddleGrid {
+pub(crate) fn mirror_image(grid: &SaddleGrid) -> SaddleGrid {
     grid.iter().map(|(&vertex, &placed)| (mirrored(vertex), placed)).collect()
 }
 
 /// A corner in a grid while it grows.
 #[derive(Clone, Copy, Debug)]
-pub struct GrownSaddle<const N: usize> {
+pub(crate) struct GrownSaddle<const N: usize> {
     /// The corner.
     pub saddle: Saddle<N>,
     /// Ray k points along step `k + turn` (mod N) of the lattice.
@@ -41,10 +41,10 @@ pub struct GrownSaddle<const N: usize> {
 
 impl<const N: usize> GrownSaddle<N> {
     /// Index of the ray along step `k` of the lattice.
-    pub fn ray(&self, k: usize) -> usize {
+    pub(crate) fn ray(&self, k: usize) -> usize {
         (k + N - self.turn) % N
     }
 }
 
 /// A grid while it grows.
-pub type Growing<const N: usize> = BTreeMap<Vertex, GrownSaddle<N>>;
+pub(crate) type Growing<const N: usize> = BTreeMap<Vertex, GrownSaddle<N>>;

@@ -52,7 +52,7 @@ const SAMPLES: usize = 8;
 
 /// Whether a grid without tags is made of squares, with its corners refined. Of deltille grids it
 /// tells nothing.
-pub fn is_of_squares(image: ImageView, grid: &Grid, may_have_tags: bool) -> bool {
+pub(crate) fn is_of_squares(image: ImageView, grid: &Grid, may_have_tags: bool) -> bool {
     if grid.kind == GridKind::Deltille {
         return true;
     }

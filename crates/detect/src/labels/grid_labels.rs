@@ -21,14 +21,14 @@ use deltille_core::targets::{Target, board_vertices};
 
 /// A grid of corners without labels, and its tiling.
 #[derive(Clone, Copy, Debug)]
-pub struct FoundGrid<'a> {
+pub(crate) struct FoundGrid<'a> {
     pub kind: GridKind,
     pub corners: &'a SaddleGrid,
 }
 
 /// How corners get absolute labels.
 #[derive(Clone, Debug)]
-pub struct Labels {
+pub(crate) struct Labels {
     source: Source,
     /// The board, where one alone is looked for.
     whole: Option<WholeBoard>,
@@ -67,7 +67,11 @@ pub(crate) const MOST_CORNERS: usize = 20_000;
 
 impl Labels {
     /// By the rows and columns of an untagged board, where they are known.
-    pub fn of_size(kind: GridKind, size: Option<(u32, u32)>, config: &DetectorConfig) -> Self {
+    pub(crate) fn of_size(
+        kind: GridKind,
+        size: Option<(u32, u32)>,
+        config: &DetectorConfig,
+    ) -> Self {
         let outline = size.map(|(rows, cols)| board_vertices(kind, rows, cols));
         let whole = outline.clone().map(|outline| WholeBoard::new(kind, outline));
         let source = match (size, kind) {
@@ -81,7 +85,11 @@ impl Labels {
     }
 
     /// By the tags of a target, and the outlines of its untagged panels.
-    pub fn of_target(target: &Target, family: Option<&Family>, config: &DetectorConfig) -> Self {
+    pub(crate) fn of_target(
+        target: &Target,
+        family: Option<&Family>,
+        config: &DetectorConfig,
+    ) -> Self {
         let tags =
             family.and_then(|family| TagLabeller::new(target, family, config.max_bit_errors));
         let whole = match &target.panels[..] {
@@ -104,14 +112,14 @@ impl Labels {
     }
 
     /// By the tags and outlines of several targets that can be told apart, each with its name.
-    pub fn of_scene(targets: Vec<(String, Self)>) -> Self {
+    pub(crate) fn of_scene(targets: Vec<(String, Self)>) -> Self {
         let allow_mirrored = targets.iter().any(|(_, labels)| labels.allow_mirrored);
         Self { source: Source::Scene(targets), whole: None, allow_mirrored }
     }
 
     /// The panels in a grid; the grid itself with relative labels where there are none, and why there are
     /// none.
-    pub fn label(
+    pub(crate) fn label(
         &self,
         image: ImageView,
         found: FoundGrid,
@@ -161,18 +169,18 @@ impl Labels {
     }
 
     /// The board, where one alone is looked for.
-    pub fn whole(&self) -> Option<&WholeBoard> {
+    pub(crate) fn whole(&self) -> Option<&WholeBoard> {
         self.whole.as_ref()
     }
 
     /// Whether labels are looked for.
-    pub fn are_wanted(&self) -> bool {
+    pub(crate) fn are_wanted(&self) -> bool {
         !matches!(self.source, Source::None)
     }
 
     /// Corners of the largest thing that is looked for. What has more, and no tag that vouches for it, is another
     /// thing: a halftone, a fabric or a tiled floor is as regular as a board, but seldom as small.
-    pub fn most_corners(&self) -> usize {
+    pub(crate) fn most_corners(&self) -> usize {
         match &self.source {
             Source::None => MOST_CORNERS,
             Source::Outline(outline) => outline.len(),

@@ -84,7 +84,7 @@ const HARDLY_HELD: f64 = 0.1;
 
 /// How far from the edges tiles are plain, in the units of tile coordinates.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct ClearDepth {
+pub(crate) struct ClearDepth {
     /// In dark tiles.
     pub dark: f64,
     /// In bright tiles.
@@ -93,7 +93,7 @@ pub struct ClearDepth {
 
 /// Light and blur of a grid.
 #[derive(Clone, Debug)]
-pub struct GridLight {
+pub(crate) struct GridLight {
     /// Covariance of the blur xx, xy, yy, px²: lens, motion, pixel and interpolation together.
     pub blur_px2: [f64; 3],
     /// κ.
@@ -108,14 +108,14 @@ pub struct GridLight {
 
 /// Black and white over a tile, as planes of its coordinates.
 #[derive(Clone, Copy, Debug)]
-pub struct Levels {
+pub(crate) struct Levels {
     dark: [f64; 3],
     contrast: [f64; 3],
 }
 
 impl Levels {
     /// Black at a point of the tile, and how much brighter white is.
-    pub fn at(&self, DVec2 { x: u, y: v }: DVec2) -> [f64; 2] {
+    pub(crate) fn at(&self, DVec2 { x: u, y: v }: DVec2) -> [f64; 2] {
         [self.dark, self.contrast].map(|[a, b, c]| a + b * u + c * v)
     }
 }
@@ -132,7 +132,7 @@ struct Profile {
 
 impl GridLight {
     /// That of a grid; `None` where too little of it is seen.
-    pub fn of(
+    pub(crate) fn of(
         image: ImageView,
         grid: &SaddleGrid,
         kind: GridKind,
@@ -203,13 +203,13 @@ impl GridLight {
     }
 
     /// Deviation of the blur in px, the mean of all directions.
-    pub fn blur_px(&self) -> f64 {
+    pub(crate) fn blur_px(&self) -> f64 {
         (0.5 * (self.blur_px2[0] + self.blur_px2[2])).sqrt()
     }
 
     /// The share of white that a pixel shows, of a brightness on the scale of black 0 and white 1; from
     /// the clipped share on it may be more.
-    pub fn share(&self, brightness: f64) -> f64 {
+    pub(crate) fn share(&self, brightness: f64) -> f64 {
         if self.clipped_share < 1.0 {
             return brightness * self.clipped_share;
         }
@@ -224,7 +224,7 @@ impl GridLight {
     }
 
     /// Black and white over a tile whose corners are in the grid.
-    pub fn levels(
+    pub(crate) fn levels(
         &self,
         image: ImageView,
         grid: &SaddleGrid,

@@ -86,7 +86,7 @@ const ROUNDS: usize = 6;
 
 /// The positions at which cells are sampled, and the geometry by which blur mixes them.
 #[derive(Clone, Debug)]
-pub struct CellModel {
+pub(crate) struct CellModel {
     kind: GridKind,
     bits: usize,
     /// Length of the tile's edge, bit-widths.
@@ -101,7 +101,7 @@ pub struct CellModel {
 
 /// The blur in tile coordinates, and the noise.
 #[derive(Clone, Copy, Debug)]
-pub struct TileBlur {
+pub(crate) struct TileBlur {
     /// Covariance uu, uv, vv, bit-widths².
     pub covariance: [f64; 3],
     /// Area of a bit-width squared of tile coordinates, px².
@@ -112,7 +112,7 @@ pub struct TileBlur {
 
 /// The estimator K with the terms that belong to it.
 #[derive(Debug)]
-pub struct Mixing {
+pub(crate) struct Mixing {
     bits: usize,
     /// ½ Σ W + white, by sample.
     middle: Vec<f32>,
@@ -127,11 +127,11 @@ pub struct Mixing {
 }
 
 /// Cache of mixings, by quantised blur.
-pub type Mixings = BTreeMap<[i32; 3], Rc<Mixing>>;
+pub(crate) type Mixings = BTreeMap<[i32; 3], Rc<Mixing>>;
 
 /// A sample of a tile on the scale of black 0 and white 1.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Sample {
+pub(crate) enum Sample {
     /// The measured value.
     Share(f32),
     /// A lower bound: the sample is saturated.
@@ -143,7 +143,7 @@ pub enum Sample {
 impl CellModel {
     /// A model for tags whose cells begin `inset_bits`, and whose border begins `margin_bits`, from
     /// the edges of their tiles, in bit-widths.
-    pub fn new(cells: &TagCells, inset_bits: f64, margin_bits: f64) -> Self {
+    pub(crate) fn new(cells: &TagCells, inset_bits: f64, margin_bits: f64) -> Self {
         let bits = cells.dimension().bits();
         let points = (0..bits).flat_map(|bit| {
             let centre = cells.centre(bit, inset_bits);
@@ -166,24 +166,24 @@ impl CellModel {
     }
 
     /// The positions at which a tile is sampled, in tile coordinates.
-    pub fn points(&self) -> &[DVec2] {
+    pub(crate) fn points(&self) -> &[DVec2] {
         &self.points
     }
 
     /// The same with the bit of the cell that each is in.
-    pub fn points_by_bit(&self) -> impl Iterator<Item = (usize, &DVec2)> {
+    pub(crate) fn points_by_bit(&self) -> impl Iterator<Item = (usize, &DVec2)> {
         let of_cell = self.points.len() / self.bits;
         self.points.iter().enumerate().map(move |(i, point)| (i / of_cell, point))
     }
 
     /// Length of the tile's edge, bit-widths.
-    pub fn width(&self) -> f64 {
+    pub(crate) fn width(&self) -> f64 {
         self.width
     }
 
     /// The mixing for a blur, from the cache `known` where one for nearly the same blur exists;
     /// `None` where the equations cannot be solved.
-    pub fn mixing(&self, blur: TileBlur, known: &mut Mixings) -> Option<Rc<Mixing>> {
+    pub(crate) fn mixing(&self, blur: TileBlur, known: &mut Mixings) -> Option<Rc<Mixing>> {
         let [uu, uv, vv] = blur.covariance;
         // Isotropic on the print: steps along u and v lie 60° apart there, so that uu = vv = 1/sin² 60° and uv = −cos 60° of that.
         let [puu, puv] = match self.kind {
@@ -287,7 +287,7 @@ impl CellModel {
 impl Mixing {
     /// Half the log-odds that each cell is white, by bit; `samples` are at the positions of
     /// [`CellModel::points`].
-    pub fn half_odds(&self, samples: &[Sample]) -> Vec<f32> {
+    pub(crate) fn half_odds(&self, samples: &[Sample]) -> Vec<f32> {
         let whole = samples.iter().all(|sample| matches!(sample, Sample::Share(_)));
         let mut off_middle: Vec<f32> = samples
             .iter()
@@ -375,7 +375,7 @@ fn parts_of(cell: &[DVec2]) -> Vec<DVec2> {
 
 /// Converts a covariance xx, xy, yy, px², to tile coordinates whose unit steps along u and v are
 /// the vectors `a` and `b`, px; also returns the area of a unit square, px².
-pub fn in_tile([xx, xy, yy]: [f64; 3], [a, b]: [DVec2; 2]) -> Option<([f64; 3], f64)> {
+pub(crate) fn in_tile([xx, xy, yy]: [f64; 3], [a, b]: [DVec2; 2]) -> Option<([f64; 3], f64)> {
     let jacobian = Matrix2::new(a.x, b.x, a.y, b.y);
     let determinant = jacobian.determinant().abs();
     let inverse = jacobian.try_inverse()?;

@@ -10,7 +10,7 @@ const LEAST_FREQUENCY: f64 = 0.05;
 
 /// Codes of a target in all their turns.
 #[derive(Clone, Debug)]
-pub struct TargetWords {
+pub(crate) struct TargetWords {
     ids: Vec<u32>,
     turns: usize,
     /// Of code i turned k times: word i · turns + k.
@@ -21,7 +21,7 @@ pub struct TargetWords {
 
 impl TargetWords {
     /// Those of some codes of a family.
-    pub fn new(family: &Family, ids: Vec<u32>) -> Self {
+    pub(crate) fn new(family: &Family, ids: Vec<u32>) -> Self {
         let cells = family.cells();
         let turns = usize::from(family.kind().turns());
         let bits = family.dimension().bits() as usize;
@@ -61,28 +61,28 @@ impl TargetWords {
     }
 
     /// How many there are.
-    pub fn len(&self) -> usize {
+    pub(crate) fn len(&self) -> usize {
         self.words.len()
     }
 
     /// How many turns each code has.
-    pub fn turns(&self) -> usize {
+    pub(crate) fn turns(&self) -> usize {
         self.turns
     }
 
     /// The index of an id's code.
-    pub fn code_of(&self, id: u32) -> Option<usize> {
+    pub(crate) fn code_of(&self, id: u32) -> Option<usize> {
         self.ids.binary_search(&id).ok()
     }
 
     /// A word.
-    pub fn word(&self, index: usize) -> u64 {
+    pub(crate) fn word(&self, index: usize) -> u64 {
         self.words[index]
     }
 
     /// Λ of every word, nats: how much more likely the cells are if they show that word than any that is
     /// drawn by the cells' frequencies.
-    pub fn evidence(&self, half_odds: &[f32]) -> Vec<f32> {
+    pub(crate) fn evidence(&self, half_odds: &[f32]) -> Vec<f32> {
         let bytes = half_odds.len().div_ceil(8);
         // Sum of the half odds of the white cells, for each value of each byte of 8 cells.
         let mut sums = vec![[0.0f32; 256]; bytes];
@@ -107,7 +107,7 @@ impl TargetWords {
     }
 
     /// Λ of any word, nats.
-    pub fn evidence_of(&self, word: u64, half_odds: &[f32]) -> f32 {
+    pub(crate) fn evidence_of(&self, word: u64, half_odds: &[f32]) -> f32 {
         let sign = |bit: usize| if word >> bit & 1 == 1 { 1.0 } else { -1.0 };
         let sum: f32 = half_odds.iter().enumerate().map(|(bit, odds)| sign(bit) * odds).sum();
         sum - self.unrelated(half_odds)[0]

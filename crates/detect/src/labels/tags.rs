@@ -40,7 +40,7 @@ const SHARES: [f64; 2] = [-0.5, 1.5];
 
 /// The cells of a tile.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Reading {
+pub(crate) struct Reading {
     /// The tile, in the grid's vertices.
     pub tile: Tile,
     /// Half the logarithm of the odds that a cell is of the colour around the border, by bit in the
@@ -50,12 +50,12 @@ pub struct Reading {
 
 impl Reading {
     /// The most likely word.
-    pub fn word(&self) -> u64 {
+    pub(crate) fn word(&self) -> u64 {
         self.half_odds.iter().rev().fold(0, |word, odds| word << 1 | u64::from(*odds > 0.0))
     }
 
     /// How much the cells tell, bits: one for each that is known, none for each that may be either.
-    pub fn bits_told(&self) -> f64 {
+    pub(crate) fn bits_told(&self) -> f64 {
         let told = |&half_odds: &f32| {
             let wrong = 1.0 / (1.0 + (2.0 * f64::from(half_odds.abs())).exp());
             let right = 1.0 - wrong;
@@ -67,7 +67,7 @@ impl Reading {
 
 /// How the tags of a panel lie in their tiles.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct TagPlace {
+pub(crate) struct TagPlace {
     /// Width of the border, bit-widths along the edge.
     border_bits: f64,
     /// Blank between the edges of the tile and the border.
@@ -79,12 +79,12 @@ pub struct TagPlace {
 
 impl TagPlace {
     /// That of tags with a border of so many bits.
-    pub fn with(border_bits: f64, tags_in: TagsIn) -> Self {
+    pub(crate) fn with(border_bits: f64, tags_in: TagsIn) -> Self {
         Self { border_bits, margin_bits: tags_in.margin_bits(), tags_in, gap_edges: None }
     }
 
     /// That of the tags of `panel`.
-    pub fn of(panel: &Panel) -> Self {
+    pub(crate) fn of(panel: &Panel) -> Self {
         let border_bits = panel.border_bits.unwrap_or(1.0);
         let (margin_bits, tags_in) = (panel.tag_margin_bits(), panel.tags_in);
         Self { border_bits, margin_bits, tags_in, gap_edges: panel.gap_edges }
@@ -103,7 +103,7 @@ struct Known {
 
 /// Reads the tags of one family that lie alike in their tiles.
 #[derive(Clone, Debug)]
-pub struct TagReader {
+pub(crate) struct TagReader {
     kind: GridKind,
     tags_in: TagsIn,
     gap_edges: Option<f64>,
@@ -117,7 +117,7 @@ pub struct TagReader {
 
 /// What was read in a grid.
 #[derive(Clone, Debug, Default)]
-pub struct Read {
+pub(crate) struct Read {
     /// Tiles that may carry a tag.
     pub readings: Vec<Reading>,
     /// The median length of a bit, px.
@@ -128,7 +128,7 @@ pub struct Read {
 
 impl TagReader {
     /// A reader for tags that lie so in their tiles.
-    pub fn new(family: &Family, place: TagPlace) -> Self {
+    pub(crate) fn new(family: &Family, place: TagPlace) -> Self {
         let TagPlace { border_bits, margin_bits, tags_in, gap_edges } = place;
         let cells = family.cells();
         let inset_bits = margin_bits + border_bits;
@@ -152,7 +152,13 @@ impl TagReader {
 
     /// Reads tiles of a grid whose corners are known: those that may carry a tag of a board that is not
     /// inverted, or of one that is; no more than `most` of them, spread over the grid.
-    pub fn read(&self, image: ImageView, grid: &SaddleGrid, inverted: bool, most: usize) -> Read {
+    pub(crate) fn read(
+        &self,
+        image: ImageView,
+        grid: &SaddleGrid,
+        inverted: bool,
+        most: usize,
+    ) -> Read {
         let ClearDepth { dark, bright } = self.clear;
         let clear = if inverted { ClearDepth { dark: bright, bright: dark } } else { self.clear };
         let Some(light) = GridLight::of(image, grid, self.kind, clear) else {
@@ -180,7 +186,7 @@ impl TagReader {
     }
 
     /// What a tile without a tag shows: it is of one colour all over.
-    pub fn plain_word(&self) -> u64 {
+    pub(crate) fn plain_word(&self) -> u64 {
         match self.tags_in {
             TagsIn::Black => 0,
             TagsIn::White => u64::MAX,
@@ -188,7 +194,7 @@ impl TagReader {
     }
 
     /// A reading as it would be in a mirror.
-    pub fn mirrored(&self, reading: &Reading) -> Reading {
+    pub(crate) fn mirrored(&self, reading: &Reading) -> Reading {
         let tile = reading.tile;
         Reading {
             tile: Tile { anchor: Vertex::new(tile.anchor.col, tile.anchor.row), ..tile },

@@ -14,7 +14,7 @@ const BENDING_PENALTY: f64 = 0.05;
 /// Image positions of the points of a tile: a quadratic map fitted to its corners and to the
 /// corners around it, so that perspective and distortion are followed.
 #[derive(Clone, Debug)]
-pub struct TileMap {
+pub(crate) struct TileMap {
     /// Coefficients of 1, u, v, u², uv, v² for x and for y.
     coefficients: [[f64; 6]; 2],
 }
@@ -23,7 +23,7 @@ impl TileMap {
     /// The map of `tile`, in the coordinates of [`Tile::frame`]; `None` unless all its corners are
     /// in the grid. `gap` is the width of every second row and column of tiles, in edges, where these are gaps
     /// between tags.
-    pub fn new(grid: &SaddleGrid, tile: Tile, gap: Option<f64>) -> Option<Self> {
+    pub(crate) fn new(grid: &SaddleGrid, tile: Tile, gap: Option<f64>) -> Option<Self> {
         let kind = tile.kind();
         let own = tile.vertices();
         let mut around: Vec<Vertex> = own.clone().flat_map(|v| kind.neighbours(v)).collect();
@@ -56,7 +56,7 @@ impl TileMap {
     }
 
     /// Image position of the tile point (u, v), px.
-    pub fn image_from_tile(&self, point: DVec2) -> DVec2 {
+    pub(crate) fn image_from_tile(&self, point: DVec2) -> DVec2 {
         let monomials = monomials(point);
         let value = |row: [f64; 6]| row.iter().zip(&monomials).map(|(c, m)| c * m).sum::<f64>();
         self.coefficients.map(value).into()

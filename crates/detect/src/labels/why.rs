@@ -38,7 +38,7 @@ const PIXELS_A_DEAD_ONE: usize = 1000;
 const PIXELS_A_STEEP_ONE: usize = 5000;
 
 /// Why nothing was found in a picture with so many corners of its tiling.
-pub fn nothing_found(pyramid: &Pyramid, corners: usize) -> Reason {
+pub(crate) fn nothing_found(pyramid: &Pyramid, corners: usize) -> Reason {
     let level = &pyramid.levels()[0];
     let [low, high] = range(level);
     let brightest = high / f64::from(PYRAMID_FULL_SCALE);
@@ -62,7 +62,7 @@ pub fn nothing_found(pyramid: &Pyramid, corners: usize) -> Reason {
 }
 
 /// Why the tags of a grid gave no labels.
-pub fn no_labels(evidence: &TagEvidence, grid: &SaddleGrid, size: [usize; 2]) -> Reason {
+pub(crate) fn no_labels(evidence: &TagEvidence, grid: &SaddleGrid, size: [usize; 2]) -> Reason {
     let corners = ("corners", grid.len() as f64);
     if evidence.is_ambiguous {
         return Reason::new(ReasonKind::Ambiguous, [corners]);
@@ -104,7 +104,7 @@ pub fn no_labels(evidence: &TagEvidence, grid: &SaddleGrid, size: [usize; 2]) ->
 }
 
 /// Why a grid is not labelled by an outline of so many corners.
-pub fn no_outline(grid: &SaddleGrid, expected: usize, size: [usize; 2]) -> Reason {
+pub(crate) fn no_outline(grid: &SaddleGrid, expected: usize, size: [usize; 2]) -> Reason {
     let figures = [("corners", grid.len() as f64), ("expected", expected as f64)];
     let kind = if grid.len() < expected && ends_at_border(grid, size) {
         ReasonKind::CutByBorder
@@ -126,7 +126,7 @@ fn ends_at_border(grid: &SaddleGrid, [width, height]: [usize; 2]) -> bool {
 }
 
 /// The median distance of corners that follow each other in a row or column, px; `None` where there are none such.
-pub fn edge_px(grid: &SaddleGrid) -> Option<f64> {
+pub(crate) fn edge_px(grid: &SaddleGrid) -> Option<f64> {
     let lengths = grid.iter().flat_map(|(&v, placed)| {
         let beside = GridKind::Checker.neighbours(v).filter_map(|n| grid.get(&n));
         beside.map(move |other| {

@@ -39,11 +39,11 @@ const RULE_OF_THREE: [(f64, f64); 3] =
     [(0.0, 0.888_888_889), (0.774_596_669, 0.555_555_556), (-0.774_596_669, 0.555_555_556)];
 
 /// Edges 46° apart.
-pub const FEW_NODES_RHO: f64 = 0.7;
+pub(crate) const FEW_NODES_RHO: f64 = 0.7;
 
 /// A value with its derivatives.
 #[derive(Clone, Copy, Debug)]
-pub struct Shade<const K: usize> {
+pub(crate) struct Shade<const K: usize> {
     /// f, −1 to 1.
     pub f: f32,
     /// ∂f/∂h_k.
@@ -62,14 +62,14 @@ pub struct Shade<const K: usize> {
 ///
 /// A trait, since its methods are compiled for the processor of the loop that they are inlined into; closures
 /// that are called twice are not.
-pub trait Pattern<const K: usize> {
+pub(crate) trait Pattern<const K: usize> {
     /// The brightness at distances h from the edges.
     fn at(&self, h: [f32; K]) -> Shade<K>;
 }
 
 /// Three edges.
 #[derive(Clone, Copy, Debug)]
-pub struct Deltille;
+pub(crate) struct Deltille;
 
 impl Pattern<3> for Deltille {
     #[inline(always)]
@@ -88,7 +88,7 @@ impl<const NODES: usize> Pattern<2> for Orthant<NODES> {
 /// The corner of a picture that was sharpened: (1 + α)·f(h) − α·f(h/w). A pattern of edges is linear in the
 /// point spread function, so this is exact where the mask is a Gaussian.
 #[derive(Clone, Copy, Debug)]
-pub struct Haloed<P> {
+pub(crate) struct Haloed<P> {
     /// Without the halo.
     pub pattern: P,
     /// As wide as the halo, at distances in its units: the same, but for a way in them.
@@ -119,7 +119,7 @@ impl<const K: usize, P: Pattern<K>> Pattern<K> for Haloed<P> {
 /// overlap there, where the alternating sum has −3. Blurred, it is nearly a Gaussian with the triangle's area,
 /// centroid and variance.
 #[derive(Clone, Copy, Debug)]
-pub struct Overlap {
+pub(crate) struct Overlap {
     /// 1 where what is dark has grown, −1 where it has shrunk.
     sign: f64,
     /// Logarithm of what it adds to f in its middle.
@@ -133,7 +133,7 @@ pub struct Overlap {
 impl Overlap {
     /// Between h₁ = 0, h₂ = 0 and h₃ = a·h₁ + b·h₂ + c = 0 under a blur of this covariance along the first two
     /// normals.
-    pub fn between([a, b, c]: [f64; 3], [xx, xy, yy]: [f64; 3], sign: f64) -> Self {
+    pub(crate) fn between([a, b, c]: [f64; 3], [xx, xy, yy]: [f64; 3], sign: f64) -> Self {
         let [x, y] = [-c / a, -c / b];
         // The covariance of a triangle with the sides x and y along the axes: x²/18, −xy/36, y²/18.
         let [xx, xy, yy] = [xx + x * x / 18.0, xy - x * y / 36.0, yy + y * y / 18.0];
@@ -169,11 +169,11 @@ impl Overlap {
 }
 
 /// Parameters that a triangle depends on, beside the distances from the edges.
-pub const TRIANGLE_PARAMS: usize = 5;
+pub(crate) const TRIANGLE_PARAMS: usize = 5;
 
 /// An [`Overlap`] with its derivatives, for many pixels.
 #[derive(Clone, Copy, Debug)]
-pub struct Triangle {
+pub(crate) struct Triangle {
     height: f32,
     middle: [f32; 2],
     inverse: [f32; 3],
@@ -182,7 +182,7 @@ pub struct Triangle {
 
 impl Triangle {
     /// With what becomes of it after a step in each parameter.
-    pub fn new(here: Overlap, there: [Overlap; TRIANGLE_PARAMS], step: f64) -> Self {
+    pub(crate) fn new(here: Overlap, there: [Overlap; TRIANGLE_PARAMS], step: f64) -> Self {
         Self {
             height: (here.sign * here.ln_height.exp()) as f32,
             middle: here.middle.map(|c| c as f32),
@@ -194,7 +194,7 @@ impl Triangle {
 
 /// Three edges that miss each other, with the triangle between them.
 #[derive(Clone, Copy, Debug)]
-pub struct Inked<P> {
+pub(crate) struct Inked<P> {
     /// The edges.
     pub edges: P,
     /// What lies between them.
@@ -225,7 +225,7 @@ const LEAST_WAY: f32 = 0.1;
 /// Three edges in a picture that moved along a line at a constant speed, half of the way on each side of the middle. An
 /// edge's blur is then a box after a Gaussian.
 #[derive(Clone, Copy, Debug)]
-pub struct SweptDeltille {
+pub(crate) struct SweptDeltille {
     /// Half of the way across each edge, in units of the blur: its length, the inverse of its double, and its sign.
     reach: [f32; 3],
     over_whole: [f32; 3],
@@ -234,7 +234,7 @@ pub struct SweptDeltille {
 
 impl SweptDeltille {
     /// With half of the way across each edge, in units of the blur.
-    pub fn new(way: [f32; 3]) -> Self {
+    pub(crate) fn new(way: [f32; 3]) -> Self {
         let reach = way.map(|way| way.abs().max(LEAST_WAY));
         let over_whole = reach.map(|reach| 0.5 / reach);
         Self { reach, over_whole, signs: way.map(f32::signum) }
@@ -272,7 +272,7 @@ impl Pattern<3> for SweptDeltille {
 
 /// Two edges alike. The box is made of four Gaussians, and what blur is left.
 #[derive(Clone, Copy, Debug)]
-pub struct SweptChecker<P> {
+pub(crate) struct SweptChecker<P> {
     /// Standing still.
     pub pattern: P,
     /// Half of the way across both edges, in units of the blur.
@@ -280,7 +280,7 @@ pub struct SweptChecker<P> {
 }
 
 /// Of the variance of a box, what the places of four equal parts of it make.
-pub const PLACES_OF_FOUR: f64 = 15.0 / 16.0;
+pub(crate) const PLACES_OF_FOUR: f64 = 15.0 / 16.0;
 
 impl<P: Pattern<2>> Pattern<2> for SweptChecker<P> {
     #[inline(always)]
@@ -336,7 +336,7 @@ fn deltille([h1, h2, h3]: [f32; 3]) -> Shade<3> {
 
 /// What the orthant integral needs of ρ: computed once for all pixels.
 #[derive(Clone, Copy, Debug)]
-pub struct Orthant<const NODES: usize> {
+pub(crate) struct Orthant<const NODES: usize> {
     rho: f32,
     /// √(1 − ρ²).
     sine: f32,
@@ -348,14 +348,14 @@ pub struct Orthant<const NODES: usize> {
 
 impl Orthant<6> {
     /// For ρ = cos(angle between the edges), |ρ| < 1.
-    pub fn new(rho: f64) -> Self {
+    pub(crate) fn new(rho: f64) -> Self {
         Self::by(RULE_OF_SIX, rho)
     }
 }
 
 impl Orthant<3> {
     /// For ρ up to [`FEW_NODES_RHO`].
-    pub fn of_few_nodes(rho: f64) -> Self {
+    pub(crate) fn of_few_nodes(rho: f64) -> Self {
         Self::by(RULE_OF_THREE, rho)
     }
 }
@@ -373,7 +373,7 @@ impl<const NODES: usize> Orthant<NODES> {
 
     /// Two edges.
     #[inline(always)]
-    pub fn checker(&self, [h1, h2]: [f32; 2]) -> Shade<2> {
+    pub(crate) fn checker(&self, [h1, h2]: [f32; 2]) -> Shade<2> {
         let (squares, product) = (h1 * h1 + h2 * h2, h1 * h2);
         let mut integral = 0.0;
         for [weight, sin, half_sec2] in self.nodes {

@@ -34,7 +34,7 @@ type TilesOfPanels = BTreeMap<u32, BTreeSet<Tile>>;
 
 /// The tiles of a target with tags, and the area of the tag in its tile.
 #[derive(Clone, Debug, Default)]
-pub struct TagAreas {
+pub(crate) struct TagAreas {
     /// Distance from the edges of a tile to what it shows of a tag, in edges along the other
     /// edges; the smallest of all panels.
     inset: f64,
@@ -44,7 +44,7 @@ pub struct TagAreas {
 
 impl TagAreas {
     /// The tag areas of `target` with the tags of this family.
-    pub fn of(target: &Target, family: &Family) -> Self {
+    pub(crate) fn of(target: &Target, family: &Family) -> Self {
         let tagged = || target.panels.iter().filter(|panel| !panel.tags.is_empty());
         let inset = |panel: &Panel| {
             let at = match panel.tags_in {
@@ -61,7 +61,7 @@ impl TagAreas {
     }
 
     /// The tag areas of several targets, by their names.
-    pub fn of_scene(targets: impl IntoIterator<Item = (String, Self)>) -> Self {
+    pub(crate) fn of_scene(targets: impl IntoIterator<Item = (String, Self)>) -> Self {
         let mut all = Self { inset: f64::INFINITY, targets: Vec::new() };
         for (name, of_target) in targets {
             all.inset = all.inset.min(of_target.inset);
@@ -72,7 +72,7 @@ impl TagAreas {
     }
 
     /// Whether no tile shows a tag.
-    pub fn is_empty(&self) -> bool {
+    pub(crate) fn is_empty(&self) -> bool {
         self.targets.iter().all(|(_, tiles)| tiles.is_empty())
     }
 
@@ -91,14 +91,14 @@ impl TagAreas {
 }
 
 /// An empty span.
-pub const NOTHING: [f64; 2] = [f64::INFINITY, f64::NEG_INFINITY];
+pub(crate) const NOTHING: [f64; 2] = [f64::INFINITY, f64::NEG_INFINITY];
 
 /// Signed distance from a line, px: a·u + b·v + c.
 type Line = [f64; 3];
 
 /// The surroundings of a corner, px from it.
 #[derive(Clone, Debug, Default)]
-pub struct Surroundings {
+pub(crate) struct Surroundings {
     /// Far sides of the tiles, positive towards the corner.
     sides: Vec<Line>,
     /// Tags: their sides, positive outside.
@@ -111,7 +111,7 @@ pub struct Surroundings {
 
 /// An edge through a corner.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Edge {
+pub(crate) struct Edge {
     /// Direction within a half-turn, radians.
     pub angle_rad: f64,
     /// Curvature to the left of that direction (to greater v of u), 1/px.
@@ -124,7 +124,7 @@ pub struct Edge {
 impl Surroundings {
     /// Ends of the clear part of a row at distance `v` from the corner, px, between the far sides
     /// of the tiles under a blur of this standard deviation, px.
-    pub fn span(&self, v: f64, blur_px: f64) -> [f64; 2] {
+    pub(crate) fn span(&self, v: f64, blur_px: f64) -> [f64; 2] {
         if self.sides.is_empty() {
             return NOTHING;
         }
@@ -145,7 +145,7 @@ impl Surroundings {
 
     /// A predicate for places, px from the corner, at which no tag is visible under a blur of this
     /// standard deviation, px.
-    pub fn off_tags(&self, blur_px: f64) -> impl Fn(DVec2) -> bool {
+    pub(crate) fn off_tags(&self, blur_px: f64) -> impl Fn(DVec2) -> bool {
         let margin = BLUR_MARGIN_SIGMAS * blur_px;
         let circle2 = (self.distance_of_tags(DVec2::ZERO) - margin).max(0.0).powi(2);
         move |place| place.length_squared() < circle2 || self.distance_of_tags(place) >= margin
@@ -153,7 +153,7 @@ impl Surroundings {
 
     /// Half the side of the largest clear square around the corner, px, under a blur of this
     /// standard deviation, px.
-    pub fn clear_square_px(&self, blur_px: f64) -> f64 {
+    pub(crate) fn clear_square_px(&self, blur_px: f64) -> f64 {
         let clear = self.distance(DVec2::ZERO) - BLUR_MARGIN_SIGMAS * blur_px;
         clear.max(0.0) * std::f64::consts::FRAC_1_SQRT_2
     }
@@ -176,12 +176,12 @@ impl Surroundings {
 /// The surroundings of every corner of a grid, in their order, in pixels of `scale` times the size
 /// of those of the grid. For a corner whose neighbours are collinear nothing is known, and nothing
 /// counts as clear.
-pub fn surroundings(grid: &Grid, tags: &TagAreas, scale: f64) -> Vec<Surroundings> {
+pub(crate) fn surroundings(grid: &Grid, tags: &TagAreas, scale: f64) -> Vec<Surroundings> {
     surroundings_of(grid, tags, scale, 0..grid.corners.len())
 }
 
 /// The surroundings of some of the corners, by their index.
-pub fn surroundings_of(
+pub(crate) fn surroundings_of(
     grid: &Grid,
     tags: &TagAreas,
     scale: f64,
@@ -229,7 +229,7 @@ pub fn surroundings_of(
 /// The crossing of the lines through the neighbours of a corner, px, if the corner is displaced
 /// from them. `None` where it lies as near to them as lens distortion permits, and with fewer than
 /// two lines.
-pub fn crossing(grid: &Grid, corner: &GridCorner) -> Option<DVec2> {
+pub(crate) fn crossing(grid: &Grid, corner: &GridCorner) -> Option<DVec2> {
     let places = Places::of(grid, 1.0);
     let vertex = Vertex::new(corner.row, corner.col);
     let here = corner.position();

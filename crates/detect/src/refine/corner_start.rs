@@ -40,7 +40,7 @@ const MAX_START_BLUR: f64 = 0.5;
 
 /// The start of a corner whose edges have these directions, rising within a half-turn, under a blur of `blur_px`,
 /// from the pixels of a window; `None` when it shows one side of the edges alone.
-pub fn start_along<const K: usize>(
+pub(crate) fn start_along<const K: usize>(
     window: &Window,
     pixels: &[f32],
     position: DVec2,
@@ -116,7 +116,7 @@ fn sums<const K: usize>(
 }
 
 /// The start around `position`, from circles; `None` when the circles leave the image or show no contrast.
-pub fn start<const K: usize>(
+pub(crate) fn start<const K: usize>(
     image: ImageView,
     position: DVec2,
     radius: usize,

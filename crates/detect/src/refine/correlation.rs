@@ -22,7 +22,7 @@ use crate::lanes::LANES;
 
 /// Residuals of a corner, and how its parameters answer to its pixels.
 #[derive(Clone, Debug)]
-pub struct Influence {
+pub(crate) struct Influence {
     /// Pixels, counted from any.
     pub places: Vec<[i32; 2]>,
     /// The place of the corner among them, twice.
@@ -51,7 +51,7 @@ const FACTORS: [f64; 2] = [0.02, 40.0];
 const LEAST_LEFT: f32 = 0.1;
 
 /// Corners from which correlations are told; the sums of ten vary by some per cent.
-pub const CORNERS: usize = 10;
+pub(crate) const CORNERS: usize = 10;
 
 /// Of so many one tells what fits take out of residuals, which depends on the windows alone and is nearly
 /// the same for all.
@@ -132,7 +132,7 @@ impl Part {
 }
 
 /// Factor of the covariances of positions against those under white noise.
-pub fn inflation(corners: &[Influence]) -> f64 {
+pub(crate) fn inflation(corners: &[Influence]) -> f64 {
     let corners = &corners[..corners.len().min(CORNERS)];
     if corners.is_empty() {
         return 1.0;

@@ -49,7 +49,7 @@ const MAX_RESIDUAL_RATIO: f64 = 3.0;
 
 /// A corner that takes part in the joint fit, in picture coordinates.
 #[derive(Clone, Debug)]
-pub struct Sample {
+pub(crate) struct Sample {
     /// The pixels that show only this corner.
     pub patch: Patch,
     /// Its estimate by itself.

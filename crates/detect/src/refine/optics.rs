@@ -23,7 +23,7 @@ const HALO_WIDTH: f64 = 2.5;
 const LEAST_CORE: f64 = 0.3;
 
 /// The unit of the ink, in edges.
-pub const INK_UNIT: f64 = 0.01;
+pub(crate) const INK_UNIT: f64 = 0.01;
 
 /// Greatest astigmatism: the part of the squared blur that may lie in one direction, over the mean
 /// of both.
@@ -31,7 +31,7 @@ const MAX_ASTIGMATISM: f64 = 0.98;
 
 /// The parameters that the corners of a picture share.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Optics {
+pub(crate) struct Optics {
     /// Whether the tone curve is unknown.
     pub(super) is_open: bool,
     /// Whether the ink spread is unknown.
@@ -89,7 +89,7 @@ pub(super) const LEAST_MOTION: f64 = 0.25;
 /// Distribution of the blur over directions: M, of trace 2, or what remains of it without motion
 /// along a line.
 #[derive(Clone, Copy, Debug)]
-pub struct Spread {
+pub(crate) struct Spread {
     astigmatism: [f64; 2],
     /// The part of the astigmatism that the motion takes, and the length of the astigmatism.
     part: f64,
@@ -104,7 +104,7 @@ pub struct Spread {
 
 impl Spread {
     /// The bilinear form aᵀ M b.
-    pub fn product(&self, a: [f64; 2], b: [f64; 2]) -> f64 {
+    pub(crate) fn product(&self, a: [f64; 2], b: [f64; 2]) -> f64 {
         let [along, across] = parts(a, b);
         let [e1, e2] = self.astigmatism;
         (1.0 - self.part * self.length) * (a[0] * b[0] + a[1] * b[1])
@@ -112,7 +112,7 @@ impl Spread {
     }
 
     /// Derivatives of [`Self::product`] by both parameters of astigmatism.
-    pub fn by_astigmatism(&self, a: [f64; 2], b: [f64; 2]) -> [f64; 2] {
+    pub(crate) fn by_astigmatism(&self, a: [f64; 2], b: [f64; 2]) -> [f64; 2] {
         let parts = parts(a, b);
         let round = self.part * (a[0] * b[0] + a[1] * b[1]);
         [0, 1].map(|e| match self.is_swept {
@@ -129,22 +129,22 @@ fn parts(a: [f64; 2], b: [f64; 2]) -> [f64; 2] {
 
 impl Optics {
     /// Optics with a given tone curve, and nothing else known.
-    pub fn of(tone: Tone) -> Self {
+    pub(crate) fn of(tone: Tone) -> Self {
         Self { is_open: tone == Tone::Auto, curve: Curve::of(tone), ..Self::default() }
     }
 
     /// The same optics for a print with this ink spread, in edges; `None` where it is not known.
-    pub fn with_ink(self, ink: Option<f64>) -> Self {
+    pub(crate) fn with_ink(self, ink: Option<f64>) -> Self {
         Self { is_ink_open: ink.is_none(), ink: ink.unwrap_or(0.0) / INK_UNIT, ..self }
     }
 
     /// The same optics with the ink spread taken for known: an unknown one counts as none.
-    pub fn with_ink_as_known(self) -> Self {
+    pub(crate) fn with_ink_as_known(self) -> Self {
         Self { is_ink_open: false, ..self }
     }
 
     /// The distribution of the blur over directions, for corners with this number of edges.
-    pub fn spread(&self, edges: usize) -> Spread {
+    pub(crate) fn spread(&self, edges: usize) -> Spread {
         let ([e1, e2], length) = (self.astigmatism, self.stretch());
         let is_swept = self.is_motion && length > 0.0;
         let still = Spread {
@@ -178,30 +178,30 @@ impl Optics {
     }
 
     /// Least blur over all directions, relative to the mean blur.
-    pub fn narrowest(&self) -> f64 {
+    pub(crate) fn narrowest(&self) -> f64 {
         (1.0 - self.stretch()).sqrt()
     }
 
     /// Blur of the pattern without halo, relative to the blur of a pattern whose edges are as steep
     /// without one: (1 + α)/s − α/(w·s) is the same for all α. So the blur of a corner is nearly
     /// the same with and without a halo.
-    pub fn core(&self) -> f64 {
+    pub(crate) fn core(&self) -> f64 {
         let [strength, width] = self.halo;
         (1.0 + strength * (1.0 - 1.0 / width)).max(LEAST_CORE)
     }
 
     /// Derivative of the logarithm of [`Self::core`] by the strength of the halo.
-    pub fn ln_core_by_halo(&self) -> f64 {
+    pub(crate) fn ln_core_by_halo(&self) -> f64 {
         (1.0 - 1.0 / self.halo[1]) / self.core()
     }
 
     /// Whether there is a tone curve.
-    pub fn is_toned(&self) -> bool {
+    pub(crate) fn is_toned(&self) -> bool {
         self.curve.is_some()
     }
 
     /// The tone curve between the black and white of a corner.
-    pub fn piece(&self, level: f64, amplitude: f64) -> Piece {
+    pub(crate) fn piece(&self, level: f64, amplitude: f64) -> Piece {
         match &self.curve {
             Some(curve) => curve.piece(level, amplitude),
             None => Piece::line(level, amplitude),

@@ -34,7 +34,7 @@ use deltille_core::lattice::GridKind;
 use deltille_core::raster::ImageView;
 
 /// Smallest radius in which the model is fitted: 49 pixels for ten unknowns.
-pub const MIN_MODEL_RADIUS: usize = 3;
+pub(crate) const MIN_MODEL_RADIUS: usize = 3;
 
 /// Fewest pixels to which the model is fitted: three for each unknown, so that the noise shows.
 pub(crate) const MIN_PIXELS: usize = 30;
@@ -97,17 +97,17 @@ pub(crate) struct ModelFit {
 
 impl ModelFit {
     /// Position, px.
-    pub fn position(&self) -> DVec2 {
+    pub(crate) fn position(&self) -> DVec2 {
         self.corner.position
     }
 
     /// Standard deviation of what is left, of full scale.
-    pub fn noise(&self) -> f64 {
+    pub(crate) fn noise(&self) -> f64 {
         self.residual * self.corner.amplitude.abs()
     }
 
     /// Standard deviation of the blur with the pixel's box in it, px.
-    pub fn blur_px(&self) -> f64 {
+    pub(crate) fn blur_px(&self) -> f64 {
         self.corner.blur_px
     }
 }
@@ -165,7 +165,7 @@ impl Room<'_> {
     }
 
     /// Half the side of the largest square that shows nothing else, px.
-    pub fn clear_square_px(&self) -> f64 {
+    pub(crate) fn clear_square_px(&self) -> f64 {
         self.around.clear_square_px(self.blur_px).min(self.reach_px)
     }
 }

@@ -19,13 +19,13 @@ use deltille_core::statistics::median;
 
 /// Number of corners that are fitted together; more would determine the curve better than single
 /// corners can use it.
-pub const SAMPLES: usize = 16;
+pub(crate) const SAMPLES: usize = 16;
 
 /// Radius of the windows of these corners, px: the common parameters show at the edges, and near the corner.
-pub const REACH_PX: f64 = 7.0;
+pub(crate) const REACH_PX: f64 = 7.0;
 
 /// Where the picture is blurred the radius is so many standard deviations of the blur instead.
-pub const REACH_SIGMAS: f64 = 5.0;
+pub(crate) const REACH_SIGMAS: f64 = 5.0;
 
 /// A group is estimated where the first step, from a straight curve, promises this fraction of its
 /// threshold.
@@ -33,7 +33,7 @@ const WORTH_A_LOOK: f64 = 0.5;
 
 impl Optics {
     /// Estimates the optics from the corners of a picture; a tone curve that is known is kept.
-    pub fn estimate<const K: usize>(
+    pub(crate) fn estimate<const K: usize>(
         fitter: &mut CornerFitter,
         image: ImageView,
         samples: Vec<Sample>,

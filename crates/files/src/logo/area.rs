@@ -22,7 +22,7 @@ pub(super) struct Straight {
 }
 
 impl Straight {
-    pub fn area(&self) -> Area {
+    pub(super) fn area(&self) -> Area {
         Area::within(&self.outlines, self.rule)
     }
 }
@@ -35,23 +35,23 @@ pub(super) struct Area {
 
 impl Area {
     /// What is within outlines that may cross.
-    pub fn within(outlines: &[Vec<[f64; 2]>], rule: FillRule) -> Self {
+    pub(super) fn within(outlines: &[Vec<[f64; 2]>], rule: FillRule) -> Self {
         Self::of(outlines.to_vec().simplify_shape(rule))
     }
 
     /// All that is in one of several.
-    pub fn union<'a>(areas: impl IntoIterator<Item = &'a Self>) -> Self {
+    pub(super) fn union<'a>(areas: impl IntoIterator<Item = &'a Self>) -> Self {
         let outlines: Vec<_> = areas.into_iter().flat_map(|area| area.outlines.clone()).collect();
         Self::within(&outlines, FillRule::NonZero)
     }
 
     /// What is in this and not in another.
-    pub fn without(&self, other: &Self) -> Self {
+    pub(super) fn without(&self, other: &Self) -> Self {
         self.combined(other, OverlayRule::Difference)
     }
 
     /// What is in both.
-    pub fn common(&self, other: &Self) -> Self {
+    pub(super) fn common(&self, other: &Self) -> Self {
         self.combined(other, OverlayRule::Intersect)
     }
 
@@ -64,7 +64,7 @@ impl Area {
     }
 
     /// Its outlines.
-    pub fn into_outlines(self) -> Vec<Vec<DVec2>> {
+    pub(super) fn into_outlines(self) -> Vec<Vec<DVec2>> {
         let outline = |outline: Vec<[f64; 2]>| outline.into_iter().map(DVec2::from).collect();
         self.outlines.into_iter().map(outline).collect()
     }

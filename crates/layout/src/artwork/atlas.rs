@@ -102,7 +102,7 @@ pub(super) struct Packing {
 impl Packing {
     /// The packing whose longer side is the shortest, over all numbers of faces in a row; `padding`
     /// in mm.
-    pub fn tightest(faces: &[Face], padding: f64) -> Self {
+    pub(super) fn tightest(faces: &[Face], padding: f64) -> Self {
         let packings = (1..=faces.len()).map(|columns| Self::new(faces, columns, padding));
         let side = |packing: &Self| packing.size_mm.max_element();
         let tightest = packings.min_by(|a, b| side(a).total_cmp(&side(b)));
@@ -110,7 +110,7 @@ impl Packing {
     }
 
     /// The placement of each face on the sheet, numbered from 0.
-    pub fn placements(&self) -> impl Iterator<Item = Placement> {
+    pub(super) fn placements(&self) -> impl Iterator<Item = Placement> {
         let places = self.places.iter().zip(0..);
         places.map(|(&(angle_rad, origin_mm), panel)| Placement { panel, angle_rad, origin_mm })
     }

@@ -33,19 +33,19 @@ pub(crate) struct LogoSize {
 
 impl LogoSize {
     /// That of the logo of a paper.
-    pub fn of(paper: &PaperSpec) -> Option<Self> {
+    pub(crate) fn of(paper: &PaperSpec) -> Option<Self> {
         let width = paper.logo.as_ref()?.width();
         Some(Self { width, height_mm: paper.logo_height_mm })
     }
 
     /// Its width, in heights.
-    pub fn width(self) -> f64 {
+    pub(crate) fn width(self) -> f64 {
         self.width
     }
 
     /// Width and height in a strip of some length, with words that want to be so long: as high as asked for, where there
     /// is room for the `most`; else as the strip is `deep`, or less for the sake of the words.
-    pub fn in_strip(self, [length, words]: [f64; 2], deep: f64, most: f64) -> DVec2 {
+    pub(crate) fn in_strip(self, [length, words]: [f64; 2], deep: f64, most: f64) -> DVec2 {
         let widest = MOST_PART * length;
         let height = match self.height_mm {
             Some(asked) => asked.min(most).min(widest / self.width),
@@ -58,7 +58,7 @@ impl LogoSize {
     }
 
     /// How much of the length of a strip a logo of that width takes, mm.
-    pub fn taken(width_mm: f64) -> f64 {
+    pub(crate) fn taken(width_mm: f64) -> f64 {
         width_mm + BESIDE_MM
     }
 }

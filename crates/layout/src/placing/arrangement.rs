@@ -74,7 +74,7 @@ pub(crate) struct Footprint {
 }
 
 impl Footprint {
-    pub fn new(spec: &BoardSpec, margin_mm: f64) -> Self {
+    pub(crate) fn new(spec: &BoardSpec, margin_mm: f64) -> Self {
         let DVec2 { x: width, y: height } = size_mm(spec);
         let quiet = Panel::quiet_zone_at_mm(spec.edge_mm);
         let is_centred = spec.two_sided_mm.is_some();

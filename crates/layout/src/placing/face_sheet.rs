@@ -31,7 +31,7 @@ use deltille_core::targets::{
 };
 
 /// White beyond the edges of a face, mm: what cutting and gluing by hand are off, and some more.
-pub const BLEED_MM: f64 = 3.0;
+pub(crate) const BLEED_MM: f64 = 3.0;
 /// Cutting marks start this far from a vertex and end that far, mm.
 const MARK_MM: [f64; 2] = [BLEED_MM, 9.0];
 /// Distance of a registration cross from its vertex, and length of its arms, mm: it stays clear of

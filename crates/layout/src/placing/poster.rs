@@ -75,7 +75,7 @@ pub(crate) struct Poster {
 
 impl Poster {
     /// That with the fewest windows that shows all points, on A0 unless the paper is said.
-    pub fn new(points: &[DVec2], paper: &PaperSpec) -> Result<Self, TargetError> {
+    pub(crate) fn new(points: &[DVec2], paper: &PaperSpec) -> Result<Self, TargetError> {
         let size = Self::paper_size(paper);
         let orientations = match paper.orientation {
             Orientation::Auto => vec![Orientation::Portrait, Orientation::Landscape],
@@ -137,7 +137,7 @@ impl Poster {
 
     /// Refuses more pages, or a larger sheet, than can be assembled and verified. `what` has edges of so many mm by a
     /// setting; the refusal says which edge would do, or what `instead`.
-    pub fn check(
+    pub(crate) fn check(
         &self,
         what: &str,
         setting: Setting,
@@ -163,12 +163,12 @@ impl Poster {
     }
 
     /// Where the points lie on the sheet.
-    pub fn sheet_from_points(&self) -> Motion {
+    pub(crate) fn sheet_from_points(&self) -> Motion {
         self.sheet_from_points
     }
 
     /// The sheet, still empty.
-    pub fn sheet(&self) -> SheetLayout {
+    pub(crate) fn sheet(&self) -> SheetLayout {
         let DVec2 { x: width_mm, y: height_mm } = self.size_mm();
         SheetLayout {
             width_mm,
@@ -205,7 +205,7 @@ impl Poster {
     ///
     /// `areas` are convex polygons of the sheet that no cross may meet, beside its lines and texts; the `overview` is drawn
     /// small on every page, which has this `label` in small type, and its number in large type after what it is `of`; the `words` are set from a place on, in a room of some width.
-    pub fn add_pages(
+    pub(crate) fn add_pages(
         &self,
         sheet: &mut SheetLayout,
         areas: Vec<Vec<DVec2>>,

@@ -7,10 +7,10 @@ use deltille_core::family::Family;
 use deltille_core::targets::{Target, TargetSpec};
 
 /// A cell of a tag that is so long leaves room for tilt, blur and noise, px; without these half of it is read.
-pub const COMFORTABLE_BIT_PX: f64 = 2.0;
+pub(super) const COMFORTABLE_BIT_PX: f64 = 2.0;
 
 /// Likewise the edge of a tile of a board without tags.
-pub const COMFORTABLE_EDGE_PX: f64 = 1.25 * MIN_UNTAGGED_EDGE_PX;
+pub(super) const COMFORTABLE_EDGE_PX: f64 = 1.25 * MIN_UNTAGGED_EDGE_PX;
 
 /// A cell of a tag from which on boards are labelled where pictures are sharp, px: half of the views are at 1.25, nearly all
 /// from a twentieth more on. Tilted cells need as large an area.
@@ -115,7 +115,7 @@ impl Reach {
 }
 
 /// What is left, at a tilt, of how far a board is labelled: cells of tags must keep their area, tiles without their height.
-pub fn shortening(has_tags: bool, tilt_rad: f64) -> f64 {
+pub(super) fn shortening(has_tags: bool, tilt_rad: f64) -> f64 {
     if has_tags { tilt_rad.cos().sqrt() } else { tilt_rad.cos() }
 }
 

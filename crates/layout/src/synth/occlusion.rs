@@ -35,7 +35,7 @@ pub(super) struct Shadow {
 impl Shadow {
     /// The shadow of `before` on the plane of `behind`, both with their fronts to the eye (in the
     /// target frame); `None` where `before` does not rise above that plane.
-    pub fn of(before: &Surface, behind: &Surface, eye: DVec3) -> Option<Self> {
+    pub(super) fn of(before: &Surface, behind: &Surface, eye: DVec3) -> Option<Self> {
         let surface_from_target = behind.target_from_surface.inverse();
         let outline: Vec<DVec3> = before
             .paper_mm
@@ -58,13 +58,13 @@ impl Shadow {
     }
 
     /// Whether a point of the plane is hidden.
-    pub fn hides(&self, p: DVec2) -> bool {
+    pub(super) fn hides(&self, p: DVec2) -> bool {
         self.halves.iter().all(|half| half.at(p) > 0.0)
     }
 
     /// The parts of a polygon outside the shadow. An outline and its holes may be cut one by one:
     /// what the cuts add to one they add to the other.
-    pub fn cut(&self, polygon: Vec<DVec2>) -> Vec<Vec<DVec2>> {
+    pub(super) fn cut(&self, polygon: Vec<DVec2>) -> Vec<Vec<DVec2>> {
         let mut visible = Vec::new();
         let mut rest = polygon;
         for half in &self.halves {

@@ -12,7 +12,7 @@ pub(super) struct Findings(pub(super) Vec<Finding>);
 
 impl Findings {
     /// Adds a construct, such as "element <image>", and where it is, such as "line 12".
-    pub fn add(&mut self, place: impl Into<String>, construct: impl Into<String>) {
+    pub(super) fn add(&mut self, place: impl Into<String>, construct: impl Into<String>) {
         if !self.is_full() {
             let (place, construct) = (place.into(), construct.into());
             self.0.push(ConstructFinding::Construct { place, construct }.into());
@@ -20,21 +20,26 @@ impl Findings {
     }
 
     /// Adds a line that is not the one that the program writes.
-    pub fn add_other_line(&mut self, place: String, found: String) {
+    pub(super) fn add_other_line(&mut self, place: String, found: String) {
         if !self.is_full() {
             self.0.push(ConstructFinding::OtherLine { place, found }.into());
         }
     }
 
     /// Adds a construct unless `holds`.
-    pub fn unless(&mut self, holds: bool, place: impl Into<String>, construct: impl Into<String>) {
+    pub(super) fn unless(
+        &mut self,
+        holds: bool,
+        place: impl Into<String>,
+        construct: impl Into<String>,
+    ) {
         if !holds {
             self.add(place, construct);
         }
     }
 
     /// Adds hidden content unless `holds`; the file is rendered and compared all the same.
-    pub fn unseen_unless(
+    pub(super) fn unseen_unless(
         &mut self,
         holds: bool,
         place: impl Into<String>,
@@ -47,18 +52,18 @@ impl Findings {
     }
 
     /// Whether the file has a construct that is not permitted, so that it is not rendered.
-    pub fn refuse(&self) -> bool {
+    pub(super) fn refuse(&self) -> bool {
         refuse(&self.0)
     }
 
     /// Whether as many findings are listed as are listed at all; more are dropped.
-    pub fn is_full(&self) -> bool {
+    pub(super) fn is_full(&self) -> bool {
         self.0.len() >= MOST_LISTED
     }
 
     /// Adds the findings of a file that belongs to this one, such as a texture, with its name before
     /// the places.
-    pub fn add_of(&mut self, file: &str, other: Findings) {
+    pub(super) fn add_of(&mut self, file: &str, other: Findings) {
         for finding in other.0 {
             match finding {
                 Finding::Construct(ConstructFinding::Construct { place, construct }) => {

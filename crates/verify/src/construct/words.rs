@@ -23,7 +23,7 @@ pub(super) struct Words {
 
 impl Words {
     /// The texts that belong to a target.
-    pub fn of(printing: &Printing) -> Self {
+    pub(super) fn of(printing: &Printing) -> Self {
         let target = &printing.target;
         let (title, finish) = (target.name.to_string(), printing.finish.clone());
         let cut = |layout: &SheetLayout| {
@@ -34,7 +34,7 @@ impl Words {
     }
 
     /// Whether data in a mesh is that of the target; any version of the program may have written it.
-    pub fn are_extras(&self, found: &Value) -> bool {
+    pub(super) fn are_extras(&self, found: &Value) -> bool {
         let creator = found["generator"].as_str().is_some_and(is_creator);
         let mut stated = self.extras.clone();
         stated["generator"] = found["generator"].clone();

@@ -24,19 +24,19 @@ pub(super) struct Pdf(hayro_syntax::Pdf);
 
 impl Pdf {
     /// Parses a PDF; the error says why that fails.
-    pub fn parse(bytes: Arc<Vec<u8>>) -> Result<Self, String> {
+    pub(super) fn parse(bytes: Arc<Vec<u8>>) -> Result<Self, String> {
         let pdf = hayro_syntax::Pdf::new(bytes)
             .map_err(|_| "not a readable PDF; it may be truncated".to_owned())?;
         if pdf.pages().is_empty() { Err("a PDF without pages".to_owned()) } else { Ok(Self(pdf)) }
     }
 
     /// Number of pages.
-    pub fn pages(&self) -> usize {
+    pub(super) fn pages(&self) -> usize {
         self.0.pages().len()
     }
 
     /// Width and height of the visible part of a page, mm, as it is shown, after its rotation.
-    pub fn size_mm(&self, index: usize) -> DVec2 {
+    pub(super) fn size_mm(&self, index: usize) -> DVec2 {
         let page = &self.0.pages()[index];
         let visible = page.intersected_crop_box();
         let unit: f64 = page.raw().get::<f64>("UserUnit").unwrap_or(1.0) * MM_PER_PT;
@@ -47,7 +47,7 @@ impl Pdf {
     }
 
     /// Renders a page at a resolution; after the time `end` the rest stays white.
-    pub fn render(&self, index: usize, px_per_mm: f64, end: Option<Instant>) -> Gray<u8> {
+    pub(super) fn render(&self, index: usize, px_per_mm: f64, end: Option<Instant>) -> Gray<u8> {
         let page = &self.0.pages()[index];
         let DVec2 { x: width_mm, y: height_mm } = self.size_mm(index);
         let (width, height) = (pixels(width_mm, px_per_mm), pixels(height_mm, px_per_mm));

@@ -24,7 +24,7 @@ pub(super) struct Png {
 impl Png {
     /// Decodes a PNG. The error says why that fails: it is damaged or too large, states no resolution
     /// in pixels per metre, or its pixels are not square.
-    pub fn parse(bytes: &[u8], limits: &Limits) -> Result<Self, String> {
+    pub(super) fn parse(bytes: &[u8], limits: &Limits) -> Result<Self, String> {
         let broken = |error: &dyn std::fmt::Display| format!("not a readable PNG ({error})");
         let reader =
             png::Decoder::new(Cursor::new(bytes)).read_info().map_err(|error| broken(&error))?;
@@ -59,22 +59,22 @@ impl Png {
     }
 
     /// Width and height on paper, mm.
-    pub fn size_mm(&self) -> DVec2 {
+    pub(super) fn size_mm(&self) -> DVec2 {
         DVec2::from(self.size_px.map(|px| px as f64)) / self.px_per_mm
     }
 
     /// The resolution of the file.
-    pub fn px_per_mm(&self) -> f64 {
+    pub(super) fn px_per_mm(&self) -> f64 {
         self.px_per_mm
     }
 
     /// The resolution of the [`image`](Self::image).
-    pub fn image_px_per_mm(&self) -> f64 {
+    pub(super) fn image_px_per_mm(&self) -> f64 {
         self.px_per_mm / self.reduced as f64
     }
 
     /// Its grey values, at the resolution [`image_px_per_mm`](Self::image_px_per_mm).
-    pub fn image(&self) -> &Gray<u8> {
+    pub(super) fn image(&self) -> &Gray<u8> {
         &self.image
     }
 }

@@ -21,7 +21,7 @@ pub(super) struct Svg {
 
 impl Svg {
     /// Parses an SVG; the error says why that fails, such as a width that is no length.
-    pub fn parse(bytes: &[u8]) -> Result<Self, String> {
+    pub(super) fn parse(bytes: &[u8]) -> Result<Self, String> {
         let text = std::str::from_utf8(bytes).map_err(|_| "not a text file".to_owned())?;
         let xml = roxmltree::Document::parse(text)
             .map_err(|error| format!("not a readable SVG ({error})"))?;
@@ -38,13 +38,13 @@ impl Svg {
     }
 
     /// Width and height on paper, mm, as the file states them.
-    pub fn size_mm(&self) -> DVec2 {
+    pub(super) fn size_mm(&self) -> DVec2 {
         self.size_mm
     }
 
     /// Renders the page at a resolution; after the time `end` the rest stays white. It is an error if
     /// the renderer panics.
-    pub fn render(&self, px_per_mm: f64, end: Option<Instant>) -> Result<Gray<u8>, String> {
+    pub(super) fn render(&self, px_per_mm: f64, end: Option<Instant>) -> Result<Gray<u8>, String> {
         let [width, height] = self.size_mm.to_array().map(|mm| pixels(mm, px_per_mm));
         let scale = px_per_mm * self.size_mm.x / f64::from(self.tree.size().width());
         let mut grey = Vec::with_capacity(width * height);

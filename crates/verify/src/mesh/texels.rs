@@ -40,7 +40,7 @@ pub(super) struct Texels<'a> {
 impl Texels<'_> {
     /// Marks the pixels of a page on which a texel of `front` has the wrong colour; those of tiles only if they are
     /// `with_tiles`. An error says why the texture cannot be compared.
-    pub fn wrong(
+    pub(super) fn wrong(
         &self,
         front: &[Front],
         page: &Page,

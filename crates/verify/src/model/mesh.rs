@@ -14,13 +14,13 @@ pub(crate) struct Model {
 
 impl Model {
     /// The texture of a triangle, and its size, px.
-    pub fn texture(&self, triangle: &Triangle) -> (&Gray<u8>, DVec2) {
+    pub(crate) fn texture(&self, triangle: &Triangle) -> (&Gray<u8>, DVec2) {
         let texture = &self.textures[triangle.texture];
         (texture, DVec2::new(texture.width() as f64, texture.height() as f64))
     }
 
     /// Side of a pixel of its texture on a triangle, mm.
-    pub fn texel_mm(&self, triangle: &Triangle) -> f64 {
+    pub(crate) fn texel_mm(&self, triangle: &Triangle) -> f64 {
         let (_, size_px) = self.texture(triangle);
         let [a, b, c] = triangle.uv.map(|uv| uv * size_px);
         (triangle.winding().length() / (b - a).perp_dot(c - a).abs()).sqrt()
@@ -43,7 +43,7 @@ pub(crate) struct Triangle {
 
 impl Triangle {
     /// Normal that follows from the order of the vertices; its length is twice the area, mm².
-    pub fn winding(&self) -> DVec3 {
+    pub(crate) fn winding(&self) -> DVec3 {
         let [a, b, c] = self.vertices_mm;
         (b - a).cross(c - a)
     }

@@ -24,7 +24,7 @@ pub(crate) struct View {
 impl View {
     /// Renders the mesh: at each sample the texture of the nearest triangle whose front, by the order
     /// of its vertices, faces the camera. A triangle with a vertex that is not projected is left out.
-    pub fn render(&self, model: &Model) -> Gray<u8> {
+    pub(crate) fn render(&self, model: &Model) -> Gray<u8> {
         let [width, height] = [self.camera.width, self.camera.height].map(|n| n as usize * SAMPLES);
         let mut nearest = vec![0.0f32; width * height];
         let mut shades = vec![BACKGROUND; width * height];
@@ -81,7 +81,7 @@ impl View {
 
     /// The first point of a front side of the mesh on the ray of a pixel, in the target frame, mm;
     /// `None` where the ray hits nothing.
-    pub fn meet(&self, model: &Model, pixel: DVec2) -> Option<DVec3> {
+    pub(crate) fn meet(&self, model: &Model, pixel: DVec2) -> Option<DVec3> {
         let target_from_camera = self.camera_from_target.inverse();
         let eye = target_from_camera.translation;
         let ahead = (pixel - self.camera.centre_px) / self.camera.focal_px;

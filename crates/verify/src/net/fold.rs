@@ -36,7 +36,7 @@ pub(super) struct Folded {
 
 impl Net {
     /// The pieces of a sheet: faces that hang together by folds, the largest piece first.
-    pub fn pieces(&self, sheet: usize) -> Vec<Vec<usize>> {
+    pub(super) fn pieces(&self, sheet: usize) -> Vec<Vec<usize>> {
         let mut left: BTreeSet<usize> =
             (0..self.faces.len()).filter(|&face| self.faces[face].sheet == sheet).collect();
         let mut pieces = Vec::new();
@@ -57,7 +57,7 @@ impl Net {
 
     /// Whether faces lack the fold by which they belong to another piece: whether a side of theirs is neither folded nor
     /// numbered.
-    pub fn is_broken_off(&self, members: &[usize]) -> bool {
+    pub(super) fn is_broken_off(&self, members: &[usize]) -> bool {
         let mut sides = members.iter().flat_map(|&face| self.sides_of(face));
         sides.any(|at| {
             !self.folds.contains_key(&at) && self.faces[at.face].numbers[at.side].is_empty()
@@ -66,7 +66,7 @@ impl Net {
 
     /// Folds the faces of a piece, `members`, about several roots and returns the result with the
     /// fewest findings: if a misprinted face is the root, all others are off.
-    pub fn best_fold(&self, members: &[usize]) -> Folded {
+    pub(super) fn best_fold(&self, members: &[usize]) -> Folded {
         let mut best: Option<Folded> = None;
         for &root in members.iter().take(MOST_ROOTS) {
             let folded = self.fold(members, root);

@@ -18,7 +18,7 @@ impl Rigid {
     /// The least-squares rigid motion that takes the first point of each pair to the second; `None`
     /// where the points do not determine the rotation. With p and q as complex numbers about their
     /// means, turn ∝ Σ p̄ q.
-    pub fn fit(pairs: &[(DVec2, DVec2)]) -> Option<Self> {
+    pub(super) fn fit(pairs: &[(DVec2, DVec2)]) -> Option<Self> {
         let n = pairs.len() as f64;
         let p0 = pairs.iter().map(|(p, _)| *p).sum::<DVec2>() / n;
         let q0 = pairs.iter().map(|(_, q)| *q).sum::<DVec2>() / n;
@@ -28,7 +28,7 @@ impl Rigid {
         Some(Self { turn, shift: q0 - turn.rotate(p0) })
     }
 
-    pub fn apply(&self, p: DVec2) -> DVec2 {
+    pub(super) fn apply(&self, p: DVec2) -> DVec2 {
         self.turn.rotate(p) + self.shift
     }
 }
@@ -42,13 +42,13 @@ pub(super) struct SpaceFromPage {
 }
 
 impl SpaceFromPage {
-    pub fn apply(&self, p: DVec2) -> DVec3 {
+    pub(super) fn apply(&self, p: DVec2) -> DVec3 {
         self.linear * p.extend(0.0) + self.shift
     }
 
     /// The same pose followed by a rotation by an angle about the line from the first to the second of
     /// two points of the page.
-    pub fn folded(&self, [p, q]: [DVec2; 2], angle_rad: f64) -> Self {
+    pub(super) fn folded(&self, [p, q]: [DVec2; 2], angle_rad: f64) -> Self {
         let (a, b) = (self.apply(p), self.apply(q));
         let turn = DMat3::from_axis_angle((b - a).normalize_or(DVec3::X), angle_rad);
         Self { linear: turn * self.linear, shift: turn * (self.shift - a) + a }

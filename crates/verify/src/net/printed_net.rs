@@ -71,7 +71,7 @@ pub(super) struct Net {
 
 impl Net {
     /// The net of a target from the corners detected on each sheet; `None` where a face is missing.
-    pub fn new(printing: &Printing, seen: &[Seen]) -> Option<Self> {
+    pub(super) fn new(printing: &Printing, seen: &[Seen]) -> Option<Self> {
         let target = &printing.target;
         let TargetSpec::Solid(spec) = &target.spec else { return None };
         let (outlines, solid) = (spec.faces().ok()?, spec.polyhedron());
@@ -124,13 +124,13 @@ impl Net {
     }
 
     /// Ends of a side on the page, mm.
-    pub fn ends(&self, Side { face, side }: Side) -> [DVec2; 2] {
+    pub(super) fn ends(&self, Side { face, side }: Side) -> [DVec2; 2] {
         let outline = &self.faces[face].outline_mm;
         [outline[side], outline[(side + 1) % outline.len()]]
     }
 
     /// The sides of a face.
-    pub fn sides_of(&self, face: usize) -> impl Iterator<Item = Side> + use<> {
+    pub(super) fn sides_of(&self, face: usize) -> impl Iterator<Item = Side> + use<> {
         (0..self.faces[face].vertices.len()).map(move |side| Side { face, side })
     }
 

@@ -13,7 +13,7 @@ pub(super) struct Edge {
 
 impl Net {
     /// All edges of the solid, each once.
-    pub fn edges(&self) -> Vec<Edge> {
+    pub(super) fn edges(&self) -> Vec<Edge> {
         let forward = self.along.iter().filter(|([a, b], _)| a < b);
         let both = forward.filter_map(|([a, b], &one)| Some([one, *self.along.get(&[*b, *a])?]));
         both.map(|sides| Edge { sides }).collect()
@@ -25,7 +25,7 @@ impl Net {
     /// # Errors
     ///
     /// The finding, where they do not belong together or lie apart.
-    pub fn check_edge(
+    pub(super) fn check_edge(
         &self,
         edge: &Edge,
         carried: &[Option<SpaceFromPage>],
@@ -55,7 +55,7 @@ impl Net {
     }
 
     /// Findings about the number printed in a face and the faces that its tabs name.
-    pub fn check_words(&self, index: usize) -> Vec<FoldFinding> {
+    pub(super) fn check_words(&self, index: usize) -> Vec<FoldFinding> {
         let face = &self.faces[index];
         let mut findings = Vec::new();
         if face.names != [index] {
@@ -73,7 +73,7 @@ impl Net {
     }
 
     /// Findings about edge numbers that stand on more than two sides.
-    pub fn numbers_used_twice(&self) -> Vec<FoldFinding> {
+    pub(super) fn numbers_used_twice(&self) -> Vec<FoldFinding> {
         let mut count = BTreeMap::<usize, usize>::new();
         let numbers = self.faces.iter().flat_map(|face| face.numbers.iter().flatten());
         numbers.for_each(|&number| *count.entry(number).or_default() += 1);

@@ -13,12 +13,12 @@ pub(crate) struct AffineMap {
 }
 
 impl AffineMap {
-    pub const IDENTITY: AffineMap =
+    pub(crate) const IDENTITY: AffineMap =
         AffineMap { linear: [[1.0, 0.0], [0.0, 1.0]], shift: DVec2::ZERO };
 
     /// Least-squares fit over pairs (stated, found); `None` unless the stated points span the
     /// plane.
-    pub fn fit(pairs: &[(DVec2, DVec2)]) -> Option<Self> {
+    pub(crate) fn fit(pairs: &[(DVec2, DVec2)]) -> Option<Self> {
         if pairs.len() < 3 {
             return None;
         }
@@ -38,12 +38,12 @@ impl AffineMap {
         Some(Self { linear, shift: shift.into() })
     }
 
-    pub fn apply(&self, DVec2 { x, y }: DVec2) -> DVec2 {
+    pub(crate) fn apply(&self, DVec2 { x, y }: DVec2) -> DVec2 {
         DVec2::from(self.linear.map(|[by_x, by_y]| by_x * x + by_y * y)) + self.shift
     }
 
     /// The inverse map; `None` for a degenerate map.
-    pub fn inverse(&self) -> Option<Self> {
+    pub(crate) fn inverse(&self) -> Option<Self> {
         let [[a, b], [c, d]] = self.linear;
         let det = a * d - b * c;
         let linear = [[d / det, -b / det], [-c / det, a / det]];
@@ -53,12 +53,12 @@ impl AffineMap {
     }
 
     /// Lengths of the images of the unit vectors: the scales along x and y.
-    pub fn scales(&self) -> [f64; 2] {
+    pub(crate) fn scales(&self) -> [f64; 2] {
         [0, 1].map(|i| self.linear[0][i].hypot(self.linear[1][i]))
     }
 
     /// Counter-clockwise rotation of the mean of both axes, rad.
-    pub fn turn_rad(&self) -> f64 {
+    pub(crate) fn turn_rad(&self) -> f64 {
         let [[a, b], [c, d]] = self.linear;
         (c - b).atan2(a + d)
     }

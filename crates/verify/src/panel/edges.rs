@@ -57,7 +57,7 @@ impl LatticeFromPx {
 impl PlacedPanel<'_> {
     /// The edges that are displaced by more than `tolerance_px`: for each tile the one that is
     /// displaced most.
-    pub fn moved_edges(
+    pub(crate) fn moved_edges(
         &self,
         expected: &BTreeMap<Tile, Expected>,
         tolerance_px: f64,

@@ -28,7 +28,7 @@ pub(crate) struct Expected<'a> {
 
 impl Expected<'_> {
     /// Whether the tile is black at tile coordinates.
-    pub fn is_black_at(&self, p: DVec2) -> bool {
+    pub(crate) fn is_black_at(&self, p: DVec2) -> bool {
         let Some(tag) = &self.tag else { return self.black };
         match tag.looks.region(p) {
             Region::Margin => self.black,
@@ -65,18 +65,18 @@ pub(crate) struct Pattern<'a> {
 }
 
 impl<'a> Pattern<'a> {
-    pub fn new(panel: &'a Panel, expected: &'a BTreeMap<Tile, Expected<'a>>) -> Self {
+    pub(crate) fn new(panel: &'a Panel, expected: &'a BTreeMap<Tile, Expected<'a>>) -> Self {
         let table = TileTable::new(expected.iter().map(|(&tile, expected)| (tile, expected)));
         Self { panel, table }
     }
 
     /// Whether a point of the panel, in edges, lies in a tile.
-    pub fn has_tile_at(&self, at: DVec2) -> bool {
+    pub(crate) fn has_tile_at(&self, at: DVec2) -> bool {
         self.table.get(self.panel.tile_at(at)).is_some()
     }
 
     /// Whether the panel is black at a point, in edges. Outside the tiles that is the colour of its field.
-    pub fn is_black_at(&self, at: DVec2) -> bool {
+    pub(crate) fn is_black_at(&self, at: DVec2) -> bool {
         let tile = self.panel.tile_at(at);
         let Some(expected) = self.table.get(tile) else { return self.panel.inverted };
         if expected.tag.is_none() {
@@ -118,7 +118,7 @@ enum Region {
 }
 
 impl TagLooks {
-    pub fn new(family: &Family, panel: &Panel) -> Self {
+    pub(crate) fn new(family: &Family, panel: &Panel) -> Self {
         let cells = family.cells();
         let (margin, inset) = (panel.tag_margin_bits(), panel.tag_inset_bits());
         let most = |of: fn(&Cell) -> u32| {
@@ -157,7 +157,7 @@ impl TagLooks {
     }
 
     /// The bit of the cell at tile coordinates (u, v); `None` beside the cells.
-    pub fn bit(&self, p: DVec2) -> Option<u32> {
+    pub(crate) fn bit(&self, p: DVec2) -> Option<u32> {
         let DVec2 { x: u, y: v } = p * self.width - self.inset;
         if u < 0.0 || v < 0.0 {
             return None;

@@ -29,7 +29,7 @@ pub(crate) struct PlacedPanel<'a> {
 }
 
 impl<'a> PlacedPanel<'a> {
-    pub fn new(
+    pub(crate) fn new(
         page: &'a Page,
         panel: &'a Panel,
         placement: &'a Placement,
@@ -40,7 +40,7 @@ impl<'a> PlacedPanel<'a> {
     }
 
     /// The same among the texts of its sheet, some of which may stand in its tiles.
-    pub fn among(mut self, layout: &SheetLayout) -> Self {
+    pub(crate) fn among(mut self, layout: &SheetLayout) -> Self {
         let [left, lower, right, upper] = self.panel.bounds_mm();
         let rectangle = |text: &SheetText| {
             let first = self.panel_from_page(text.at_mm);
@@ -52,7 +52,7 @@ impl<'a> PlacedPanel<'a> {
     }
 
     /// Whether a pixel belongs to a text, or one within `near_px` of it.
-    pub fn is_text(&self, px: DVec2, near_px: f64) -> bool {
+    pub(crate) fn is_text(&self, px: DVec2, near_px: f64) -> bool {
         self.texts.iter().any(|corners| {
             (0..4).all(|i| {
                 let (a, b) = (corners[i], corners[(i + 1) % 4]);
@@ -63,19 +63,19 @@ impl<'a> PlacedPanel<'a> {
     }
 
     /// Stated page position of a point of the panel.
-    pub fn page_from_panel(&self, point: DVec2) -> DVec2 {
+    pub(crate) fn page_from_panel(&self, point: DVec2) -> DVec2 {
         self.along.rotate(point) + self.placement.origin_mm
     }
 
     /// Stated panel position of a point of the page.
-    pub fn panel_from_page(&self, point: DVec2) -> DVec2 {
+    pub(crate) fn panel_from_page(&self, point: DVec2) -> DVec2 {
         let back = DVec2::new(self.along.x, -self.along.y);
         back.rotate(point - self.placement.origin_mm)
     }
 
     /// The ink of the tiles that should be white and black, in the middle of plain tiles; `None`
     /// where those of one colour are not alike, so that the picture shows something else.
-    pub fn tones(&self) -> Option<[f64; 2]> {
+    pub(crate) fn tones(&self) -> Option<[f64; 2]> {
         let tagged: BTreeSet<Tile> =
             self.panel.tags.iter().map(|tag| self.panel.tag_tile(tag)).collect();
         let mut inks = [Vec::new(), Vec::new()];
@@ -101,12 +101,12 @@ impl<'a> PlacedPanel<'a> {
     }
 
     /// Picture positions of a tile's A, B and C.
-    pub fn frame_px(&self, tile: Tile) -> [DVec2; 3] {
+    pub(crate) fn frame_px(&self, tile: Tile) -> [DVec2; 3] {
         tile.frame().map(|vertex| self.px_of(vertex))
     }
 
     /// Picture position of a vertex.
-    pub fn px_of(&self, vertex: Vertex) -> DVec2 {
+    pub(crate) fn px_of(&self, vertex: Vertex) -> DVec2 {
         let stated = self.page_from_panel(self.panel.lattice_mm(vertex));
         self.page.px_from_page(self.found_from_stated.apply(stated))
     }

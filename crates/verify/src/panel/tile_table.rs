@@ -12,7 +12,7 @@ pub(crate) struct TileTable<T> {
 }
 
 impl<T> TileTable<T> {
-    pub fn new(tiles: impl Iterator<Item = (Tile, T)> + Clone) -> Self {
+    pub(crate) fn new(tiles: impl Iterator<Item = (Tile, T)> + Clone) -> Self {
         let ends = |of: fn(&Tile) -> i32| {
             let values = || tiles.clone().map(|(tile, _)| of(&tile));
             let (least, most) = (values().min().unwrap_or(0), values().max().unwrap_or(-1));
@@ -37,7 +37,7 @@ impl<T> TileTable<T> {
         (row < self.size[0] && col < self.size[1]).then_some(2 * (row * self.size[1] + col) + other)
     }
 
-    pub fn get(&self, tile: Tile) -> Option<&T> {
+    pub(crate) fn get(&self, tile: Tile) -> Option<&T> {
         self.values[self.place(tile)?].as_ref()
     }
 }

@@ -56,7 +56,7 @@ pub(crate) struct TileReport {
 
 impl<'a> PlacedPanel<'a> {
     /// Compares all tiles of the panel.
-    pub fn check_tiles(&self, family: Option<&Family>) -> TileReport {
+    pub(crate) fn check_tiles(&self, family: Option<&Family>) -> TileReport {
         let family = family.and_then(|family| family.of_tiling(self.panel.kind));
         let looks = family.map(|family| TagLooks::new(family, self.panel));
         // Needed only where something is wrong.

@@ -80,23 +80,23 @@ pub(crate) struct Reader<'a> {
 
 impl Reader<'_> {
     /// Whether there is such a file.
-    pub fn has(&self, path: &Path) -> bool {
+    pub(crate) fn has(&self, path: &Path) -> bool {
         self.files.has(path)
     }
 
     /// The bytes of a file.
-    pub fn read(&self, path: &Path) -> Result<Arc<Vec<u8>>, DocumentError> {
+    pub(crate) fn read(&self, path: &Path) -> Result<Arc<Vec<u8>>, DocumentError> {
         self.files.read(path)
     }
 
     /// The text of a file.
-    pub fn read_text(&self, path: &Path) -> Result<String, DocumentError> {
+    pub(crate) fn read_text(&self, path: &Path) -> Result<String, DocumentError> {
         let text = String::from_utf8(Arc::unwrap_or_clone(self.read(path)?));
         text.map_err(|_| ReadError::NotText { path: path.to_owned() }.into())
     }
 
     /// Runs third-party code on the file of that name; it may panic, or never end.
-    pub fn run<T: Send + 'static>(
+    pub(crate) fn run<T: Send + 'static>(
         &self,
         path: &Path,
         work: impl FnOnce() -> Result<T, String> + Send + 'static,

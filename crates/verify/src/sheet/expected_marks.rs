@@ -35,7 +35,7 @@ pub(super) enum What {
 
 impl What {
     /// The finding that a mark differs from the layout.
-    pub fn differs(self, layout: &SheetLayout) -> MarkFinding {
+    pub(super) fn differs(self, layout: &SheetLayout) -> MarkFinding {
         match self {
             Self::Text(i) => {
                 MarkFinding::TextDiffers { text: i + 1, stated: layout.texts[i].text.clone() }
@@ -152,20 +152,20 @@ fn pieces([from, to]: [DVec2; 2], width_mm: f64) -> Vec<Area> {
 
 impl Area {
     /// The rectangle of pixels around it.
-    pub fn pixels(&self, page: &Page) -> [usize; 4] {
+    pub(super) fn pixels(&self, page: &Page) -> [usize; 4] {
         let Rect { x0, y0, x1, y1 } = self.along.inverse().transform_rect_bbox(self.bounds);
         pixels(page, [x0, y0, x1, y1], BLANK_PX)
     }
 
     /// Whether a pixel belongs to it, with `blank` around.
-    pub fn contains(&self, page: &Page, x: usize, y: usize, blank_px: f64) -> bool {
+    pub(super) fn contains(&self, page: &Page, x: usize, y: usize, blank_px: f64) -> bool {
         let place = page.page_from_px(DVec2::new(x as f64, y as f64));
         let blank = blank_px / page.px_per_mm;
         self.bounds.inflate(blank, blank).contains(self.along * Point::new(place.x, place.y))
     }
 
     /// Marks its pixels.
-    pub fn cover(&self, page: &Page, known: &mut [bool]) {
+    pub(super) fn cover(&self, page: &Page, known: &mut [bool]) {
         let [x0, y0, x1, y1] = self.pixels(page);
         for y in y0..y1 {
             for x in x0..x1 {

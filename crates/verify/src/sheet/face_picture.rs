@@ -25,7 +25,7 @@ pub(crate) struct FacePicture {
 
 impl FacePicture {
     /// A blank picture of a face with this outline in the frame of its panel, mm.
-    pub fn new(verifier: &Verifier, panel: &Panel, outline: &[DVec2]) -> Self {
+    pub(crate) fn new(verifier: &Verifier, panel: &Panel, outline: &[DVec2]) -> Self {
         let least = outline.iter().copied().reduce(DVec2::min).unwrap_or_default();
         let most = outline.iter().copied().reduce(DVec2::max).unwrap_or_default();
         let low = least - AROUND_MM;
@@ -57,14 +57,14 @@ impl FacePicture {
     }
 
     /// The place of a pixel in the frame of the panel, mm.
-    pub fn place(&self, index: usize) -> DVec2 {
+    pub(crate) fn place(&self, index: usize) -> DVec2 {
         let width = self.size_px[0];
         let pixel = DVec2::new((index % width) as f64, (index / width) as f64);
         self.page.page_from_px(pixel) + self.low
     }
 
     /// How much of each pixel polygons in the frame of the panel cover, each times its value; clockwise ones negative.
-    pub fn covered<'p>(&self, parts: impl Iterator<Item = (&'p [DVec2], f64)>) -> Gray<f32> {
+    pub(crate) fn covered<'p>(&self, parts: impl Iterator<Item = (&'p [DVec2], f64)>) -> Gray<f32> {
         let mut cover = Coverage::new(self.size_px[0], self.size_px[1]);
         for (corners, value) in parts {
             // Clockwise on the screen is positive.
@@ -76,7 +76,7 @@ impl FacePicture {
     }
 
     /// The face with these polygons in black, and what it should show.
-    pub fn inked<'p>(
+    pub(crate) fn inked<'p>(
         mut self,
         dark: impl Iterator<Item = (&'p [DVec2], f64)>,
     ) -> (Page, SheetLayout) {

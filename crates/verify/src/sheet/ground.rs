@@ -60,7 +60,7 @@ pub(super) struct Ground<'a> {
 }
 
 impl<'a> Ground<'a> {
-    pub fn new(placed: &'a PlacedPanel<'a>) -> Self {
+    pub(super) fn new(placed: &'a PlacedPanel<'a>) -> Self {
         let panel = placed.panel;
         let outline = match panel.inverted {
             true => panel.field_outline_mm(),
@@ -107,7 +107,7 @@ impl<'a> Ground<'a> {
     /// What a pixel of the panel's area should be; `Some(None)` in and beside the tiles, which are
     /// compared by themselves, and at the edge of the field, `near_px` to either side. Between the tiles of a panel
     /// that is not inverted there may be another one.
-    pub fn expected(&self, page: &Page, pixel: DVec2, near_px: f64) -> Option<Option<f64>> {
+    pub(super) fn expected(&self, page: &Page, pixel: DVec2, near_px: f64) -> Option<Option<f64>> {
         if !self.is_around(pixel) {
             return None;
         }

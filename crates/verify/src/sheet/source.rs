@@ -25,7 +25,7 @@ pub(crate) struct Source<'a> {
 
 impl Source<'_> {
     /// The page as a picture, turned over where it is printed as its mirror image, and whether it has the stated size.
-    pub fn render(
+    pub(crate) fn render(
         &self,
         layout: &SheetLayout,
         px_per_mm: f64,

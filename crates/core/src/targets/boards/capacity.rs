@@ -20,19 +20,19 @@ pub(in crate::targets) struct TagSettings {
 
 impl TagSettings {
     /// Of all tags of a target.
-    pub const TAGS: Self = Self { family: TagFamily, first_id: TagFirstId };
+    pub(crate) const TAGS: Self = Self { family: TagFamily, first_id: TagFirstId };
 
     /// Of square tags beside others.
-    pub const SQUARE_TAGS: Self =
+    pub(crate) const SQUARE_TAGS: Self =
         Self { family: SolidSquareTagsFamily, first_id: SolidSquareTagsFirstId };
 
     /// Of the tags in tiles of a kind on a target of one or two tilings.
-    pub fn of(kind: GridKind, has_both: bool) -> Self {
+    pub(crate) fn of(kind: GridKind, has_both: bool) -> Self {
         if has_both && kind == GridKind::Checker { Self::SQUARE_TAGS } else { Self::TAGS }
     }
 
     /// What sets the first id.
-    pub fn first_id(self) -> Setting {
+    pub(crate) fn first_id(self) -> Setting {
         self.first_id
     }
 }

@@ -47,7 +47,12 @@ struct Placed {
 impl TagLabeller {
     /// Identifies the panels in a grid, whose positions are px of `image`, by the tags that are read
     /// there; `budget` is reduced by the cost, and where it is exhausted nothing more is read.
-    pub fn label(&self, image: ImageView, grid: &SaddleGrid, budget: &mut Budget) -> TagEvidence {
+    pub(crate) fn label(
+        &self,
+        image: ImageView,
+        grid: &SaddleGrid,
+        budget: &mut Budget,
+    ) -> TagEvidence {
         let mut evidence = TagEvidence::default();
         let mut sights = Vec::new();
         for way in self.ways_to_read() {

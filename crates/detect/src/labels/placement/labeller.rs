@@ -16,7 +16,7 @@ const BUDGET: usize = 4_000_000;
 /// The computing time that is left for reading tags in a picture, in comparisons of a tile with a
 /// word; counted rather than measured, so that results are the same on every computer.
 #[derive(Clone, Copy, Debug)]
-pub struct Budget(pub(super) usize);
+pub(crate) struct Budget(pub(super) usize);
 
 impl Default for Budget {
     fn default() -> Self {
@@ -26,7 +26,7 @@ impl Default for Budget {
 
 /// A grid, or a part of one, on a panel of the target.
 #[derive(Clone, Debug)]
-pub struct Labelled {
+pub(crate) struct Labelled {
     /// Index of the panel in the target.
     pub panel: usize,
     /// Whether the picture shows it as in a mirror.
@@ -39,7 +39,7 @@ pub struct Labelled {
 
 /// The result of labelling a grid by its tags.
 #[derive(Clone, Debug, Default)]
-pub struct TagEvidence {
+pub(crate) struct TagEvidence {
     /// The panels that were identified.
     pub found: Vec<Labelled>,
     /// Tiles that may carry a tag.
@@ -68,7 +68,7 @@ pub struct TagEvidence {
 /// of the orientations of its tile, so that each code has three words on a deltille grid and four on
 /// a checkerboard.
 #[derive(Clone, Debug)]
-pub struct TagLabeller {
+pub(crate) struct TagLabeller {
     /// One for each way in which the tags of a panel lie in their tiles.
     pub(super) readers: Vec<TagReader>,
     /// Name of the family.
@@ -142,7 +142,7 @@ impl TagLabeller {
     /// A labeller for the tags of `target`, whose codes are those of `family`; `None` when the
     /// target has no tags. Tags with more than `max_errors` misread cells do not count, where that
     /// is given.
-    pub fn new(target: &Target, family: &Family, max_errors: Option<u32>) -> Option<Self> {
+    pub(crate) fn new(target: &Target, family: &Family, max_errors: Option<u32>) -> Option<Self> {
         Self::with_decoder(target, family, max_errors, || Decoder::new(family))
     }
 

@@ -13,13 +13,13 @@ pub(super) fn turns_of(panel_from_grid: LatticeMap, on_grid: Tile) -> usize {
 }
 
 /// The lattice vertices of the corners of a panel.
-pub fn panel_vertices(panel: &Panel) -> BTreeSet<Vertex> {
+pub(crate) fn panel_vertices(panel: &Panel) -> BTreeSet<Vertex> {
     panel.corners.iter().map(|corner| Vertex::new(corner.row, corner.col)).collect()
 }
 
 /// The motion that takes the grid tile to the panel's `tile` when the tag in it is turned
 /// counter-clockwise `turns` times, by 120° or 90°, against the grid.
-pub fn panel_from_grid(on_grid: Tile, tile: Tile, turns: u8) -> LatticeMap {
+pub(crate) fn panel_from_grid(on_grid: Tile, tile: Tile, turns: u8) -> LatticeMap {
     // The tag's lower-left vertex lies on vertex `turns` of the grid tile, and its lower edge
     // points along step 2·turns, on an inverted tile half a turn further; on a square along step
     // `turns`.

@@ -38,7 +38,7 @@ pub(crate) const OWN: usize = PARAMS;
 
 /// A corner of K edges.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Corner<const K: usize> {
+pub(crate) struct Corner<const K: usize> {
     /// Position, px.
     pub position: DVec2,
     /// Standard deviation of the blur with the pixel's box in it, px.
@@ -60,7 +60,7 @@ pub struct Corner<const K: usize> {
 
 impl<const K: usize> Corner<K> {
     /// The corner with its first J edges; further ones mean nothing.
-    pub fn with_edges<const J: usize>(self) -> Corner<J> {
+    pub(crate) fn with_edges<const J: usize>(self) -> Corner<J> {
         let Self { position, blur_px, amplitude, level, slope, angles, bends, across_px } = self;
         let first = |edges: [f64; K]| std::array::from_fn(|k| edges.get(k).copied().unwrap_or(0.0));
         let [angles, bends, across_px] = [first(angles), first(bends), first(across_px)];

@@ -59,7 +59,7 @@ const ARM_PX: f64 = 3.0;
 pub(super) const MIN_NOISE: f64 = 2e-5;
 
 /// A corner may not leave its start by more than this, px: the start is the polynomial's result.
-pub const MAX_WAY_PX: f64 = 1.5;
+pub(crate) const MAX_WAY_PX: f64 = 1.5;
 
 /// Residuals larger than this part of the amplitude: the window shows something else, unless they differ from
 /// pixel to pixel as much as noise does.
@@ -77,7 +77,7 @@ const UNLIMITED: [f32; 2] = [f32::NEG_INFINITY, f32::INFINITY];
 
 /// How far a fit goes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Accuracy {
+pub(crate) enum Accuracy {
     /// To some hundredths of a pixel: a start for another fit.
     Rough,
     /// As far as the noise allows.
@@ -86,7 +86,7 @@ pub enum Accuracy {
 
 /// A fitted corner and what is known about its errors.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Fitted<const K: usize> {
+pub(crate) struct Fitted<const K: usize> {
     /// The corner.
     pub corner: Corner<K>,
     /// Covariance xx, xy, yy of the position, px².
@@ -99,7 +99,7 @@ pub struct Fitted<const K: usize> {
 
 /// Fits corners; holds the work space, so one fitter serves one thread.
 #[derive(Clone, Debug)]
-pub struct CornerFitter {
+pub(crate) struct CornerFitter {
     /// Pixels of full scale 1.
     pub(super) pixels: Box<[f32; MAX_PIXELS]>,
     /// Derivatives by the parameters, then the residual.
@@ -131,7 +131,7 @@ pub(super) struct Normal {
 
 impl CornerFitter {
     /// The corner near `start`; `None` when the window leaves the image or the fit is no corner.
-    pub fn fit<const K: usize>(
+    pub(crate) fn fit<const K: usize>(
         &mut self,
         image: ImageView,
         window: &Window,

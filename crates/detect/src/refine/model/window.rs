@@ -6,7 +6,7 @@ use crate::lanes::LANES;
 use deltille_core::raster::ImageView;
 
 /// Largest radius of a window, px.
-pub const MAX_RADIUS: usize = 15;
+pub(crate) const MAX_RADIUS: usize = 15;
 
 /// Pixels of the largest window, rounded up to whole vectors.
 pub(super) const MAX_PIXELS: usize =
@@ -14,7 +14,7 @@ pub(super) const MAX_PIXELS: usize =
 
 /// Pixels around a corner, by their distance from the pixel in the middle.
 #[derive(Clone, Debug)]
-pub struct Window {
+pub(crate) struct Window {
     pub(super) radius: usize,
     pub(super) count: usize,
     /// Columns, padded with zeros to whole vectors.
@@ -27,17 +27,17 @@ pub struct Window {
 
 impl Window {
     /// The window of (2 · radius + 1)² pixels; radii above [`MAX_RADIUS`] are cut to it.
-    pub fn new(radius: usize) -> Self {
+    pub(crate) fn new(radius: usize) -> Self {
         Self::of(radius, |_| true)
     }
 
     /// Those pixels (u, v) of such a window that are `seen`.
-    pub fn of(radius: usize, seen: impl Fn(DVec2) -> bool) -> Self {
+    pub(crate) fn of(radius: usize, seen: impl Fn(DVec2) -> bool) -> Self {
         Self::within(radius, |_| [f64::NEG_INFINITY, f64::INFINITY], seen)
     }
 
     /// Those of each row v that lie in its `span` and are `seen`.
-    pub fn within(
+    pub(crate) fn within(
         radius: usize,
         span: impl Fn(f64) -> [f64; 2],
         seen: impl Fn(DVec2) -> bool,
@@ -74,17 +74,17 @@ impl Window {
     }
 
     /// Half the side, px.
-    pub fn radius(&self) -> usize {
+    pub(crate) fn radius(&self) -> usize {
         self.radius
     }
 
     /// How many pixels.
-    pub fn count(&self) -> usize {
+    pub(crate) fn count(&self) -> usize {
         self.count
     }
 
     /// Columns and rows of the pixels.
-    pub fn places(&self) -> [&[f32]; 2] {
+    pub(crate) fn places(&self) -> [&[f32]; 2] {
         [&self.u[..self.count], &self.v[..self.count]]
     }
 
@@ -109,7 +109,7 @@ impl Window {
 
 /// The pixels of a window about a pixel of a picture.
 #[derive(Clone, Debug)]
-pub struct Patch {
+pub(crate) struct Patch {
     /// The window.
     pub window: Window,
     /// The pixel in its middle.

@@ -7,9 +7,9 @@
 pub mod calibration;
 pub mod camera;
 pub mod comparison;
-pub mod estimate;
-pub mod finding;
-pub mod motion;
+pub(super) mod estimate;
+pub(super) mod finding;
+pub(super) mod motion;
 pub mod next_view;
 pub mod pose;
 pub mod rig;

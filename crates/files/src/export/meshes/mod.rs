@@ -11,7 +11,7 @@ pub mod inlay;
 #[cfg(feature = "meshes")]
 pub mod mesh;
 #[cfg(feature = "meshes")]
-pub mod meshing;
+pub(super) mod meshing;
 #[cfg(feature = "meshes")]
 pub mod obj;
 #[cfg(feature = "meshes")]

@@ -9,6 +9,6 @@ pub mod pdf;
 #[cfg(feature = "print")]
 pub mod png;
 #[cfg(feature = "print")]
-pub mod supersample;
+pub(super) mod supersample;
 #[cfg(feature = "print")]
 pub mod svg;

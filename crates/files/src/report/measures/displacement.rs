@@ -56,7 +56,7 @@ pub(in crate::report) struct Displacement {
 
 impl Ideal {
     /// Of a camera whose image shows so much, rad from the axis.
-    pub fn of(camera: &Camera, widest_rad: f64) -> Self {
+    pub(crate) fn of(camera: &Camera, widest_rad: f64) -> Self {
         // A spline has the axis where its knots say, not at cx and cy.
         let on_axis = camera.project(INFINITY_MM * DVec3::Z);
         let centre_px = on_axis.unwrap_or(camera.centre_px);
@@ -71,7 +71,7 @@ impl Ideal {
     }
 
     /// The pixel of a direction; `None` behind a pinhole.
-    pub fn pixel(&self, direction: DVec3) -> Option<DVec2> {
+    pub(crate) fn pixel(&self, direction: DVec3) -> Option<DVec2> {
         let angle = direction.angle_between(DVec3::Z);
         let around = direction.truncate().try_normalize().unwrap_or(DVec2::ZERO);
         let radius = match self.is_pinhole {
@@ -83,7 +83,7 @@ impl Ideal {
     }
 
     /// The direction of a pixel; `None` where there is none.
-    pub fn direction(&self, pixel: DVec2) -> Option<DVec3> {
+    pub(crate) fn direction(&self, pixel: DVec2) -> Option<DVec3> {
         let flat = (pixel - self.centre_px) / self.focal_px;
         let angle = if self.is_pinhole { flat.length().atan() } else { flat.length() };
         let around = flat.try_normalize().unwrap_or(DVec2::ZERO);
@@ -91,11 +91,11 @@ impl Ideal {
     }
 
     /// Its law, as the axes name it.
-    pub fn law(&self) -> &'static str {
+    pub(crate) fn law(&self) -> &'static str {
         if self.is_pinhole { "f · tan θ" } else { "f · θ" }
     }
 
-    pub fn name(&self) -> &'static str {
+    pub(crate) fn name(&self) -> &'static str {
         if self.is_pinhole { "a pinhole" } else { "an equidistant lens" }
     }
 }

@@ -63,14 +63,14 @@ pub(super) struct Axes {
 
 impl Axes {
     /// A frame of this size, user units, with axes over two ranges; y grows upwards.
-    pub fn new(size: DVec2, x: [f64; 2], y: [f64; 2]) -> Self {
+    pub(super) fn new(size: DVec2, x: [f64; 2], y: [f64; 2]) -> Self {
         let (body, foot) = (String::new(), (0.0, String::new()));
         Self { x, y, size, room: size, body, foot, is_framed: true }
     }
 
     /// A frame with the proportions of an image whose size is given in px. Its axes are pixel
     /// coordinates, which are integers in the middles of pixels; y runs downwards.
-    pub fn of_image(image_px: DVec2) -> Self {
+    pub(super) fn of_image(image_px: DVec2) -> Self {
         let room = frame(image_px);
         let size = image_px * (room / image_px).min_element();
         let far = image_px - 0.5;
@@ -78,13 +78,13 @@ impl Axes {
     }
 
     /// The same area as [`Self::of_image`], without frame, ticks and names.
-    pub fn bare(image_px: DVec2) -> Self {
+    pub(super) fn bare(image_px: DVec2) -> Self {
         Self { is_framed: false, ..Self::new(frame(image_px), [0.0, 1.0], [0.0, 1.0]) }
     }
 
     /// Upper left corner and size, user units, of the area that may be drawn into; without a frame
     /// it includes the margins that other plots use for numbers.
-    pub fn bounds(&self) -> [DVec2; 2] {
+    pub(super) fn bounds(&self) -> [DVec2; 2] {
         match self.is_framed {
             true => [self.corner(), self.size],
             false => [DVec2::ZERO, self.room + DVec2::new(LEFT + RIGHT, ABOVE + BELOW)],
@@ -92,7 +92,7 @@ impl Axes {
     }
 
     /// The position in the picture, user units, of a point given in the units of the axes.
-    pub fn at(&self, DVec2 { x, y }: DVec2) -> DVec2 {
+    pub(super) fn at(&self, DVec2 { x, y }: DVec2) -> DVec2 {
         let part = |v: f64, [low, high]: [f64; 2]| (v - low) / (high - low);
         let parts = DVec2::new(part(x, self.x), 1.0 - part(y, self.y));
         self.corner() + parts * self.size
@@ -104,12 +104,12 @@ impl Axes {
     }
 
     /// User units per unit of the x axis and of the y axis.
-    pub fn scale(&self) -> DVec2 {
+    pub(super) fn scale(&self) -> DVec2 {
         self.size / DVec2::new(self.x[1] - self.x[0], self.y[1] - self.y[0]).abs()
     }
 
     /// Clips everything that `draw` adds to the frame.
-    pub fn within(&mut self, draw: impl FnOnce(&mut Self)) {
+    pub(super) fn within(&mut self, draw: impl FnOnce(&mut Self)) {
         let (DVec2 { x, y }, DVec2 { x: w, y: h }) = (self.corner(), self.size);
         let _ = write!(
             self.body,
@@ -122,22 +122,22 @@ impl Axes {
 
     /// Sets the legend below the axes: its height, user units, and its SVG elements, whose origin is
     /// below the axes at the left end of the frame.
-    pub fn foot(&mut self, height: f64, elements: String) {
+    pub(super) fn foot(&mut self, height: f64, elements: String) {
         self.foot = (height, elements);
     }
 
     /// Greatest width of the legend set by [`Self::foot`], user units.
-    pub fn foot_width(&self) -> f64 {
+    pub(super) fn foot_width(&self) -> f64 {
         self.room.x
     }
 
     /// Adds an SVG element whose coordinates are user units.
-    pub fn add(&mut self, element: &str) {
+    pub(super) fn add(&mut self, element: &str) {
         self.body.push_str(element);
     }
 
     /// Adds a dot of a CSS class; the radius is in user units.
-    pub fn dot(&mut self, point: DVec2, radius: f64, class: &str) {
+    pub(super) fn dot(&mut self, point: DVec2, radius: f64, class: &str) {
         let DVec2 { x: cx, y: cy } = self.at(point);
         let _ = write!(
             self.body,
@@ -146,7 +146,7 @@ impl Axes {
     }
 
     /// Adds a text at a point, moved by `by`, user units; `anchor` is a value of `text-anchor`.
-    pub fn text(&mut self, point: DVec2, by: DVec2, anchor: &str, text: &str) {
+    pub(super) fn text(&mut self, point: DVec2, by: DVec2, anchor: &str, text: &str) {
         let DVec2 { x, y } = self.at(point) + by;
         let _ = write!(
             self.body,
@@ -155,7 +155,7 @@ impl Axes {
     }
 
     /// Adds a polyline of a CSS class.
-    pub fn line(&mut self, points: &[DVec2], class: &str) {
+    pub(super) fn line(&mut self, points: &[DVec2], class: &str) {
         let places = points.iter().map(|&point| {
             let DVec2 { x, y } = self.at(point);
             format!("{x:.1},{y:.1}")
@@ -165,7 +165,7 @@ impl Axes {
     }
 
     /// Adds a rectangle of a CSS class between two opposite corners; `style` are further attributes.
-    pub fn bar(&mut self, low: DVec2, high: DVec2, class: &str, style: &str) {
+    pub(super) fn bar(&mut self, low: DVec2, high: DVec2, class: &str, style: &str) {
         let (low, high) = (self.at(low), self.at(high));
         let (DVec2 { x, y }, size) = (low.min(high), (high - low).abs());
         let _ = write!(
@@ -177,13 +177,19 @@ impl Axes {
     }
 
     /// The finished picture with the names of the x and y axes; `shows` is what screen readers say.
-    pub fn svg(self, names: [&str; 2], shows: &str) -> String {
+    pub(super) fn svg(self, names: [&str; 2], shows: &str) -> String {
         self.svg_with(names, shows, "", "")
     }
 
     /// The same with further attributes of the `svg` element and with a `style` element, for a file
     /// of its own, which has no page's style sheet.
-    pub fn svg_with(self, names: [&str; 2], shows: &str, attributes: &str, style: &str) -> String {
+    pub(super) fn svg_with(
+        self,
+        names: [&str; 2],
+        shows: &str,
+        attributes: &str,
+        style: &str,
+    ) -> String {
         let (DVec2 { x: w, y: h }, DVec2 { x: left, y: top }) = (self.size, self.corner());
         let (width, end) = (LEFT + self.room.x + RIGHT, ABOVE + self.room.y + BELOW);
         let height = end + self.foot.0;

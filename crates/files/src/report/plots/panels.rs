@@ -58,7 +58,7 @@ pub(super) struct Panels<'a> {
 impl<'a> Panels<'a> {
     /// Lays out marks, which are sorted by panel, at the largest scale that fits a width and a height,
     /// user units.
-    pub fn new(marks: &'a [Mark], width: f64, most_height: f64) -> Self {
+    pub(super) fn new(marks: &'a [Mark], width: f64, most_height: f64) -> Self {
         let panels: Vec<&[Mark]> = marks.chunk_by(|a, b| a.panel == b.panel).collect();
         let in_a_row = panels.len().clamp(1, PANELS_IN_A_ROW);
         let rows = panels.len().div_ceil(in_a_row).max(1);
@@ -74,23 +74,23 @@ impl<'a> Panels<'a> {
     }
 
     /// The median distance from a corner to the next in its row, mm.
-    pub fn spacing_mm(&self) -> f64 {
+    pub(super) fn spacing_mm(&self) -> f64 {
         self.spacing_mm
     }
 
     /// User units per millimetre on the panel.
-    pub fn per_mm(&self) -> f64 {
+    pub(super) fn per_mm(&self) -> f64 {
         self.per_mm
     }
 
     /// Height of the whole drawing, user units.
-    pub fn height(&self) -> f64 {
+    pub(super) fn height(&self) -> f64 {
         let in_a_row = self.panels.len().clamp(1, PANELS_IN_A_ROW);
         self.panels.len().div_ceil(in_a_row) as f64 * self.cell.y
     }
 
     /// The SVG elements of all panels, with offsets enlarged by a factor.
-    pub fn drawn(&self, enlarged: f64) -> String {
+    pub(super) fn drawn(&self, enlarged: f64) -> String {
         let in_a_row = self.panels.len().clamp(1, PANELS_IN_A_ROW);
         let mut drawn = String::new();
         for (index, marks) in self.panels.iter().enumerate() {

@@ -28,11 +28,11 @@ const LEAST_CELL_MM: f64 = 1.0;
 const TURNS: usize = 12;
 
 /// A piece to be nested: convex polygons in a frame of its own, mm.
-pub type Outline = Vec<Vec<DVec2>>;
+pub(super) type Outline = Vec<Vec<DVec2>>;
 
 /// Where a piece lies.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Place {
+pub(super) struct Place {
     /// Index of the page.
     pub page: usize,
     /// From the frame of the piece to that of the room on a page, whose lower left corner is the origin.
@@ -40,7 +40,7 @@ pub struct Place {
 }
 
 /// Nests pieces in rooms of this width and height, mm; `None` where a piece fits none.
-pub fn nest(pieces: &[Outline], room: DVec2) -> Option<Vec<Place>> {
+pub(super) fn nest(pieces: &[Outline], room: DVec2) -> Option<Vec<Place>> {
     let cell = (room.max_element() / CELLS).max(LEAST_CELL_MM);
     let mut order: Vec<usize> = (0..pieces.len()).collect();
     let areas: Vec<f64> = pieces.iter().map(|piece| piece.iter().map(|p| area(p)).sum()).collect();
@@ -70,7 +70,7 @@ pub fn nest(pieces: &[Outline], room: DVec2) -> Option<Vec<Place>> {
 }
 
 /// Whether a piece with these points, and a rim of this width around it, can lie in a room.
-pub fn fits(points: &[DVec2], rim: f64, room: DVec2) -> bool {
+pub(super) fn fits(points: &[DVec2], rim: f64, room: DVec2) -> bool {
     directions(points).into_iter().any(|turn| {
         let turned: Vec<DVec2> = points.iter().map(|&p| turn.apply(p)).collect();
         let [left, lower, right, upper] = bounds(&turned);

@@ -6,14 +6,14 @@ use deltille_core::angles::direction;
 
 /// Depth of an overlap that rounding makes of two polygons that share an edge, mm; coordinates of
 /// metres carry errors a million times smaller.
-pub const TOUCHING_MM: f64 = 1e-6;
+pub(crate) const TOUCHING_MM: f64 = 1e-6;
 
 /// How far two convex polygons, both counter-clockwise, lie apart: a lower bound of their distance
 /// where it is positive, minus the depth of their overlap where it is negative, mm.
 ///
 /// Two convex polygons are disjoint if, and only if, a line along an edge of one of them separates
 /// them; so the sign is exact but for [`TOUCHING_MM`] of rounding.
-pub fn gap_mm(a: &[DVec2], b: &[DVec2]) -> f64 {
+pub(crate) fn gap_mm(a: &[DVec2], b: &[DVec2]) -> f64 {
     let beyond_edges_of = |a: &[DVec2], b: &[DVec2]| {
         let edges = a.iter().zip(a.iter().cycle().skip(1));
         let gaps = edges.filter_map(|(&p, &q)| {
@@ -27,7 +27,7 @@ pub fn gap_mm(a: &[DVec2], b: &[DVec2]) -> f64 {
 
 /// A turn about the origin and a shift: `p ↦ turn · p + shift`.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Motion {
+pub(crate) struct Motion {
     /// Unit vector: where the x axis goes.
     pub turn: DVec2,
     /// Where the origin goes, mm.
@@ -37,25 +37,25 @@ pub struct Motion {
 impl Motion {
     /// The motion that takes a to the place of p, and the direction from a to b to that from p
     /// to q.
-    pub fn carrying([a, b]: [DVec2; 2], [p, q]: [DVec2; 2]) -> Self {
+    pub(crate) fn carrying([a, b]: [DVec2; 2], [p, q]: [DVec2; 2]) -> Self {
         let (from, to) = ((b - a).normalize_or_zero(), (q - p).normalize_or_zero());
         let turn = DVec2::new(from.dot(to), from.perp_dot(to));
         Self { turn, shift: p - turn.rotate(a) }
     }
 
     /// Turn by an angle, counter-clockwise.
-    pub fn turning(angle_rad: f64) -> Self {
+    pub(crate) fn turning(angle_rad: f64) -> Self {
         Self { turn: direction(angle_rad), shift: DVec2::ZERO }
     }
 
     /// Image of a point.
-    pub fn apply(&self, p: DVec2) -> DVec2 {
+    pub(crate) fn apply(&self, p: DVec2) -> DVec2 {
         self.turn.rotate(p) + self.shift
     }
 }
 
 /// Left, lower, right and upper end of some points.
-pub fn bounds<'a>(points: impl IntoIterator<Item = &'a DVec2>) -> [f64; 4] {
+pub(crate) fn bounds<'a>(points: impl IntoIterator<Item = &'a DVec2>) -> [f64; 4] {
     let start = (DVec2::INFINITY, DVec2::NEG_INFINITY);
     let (least, most) =
         points.into_iter().fold(start, |(least, most), &p| (least.min(p), most.max(p)));

@@ -31,7 +31,7 @@ use deltille_core::targets::{
 const FLAT_RAD: f64 = 0.1 / 180.0 * PI;
 
 /// Width of lines to cut and to fold along, mm: a hairline that every printer holds.
-pub const LINE_WIDTH_MM: f64 = 0.15;
+pub(super) const LINE_WIDTH_MM: f64 = 0.15;
 
 /// Least margin of a face that takes its numbers, mm.
 const LEAST_MARGIN_MM: f64 = 2.5;
@@ -99,7 +99,7 @@ struct Laid<'a> {
 }
 
 /// The sheets of a solid's net.
-pub fn sheets(
+pub(crate) fn sheets(
     name: &str,
     spec: &SolidSpec,
     panels: &[Panel],

@@ -20,7 +20,7 @@ use deltille_core::angles::tangent;
 const DEPTH: (f64, f64, f64) = (0.15, 4.0, MOST_DEPTH_MM);
 
 /// Depth of the deepest tabs, mm.
-pub const MOST_DEPTH_MM: f64 = 9.0;
+pub(super) const MOST_DEPTH_MM: f64 = 9.0;
 
 /// Angles between a tab's edge and its legs, degrees: the usual one, flatter ones for narrow gaps,
 /// a steep one for short edges; tried in this order.
@@ -41,7 +41,7 @@ const CLEARANCE_MM: f64 = 0.5;
 
 /// A tab beside a side of a face.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Tab {
+pub(super) struct Tab {
     /// The side that it hangs on.
     pub side: Side,
     /// Its corners, counter-clockwise: b, a, a', b' of the figure; mm.
@@ -55,7 +55,7 @@ pub struct Tab {
 ///
 /// The side with the deeper tab gets it; where both take the same, the one with the lower number
 /// in its face, so that the tabs of a regular net all point the same way round.
-pub fn place(pieces: &[Piece], sides: &Sides) -> Option<Vec<Vec<Tab>>> {
+pub(super) fn place(pieces: &[Piece], sides: &Sides) -> Option<Vec<Vec<Tab>>> {
     let mut tabs: Vec<Vec<Tab>> = vec![Vec::new(); pieces.len()];
     let mut places = BTreeMap::new();
     for (p, piece) in pieces.iter().enumerate() {
@@ -78,7 +78,7 @@ pub fn place(pieces: &[Piece], sides: &Sides) -> Option<Vec<Vec<Tab>>> {
 }
 
 /// The edges of the solid along which the net is cut, as pairs of sides in the order of faces.
-pub fn cut_edges(pieces: &[Piece], sides: &Sides) -> Vec<(Side, Side)> {
+pub(super) fn cut_edges(pieces: &[Piece], sides: &Sides) -> Vec<(Side, Side)> {
     let faces = || pieces.iter().flatten();
     let folded: Vec<(Side, Side)> = faces().filter_map(|face| face.hinge).collect();
     let mut all: Vec<(Side, Side)> = faces()

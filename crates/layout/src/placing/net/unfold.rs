@@ -29,7 +29,7 @@ fn tries(faces: usize) -> u64 {
 
 /// A side of a face: from its vertex of that index to the next.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub struct Side {
+pub(crate) struct Side {
     /// Index of the face.
     pub face: usize,
     /// 0 is the lower edge, 1 and 2 follow counter-clockwise.
@@ -38,7 +38,7 @@ pub struct Side {
 
 /// A face laid into the plane.
 #[derive(Clone, Debug, PartialEq)]
-pub struct FlatFace {
+pub(super) struct FlatFace {
     /// Index of the face.
     pub face: usize,
     /// Its vertices, counter-clockwise, mm.
@@ -49,23 +49,23 @@ pub struct FlatFace {
 
 impl FlatFace {
     /// Ends of a side, mm.
-    pub fn ends(&self, side: usize) -> [DVec2; 2] {
+    pub(super) fn ends(&self, side: usize) -> [DVec2; 2] {
         [self.corners[side], self.corners[(side + 1) % self.corners.len()]]
     }
 }
 
 /// Faces joined in one piece, none of which overlaps another; the first hangs on nothing, every
 /// other on one before it.
-pub type Piece = Vec<FlatFace>;
+pub(super) type Piece = Vec<FlatFace>;
 
 /// The sides of a solid's faces, matched.
-pub struct Sides {
+pub(crate) struct Sides {
     partner: Vec<Vec<Option<Side>>>,
 }
 
 impl Sides {
     /// Matches the sides that run along the same edge in opposite directions.
-    pub fn new(solid: &Polyhedron) -> Self {
+    pub(crate) fn new(solid: &Polyhedron) -> Self {
         let mut along = BTreeMap::new();
         for (face, vertices) in solid.faces.iter().enumerate() {
             for (side, ends) in sides(vertices).enumerate() {
@@ -79,12 +79,12 @@ impl Sides {
     }
 
     /// The sides of a face.
-    pub fn of(&self, face: usize) -> impl Iterator<Item = Side> + use<> {
+    pub(crate) fn of(&self, face: usize) -> impl Iterator<Item = Side> + use<> {
         (0..self.partner[face].len()).map(move |side| Side { face, side })
     }
 
     /// The other side of the same edge; `None` on the rim of an open mesh.
-    pub fn partner(&self, side: Side) -> Option<Side> {
+    pub(crate) fn partner(&self, side: Side) -> Option<Side> {
         self.partner[side.face][side.side]
     }
 }
@@ -93,7 +93,11 @@ impl Sides {
 /// once. `flat` holds the outlines of the faces, each in a frame of its own, mm.
 ///
 /// A named solid has its usual nets, any other solid those that are [`grown`].
-pub fn unfoldings(solid: &Polyhedron, shape: &SolidShape, flat: &[Vec<DVec2>]) -> Vec<Vec<Piece>> {
+pub(super) fn unfoldings(
+    solid: &Polyhedron,
+    shape: &SolidShape,
+    flat: &[Vec<DVec2>],
+) -> Vec<Vec<Piece>> {
     let usual = usual(solid, shape, flat);
     if usual.is_empty() { grown(solid, flat) } else { usual }
 }
@@ -121,7 +125,7 @@ fn grown(solid: &Polyhedron, flat: &[Vec<DVec2>]) -> Vec<Vec<Piece>> {
 }
 
 /// A last resort: nets of pieces of at most `most` faces.
-pub fn in_small_pieces(
+pub(super) fn in_small_pieces(
     solid: &Polyhedron,
     flat: &[Vec<DVec2>],
     most: usize,
@@ -132,7 +136,7 @@ pub fn in_small_pieces(
 }
 
 /// Nets of pieces whose corners `fit`, with room for a tab along every side that is cut.
-pub fn in_pieces_that_fit(
+pub(super) fn in_pieces_that_fit(
     flat: &[Vec<DVec2>],
     sides: &Sides,
     seed: u64,

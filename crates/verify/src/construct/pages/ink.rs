@@ -53,13 +53,13 @@ pub(super) struct Ink {
 
 impl Ink {
     /// An empty page of this width and height, in units of `mm` millimetres.
-    pub fn new(size: DVec2, mm: f64) -> Self {
+    pub(super) fn new(size: DVec2, mm: f64) -> Self {
         Self { page: size.element_product(), mm, length: 0.0, area: 0.0, marks: HashSet::new() }
     }
 
     /// Adds a path that is filled by the even-odd rule, or stroked where the width of a pen is given,
     /// in units of the page; returns the problem if not all viewers draw it alike.
-    pub fn add(&mut self, path: &BezPath, pen: Option<f64>) -> Option<&'static str> {
+    pub(super) fn add(&mut self, path: &BezPath, pen: Option<f64>) -> Option<&'static str> {
         let (length, count) = length(path);
         let around = path.control_box();
         match pen {
@@ -113,7 +113,7 @@ impl Ink {
     }
 
     /// Whether the marks so far are within the bounds, so that rendering them takes little time.
-    pub fn is_drawable(&self) -> bool {
+    pub(super) fn is_drawable(&self) -> bool {
         // Written so that NaN is refused too.
         self.length <= MOST_PER_MM * self.mm * self.page && self.area <= MOST_PAGES * self.page
     }

@@ -4,7 +4,7 @@ use parquet::data_type::ByteArray;
 
 /// What a column holds.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Kind {
+pub(super) enum Kind {
     /// UTF-8.
     Text,
     /// A whole number of 32 bits, with a sign.
@@ -19,7 +19,7 @@ pub enum Kind {
 
 /// A column.
 #[derive(Clone, Copy, Debug)]
-pub struct Column {
+pub(super) struct Column {
     pub name: &'static str,
     pub kind: Kind,
     /// Whether every row has a value.
@@ -32,7 +32,7 @@ pub struct Column {
 
 /// A value of a row.
 #[derive(Clone, Debug, PartialEq)]
-pub enum Cell {
+pub(super) enum Cell {
     None,
     Text(ByteArray),
     Whole(i64),
@@ -62,7 +62,7 @@ impl Column {
 }
 
 /// A row for each corner.
-pub const CORNERS: [Column; 17] = [
+pub(super) const CORNERS: [Column; 17] = [
     column("image", Kind::Text),
     column("grid", Kind::Signed),
     column("kind", Kind::Text),
@@ -83,7 +83,7 @@ pub const CORNERS: [Column; 17] = [
 ];
 
 /// A row for each picture.
-pub const PICTURES: [Column; 25] = [
+pub(super) const PICTURES: [Column; 25] = [
     column("image", Kind::Text),
     column("width", Kind::Signed).gaps(),
     column("height", Kind::Signed).gaps(),

@@ -26,7 +26,7 @@ struct Header {
 
 /// Bytes of all pages of a column's part of a file once they are unpacked; `Err` says what is wrong with a page.
 /// No dictionary may have more than `most_entries`.
-pub fn unpacked_bytes(mut chunk: &[u8], most_entries: u64) -> Result<u64, String> {
+pub(super) fn unpacked_bytes(mut chunk: &[u8], most_entries: u64) -> Result<u64, String> {
     let mut all = 0;
     while !chunk.is_empty() {
         let header = header(&mut chunk).ok_or("the header of a page is damaged")?;
