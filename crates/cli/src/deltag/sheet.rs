@@ -5,7 +5,7 @@ use std::process::ExitCode;
 
 use anyhow::{Context, ensure};
 
-use crate::deltille::files::{Formats, drawn, write_all};
+use crate::deltille::files::written::{Formats, drawn, write_all};
 use crate::interrupt;
 use crate::output::{Overwrite, say};
 use crate::run::{FAILED, Interrupted};
