@@ -7,7 +7,7 @@ use numpy::ndarray::{Array1, Array2, Array3};
 use numpy::{Element, IntoPyArray, PyArray1, PyArray2, PyArray3, PyArrayLikeDyn};
 use pyo3::prelude::*;
 
-use crate::errors;
+use super::errors;
 
 /// Rows of so many numbers as an array of N × so many.
 pub fn rows<'py, T: Element + Copy, const N: usize>(

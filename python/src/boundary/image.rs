@@ -12,8 +12,8 @@ use numpy::{
 };
 use pyo3::prelude::*;
 
-use crate::arrays::shape_in_words;
-use crate::errors::{self, Raise, raised};
+use super::arrays::shape_in_words;
+use super::errors::{self, Raise, raised};
 
 /// A picture that Python holds, or a copy of it.
 pub enum Picture<'py> {

@@ -9,7 +9,7 @@ use std::time::Duration;
 use deltille::limits;
 use pyo3::prelude::*;
 
-use crate::errors::Fault;
+use super::errors::Fault;
 
 /// How often signals are looked for.
 const EVERY: Duration = Duration::from_millis(50);

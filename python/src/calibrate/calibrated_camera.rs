@@ -7,13 +7,13 @@ use deltille::calibrate::{self as solver, CameraEstimate, Source, ViewEstimate};
 use numpy::{PyArray1, PyArray2, PyArray3};
 use pyo3::prelude::*;
 
-use crate::arrays::{self, distance, record};
-use crate::camera::Camera;
-use crate::errors::{raised, unlocked};
-use crate::pickled::{Part, pickled, restored};
-use crate::pose::Pose;
-use crate::solving::Solved;
-use crate::views::{View, residual_arrays};
+use super::pickled::{Part, pickled, restored};
+use super::solving::Solved;
+use super::views::{View, residual_arrays};
+use crate::boundary::arrays::{self, distance, record};
+use crate::boundary::errors::{raised, unlocked};
+use crate::see::camera::Camera;
+use crate::see::pose::Pose;
 
 /// One camera as it was found.
 ///

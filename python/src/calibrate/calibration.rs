@@ -14,16 +14,16 @@ use deltille::report;
 use numpy::PyArray2;
 use pyo3::prelude::*;
 
-use crate::arrays::{self, record};
-use crate::calibrated_camera::CalibratedCamera;
-use crate::camera::save_text;
-use crate::detection::Targets;
-use crate::errors::{self, Raise, RaiseFile, raised, unlocked};
-use crate::pickled::{of_text, pickled, restored};
-use crate::pose::Pose;
-use crate::solving::Solved;
-use crate::targets::Target;
-use crate::views::{Diagnosis, Excluded};
+use super::calibrated_camera::CalibratedCamera;
+use super::pickled::{of_text, pickled, restored};
+use super::solving::Solved;
+use super::views::{Diagnosis, Excluded};
+use crate::boundary::arrays::{self, record};
+use crate::boundary::errors::{self, Raise, RaiseFile, raised, unlocked};
+use crate::see::camera::save_text;
+use crate::see::detection::Targets;
+use crate::see::pose::Pose;
+use crate::targets::target::Target;
 
 /// A calibrated camera, with all that is said about it.
 #[pyclass(frozen, extends = CalibratedCamera, module = "deltille")]

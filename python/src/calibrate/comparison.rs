@@ -13,15 +13,15 @@ use deltille::targets::TargetIdentity;
 use numpy::{PyArray1, PyArray2};
 use pyo3::prelude::*;
 
-use crate::arrays::{self, distance};
-use crate::calibrated_camera::CalibratedCamera;
-use crate::calibration::Rig;
-use crate::camera::Camera;
-use crate::detection::{Detection, Targets};
-use crate::errors::{self, Raise, raised, unlocked};
-use crate::pose::Pose;
-use crate::solving::{Solved, print_scale_of};
-use crate::targets::Target;
+use super::calibrated_camera::CalibratedCamera;
+use super::calibration::Rig;
+use super::solving::{Solved, print_scale_of};
+use crate::boundary::arrays::{self, distance};
+use crate::boundary::errors::{self, Raise, raised, unlocked};
+use crate::see::camera::Camera;
+use crate::see::detection::{Detection, Targets};
+use crate::see::pose::Pose;
+use crate::targets::target::Target;
 
 /// A camera as found, or as given.
 pub struct Compared(Estimate);

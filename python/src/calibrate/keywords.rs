@@ -10,12 +10,12 @@ use deltille::targets;
 use pyo3::prelude::*;
 use pyo3::types::PyMapping;
 
-use crate::calibration::{Calibration, Rig, calibration};
-use crate::camera::Camera;
-use crate::detection::{Detection, Results, Targets};
-use crate::detector::sides;
-use crate::errors::{self, RaiseFile, raised};
-use crate::solving::{How, ModelChoice, OneCamera, Seen, named, solve};
+use super::calibration::{Calibration, Rig, calibration};
+use super::solving::{How, ModelChoice, OneCamera, Seen, named, solve};
+use crate::boundary::errors::{self, RaiseFile, raised};
+use crate::see::camera::Camera;
+use crate::see::detection::{Detection, Results, Targets};
+use crate::see::detector::sides;
 
 /// Calibrates a camera from detections.
 ///

@@ -6,13 +6,13 @@ use deltille_core::quantity::distance_mm;
 use numpy::PyArray2;
 use pyo3::prelude::*;
 
-use crate::arrays::{self, number, whole};
-use crate::calibrate::of_detections;
-use crate::camera::Camera;
-use crate::detection::{Results, Targets};
-use crate::errors::{self, Raise, raised, unlocked};
-use crate::pose::Pose;
-use crate::solving::{ModelChoice, Seen, assume, named};
+use super::keywords::of_detections;
+use super::solving::{ModelChoice, Seen, assume, named};
+use crate::boundary::arrays::{self, number, whole};
+use crate::boundary::errors::{self, Raise, raised, unlocked};
+use crate::see::camera::Camera;
+use crate::see::detection::{Results, Targets};
+use crate::see::pose::Pose;
 
 /// A view that is proposed: where to hold the board so that the camera is known best.
 #[pyclass(frozen, module = "deltille")]

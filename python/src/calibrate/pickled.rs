@@ -6,8 +6,8 @@ use deltille::export::saved;
 use deltille::layout::Printing;
 use pyo3::prelude::*;
 
-use crate::errors::{self, Raise};
-use crate::solving::Solved;
+use super::solving::Solved;
+use crate::boundary::errors::{self, Raise};
 
 /// What a part of a calibration is restored from: the whole, its targets, the camera, and the view, if it is one.
 pub type Part = (String, Vec<String>, usize, Option<usize>);

@@ -17,11 +17,11 @@ use deltille_core::quantity::{board_accuracy_mm, distance_mm, edge_mm, print_sca
 use pyo3::prelude::*;
 use serde_json::Value;
 
-use crate::arrays::{number, vector, whole};
-use crate::detection::{Detection, Targets};
-use crate::detector::{size, tiling};
-use crate::errors::{self, Raise, raised};
-use crate::interrupt::interruptible;
+use crate::boundary::arrays::{number, vector, whole};
+use crate::boundary::errors::{self, Raise, raised};
+use crate::boundary::interrupt::interruptible;
+use crate::see::detection::{Detection, Targets};
+use crate::see::detector::{size, tiling};
 
 /// What was photographed.
 pub enum Seen {
@@ -49,7 +49,7 @@ impl Seen {
                 "give a target, or grid=\"deltille\" or \"checker\" with edge_mm for untagged boards",
             ),
             (found, None) => {
-                let own = |target: &crate::targets::Target| (*target.printing).clone();
+                let own = |target: &crate::targets::target::Target| (*target.printing).clone();
                 let printed: Vec<Printing> = found.iter().map(own).collect();
                 let targets = printed.iter().map(|printing| printing.target.clone()).collect();
                 Ok(Self::Targets { targets, printed })

@@ -10,11 +10,12 @@ use numpy::{PyArray1, PyArray2};
 use pyo3::prelude::*;
 use serde::{Deserialize, Serialize};
 
-use crate::arrays::record;
-use crate::pickled::{Part, pickled};
-use crate::pose::Pose;
-use crate::solving::Solved;
-use crate::{arrays, errors, pickles};
+use super::pickled::{Part, pickled};
+use super::solving::Solved;
+use crate::boundary::arrays::{self, record};
+use crate::boundary::errors;
+use crate::pickles;
+use crate::see::pose::Pose;
 
 /// Something that is said of a calibration, with what to do about it.
 #[pyclass(frozen, module = "deltille", eq)]
@@ -144,7 +145,7 @@ macro_rules! residual_arrays {
             /// Ids of the corners on the target, N, int64; −1 where the target is not known.
             #[getter]
             fn ids<'py>(&$self, py: Python<'py>) -> Bound<'py, PyArray1<i64>> {
-                let ids = $crate::views::corner_ids(&$solved.targets);
+                let ids = $crate::calibrate::views::corner_ids(&$solved.targets);
                 let corners = $views.iter().flat_map(|view: &ViewEstimate| &view.corners);
                 let id = |c: &solver::Corner| ids.get(&(c.panel.index(), c.row, c.col)).copied();
                 arrays::column(py, corners.map(|corner| id(corner).unwrap_or(-1)))

@@ -13,8 +13,8 @@ use numpy::{PyArray1, PyArray2};
 use pyo3::prelude::*;
 use serde_json::json;
 
-use crate::arrays::{self, number, vector, whole};
-use crate::errors::{self, Raise, RaiseFile, raised, unlocked};
+use crate::boundary::arrays::{self, number, vector, whole};
+use crate::boundary::errors::{self, Raise, RaiseFile, raised, unlocked};
 
 /// A camera with its lens: where points are seen, and along which rays pixels look.
 ///

@@ -15,11 +15,12 @@ use pyo3::exceptions::PyTypeError;
 use pyo3::prelude::*;
 use serde::{Deserialize, Serialize};
 
-use crate::arrays::record;
-use crate::camera::save_text;
-use crate::errors::{self, Raise, RaiseFile, raised};
-use crate::targets::Target;
-use crate::{arrays, families, pickles};
+use super::camera::save_text;
+use crate::boundary::arrays::{self, record};
+use crate::boundary::errors::{self, Raise, RaiseFile, raised};
+use crate::pickles;
+use crate::targets::families;
+use crate::targets::target::Target;
 
 /// Why a picture, or a grid in it, has no labels.
 #[pyclass(frozen, module = "deltille", eq)]

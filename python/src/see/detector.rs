@@ -11,11 +11,11 @@ use deltille::targets::SIDES;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
-use crate::arrays::whole;
-use crate::detection::{Detection, Targets};
-use crate::errors::{self, Raise, RaiseFile, raised, unlocked};
-use crate::image::Picture;
-use crate::targets::Target;
+use super::detection::{Detection, Targets};
+use crate::boundary::arrays::whole;
+use crate::boundary::errors::{self, Raise, RaiseFile, raised, unlocked};
+use crate::boundary::image::Picture;
+use crate::targets::target::Target;
 
 /// Finds targets, or untagged boards, in pictures. One detector may be used by several threads at a time.
 ///

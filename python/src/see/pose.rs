@@ -7,8 +7,8 @@ use numpy::{PyArray1, PyArray2};
 use pyo3::exceptions::PyTypeError;
 use pyo3::prelude::*;
 
-use crate::arrays::{self, vector};
-use crate::errors::{self, raised};
+use crate::boundary::arrays::{self, vector};
+use crate::boundary::errors::{self, raised};
 
 /// A rigid motion ``y = R x + t`` between two frames, in millimetres.
 ///

@@ -11,12 +11,12 @@ use numpy::ndarray::Array2;
 use numpy::{IntoPyArray, PyArray1, PyArray2};
 use pyo3::prelude::*;
 
-use crate::arrays::{self, number, vector, whole};
-use crate::camera::Camera;
-use crate::errors::{self, Raise, RaiseFile, raised};
-use crate::interrupt::interruptible;
-use crate::pose::Pose;
-use crate::targets::Target;
+use super::camera::Camera;
+use super::pose::Pose;
+use crate::boundary::arrays::{self, number, vector, whole};
+use crate::boundary::errors::{self, Raise, RaiseFile, raised};
+use crate::boundary::interrupt::interruptible;
+use crate::targets::target::Target;
 
 /// The true places of the N corners that a synthetic picture shows.
 #[pyclass(frozen, module = "deltille")]

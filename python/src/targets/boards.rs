@@ -9,11 +9,11 @@ use deltille::layout::{PaperSpec, usual_edge_mm};
 use deltille::targets::{BoardSpec, TagSpec, TagsIn, TargetSpec};
 use pyo3::prelude::*;
 
-use crate::arrays::whole;
-use crate::errors::{self, raised};
-use crate::families::FamilyChoice;
-use crate::paper::flat;
-use crate::targets::Target;
+use super::families::FamilyChoice;
+use super::paper::flat;
+use super::target::Target;
+use crate::boundary::arrays::whole;
+use crate::boundary::errors::{self, raised};
 
 /// What a board is, and the family of its tags.
 pub type Made = (TargetSpec, Option<Arc<family::Family>>);

@@ -13,9 +13,9 @@ use deltille::lattice::{Dimension, GridKind};
 use numpy::{PyArray1, PyArrayLike1};
 use pyo3::prelude::*;
 
-use crate::arrays::{self, whole};
-use crate::errors::{self, Raise, RaiseFile, raised, unlocked};
-use crate::interrupt::interruptible;
+use crate::boundary::arrays::{self, whole};
+use crate::boundary::errors::{self, Raise, RaiseFile, raised, unlocked};
+use crate::boundary::interrupt::interruptible;
 
 /// A family of tags: codes with a Hamming distance in all turns.
 #[pyclass(frozen, module = "deltille")]
@@ -111,7 +111,7 @@ impl Family {
     /// pathlib.Path
     #[pyo3(signature = (path, *, overwrite = false))]
     fn save(&self, path: PathBuf, overwrite: bool) -> PyResult<PathBuf> {
-        crate::camera::save_text(path, self.to_json(), overwrite)
+        crate::see::camera::save_text(path, self.to_json(), overwrite)
     }
 
     /// Its name.

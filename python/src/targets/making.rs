@@ -6,7 +6,7 @@ use deltille::export::texture::MAX_TEXTURES;
 use deltille::targets::{Target, TargetSpec};
 use pyo3::prelude::*;
 
-use crate::errors::{self, Raise, raised};
+use crate::boundary::errors::{self, Raise, raised};
 
 /// One format, or several.
 #[derive(FromPyObject)]

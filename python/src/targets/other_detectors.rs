@@ -8,11 +8,11 @@ use deltille::layout::PaperSpec;
 use deltille::targets::{AprilGridSpec, CharucoSpec, CirclesSpec, TargetSpec};
 use pyo3::prelude::*;
 
-use crate::arrays::whole;
-use crate::errors;
-use crate::families::FamilyChoice;
-use crate::paper::flat;
-use crate::targets::Target;
+use super::families::FamilyChoice;
+use super::paper::flat;
+use super::target::Target;
+use crate::boundary::arrays::whole;
+use crate::boundary::errors;
 
 /// Columns and rows, as OpenCV has them.
 fn size_of(name: &str, (columns, rows): (i64, i64)) -> PyResult<[u32; 2]> {

@@ -10,8 +10,8 @@ use deltille::logo::{self, LogoError, MAX_LOGO_BYTES};
 use deltille::targets::TargetSpec;
 use pyo3::prelude::*;
 
-use crate::errors::{self, Raise, RaiseFile};
-use crate::targets::Target;
+use super::target::Target;
+use crate::boundary::errors::{self, Raise, RaiseFile};
 
 /// What a target is printed on.
 pub fn paper(
@@ -131,16 +131,16 @@ macro_rules! flat {
                 name: &str,
             ) -> PyResult<PyClassInitializer<Self>> {
                 let solids = deltille::layout::SolidSheets::default();
-                let of_all = crate::paper::paper(paper, orientation, margin_mm, solids)?;
+                let of_all = crate::targets::paper::paper(paper, orientation, margin_mm, solids)?;
                 #[allow(unused_mut, reason = "few targets have a say in it")]
-                let mut $paper = crate::paper::with_logo(
+                let mut $paper = crate::targets::paper::with_logo(
                     PaperSpec { note, guide_page, ..of_all },
                     logo,
                     logo_height_mm,
                 )?;
                 let (spec, family) = $make;
                 let finish = deltille::layout::Finish { mirrored, white, contour };
-                let target = crate::paper::build(name, &spec, family, &$paper, finish)?;
+                let target = crate::targets::paper::build(name, &spec, family, &$paper, finish)?;
                 Ok(PyClassInitializer::from(target).add_subclass(Self))
             }
         }

@@ -5,11 +5,11 @@ use std::sync::Arc;
 use deltille::layout::Printing;
 use pyo3::prelude::*;
 
-use crate::boards::{Board, Checkerboard};
-use crate::errors::{self, Raise};
-use crate::other_detectors::{AprilGrid, Charuco, Circles};
-use crate::solids::{Cube, Cuboid, Icosahedron, Octahedron, Solid, Tetrahedron};
-use crate::targets::Target;
+use super::boards::{Board, Checkerboard};
+use super::other_detectors::{AprilGrid, Charuco, Circles};
+use super::solids::{Cube, Cuboid, Icosahedron, Octahedron, Solid, Tetrahedron};
+use super::target::Target;
+use crate::boundary::errors::{self, Raise};
 
 /// A target that was pickled.
 #[pyfunction]

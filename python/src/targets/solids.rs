@@ -13,12 +13,12 @@ use deltille::targets::{
 };
 use pyo3::prelude::*;
 
-use crate::arrays::whole;
-use crate::boards::{Tags, spacing_of};
-use crate::errors::{self, Raise, RaiseFile, raised};
-use crate::families::FamilyChoice;
-use crate::paper::{build, paper as paper_of, with_logo};
-use crate::targets::Target;
+use super::boards::{Tags, spacing_of};
+use super::families::FamilyChoice;
+use super::paper::{build, paper as paper_of, with_logo};
+use super::target::Target;
+use crate::boundary::arrays::whole;
+use crate::boundary::errors::{self, Raise, RaiseFile, raised};
 
 /// A shape, and what is said of its solids alone.
 struct Shape {

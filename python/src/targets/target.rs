@@ -15,12 +15,13 @@ use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict};
 use serde::{Deserialize, Serialize};
 
-use crate::errors::{self, Raise, RaiseFile, raised, unlocked};
-use crate::families::{Family, FamilyChoice};
-use crate::interrupt::interruptible;
-use crate::making::{Formats, Keywords};
-use crate::verdict::{Proof, Verdict};
-use crate::{arrays, pickles};
+use super::families::{Family, FamilyChoice};
+use super::making::{Formats, Keywords};
+use super::verdict::{Proof, Verdict};
+use crate::boundary::arrays;
+use crate::boundary::errors::{self, Raise, RaiseFile, raised, unlocked};
+use crate::boundary::interrupt::interruptible;
+use crate::pickles;
 
 /// What is printed, photographed and found: panels with corners and tags, in millimetres.
 ///

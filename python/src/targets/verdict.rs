@@ -10,7 +10,7 @@ use deltille::verify::{self, Artifact, Verifier};
 use pyo3::prelude::*;
 use serde_json::Value;
 
-use crate::errors::{self, Raise, RaiseFile};
+use crate::boundary::errors::{self, Raise, RaiseFile};
 
 /// Content of a file, or where it is.
 #[derive(FromPyObject)]
