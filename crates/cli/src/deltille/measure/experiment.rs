@@ -18,7 +18,8 @@ use deltille::detect::Tone;
 use deltille::family;
 use deltille::limits::Limits;
 use deltille_lab::photographs::axes::Axis;
-use deltille_lab::photographs::{self, Kind, Subject, table};
+use deltille_lab::photographs::result::table;
+use deltille_lab::photographs::{self, Kind, Subject};
 use deltille_lab::states::Scene;
 use deltille_lab::{corners, guide, plot, rig, states, table2};
 
@@ -320,7 +321,7 @@ fn run_photographs(args: PhotographsArgs) -> anyhow::Result<ExitCode> {
         return Err(Interrupted("no result was written".to_owned()).into());
     };
     output::print(&table::text(&rows))?;
-    let svg = photographs::plot::svg(&rows);
+    let svg = photographs::result::plot::svg(&rows);
     let png = plot::png(&svg).context("the plot cannot be drawn")?;
     let files = [
         text_file("photographs.csv".to_owned(), table::csv(&rows)),

@@ -1,14 +1,14 @@
 //! Bayer's colour filters, and colours interpolated from what they leave.
 
-use super::scene::Mosaic;
+use crate::photographs::scene::Mosaic;
 use deltille::raster::Gray;
 
 /// What the filters let pass of a grey scene, relative to green; the gains that follow undo it, and
 /// raise the noise with it.
-pub(super) const RESPONSE: [f32; 3] = [0.55, 1.0, 0.65];
+pub(crate) const RESPONSE: [f32; 3] = [0.55, 1.0, 0.65];
 
 /// Red, green or blue: the colour of a pixel, rows RGRG… and GBGB….
-pub(super) fn colour(x: usize, y: usize) -> usize {
+pub(crate) fn colour(x: usize, y: usize) -> usize {
     match (x % 2, y % 2) {
         (0, 0) => 0,
         (1, 1) => 2,
@@ -17,7 +17,7 @@ pub(super) fn colour(x: usize, y: usize) -> usize {
 }
 
 /// Three colours at every pixel from one; `raw` has its gains already.
-pub(super) fn interpolated(raw: &Gray<f32>, how: Mosaic) -> [Gray<f32>; 3] {
+pub(crate) fn interpolated(raw: &Gray<f32>, how: Mosaic) -> [Gray<f32>; 3] {
     let green = green(raw, how);
     let (width, height) = (raw.width(), raw.height());
     let other = |wanted: usize| {

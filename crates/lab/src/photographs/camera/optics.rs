@@ -13,12 +13,12 @@
 use glam::DVec2;
 use rayon::prelude::*;
 
-use super::background::TEXELS_PER_MM;
-use super::covers::Covers;
-use super::mips::{Footprint, Mips};
-use super::page::PrintedPage;
-use super::scene::Scene;
 use super::view::View;
+use crate::photographs::scene::Scene;
+use crate::photographs::world::background::TEXELS_PER_MM;
+use crate::photographs::world::covers::Covers;
+use crate::photographs::world::mips::{Footprint, Mips};
+use crate::photographs::world::page::PrintedPage;
 use deltille::raster::Gray;
 
 /// Samples along a pixel: so many along a standard deviation of the blur, within these. Four along pixels of the usual
@@ -34,7 +34,7 @@ const REACH_SIGMAS: f64 = 4.0;
 const BLOCK: usize = 16;
 
 /// What stands before the camera.
-pub(super) struct Setting<'a> {
+pub(crate) struct Setting<'a> {
     pub page: &'a PrintedPage,
     pub view: &'a View,
     pub covers: &'a Covers,
@@ -97,7 +97,7 @@ impl Light {
 }
 
 /// The light on every pixel, 1 being what the sensor takes.
-pub(super) fn expose(setting: &Setting, scene: &Scene) -> Gray<f32> {
+pub(crate) fn expose(setting: &Setting, scene: &Scene) -> Gray<f32> {
     // What a move brings in from outside the picture.
     let margin =
         (0.5 * scene.motion_px).ceil() as usize + if scene.motion_px > 0.0 { 2 } else { 0 };

@@ -8,14 +8,14 @@ use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 
 use super::mosaic::{RESPONSE, colour, interpolated};
-use super::scene::{Mosaic, SHARPENING_PX, Scene};
+use crate::photographs::scene::{Mosaic, SHARPENING_PX, Scene};
 use deltille::raster::{Gray, gaussian};
 
 /// Rec. 601 weights, those of JPEG.
 const LUMA: [f32; 3] = [0.299, 0.587, 0.114];
 
 /// What the file holds.
-pub(super) fn record(light: &Gray<f32>, scene: &Scene, rng: &mut ChaCha8Rng) -> Gray<u8> {
+pub(crate) fn record(light: &Gray<f32>, scene: &Scene, rng: &mut ChaCha8Rng) -> Gray<u8> {
     let grey = developed(light, scene, rng);
     let sharp = sharpened(grey, scene.sharpening);
     let file = sharp.map(|v| (v.clamp(0.0, 1.0) * 255.0 + 0.5) as u8);
@@ -91,8 +91,8 @@ fn resized(picture: Gray<u8>, width: u32) -> Gray<u8> {
 mod tests {
     use rand::SeedableRng;
 
-    use super::super::scene::Tone;
     use super::*;
+    use crate::photographs::scene::Tone;
 
     fn plain() -> Scene {
         Scene { noise: 0.0, tone: Tone::Linear, ..Scene::default() }

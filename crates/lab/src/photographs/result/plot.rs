@@ -2,8 +2,8 @@
 
 use glam::DVec2;
 
-use super::axes::Axis;
 use super::table::Row;
+use crate::photographs::axes::Axis;
 use crate::plot::{line, page, write};
 
 /// Size of a panel's axes and the room around it, in user units.

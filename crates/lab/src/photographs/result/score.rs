@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use glam::DVec2;
 
-use super::photograph::{Photograph, Sight, TrueCorner};
+use crate::photographs::photograph::{Photograph, Sight, TrueCorner};
 use deltille::detect::Detection;
 
 /// A report within this of a true corner is of that corner, px of the sensor at most.

@@ -7,10 +7,10 @@ use image::codecs::png::PngEncoder;
 use image::{ExtendedColorType, ImageEncoder};
 use serde::Serialize;
 
-use super::axes::{Axis, Level};
-use super::photograph::TrueCorner;
-use super::scene::Scene;
 use super::score::Score;
+use crate::photographs::axes::{Axis, Level};
+use crate::photographs::photograph::TrueCorner;
+use crate::photographs::scene::Scene;
 use deltille::export::kind::signed_png;
 use deltille::raster::Gray;
 use deltille_core::json;
@@ -61,7 +61,7 @@ pub struct Row {
 
 impl Row {
     /// Sums up the photographs of one level.
-    pub(super) fn new(subject: &str, axis: Axis, level: &Level, scores: &[Score]) -> Self {
+    pub(crate) fn new(subject: &str, axis: Axis, level: &Level, scores: &[Score]) -> Self {
         let sum = |of: fn(&Score) -> usize| scores.iter().map(of).sum::<usize>();
         let visible = sum(|s| s.visible);
         let part = |count: usize| if visible == 0 { 1.0 } else { count as f64 / visible as f64 };
@@ -178,7 +178,7 @@ pub fn json(rows: &[Row], seed: u64) -> String {
 }
 
 /// The truth about a picture with this file name, schema `deltille/photograph/1`.
-pub(super) fn truth(image: &str, target: &str, scene: &Scene, corners: &[TrueCorner]) -> String {
+pub(crate) fn truth(image: &str, target: &str, scene: &Scene, corners: &[TrueCorner]) -> String {
     #[derive(Serialize)]
     struct File<'a> {
         schema: &'static str,
@@ -191,7 +191,7 @@ pub(super) fn truth(image: &str, target: &str, scene: &Scene, corners: &[TrueCor
 }
 
 /// A grey picture as PNG.
-pub(super) fn png(picture: &Gray<u8>) -> Vec<u8> {
+pub(crate) fn png(picture: &Gray<u8>) -> Vec<u8> {
     let (width, height) = (picture.width() as u32, picture.height() as u32);
     let mut bytes = Vec::new();
     PngEncoder::new(&mut bytes)

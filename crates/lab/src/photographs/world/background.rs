@@ -6,14 +6,14 @@ use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
 use super::mips::{Beyond, Mips};
-use super::scene::Background;
+use crate::photographs::scene::Background;
 use deltille::raster::Gray;
 
 /// Side of a texture, texels; a power of two.
 const SIDE: usize = 1024;
 
 /// Texels of a texture to a millimetre.
-pub(super) const TEXELS_PER_MM: f64 = 3.0;
+pub(crate) const TEXELS_PER_MM: f64 = 3.0;
 
 /// Things in a cluttered texture.
 const THINGS: usize = 400;
@@ -23,7 +23,7 @@ const STREAM: u64 = 1 << 63;
 
 /// All textures of a run, made when they are first seen.
 pub struct Studio {
-    pub(super) seed: u64,
+    pub(crate) seed: u64,
     backgrounds: [OnceLock<Mips>; 3],
     skin: OnceLock<Mips>,
 }
@@ -35,7 +35,7 @@ impl Studio {
     }
 
     /// What lies around the page: how much light it sends back, 0 to 255.
-    pub(super) fn background(&self, kind: Background) -> &Mips {
+    pub(crate) fn background(&self, kind: Background) -> &Mips {
         self.backgrounds[kind as usize].get_or_init(|| {
             let mut rng = self.rng(1 + kind as u64);
             let tone: f64 = rng.random_range(0.3..0.5);
@@ -49,7 +49,7 @@ impl Studio {
     }
 
     /// Grain about 128.
-    pub(super) fn skin(&self) -> &Mips {
+    pub(crate) fn skin(&self) -> &Mips {
         self.skin.get_or_init(|| Mips::new(grain(0.5, 0.06, &mut self.rng(0)), Beyond::Again))
     }
 

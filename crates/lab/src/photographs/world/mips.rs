@@ -6,7 +6,7 @@ use deltille::raster::Gray;
 
 /// What lies beyond the borders of a picture.
 #[derive(Clone, Copy, PartialEq, Eq)]
-pub(super) enum Beyond {
+pub(crate) enum Beyond {
     /// Its outermost pixels.
     Border,
     /// The same picture again.
@@ -14,7 +14,7 @@ pub(super) enum Beyond {
 }
 
 /// A picture and its halvings, by exact means of 2 × 2 pixels.
-pub(super) struct Mips {
+pub(crate) struct Mips {
     levels: Vec<Gray<u8>>,
     beyond: Beyond,
 }
@@ -60,7 +60,7 @@ impl Mips {
 }
 
 /// How a small parallelogram of a picture is sampled.
-pub(super) struct Footprint {
+pub(crate) struct Footprint {
     level: usize,
     scale: f64,
     samples: u32,

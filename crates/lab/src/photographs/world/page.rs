@@ -5,9 +5,9 @@
 
 use glam::DVec2;
 
-use super::PhotographError;
 use super::mips::{Beyond, Footprint, Mips};
 use super::paths::Vertices;
+use crate::photographs::PhotographError;
 use deltille::artwork;
 use deltille::export::pdf;
 use deltille::family::Family;
@@ -124,7 +124,7 @@ impl PrintedPage {
 
     /// How white a small parallelogram of the page is on the average, 0 on ink to 1 on bare paper;
     /// `None` beside the page. Its sides are in mm.
-    pub(super) fn whiteness(&self, place: DVec2, footprint: &Footprint) -> Option<f32> {
+    pub(crate) fn whiteness(&self, place: DVec2, footprint: &Footprint) -> Option<f32> {
         let on_page = place.cmpge(DVec2::ZERO).all() && place.cmple(self.size_mm).all();
         on_page.then(|| {
             let from_top = DVec2::new(place.x, self.size_mm.y - place.y);
@@ -133,7 +133,7 @@ impl PrintedPage {
     }
 
     /// How a parallelogram with these sides, mm, is sampled.
-    pub(super) fn footprint(&self, across: DVec2, down: DVec2) -> Footprint {
+    pub(crate) fn footprint(&self, across: DVec2, down: DVec2) -> Footprint {
         let px = |side: DVec2| side * DVec2::new(1.0, -1.0) * self.px_per_mm;
         self.brightness.footprint(px(across), px(down))
     }

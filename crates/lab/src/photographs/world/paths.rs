@@ -9,7 +9,7 @@ use lopdf::{Document, Object};
 use rstar::primitives::GeomWithData;
 use rstar::{AABB, RTree};
 
-use super::PhotographError;
+use crate::photographs::PhotographError;
 
 const MM_PER_PT: f64 = 25.4 / 72.0;
 
@@ -19,7 +19,7 @@ type Matrix = [f64; 6];
 const IDENTITY: Matrix = [1.0, 0.0, 0.0, 1.0, 0.0, 0.0];
 
 /// The vertices of all contours of a page, mm from its lower left corner, y up.
-pub(super) struct Vertices(RTree<GeomWithData<[f64; 2], usize>>);
+pub(crate) struct Vertices(RTree<GeomWithData<[f64; 2], usize>>);
 
 impl Vertices {
     /// Reads the first page of a PDF.
