@@ -1,23 +1,17 @@
 //! `deltag`: search, check, list and draw DelTag code families.
+//!
+//! Comes in: arguments. Goes out: files of families, pictures, messages and an exit code. A user meets the commands in
+//! this order:
+//!
+//! 1. `about` lists the families there are, tells of them, and checks what their files claim.
+//! 2. `search` makes others.
+//! 3. `draw` shows and prints their tags.
+//! 4. `exchange` writes them for other programs, and reads theirs.
 
-mod bounds;
-mod by_rank;
-mod checkpoint;
-mod confusion;
-mod export;
-mod false_positives;
-mod frontier;
-mod gen_family;
-mod import;
-mod info;
-mod list;
-mod parameters;
-mod place_codes;
-mod plan;
-mod rules;
-mod sheet;
-mod show;
-mod verify_family;
+mod about;
+mod draw;
+mod exchange;
+mod search;
 
 use std::path::Path;
 use std::process::ExitCode;
@@ -25,6 +19,10 @@ use std::process::ExitCode;
 use anyhow::bail;
 use clap::{Parser, Subcommand};
 
+use self::about::{by_rank, info, list, verify_family};
+use self::draw::{sheet, show};
+use self::exchange::{export, import};
+use self::search::{bounds, frontier, gen_family, plan};
 use crate::output::tell;
 use crate::shell;
 use deltille::family::{self, Family, PAIRS_COUNTED, certify_codes, shipped_names};

@@ -8,7 +8,7 @@ use crate::values::whole;
 use deltille::family::{self, Construction, Screen, TagWords};
 
 #[derive(clap::Args)]
-pub(super) struct Args {
+pub struct Args {
     /// A shipped family such as d49h12, or a family file
     family: String,
     /// First number, from 0
@@ -20,8 +20,8 @@ pub(super) struct Args {
     count: u64,
 }
 
-pub(super) fn run(args: Args) -> anyhow::Result<ExitCode> {
-    let family = super::deltags(family::resolve(&args.family)?)?;
+pub fn run(args: Args) -> anyhow::Result<ExitCode> {
+    let family = crate::deltag::deltags(family::resolve(&args.family)?)?;
     let Construction::Algebraic(construction) = family.construction() else {
         anyhow::bail!("{}: not an algebraic family, its codes have no rank", args.family);
     };

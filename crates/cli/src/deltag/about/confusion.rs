@@ -7,7 +7,7 @@ use crate::output::{self, Telling, say};
 use deltille::family::{Confusion, Family, PAIRS_COUNTED};
 
 /// Tells how far the tags of two families are from each other.
-pub(super) fn about(of: &Family, other: &Family, telling: Telling) -> anyhow::Result<()> {
+pub fn about(of: &Family, other: &Family, telling: Telling) -> anyhow::Result<()> {
     let Some(confusion) = Confusion::between(of, other) else {
         let bits = [of, other].map(|family| family.dimension().bits());
         if bits[0] != bits[1] {

@@ -9,7 +9,7 @@ use deltille::family::{
 use deltille_core::words::counted;
 
 /// Adds the fields of `--json` to what is told of a family.
-pub(super) fn add_to(told: &mut Value, family: &Family) {
+pub fn add_to(told: &mut Value, family: &Family) {
     let natural = family.natural_false_positive_rates();
     let per_megapixel = natural
         .as_ref()
@@ -23,7 +23,7 @@ pub(super) fn add_to(told: &mut Value, family: &Family) {
 }
 
 /// Says both rates for each number of corrected cells.
-pub(super) fn tell(family: &Family) -> anyhow::Result<()> {
+pub fn tell(family: &Family) -> anyhow::Result<()> {
     let natural = family.natural_false_positive_rates();
     say!("  a triangle with a border that is no tag is taken for one with probability");
     say!("    fair coins  natural pictures  when");
@@ -52,7 +52,7 @@ fn recommended_correction(natural: Option<&[f64]>) -> Option<u32> {
 }
 
 /// How many cells of a single tag may be corrected, by a family's natural rates.
-pub(super) fn recommended(natural: Option<&[f64]>) -> String {
+pub fn recommended(natural: Option<&[f64]>) -> String {
     let rate = format!("{ACCEPTED_FALSE_POSITIVES:.0e}");
     match recommended_correction(natural) {
         Some(0) => format!(

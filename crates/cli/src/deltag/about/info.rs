@@ -10,7 +10,7 @@ use deltille::targets::{BoardSpec, SolidShape, SolidSpec, TagSpec, Target, Targe
 use deltille_core::words::counted;
 
 #[derive(clap::Args)]
-pub(super) struct Args {
+pub struct Args {
     /// A shipped family, or a family file; of two it is told how far they are from each other
     #[arg(required = true, num_args = 1..=2, value_names = ["FAMILY", "OTHER"])]
     families: Vec<String>,
@@ -44,9 +44,9 @@ fn upper_bound(family: &Family) -> (u64, &'static str) {
     }
 }
 
-pub(super) fn run(args: Args) -> anyhow::Result<ExitCode> {
+pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     if let [of, other] = &args.families[..] {
-        let [of, other] = [super::resolve(of)?, super::resolve(other)?];
+        let [of, other] = [crate::deltag::resolve(of)?, crate::deltag::resolve(other)?];
         confusion::about(&of, &other, args.telling)?;
         return Ok(ExitCode::SUCCESS);
     }
@@ -56,7 +56,7 @@ pub(super) fn run(args: Args) -> anyhow::Result<ExitCode> {
         place_codes::about(&known, args.telling)?;
         return Ok(ExitCode::SUCCESS);
     }
-    let family = super::resolve(name)?;
+    let family = crate::deltag::resolve(name)?;
     if args.telling.is_json() {
         let (bound, _) = upper_bound(&family);
         let mut told = json!({

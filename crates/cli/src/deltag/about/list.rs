@@ -6,12 +6,12 @@ use crate::output::{self, Telling, say};
 use deltille::family::{self, places, shipped_names};
 
 #[derive(clap::Args)]
-pub(super) struct Args {
+pub struct Args {
     #[command(flatten)]
     telling: Telling,
 }
 
-pub(super) fn run(args: Args) -> anyhow::Result<ExitCode> {
+pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let families = shipped_names().into_iter().map(family::resolve);
     let families = families.collect::<Result<Vec<_>, _>>()?;
     if args.telling.is_json() {

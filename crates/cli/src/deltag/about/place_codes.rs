@@ -8,7 +8,7 @@ use deltille::family::places::{BITS, BOARDS, PLACES, PatchCertificate, certify_p
 use deltille_core::words::counted;
 
 /// Tells all about them.
-pub(super) fn about(family: &Family, telling: Telling) -> anyhow::Result<()> {
+pub fn about(family: &Family, telling: Telling) -> anyhow::Result<()> {
     if telling.is_json() {
         let patches = certify_places().into_iter().map(|certificate| {
             let PatchCertificate { tiles, forms, least, .. } = certificate;
@@ -50,7 +50,7 @@ fn line(certificate: &PatchCertificate) -> String {
 }
 
 /// Whether what is claimed of them holds, and what was found.
-pub(super) fn verify(family: &Family) -> (bool, String) {
+pub fn verify(family: &Family) -> (bool, String) {
     let certificates = certify_places();
     let cells = |c: &PatchCertificate| c.least.places.min(c.least.turned);
     if let Some(broken) = certificates.iter().find(|certificate| !certificate.holds()) {

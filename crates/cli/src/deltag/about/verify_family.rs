@@ -9,14 +9,14 @@ use deltille::family::{self, Certificate, Family, FamilyFileError, Robust, certi
 use deltille_core::words::counted;
 
 /// Told at the end of `--help`.
-pub(super) const HELP: &str = "Checked are the codes (distance, rules, fingerprint, statistics) and the \
+pub const HELP: &str = "Checked are the codes (distance, rules, fingerprint, statistics) and the \
     construction: an algebraic one, and a lexicode of up to 25 bits, is written down again; what is \
     not repeated is named. Seeds and texts are taken as they are. Exit code 0 when all that is \
     checked holds for every family, 1 when something does not, 2 when a file cannot be read as a \
     family file.";
 
 #[derive(clap::Args)]
-pub(super) struct Args {
+pub struct Args {
     /// Family files, or names of shipped families
     #[arg(required = true)]
     families: Vec<String>,
@@ -24,7 +24,7 @@ pub(super) struct Args {
     telling: Telling,
 }
 
-pub(super) fn run(args: Args) -> anyhow::Result<ExitCode> {
+pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let (mut all_hold, mut all_read) = (true, true);
     let mut told = Vec::new();
     for name in &args.families {
@@ -85,7 +85,7 @@ fn verify(family: &Family, certificate: &Certificate) -> (bool, String) {
 }
 
 /// How far apart the codes of a family that claims a distance are, and how that is known.
-pub(super) fn proof_of(certificate: &Certificate, claimed: u32) -> String {
+pub fn proof_of(certificate: &Certificate, claimed: u32) -> String {
     let found = certificate.min_distance;
     let cells = counted(found as usize, "cell");
     if !certificate.all_compared {

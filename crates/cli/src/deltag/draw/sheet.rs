@@ -20,7 +20,7 @@ use deltille::verify::{Verifier, VerifyError};
 const MOST_PAGES: usize = 200;
 
 #[derive(clap::Args)]
-pub(super) struct Args {
+pub struct Args {
     /// A name from `deltag list`, or a family file
     family: String,
     /// Which tags: ids and ranges such as 0-99 or 3,7,20-25 [default: all]
@@ -68,8 +68,8 @@ pub(super) struct Args {
 }
 
 /// Lays out the tags, writes the pages, and verifies what it wrote.
-pub(super) fn run(args: Args) -> anyhow::Result<ExitCode> {
-    let family = super::resolve(&args.family)?;
+pub fn run(args: Args) -> anyhow::Result<ExitCode> {
+    let family = crate::deltag::resolve(&args.family)?;
     let length =
         |option: &'static str, text: &str| parse_length_mm(text).with_context(|| option.to_owned());
     let paper = PaperSpec {

@@ -14,7 +14,7 @@ use deltille::layout::Finish;
 const MOST_TAGS: usize = 600;
 
 #[derive(clap::Args)]
-pub(super) struct Args {
+pub struct Args {
     /// A name from `deltag list`, or a family file
     family: String,
     /// Which tags: ids and ranges such as 0-9 or 3,7,20-25 [default: the first ten]
@@ -43,8 +43,8 @@ pub(super) struct Args {
     overwrite: Overwrite,
 }
 
-pub(super) fn run(args: Args) -> anyhow::Result<ExitCode> {
-    let family = super::resolve(&args.family)?;
+pub fn run(args: Args) -> anyhow::Result<ExitCode> {
+    let family = crate::deltag::resolve(&args.family)?;
     let ids = args.ids.unwrap_or_else(|| Ids((0..10).take(family.len()).collect()));
     ids.check(&family)?;
     let Ids(ids) = ids;

@@ -9,7 +9,7 @@ use crate::values::name;
 use deltille::family::{ExportFormat, export};
 
 #[derive(clap::Args)]
-pub(super) struct Args {
+pub struct Args {
     /// A shipped family, or a family file
     family: String,
     /// What to write
@@ -42,8 +42,8 @@ enum Format {
     Opencv,
 }
 
-pub(super) fn run(args: Args) -> anyhow::Result<ExitCode> {
-    let family = super::resolve(&args.family)?;
+pub fn run(args: Args) -> anyhow::Result<ExitCode> {
+    let family = crate::deltag::resolve(&args.family)?;
     let format = match args.format {
         Format::C => ExportFormat::C,
         Format::Rust => ExportFormat::Rust,

@@ -12,7 +12,7 @@ use deltille::limits::{MAX_FAMILY_BYTES, read_short_text};
 use deltille_core::words::counted;
 
 /// Told at the end of `--help`.
-pub(super) const HELP: &str = "Codes are the hexadecimal words of the table, in their order; in a text without any, the lines of \
+pub const HELP: &str = "Codes are the hexadecimal words of the table, in their order; in a text without any, the lines of \
     nothing but hexadecimal digits. Bits are read row by row from the upper left, in triangles from the apex; a \
     table of AprilTag 3 says where its bits are. The distance is found by comparing all codes.
 
@@ -22,7 +22,7 @@ Examples:
   deltag import mine.py --shape triangle --distance 7";
 
 #[derive(clap::Args)]
-pub(super) struct Args {
+pub struct Args {
     /// A table of codes: C, Rust or Python source, or a code a line
     table: PathBuf,
     /// Shape of the tags; a table of AprilTag 3 says it
@@ -52,7 +52,7 @@ enum Shape {
     Square,
 }
 
-pub(super) fn run(args: Args) -> anyhow::Result<ExitCode> {
+pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let text = read_short_text(&args.table, MAX_FAMILY_BYTES)?;
     let of_file = |part: Option<&std::ffi::OsStr>| {
         part.map(|part| part.to_string_lossy().into_owned()).unwrap_or_default()

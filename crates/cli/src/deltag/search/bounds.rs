@@ -8,14 +8,14 @@ use deltille::family::{
 use deltille::lattice::{GridKind, TagCells};
 
 #[derive(clap::Args)]
-pub(super) struct Args {
+pub struct Args {
     /// Bits and distance, such as d25h7
     family: Parameters,
     #[command(flatten)]
     telling: Telling,
 }
 
-pub(super) fn run(args: Args) -> anyhow::Result<ExitCode> {
+pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let Parameters { dimension, distance } = args.family;
     let bounds = bounds(GridKind::Deltille, dimension, distance);
     let found_none = bounds.found_none();

@@ -11,7 +11,7 @@ use crate::output::{self, Overwrite};
 use deltille::limits;
 
 /// The checkpoint file of one search, if it has one.
-pub(super) struct CheckpointFile<'a> {
+pub struct CheckpointFile<'a> {
     path: Option<&'a Path>,
     /// All that decides what the search finds.
     search: String,
@@ -28,13 +28,13 @@ struct Saved<C> {
 
 impl<'a> CheckpointFile<'a> {
     /// The file at `path` for a search that the text describes in full.
-    pub(super) fn new(path: Option<&'a Path>, search: String) -> Self {
+    pub fn new(path: Option<&'a Path>, search: String) -> Self {
         Self { path, search, failed: RefCell::new(None) }
     }
 
     /// Where the search stood; at its beginning where there is no file. That the file can be
     /// written is found out now, not after hours.
-    pub(super) fn load<C: Default + Serialize + DeserializeOwned>(&self) -> anyhow::Result<C> {
+    pub fn load<C: Default + Serialize + DeserializeOwned>(&self) -> anyhow::Result<C> {
         let Some(path) = self.path else { return Ok(C::default()) };
         let file = path.display();
         if !path.exists() {
@@ -53,7 +53,7 @@ impl<'a> CheckpointFile<'a> {
     }
 
     /// Keeps a checkpoint. What goes wrong is told at the end, by [`Self::finish`].
-    pub(super) fn save<C: Serialize>(&self, checkpoint: &C) {
+    pub fn save<C: Serialize>(&self, checkpoint: &C) {
         if let Some(path) = self.path
             && let Err(error) = self.write(path, checkpoint)
         {
@@ -67,7 +67,7 @@ impl<'a> CheckpointFile<'a> {
     }
 
     /// How to go on after an interruption.
-    pub(super) fn advice(&self) -> String {
+    pub fn advice(&self) -> String {
         match (self.path, self.failed.borrow().as_ref()) {
             (Some(path), None) => {
                 format!("the same command goes on from the checkpoint {}", path.display())
@@ -78,7 +78,7 @@ impl<'a> CheckpointFile<'a> {
     }
 
     /// Removes the file once the family is written.
-    pub(super) fn finish(self) -> anyhow::Result<()> {
+    pub fn finish(self) -> anyhow::Result<()> {
         let Some(path) = self.path else { return Ok(()) };
         if path.exists() {
             std::fs::remove_file(path)

@@ -12,11 +12,11 @@ use deltille::family::search::best::{Best, Budget};
 use deltille::family::{RuleChoice, Rules, best_rule, rule_choices};
 
 /// Told at the end of `--help`.
-pub(super) const HELP: &str = "The construction is the best on record, that gen-family starts from. \
+pub const HELP: &str = "The construction is the best on record, that gen-family starts from. \
     `gen-family --false-positives` takes the rule that is marked.";
 
 #[derive(clap::Args)]
-pub(super) struct Args {
+pub struct Args {
     /// Bits and distance, such as d36h9
     family: Parameters,
     #[command(flatten)]
@@ -27,21 +27,21 @@ pub(super) struct Args {
 
 /// Which of the rules is the best.
 #[derive(clap::Args)]
-pub(super) struct ChoiceArgs {
+pub struct ChoiceArgs {
     /// Choose the rule for complexity that leaves the most codes with so many natural false positives
     /// for each triangle with a border, such as 1e-4, where --corrects cells are corrected
     #[arg(long, value_name = "RATE", allow_negative_numbers = true,
           value_parser = crate::values::number(1e-15..=1.0))]
-    pub(super) false_positives: Option<f64>,
+    pub false_positives: Option<f64>,
     /// Cells that are corrected in a single tag [default: half of what the distance allows]
     #[arg(long, value_name = "CELLS", requires = "false_positives", allow_negative_numbers = true,
           value_parser = crate::values::whole(0..=31u32))]
-    pub(super) corrects: Option<u32>,
+    pub corrects: Option<u32>,
 }
 
 impl ChoiceArgs {
     /// Cells that are corrected in a single tag.
-    pub(super) fn corrected(&self, distance: u32) -> anyhow::Result<u32> {
+    pub fn corrected(&self, distance: u32) -> anyhow::Result<u32> {
         let most = (distance - 1) / 2;
         let corrected = self.corrects.unwrap_or(most / 2);
         if corrected > most {
@@ -53,7 +53,7 @@ impl ChoiceArgs {
     }
 
     /// The best of the rules; `None` where none is asked for.
-    pub(super) fn best<'a>(
+    pub fn best<'a>(
         &self,
         choices: &'a [RuleChoice],
         distance: u32,
@@ -71,7 +71,7 @@ impl ChoiceArgs {
 }
 
 /// What rules for complexity leave of the best construction on record, whose other rules are these.
-pub(super) fn choices(parameters: Parameters, rules: &Rules) -> anyhow::Result<Vec<RuleChoice>> {
+pub fn choices(parameters: Parameters, rules: &Rules) -> anyhow::Result<Vec<RuleChoice>> {
     let Parameters { dimension, distance } = parameters;
     // No time is spent: what is on record is not searched for.
     let budget = Budget::Time(Duration::ZERO, clock::now);
@@ -85,7 +85,7 @@ pub(super) fn choices(parameters: Parameters, rules: &Rules) -> anyhow::Result<V
     Ok(rule_choices(dimension, distance, &start.codes))
 }
 
-pub(super) fn run(args: Args) -> anyhow::Result<ExitCode> {
+pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let distance = args.family.distance;
     let choices = choices(args.family, &Rules::published(distance))?;
     let best = args.choice.best(&choices, distance)?;

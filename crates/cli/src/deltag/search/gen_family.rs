@@ -12,7 +12,7 @@ use super::checkpoint::CheckpointFile;
 use super::frontier::{self, ChoiceArgs};
 use super::parameters::Parameters;
 use super::rules::RuleArgs;
-use super::verify_family::proof_of;
+use crate::deltag::about::verify_family::proof_of;
 use crate::interrupt;
 use crate::output::{self, Overwrite, say, tell};
 use crate::progress::SearchProgress;
@@ -31,7 +31,7 @@ use deltille::lattice::Dimension;
 use deltille_core::words::counted;
 
 /// Told at the end of `--help`.
-pub(super) const HELP: &str = "Ctrl-C ends a search early. The methods best and algebraic write \
+pub const HELP: &str = "Ctrl-C ends a search early. The methods best and algebraic write \
     the best family so far (exit code 0). The method search writes what its finished rounds found, \
     and lexicode nothing (exit code 130). With --resume the same command goes on later, and finds \
     exactly what it would have found without a break, except by --time, of which it has what is \
@@ -39,11 +39,11 @@ pub(super) const HELP: &str = "Ctrl-C ends a search early. The methods best and 
     at once.";
 
 /// Told of `--force`.
-pub(super) const FORCE: &str = "Replace a family file also by one with fewer codes, other bits or \
+pub const FORCE: &str = "Replace a family file also by one with fewer codes, other bits or \
     another distance, and a file of another kind";
 
 #[derive(clap::Args)]
-pub(super) struct Args {
+pub struct Args {
     /// Bits and distance, d<bits>h<distance> with 9, 16, 25, 36, 49 or 64 bits, such as d25h7
     family: Parameters,
     /// How to search
@@ -148,7 +148,7 @@ impl Outcome {
     }
 }
 
-pub(super) fn run(args: Args) -> anyhow::Result<ExitCode> {
+pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     args.check_options()?;
     let Parameters { dimension, distance } = args.family;
     let name = args.name.clone().unwrap_or_else(|| format!("d{}h{distance}", dimension.bits()));
@@ -235,7 +235,7 @@ fn extended_by(
     start: Option<&Start>,
     older: &str,
 ) -> anyhow::Result<Family> {
-    let older = super::resolve(older).context("--extend")?;
+    let older = crate::deltag::resolve(older).context("--extend")?;
     let Some(start) = start else { bail!("--extend: nothing is on record to extend with") };
     match best.family_of(name, start)?.extending(&older) {
         Err(FamilyError::Field { problem, .. }) => {
@@ -258,13 +258,13 @@ fn free_name(path: &Path) -> PathBuf {
 }
 
 /// Size of a family file at most: 64 MiB, of which a little is for what is not codes.
-pub(super) const FILE_LIMIT: u64 = (64 << 20) - (64 << 10);
+pub const FILE_LIMIT: u64 = (64 << 20) - (64 << 10);
 
 /// Codes of 49 and 64 bits that are listed where cells may be hidden.
 const ROBUST_LIMIT: u64 = 20_000;
 
 /// Length of a code's line: four spaces, quotes, 0x, digits, comma, line feed.
-pub(super) fn bytes_per_code(dimension: Dimension) -> u64 {
+pub fn bytes_per_code(dimension: Dimension) -> u64 {
     u64::from(dimension.bits().div_ceil(4)) + 10
 }
 

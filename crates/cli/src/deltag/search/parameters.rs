@@ -4,9 +4,9 @@ use deltille::lattice::Dimension;
 
 /// Bits and distance, written d25h7.
 #[derive(Clone, Copy)]
-pub(super) struct Parameters {
-    pub(super) dimension: Dimension,
-    pub(super) distance: u32,
+pub struct Parameters {
+    pub dimension: Dimension,
+    pub distance: u32,
 }
 
 impl FromStr for Parameters {

@@ -4,8 +4,8 @@ use std::process::ExitCode;
 
 use serde_json::Value;
 
-use super::false_positives;
 use super::gen_family::{FILE_LIMIT, bytes_per_code};
+use crate::deltag::about::false_positives;
 use crate::output::{self, Telling, say};
 use crate::values::whole;
 use deltille::family::{Family, NATURAL_FACTOR, ShippedFamily, shipped_names, smallest_shipped};
@@ -13,7 +13,7 @@ use deltille::lattice::GridKind;
 use deltille_core::words::counted;
 
 #[derive(clap::Args)]
-pub(super) struct Args {
+pub struct Args {
     /// Faces of the target, or boards
     #[arg(long, default_value_t = 1, allow_negative_numbers = true,
           value_parser = whole(1..=u32::MAX))]
@@ -30,7 +30,7 @@ pub(super) struct Args {
     telling: Telling,
 }
 
-pub(super) fn run(args: Args) -> anyhow::Result<ExitCode> {
+pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let needed = u64::from(args.faces) * u64::from(args.tags_per_face);
     let families = shipped_names().into_iter().map(Family::shipped);
     let mut families: Vec<Family> = families.collect::<Result<_, _>>()?;

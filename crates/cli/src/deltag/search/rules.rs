@@ -9,7 +9,7 @@ use deltille::family::{FamilyError, FreeCells, Robust, Rules};
 use deltille::limits;
 
 #[derive(clap::Args)]
-pub(super) struct RuleArgs {
+pub struct RuleArgs {
     /// Share of edge-adjacent cell pairs that must differ in every code, 0 to 1 [default: 0.5]
     #[arg(long, value_name = "SHARE", allow_negative_numbers = true,
           value_parser = crate::values::number(0.0..=1.0))]
@@ -37,22 +37,22 @@ pub(super) struct RuleArgs {
 
 impl RuleArgs {
     /// Whether the complexity is given.
-    pub(super) fn has_complexity(&self) -> bool {
+    pub fn has_complexity(&self) -> bool {
         self.min_complexity.is_some()
     }
 
     /// Whether codes are to be known with cells hidden.
-    pub(super) fn is_robust(&self) -> bool {
+    pub fn is_robust(&self) -> bool {
         !self.robust_to.is_empty()
     }
 
     /// Whether cells are left free.
-    pub(super) fn has_free_cells(&self) -> bool {
+    pub fn has_free_cells(&self) -> bool {
         self.free.is_some()
     }
 
     /// The rules asked for, checked for the bits of the family.
-    pub(super) fn rules(&self, parameters: Parameters) -> anyhow::Result<Rules> {
+    pub fn rules(&self, parameters: Parameters) -> anyhow::Result<Rules> {
         let Parameters { dimension, distance } = parameters;
         let bits = dimension.bits();
         let mut rules = Rules::published(distance);
