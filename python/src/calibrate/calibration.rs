@@ -20,7 +20,7 @@ use super::solving::Solved;
 use super::views::{Diagnosis, Excluded};
 use crate::boundary::arrays::{self, record};
 use crate::boundary::errors::{self, Raise, RaiseFile, raised, unlocked};
-use crate::see::camera::save_text;
+use crate::boundary::text_file::save_text;
 use crate::see::detection::Targets;
 use crate::see::pose::Pose;
 use crate::targets::target::Target;

@@ -3,7 +3,6 @@
 use std::path::PathBuf;
 
 use deltille::camera::{self, Lens};
-use deltille::export::artifacts::write_set;
 use deltille::export::camera as formats;
 use deltille::{camera_file, glam};
 use deltille_core::quantity::{Range, coefficient, focal_px, place_px};
@@ -15,6 +14,7 @@ use serde_json::json;
 
 use crate::boundary::arrays::{self, number, vector, whole};
 use crate::boundary::errors::{self, Raise, RaiseFile, raised, unlocked};
+use crate::boundary::text_file::save_text;
 
 /// A camera with its lens: where points are seen, and along which rays pixels look.
 ///
@@ -329,16 +329,4 @@ impl Camera {
         };
         text.raise(errors::camera)
     }
-}
-
-/// Writes a file of text whole or not at all.
-pub fn save_text(path: PathBuf, text: String, overwrite: bool) -> PyResult<PathBuf> {
-    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty());
-    let folder = folder.unwrap_or(std::path::Path::new(".")).to_owned();
-    let Some(name) = path.file_name() else {
-        return Err(raised::FileError::new_err(format!("{} is not a file name", path.display())));
-    };
-    let files = [(name.to_string_lossy().into_owned(), text.into_bytes())];
-    write_set(&folder, &files, overwrite).raise_of_file(&path, errors::file)?;
-    Ok(path)
 }

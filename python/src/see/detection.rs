@@ -15,9 +15,9 @@ use pyo3::exceptions::PyTypeError;
 use pyo3::prelude::*;
 use serde::{Deserialize, Serialize};
 
-use super::camera::save_text;
 use crate::boundary::arrays::{self, record};
 use crate::boundary::errors::{self, Raise, RaiseFile, raised};
+use crate::boundary::text_file::save_text;
 use crate::pickles;
 use crate::targets::families;
 use crate::targets::target::Target;

@@ -16,6 +16,7 @@ use pyo3::prelude::*;
 use crate::boundary::arrays::{self, whole};
 use crate::boundary::errors::{self, Raise, RaiseFile, raised, unlocked};
 use crate::boundary::interrupt::interruptible;
+use crate::boundary::text_file::save_text;
 
 /// A family of tags: codes with a Hamming distance in all turns.
 #[pyclass(frozen, module = "deltille")]
@@ -111,7 +112,7 @@ impl Family {
     /// pathlib.Path
     #[pyo3(signature = (path, *, overwrite = false))]
     fn save(&self, path: PathBuf, overwrite: bool) -> PyResult<PathBuf> {
-        crate::see::camera::save_text(path, self.to_json(), overwrite)
+        save_text(path, self.to_json(), overwrite)
     }
 
     /// Its name.
