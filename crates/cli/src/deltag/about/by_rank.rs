@@ -3,6 +3,7 @@ use std::process::ExitCode;
 
 use anyhow::Context;
 
+use crate::deltag::named::deltags;
 use crate::output;
 use crate::values::whole;
 use deltille::family::{self, Construction, Screen, TagWords};
@@ -21,7 +22,7 @@ pub struct Args {
 }
 
 pub fn run(args: Args) -> anyhow::Result<ExitCode> {
-    let family = crate::deltag::deltags(family::resolve(&args.family)?)?;
+    let family = deltags(family::resolve(&args.family)?)?;
     let Construction::Algebraic(construction) = family.construction() else {
         anyhow::bail!("{}: not an algebraic family, its codes have no rank", args.family);
     };

@@ -3,6 +3,7 @@ use std::process::ExitCode;
 use serde_json::{Value, json};
 
 use super::{confusion, false_positives, place_codes};
+use crate::deltag::named::resolve;
 use crate::output::{self, Telling, say};
 use deltille::family::{self, Family, HiddenCells, PAIRS_COUNTED, TagWords};
 use deltille::lattice::GridKind;
@@ -46,7 +47,7 @@ fn upper_bound(family: &Family) -> (u64, &'static str) {
 
 pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     if let [of, other] = &args.families[..] {
-        let [of, other] = [crate::deltag::resolve(of)?, crate::deltag::resolve(other)?];
+        let [of, other] = [resolve(of)?, resolve(other)?];
         confusion::about(&of, &other, args.telling)?;
         return Ok(ExitCode::SUCCESS);
     }
@@ -56,7 +57,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         place_codes::about(&known, args.telling)?;
         return Ok(ExitCode::SUCCESS);
     }
-    let family = crate::deltag::resolve(name)?;
+    let family = resolve(name)?;
     if args.telling.is_json() {
         let (bound, _) = upper_bound(&family);
         let mut told = json!({

@@ -5,6 +5,7 @@ use std::process::ExitCode;
 
 use anyhow::{Context, ensure};
 
+use crate::deltag::named::resolve;
 use crate::deltille::files::written::{Formats, drawn, write_all};
 use crate::interrupt;
 use crate::output::{Overwrite, say};
@@ -69,7 +70,7 @@ pub struct Args {
 
 /// Lays out the tags, writes the pages, and verifies what it wrote.
 pub fn run(args: Args) -> anyhow::Result<ExitCode> {
-    let family = crate::deltag::resolve(&args.family)?;
+    let family = resolve(&args.family)?;
     let length =
         |option: &'static str, text: &str| parse_length_mm(text).with_context(|| option.to_owned());
     let paper = PaperSpec {

@@ -3,6 +3,7 @@ use std::process::ExitCode;
 
 use anyhow::Context;
 
+use crate::deltag::named::resolve;
 use crate::output::{self, Overwrite, say};
 use crate::values::{Ids, name, whole};
 use deltille::artwork::{Artwork, GalleryTile, tag_gallery};
@@ -44,7 +45,7 @@ pub struct Args {
 }
 
 pub fn run(args: Args) -> anyhow::Result<ExitCode> {
-    let family = crate::deltag::resolve(&args.family)?;
+    let family = resolve(&args.family)?;
     let ids = args.ids.unwrap_or_else(|| Ids((0..10).take(family.len()).collect()));
     ids.check(&family)?;
     let Ids(ids) = ids;

@@ -4,6 +4,7 @@ use std::process::ExitCode;
 use anyhow::Context;
 use clap::ValueEnum;
 
+use crate::deltag::named::resolve;
 use crate::output::{self, Overwrite, say};
 use crate::values::name;
 use deltille::family::{ExportFormat, export};
@@ -43,7 +44,7 @@ enum Format {
 }
 
 pub fn run(args: Args) -> anyhow::Result<ExitCode> {
-    let family = crate::deltag::resolve(&args.family)?;
+    let family = resolve(&args.family)?;
     let format = match args.format {
         Format::C => ExportFormat::C,
         Format::Rust => ExportFormat::Rust,

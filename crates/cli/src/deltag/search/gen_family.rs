@@ -13,6 +13,7 @@ use super::frontier::{self, ChoiceArgs};
 use super::parameters::Parameters;
 use super::rules::RuleArgs;
 use crate::deltag::about::verify_family::proof_of;
+use crate::deltag::named::resolve;
 use crate::interrupt;
 use crate::output::{self, Overwrite, say, tell};
 use crate::progress::SearchProgress;
@@ -235,7 +236,7 @@ fn extended_by(
     start: Option<&Start>,
     older: &str,
 ) -> anyhow::Result<Family> {
-    let older = crate::deltag::resolve(older).context("--extend")?;
+    let older = resolve(older).context("--extend")?;
     let Some(start) = start else { bail!("--extend: nothing is on record to extend with") };
     match best.family_of(name, start)?.extending(&older) {
         Err(FamilyError::Field { problem, .. }) => {

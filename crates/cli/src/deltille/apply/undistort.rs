@@ -8,7 +8,6 @@ use std::sync::Mutex;
 
 use anyhow::{Context, anyhow, bail, ensure};
 
-use crate::deltille::calibrate::solving::distance;
 use crate::deltille::files::images::{self, Images, Stems};
 use crate::deltille::files::limits::ImageLimits;
 use crate::deltille::files::written::{
@@ -17,6 +16,7 @@ use crate::deltille::files::written::{
 use crate::deltille::files::{camera_file, images_at_once};
 use crate::output::{self, Overwrite, say};
 use crate::run::{self, BAD_INPUT, FAILED, Interrupted};
+use crate::values::distance;
 use crate::{interrupt, progress};
 use deltille::calibrate::Estimate;
 use deltille::camera::{Camera, CameraFile, Field, PixelMap, Rectification, Undistortion};

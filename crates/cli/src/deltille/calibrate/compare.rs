@@ -7,11 +7,11 @@ use std::process::ExitCode;
 use anyhow::{Context, anyhow, ensure};
 use glam::DVec2;
 
-use super::solving::distance;
 use crate::deltille::files::camera_file;
 use crate::deltille::files::written::{File, check_places, sample_of, text_file, write_all};
 use crate::output::{self, Overwrite, tell};
 use crate::run::{FAILED, UNDECIDED};
+use crate::values::distance;
 use deltille::calibrate::{
     CameraEstimate, CameraMotion, Comparison, Estimate, Region, Verdict, compare_boards,
 };

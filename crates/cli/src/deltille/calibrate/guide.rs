@@ -8,7 +8,7 @@ use std::time::{Duration, SystemTime};
 use anyhow::{Context, bail, ensure};
 
 use super::sightings::{self, GridArgs, SheetArgs};
-use super::solving::{ModelChoice, distance};
+use super::solving::ModelChoice;
 use crate::deltille::files::images::photographs_in;
 use crate::deltille::files::limits::ImageLimits;
 use crate::deltille::files::written::{check_places, sample_of, text_file};
@@ -16,6 +16,7 @@ use crate::deltille::files::{camera_file, target_file};
 use crate::interrupt;
 use crate::output::{self, Overwrite, say, tell};
 use crate::run::Interrupted;
+use crate::values::distance;
 use deltille::calibrate::{
     Calibration, Excluded, Guide, Intrinsics, Model, NextView, PanelPlace, Reference, View, views,
 };

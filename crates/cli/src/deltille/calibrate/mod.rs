@@ -16,4 +16,4 @@ pub mod one_camera;
 mod report_page;
 pub mod rig;
 pub mod sightings;
-pub mod solving;
+mod solving;

@@ -11,7 +11,7 @@ use clap::ValueEnum;
 use crate::deltille::files::written::{File, sample_of, text_file};
 use crate::output::{self, Overwrite, tell};
 use crate::run::FAILED;
-use crate::values::whole;
+use crate::values::{distance, whole};
 use deltille::calibrate::{
     BoardShape, Calibration, CalibrationError, CameraEstimate, Candidate, Diagnosis, Estimate,
     Intrinsics, LEAST_TO_MEASURE, Loss, Model, ModelError, PanelPlace, Source, TargetMap, Weights,
@@ -24,7 +24,7 @@ use deltille::export::kind::Kind;
 use deltille::layout::Printing;
 use deltille::report::target_map_svg;
 use deltille::targets::{self, parse_length_mm};
-use deltille_core::quantity::{board_accuracy_mm, distance_mm};
+use deltille_core::quantity::board_accuracy_mm;
 use deltille_core::words::counted;
 
 /// How a calibration is solved, and the page about it.
@@ -326,12 +326,6 @@ fn accuracy(text: &str) -> Result<f64, String> {
     }
     let mm = parse_length_mm(text).map_err(|error| error.to_string())?;
     board_accuracy_mm::RANGE.check(mm).map_err(|error| error.to_string())
-}
-
-/// How far a point is, mm.
-pub fn distance(text: &str) -> Result<f64, String> {
-    let mm = parse_length_mm(text).map_err(|error| error.to_string())?;
-    distance_mm::RANGE.check(mm).map_err(|_| format!("{text}: not between 1 mm and 1000 m"))
 }
 
 /// How sure projections are where corners were, a line for each camera of which it is known.

@@ -6,7 +6,7 @@ use std::process::ExitCode;
 use anyhow::{Context, bail};
 
 use super::delivery::Delivery;
-use super::settings::board_settings::{Plan, Settings};
+use super::settings::board_settings::{BoardSettings, Plan};
 use super::settings::finishing::{Finishing, Laser};
 use super::settings::meshes::PlateMeshes;
 use super::settings::template::Template;
@@ -24,7 +24,7 @@ use deltille::targets::TargetSpec;
 #[derive(clap::Args)]
 pub struct Args {
     #[command(flatten)]
-    settings: Settings,
+    settings: BoardSettings,
     /// Take what is not given here from a TOML file
     #[arg(long, value_name = "FILE")]
     template: Option<PathBuf>,
@@ -45,7 +45,7 @@ pub struct Args {
 pub fn run(grid: GridKind, args: Args) -> anyhow::Result<ExitCode> {
     let given = args.settings.with(args.meshes, args.laser, args.finishing);
     let settings = match &args.template {
-        Some(path) => given.or(Settings::read(path, grid)?),
+        Some(path) => given.or(BoardSettings::read(path, grid)?),
         None => given,
     };
     let (meshes, laser) = (settings.meshes(), &settings.laser);

@@ -21,4 +21,4 @@ mod single_panel;
 pub mod solid;
 pub mod verify;
 
-pub use settings::board_settings::Settings as BoardSettings;
+pub use settings::board_settings::BoardSettings;

@@ -5,10 +5,9 @@ use std::process::ExitCode;
 
 use anyhow::{Context, bail, ensure};
 
-use crate::deltille::calibrate::solving::distance;
 use crate::deltille::files::camera_file;
 use crate::output::{self, Telling, say};
-use crate::values::number;
+use crate::values::{distance, number};
 use deltille::family::{self, places};
 use deltille::lattice::GridKind;
 use deltille::layout::PaperSpec;

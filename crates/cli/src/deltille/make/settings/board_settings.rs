@@ -36,7 +36,7 @@ pub const PRINT: &str = "Files to print, and lists";
 /// Settings as they are given; what is not given has a default.
 #[derive(Clone, Debug, Default, PartialEq, clap::Args, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields, default)]
-pub struct Settings {
+pub struct BoardSettings {
     /// The command that a template was made for.
     #[arg(skip)]
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -221,7 +221,7 @@ pub struct Plan {
     pub dpi: u32,
 }
 
-impl Settings {
+impl BoardSettings {
     /// Reads a template of boards of a kind.
     pub fn read(path: &Path, grid: GridKind) -> anyhow::Result<Self> {
         template::read(path, command(grid), |settings: &Self| settings.command.as_deref())
