@@ -1,48 +1,20 @@
 //! The Python package `deltille`, thin over the library: what arrays become, and what becomes of results.
 //!
-//! | module | its one job |
-//! |---|---|
-//! | `errors`, `interrupt` | exceptions in the words of Python; long work that Ctrl-C ends |
-//! | `image`, `arrays` | arrays to pictures and points, and back |
-//! | `targets`, `making`, `verdict` | targets, and their files |
-//! | `paper`, `boards`, `other_detectors`, `solids` | targets from what is asked for |
-//! | `families` | codes of tags |
-//! | `detector`, `detection` | pictures to corners |
-//! | `camera`, `pose` | cameras and rigid motions |
-//! | `calibrate`, `solving` | corners to cameras and rigs: keywords, and the work |
-//! | `calibration`, `calibrated_camera`, `views` | what came of it |
-//! | `next_view` | which view to take next |
-//! | `comparison` | whether two calibrations differ; where a target is |
-//! | `rendering` | synthetic pictures |
-//! | `programs` | the programs `deltille` and `deltag` |
+//! Comes in: a call from Python with arrays, paths and keywords. Goes out: a class of the package, arrays, or an exception.
+//!
+//! 1. `boundary` takes what Python gives, and makes exceptions of errors.
+//! 2. `targets` are made, written and verified.
+//! 3. `see` finds them in pictures.
+//! 4. `calibrate` makes cameras and rigs of what was found, and compares them.
+//! 5. `programs` runs `deltille` and `deltag`.
+//!
+//! What can be named in Python is listed below, in `_core`.
 
-mod arrays;
-mod boards;
+mod boundary;
 mod calibrate;
-mod calibrated_camera;
-mod calibration;
-mod camera;
-mod comparison;
-mod detection;
-mod detector;
-mod errors;
-mod families;
-mod image;
-mod interrupt;
-mod making;
-mod next_view;
-mod other_detectors;
-mod paper;
-mod pickled;
-mod pickled_target;
-mod pose;
 mod programs;
-mod rendering;
-mod solids;
-mod solving;
+mod see;
 mod targets;
-mod verdict;
-mod views;
 
 use pyo3::prelude::*;
 
@@ -62,7 +34,7 @@ macro_rules! pickles {
             #[staticmethod]
             fn _from_json(text: &str) -> PyResult<Self> {
                 let wrong = |error: serde_json::Error| {
-                    crate::errors::raised::Error::new_err(error.to_string())
+                    crate::boundary::errors::raised::Error::new_err(error.to_string())
                 };
                 serde_json::from_str(text).map_err(wrong)
             }
@@ -77,49 +49,49 @@ mod _core {
     use super::*;
 
     #[pymodule_export]
-    use super::boards::{Board, Checkerboard};
+    use super::calibrate::calibrated_camera::{_part, CalibratedCamera};
     #[pymodule_export]
-    use super::calibrate::{calibrate, rig};
+    use super::calibrate::calibration::{_calibration, _rig, Calibration, Rig};
     #[pymodule_export]
-    use super::calibrated_camera::{_part, CalibratedCamera};
-    #[pymodule_export]
-    use super::calibration::{_calibration, _rig, Calibration, Rig};
-    #[pymodule_export]
-    use super::camera::Camera;
-    #[pymodule_export]
-    use super::comparison::{
+    use super::calibrate::comparison::{
         _located, Comparison, Located, Motion, compare, compare_rigs, pose_of,
     };
     #[pymodule_export]
-    use super::detection::{_detection, _grid, _tables, DecodedTag, Detection, Grid, Reason};
+    use super::calibrate::keywords::{calibrate, rig};
     #[pymodule_export]
-    use super::detector::{_detector, Detector};
+    use super::calibrate::next_view::{NextView, next_view};
     #[pymodule_export]
-    use super::families::{Family, search_family};
-    #[pymodule_export]
-    use super::next_view::{NextView, next_view};
-    #[pymodule_export]
-    use super::other_detectors::{AprilGrid, Charuco, Circles};
-    #[pymodule_export]
-    use super::pickled_target::_target;
-    #[pymodule_export]
-    use super::pose::Pose;
+    use super::calibrate::views::{Diagnosis, Excluded, View};
     #[pymodule_export]
     use super::programs::_run;
     #[pymodule_export]
-    use super::rendering::{Truth, render};
+    use super::see::camera::Camera;
     #[pymodule_export]
-    use super::solids::{Cube, Cuboid, Icosahedron, Octahedron, Solid, Tetrahedron};
+    use super::see::detection::{_detection, _grid, _tables, DecodedTag, Detection, Grid, Reason};
     #[pymodule_export]
-    use super::targets::{Tag, Target};
+    use super::see::detector::{_detector, Detector};
     #[pymodule_export]
-    use super::verdict::Verdict;
+    use super::see::pose::Pose;
     #[pymodule_export]
-    use super::views::{Diagnosis, Excluded, View};
+    use super::see::rendering::{Truth, render};
+    #[pymodule_export]
+    use super::targets::boards::{Board, Checkerboard};
+    #[pymodule_export]
+    use super::targets::families::{Family, search_family};
+    #[pymodule_export]
+    use super::targets::other_detectors::{AprilGrid, Charuco, Circles};
+    #[pymodule_export]
+    use super::targets::pickled_target::_target;
+    #[pymodule_export]
+    use super::targets::solids::{Cube, Cuboid, Icosahedron, Octahedron, Solid, Tetrahedron};
+    #[pymodule_export]
+    use super::targets::target::{Tag, Target};
+    #[pymodule_export]
+    use super::targets::verdict::Verdict;
 
     #[pymodule_init]
     fn init(module: &Bound<'_, PyModule>) -> PyResult<()> {
-        deltille::setting::speak(errors::keyword);
+        deltille::setting::speak(super::boundary::errors::keyword);
         module.add("__version__", env!("CARGO_PKG_VERSION"))
     }
 }

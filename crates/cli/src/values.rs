@@ -5,6 +5,8 @@ use std::ops::RangeInclusive;
 use std::str::FromStr;
 
 use deltille::Name;
+use deltille::targets::parse_length_mm;
+use deltille_core::quantity::distance_mm;
 
 /// A whole number of a range. The ends of the number's own type go unsaid.
 pub fn whole<T>(range: RangeInclusive<T>) -> impl Fn(&str) -> Result<T, String> + Clone
@@ -119,6 +121,12 @@ impl FromStr for Ids {
             None => Ok(Self(ids)),
         }
     }
+}
+
+/// How far a point is, mm.
+pub fn distance(text: &str) -> Result<f64, String> {
+    let mm = parse_length_mm(text).map_err(|error| error.to_string())?;
+    distance_mm::RANGE.check(mm).map_err(|_| format!("{text}: not between 1 mm and 1000 m"))
 }
 
 #[cfg(test)]

@@ -4,8 +4,9 @@ use std::borrow::Cow;
 
 use super::paper::{PaperSpec, SolidSheets};
 use crate::marks::{logo_room, tag_ids};
-use crate::placing::arrangement::{arrange, label};
+use crate::placing::arrangement::arrange;
 use crate::placing::poster::Poster;
+use crate::placing::sheet_label::label;
 use crate::placing::{face_sheet, guide, net, packed, single_panel, tag_sheet};
 use crate::{Finish, LineKind, Logo, Placement, SheetLayout, SheetLine};
 use deltille_core::angles::turn_of;

@@ -11,7 +11,7 @@ use deltille::layout::Printing;
 use deltille::limits::Limits;
 use deltille::photograph;
 use deltille::verify::Verifier;
-use deltille_cli::deltille::settings::Settings;
+use deltille_cli::deltille::BoardSettings;
 use glam::{DVec2, DVec3};
 
 use super::good::{BOARD, FAMILY, SOLID};
@@ -90,7 +90,7 @@ pub fn camera(file: File) -> bool {
 
 pub fn template(file: File) -> bool {
     let read = |grid| {
-        let settings = Settings::read(file.path, grid).ok()?;
+        let settings = BoardSettings::read(file.path, grid).ok()?;
         Some(settings.plan(grid).is_ok())
     };
     [GridKind::Deltille, GridKind::Checker].map(read).contains(&Some(true))

@@ -10,10 +10,10 @@ use deltille::layout::{PaperSpec, Printing};
 use deltille::layout::{Reach, Situation};
 use deltille::synth::{Light, scene_of_target};
 use deltille::targets::{BoardSpec, TagSpec, Target, TargetSpec};
-use deltille_lab::photographs::background::Studio;
-use deltille_lab::photographs::page::PrintedPage;
 use deltille_lab::photographs::photograph::take;
 use deltille_lab::photographs::scene::Scene;
+use deltille_lab::photographs::world::background::Studio;
+use deltille_lab::photographs::world::page::PrintedPage;
 use glam::DVec3;
 
 #[test]

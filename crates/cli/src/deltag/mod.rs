@@ -1,34 +1,30 @@
 //! `deltag`: search, check, list and draw DelTag code families.
+//!
+//! Comes in: arguments. Goes out: files of families, pictures, messages and an exit code. A user meets the commands in
+//! this order:
+//!
+//! 1. `about` lists the families there are, tells of them, and checks what their files claim.
+//! 2. `search` makes others.
+//! 3. `draw` shows and prints their tags.
+//! 4. `exchange` writes them for other programs, and reads theirs.
+//!
+//! `named` is the family that a command is given.
 
-mod bounds;
-mod by_rank;
-mod checkpoint;
-mod confusion;
-mod export;
-mod false_positives;
-mod frontier;
-mod gen_family;
-mod import;
-mod info;
-mod list;
-mod parameters;
-mod place_codes;
-mod plan;
-mod rules;
-mod sheet;
-mod show;
-mod verify_family;
+mod about;
+mod draw;
+mod exchange;
+mod named;
+mod search;
 
-use std::path::Path;
 use std::process::ExitCode;
 
-use anyhow::bail;
 use clap::{Parser, Subcommand};
 
-use crate::output::tell;
+use self::about::{by_rank, info, list, verify_family};
+use self::draw::{sheet, show};
+use self::exchange::{export, import};
+use self::search::{bounds, frontier, gen_family, plan};
 use crate::shell;
-use deltille::family::{self, Family, PAIRS_COUNTED, certify_codes, shipped_names};
-use deltille::lattice::GridKind;
 
 /// Search, check, list and draw DelTag code families.
 #[derive(Parser)]
@@ -92,34 +88,4 @@ pub fn run(deltag: Deltag) -> anyhow::Result<ExitCode> {
         Command::Completions(args) => shell::completions::<Deltag>(args),
         Command::Man(args) => shell::man::<Deltag>(args),
     }
-}
-
-/// Refuses families of other tags than DelTags.
-fn deltags(family: Family) -> anyhow::Result<Family> {
-    if family.kind() != GridKind::Deltille {
-        let name = family.name();
-        bail!(
-            "{name}: its tags are square, deltag is about triangular ones; squares carry them: \
-             `deltille checkerboard --tags {name}`"
-        );
-    }
-    if family.is_of_places() {
-        let name = family.name();
-        bail!("{name}: its tags tell a place together only, on boards: `deltille board --dense`");
-    }
-    Ok(family)
-}
-
-/// A family to make something of. The codes of a file that comes from elsewhere are compared where
-/// that is a matter of a second, and a word is said where they are not what the file claims.
-fn resolve(name_or_path: &str) -> anyhow::Result<Family> {
-    let family = deltags(family::resolve(name_or_path)?)?;
-    if !shipped_names().contains(&name_or_path)
-        && family.len() <= PAIRS_COUNTED
-        && let Some(failure) = certify_codes(&family).failures.first()
-    {
-        let file = Path::new(name_or_path).display();
-        tell!("warning: {file} is not what it claims: {failure}");
-    }
-    Ok(family)
 }

@@ -1,52 +1,37 @@
 //! `deltille`: make, detect and verify deltille targets.
+//!
+//! Comes in: arguments. Goes out: files, messages and an exit code. A user meets the commands in this order:
+//!
+//! 1. `make` plans a target, makes it, and compares its files with its description.
+//! 2. `see` finds targets in photographs.
+//! 3. `calibrate` makes cameras and rigs of what was found, says which photograph to take next, and compares results.
+//! 4. `apply` uses these cameras: poses of targets, pictures without distortion.
+//! 5. `measure` is about the library itself.
+//!
+//! `files` is what all of them read and write, `examples` the end of each command's help.
 
-mod aprilgrid;
-mod bench;
-mod board;
+mod apply;
 mod calibrate;
-mod calibrating;
-mod camera_file;
-mod charuco;
-mod circles;
-mod compare;
-mod delivery;
-mod detect;
 mod examples;
-mod experiment;
 pub(crate) mod files;
-mod finder;
-mod finishing;
-mod given;
-mod guide;
-mod images;
-mod in_flight;
-mod limits;
-mod logo;
-mod meshes;
-mod page;
-mod plan;
-mod pose;
-mod printing;
-mod refine;
-mod render;
-mod rig;
-pub mod settings;
-mod sightings;
-mod solid;
-mod solid_settings;
-mod tables;
-mod target_file;
-mod template;
-mod undistort;
-mod verify;
+mod make;
+mod measure;
+mod see;
 
 use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
 
+use self::apply::{pose, undistort};
+use self::calibrate::{compare, guide, one_camera, rig};
+use self::make::{aprilgrid, board, charuco, circles, plan, solid, verify};
+use self::measure::{bench, experiment};
+use self::see::{detect, refine, render};
 use crate::shell;
 use deltille::lattice::GridKind;
 use deltille::targets::SolidShape;
+
+pub use self::make::BoardSettings;
 
 /// Make, detect and verify deltille targets.
 #[derive(Parser)]
@@ -122,7 +107,7 @@ enum Command {
     Guide(Box<guide::Args>),
     /// Find a camera from detections
     #[command(after_help = examples::CALIBRATE)]
-    Calibrate(calibrate::Args),
+    Calibrate(one_camera::Args),
     /// Find the cameras of a rig, and where they are to each other, from detections
     #[command(after_help = examples::RIG)]
     Rig(rig::Args),
@@ -157,7 +142,7 @@ enum Command {
 pub fn run(deltille: Deltille) -> anyhow::Result<ExitCode> {
     match deltille.command {
         Command::Bench(args) => bench::run(args),
-        Command::Calibrate(args) => calibrate::run(args),
+        Command::Calibrate(args) => one_camera::run(args),
         Command::Compare(args) => compare::run(args),
         Command::Guide(args) => guide::run(*args),
         Command::Plan(args) => plan::run(args),

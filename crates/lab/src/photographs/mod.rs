@@ -5,30 +5,25 @@
 //!   └───────┴── truth ───────────────────────▶ score
 //! ```
 //!
-//! A target's PDF is written and drawn by hayro ([`page`]); nothing of [`deltille::synth`] takes part, nor
-//! of [`deltille::camera`]. Where its corners are, its own paths say. The page is seen by a pinhole camera
-//! with a bending lens ([`view`]), blurred and lit ([`optics`]), partly covered ([`covers`]) and recorded
-//! (`sensor`). One thing at a time is varied ([`axes`]) from a scene that is always the same
-//! ([`scene`]), with the same poses at every level.
+//! Comes in: a target, and what is to be varied. Goes out: how well the detector found it, level by level.
+//!
+//! 1. `axes` are what is varied, one thing at a time, from a [`scene`] that is always the same, with the same poses at
+//!    every level.
+//! 2. `world` has what there is to see: the target's PDF, written and drawn by hayro, what lies around it and on it. Where
+//!    its corners are, its own paths say; nothing of [`deltille::synth`] takes part.
+//! 3. `camera` has a pinhole with a bending lens, blur and light, and a sensor; nothing of [`deltille::camera`] takes part.
+//! 4. `photograph` takes a photograph with its truth.
+//! 5. `result` compares what the detector found with that, and makes tables and the plot.
 //!
 //! What it does not show: print that is not black and white, depth of field, lateral colour, rolling
 //! shutters, noise reduction.
 
 pub mod axes;
-pub mod background;
-pub mod covers;
-mod mips;
-mod mosaic;
-pub mod optics;
-pub mod page;
-mod paths;
+pub mod camera;
 pub mod photograph;
-pub mod plot;
+pub mod result;
 pub mod scene;
-pub mod score;
-mod sensor;
-pub mod table;
-pub mod view;
+pub mod world;
 
 use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -37,11 +32,11 @@ use glam::DVec2;
 use rayon::prelude::*;
 
 use self::axes::{Axis, Level};
-use self::background::Studio;
-use self::page::PrintedPage;
 use self::photograph::{Photograph, take};
-use self::score::{Score, score};
-use self::table::Row;
+use self::result::score::{Score, score};
+use self::result::table::{self, Row};
+use self::world::background::Studio;
+use self::world::page::PrintedPage;
 use deltille::artwork::ArtworkError;
 use deltille::clock;
 use deltille::detect::{Detector, DetectorConfig};

@@ -10,13 +10,13 @@ use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use serde::Serialize;
 
-use super::background::Studio;
-use super::covers::Covers;
-use super::optics::{Light, Setting, Spot, expose};
-use super::page::{PageCorner, PrintedPage};
+use super::camera::optics::{Light, Setting, Spot, expose};
+use super::camera::sensor::record;
+use super::camera::view::{Curl, Place, View};
 use super::scene::{MOST_TILT_DEG, Scene};
-use super::sensor::record;
-use super::view::{Curl, Place, View};
+use super::world::background::Studio;
+use super::world::covers::Covers;
+use super::world::page::{PageCorner, PrintedPage};
 use deltille::raster::Gray;
 
 /// A corner nearer to a cover's outline or to the border than this counts neither as seen nor as

@@ -15,40 +15,25 @@ use std::f64::consts::FRAC_PI_2;
 
 use glam::DVec2;
 
+use super::margin_marks::{
+    ADVANCE_CAPS, BAR_CAP_MM, BAR_INDENT_MM, LABEL_CAP_MM, Marks, Strip, bar_words,
+};
 use crate::marks::logo::LogoPlacement;
 use crate::marks::logo_room::LogoSize;
 use crate::paper::{Orientation, PaperSize, PaperSpec};
 use crate::{CheckBar, Label, LineKind, Placement, SheetLayout, SheetLine, SheetText};
-use deltille_core::family::places;
-use deltille_core::lattice::GridKind;
 use deltille_core::polygon::rectangle;
 use deltille_core::setting::Setting::PaperMarginMm;
 use deltille_core::targets::format_mm;
 use deltille_core::targets::size_mm;
-use deltille_core::targets::{BoardSpec, FamilyRef, Fingerprint, Panel, TagsIn, TargetError};
+use deltille_core::targets::{BoardSpec, Panel, TargetError};
 
-/// Capital height of the words on a check bar, mm: 7 pt, small print that is still easy to read.
-const BAR_CAP_MM: f64 = 1.8;
-/// Capital height of the label, mm.
-const LABEL_CAP_MM: f64 = 2.2;
-/// Length of a bar's end strokes, across the bar, mm: enough to lay a ruler on, short enough to
-/// leave room for the words.
-pub const CHECK_BAR_STROKE_MM: f64 = 2.0;
 /// Capital height of a board's id, mm: legible from three metres; and the least that is worth printing.
 const LARGE_CAP_MM: f64 = 8.0;
 const LEAST_LARGE_CAP_MM: f64 = 4.0;
-/// What letters such as g reach below the base line, in capital heights.
-const DESCENT_CAPS: f64 = 0.33;
 /// Blanks between a bar, its words and the label, mm: the first that leaves room for the board. The
 /// last is what 10 × 11 corners with 20 mm edges leave on A4.
 const GAPS_MM: [f64; 2] = [1.5, 0.8];
-/// Blank between the ends of a bar and its words, mm.
-const BAR_INDENT_MM: f64 = 3.0;
-/// Check bars are a multiple of this long, mm: a round number is read off a ruler without error.
-const BAR_STEP_MM: f64 = 10.0;
-/// Average advance of a character in the built-in font, in capital heights; a long text is set
-/// only where it fits by this estimate.
-pub(crate) const ADVANCE_CAPS: f64 = 0.76;
 /// Blank between the black field of an inverted board and the marks, mm.
 const FIELD_GAP_MM: f64 = 1.0;
 /// Marks to cut a plate's sheet out begin and end so far from its corners, mm.
@@ -104,34 +89,6 @@ pub(crate) struct Arrangement {
     rooms: [f64; 2],
     /// How large the logo is to be, where there is one.
     logo: Option<LogoSize>,
-}
-
-/// A check bar and perhaps the label, along a margin: distances from the margin inwards, mm.
-#[derive(Clone, Copy)]
-struct Marks {
-    label: bool,
-    gap: f64,
-}
-
-impl Marks {
-    /// Base line of the label.
-    const LABEL: f64 = LABEL_CAP_MM * DESCENT_CAPS;
-
-    /// Base line of the words on the bar.
-    fn words(self) -> f64 {
-        let label = if self.label { Self::LABEL + LABEL_CAP_MM + self.gap } else { 0.0 };
-        label + BAR_CAP_MM * DESCENT_CAPS
-    }
-
-    /// The line of the bar.
-    fn line(self) -> f64 {
-        self.words() + BAR_CAP_MM + self.gap
-    }
-
-    /// All of it.
-    fn depth(self) -> f64 {
-        self.line() + CHECK_BAR_STROKE_MM / 2.0
-    }
 }
 
 /// Fits a board on paper, in this order of preference: the smallest paper (where it is free), the
@@ -417,122 +374,14 @@ impl Arrangement {
     }
 }
 
-/// A strip along the lower or, turned counter-clockwise, the right margin.
-struct Strip {
-    /// Its outer corner: lower left, or lower right.
-    start: DVec2,
-    turned: bool,
-    length: f64,
-}
-
-impl Strip {
-    /// The page position `along` the strip and `inwards` from the margin.
-    fn at(&self, along: f64, inwards: f64) -> DVec2 {
-        let way = DVec2::new(along, inwards);
-        self.start + if self.turned { way.perp() } else { way }
-    }
-
-    /// Length of the bar along it, mm.
-    fn bar_mm(&self) -> f64 {
-        (self.length / BAR_STEP_MM).floor() * BAR_STEP_MM
-    }
-
-    fn angle(&self) -> f64 {
-        if self.turned { FRAC_PI_2 } else { 0.0 }
-    }
-}
-
-/// How to measure a check bar and what to do when it is off, as fully as its length allows.
-fn bar_words(length_mm: f64) -> String {
-    let texts = [
-        format!(
-            "Measure between the outer ends of this line: {length_mm} mm. If not, print again at \
-             100 % without \"fit to page\", or multiply all lengths by measured / {length_mm}."
-        ),
-        format!(
-            "{length_mm} mm between the outer ends. If not: print at 100 %, no \"fit to page\", \
-             or scale by measured / {length_mm}."
-        ),
-        format!("{length_mm} mm end to end. If not: print at 100 %."),
-    ];
-    let room = length_mm - 2.0 * BAR_INDENT_MM;
-    let width = |text: &str| text.chars().count() as f64 * ADVANCE_CAPS * BAR_CAP_MM;
-    let fitting = texts.into_iter().find(|text| width(text) <= room);
-    fitting.unwrap_or_else(|| format!("{length_mm} mm"))
-}
-
-/// How the label of a sheet ends: which target it is part of, and what made it.
-pub(crate) fn imprint(target: Fingerprint) -> String {
-    format!("target {} · deltille {}", target.short(), env!("CARGO_PKG_VERSION"))
-}
-
-/// The label of a sheet of boards: all that is needed to make them again.
-pub(crate) fn label(
-    name: &str,
-    spec: &BoardSpec,
-    panels: &[Panel],
-    family: Option<&FamilyRef>,
-    target: Fingerprint,
-) -> String {
-    let mut parts = size_in_words(name, spec);
-    let mut tags = panels.iter().flat_map(|panel| &panel.tags);
-    if let (Some(family), Some(first)) = (family, tags.next()) {
-        let last = tags.next_back().unwrap_or(first);
-        parts.push(tag_range(&family.name, first.id, last.id));
-        if panels[0].tags_in == TagsIn::White {
-            parts.push("tags in white squares".to_owned());
-        }
-    }
-    parts.extend(match panels {
-        [] => None,
-        [only] if spec.two_sided_mm.is_some() => {
-            let side = if only.id == spec.board_id { "front" } else { "back" };
-            Some(format!("board {}, {side}", only.id))
-        }
-        [only] => Some(format!("board {}", only.id)),
-        [first, .., last] => Some(format!("boards {}–{}", first.id, last.id)),
-    });
-    parts.push(imprint(target));
-    parts.join(" · ")
-}
-
-/// The label of a board among others on a sheet: what tells it from them.
-pub(crate) fn label_of_one(spec: &BoardSpec, panel: &Panel, family: Option<&FamilyRef>) -> String {
-    let mut parts = size_in_words(&format!("board {}", panel.id), spec);
-    if let (Some(family), [first, .., last] | [first @ last]) = (family, panel.tags.as_slice()) {
-        parts.push(tag_range(&family.name, first.id, last.id));
-    }
-    parts.join(" · ")
-}
-
-/// What is called so, its corners and its edge.
-fn size_in_words(name: &str, spec: &BoardSpec) -> Vec<String> {
-    let corners = format!("{} × {} corners", spec.rows, spec.cols);
-    vec![
-        name.to_owned(),
-        match spec.grid {
-            GridKind::Deltille => corners,
-            GridKind::Checker => format!("checkerboard {corners}"),
-        },
-        format!("edge {}", format_mm(spec.edge_mm)),
-    ]
-}
-
-/// Tags in words: `d25h7 id 3`, `d25h7 ids 3–7`; place codes, whose ids are those of places, by their family alone.
-pub fn tag_range(family: &str, first: u32, last: u32) -> String {
-    match (family, first == last) {
-        (places::NAME, _) => family.to_owned(),
-        (_, true) => format!("{family} id {first}"),
-        (_, false) => format!("{family} ids {first}–{last}"),
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use proptest::prelude::*;
 
     use super::*;
     use crate::Printing;
+    use crate::placing::margin_marks::{BAR_STEP_MM, CHECK_BAR_STROKE_MM};
+    use deltille_core::lattice::GridKind;
     use deltille_core::targets::{TargetSpec, least_untagged_corners};
 
     fn spec(rows: u32, cols: u32, edge_mm: f64) -> BoardSpec {
@@ -586,14 +435,6 @@ mod tests {
         assert!(build(&spec(10, 11, 20.0), &paper).is_ok());
         let error = build(&spec(200, 300, 30.0), &PaperSpec::default()).unwrap_err();
         assert!(error.to_string().contains("even A0"), "{error}");
-    }
-
-    #[test]
-    fn bars_on_a4_say_how_to_measure_and_what_to_do() {
-        for length in [150.0, 190.0, 270.0] {
-            let words = bar_words(length);
-            assert!(words.contains("outer ends") && words.contains("measured / "), "{words}");
-        }
     }
 
     proptest! {

@@ -18,8 +18,10 @@
 
 use glam::DVec2;
 
-use super::arrangement::{ADVANCE_CAPS, Arrangement, Footprint, fit, imprint, tag_range};
+use super::arrangement::{Arrangement, Footprint, fit};
+use super::margin_marks::ADVANCE_CAPS;
 use super::net::Sides;
+use super::sheet_label::{imprint, tag_range};
 use crate::paper::PaperSpec;
 use crate::{Label, LineKind, Placement, SheetLayout, SheetLine, SheetText};
 use deltille_core::angles::turn_of;

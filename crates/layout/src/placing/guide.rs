@@ -16,7 +16,8 @@ use std::f64::consts::TAU;
 
 use glam::{DVec2, DVec3};
 
-use super::arrangement::{ADVANCE_CAPS, Footprint, fit_upright};
+use super::arrangement::{Footprint, fit_upright};
+use super::margin_marks::ADVANCE_CAPS;
 use crate::paper::{Orientation, PaperSize, PaperSpec, SolidSheets};
 use crate::{Label, LineKind, SheetLayout, SheetLine, SheetText};
 use deltille_core::lattice::{GridKind, Tile};

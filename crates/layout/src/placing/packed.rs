@@ -13,9 +13,9 @@ use std::cmp::Reverse;
 
 use glam::DVec2;
 
-use super::arrangement::{
-    ADVANCE_CAPS, Arrangement, Footprint, check_margin, label, label_of_one, on_page,
-};
+use super::arrangement::{Arrangement, Footprint, check_margin, on_page};
+use super::margin_marks::ADVANCE_CAPS;
+use super::sheet_label::{label, label_of_one};
 use crate::marks::logo::LogoPlacement;
 use crate::marks::logo_room::LogoSize;
 use crate::paper::PaperSpec;

@@ -11,7 +11,8 @@
 
 use glam::DVec2;
 
-use super::arrangement::{ADVANCE_CAPS, Arrangement, Footprint, fit_upright};
+use super::arrangement::{Arrangement, Footprint, fit_upright};
+use super::margin_marks::ADVANCE_CAPS;
 use super::net::plane::{Motion, bounds, gap_mm};
 use crate::paper::{Orientation, PaperSize, PaperSpec};
 use crate::{Label, LineKind, SheetLayout, SheetLine, SheetPage, SheetText};

@@ -1,6 +1,7 @@
 //! Sheets of ChArUco boards, AprilGrids and circles: their panel in the middle of the smallest paper that takes it.
 
-use super::arrangement::{Footprint, fit, imprint, tag_range};
+use super::arrangement::{Footprint, fit};
+use super::sheet_label::{imprint, tag_range};
 use crate::SheetLayout;
 use crate::paper::PaperSpec;
 use deltille_core::setting::Setting::{

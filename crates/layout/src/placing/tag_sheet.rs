@@ -9,7 +9,8 @@
 
 use glam::DVec2;
 
-use super::arrangement::{ADVANCE_CAPS, Arrangement, Footprint, check_margin, on_page};
+use super::arrangement::{Arrangement, Footprint, check_margin, on_page};
+use super::margin_marks::ADVANCE_CAPS;
 use crate::paper::{PaperSize, PaperSpec};
 use crate::{Label, Placement, SheetLayout, SheetText};
 use deltille_core::family::Family;

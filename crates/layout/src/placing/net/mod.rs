@@ -18,9 +18,11 @@
 //! one to the other. With [`SolidSheets::SeamedNet`](crate::SolidSheets::SeamedNet) a net that is larger
 //! than the paper stays in one piece, over several pages that are joined first.
 //!
-//! `unfold` lays the faces of a solid in the plane, `tabs` adds what is glued, `nest` packs pieces on pages, and `sheet` makes the
-//! sheets of all of them; `plane` moves outlines, `hinge` says how faces hang together, for a picture of the folding.
+//! `unfold` lays the faces of a solid in the plane, `tabs` adds what is glued, `nest` packs pieces on pages, `choice` says which
+//! unfolding is printed, `drawing` what is drawn of it, and `sheet` makes the sheets; `plane` moves outlines, `hinge` says how faces hang together, for a picture of the folding.
 
+mod choice;
+mod drawing;
 mod hinge;
 mod nest;
 pub(crate) mod plane;

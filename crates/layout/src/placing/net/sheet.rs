@@ -1,94 +1,30 @@
-//! A net on paper: which of its unfoldings, how it lies, and what is drawn of it.
-
-use std::f64::consts::PI;
+//! A net on paper: on one sheet, over several pages, or in pieces, and how it lies there.
 
 use glam::DVec2;
 
-use super::nest::{self, Outline, Place};
+use super::choice::{Nested, Net, nest_on, nets, outlines};
+use super::drawing::{BLANK_MM, Drawing, WORDS_MM, instructions};
 use super::plane::{Motion, bounds};
-use super::tabs::{self, Tab};
-use super::unfold::{self, Piece, Side, Sides};
+use super::tabs::Tab;
+use super::unfold::{Piece, Sides};
+use crate::Placement;
+use crate::SheetLayout;
 use crate::paper::{PaperSpec, SolidSheets};
-use crate::placing::arrangement::{
-    ADVANCE_CAPS, Arrangement, Footprint, fit_upright, imprint, tag_range,
-};
-use crate::placing::face_sheet::edge_numbers;
+use crate::placing::arrangement::{Arrangement, Footprint, fit_upright};
 use crate::placing::poster::{MOST_PAGES, Poster};
-use crate::{Label, LineKind, Placement, SheetLayout, SheetLine, SheetText};
-use deltille_core::angles::turn_of;
-use deltille_core::lattice::{GridKind, Vertex};
+use deltille_core::lattice::Vertex;
 use deltille_core::polygon;
 use deltille_core::setting::Setting::{
     PaperSize, SolidEdgeMm, SolidMarginMm, SolidSheetsPerFace, SolidSheetsSeamedNet,
 };
 use deltille_core::targets::format_mm;
-use deltille_core::targets::{
-    Face, FamilyRef, Panel, Polyhedron, SolidSpec, TargetError, fingerprint,
-};
-
-/// Faces that rise or fall from one plane by less than this are not folded, radians (a tenth of a
-/// degree): no hand makes so slight a fold, and the neighbours hold the paper in its place.
-const FLAT_RAD: f64 = 0.1 / 180.0 * PI;
-
-/// Width of lines to cut and to fold along, mm: a hairline that every printer holds.
-pub(super) const LINE_WIDTH_MM: f64 = 0.15;
+use deltille_core::targets::{FamilyRef, Panel, SolidSpec, TargetError};
 
 /// Least margin of a face that takes its numbers, mm.
 const LEAST_MARGIN_MM: f64 = 2.5;
 
-/// Capital height of the numbers in the margin of a face, in widths of the margin, and the most of
-/// it, mm.
-const NUMBER_CAP: (f64, f64) = (0.35, 2.0);
-
-/// Capital height of the words on a tab, in depths of the tab, and the most of it, mm.
-const TAB_CAP: (f64, f64) = (0.35, 2.2);
-
-/// Blank on either side of the words on a tab, mm.
-const TAB_INDENT_MM: f64 = 1.0;
-
-/// Smallest capital height of words on a tab before they are cut short, mm.
-const LEGIBLE_CAP_MM: f64 = 1.2;
-
-/// Capital height and line spacing of the instructions, mm.
-const WORDS_CAP_MM: f64 = 2.2;
-const WORDS_STEP_MM: f64 = 3.6;
-
 /// Smallest room for pieces of a net, mm.
 const LEAST_ROOM_MM: f64 = 40.0;
-
-/// Largest pieces that are tried, in parts of the room of a page: large ones are less work to glue, small ones leave less
-/// of the paper unused.
-const PARTS_OF_ROOM: [f64; 6] = [1.0, 0.7, 0.5, 0.35, 0.25, 0.18];
-
-/// Orders of growth that are tried for each of them.
-const ORDERS: u64 = 4;
-
-/// Capital height of the number of a page, mm.
-const PAGE_CAP_MM: f64 = 5.0;
-
-/// Blank between the net, the instructions and the marks along the margins, mm.
-const BLANK_MM: f64 = 2.5;
-
-/// A net in its own frame: faces, and the tabs of each piece.
-struct Net {
-    pieces: Vec<Piece>,
-    tabs: Vec<Vec<Tab>>,
-}
-
-/// A net whose pieces lie on pages.
-struct Nested {
-    net: Net,
-    /// Of each piece.
-    places: Vec<Place>,
-    pages: usize,
-}
-
-impl Nested {
-    /// Pages to print, then pieces to glue.
-    fn work(&self) -> [usize; 2] {
-        [self.pages, self.net.pieces.len()]
-    }
-}
 
 /// A piece of a net on a sheet.
 struct Laid<'a> {
@@ -126,7 +62,7 @@ pub(crate) fn sheets(
         let Some(laid) = lay(piece, tabs, paper)? else { continue };
         let area = laid.arrangement.page_mm().element_product();
         if best.as_ref().is_none_or(|(least, _)| area < *least) {
-            best = Some((area, drawing.sheet(&laid)));
+            best = Some((area, sheet_of_one(&drawing, &laid)));
         }
     }
     match best {
@@ -134,6 +70,16 @@ pub(crate) fn sheets(
         None if paper.solids == SolidSheets::SeamedNet => seamed(&nets, spec, &drawing, paper),
         None => nested(spec, &drawing, paper),
     }
+}
+
+/// The sheet of a net in one piece that fits its paper.
+fn sheet_of_one(drawing: &Drawing, laid: &Laid) -> SheetLayout {
+    let mut sheet = laid.arrangement.sheet(0, [0.0; 4], drawing.label("net"));
+    sheet.placements.clear();
+    drawing.draw(&mut sheet, laid.piece, laid.tabs, &laid.page_from_net);
+    let [left, lower, right, _] = laid.arrangement.clear_mm();
+    drawing.explain(&mut sheet, DVec2::new(left, lower + BLANK_MM), right - BLANK_MM, None);
+    sheet
 }
 
 /// A net that is larger than the paper, over pages that are joined along seams.
@@ -247,64 +193,6 @@ fn nested(
     Err(TargetError::invalid(SolidEdgeMm, problem))
 }
 
-/// The net whose pieces take the fewest pages with a room of this size, then that with the fewest pieces.
-fn nest_on(flat: &[Vec<DVec2>], sides: &Sides, room: DVec2) -> Option<Nested> {
-    let mut best: Option<Nested> = None;
-    for part in PARTS_OF_ROOM {
-        let mut fewest = usize::MAX;
-        for seed in 0..ORDERS {
-            let most = room * part;
-            let fit = |points: &[DVec2]| nest::fits(points, tabs::MOST_DEPTH_MM, most);
-            let pieces = unfold::in_pieces_that_fit(flat, sides, seed, fit);
-            fewest = fewest.min(pieces.len());
-            let Some(net) = with_tabs(pieces, sides) else { continue };
-            let outline = |(piece, tabs): (&Piece, &Vec<Tab>)| -> Outline {
-                let faces = piece.iter().map(|face| face.corners.clone());
-                faces.chain(tabs.iter().map(|tab| tab.corners.to_vec())).collect()
-            };
-            let outlines: Vec<Outline> = net.pieces.iter().zip(&net.tabs).map(outline).collect();
-            let Some(places) = nest::nest(&outlines, room) else { continue };
-            let pages = 1 + places.iter().map(|place| place.page).max().unwrap_or_default();
-            let nested = Nested { net, places, pages };
-            if best.as_ref().is_none_or(|best| nested.work() < best.work()) {
-                best = Some(nested);
-            }
-        }
-        // There are no smaller pieces than single faces.
-        if fewest == flat.len() {
-            break;
-        }
-    }
-    best
-}
-
-/// The unfoldings that have room for tabs, best liked first.
-fn nets(solid: &Polyhedron, spec: &SolidSpec, faces: &[Face], sides: &Sides) -> Vec<Net> {
-    let flat = outlines(faces);
-    let with_tabs = |pieces: Vec<Piece>| with_tabs(pieces, sides);
-    let unfoldings = unfold::unfoldings(solid, &spec.shape, &flat);
-    let nets: Vec<Net> = unfoldings.into_iter().filter_map(with_tabs).collect();
-    if !nets.is_empty() {
-        return nets;
-    }
-    // A single face has room for all of its tabs.
-    let sizes = std::iter::successors(Some(flat.len()), |most| Some(most * 3 / 4));
-    let mut fewest = sizes.take_while(|&most| most > 0).filter_map(|most| {
-        let small = unfold::in_small_pieces(solid, &flat, most).filter_map(with_tabs);
-        small.min_by_key(|net| net.pieces.len())
-    });
-    fewest.next().into_iter().collect()
-}
-
-fn outlines(faces: &[Face]) -> Vec<Vec<DVec2>> {
-    faces.iter().map(|face| face.outline_mm.clone()).collect()
-}
-
-fn with_tabs(pieces: Vec<Piece>, sides: &Sides) -> Option<Net> {
-    let tabs = tabs::place(&pieces, sides)?;
-    Some(Net { pieces, tabs })
-}
-
 /// The convex shape that the tiles of a face fill, in the panel frame, mm.
 fn tiles_outline(panel: &Panel) -> Vec<DVec2> {
     if panel.outline != deltille_core::targets::Outline::Triangle {
@@ -327,9 +215,6 @@ fn points(piece: &Piece, tabs: &[Tab]) -> Vec<DVec2> {
     let faces = piece.iter().flat_map(|face| face.corners.iter().copied());
     faces.chain(tabs.iter().flat_map(|tab| tab.corners)).collect()
 }
-
-/// Height of the instructions with the blank above them, mm.
-const WORDS_MM: f64 = 2.0 * WORDS_STEP_MM + BLANK_MM;
 
 /// Lays a piece on the smallest paper that takes it, turned no more than that needs.
 fn lay<'a>(
@@ -367,251 +252,16 @@ fn lay<'a>(
     Ok(None)
 }
 
-/// What it takes to draw any piece of a solid's net.
-struct Drawing<'a> {
-    name: &'a str,
-    spec: &'a SolidSpec,
-    faces: &'a [Face],
-    panels: &'a [Panel],
-    family: Option<&'a FamilyRef>,
-    sides: &'a Sides,
-    /// Numbers of the edges of each face.
-    numbers: Vec<Vec<usize>>,
-    /// Which way each side of each face is folded.
-    folds: Vec<Vec<LineKind>>,
-}
-
-impl<'a> Drawing<'a> {
-    fn new(
-        name: &'a str,
-        spec: &'a SolidSpec,
-        solid: &Polyhedron,
-        faces: &'a [Face],
-        panels: &'a [Panel],
-        family: Option<&'a FamilyRef>,
-        sides: &'a Sides,
-    ) -> Self {
-        let edges = solid.edges();
-        let numbers: Vec<Vec<usize>> =
-            (0..faces.len()).map(|face| edge_numbers(solid, &edges, face)).collect();
-        let angles_rad = solid.dihedral_angles_rad();
-        let fold = |edge: usize| match angles_rad[edge] - PI {
-            angle if angle.abs() < FLAT_RAD => LineKind::Flat,
-            // The next face rises out of this one's plane.
-            angle if angle > 0.0 => LineKind::Valley,
-            _ => LineKind::Fold,
-        };
-        let folds =
-            numbers.iter().map(|edges| edges.iter().map(|&edge| fold(edge)).collect()).collect();
-        Self { name, spec, faces, panels, family, sides, numbers, folds }
-    }
-
-    /// The sheet of a net in one piece that fits its paper.
-    fn sheet(&self, laid: &Laid) -> SheetLayout {
-        let mut sheet = laid.arrangement.sheet(0, [0.0; 4], self.label("net"));
-        sheet.placements.clear();
-        self.draw(&mut sheet, laid.piece, laid.tabs, &laid.page_from_net);
-        let [left, lower, right, _] = laid.arrangement.clear_mm();
-        self.explain(&mut sheet, DVec2::new(left, lower + BLANK_MM), right - BLANK_MM, None);
-        sheet
-    }
-
-    /// Adds the instructions from `at` to the right end, and before them which page of how many it is.
-    fn explain(&self, sheet: &mut SheetLayout, at: DVec2, right: f64, page: Option<[usize; 2]>) {
-        let mut start = at;
-        if let Some([number, count]) = page {
-            let text = Label::Words(format!("{} of {count}", number + 1));
-            let max_width_mm = width(&text, PAGE_CAP_MM);
-            start.x += max_width_mm + BLANK_MM;
-            sheet.texts.push(SheetText {
-                text,
-                at_mm: at + DVec2::Y * (WORDS_MM - BLANK_MM - PAGE_CAP_MM) / 2.0,
-                angle_rad: 0.0,
-                cap_height_mm: PAGE_CAP_MM,
-                max_width_mm,
-            });
-        }
-        let words = instructions(&sheet.lines, start, right - start.x);
-        sheet.texts.extend(words);
-    }
-
-    /// Adds the panels, lines and numbers of a piece to a sheet.
-    fn draw(&self, sheet: &mut SheetLayout, piece: &Piece, tabs: &[Tab], sheet_from_net: &Motion) {
-        let hinges: Vec<(Side, Side)> = piece.iter().filter_map(|face| face.hinge).collect();
-        for flat in piece {
-            let (face, index) = (&self.faces[flat.face], flat.face);
-            let corners: Vec<DVec2> =
-                flat.corners.iter().map(|&corner| sheet_from_net.apply(corner)).collect();
-            let lower = [face.outline_mm[0], face.outline_mm[1]];
-            let motion = Motion::carrying(lower, [corners[0], corners[1]]);
-            let placement = Placement {
-                panel: self.panels[index].id,
-                angle_rad: turn_of(motion.turn),
-                origin_mm: motion.shift,
-            };
-            sheet.placements.push(placement);
-            let mut named = false;
-            for at in self.sides.of(index) {
-                let side = at.side;
-                let ends = [corners[side], corners[(side + 1) % corners.len()]];
-                let hinge = hinges.iter().find(|(on, own)| *on == at || *own == at);
-                let tab = tabs.iter().find(|tab| tab.side == at);
-                let number = self.numbers[index][side];
-                match (hinge, tab) {
-                    // A fold is drawn once, with the face that hangs on the other.
-                    (Some((_, own)), _) => {
-                        if *own == at {
-                            sheet.lines.push(line(self.folds[index][side], ends));
-                        }
-                    }
-                    (None, Some(tab)) => {
-                        sheet.lines.extend(self.tab_lines(tab, ends, sheet_from_net));
-                        sheet.texts.extend(self.tab_words(tab, number, sheet_from_net));
-                    }
-                    (None, None) => {
-                        sheet.lines.push(line(LineKind::Cut, ends));
-                        sheet.texts.push(self.margin_words(ends, Label::Edge(number), 0.5));
-                    }
-                }
-                // The name of the face stands where no number of an edge does.
-                if !named && (hinge.is_some() || tab.is_some()) {
-                    named = true;
-                    sheet.texts.push(self.margin_words(ends, Label::Face(index), 0.5));
-                }
-            }
-            if !named {
-                let ends = [corners[0], corners[1]];
-                sheet.texts.push(self.margin_words(ends, Label::Face(index), 0.25));
-            }
-        }
-    }
-
-    fn tab_lines(&self, tab: &Tab, [from, to]: [DVec2; 2], motion: &Motion) -> Vec<SheetLine> {
-        let [b, a, far_a, far_b] = tab.corners.map(|corner| motion.apply(corner));
-        let fold = self.folds[tab.side.face][tab.side.side];
-        let mut lines = vec![line(fold, [a, b])];
-        lines.extend([[a, far_a], [far_a, far_b], [far_b, b]].map(|e| line(LineKind::Cut, e)));
-        let free = [[from, a], [b, to]].into_iter().filter(|[p, q]| p.distance(*q) > LINE_WIDTH_MM);
-        lines.extend(free.map(|ends| line(LineKind::Cut, ends)));
-        lines
-    }
-
-    /// The words on a tab: its edge, and the face it goes under where there is room for that.
-    fn tab_words(&self, tab: &Tab, number: usize, motion: &Motion) -> Option<SheetText> {
-        let [_, _, far_a, far_b] = tab.corners.map(|corner| motion.apply(corner));
-        let under = self.sides.partner(tab.side)?.face;
-        let room = far_a.distance(far_b) - 2.0 * TAB_INDENT_MM;
-        let cap = (TAB_CAP.0 * tab.depth_mm).min(TAB_CAP.1);
-        let long = Label::Tab { edge: number, under };
-        let text =
-            if width(&long, LEGIBLE_CAP_MM.min(cap)) <= room { long } else { Label::Edge(number) };
-        let cap = cap.min(cap * room / width(&text, cap));
-        Some(words([far_a, far_b], text, cap, 0.5, (tab.depth_mm - cap) / 2.0, room))
-    }
-
-    /// Words in the margin of a face along one of its sides, centred at a part of its length.
-    fn margin_words(&self, ends: [DVec2; 2], text: Label, part: f64) -> SheetText {
-        let margin = self.spec.white_margin_mm();
-        let cap = (NUMBER_CAP.0 * margin).min(NUMBER_CAP.1);
-        let room = (ends[0].distance(ends[1]) - 4.0 * margin).max(cap);
-        let cap = cap.min(cap * room / width(&text, cap));
-        // Wide margins keep the words near the edge that they name.
-        let inwards = ((margin - cap) / 2.0).min(2.0 * cap);
-        words(ends, text, cap, part, inwards, room)
-    }
-
-    /// All that is needed to make the net again.
-    fn label(&self, of: &str) -> String {
-        let (spec, name) = (self.spec, self.name);
-        let mut parts = vec![name.to_owned(), spec.size()];
-        parts.push(of.to_owned());
-        parts.push(format!("{} tiles, margin {}", spec.tiles, format_mm(spec.margin_mm)));
-        for kind in [GridKind::Deltille, GridKind::Checker] {
-            let own = || self.panels.iter().filter(|panel| panel.kind == kind);
-            let tags = || own().flat_map(|panel| &panel.tags);
-            if let (Some(family), Some(first), Some(last)) =
-                (self.family, tags().next(), tags().last())
-            {
-                let family = family.of_tiling(kind);
-                parts.push(tag_range(&family.name, first.id, last.id));
-            }
-        }
-        let last = self.panels.last().map_or(0, |panel| panel.id);
-        parts.push(format!("boards {}–{last}", spec.board_id));
-        parts.push(imprint(fingerprint(self.panels, self.family)));
-        parts.join(" · ")
-    }
-}
-
-/// How to make the solid from a print of these lines, two lines of text; the lower one stands at
-/// `at`.
-fn instructions(lines: &[SheetLine], at: DVec2, room: f64) -> [SheetText; 2] {
-    let has = |kind| lines.iter().any(|line| line.kind == kind);
-    let mut folds = if has(LineKind::Valley) {
-        "Cut along solid lines. Score and fold dashed lines away from the print, dash-dotted ones \
-         towards it."
-    } else {
-        "Cut along solid lines. Score dashed lines and fold them away from the print."
-    }
-    .to_owned();
-    if has(LineKind::Flat) {
-        folds += " Do not fold dotted lines.";
-    }
-    let glue = "Glue each tab under the face that it names, where the face has the same number: \
-                edge 1 to edge 1, and so on."
-        .to_owned();
-    let mut y = at.y + 2.0 * WORDS_STEP_MM;
-    [folds, glue].map(|text| {
-        y -= WORDS_STEP_MM;
-        SheetText {
-            text: Label::Words(text),
-            at_mm: DVec2::new(at.x, y),
-            angle_rad: 0.0,
-            cap_height_mm: WORDS_CAP_MM,
-            max_width_mm: room,
-        }
-    })
-}
-
-fn line(kind: LineKind, [from_mm, to_mm]: [DVec2; 2]) -> SheetLine {
-    SheetLine { kind, from_mm, to_mm, width_mm: LINE_WIDTH_MM }
-}
-
-/// Estimated width of a text, mm.
-fn width(text: &Label, cap: f64) -> f64 {
-    text.characters() as f64 * ADVANCE_CAPS * cap
-}
-
-/// Words along the line between two points, centred at a part of it, their base line `inwards`
-/// (to the left) of it.
-fn words(
-    [from, to]: [DVec2; 2],
-    text: Label,
-    cap: f64,
-    part: f64,
-    inwards: f64,
-    room: f64,
-) -> SheetText {
-    let along = (to - from).normalize_or_zero();
-    let start = from + (to - from) * part - along * width(&text, cap) / 2.0;
-    SheetText {
-        text,
-        at_mm: start + along.perp() * inwards,
-        angle_rad: turn_of(along),
-        cap_height_mm: cap,
-        max_width_mm: room,
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use glam::DVec3;
     use proptest::prelude::*;
 
+    use super::super::drawing::width;
     use super::super::plane::gap_mm;
     use super::*;
-    use crate::Printing;
     use crate::placing::poster::TICK_MM;
+    use crate::{LineKind, Printing, SheetText};
     use deltille_core::family::Family;
     use deltille_core::targets::{SolidShape, TargetSpec};
 

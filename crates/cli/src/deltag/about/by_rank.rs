@@ -1,0 +1,55 @@
+use std::fmt::Write;
+use std::process::ExitCode;
+
+use anyhow::Context;
+
+use crate::deltag::named::deltags;
+use crate::output;
+use crate::values::whole;
+use deltille::family::{self, Construction, Screen, TagWords};
+
+#[derive(clap::Args)]
+pub struct Args {
+    /// A shipped family such as d49h12, or a family file
+    family: String,
+    /// First number, from 0
+    #[arg(long, allow_negative_numbers = true, value_parser = whole(0..=u64::MAX))]
+    rank: u64,
+    /// How many
+    #[arg(long, default_value_t = 1, allow_negative_numbers = true,
+          value_parser = whole(1..=u64::MAX))]
+    count: u64,
+}
+
+pub fn run(args: Args) -> anyhow::Result<ExitCode> {
+    let family = deltags(family::resolve(&args.family)?)?;
+    let Construction::Algebraic(construction) = family.construction() else {
+        anyhow::bail!("{}: not an algebraic family, its codes have no rank", args.family);
+    };
+    let words = TagWords::new(family.dimension());
+    let screen = Screen::new(words.clone(), family.distance(), family.rules());
+    for rank in args.rank..=args.rank.saturating_add(args.count - 1) {
+        let (word, count) = construction.by_rank(family.dimension(), rank).with_context(|| {
+            format!("{}: more than a linear code, its codes have no rank", args.family)
+        })?;
+        let word = word.with_context(|| {
+            format!("--rank {rank}: there are {count}, numbered from 0 to {}", count - 1)
+        })?;
+        // Found out at the first one, before anything is printed.
+        let left = count - args.rank;
+        anyhow::ensure!(
+            args.count <= left,
+            "--count {}: from --rank {} on there are {left}",
+            args.count,
+            args.rank
+        );
+        let mut line = format!("{rank} {}", words.hex(word));
+        if !screen.admits(word) {
+            line.push_str(" breaks a rule of the family");
+        }
+        // Writing to a String cannot fail.
+        let _ = writeln!(line);
+        output::print(&line)?;
+    }
+    Ok(ExitCode::SUCCESS)
+}

@@ -1,0 +1,149 @@
+use std::process::ExitCode;
+
+use serde_json::{Value, json};
+
+use super::{confusion, false_positives, place_codes};
+use crate::deltag::named::resolve;
+use crate::output::{self, Telling, say};
+use deltille::family::{self, Family, HiddenCells, PAIRS_COUNTED, TagWords};
+use deltille::lattice::GridKind;
+use deltille::targets::{BoardSpec, SolidShape, SolidSpec, TagSpec, Target, TargetSpec};
+use deltille_core::words::counted;
+
+#[derive(clap::Args)]
+pub struct Args {
+    /// A shipped family, or a family file; of two it is told how far they are from each other
+    #[arg(required = true, num_args = 1..=2, value_names = ["FAMILY", "OTHER"])]
+    families: Vec<String>,
+    #[command(flatten)]
+    telling: Telling,
+}
+
+/// Rows and columns of the board that coverage is told in, that of the paper.
+const BOARD: [u32; 2] = [10, 11];
+
+/// How many tags a target takes with the settings that `deltille` has by default.
+fn tags_of(spec: &TargetSpec) -> anyhow::Result<usize> {
+    let family = Family::shipped(&TagSpec::default().family)?;
+    let target = Target::build("probe", spec, Some(&family))?;
+    Ok(target.panels.iter().map(|panel| panel.tags.len()).sum())
+}
+
+/// The distances that are left with cells hidden, of a family whose pairs are counted.
+fn without_hidden(family: &Family) -> Vec<(HiddenCells, u32)> {
+    let known = family.len() <= PAIRS_COUNTED;
+    let all = HiddenCells::ALL.into_iter().filter(|_| known);
+    all.filter_map(|hidden| Some((hidden, family.distance_without(hidden)?))).collect()
+}
+
+/// How many codes no such family exceeds, and how that is known.
+fn upper_bound(family: &Family) -> (u64, &'static str) {
+    let bounds = family.bounds();
+    match bounds.found_none() {
+        true => (bounds.sphere_packing, "sphere packing"),
+        false => (bounds.linear_programming, "linear programming"),
+    }
+}
+
+pub fn run(args: Args) -> anyhow::Result<ExitCode> {
+    if let [of, other] = &args.families[..] {
+        let [of, other] = [resolve(of)?, resolve(other)?];
+        confusion::about(&of, &other, args.telling)?;
+        return Ok(ExitCode::SUCCESS);
+    }
+    let name = &args.families[0];
+    let known = family::resolve(name)?;
+    if known.is_of_places() {
+        place_codes::about(&known, args.telling)?;
+        return Ok(ExitCode::SUCCESS);
+    }
+    let family = resolve(name)?;
+    if args.telling.is_json() {
+        let (bound, _) = upper_bound(&family);
+        let mut told = json!({
+            "name": family.name(), "fingerprint": family.fingerprint(), "codes": family.len(),
+            "bits": family.dimension().bits(), "distance": family.distance(),
+            "corrects": family.correctable(), "rules": family.rules(),
+            "construction": family.construction(), "upper_bound": bound,
+            "distance_histogram": family.histogram(),
+        });
+        let left = without_hidden(&family);
+        let left = left.iter().map(|(cells, left)| (cells.name().to_owned(), json!(left)));
+        told["distance_without"] = left.collect::<serde_json::Map<_, _>>().into();
+        told["beginnings"] = json!(family.beginnings());
+        false_positives::add_to(&mut told, &family);
+        output::print_json(&told)?;
+        return Ok(ExitCode::SUCCESS);
+    }
+    let (bits, rules) = (family.dimension().bits(), family.rules());
+    let pairs = TagWords::new(family.dimension()).without(family.free_cells()).pairs();
+    say!("{}, fingerprint {}", family.name(), family.fingerprint());
+    say!("  codes           {}", family.len());
+    say!("  bits            {bits} in {} rows", family.dimension().rows());
+    say!("  distance        {}, corrects {} cells", family.distance(), family.correctable());
+    if let Some(free) = rules.free {
+        let cells = counted(family.free_cells().count_ones() as usize, "cell");
+        say!("  free            {cells}, the {}: no code uses them", free.name());
+    }
+    for (hidden, left) in without_hidden(&family) {
+        let cells = hidden.count(family.dimension());
+        let what = match hidden {
+            HiddenCells::Apex => format!("the {cells} of a corner"),
+            HiddenCells::Edge => format!("the {cells} along an edge"),
+            _ => format!("any {cells} in a triangle"),
+        };
+        let kept = rules.robust.iter().find(|rule| rule.to == hidden);
+        let kept = kept.map_or(String::new(), |rule| format!(", by rule {}", rule.distance));
+        say!("                  {left} with {what} hidden ({}{kept})", hidden.name());
+    }
+    for before in family.beginnings() {
+        let (codes, fingerprint) = (before.codes, &before.fingerprint);
+        say!("  began as        {codes} codes, fingerprint {fingerprint}");
+    }
+    say!(
+        "  rules           every code: {} of {} neighbouring pairs of cells differ, {} cells are white, \
+         {} black, at least",
+        (rules.min_complexity * f64::from(pairs) - 1e-9).ceil(),
+        pairs,
+        rules.black_distance,
+        rules.white_distance
+    );
+    let construction = match serde_json::to_value(family.construction())? {
+        Value::Object(mut fields) => {
+            let method = fields.remove("method").unwrap_or_default();
+            let source = fields.remove("source").unwrap_or_default();
+            [method, source].iter().filter_map(|v| v.as_str()).collect::<Vec<_>>().join(", ")
+        }
+        _ => String::new(),
+    };
+    say!("  construction    {construction}");
+    let of_cells = match family.free_cells().count_ones() {
+        0 => String::new(),
+        free => format!(", of the {} cells in use", bits - free),
+    };
+    let (bound, by) = upper_bound(&family);
+    say!("  upper bound     {bound} codes ({by}{of_cells})");
+    let [rows, cols] = BOARD;
+    let board = tags_of(&TargetSpec::Board(BoardSpec::new(GridKind::Deltille, rows, cols, 20.0)))?;
+    let solid = tags_of(&TargetSpec::Solid(SolidSpec::new(SolidShape::Icosahedron)))?;
+    let solids = match family.len() / solid {
+        1 => "1 icosahedron".to_owned(),
+        n => format!("{n} icosahedra"),
+    };
+    say!(
+        "  enough for      {} of {rows} x {cols} corners ({board} tags each) or {solids} ({solid} tags each)",
+        counted(family.len() / board, "board")
+    );
+    false_positives::tell(&family)?;
+    if family.histogram().is_empty() {
+        say!("  distances       of so many codes are not counted");
+        return Ok(ExitCode::SUCCESS);
+    }
+    say!("  pairs of words, turns included, at each distance");
+    let most = family.histogram().values().copied().max().unwrap_or(1) as f64;
+    for (distance, pairs) in family.histogram() {
+        let bar = "█".repeat((40.0 * *pairs as f64 / most).ceil() as usize);
+        say!("    {distance:>3} {pairs:>12} {bar}");
+    }
+    Ok(ExitCode::SUCCESS)
+}

@@ -1,0 +1,46 @@
+use std::process::ExitCode;
+
+use serde_json::json;
+
+use crate::output::{self, Telling, say};
+use deltille::family::{self, places, shipped_names};
+
+#[derive(clap::Args)]
+pub struct Args {
+    #[command(flatten)]
+    telling: Telling,
+}
+
+pub fn run(args: Args) -> anyhow::Result<ExitCode> {
+    let families = shipped_names().into_iter().map(family::resolve);
+    let families = families.collect::<Result<Vec<_>, _>>()?;
+    if args.telling.is_json() {
+        let listed = families.iter().map(|family| {
+            json!({
+                "name": family.name(), "bits": family.dimension().bits(), "distance": family.distance(),
+                "codes": family.len(), "fingerprint": family.fingerprint(),
+            })
+        });
+        let of_places = json!({ "name": places::NAME, "bits": places::BITS, "boards": places::BOARDS, "places": places::PLACES });
+        output::print_json(&listed.chain([of_places]).collect::<Vec<_>>())?;
+        return Ok(ExitCode::SUCCESS);
+    }
+    say!("{:<12} {:>4} {:>8} {:>8}  fingerprint", "family", "bits", "distance", "codes");
+    for family in families {
+        say!(
+            "{:<12} {:>4} {:>8} {:>8}  {}",
+            family.name(),
+            family.dimension().bits(),
+            family.distance(),
+            family.len(),
+            family.fingerprint()
+        );
+    }
+    say!(
+        "{:<12} {:>4}   place codes of {} boards: `deltag info {0}`",
+        places::NAME,
+        places::BITS,
+        places::BOARDS
+    );
+    Ok(ExitCode::SUCCESS)
+}

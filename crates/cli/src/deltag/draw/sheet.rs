@@ -1,0 +1,142 @@
+//! `deltag sheet`.
+
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+use anyhow::{Context, ensure};
+
+use crate::deltag::named::resolve;
+use crate::deltille::files::written::{Formats, drawn, write_all};
+use crate::interrupt;
+use crate::output::{Overwrite, say};
+use crate::run::{FAILED, Interrupted};
+use crate::values::{Ids, name, whole};
+use deltille::artwork;
+use deltille::layout::{DEFAULT_MARGIN_MM, PaperSize, PaperSpec, Printing};
+use deltille::limits::Limits;
+use deltille::targets::{TagSheetSpec, TargetSpec, parse_length_mm};
+use deltille::verify::{Verifier, VerifyError};
+
+/// More pages at once are a mistake.
+const MOST_PAGES: usize = 200;
+
+#[derive(clap::Args)]
+pub struct Args {
+    /// A name from `deltag list`, or a family file
+    family: String,
+    /// Which tags: ids and ranges such as 0-99 or 3,7,20-25 [default: all]
+    #[arg(long, allow_hyphen_values = true)]
+    ids: Option<Ids>,
+    /// Edge of a tag, such as 30mm or 1.5in
+    #[arg(long, value_name = "LENGTH", default_value = "30mm", allow_hyphen_values = true)]
+    edge: String,
+    /// Black border of a tag in bit-widths, as on boards
+    #[arg(long, value_name = "BITS", default_value_t = 1.5, allow_negative_numbers = true,
+          value_parser = crate::values::number(0.6..=10.0))]
+    tag_border: f64,
+    /// Paper
+    #[arg(long, help = format!("Paper: {}", PaperSize::choice()), default_value = "A4", allow_hyphen_values = true)]
+    paper: String,
+    /// Which way the paper lies: auto (the one that takes more tags), portrait, landscape
+    #[arg(long, default_value = "auto")]
+    orientation: String,
+    /// Width of the strip along the edges of the paper that stays blank [default: 5mm]
+    #[arg(long, value_name = "LENGTH", allow_hyphen_values = true)]
+    margin: Option<String>,
+    /// Write a PDF of all pages; so it is where neither --svg nor --png is asked for
+    #[arg(long)]
+    pdf: bool,
+    /// Write an SVG of each page
+    #[arg(long)]
+    svg: bool,
+    /// Write a PNG of each page
+    #[arg(long)]
+    png: bool,
+    /// Resolution of the PNG, dots per inch [default: 300]
+    #[arg(long, allow_negative_numbers = true, value_parser = whole(150..=2400u32))]
+    dpi: Option<u32>,
+    /// Folder for the files
+    #[arg(short, long, value_name = "FOLDER", default_value = ".")]
+    output: PathBuf,
+    /// Stem of the files' names [default: the family's name and -sheet]
+    #[arg(long, value_parser = name, allow_hyphen_values = true)]
+    name: Option<String>,
+    #[command(flatten)]
+    overwrite: Overwrite,
+    /// Do not read the written files back to compare every cell
+    #[arg(long)]
+    no_verify: bool,
+}
+
+/// Lays out the tags, writes the pages, and verifies what it wrote.
+pub fn run(args: Args) -> anyhow::Result<ExitCode> {
+    let family = resolve(&args.family)?;
+    let length =
+        |option: &'static str, text: &str| parse_length_mm(text).with_context(|| option.to_owned());
+    let paper = PaperSpec {
+        size: Some(args.paper.parse().context("--paper")?),
+        orientation: args.orientation.parse().context("--orientation")?,
+        margin_mm: match &args.margin {
+            Some(text) => length("--margin", text)?,
+            None => DEFAULT_MARGIN_MM,
+        },
+        ..PaperSpec::default()
+    };
+    ensure!(args.dpi.is_none() || args.png, "--dpi: there is no PNG to write: add --png");
+    ensure!(
+        args.output.is_dir() || args.output.extension().is_none(),
+        "-o {}: name a folder; --name gives the stem of the files in it",
+        args.output.display()
+    );
+    if let Some(ids) = &args.ids {
+        ids.check(&family)?;
+    }
+    let ids = match args.ids {
+        Some(Ids(ids)) => ids,
+        None => (0..).take(family.len()).collect(),
+    };
+    let spec = TagSheetSpec {
+        family: args.family,
+        ids,
+        edge_mm: length("--edge", &args.edge)?,
+        border_bits: args.tag_border,
+    };
+    let count = spec.ids.len();
+    let name = args.name.unwrap_or_else(|| format!("{}-sheet", family.name()));
+    let target = Printing::build(&name, &TargetSpec::Tags(spec), Some(&family), Some(&paper))?;
+    let pages = target.sheets.len();
+    ensure!(
+        pages <= MOST_PAGES,
+        "--ids: {count} tags take {pages} pages, more than {MOST_PAGES}: take fewer, such as --ids \
+         0-99, a smaller --edge or larger --paper"
+    );
+
+    let formats =
+        Formats { pdf: args.pdf || !(args.svg || args.png), svg: args.svg, png: args.png };
+    let artwork = artwork::draw(&target, Some(&family))?;
+    let files = drawn(&name, artwork, formats, args.dpi.unwrap_or(300));
+    let written = write_all(&args.output, &files, args.overwrite)?;
+    for path in &written {
+        say!("wrote {}", path.display());
+    }
+    if args.no_verify {
+        return Ok(ExitCode::SUCCESS);
+    }
+    let verifier = Verifier::new(&target, Some(&family))?;
+    let verifier = verifier.within(Limits::NONE).stopped_by(interrupt::flag());
+    let mut passed = true;
+    for path in &written {
+        let verdict = match verifier.verify_path(path) {
+            Err(VerifyError::Cancelled) => {
+                return Err(Interrupted(
+                    "the files are whole, but were not all compared".to_owned(),
+                )
+                .into());
+            }
+            verdict => verdict?,
+        };
+        say!("{verdict}");
+        passed &= verdict.passed;
+    }
+    Ok(if passed { ExitCode::SUCCESS } else { ExitCode::from(FAILED) })
+}

@@ -1,0 +1,88 @@
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+use anyhow::Context;
+
+use crate::deltag::named::resolve;
+use crate::output::{self, Overwrite, say};
+use crate::values::{Ids, name, whole};
+use deltille::artwork::{Artwork, GalleryTile, tag_gallery};
+use deltille::export::kind::Kind;
+use deltille::export::{png, svg};
+use deltille::layout::Finish;
+
+/// Most tags on one picture: a sheet of A0 size at the default edge.
+const MOST_TAGS: usize = 600;
+
+#[derive(clap::Args)]
+pub struct Args {
+    /// A name from `deltag list`, or a family file
+    family: String,
+    /// Which tags: ids and ranges such as 0-9 or 3,7,20-25 [default: the first ten]
+    #[arg(long, allow_hyphen_values = true)]
+    ids: Option<Ids>,
+    /// Write an SVG; so it is where --png is not asked for
+    #[arg(long)]
+    svg: bool,
+    /// Write a PNG
+    #[arg(long)]
+    png: bool,
+    /// Resolution of the PNG, dots per inch [default: 200]
+    #[arg(long, allow_negative_numbers = true, value_parser = whole(20..=2400u32))]
+    dpi: Option<u32>,
+    /// Tags in a row
+    #[arg(long, default_value_t = 5, allow_negative_numbers = true,
+          value_parser = whole(1..=100u16))]
+    columns: u16,
+    /// Folder for the files, or the file where there is one
+    #[arg(short, long, default_value = ".")]
+    output: PathBuf,
+    /// Stem of the files' names [default: the family's name]
+    #[arg(long, value_parser = name, allow_hyphen_values = true)]
+    name: Option<String>,
+    #[command(flatten)]
+    overwrite: Overwrite,
+}
+
+pub fn run(args: Args) -> anyhow::Result<ExitCode> {
+    let family = resolve(&args.family)?;
+    let ids = args.ids.unwrap_or_else(|| Ids((0..10).take(family.len()).collect()));
+    ids.check(&family)?;
+    let Ids(ids) = ids;
+    anyhow::ensure!(
+        ids.len() <= MOST_TAGS,
+        "--ids: more than {MOST_TAGS} tags do not fit on one picture; `deltag sheet` takes more"
+    );
+    anyhow::ensure!(args.dpi.is_none() || args.png, "--dpi: there is no PNG to write: add --png");
+    let stem = args.name.as_deref().unwrap_or(family.name());
+    let svg = args.svg || !args.png;
+    let place = |extension| output::file(&args.output, stem, extension);
+    let png_path = args.png.then(|| place("png")).transpose()?;
+    let svg_path = svg.then(|| place("svg")).transpose()?;
+    let kinds = [(&png_path, Kind::own_printed_png()), (&svg_path, Kind::of(svg::HEAD.as_bytes()))];
+    for (path, kind) in kinds {
+        let Some(path) = path else { continue };
+        args.overwrite.check(path, &kind)?;
+        output::settle(output::folder_of(path))?;
+        output::make_folder_of(path).context("-o")?;
+    }
+    let style = GalleryTile { columns: usize::from(args.columns), ..GalleryTile::default() };
+    let sheet = tag_gallery(&family, &ids, style)?;
+    let title = format!("DelTags of family {}", family.name());
+    let mut written = Vec::new();
+    if let Some(path) = png_path {
+        png::write(&sheet, &title, &path, f64::from(args.dpi.unwrap_or(200))).context("-o")?;
+        written.push(path);
+    }
+    if let Some(path) = svg_path {
+        let subject = format!("fingerprint {}", family.fingerprint());
+        let finish = Finish::default();
+        let artwork = Artwork { title, subject, sheets: vec![sheet], finish };
+        svg::write(&artwork, 0, &path).context("-o")?;
+        written.push(path);
+    }
+    for path in written {
+        say!("wrote {}", path.display());
+    }
+    Ok(ExitCode::SUCCESS)
+}

@@ -1,0 +1,89 @@
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+use anyhow::{Context, anyhow};
+use clap::ValueEnum;
+
+use crate::output::{self, Overwrite, say};
+use crate::values::{name, whole};
+use deltille::family::{ImportSpec, import};
+use deltille::lattice::GridKind;
+use deltille::limits::{MAX_FAMILY_BYTES, read_short_text};
+use deltille_core::words::counted;
+
+/// Told at the end of `--help`.
+pub const HELP: &str = "Codes are the hexadecimal words of the table, in their order; in a text without any, the lines of \
+    nothing but hexadecimal digits. Bits are read row by row from the upper left, in triangles from the apex; a \
+    table of AprilTag 3 says where its bits are. The distance is found by comparing all codes.
+
+Examples:
+  deltag import tag36h11.c -o families
+  deltag import codes.txt --shape square --bits 36 --name mine
+  deltag import mine.py --shape triangle --distance 7";
+
+#[derive(clap::Args)]
+pub struct Args {
+    /// A table of codes: C, Rust or Python source, or a code a line
+    table: PathBuf,
+    /// Shape of the tags; a table of AprilTag 3 says it
+    #[arg(long, value_enum)]
+    shape: Option<Shape>,
+    /// Cells of a tag: 9, 16, 25, 36, 49 or 64; a table that has nbits or BITS says it
+    #[arg(long, allow_negative_numbers = true, value_parser = whole(1..=64u32))]
+    bits: Option<u32>,
+    /// Cells in which any two tags differ, to be less than they do [default: what they do]
+    #[arg(long, allow_negative_numbers = true, value_parser = whole(1..=64u32))]
+    distance: Option<u32>,
+    /// Name of the family [default: the stem of the table's name]
+    #[arg(long, value_parser = name, allow_hyphen_values = true)]
+    name: Option<String>,
+    /// Folder for the family file, or the file itself
+    #[arg(short, long, default_value = ".")]
+    output: PathBuf,
+    #[command(flatten)]
+    overwrite: Overwrite,
+}
+
+#[derive(Clone, Copy, ValueEnum)]
+enum Shape {
+    /// DelTags, which turn by 120°
+    Triangle,
+    /// AprilTags and ArUco markers, which turn by 90°
+    Square,
+}
+
+pub fn run(args: Args) -> anyhow::Result<ExitCode> {
+    let text = read_short_text(&args.table, MAX_FAMILY_BYTES)?;
+    let of_file = |part: Option<&std::ffi::OsStr>| {
+        part.map(|part| part.to_string_lossy().into_owned()).unwrap_or_default()
+    };
+    let name = match args.name {
+        Some(given) => given,
+        None => name(&of_file(args.table.file_stem()))
+            .map_err(|problem| anyhow!("{}: {problem}: give --name", args.table.display()))?,
+    };
+    let spec = ImportSpec {
+        name,
+        source: format!("imported from {}", of_file(args.table.file_name())),
+        kind: args.shape.map(|shape| match shape {
+            Shape::Triangle => GridKind::Deltille,
+            Shape::Square => GridKind::Checker,
+        }),
+        bits: args.bits,
+        distance: args.distance,
+    };
+    let family = import(&text, &spec).with_context(|| args.table.display().to_string())?;
+    let path = output::file(&args.output, family.name(), "json")?;
+    output::write(&path, family.to_json().as_bytes(), args.overwrite).context("-o")?;
+    say!(
+        "{}: {} of {} bits, distance {}, corrects {}, fingerprint {}",
+        family.name(),
+        counted(family.len(), "code"),
+        family.dimension().bits(),
+        family.distance(),
+        family.correctable(),
+        family.fingerprint()
+    );
+    say!("{}", path.display());
+    Ok(ExitCode::SUCCESS)
+}

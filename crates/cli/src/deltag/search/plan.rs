@@ -1,0 +1,105 @@
+//! `deltag plan`.
+
+use std::process::ExitCode;
+
+use serde_json::Value;
+
+use super::gen_family::{FILE_LIMIT, bytes_per_code};
+use crate::deltag::about::false_positives;
+use crate::output::{self, Telling, say};
+use crate::values::whole;
+use deltille::family::{Family, NATURAL_FACTOR, ShippedFamily, shipped_names, smallest_shipped};
+use deltille::lattice::GridKind;
+use deltille_core::words::counted;
+
+#[derive(clap::Args)]
+pub struct Args {
+    /// Faces of the target, or boards
+    #[arg(long, default_value_t = 1, allow_negative_numbers = true,
+          value_parser = whole(1..=u32::MAX))]
+    faces: u32,
+    /// Tags on each
+    #[arg(long, default_value_t = 10, allow_negative_numbers = true,
+          value_parser = whole(1..=u32::MAX))]
+    tags_per_face: u32,
+    /// Misread cells that must be corrected in a tag, at least
+    #[arg(long, value_name = "CELLS", default_value_t = 0, allow_negative_numbers = true,
+          value_parser = whole(0..=31u32))]
+    corrects: u32,
+    #[command(flatten)]
+    telling: Telling,
+}
+
+pub fn run(args: Args) -> anyhow::Result<ExitCode> {
+    let needed = u64::from(args.faces) * u64::from(args.tags_per_face);
+    let families = shipped_names().into_iter().map(Family::shipped);
+    let mut families: Vec<Family> = families.collect::<Result<_, _>>()?;
+    families.retain(|family| family.correctable() >= args.corrects);
+    let largest = families.iter().max_by_key(|f| f.len());
+    let Some(largest) = largest else {
+        anyhow::bail!("--corrects {}: no shipped family corrects so many cells", args.corrects);
+    };
+    let Some(best) = smallest_shipped(GridKind::Deltille, needed, args.corrects) else {
+        let (name, len) = (largest.name(), largest.len());
+        let listed = FILE_LIMIT / bytes_per_code(largest.dimension());
+        let instead = if largest.dimension().bits() >= 49 && needed <= listed / 2 {
+            format!("`deltag gen-family {name}` makes a file with more, or lower")
+        } else {
+            "lower".to_owned()
+        };
+        let (kind, corrects) = match args.corrects {
+            0 => (String::new(), ""),
+            n => (format!(" that correct {}", counted(n as usize, "cell")), " or --corrects"),
+        };
+        anyhow::bail!(
+            "{needed} tags{kind}: the largest shipped family, {name}, lists {len}; {instead} \
+             --faces or --tags-per-face{corrects}"
+        );
+    };
+    let more = smallest_shipped(GridKind::Deltille, needed, best.correctable() + 1);
+    if args.telling.is_json() {
+        output::print_json(&serde_json::json!({
+            "tags": needed, "best": of(best)?, "corrects_more": more.map(of).transpose()?,
+        }))?;
+        return Ok(ExitCode::SUCCESS);
+    }
+    let tags = counted(needed as usize, "tag");
+    say!(
+        "{} x {} = {tags}: {}",
+        args.faces,
+        args.tags_per_face,
+        about(&Family::shipped(best.name)?)
+    );
+    // What more bits would buy.
+    if let Some(more) = more {
+        say!("to correct more, with smaller cells: {}", about(&Family::shipped(more.name)?));
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+/// A family as `--json` has it.
+fn of(family: &ShippedFamily) -> anyhow::Result<Value> {
+    let mut told = serde_json::json!({
+        "name": family.name, "bits": family.bits, "distance": family.distance,
+        "codes": family.codes, "corrects": family.correctable(),
+    });
+    false_positives::add_to(&mut told, &Family::shipped(family.name)?);
+    Ok(told)
+}
+
+fn about(family: &Family) -> String {
+    let coins = family.false_positive_rates();
+    let rates = family.natural_false_positive_rates();
+    let last = |rates: &[f64]| rates.last().copied().unwrap_or_default();
+    let [coins, natural] = [last(&coins), last(rates.as_deref().unwrap_or_default())];
+    format!(
+        "{}, {} codes of {} bits, distance {}; corrects {} cells, then takes for a tag a word of fair coins with \
+         probability {coins:.1e}, a bordered triangle of a natural picture with {natural:.1e} (within a factor of {NATURAL_FACTOR}); {}",
+        family.name(),
+        family.len(),
+        family.dimension().bits(),
+        family.distance(),
+        family.correctable(),
+        false_positives::recommended(rates.as_deref())
+    )
+}

@@ -1,0 +1,383 @@
+//! `deltille undistort` and `deltille rectify`.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+use std::str::FromStr;
+use std::sync::Mutex;
+
+use anyhow::{Context, anyhow, bail, ensure};
+
+use crate::deltille::files::images::{self, Images, Stems};
+use crate::deltille::files::limits::ImageLimits;
+use crate::deltille::files::written::{
+    File, Staged, bytes_file, check_places, same_file, sample_of, text_file,
+};
+use crate::deltille::files::{camera_file, images_at_once};
+use crate::output::{self, Overwrite, say};
+use crate::run::{self, BAD_INPUT, FAILED, Interrupted};
+use crate::values::distance;
+use crate::{interrupt, progress};
+use deltille::calibrate::Estimate;
+use deltille::camera::{Camera, CameraFile, Field, PixelMap, Rectification, Undistortion};
+use deltille::export::camera::{opencv, ros};
+use deltille::export::kind::{Kind, signed_png};
+use deltille::export::{atomic, saved, undistortion};
+use deltille::limits::Limits;
+use deltille::photograph;
+use deltille::remap::remapped;
+use deltille_core::words::counted;
+
+/// How the views are made.
+#[derive(clap::Args)]
+struct ViewArgs {
+    /// How much is shown: inside, as much as leaves nothing black; whole, all that the camera sees, up to 150°; a
+    /// horizontal field of view such as 90deg; or a focal length such as 800px
+    #[arg(long, value_name = "FIELD", default_value = "inside", value_parser = field)]
+    field: Field,
+    /// Width and height of the new pictures, px, such as 1280x960 [default: those of the camera]
+    #[arg(long, value_name = "WxH", value_parser = size)]
+    size: Option<[u32; 2]>,
+    /// Distance for which pictures of a lens of the pupil model are right, such as 2m [default: infinity]
+    #[arg(long, value_name = "LENGTH", value_parser = distance)]
+    distance: Option<f64>,
+    /// Write the maps for OpenCV's remap too, as arrays of float32 for NumPy
+    #[arg(long)]
+    maps: bool,
+    /// Folder for the results
+    #[arg(short, long, value_name = "FOLDER", default_value = ".")]
+    output: PathBuf,
+    #[command(flatten)]
+    limits: ImageLimits,
+    #[command(flatten)]
+    overwrite: Overwrite,
+}
+
+/// Arguments of `deltille undistort`.
+#[derive(clap::Args)]
+pub struct Args {
+    /// Photographs that the camera took: files, folders, patterns, or - for a list on standard input; without, the new
+    /// camera and the maps are made
+    #[arg(value_name = "IMAGES")]
+    images: Vec<PathBuf>,
+    /// The camera, as `deltille calibrate`, ROS or OpenCV write it
+    #[arg(long, value_name = "FILE")]
+    camera: PathBuf,
+    #[command(flatten)]
+    view: ViewArgs,
+}
+
+/// Arguments of `deltille rectify`.
+#[derive(clap::Args)]
+pub struct PairArgs {
+    /// The rig: the .json of `deltille rig`
+    #[arg(value_name = "RIG")]
+    rig: PathBuf,
+    /// Names of the two cameras, such as left,right
+    #[arg(long, value_name = "NAME,NAME", value_parser = pair)]
+    pair: [String; 2],
+    /// Photographs of the first camera: a file, a folder or a pattern
+    #[arg(long, value_name = "IMAGES")]
+    first: Vec<PathBuf>,
+    /// Photographs of the second camera
+    #[arg(long, value_name = "IMAGES")]
+    second: Vec<PathBuf>,
+    #[command(flatten)]
+    view: ViewArgs,
+}
+
+fn field(text: &str) -> Result<Field, String> {
+    let number = |end: &str| text.strip_suffix(end).map(f64::from_str).and_then(Result::ok);
+    match (text, number("deg"), number("px")) {
+        ("inside", ..) => Ok(Field::Inside),
+        ("whole", ..) => Ok(Field::Whole),
+        (_, Some(degrees), _) if degrees > 0.0 && degrees < 180.0 => {
+            Ok(Field::Horizontal(degrees.to_radians()))
+        }
+        (_, Some(_), _) => Err("a pinhole sees more than 0° and less than 180°".to_owned()),
+        (_, _, Some(focal)) if (1.0..=1e6).contains(&focal) => Ok(Field::Focal(focal)),
+        _ => Err("give inside, whole, an angle such as 90deg, or a focal length such as 800px"
+            .to_owned()),
+    }
+}
+
+fn size(text: &str) -> Result<[u32; 2], String> {
+    let side =
+        |text: &str| text.parse().ok().filter(|side| (2..=u32::from(u16::MAX)).contains(side));
+    let sides =
+        text.split_once('x').and_then(|(width, height)| Some([side(width)?, side(height)?]));
+    sides.ok_or_else(|| format!("`{text}` is no width and height in px, such as 1280x960"))
+}
+
+fn pair(text: &str) -> Result<[String; 2], String> {
+    match text.split_once(',') {
+        Some((first, second)) if first != second && !first.is_empty() && !second.is_empty() => {
+            Ok([first.to_owned(), second.to_owned()])
+        }
+        _ => Err("give the names of two cameras, such as left,right".to_owned()),
+    }
+}
+
+impl ViewArgs {
+    /// The map of a view.
+    fn map(&self, made: &Undistortion) -> PixelMap {
+        match self.distance {
+            Some(distance_mm) => made.clone().at_distance(distance_mm).map(),
+            None => made.map(),
+        }
+    }
+
+    fn size_of(&self, camera: &Camera) -> anyhow::Result<[u32; 2]> {
+        let size = self.size.unwrap_or([camera.width, camera.height]);
+        let (pixels, most) =
+            (u64::from(size[0]) * u64::from(size[1]), self.limits.limits().max_pixels);
+        ensure!(
+            pixels <= most,
+            "--size: {pixels} pixels are more than {most}: --max-pixels allows more"
+        );
+        Ok(size)
+    }
+
+    /// The files of a view beside its pictures.
+    fn files(&self, stem: &str, file: &CameraFile, map: &PixelMap) -> anyhow::Result<Vec<File>> {
+        let view = &file.camera;
+        let mut files = vec![
+            text_file(format!("{stem}.yaml"), file.to_yaml()),
+            text_file(format!("{stem}-opencv.yaml"), opencv(view)?),
+            text_file(format!("{stem}-ros.yaml"), ros(view, stem)?),
+        ];
+        if self.maps {
+            let [x, y] = undistortion::maps(map);
+            files.push(bytes_file(format!("{stem}-map-x.npy"), x));
+            files.push(bytes_file(format!("{stem}-map-y.npy"), y));
+        }
+        Ok(files)
+    }
+}
+
+/// Makes a pinhole view of a camera, and pictures of it.
+pub fn run(args: Args) -> anyhow::Result<ExitCode> {
+    let file = camera_file::read_with_targets("--camera", &args.camera)?;
+    let CameraFile { camera, calibrated_with, failed } = file;
+    let stem = args.camera.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+    let stem = format!("{stem}-undistorted");
+    let made = Undistortion::new(&camera, args.view.size_of(&camera)?, args.view.field);
+    let made = made.context("--field")?;
+    let images = Images::of(&args.images)?;
+    let (folder, end) = (args.view.output.as_path(), "undistorted");
+    let pictures = Pictures { args: &args.view, folder, camera: &camera, end };
+    pictures.check(&images)?;
+    let map = args.view.map(&made);
+    let view = CameraFile { camera: made.view().clone(), calibrated_with, failed };
+    let mut files = args.view.files(&stem, &view, &map)?;
+    files.insert(0, text_file(format!("{stem}.json"), undistortion::write(&made, &map)));
+    let staged = Staged::new(&args.view.output, &files, args.view.overwrite)?;
+    say!("{}", told(made.view(), &map));
+    let made = pictures.write(&images, &map)?;
+    made.end(staged)
+}
+
+/// A view in a line.
+fn told(view: &Camera, map: &PixelMap) -> String {
+    let field = |side: u32| 2.0 * (f64::from(side) / 2.0 / view.focal_px.x).atan().to_degrees();
+    let [x, y, width, height] = map.whole_rectangle();
+    let whole = match map.covered() {
+        1.0 => "every pixel shows something".to_owned(),
+        part => format!(
+            "{:.1} % of it show something, all in {width} × {height} px from ({x}, {y})",
+            100.0 * part
+        ),
+    };
+    format!(
+        "{} × {} px, focal length {:.2} px, {:.1}° × {:.1}°; {whole}",
+        view.width,
+        view.height,
+        view.focal_px.x,
+        field(view.width),
+        field(view.height)
+    )
+}
+
+/// Pictures to be made from a camera's.
+struct Pictures<'a> {
+    args: &'a ViewArgs,
+    folder: &'a Path,
+    camera: &'a Camera,
+    /// What the name of a picture ends with.
+    end: &'static str,
+}
+
+impl Pictures<'_> {
+    fn place(&self, image: &Path) -> anyhow::Result<PathBuf> {
+        Ok(self.folder.join(format!("{}-{}.png", images::stem(image)?, self.end)))
+    }
+
+    /// Refuses before the work what could not be written after it.
+    fn check(&self, images: &Images) -> anyhow::Result<()> {
+        output::check_folder(self.folder).context("-o")?;
+        let mut stems = Stems::default();
+        images.named().iter().try_for_each(|image| {
+            stems.claim(image)?;
+            self.args.overwrite.check(&self.place(image)?, &Kind::own_png())
+        })
+    }
+
+    /// Writes all; a picture that cannot be read is reported, and the others go on.
+    fn write(&self, images: &Images, map: &PixelMap) -> anyhow::Result<Made> {
+        let is_new = !self.folder.exists();
+        if images.count() != Some(0) {
+            fs::create_dir_all(self.folder)
+                .with_context(|| format!("-o: cannot write to {}", self.folder.display()))?;
+        }
+        let count = images.count().unwrap_or(0);
+        let bar = progress::bar(count as u64, "images");
+        let failed: Mutex<Vec<anyhow::Error>> = Mutex::default();
+        let done: Mutex<usize> = Mutex::default();
+        let pool = rayon::ThreadPoolBuilder::new().build()?;
+        images_at_once::for_each(&pool, &self.args.limits.limits(), images.iter(), |_, image| {
+            if interrupt::is_raised() {
+                return;
+            }
+            match image.and_then(|image| self.write_one(&image, map)) {
+                Ok(()) => *done.lock().expect("no thread panics here") += 1,
+                Err(error) => {
+                    bar.suspend(|| run::report(&error));
+                    failed.lock().expect("no thread panics here").push(error);
+                }
+            }
+            bar.inc(1);
+        });
+        bar.finish_and_clear();
+        let done = done.into_inner().expect("no thread panics here");
+        let failed = failed.into_inner().expect("no thread panics here").len();
+        if done > 0 {
+            say!("wrote {} to {}", counted(done, "picture"), self.folder.display());
+        } else if is_new {
+            // This removes only an empty folder.
+            let _ = fs::remove_dir(self.folder);
+        }
+        Ok(Made { done, failed })
+    }
+
+    fn write_one(&self, image: &Path, map: &PixelMap) -> anyhow::Result<()> {
+        let picture = photograph::read_colours(image, &self.args.limits.limits())?;
+        let size = [picture.width(), picture.height()];
+        ensure!(
+            size == [self.camera.width, self.camera.height],
+            "{}: {} × {} px, the camera has {} × {}: it is another camera's, or of another mode",
+            image.display(),
+            size[0],
+            size[1],
+            self.camera.width,
+            self.camera.height
+        );
+        let place = self.place(image)?;
+        ensure!(!same_file(&place, image), "{} would be overwritten", image.display());
+        let mut png = std::io::Cursor::new(Vec::new());
+        remapped(&picture, map)
+            .write_to(&mut png, image::ImageFormat::Png)
+            .with_context(|| place.display().to_string())?;
+        self.args.overwrite.check(&place, &Kind::own_png())?;
+        let png = signed_png(png.into_inner());
+        Ok(atomic::write(&place, |out| out.write_all(&png))?)
+    }
+}
+
+/// How many pictures were made, and how many were not.
+#[derive(Clone, Copy)]
+struct Made {
+    done: usize,
+    failed: usize,
+}
+
+impl Made {
+    /// Writes the files beside the pictures, unless there should be pictures and none could be made.
+    fn end(self, staged: Staged) -> anyhow::Result<ExitCode> {
+        let Self { done, failed } = self;
+        let is_left = interrupt::is_raised();
+        if done == 0 && (failed > 0 || is_left) {
+            drop(staged);
+            return match is_left {
+                true => Err(Interrupted("nothing was written".to_owned()).into()),
+                false => Ok(ExitCode::from(BAD_INPUT)),
+            };
+        }
+        for path in staged.commit()? {
+            say!("wrote {}", path.display());
+        }
+        if is_left {
+            return Err(Interrupted(format!("{done} pictures are written")).into());
+        }
+        Ok(if failed > 0 { ExitCode::from(FAILED) } else { ExitCode::SUCCESS })
+    }
+}
+
+/// Makes rectified views of two cameras of a rig, and pictures of them.
+pub fn run_pair(args: PairArgs) -> anyhow::Result<ExitCode> {
+    let (found, failed) = read_rig(&args.rig)?;
+    let Estimate { cameras, calibrated_with, .. } = found;
+    let named = |name: &String| {
+        cameras.iter().find(|camera| camera.name == *name).ok_or_else(|| {
+            let names: Vec<&str> = cameras.iter().map(|camera| camera.name.as_str()).collect();
+            anyhow!("--pair: there is no camera {name}: the rig has {}", names.join(", "))
+        })
+    };
+    let [first, second] = [named(&args.pair[0])?, named(&args.pair[1])?];
+    let names = [first.name.as_str(), second.name.as_str()];
+    // A camera that was given to the rig was calibrated elsewhere.
+    let calibrated_with = [first, second].map(|camera| match camera.model {
+        Some(_) => calibrated_with.clone(),
+        None => Vec::new(),
+    });
+    let size = args.view.size_of(&first.camera)?;
+    let cameras = [first, second].map(|camera| (&camera.camera, camera.camera_from_rig));
+    let made = Rectification::new(cameras, size, args.view.field).context("--pair")?;
+    let folders = names.map(|name| args.view.output.join(name));
+    let images = [Images::of(&args.first)?, Images::of(&args.second)?];
+    let of_camera = |index: usize| Pictures {
+        args: &args.view,
+        folder: &folders[index],
+        camera: cameras[index].0,
+        end: "rectified",
+    };
+    of_camera(0).check(&images[0])?;
+    of_camera(1).check(&images[1])?;
+    let stem = format!("{}-{}", names[0], names[1]);
+    let sample = [text_file(format!("{stem}.json"), sample_of(undistortion::PAIR_SCHEMA))];
+    check_places(&args.view.output, &sample, args.view.overwrite)?;
+    let maps = [&made.views[0], &made.views[1]].map(|view| args.view.map(view));
+    let mut files = vec![
+        text_file(format!("{stem}.json"), undistortion::write_pair(&made, names, &maps)),
+        text_file(format!("{stem}-opencv.yaml"), undistortion::opencv_pair(&made)),
+    ];
+    let views = made.views.iter().zip(calibrated_with);
+    for ((name, (view, calibrated_with)), map) in names.iter().zip(views).zip(&maps) {
+        let file =
+            CameraFile { camera: view.view().clone(), calibrated_with, failed: failed.clone() };
+        files.extend(args.view.files(&format!("{name}-rectified"), &file, map)?);
+        say!("{name}: {}", told(view.view(), map));
+    }
+    let baseline = made.baseline_mm;
+    let (mm, what) = match baseline.y == 0.0 {
+        true => (baseline.x, "row"),
+        false => (baseline.y, "column"),
+    };
+    say!("baseline {mm:.3} mm; a point is in the same {what} of both pictures");
+    let staged = Staged::new(&args.view.output, &files, args.view.overwrite)?;
+    let mut made = Made { done: 0, failed: 0 };
+    for (index, images) in images.iter().enumerate() {
+        let Made { done, failed } = of_camera(index).write(images, &maps[index])?;
+        made = Made { done: made.done + done, failed: made.failed + failed };
+    }
+    made.end(staged)
+}
+
+/// The rig of a file, and why its calibration failed.
+fn read_rig(path: &Path) -> anyhow::Result<(Estimate, Option<String>)> {
+    let text = Limits::default().read_text(path)?;
+    let found = saved::read_without_target(&text).with_context(|| path.display().to_string())?;
+    if found.cameras.len() < 2 {
+        bail!("{}: a single camera: give the rig.json of `deltille rig`", path.display());
+    }
+    Ok((found, camera_file::warn_if_failed(path, &text)))
+}

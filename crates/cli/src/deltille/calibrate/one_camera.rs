@@ -1,0 +1,322 @@
+//! `deltille calibrate`.
+
+use std::fmt::Write as _;
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+
+use anyhow::{Context, ensure};
+use clap::ValueEnum;
+
+use super::report_page::check_images;
+use super::sightings::{Sightings, SightingsArgs};
+use super::solving::{
+    Calibrated, ModelChoice, SolveArgs, chosen, left_out as formats_left_out, sample, sureness,
+    without_outliers,
+};
+use crate::deltille::files::camera_file;
+use crate::deltille::files::written::{
+    File, check_places, same_file, sample_of, text_file, write_all,
+};
+use crate::output::{self, Overwrite, tell};
+use crate::run::{FAILED, report};
+use deltille::calibrate::{CameraEstimate, Estimate, Intrinsics, Source};
+use deltille::camera::{Camera, CameraFile, Lens, PROJECTION_PARAMETERS, Pose, SplineGrid};
+use deltille::export::camera::{FormatError, colmap, kalibr, mrcal, nerfstudio, opencv, ros};
+use deltille::export::{calibration, saved};
+use deltille::targets::TargetIdentity;
+use deltille_core::words::{counted, places, shown};
+
+/// Correlations from here on are told: such parameters are hardly told apart.
+const STRONG_CORRELATION: f64 = 0.98;
+
+/// Arguments of `deltille calibrate`.
+#[derive(clap::Args)]
+pub struct Args {
+    #[command(flatten)]
+    sightings: SightingsArgs,
+    /// What is to be found beside fx, fy, cx, cy: radtan (k1 k2 p1 p2), radtan5 (and k3), rational
+    /// (and k4 k5 k6), thin-prism (and s1 … s4), kannala-brandt (4 terms; kannala-brandt-5 …),
+    /// eucm, double-sphere, pupil (fisheye with a moving entrance pupil), or spline (any smooth lens, of
+    /// degree 3; spline-2; spline-3-16x12 with so many knots), whose fx, fy, cx, cy are kept; auto takes
+    /// the one that holds views best that took no part in finding it
+    #[arg(long, required_unless_present = "fixed_intrinsics")]
+    model: Option<ModelChoice>,
+    /// Find only the poses of this camera: its file, as written by this command, ROS or OpenCV
+    #[arg(long, value_name = "CAMERA", conflicts_with_all = ["model", "holdout", "board_shape"])]
+    fixed_intrinsics: Option<PathBuf>,
+    #[command(flatten)]
+    solve: SolveArgs,
+    /// What to write; several may be given, separated by commas
+    #[arg(long, value_delimiter = ',', default_value = "own")]
+    format: Vec<Format>,
+    /// Folder of the photographs, for small pictures on the page
+    #[arg(long, value_name = "FOLDER", requires = "report")]
+    images: Option<PathBuf>,
+    /// The camera file, .yaml, or a folder for camera.yaml; other files are written beside it and
+    /// named after it [default: camera.yaml, or poses.yaml with --fixed-intrinsics]
+    #[arg(short, long, value_name = "FILE")]
+    output: Option<PathBuf>,
+    #[command(flatten)]
+    overwrite: Overwrite,
+}
+
+#[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum Format {
+    /// <name>.yaml, which every command here reads, and <name>.json with uncertainties, poses and,
+    /// with --residuals, every corner
+    Own,
+    /// <name>-opencv.yaml
+    Opencv,
+    /// <name>-ros.yaml
+    Ros,
+    /// <name>-camchain.yaml
+    Kalibr,
+    /// <name>-cameras.txt
+    Colmap,
+    /// <name>-transforms.json
+    Nerfstudio,
+    /// <name>.cameramodel
+    Mrcal,
+}
+
+/// Calibrates, writes the camera, and tells how good it is.
+pub fn run(args: Args) -> anyhow::Result<ExitCode> {
+    // Poses of a known camera do not take the place of its calibration.
+    let stem = if args.fixed_intrinsics.is_some() { "poses" } else { "camera" };
+    let path = output::file(args.output.as_deref().unwrap_or(Path::new(".")), stem, "yaml")?;
+    let stem = path.file_stem().unwrap_or_default().to_string_lossy();
+    if let Some(known) = &args.fixed_intrinsics {
+        ensure!(
+            !same_file(&path, known),
+            "-o: {} is the camera of --fixed-intrinsics, whose uncertainties would be lost: give another name",
+            path.display()
+        );
+    }
+    let (intrinsics, known_with) = args.intrinsics()?;
+    let folder = output::folder_of(&path);
+    let sample = sample(&intrinsics);
+    let (planned, refused) = args.files(&stem, &sample, &[], &[], &sample_of(calibration::SCHEMA));
+    if let (true, Some(refused)) = (planned.is_empty(), refused.into_iter().next()) {
+        return Err(refused).context("--format");
+    }
+    let planned: Vec<File> = planned.into_iter().chain(args.solve.planned(&stem)).collect();
+    check_places(folder, &planned, args.overwrite)?;
+    let page = args.solve.page(&stem, args.overwrite)?;
+    let measure = args.solve.measures_target();
+    let Sightings { calibration, views, target, empty, left_out, print, unnamed } =
+        args.sightings.read(measure)?;
+    if let (Some(known), Some(printing)) = (&args.fixed_intrinsics, &target) {
+        let targets = std::slice::from_ref(&printing.target);
+        let is_assumed = args.sightings.assumes_target();
+        camera_file::check_or_note(known, &known_with, targets, is_assumed)?;
+    }
+    for picture in &empty {
+        tell!("{}: no board, left out", picture.display());
+    }
+    if let Some(folder) = &args.images {
+        check_images(folder, &views)?;
+    }
+    let mut calibration = calibration.camera(&stem, views, intrinsics);
+    let tried = match args.model {
+        Some(model) => model.choose(&mut calibration, 0)?,
+        None => Vec::new(),
+    };
+    let listed = chosen(&tried);
+    let mut solved = args.solve.solve(calibration, print, vec![tried])?;
+    unnamed.iter().for_each(|note| tell!("{note}"));
+    ensure!(!solved.estimate.frames.is_empty(), "no view shows the target as this camera sees it");
+    let of_test = solved.estimate.held_out.iter().flat_map(|test| &test.excluded);
+    for out in solved.estimate.excluded.iter().chain(of_test) {
+        tell!("{}: left out: {}", out.view, out.reason);
+    }
+    solved.estimate.excluded.splice(0..0, left_out);
+    if let Err(foreign) = solved.tell() {
+        let camera = args.fixed_intrinsics.as_deref().unwrap_or(Path::new(""));
+        report(&foreign.context(format!("--fixed-intrinsics: {}", camera.display())));
+        return Ok(ExitCode::from(FAILED));
+    }
+    let Calibrated { estimate, diagnoses, print, .. } = &solved;
+    let (mut files, mut refused) = (Vec::new(), Vec::new());
+    for camera in &estimate.cameras {
+        let views = camera.views.iter().map(|view| (view.image.as_str(), view.pose));
+        let json = calibration::write(estimate, diagnoses, *print, args.solve.residuals());
+        let json = json.unwrap_or_default();
+        let views = views.collect::<Vec<_>>();
+        let of_camera = match camera.model {
+            Some(_) => &estimate.calibrated_with,
+            None => &known_with,
+        };
+        (files, refused) = args.files(&stem, &camera.camera, of_camera, &views, &json);
+    }
+    files.extend(solved.measured(&stem, target.as_ref()));
+    let mut written = write_all(folder, &files, args.overwrite)?;
+    if let Some(page) = page {
+        solved.write_page(&page, &stem, &[args.images.as_deref()], args.overwrite)?;
+        written.push(page);
+    }
+    let mut text = listed + &table(&solved.estimate);
+    for line in solved.lines() {
+        text += &(line + "\n");
+    }
+    if let Some(test) = &solved.estimate.held_out {
+        // Writing to a String cannot fail.
+        let _ = writeln!(text, "held out: {}", headline(test));
+    }
+    for path in written {
+        let _ = writeln!(text, "wrote {}", shown(&path.display().to_string()));
+    }
+    output::print(&text)?;
+    Ok(formats_left_out(&refused).unwrap_or(solved.exit_code()))
+}
+
+impl Args {
+    /// What is known of the camera, and the targets that it was calibrated with.
+    fn intrinsics(&self) -> anyhow::Result<(Intrinsics, Vec<TargetIdentity>)> {
+        if let Some(path) = &self.fixed_intrinsics {
+            let known = camera_file::read_to_keep("--fixed-intrinsics", path)?;
+            return Ok((Intrinsics::Known(known.camera), known.calibrated_with));
+        }
+        let sought = self.model.map(|model| Intrinsics::Unknown(model.richest()));
+        Ok((sought.context("give --model, or --fixed-intrinsics")?, Vec::new()))
+    }
+
+    /// The files of a camera in all formats asked for, and why there are not all; `json` is the text that tells all.
+    fn files(
+        &self,
+        stem: &str,
+        camera: &Camera,
+        calibrated_with: &[TargetIdentity],
+        views: &[(&str, Pose)],
+        json: &str,
+    ) -> (Vec<File>, Vec<FormatError>) {
+        let (mut files, mut refused) = (Vec::new(), Vec::new());
+        let file = CameraFile {
+            camera: camera.clone(),
+            calibrated_with: calibrated_with.to_vec(),
+            failed: saved::failures(json).into_iter().next(),
+        };
+        for format in &self.format {
+            if file.failed.is_some() && *format != Format::Own {
+                // No other program would read the reason.
+                tell!(
+                    "warning: --format {}: not written, as the calibration failed",
+                    format.name()
+                );
+                continue;
+            }
+            match format.texts(stem, &file, views, json) {
+                Ok(texts) => {
+                    files.extend(texts.into_iter().map(|(name, text)| text_file(name, text)))
+                }
+                Err(error) => refused.push(error),
+            }
+        }
+        (files, refused)
+    }
+}
+
+impl Format {
+    /// What the option calls it.
+    fn name(self) -> String {
+        self.to_possible_value().map_or(String::new(), |value| value.get_name().to_owned())
+    }
+
+    /// The names and texts of its files.
+    fn texts(
+        self,
+        stem: &str,
+        file: &CameraFile,
+        views: &[(&str, Pose)],
+        json: &str,
+    ) -> Result<Vec<(String, String)>, FormatError> {
+        let camera = &file.camera;
+        let named = |end: &str, text: String| (format!("{stem}{end}"), text);
+        Ok(match self {
+            Self::Own => {
+                vec![named(".yaml", file.to_yaml()), named(".json", json.to_owned())]
+            }
+            Self::Opencv => vec![named("-opencv.yaml", opencv(camera)?)],
+            Self::Ros => vec![named("-ros.yaml", ros(camera, stem)?)],
+            Self::Kalibr => {
+                vec![named("-camchain.yaml", kalibr(&[(camera, Pose::IDENTITY)], &[])?)]
+            }
+            Self::Colmap => vec![named("-cameras.txt", colmap(&[camera])?)],
+            Self::Mrcal => vec![named(".cameramodel", mrcal(camera)?)],
+            Self::Nerfstudio => vec![named("-transforms.json", nerfstudio(camera, views)?)],
+        })
+    }
+}
+
+/// Parameters with their deviations, views with their errors.
+fn table(estimate: &Estimate) -> String {
+    estimate.cameras.iter().map(of_camera).collect::<String>() + &headline(estimate) + "\n"
+}
+
+fn of_camera(camera: &CameraEstimate) -> String {
+    let mut text = String::new();
+    let is_observed = camera.covariance_from(Source::Observed).is_some();
+    let spline = match &camera.camera.lens {
+        Lens::Spline(spline) => Some(spline.grid()),
+        _ => None,
+    };
+    if camera.covariance_from(Source::Noise).is_some() && spline.is_none() {
+        let observed = if is_observed { "    observed" } else { "" };
+        let _ = writeln!(text, "                        ± from noise{observed}");
+    }
+    for (parameter, observed) in camera.parameters.iter().zip(camera.observed_sd()) {
+        if spline.is_some() {
+            break;
+        }
+        let Some(sd) = parameter.sd else { continue };
+        let digits = places(sd).max(1);
+        let observed = observed
+            .map_or(String::new(), |sd| format!(" {sd:>11.digits$}", digits = places(sd).max(1)));
+        let _ = writeln!(
+            text,
+            "{:5} {:>16.digits$} ± {sd:>11.digits$}{observed}",
+            parameter.name, parameter.value
+        );
+    }
+    if let Some(SplineGrid { degree, columns, rows, fov_x_deg }) = spline {
+        for parameter in &camera.parameters[..PROJECTION_PARAMETERS.len()] {
+            let _ = writeln!(text, "{:5} {:>16.3}, kept", parameter.name, parameter.value);
+        }
+        let _ = writeln!(
+            text,
+            "spline of degree {degree} with {columns} × {rows} knots, {fov_x_deg}° across"
+        );
+    }
+    if let Some(line) = sureness(camera) {
+        let _ = writeln!(text, "{line}");
+    }
+    // Of neighbouring knots nobody asks.
+    let found: Vec<&str> = camera.found().filter(|_| spline.is_none()).collect();
+    for i in 0..found.len() {
+        for j in i + 1..found.len() {
+            let correlation = camera.correlation(i, j);
+            if correlation.abs() >= STRONG_CORRELATION {
+                let _ =
+                    writeln!(text, "{} and {}: correlation {correlation:.3}", found[i], found[j]);
+            }
+        }
+    }
+    let _ = writeln!(text, "view             corners  rms px  outliers");
+    for view in &camera.views {
+        let (corners, outliers) = (view.corners.len(), view.outlier_count());
+        let name = shown(&view.name);
+        let _ = writeln!(text, "{name:16} {corners:7}  {:.4}  {outliers:8}", view.rms_px);
+    }
+    text
+}
+
+/// What a calibration is worth, in a line.
+fn headline(estimate: &Estimate) -> String {
+    let mut text = format!(
+        "{}, {}, rms {:.4} px a coordinate",
+        counted(estimate.frames.len(), "view"),
+        counted(estimate.corner_count(), "corner"),
+        estimate.rms_px
+    );
+    text += &without_outliers(estimate.outlier_count(), estimate.inlier_rms_px());
+    text
+}

@@ -1,0 +1,107 @@
+//! The page about a calibration, with the photographs that it shows.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context, ensure};
+
+use super::solving::Calibrated;
+use crate::output::{self, Overwrite, tell};
+use deltille::calibrate::{View, ViewEstimate};
+use deltille::photograph;
+use deltille::raster::{AnyGray, Gray};
+use deltille::report::{Report, Sample, shown_views, thumbnail};
+use deltille_core::name::is_within;
+use deltille_core::words::counted;
+
+/// Most small pictures of views that were held out.
+const MOST_HELD_OUT: usize = 100;
+
+impl Calibrated {
+    /// Writes the page; `folders` are those of each camera's photographs.
+    pub fn write_page(
+        &self,
+        page: &Path,
+        title: &str,
+        folders: &[Option<&Path>],
+        overwrite: Overwrite,
+    ) -> anyhow::Result<()> {
+        let (mut thumbnails, mut samples) = (BTreeMap::new(), BTreeMap::new());
+        for (index, (camera, folder)) in self.estimate.cameras.iter().zip(folders).enumerate() {
+            let Some(folder) = folder else { continue };
+            let is_there = |view: &&ViewEstimate| picture_of(&view.image, folder).is_some();
+            let shown = Sample::best(camera, is_there).map(|view| view.name.as_str());
+            let held_out = self.estimate.held_out.iter().flat_map(|test| test.cameras.get(index));
+            let held_out = held_out.flat_map(|camera| &camera.views).take(MOST_HELD_OUT);
+            // No more than the page shows, and the one that is undistorted.
+            let more = camera.views.iter().filter(|view| shown == Some(view.name.as_str()));
+            let views = shown_views(camera).into_iter().chain(more).chain(held_out);
+            let mut done = BTreeSet::new();
+            let views = views.filter(|view| done.insert(&view.image));
+            for view in views {
+                let size_px = [camera.camera.width, camera.camera.height];
+                let picture = picture(&view.image, folder, size_px);
+                let small = picture.as_ref().and_then(thumbnail);
+                thumbnails.extend(small.map(|small| ((index, view.name.clone()), small)));
+                if let (Some(picture), true) = (picture, shown == Some(view.name.as_str())) {
+                    samples.extend(Sample::of(camera, view, picture).map(|made| (index, made)));
+                }
+            }
+        }
+        let Self { estimate, diagnoses, stated, print, models } = self;
+        let mut report = Report::new(title, estimate);
+        (report.diagnoses, report.stated) = (diagnoses, stated);
+        (report.print, report.thumbnails) = (*print, thumbnails);
+        (report.samples, report.models) = (samples, models);
+        output::write(page, report.html().as_bytes(), overwrite).context("--report")
+    }
+}
+
+/// The picture of a view, in 8 bits. One that is not there leaves its place to the corners, as does one that cannot be
+/// read or is not of the size that the camera has, which is told.
+fn picture(image: &str, folder: &Path, size_px: [u32; 2]) -> Option<Gray<u8>> {
+    let path = picture_of(image, folder)?;
+    let picture = match photograph::read(&path) {
+        Ok(picture) => picture,
+        Err(error) => {
+            tell!("warning: --images: {error}");
+            return None;
+        }
+    };
+    if [picture.width(), picture.height()] != size_px.map(|side| side as usize) {
+        tell!(
+            "warning: --images: {} has {} × {} px, the camera {} × {}",
+            path.display(),
+            picture.width(),
+            picture.height(),
+            size_px[0],
+            size_px[1]
+        );
+        return None;
+    }
+    Some(match picture {
+        AnyGray::U8(image) => image,
+        AnyGray::U16(image) => image.map(|v| (v >> 8) as u8),
+    })
+}
+
+/// The picture of a view in a folder, or in one within it. What a file calls the picture leads nowhere else.
+fn picture_of(image: &str, folder: &Path) -> Option<PathBuf> {
+    is_within(image).then(|| folder.join(image)).filter(|path| path.is_file())
+}
+
+/// Refuses what is no folder, and tells which pictures of the views are not in it.
+pub fn check_images(folder: &Path, views: &[View]) -> anyhow::Result<()> {
+    ensure!(folder.is_dir(), "--images: {} is no folder", folder.display());
+    let missing = views.iter().filter(|view| picture_of(&view.image, folder).is_none());
+    let missing: Vec<&str> = missing.map(|view| view.image.as_str()).collect();
+    if let Some(first) = missing.first() {
+        tell!(
+            "warning: --images: {} of {} are not in {}, such as {first}",
+            missing.len(),
+            counted(views.len(), "picture"),
+            folder.display()
+        );
+    }
+    Ok(())
+}

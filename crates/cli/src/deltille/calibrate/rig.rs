@@ -1,0 +1,418 @@
+//! `deltille rig`.
+
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+
+use anyhow::{Context, bail, ensure};
+use clap::ValueEnum;
+
+use super::report_page::check_images;
+use super::sightings;
+use super::sightings::{GridArgs, SheetArgs};
+use super::solving::{
+    Calibrated, ModelChoice, SolveArgs, chosen, left_out as formats_left_out, sample, sureness,
+    without_outliers,
+};
+use crate::deltille::files::limits::FileLimits;
+use crate::deltille::files::written::{
+    File, check_places, same_file, sample_of, text_file, write_all,
+};
+use crate::deltille::files::{camera_file, target_file};
+use crate::output::{Overwrite, check_folder, fixed, say, tell};
+use crate::run::{FAILED, report};
+use deltille::calibrate::{
+    Calibration, CameraViews, Estimate, Excluded, Intrinsics, Reference, TargetMap,
+};
+use deltille::camera::{Camera, CameraFile, Pose};
+use deltille::detect::{Detection, InkEstimate};
+use deltille::export::calibration::Print;
+use deltille::export::camera::{FormatError, colmap, colmap_rig, kalibr};
+use deltille::export::{rig, saved};
+use deltille::layout::Printing;
+use deltille::report::target_map_svg;
+use deltille::targets::{Name, Target};
+use deltille_core::words::counted;
+
+/// Arguments of `deltille rig`.
+#[derive(clap::Args)]
+pub struct Args {
+    /// A camera and the folder of its detections, such as left=corners/left; once for each, the
+    /// first is the rig's frame. Pictures of one moment have the same file name in each folder
+    #[arg(long, required = true, value_name = "NAME=FOLDER", value_parser = named)]
+    camera: Vec<(String, PathBuf)>,
+    /// Description of the target: the .json that was written with it; once for each of several targets that do not
+    /// move against each other, of which no camera need see more than one
+    #[arg(long, required_unless_present = "grid", value_name = "FILE")]
+    target: Vec<PathBuf>,
+    #[command(flatten)]
+    grid: GridArgs,
+    /// What is to be found of each camera, see `deltille calibrate`
+    #[arg(long, default_value = "radtan")]
+    model: ModelChoice,
+    /// A camera that is known already and kept, with its file
+    #[arg(long, value_name = "NAME=FILE", value_parser = named)]
+    known: Vec<(String, PathBuf)>,
+    /// Use --target even where the detections, or the camera, name another target
+    #[arg(long)]
+    assume_target: bool,
+    #[command(flatten)]
+    sheet: SheetArgs,
+    /// Find where the target's panels are on it, and write that as <target>-refined.json
+    #[arg(long, conflicts_with_all = ["print_scale", "grid"])]
+    refine_target: bool,
+    #[command(flatten)]
+    solve: SolveArgs,
+    /// A camera and the folder of its photographs, for small pictures on the page
+    #[arg(long, value_name = "NAME=FOLDER", value_parser = named, requires = "report")]
+    images: Vec<(String, PathBuf)>,
+    /// What to write beside rig.json and <camera>.yaml; several may be given, separated by commas
+    #[arg(long, value_delimiter = ',')]
+    format: Vec<Format>,
+    /// Folder for rig.json, <camera>.yaml and the refined target
+    #[arg(short, long, value_name = "FOLDER", default_value = ".")]
+    output: PathBuf,
+    #[command(flatten)]
+    limits: FileLimits,
+    #[command(flatten)]
+    overwrite: Overwrite,
+}
+
+#[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum Format {
+    /// camchain.yaml
+    Kalibr,
+    /// cameras.txt and rig_config.json
+    Colmap,
+}
+
+fn named(text: &str) -> Result<(String, PathBuf), String> {
+    match text.split_once('=') {
+        Some((name, path)) if !path.is_empty() => {
+            Name::new(name).map(|name| (name.to_string(), path.into()))
+        }
+        _ => Err("give a name and a path, such as left=corners/left".to_owned()),
+    }
+}
+
+/// Calibrates a rig and writes it.
+pub fn run(args: Args) -> anyhow::Result<ExitCode> {
+    if args.camera.len() < 2 && !args.refine_target {
+        bail!(
+            "--camera: a rig has at least two; `deltille calibrate` takes one, and so does --refine-target"
+        );
+    }
+    let names: Vec<&str> = args.camera.iter().map(|(name, _)| name.as_str()).collect();
+    check_names(&names)?;
+    check_named("--known", &args.known, &names)?;
+    check_named("--images", &args.images, &names)?;
+    check_folders(&args.camera)?;
+    check_folder(&args.output).context("-o")?;
+    let limits = args.limits.limits();
+    let (printed, grid) = match args.grid.read_target()? {
+        Some((grid, target)) => (vec![target.into()], Some(grid)),
+        None => (target_file::read_all_placed(&args.target, &limits).context("--target")?, None),
+    };
+    let targets: Vec<Target> = printed.iter().map(|one| one.target.clone()).collect();
+    let reference = match (grid, targets.as_slice()) {
+        (Some(grid), _) => Reference::Grid(grid),
+        (None, [only]) => Reference::Target(only),
+        (None, several) => Reference::Scene(several),
+    };
+    let sheet = args.sheet.read(&limits, &reference.identities(), &printed)?;
+    let panels = sightings::panels(&reference, &sheet)?;
+    let cameras = args.camera.iter().map(|(name, _)| args.intrinsics(name, &targets));
+    let cameras = cameras.collect::<anyhow::Result<Vec<Intrinsics>>>()?;
+    args.check_files(&cameras, &printed)?;
+    let page = args.solve.page("rig", args.overwrite)?;
+    let mut calibration = Calibration::of(&reference, panels).refine_panels(args.refine_target);
+    let (mut left_out, mut ink, mut seen) = (Vec::new(), Vec::new(), Vec::new());
+    for ((name, folder), intrinsics) in args.camera.iter().zip(cameras) {
+        let read =
+            sightings::read(std::slice::from_ref(folder), &reference, &limits, args.assume_target);
+        let sightings::Read { mut views, left_out: out, ink: of_camera, detections, .. } =
+            read.with_context(|| format!("--camera {name}"))?;
+        check_own(name, &detections, &seen)?;
+        seen.push((name, detections));
+        let of_camera_out = |out: Vec<Excluded>| {
+            out.into_iter().map(|out| Excluded { camera: Some(name.clone()), ..out })
+        };
+        left_out.extend(of_camera_out(sightings::take_known(&mut views, &reference)));
+        if args.solve.measures_target() {
+            let unsure = sightings::take_sure(&mut views, &reference)?;
+            left_out.extend(of_camera_out(unsure));
+        }
+        sightings::put_on(&sheet, reference.targets().first(), &mut views)?;
+        left_out.extend(of_camera_out(out));
+        ink.extend(of_camera);
+        if let Some(folder) = of_name(&args.images, name) {
+            check_images(folder, &views)?;
+        }
+        calibration = calibration.with(CameraViews::new(name, views, intrinsics));
+    }
+    let (mut tried, mut text) = (Vec::new(), String::new());
+    for (index, (name, _)) in args.camera.iter().enumerate() {
+        let of_camera = args.model.choose(&mut calibration, index);
+        let of_camera = of_camera.with_context(|| format!("--camera {name}"))?;
+        if !of_camera.is_empty() {
+            text += &format!("{name}:\n{}", chosen(&of_camera));
+        }
+        tried.push(of_camera);
+    }
+    let print = Print { scale: sheet.print_scale, ink: InkEstimate::of_all(&ink) };
+    let mut solved = args.solve.solve(calibration, print, tried)?;
+    let detections = seen.iter().flat_map(|(_, detections)| detections);
+    if let (Some(note), false) = (sightings::unnamed(detections, &reference), args.assume_target) {
+        tell!("{note}");
+    }
+    let of_test = solved.estimate.held_out.iter().flat_map(|test| &test.excluded);
+    for out in solved.estimate.excluded.iter().chain(of_test) {
+        tell!("{}: left out: {}", out.shown(), out.reason);
+    }
+    if let Err(foreign) = solved.tell() {
+        report(&foreign.context("--known"));
+        return Ok(ExitCode::from(FAILED));
+    }
+    text += &summary(&solved);
+    solved.estimate.excluded.splice(0..0, left_out);
+    let Calibrated { estimate, diagnoses, print, .. } = &solved;
+    let residuals = args.solve.residuals();
+    let json = rig::write(estimate, diagnoses, &args.model.name(), *print, residuals);
+    let cameras = estimate.cameras.iter();
+    let cameras = cameras.map(|c| (c.name.as_str(), &c.camera, c.camera_from_rig));
+    let cameras = cameras.collect::<Vec<_>>();
+    let (files, refused) = args.files(&cameras, &json, estimate, &printed)?;
+    let mut written = write_all(&args.output, &files, args.overwrite)?;
+    if let Some(page) = page {
+        let folder = |(name, _): &(String, PathBuf)| of_name(&args.images, name);
+        let folders: Vec<_> = args.camera.iter().map(folder).collect();
+        solved.write_page(&page, "rig", &folders, args.overwrite)?;
+        written.push(page);
+    }
+    for line in text.lines() {
+        say!("{line}");
+    }
+    for path in written {
+        say!("wrote {}", path.display());
+    }
+    Ok(formats_left_out(&refused).unwrap_or(solved.exit_code()))
+}
+
+impl Args {
+    /// What is known of a camera.
+    fn intrinsics(&self, name: &str, targets: &[Target]) -> anyhow::Result<Intrinsics> {
+        let known = of_name(&self.known, name)
+            .map(|path| camera_file::read_to_keep("--known", path).map(|file| (path, file)));
+        let known = known.transpose()?;
+        if let Some((path, file)) = &known {
+            let of_file = &file.calibrated_with;
+            camera_file::check_or_note(path, of_file, targets, self.assume_target)?;
+        }
+        let known = known.map(|(_, file)| Intrinsics::Known(file.camera));
+        Ok(known.unwrap_or(Intrinsics::Unknown(self.model.richest())))
+    }
+
+    /// Refuses before the work what could not be written after it.
+    fn check_files(&self, cameras: &[Intrinsics], printed: &[Printing]) -> anyhow::Result<()> {
+        let samples: Vec<Camera> = cameras.iter().map(sample).collect();
+        let cameras = self.camera.iter().zip(&samples);
+        let cameras = cameras.map(|((name, _), camera)| (name.as_str(), camera, Pose::IDENTITY));
+        let mut found = Estimate::default();
+        found.map = self.solve.measures_target().then(|| TargetMap::new(Vec::new(), [0.0; 2]));
+        let json = sample_of(rig::SCHEMA);
+        let (files, _) = self.files(&cameras.collect::<Vec<_>>(), &json, &found, printed)?;
+        check_places(&self.output, &files, self.overwrite)
+    }
+
+    /// All files, and why some formats have none; `json` is the text that tells all.
+    fn files(
+        &self,
+        cameras: &[(&str, &Camera, Pose)],
+        json: &str,
+        found: &Estimate,
+        printed: &[Printing],
+    ) -> anyhow::Result<(Vec<File>, Vec<FormatError>)> {
+        let mut refused = Vec::new();
+        let mut files = vec![text_file("rig.json".to_owned(), json.to_owned())];
+        let failed = saved::failures(json).into_iter().next();
+        for (name, camera, _) in cameras {
+            let camera = (*camera).clone();
+            // A camera that was given was calibrated elsewhere.
+            let is_known = of_name(&self.known, name).is_some();
+            let calibrated_with = if is_known { Vec::new() } else { found.calibrated_with.clone() };
+            let failed = failed.clone().filter(|_| !is_known);
+            let yaml = CameraFile { camera, calibrated_with, failed }.to_yaml();
+            files.push(text_file(format!("{name}.yaml"), yaml));
+        }
+        if failed.is_some() {
+            // No other file would carry the reason.
+            if !self.format.is_empty() || self.refine_target || found.map.is_some() {
+                tell!(
+                    "warning: only rig.json and the cameras are written, as the calibration failed"
+                );
+            }
+            return Ok((files, refused));
+        }
+        for format in &self.format {
+            match format.files(cameras, found) {
+                Ok(of_format) => files.extend(of_format),
+                Err(error) => refused.push(error),
+            }
+        }
+        for (index, printing) in printed.iter().enumerate() {
+            files.extend(self.files_of_target(&found.of_target(index), printing)?);
+        }
+        Ok((files, refused))
+    }
+
+    /// A target as it was found, where that was asked for.
+    fn files_of_target(&self, found: &Estimate, printing: &Printing) -> anyhow::Result<Vec<File>> {
+        let target = &printing.target;
+        let refined = self.refine_target.then(|| found.refined(target));
+        let measured = found.map.as_ref().map(|map| map.on(refined.as_ref().unwrap_or(target)));
+        let end = if measured.is_some() { "-measured" } else { "" };
+        let Some(target) = measured.or(refined) else { return Ok(Vec::new()) };
+        let name = format!("{}{end}", target.name);
+        let place = self.output.join(format!("{name}.json"));
+        ensure!(
+            !self.target.iter().any(|given| same_file(&place, given)),
+            "-o: {} would overwrite the target that was given: choose another folder",
+            place.display()
+        );
+        let printing = Printing { target, ..printing.clone() };
+        let file = text_file(format!("{name}.json"), printing.to_json());
+        let drawn = found.map.as_ref().map(target_map_svg);
+        let drawn = drawn.map(|svg| text_file(format!("{name}.svg"), svg));
+        Ok([file].into_iter().chain(drawn).collect())
+    }
+}
+
+/// Refuses names of cameras that cannot be names of files, or not of different ones.
+fn check_names(names: &[&str]) -> anyhow::Result<()> {
+    for (index, name) in names.iter().enumerate() {
+        let is_same = |other: &&&str| other.to_lowercase() == name.to_lowercase();
+        let is_taken = ["rig", "camchain"].iter().any(|own| is_same(&own));
+        if is_taken || name.contains(['/', '\\']) || name.starts_with('.') {
+            bail!("--camera: {name} cannot be the name of a file");
+        }
+        match names[..index].iter().find(is_same) {
+            Some(other) if other == name => bail!("--camera: {name} is named twice"),
+            Some(other) => bail!(
+                "--camera: {other} and {name} differ in case only, and some systems take their files \
+                 for one"
+            ),
+            None => {}
+        }
+    }
+    Ok(())
+}
+
+/// Refuses a folder that is given for two cameras.
+fn check_folders(cameras: &[(String, PathBuf)]) -> anyhow::Result<()> {
+    let mut places: Vec<(PathBuf, &str)> = Vec::new();
+    for (name, folder) in cameras {
+        // What is not there is told where it is read.
+        let Ok(place) = folder.canonicalize() else { continue };
+        if let Some((_, other)) = places.iter().find(|(there, _)| *there == place) {
+            bail!("--camera: {other} and {name} have the same folder, {}", folder.display());
+        }
+        places.push((place, name));
+    }
+    Ok(())
+}
+
+/// Refuses pictures that another camera has too: of the same size, but of two cameras never the same corners.
+fn check_own(
+    name: &str,
+    detections: &[(String, Detection)],
+    others: &[(&String, Vec<(String, Detection)>)],
+) -> anyhow::Result<()> {
+    for (other, theirs) in others {
+        let is_theirs = |own: &&(String, Detection)| {
+            theirs.iter().any(|(_, of_other)| sightings::is_same(&own.1, of_other))
+        };
+        if let Some((picture, _)) = detections.iter().find(is_theirs) {
+            bail!("--camera {name}: {picture} has the same corners as a picture of {other}");
+        }
+    }
+    Ok(())
+}
+
+/// Refuses names that are no camera's, or given twice.
+fn check_named(option: &str, given: &[(String, PathBuf)], cameras: &[&str]) -> anyhow::Result<()> {
+    for (index, (name, _)) in given.iter().enumerate() {
+        if given[..index].iter().any(|(other, _)| other == name) {
+            bail!("{option}: {name} is given twice");
+        }
+        if !cameras.contains(&name.as_str()) {
+            bail!("{option}: there is no --camera {name}");
+        }
+    }
+    Ok(())
+}
+
+/// What was given for a camera.
+fn of_name<'a>(given: &'a [(String, PathBuf)], name: &str) -> Option<&'a Path> {
+    given.iter().find(|(of, _)| of == name).map(|(_, path)| path.as_path())
+}
+
+impl Format {
+    fn files(
+        self,
+        cameras: &[(&str, &Camera, Pose)],
+        found: &Estimate,
+    ) -> Result<Vec<File>, FormatError> {
+        let alone: Vec<&Camera> = cameras.iter().map(|(_, camera, _)| *camera).collect();
+        let placed: Vec<(&Camera, Pose)> = cameras.iter().map(|(_, c, pose)| (*c, *pose)).collect();
+        Ok(match self {
+            Self::Kalibr => {
+                vec![text_file("camchain.yaml".to_owned(), kalibr(&placed, &found.overlaps())?)]
+            }
+            Self::Colmap => vec![
+                text_file("cameras.txt".to_owned(), colmap(&alone)?),
+                text_file("rig_config.json".to_owned(), colmap_rig(cameras)?),
+            ],
+        })
+    }
+}
+
+/// The largest deviations of a place and a turn.
+fn within(sd: &[f64; 6]) -> String {
+    let largest = |sd: &[f64]| sd.iter().copied().fold(0.0, f64::max);
+    format!(" ± {:.3} mm, {:.4}°", largest(&sd[3..]), largest(&sd[..3]).to_degrees())
+}
+
+fn summary(solved: &Calibrated) -> String {
+    let estimate = &solved.estimate;
+    let headline = |estimate: &Estimate| {
+        format!(
+            "{}, rms {:.4} px{}",
+            counted(estimate.frames.len(), "frame"),
+            estimate.rms_px,
+            without_outliers(estimate.outlier_count(), estimate.inlier_rms_px())
+        )
+    };
+    let mut lines =
+        vec![format!("{}, {}", counted(estimate.cameras.len(), "camera"), headline(estimate))];
+    for camera in &estimate.cameras {
+        let (fx, fy) = camera.camera.focal_px.into();
+        let at = camera.camera_from_rig.inverse().translation;
+        let deviation = camera.pose_sd.map_or(String::new(), |sd| within(&sd));
+        lines.push(format!(
+            "{}: {} corners, rms {:.4} px{}, fx {fx:.2}, fy {fy:.2}; at ({}) mm{deviation}",
+            camera.name,
+            camera.corner_count(),
+            camera.rms_px,
+            without_outliers(camera.outlier_count(), camera.inlier_rms_px()),
+            at.to_array().map(|mm| fixed(mm, 2)).join(", ")
+        ));
+        lines.extend(sureness(camera).map(|line| format!("{}: {line}", camera.name)));
+    }
+    for target in estimate.targets.iter().filter(|_| estimate.targets.len() > 1) {
+        let at = target.scene_from_target.translation.to_array().map(|mm| fixed(mm, 2));
+        let deviation = target.pose_sd.map_or(String::new(), |sd| within(&sd));
+        lines.push(format!("target {}: at ({}) mm{deviation}", target.name, at.join(", ")));
+    }
+    lines.extend(solved.lines());
+    lines.extend(estimate.held_out.iter().map(|test| format!("held out: {}", headline(test))));
+    lines.join("\n")
+}

@@ -1,0 +1,87 @@
+//! `deltille aprilgrid`.
+
+use std::process::ExitCode;
+
+use anyhow::Context;
+
+use super::settings::board_settings::TAGS;
+use super::settings::meshes::PlateMeshes;
+use super::single_panel::{PrintingArgs, page};
+use crate::deltille::files::written::text_file;
+use crate::output::tell;
+use crate::values::{Grid, number, whole};
+use deltille::family;
+use deltille::layout::tag_range;
+use deltille::targets::{AprilGridSpec, TargetSpec, parse_length_mm};
+
+#[derive(clap::Args)]
+pub struct Args {
+    /// Tags in each row, and rows of tags, such as 6x6
+    #[arg(long, value_name = "COLUMNSxROWS")]
+    tags: Grid,
+    /// Side of a tag with its black border, Kalibr's tagSize, such as 25mm, 8.8cm, 1in
+    #[arg(long, value_name = "LENGTH", default_value = "25mm", value_parser = parse_length_mm)]
+    edge: f64,
+    /// Width of the gaps between tags, in tags, 0.1 to 0.9, Kalibr's tagSpacing
+    #[arg(long, value_name = "TAGS", default_value_t = 0.3, value_parser = number(0.1..=0.9))]
+    gap: f64,
+    /// Tag family: Kalibr reads aprilTag36h11 only
+    #[arg(long, help_heading = TAGS, default_value = "aprilTag36h11")]
+    family: String,
+    /// Id of the first tag, at the lower left; the others follow row by row
+    #[arg(long, help_heading = TAGS, value_name = "ID", default_value_t = 0,
+          allow_negative_numbers = true, value_parser = whole(0..=u32::MAX))]
+    first_id: u32,
+    /// Black border of a tag, in widths of a bit, 1 to 10: Kalibr reads 2 only, most others 1
+    #[arg(long, help_heading = TAGS, value_name = "BITS", default_value_t = 2.0,
+          value_parser = number(1.0..=10.0))]
+    tag_border: f64,
+    /// Id of the board
+    #[arg(long, value_name = "ID", default_value_t = 0, allow_negative_numbers = true,
+          value_parser = whole(0..=u32::MAX))]
+    board_id: u32,
+    #[command(flatten)]
+    printing: PrintingArgs,
+    #[command(flatten)]
+    meshes: PlateMeshes,
+}
+
+/// Makes a grid, writes its files and that of Kalibr, and verifies what it wrote.
+pub fn run(args: Args) -> anyhow::Result<ExitCode> {
+    args.meshes.check_use(None)?;
+    let is_made = args.meshes.is_any();
+    let Grid(tags) = args.tags;
+    let spec = AprilGridSpec {
+        gap: args.gap,
+        family: args.family,
+        first_id: args.first_id,
+        border_bits: args.tag_border,
+        board_id: args.board_id,
+        ..AprilGridSpec::new(tags, args.edge)
+    };
+    let family = Some(family::resolve(&spec.family).context("--family")?);
+    let family = family.as_ref();
+    let printing =
+        args.printing.build("aprilgrid", &TargetSpec::AprilGrid(spec.clone()), family, is_made)?;
+    let mut files = args.printing.files(&printing, family, is_made)?;
+    let (meshes, texture) = args.meshes.files(&printing.target, family)?;
+    files.extend(meshes);
+    match spec.to_kalibr_yaml() {
+        Some(yaml) => files.push(text_file(format!("{}.yaml", printing.target.name), yaml)),
+        None => tell!(
+            "no {}.yaml is written: Kalibr reads tags of aprilTag36h11 with a border of 2 bits only",
+            printing.target.name
+        ),
+    }
+    let [columns, rows] = spec.tags;
+    let last = spec.first_id + spec.count() - 1;
+    let summary = format!(
+        "{}: {columns} × {rows} tags, edge {} mm, gaps {} mm, {}{}{texture}",
+        printing.target.name,
+        spec.tag_mm,
+        (spec.gap * spec.tag_mm * 1e3).round() / 1e3,
+        tag_range(family.map_or("", |family| family.name()), spec.first_id, last),
+        page(&printing)
+    );
+    args.printing.delivery.deliver(&printing, family, &files, &summary)
+}

@@ -1,0 +1,79 @@
+//! `deltille charuco`.
+
+use std::process::ExitCode;
+
+use super::settings::board_settings::TAGS;
+use super::settings::meshes::PlateMeshes;
+use super::single_panel::{PrintingArgs, page};
+use crate::values::{Grid, whole};
+use deltille::family::{Family, dictionary};
+use deltille::layout::tag_range;
+use deltille::targets::{CharucoSpec, TargetSpec, parse_length_mm};
+
+#[derive(clap::Args)]
+pub struct Args {
+    /// Squares in each row, and rows of squares, such as 8x6
+    #[arg(long, value_name = "COLUMNSxROWS")]
+    squares: Grid,
+    /// Edge of a square, such as 30mm, 3cm, 1.2in
+    #[arg(long, value_name = "LENGTH", default_value = "30mm", value_parser = parse_length_mm)]
+    edge: f64,
+    /// Side of a marker with its black border [default: three quarters of the square]
+    #[arg(long, value_name = "LENGTH", value_parser = parse_length_mm)]
+    marker: Option<f64>,
+    /// OpenCV's dictionary: 4x4, 5x5, 6x6 or 7x7 with _50, _100, _250 or _1000; apriltag_16h5,
+    /// apriltag_25h9 or apriltag_36h11
+    #[arg(long, help_heading = TAGS, value_name = "NAME", default_value = "5x5_100")]
+    dictionary: String,
+    /// Id of the first marker; the others follow
+    #[arg(long, help_heading = TAGS, value_name = "ID", default_value_t = 0,
+          allow_negative_numbers = true, value_parser = whole(0..=u32::MAX))]
+    first_id: u32,
+    /// The pattern of OpenCV before 4.6, which with an even number of rows begins with a white
+    /// square; in OpenCV setLegacyPattern(true)
+    #[arg(long)]
+    legacy: bool,
+    /// Id of the board
+    #[arg(long, value_name = "ID", default_value_t = 0, allow_negative_numbers = true,
+          value_parser = whole(0..=u32::MAX))]
+    board_id: u32,
+    #[command(flatten)]
+    printing: PrintingArgs,
+    #[command(flatten)]
+    meshes: PlateMeshes,
+}
+
+/// Makes a board, writes its files, and verifies what it wrote.
+pub fn run(args: Args) -> anyhow::Result<ExitCode> {
+    args.meshes.check_use(None)?;
+    let is_made = args.meshes.is_any();
+    let Grid(squares) = args.squares;
+    // A name that is unknown is refused with the other numbers.
+    let name = dictionary(&args.dictionary).map_or(args.dictionary, |(name, _)| name.to_owned());
+    let usual = CharucoSpec::new(squares, args.edge, &name);
+    let spec = CharucoSpec {
+        marker_mm: args.marker.unwrap_or(usual.marker_mm),
+        first_id: args.first_id,
+        board_id: args.board_id,
+        legacy: args.legacy,
+        ..usual
+    };
+    let family = Family::shipped(&spec.dictionary).ok();
+    let family = family.as_ref();
+    let printing =
+        args.printing.build("charuco", &TargetSpec::Charuco(spec.clone()), family, is_made)?;
+    let mut files = args.printing.files(&printing, family, is_made)?;
+    let (meshes, texture) = args.meshes.files(&printing.target, family)?;
+    files.extend(meshes);
+    let last = spec.first_id + spec.markers() - 1;
+    let [columns, rows] = spec.squares;
+    let summary = format!(
+        "{}: {columns} × {rows} squares, edge {} mm, markers {} mm, {}{}{texture}",
+        printing.target.name,
+        spec.square_mm,
+        spec.marker_mm,
+        tag_range(&spec.dictionary, spec.first_id, last),
+        page(&printing)
+    );
+    args.printing.delivery.deliver(&printing, family, &files, &summary)
+}

@@ -1,0 +1,55 @@
+//! `deltille circles`.
+
+use std::process::ExitCode;
+
+use super::single_panel::{PrintingArgs, page};
+use crate::values::{Grid, whole};
+use deltille::targets::{CirclesSpec, TargetSpec, parse_length_mm};
+
+#[derive(clap::Args)]
+pub struct Args {
+    /// Circles in each row, and rows, such as 9x7, or 4x11 of an asymmetric grid: OpenCV's
+    /// patternSize
+    #[arg(long, value_name = "COLUMNSxROWS")]
+    circles: Grid,
+    /// Shift every second row: OpenCV's CALIB_CB_ASYMMETRIC_GRID
+    #[arg(long)]
+    asymmetric: bool,
+    /// Distance from row to row; along a row too, in an asymmetric grid half of it
+    #[arg(long, value_name = "LENGTH", default_value = "20mm", value_parser = parse_length_mm)]
+    spacing: f64,
+    /// Diameter of a circle [default: half of the spacing]
+    #[arg(long, value_name = "LENGTH", value_parser = parse_length_mm)]
+    diameter: Option<f64>,
+    /// Id of the board
+    #[arg(long, value_name = "ID", default_value_t = 0, allow_negative_numbers = true,
+          value_parser = whole(0..=u32::MAX))]
+    board_id: u32,
+    #[command(flatten)]
+    printing: PrintingArgs,
+}
+
+/// Makes a grid, writes its files, and verifies what it wrote.
+pub fn run(args: Args) -> anyhow::Result<ExitCode> {
+    let Grid(circles) = args.circles;
+    let usual = CirclesSpec::new(circles, args.spacing);
+    let spec = CirclesSpec {
+        diameter_mm: args.diameter.unwrap_or(usual.diameter_mm),
+        asymmetric: args.asymmetric,
+        board_id: args.board_id,
+        ..usual
+    };
+    let printing =
+        args.printing.build("circles", &TargetSpec::Circles(spec.clone()), None, false)?;
+    let files = args.printing.files(&printing, None, false)?;
+    let summary = format!(
+        "{}: {} × {} circles, spacing {} mm, diameter {} mm{}",
+        printing.target.name,
+        spec.circles[0],
+        spec.circles[1],
+        spec.spacing_mm,
+        spec.diameter_mm,
+        page(&printing)
+    );
+    args.printing.delivery.deliver(&printing, None, &files, &summary)
+}

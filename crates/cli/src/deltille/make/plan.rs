@@ -1,0 +1,219 @@
+//! `deltille plan`.
+
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+use anyhow::{Context, bail, ensure};
+
+use crate::deltille::files::camera_file;
+use crate::output::{self, Telling, say};
+use crate::values::{distance, number};
+use deltille::family::{self, places};
+use deltille::lattice::GridKind;
+use deltille::layout::PaperSpec;
+use deltille::layout::{Proposal, Situation};
+use deltille::targets::{BoardSpec, TagSpec, TagsIn};
+use deltille_core::words::counted;
+
+/// Tilts for which it is told how far a board is labelled, °.
+const TOLD_DEG: [f64; 3] = [0.0, 45.0, 60.0];
+
+/// Arguments of `deltille plan`.
+#[derive(clap::Args)]
+pub struct Args {
+    /// Width and height of the camera's pictures, px, such as 1920x1080
+    #[arg(long, value_name = "WxH", value_parser = size, required_unless_present = "camera")]
+    size: Option<[u32; 2]>,
+    /// Its horizontal field of view, ° [default: 60]
+    #[arg(long, value_name = "DEGREES", value_parser = number(0.1..=150.0), conflicts_with = "camera")]
+    fov: Option<f64>,
+    /// The camera, instead: its file
+    #[arg(long, value_name = "FILE", conflicts_with = "size")]
+    camera: Option<PathBuf>,
+    /// The distances from which the board is to be seen, such as 50cm..3m
+    #[arg(long, value_name = "NEAR..FAR", value_parser = range)]
+    distance: [f64; 2],
+    /// Tilt up to which all tags are to be read from the farthest distance, °
+    #[arg(long, value_name = "DEGREES", default_value = "45", value_parser = number(0.0..=75.0))]
+    tilt: f64,
+    /// Propose a checkerboard
+    #[arg(long)]
+    checker: bool,
+    /// Tag family; of a checkerboard without tags where none is given [default: delTag25h7]
+    #[arg(long)]
+    family: Option<String>,
+    /// Propose a board of place codes, of which any few tiles are labelled
+    #[arg(long, conflicts_with_all = ["family", "checker"])]
+    dense: bool,
+    /// No tags
+    #[arg(long, conflicts_with_all = ["family", "dense"])]
+    untagged: bool,
+    /// The paper that it must fit, such as A3 [default: up to A0]
+    #[arg(long, value_name = "SIZE")]
+    paper: Option<String>,
+    #[command(flatten)]
+    telling: Telling,
+}
+
+/// Width and height, px.
+fn size(text: &str) -> Result<[u32; 2], String> {
+    let sides =
+        text.split_once(['x', '×']).and_then(|(w, h)| Some([w.parse().ok()?, h.parse().ok()?]));
+    let sides =
+        sides.filter(|sides: &[u32; 2]| sides.iter().all(|side| (16..=50_000).contains(side)));
+    sides.ok_or_else(|| "write width and height in px, such as 1920x1080".to_owned())
+}
+
+/// Two distances, mm; the unit may stand with the second alone.
+fn range(text: &str) -> Result<[f64; 2], String> {
+    let (near, far) =
+        text.split_once("..").ok_or_else(|| "write two distances, such as 50cm..3m".to_owned())?;
+    let unit = far.trim_start_matches(|c: char| c.is_ascii_digit() || c == '.');
+    let with_unit = match near.parse::<f64>() {
+        Ok(_) => format!("{near}{unit}"),
+        Err(_) => near.to_owned(),
+    };
+    let [near, far] = [distance(&with_unit)?, distance(far)?];
+    if near < far {
+        Ok([near, far])
+    } else {
+        Err("the first distance must be the shorter one".to_owned())
+    }
+}
+
+/// Proposes a board and says what it is good for.
+pub fn run(args: Args) -> anyhow::Result<ExitCode> {
+    let (focal_px, size_px) = match (&args.camera, args.size) {
+        (Some(path), _) => {
+            let camera = camera_file::read("--camera", path)?;
+            ensure!(
+                camera.lens.is_perspective(),
+                "--camera: a fisheye has no one focal length: give --size and --fov for the part of the picture in which \
+                 the board is to be seen"
+            );
+            (camera.focal_px.min_element(), [camera.width, camera.height])
+        }
+        (None, Some(size)) => {
+            let half = args.fov.unwrap_or(60.0).to_radians() / 2.0;
+            (f64::from(size[0]) / 2.0 / half.tan(), size)
+        }
+        (None, None) => bail!("--size: give the size of the pictures, or --camera"),
+    };
+    let situation = Situation {
+        focal_px,
+        size_px,
+        distances_mm: args.distance,
+        tilt_rad: args.tilt.to_radians(),
+    };
+    let (kind, command) = match args.checker {
+        true => (GridKind::Checker, "checkerboard"),
+        false => (GridKind::Deltille, "board"),
+    };
+    let named = match (&args.family, args.checker || args.untagged) {
+        (Some(name), _) => Some(name.clone()),
+        (None, true) => None,
+        (None, false) if args.dense => Some(places::NAME.to_owned()),
+        (None, false) => Some(TagSpec::default().family),
+    };
+    let option = if args.checker { "--tags" } else { "--family" };
+    let family = named.as_deref().map(family::resolve).transpose().context("--family")?;
+    if let Some(family) = &family {
+        ensure!(
+            family.kind() == kind,
+            "--family: {} is of the other tiling: take another, or --checker",
+            family.name()
+        );
+    }
+    let tags = named.as_deref().map(|name| TagSpec::usual(kind, Some(name), TagsIn::Black));
+    let paper = PaperSpec {
+        size: args.paper.as_deref().map(str::parse).transpose().context("--paper")?,
+        ..PaperSpec::default()
+    };
+    let proposal = situation.board(kind, tags.zip(family.as_ref()), &paper)?;
+    let tags = match &named {
+        Some(_) if args.dense => " --dense".to_owned(),
+        Some(name) => format!(" {option} {name}"),
+        None if args.checker => String::new(),
+        None => " --untagged".to_owned(),
+    };
+    let paper = args.paper.as_ref().map_or(String::new(), |paper| format!(" --paper {paper}"));
+    let BoardSpec { rows, cols, edge_mm, .. } = proposal.spec;
+    let command =
+        format!("deltille {command} --rows {rows} --cols {cols} --edge {edge_mm}mm{tags}{paper}");
+    let to_mm = |tilt: f64| proposal.reach.labelled_to_mm(focal_px, tilt.to_radians());
+    let patches_to_mm = |tilt: f64| proposal.patches_to_mm(focal_px, tilt.to_radians());
+    if args.telling.is_json() {
+        output::print_json(&serde_json::json!({
+            "schema": "deltille/plan/1",
+            "command": command,
+            "rows": rows, "cols": cols, "edge_mm": edge_mm, "family": named,
+            "corners": proposal.reach.corners, "tags": proposal.reach.tags,
+            "whole_from_mm": proposal.whole_from_mm,
+            "labelled_to_mm": TOLD_DEG.map(|tilt| {
+                serde_json::json!({ "tilt_deg": tilt, "distance_mm": to_mm(tilt) })
+            }),
+            "patches_labelled_to_mm": args.dense.then(|| TOLD_DEG.map(|tilt| {
+                serde_json::json!({ "tilt_deg": tilt, "distance_mm": patches_to_mm(tilt) })
+            })),
+        }))?;
+        return Ok(ExitCode::SUCCESS);
+    }
+    tell(&situation, &proposal, &command)?;
+    Ok(ExitCode::SUCCESS)
+}
+
+fn tell(situation: &Situation, proposal: &Proposal, command: &str) -> anyhow::Result<()> {
+    let Situation { focal_px, size_px: [width, height], distances_mm: [near, far], .. } =
+        *situation;
+    let across = 2.0 * (f64::from(width) / 2.0 / focal_px).atan().to_degrees();
+    let px_mm = |distance: f64| distance / focal_px;
+    say!(
+        "camera: {width} × {height} px, {across:.0}° across; a pixel is {:.2} mm wide at {}, {:.2} mm at {}",
+        px_mm(near),
+        shown(near),
+        px_mm(far),
+        shown(far)
+    );
+    say!("{command}");
+    let whole = match proposal.reach.tags {
+        0 => "; nearer it is not labelled",
+        _ if is_dense(proposal) => "; nearer, any three by four tiles are labelled",
+        _ => "; nearer, parts with a tag in them are labelled",
+    };
+    say!(
+        "{}, {}; whole in the picture from {} on{whole}",
+        counted(proposal.reach.corners, "corner"),
+        counted(proposal.reach.tags, "tag"),
+        shown(proposal.whole_from_mm)
+    );
+    let told = |what: &str, to_mm: &dyn Fn(f64) -> Option<f64>| {
+        let to = TOLD_DEG.iter().filter_map(|&tilt| {
+            let far = shown(to_mm(tilt.to_radians())?);
+            Some(match tilt {
+                0.0 => format!("to {far} facing the camera"),
+                _ => format!("to {far} tilted by {tilt:.0}°"),
+            })
+        });
+        let to: Vec<String> = to.collect();
+        format!("{what} {}, where pictures are sharp", to.join(", "))
+    };
+    say!("{}", told("labelled", &|tilt| Some(proposal.reach.labelled_to_mm(focal_px, tilt))));
+    if is_dense(proposal) {
+        let patches = |tilt| proposal.patches_to_mm(focal_px, tilt);
+        say!("{}", told("three by four tiles of it", &patches));
+    }
+    Ok(())
+}
+
+/// Whether it is a board of place codes.
+fn is_dense(proposal: &Proposal) -> bool {
+    proposal.spec.tags.as_ref().is_some_and(TagSpec::is_dense)
+}
+
+/// A distance as a person says it.
+fn shown(mm: f64) -> String {
+    match mm {
+        ..995.0 => format!("{:.0} cm", mm / 10.0),
+        _ => format!("{:.1} m", mm / 1000.0),
+    }
+}

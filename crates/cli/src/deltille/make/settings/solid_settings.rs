@@ -1,0 +1,426 @@
+//! What the commands that make solids are told: the same settings as options and as a TOML template.
+
+#![allow(rustdoc::invalid_html_tags)] // The comments on options are the help of the program, too.
+
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context, anyhow, bail};
+use serde::{Deserialize, Serialize};
+
+use super::board_settings::{DPI, PAPER, PRINT, TAGS, check_tags};
+use super::finishing::Laser;
+use super::given::{is_false, is_usual, length, refuse_idle};
+use super::meshes::Meshes;
+use super::{logo, template};
+use crate::values::{number, whole};
+use deltille::export::dsc::Dialect;
+use deltille::family::places;
+use deltille::lattice::GridKind;
+use deltille::layout::{DEFAULT_MARGIN_MM, PaperSize, PaperSpec, SolidSheets};
+use deltille::targets::{
+    BORDER_BITS, FACE_TILES, MOST_ROWS, SkeletonSpec, SolidShape, SolidSpec, TagSpec, TagsIn,
+};
+
+/// Heading of the help.
+const BODIES: &str = "Bodies to print, outlines to cut";
+
+/// Settings as they are given; what is not given has a default.
+#[derive(Clone, Debug, Default, PartialEq, clap::Args, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case", deny_unknown_fields, default)]
+pub struct SolidSettings {
+    /// The command that a template was made for.
+    #[arg(skip)]
+    pub command: Option<String>,
+    /// Sides of a cuboid.
+    #[arg(skip)]
+    pub size: Option<String>,
+    /// File of a mesh, and what its command is told of it.
+    #[arg(skip)]
+    pub mesh: Option<PathBuf>,
+    #[arg(skip)]
+    pub square_family: Option<String>,
+    #[arg(skip)]
+    pub first_square_id: Option<u32>,
+    #[arg(skip)]
+    pub scale: Option<f64>,
+    #[arg(skip)]
+    #[serde(skip_serializing_if = "is_false")]
+    pub allow_skew: bool,
+    /// Edge of the solid, such as 150mm, 15cm, 6in [default: 150mm]
+    #[arg(long, value_name = "LENGTH", allow_hyphen_values = true)]
+    pub edge: Option<String>,
+    /// Black tiles along each side of a face, 6 to 200 [default: 10]
+    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = whole(FACE_TILES))]
+    pub tiles: Option<u32>,
+    /// Blank between a face's edges and its tiles [default: 5mm, with a skeleton at least 3 mm on
+    /// its panels]
+    #[arg(long, value_name = "LENGTH", allow_hyphen_values = true)]
+    pub face_margin: Option<String>,
+    /// Tag family: a name from `deltag list`, or a family file [default: delTag25h7]
+    #[arg(long, help_heading = TAGS)]
+    pub family: Option<String>,
+    /// A small place code in every upright tile: any few tiles beside each other tell where they are
+    #[arg(long, help_heading = TAGS, conflicts_with_all = ["family", "tag_spacing", "first_id"])]
+    #[serde(skip_serializing_if = "is_false")]
+    pub dense: bool,
+    /// No tags; faces are not told apart
+    #[arg(long, help_heading = TAGS,
+          conflicts_with_all = ["family", "dense", "tag_spacing", "tag_border", "hole", "first_id", "tag_ids"])]
+    #[serde(skip_serializing_if = "is_false")]
+    pub untagged: bool,
+    /// White tiles on black, which takes a part of the margin [default margin: 8mm]
+    #[arg(long)]
+    #[serde(skip_serializing_if = "is_false")]
+    pub invert: bool,
+    /// A tag in every n-th row and column of a face [default: 3]
+    #[arg(long, help_heading = TAGS, value_name = "N", allow_negative_numbers = true, value_parser = whole(1..=MOST_ROWS))]
+    pub tag_spacing: Option<u32>,
+    /// Black border of a tag, in widths of a bit [default: 1.5]
+    #[arg(long, help_heading = TAGS, value_name = "BITS", allow_negative_numbers = true, value_parser = number(BORDER_BITS))]
+    pub tag_border: Option<f64>,
+    /// A hole in the middle of each triangular tag, for a screw or a camera, of a family made with `deltag gen-family --free centre`
+    #[arg(long, help_heading = TAGS, value_name = "DIAMETER", allow_hyphen_values = true)]
+    pub hole: Option<String>,
+    /// Id of the first tag; the others follow, face by face [default: 0]
+    #[arg(long, help_heading = TAGS, value_name = "ID", allow_negative_numbers = true, value_parser = whole(0..=u32::MAX))]
+    pub first_id: Option<u32>,
+    /// The id of each tag beside it, in small type
+    #[arg(long, help_heading = TAGS)]
+    #[serde(skip_serializing_if = "is_false")]
+    pub tag_ids: bool,
+    /// Id of the first face's board; the others follow [default: 0]
+    #[arg(long, value_name = "ID", allow_negative_numbers = true, value_parser = whole(0..=u32::MAX))]
+    pub board_id: Option<u32>,
+    /// Write <name>.stl, the bare solid (millimetres)
+    #[arg(long, help_heading = BODIES)]
+    #[serde(skip_serializing_if = "is_false")]
+    pub stl: bool,
+    /// Write <name>-skeleton.stl, a frame to print with a seat for a panel on each face
+    #[arg(long, help_heading = BODIES)]
+    #[serde(skip_serializing_if = "is_false")]
+    pub skeleton: bool,
+    /// Thickness of the panels and what is glued on them [default: 3mm]
+    #[arg(long, help_heading = BODIES, value_name = "LENGTH", allow_hyphen_values = true)]
+    pub panel_thickness: Option<String>,
+    /// Thickness of the skeleton below the panels [default: 4mm]
+    #[arg(long, help_heading = BODIES, value_name = "LENGTH", allow_hyphen_values = true)]
+    pub wall: Option<String>,
+    /// Distance of the seats from the edges of the faces [default: the least that stays solid]
+    #[arg(long, help_heading = BODIES, value_name = "LENGTH", allow_hyphen_values = true)]
+    pub rib: Option<String>,
+    /// Write <name>-panels.dxf, the outlines of all faces to cut, or of what the seats of the
+    /// skeleton take, and without --per-face <name>-net.dxf, the net to cut, score and fold
+    /// (millimetres)
+    #[arg(long, help_heading = BODIES)]
+    #[serde(skip_serializing_if = "is_false")]
+    pub dxf: bool,
+    /// Write <name>.pdf: the net to cut out, fold and glue, or with --per-face a page per face
+    #[arg(long, help_heading = PRINT)]
+    #[serde(skip_serializing_if = "is_false")]
+    pub pdf: bool,
+    /// Write <name>-<page>.svg
+    #[arg(long, help_heading = PRINT)]
+    #[serde(skip_serializing_if = "is_false")]
+    pub svg: bool,
+    /// Write <name>-<page>.png
+    #[arg(long, help_heading = PRINT)]
+    #[serde(skip_serializing_if = "is_false")]
+    pub png: bool,
+    /// Print each face on a sheet of its own, to be glued on a rigid skeleton, instead of the net
+    #[arg(long, help_heading = PAPER)]
+    #[serde(skip_serializing_if = "is_false")]
+    pub per_face: bool,
+    /// Print a net that is larger than the paper in one piece, over pages that are joined along seams
+    /// through its tiles, instead of in pieces of whole faces
+    #[arg(long, help_heading = PAPER, conflicts_with = "per_face")]
+    #[serde(skip_serializing_if = "is_false")]
+    pub allow_seams: bool,
+    /// One page more: a picture of the solid with the numbers of its faces, how it is put together, and a
+    /// ruler
+    #[arg(long, help_heading = PAPER)]
+    #[serde(skip_serializing_if = "is_false")]
+    pub guide_page: bool,
+    /// Write <name>.dsc, for the reference detector or its fork
+    #[arg(long, help_heading = PRINT)]
+    #[serde(skip_serializing_if = "is_false")]
+    pub dsc: bool,
+    /// fork or original [default: fork]
+    #[arg(long, help_heading = PRINT, value_name = "DIALECT")]
+    pub dsc_dialect: Option<String>,
+    /// Resolution of the PNG pages, dots per inch [default: 300]
+    #[arg(long, help_heading = PRINT, value_parser = whole(200..=2400u32))]
+    pub dpi: Option<u32>,
+    /// The paper; a net that is larger is printed in several pieces of whole faces.
+    #[arg(long, help_heading = PAPER, value_name = "SIZE", help = format!(
+        "{}; a net that is larger is printed in several pieces of whole faces [default: the smallest of A4 to A0 that \
+         takes it, else A0]",
+        PaperSize::choice()
+    ))]
+    pub paper: Option<String>,
+    /// auto, portrait or landscape [default: auto]
+    #[arg(long, help_heading = PAPER)]
+    pub orientation: Option<String>,
+    /// Blank along the edges of the paper [default: 5mm]
+    #[arg(long, help_heading = PAPER, value_name = "LENGTH", allow_hyphen_values = true)]
+    pub margin: Option<String>,
+    /// Printed on the label of every sheet beside the name, such as whose it is
+    #[arg(long, value_name = "TEXT")]
+    pub note: Option<String>,
+    /// An SVG that is printed black at the other end of the label's strip: filled paths and strokes; white is paper
+    #[arg(long, value_name = "FILE")]
+    pub logo: Option<String>,
+    /// Height of the logo [default: that of the strip]
+    #[arg(long, value_name = "LENGTH", allow_hyphen_values = true)]
+    pub logo_height: Option<String>,
+    /// Stem of the files' names, printed on the sheets [default: the solid's name]
+    #[arg(long)]
+    pub name: Option<String>,
+    /// Meshes.
+    #[arg(skip)]
+    #[serde(skip_serializing_if = "is_usual")]
+    pub meshes: Meshes,
+    /// Drawings for a laser.
+    #[arg(skip)]
+    #[serde(skip_serializing_if = "is_usual")]
+    pub laser: Laser,
+}
+
+impl SolidSettings {
+    /// Reads a template of a command.
+    pub fn read(path: &Path, command: &str) -> anyhow::Result<Self> {
+        template::read(path, command, |settings: &Self| settings.command.as_deref())
+    }
+
+    /// The text of a template.
+    pub fn to_toml(&self, command: &str) -> String {
+        template::text(&Self { command: Some(command.to_owned()), ..self.clone() })
+    }
+
+    /// These settings, and those of a template where these say nothing.
+    pub fn or(self, template: Self) -> Self {
+        let formats = self.printed();
+        let png = self.png || (template.png && !formats);
+        let (bare, dense) = (self.untagged, self.dense);
+        let tagged = self.of_tags().into_iter().any(|(_, given)| given);
+        // Which tags there are, is said as a whole: what an option says of it replaces what else a template says.
+        Self {
+            command: None,
+            untagged: bare || (template.untagged && !tagged),
+            dense: dense || (template.dense && !bare && self.family.is_none()),
+            family: self.family.or(template.family.filter(|_| !bare && !dense)),
+            tag_spacing: self.tag_spacing.or(template.tag_spacing.filter(|_| !bare && !dense)),
+            tag_border: self.tag_border.or(template.tag_border.filter(|_| !bare)),
+            hole: self.hole.or(template.hole.filter(|_| !bare && !dense)),
+            first_id: self.first_id.or(template.first_id.filter(|_| !bare && !dense)),
+            square_family: self.square_family.or(template.square_family.filter(|_| !bare)),
+            first_square_id: self.first_square_id.or(template.first_square_id.filter(|_| !bare)),
+            tag_ids: self.tag_ids || (template.tag_ids && !bare && !dense),
+            invert: self.invert || template.invert,
+            // A mesh has one size.
+            scale: self.scale.or(template.scale.filter(|_| self.edge.is_none())),
+            edge: self.edge.or(template.edge.filter(|_| self.scale.is_none())),
+            per_face: self.per_face || (template.per_face && !self.allow_seams),
+            allow_seams: self.allow_seams || (template.allow_seams && !self.per_face),
+            pdf: self.pdf || (template.pdf && !formats),
+            svg: self.svg || (template.svg && !formats),
+            png,
+            // Of no use where other formats are asked for than in the template.
+            dpi: self.dpi.or(template.dpi.filter(|_| png || !template.png)),
+            size: self.size.or(template.size),
+            mesh: self.mesh.or(template.mesh),
+            allow_skew: self.allow_skew || template.allow_skew,
+            tiles: self.tiles.or(template.tiles),
+            face_margin: self.face_margin.or(template.face_margin),
+            board_id: self.board_id.or(template.board_id),
+            stl: self.stl || template.stl,
+            skeleton: self.skeleton || template.skeleton,
+            panel_thickness: self.panel_thickness.or(template.panel_thickness),
+            wall: self.wall.or(template.wall),
+            rib: self.rib.or(template.rib),
+            dxf: self.dxf || template.dxf,
+            guide_page: self.guide_page || template.guide_page,
+            dsc: self.dsc || template.dsc,
+            dsc_dialect: self.dsc_dialect.or(template.dsc_dialect),
+            paper: self.paper.or(template.paper),
+            orientation: self.orientation.or(template.orientation),
+            margin: self.margin.or(template.margin),
+            note: self.note.or(template.note),
+            logo: self.logo.or(template.logo),
+            logo_height: self.logo_height.or(template.logo_height),
+            name: self.name.or(template.name),
+            meshes: self.meshes.or(template.meshes),
+            laser: self.laser.or(template.laser),
+        }
+    }
+
+    /// Refuses what a template says of the shape of another solid.
+    pub fn check_shape(&self, command: &str) -> anyhow::Result<()> {
+        let keys = [
+            ("size", self.size.is_some(), "cuboid"),
+            ("mesh", self.mesh.is_some(), "solid"),
+            ("scale", self.scale.is_some(), "solid"),
+            ("allow-skew", self.allow_skew, "solid"),
+            ("square-family", self.square_family.is_some(), "solid"),
+            ("first-square-id", self.first_square_id.is_some(), "solid"),
+        ];
+        match keys.into_iter().find(|(_, is_given, of)| *is_given && *of != command) {
+            Some((key, _, of)) => {
+                bail!("--template: `{key}` is of `{of}`, not of `{command}`: leave it out")
+            }
+            None => Ok(()),
+        }
+    }
+
+    /// Whether a format to print is asked for.
+    pub fn printed(&self) -> bool {
+        self.pdf || self.svg || self.png
+    }
+
+    /// Refuses options that nothing asked for makes use of.
+    pub fn check_use(&self) -> anyhow::Result<()> {
+        let layout = self.printed() || self.dxf;
+        let needed = "--pdf, --svg, --png or --dxf: add one";
+        refuse_idle(&[
+            ("--dpi", self.dpi.is_some(), self.png, "--png: add one"),
+            ("--paper", self.paper.is_some(), layout, needed),
+            ("--orientation", self.orientation.is_some(), layout, needed),
+            ("--margin", self.margin.is_some(), layout, needed),
+            ("--per-face", self.per_face, layout, needed),
+            ("--allow-seams", self.allow_seams, layout, needed),
+            ("--guide-page", self.guide_page, layout, needed),
+            ("--tag-ids", self.tag_ids, layout, needed),
+            ("--note", self.note.is_some(), layout, needed),
+            ("--logo", self.logo.is_some(), layout, needed),
+            ("--logo-height", self.logo_height.is_some(), self.logo.is_some(), "--logo: add one"),
+            (
+                "--panel-thickness",
+                self.panel_thickness.is_some(),
+                self.skeleton,
+                "--skeleton: add one",
+            ),
+            ("--wall", self.wall.is_some(), self.skeleton, "--skeleton: add one"),
+            ("--rib", self.rib.is_some(), self.skeleton, "--skeleton: add one"),
+        ])?;
+        match self.dpi {
+            Some(dpi) if !DPI.contains(&dpi) => {
+                bail!("--dpi: {dpi} is not between {} and {}", DPI.start(), DPI.end())
+            }
+            _ => Ok(()),
+        }
+    }
+
+    /// The solid of a shape.
+    pub fn spec(&self, shape: SolidShape) -> anyhow::Result<SolidSpec> {
+        let default = SolidSpec::new(shape);
+        let mut spec = SolidSpec {
+            edge_mm: length("edge", &self.edge)?.unwrap_or(default.edge_mm),
+            tiles: self.tiles.unwrap_or(default.tiles),
+            margin_mm: default.margin_mm,
+            board_id: self.board_id.unwrap_or(default.board_id),
+            tags: self.tags(default.shape.tag_tiling())?,
+            inverted: self.invert,
+            square_tags: self.square_tags(default.square_tags)?,
+            skeleton: self.skeleton()?,
+            shape: default.shape,
+        };
+        spec.margin_mm = match length("face-margin", &self.face_margin)? {
+            Some(given) => given,
+            None => spec.comfortable_margin_mm()?,
+        };
+        Ok(spec)
+    }
+
+    /// The options that say something of tags, and whether they are given.
+    fn of_tags(&self) -> [(&'static str, bool); 8] {
+        [
+            ("--family", self.family.is_some()),
+            ("--dense", self.dense),
+            ("--tag-spacing", self.tag_spacing.is_some()),
+            ("--tag-border", self.tag_border.is_some()),
+            ("--hole", self.hole.is_some()),
+            ("--first-id", self.first_id.is_some()),
+            ("--square-family", self.square_family.is_some()),
+            ("--first-square-id", self.first_square_id.is_some()),
+        ]
+    }
+
+    /// The tags of all faces, or of those of a tiling where there are two.
+    fn tags(&self, tiling: GridKind) -> anyhow::Result<Option<TagSpec>> {
+        check_tags(self.untagged, self.dense, &self.of_tags())?;
+        if self.untagged {
+            return Ok(None);
+        }
+        let family = if self.dense { Some(places::NAME) } else { self.family.as_deref() };
+        let tags = TagSpec::usual(tiling, family, TagsIn::Black);
+        Ok(Some(TagSpec {
+            hole_mm: length("hole", &self.hole)?,
+            first_id: self.first_id.unwrap_or(tags.first_id),
+            spacing: self.tag_spacing.unwrap_or(tags.spacing),
+            border_bits: self.tag_border.unwrap_or(tags.border_bits),
+            ..tags
+        }))
+    }
+
+    /// The tags of rectangular faces, `usual` where there are such beside others.
+    fn square_tags(&self, usual: Option<TagSpec>) -> anyhow::Result<Option<TagSpec>> {
+        let is_asked = self.square_family.is_some() || self.first_square_id.is_some();
+        match usual {
+            None if is_asked => bail!(
+                "--square-family, --first-square-id: the mesh has no rectangles beside other faces: give --family \
+                 or --first-id"
+            ),
+            None => Ok(None),
+            Some(_) if self.untagged => Ok(None),
+            Some(usual) => Ok(Some(TagSpec {
+                family: self.square_family.clone().unwrap_or(usual.family),
+                first_id: self.first_square_id.unwrap_or(usual.first_id),
+                ..usual
+            })),
+        }
+    }
+
+    fn skeleton(&self) -> anyhow::Result<Option<SkeletonSpec>> {
+        if !self.skeleton {
+            return Ok(None);
+        }
+        let default = SkeletonSpec::default();
+        let thickness = length("panel-thickness", &self.panel_thickness)?;
+        Ok(Some(SkeletonSpec {
+            panel_thickness_mm: thickness.unwrap_or(default.panel_thickness_mm),
+            wall_mm: length("wall", &self.wall)?.unwrap_or(default.wall_mm),
+            rib_mm: length("rib", &self.rib)?,
+        }))
+    }
+
+    /// What it is printed on.
+    pub fn paper(&self) -> anyhow::Result<PaperSpec> {
+        let paper = PaperSpec {
+            size: self.paper.as_deref().map(str::parse).transpose().context("--paper")?,
+            orientation: match &self.orientation {
+                Some(text) => text.parse().context("--orientation")?,
+                None => Default::default(),
+            },
+            margin_mm: length("margin", &self.margin)?.unwrap_or(DEFAULT_MARGIN_MM),
+            solids: match (self.per_face, self.allow_seams) {
+                (true, _) => SolidSheets::PerFace,
+                (false, true) => SolidSheets::SeamedNet,
+                (false, false) => SolidSheets::Net,
+            },
+            note: self.note.clone(),
+            tag_ids: self.tag_ids,
+            guide_page: self.guide_page,
+            ..PaperSpec::default()
+        };
+        logo::on(paper, self.logo.as_deref(), length("logo-height", &self.logo_height)?)
+    }
+
+    /// Whose list of corners and tags is written, if any.
+    pub fn dsc(&self) -> anyhow::Result<Option<Dialect>> {
+        match &self.dsc_dialect {
+            Some(text) => {
+                Ok(Some(text.parse().map_err(|e: String| anyhow!("--dsc-dialect: {e}"))?))
+            }
+            None => Ok(self.dsc.then(Dialect::default)),
+        }
+    }
+}

@@ -1,0 +1,145 @@
+//! What every target of one panel is told about paper and files.
+
+use std::path::PathBuf;
+
+use anyhow::{Context, bail};
+
+use super::delivery::Delivery;
+use super::settings::board_settings::{DEFAULT_DPI, DPI, PAPER, PRINT};
+use super::settings::finishing::{Finishing, Laser};
+use super::settings::given::refuse_idle;
+use super::settings::logo;
+use crate::deltille::files::written::{File, Formats, drawn, text_file};
+use crate::values::{name, whole};
+use deltille::artwork;
+use deltille::family::Family;
+use deltille::layout::{self, DEFAULT_MARGIN_MM, PaperSize, PaperSpec};
+use deltille::targets::{TargetSpec, parse_length_mm};
+
+/// Paper, and files to print.
+#[derive(clap::Args)]
+pub struct PrintingArgs {
+    /// The paper.
+    #[arg(long, help_heading = PAPER, value_name = "SIZE", help = format!(
+        "{} [default: the smallest of A4 to A0 that takes the target]", PaperSize::choice()
+    ))]
+    paper: Option<String>,
+    /// auto, portrait or landscape
+    #[arg(long, help_heading = PAPER, default_value = "auto")]
+    orientation: String,
+    /// One page more: a picture of the target, what to do with the sheet, and a ruler
+    #[arg(long, help_heading = PAPER)]
+    guide_page: bool,
+    /// Blank along the edges of the paper; 0.5 mm are left in any case [default: 5mm]
+    #[arg(long, help_heading = PAPER, value_name = "LENGTH", value_parser = parse_length_mm)]
+    margin: Option<f64>,
+    /// Write <name>.pdf; so it is where no other of pdf, svg, png is asked for
+    #[arg(long, help_heading = PRINT)]
+    pdf: bool,
+    /// Write <name>.svg
+    #[arg(long, help_heading = PRINT)]
+    svg: bool,
+    /// Write <name>.png
+    #[arg(long, help_heading = PRINT)]
+    png: bool,
+    /// Resolution of the PNG, 200 to 2400 dots per inch [default: 300]
+    #[arg(long, help_heading = PRINT, allow_negative_numbers = true, value_parser = whole(DPI))]
+    dpi: Option<u32>,
+    /// Printed on the label of every sheet beside the name, such as whose it is
+    #[arg(long, value_name = "TEXT")]
+    note: Option<String>,
+    /// An SVG that is printed black at the other end of the label's strip: filled paths and strokes; white is paper
+    #[arg(long, value_name = "FILE")]
+    logo: Option<PathBuf>,
+    /// Height of the logo [default: that of the strip]
+    #[arg(long, value_name = "LENGTH", value_parser = parse_length_mm)]
+    logo_height: Option<f64>,
+    /// Stem of the files' names, printed on the sheet [default: that of the command]
+    #[arg(long, value_parser = name)]
+    name: Option<String>,
+    #[command(flatten)]
+    pub delivery: Delivery,
+    #[command(flatten)]
+    finishing: Finishing,
+    #[command(flatten)]
+    laser: Laser,
+}
+
+impl PrintingArgs {
+    /// Whether a PDF is written: where nothing else is asked for, too, and no mesh `is_made`.
+    fn is_pdf(&self, is_made: bool) -> bool {
+        self.pdf || !(self.svg || self.png || self.laser.is_any() || is_made)
+    }
+
+    /// The target on its paper.
+    pub fn build(
+        &self,
+        command: &str,
+        spec: &TargetSpec,
+        family: Option<&Family>,
+        is_made: bool,
+    ) -> anyhow::Result<layout::Printing> {
+        if self.dpi.is_some() && !self.png {
+            bail!("--dpi: there is no PNG to write: add --png");
+        }
+        let paper = PaperSpec {
+            size: self.paper.as_deref().map(str::parse).transpose().context("--paper")?,
+            orientation: self.orientation.parse().context("--orientation")?,
+            margin_mm: self.margin.unwrap_or(DEFAULT_MARGIN_MM),
+            note: self.note.clone(),
+            guide_page: self.guide_page,
+            ..PaperSpec::default()
+        };
+        let paper = logo::on(paper, self.logo.as_deref(), self.logo_height)?;
+        let name = self.name.as_deref().unwrap_or(command);
+        let is_printed = self.is_pdf(is_made) || self.svg || self.png;
+        if !is_printed {
+            idle_without_pages(&paper)?;
+        }
+        let paper_of_print = is_printed.then_some(&paper);
+        let printing = layout::Printing::build(name, spec, family, paper_of_print)?;
+        let pdf = self.is_pdf(is_made);
+        let printing = self.finishing.applied(printing, paper.margin_mm, pdf, &self.laser)?;
+        self.delivery.check_beside(&printing.target)?;
+        Ok(printing)
+    }
+
+    /// The description of a target, and its pages; without a PDF that is not asked for where something else `is_made`.
+    pub fn files(
+        &self,
+        printing: &layout::Printing,
+        family: Option<&Family>,
+        is_made: bool,
+    ) -> anyhow::Result<Vec<File>> {
+        let formats = Formats { pdf: self.is_pdf(is_made), svg: self.svg, png: self.png };
+        let dpi = self.dpi.unwrap_or(DEFAULT_DPI);
+        let name = &printing.target.name;
+        let mut files = vec![text_file(format!("{name}.json"), printing.to_json())];
+        if !printing.sheets.is_empty() {
+            files.extend(drawn(name, artwork::draw(printing, family)?, formats, dpi));
+        }
+        files.extend(self.laser.files(printing, family)?);
+        Ok(files)
+    }
+}
+
+/// Refuses what is to be on pages where there are none.
+pub fn idle_without_pages(paper: &PaperSpec) -> anyhow::Result<()> {
+    let needed = "--pdf, --svg or --png: add one";
+    refuse_idle(&[
+        ("--guide-page", paper.guide_page, false, needed),
+        ("--tag-ids", paper.tag_ids, false, needed),
+        ("--note", paper.note.is_some(), false, needed),
+        ("--logo", paper.logo.is_some(), false, needed),
+        ("--logo-height", paper.logo_height_mm.is_some(), false, "--logo: add one"),
+    ])
+}
+
+/// The paper of a target in words.
+pub fn page(printing: &layout::Printing) -> String {
+    let sheet = printing.sheets.first();
+    sheet.map_or_else(String::new, |sheet| {
+        let [width, height] = [sheet.width_mm, sheet.height_mm].map(|mm| (mm * 1e3).round() / 1e3);
+        format!(", page {width} × {height} mm")
+    })
+}

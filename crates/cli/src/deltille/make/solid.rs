@@ -1,0 +1,324 @@
+//! `deltille tetrahedron`, `octahedron`, `icosahedron`, `cube`, `cuboid`, `solid --mesh`.
+
+use std::ops::RangeInclusive;
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+use anyhow::{Context, bail};
+
+use super::delivery::Delivery;
+use super::settings::board_settings::{DEFAULT_DPI, TAGS};
+use super::settings::finishing::Laser;
+use super::settings::meshes::Meshes;
+use super::settings::solid_settings::SolidSettings;
+use super::settings::template::Template;
+use crate::deltille::files::written::{self, File, bytes_file, text_file};
+use crate::output::say;
+use crate::values::{number, whole};
+use deltille::artwork;
+use deltille::export::artifacts::{self, Making, What};
+use deltille::export::{dsc, solid_mesh};
+use deltille::family::{self, Family};
+use deltille::layout::{Printing, tag_range};
+use deltille::targets::{
+    ClosedMesh, NEAR_EQUILATERAL, Name, Skeleton, SolidShape, SolidSpec, Target, TargetSpec,
+    parse_box_mm,
+};
+use deltille_core::quantity::unit_mm;
+
+/// Arguments of the commands that make solids.
+#[derive(clap::Args)]
+pub struct Args {
+    #[command(flatten)]
+    settings: SolidSettings,
+    /// Take what is not given here from a TOML file
+    #[arg(long, value_name = "FILE")]
+    template: Option<PathBuf>,
+    /// Write the settings as a TOML file
+    #[arg(long, value_name = "FILE")]
+    save_template: Option<PathBuf>,
+    #[command(flatten)]
+    delivery: Delivery,
+    #[command(flatten)]
+    meshes: Meshes,
+    #[command(flatten)]
+    laser: Laser,
+}
+
+/// Help of options that say something else of a mesh.
+pub const MEAN_OF_MESH: &str =
+    "Mean of the edges, to which the mesh is scaled, such as 150mm, 15cm, 6in [default: as it is]";
+
+/// Help of options that say something else of solids with square tags.
+pub mod squares {
+    pub const MEAN: &str =
+        "Mean of the three sides, to which the cuboid is scaled [default: as --size says]";
+    pub const TILES: &str = "Squares along each side of a face, 6 to 200, on a cuboid along the shortest; \
+                             all faces have squares of the same size [default: 8]";
+    pub const FAMILY: &str = "Tag family: aprilTag36h11, aprilTag25h9 or aprilTag16h5, or a family file \
+                              [default: aprilTag36h11]";
+    pub const SPACING: &str = "A tag in every n-th row and column of a face, where the square is black, which with \
+                               an odd n every second is [default: 2]";
+    pub const BORDER: &str = "Black border of a tag, in widths of a bit, at least 1 [default: 2]";
+}
+
+/// Arguments of `deltille cuboid`.
+#[derive(clap::Args)]
+pub struct CuboidArgs {
+    /// Sides along x, y and z, such as 200x150x100mm or 8x6x4in
+    #[arg(long, value_name = "SIZE")]
+    size: Option<String>,
+    #[command(flatten)]
+    args: Args,
+}
+
+/// Arguments of `deltille solid`.
+#[derive(clap::Args)]
+pub struct MeshArgs {
+    /// A closed mesh as OBJ, STL or PLY, in millimetres, whose faces are flat and convex; a board is put on each: deltille
+    /// tiles on triangles, a checkerboard on rectangles, as many deltille tiles as find room on others
+    #[arg(long, value_name = "FILE")]
+    mesh: Option<PathBuf>,
+    /// Family of the square tags, where the mesh has rectangular faces and others [default:
+    /// aprilTag36h11]
+    #[arg(long, help_heading = TAGS, value_name = "FAMILY")]
+    square_family: Option<String>,
+    /// Id of the first square tag there [default: 0]
+    #[arg(long, help_heading = TAGS, value_name = "ID", allow_negative_numbers = true, value_parser = whole(0..=u32::MAX))]
+    first_square_id: Option<u32>,
+    /// Millimetres per unit of the mesh, such as 1000 for metres, 25.4 for inches [default: 1]
+    #[arg(long, value_name = "FACTOR", allow_negative_numbers = true, conflicts_with = "edge",
+          value_parser = number(SCALE))]
+    scale: Option<f64>,
+    /// Take faces that are far from equilateral, as long as a board fits
+    #[arg(long)]
+    allow_skew: bool,
+    #[command(flatten)]
+    args: Args,
+}
+
+/// Range of the millimetres per unit of a mesh.
+const SCALE: RangeInclusive<f64> = unit_mm::RANGE.least..=unit_mm::RANGE.most;
+
+/// Makes a solid whose shape its command tells.
+pub fn run(shape: SolidShape, args: Args) -> anyhow::Result<ExitCode> {
+    let command = shape.name();
+    let settings = args.settings(command)?;
+    run_with(shape, command, settings, &args)
+}
+
+/// Makes a cuboid.
+pub fn run_cuboid(cuboid: CuboidArgs) -> anyhow::Result<ExitCode> {
+    let mut args = cuboid.args;
+    args.settings.size = cuboid.size;
+    let settings = args.settings("cuboid")?;
+    let Some(size) = &settings.size else { bail!("--size is needed, here or in a --template") };
+    let sides = parse_box_mm(size).context("--size")?;
+    run_with(SolidShape::Cuboid(sides), "cuboid", settings, &args)
+}
+
+/// Makes a solid from a mesh, with the stem of its file for a name.
+pub fn run_mesh(mesh: MeshArgs) -> anyhow::Result<ExitCode> {
+    let mut args = mesh.args;
+    args.settings.mesh = mesh.mesh;
+    args.settings.square_family = mesh.square_family;
+    args.settings.first_square_id = mesh.first_square_id;
+    args.settings.scale = mesh.scale;
+    args.settings.allow_skew = mesh.allow_skew;
+    let mut settings = args.settings("solid")?;
+    let Some(path) = settings.mesh.clone() else {
+        bail!("--mesh is needed, here or in a --template")
+    };
+    let scale = settings.scale.unwrap_or(1.0);
+    if !SCALE.contains(&scale) {
+        bail!("--scale: {scale} is not between {} and {}", SCALE.start(), SCALE.end());
+    }
+    let show = || format!("--mesh: {}", path.display());
+    let text = args.delivery.limits().read(&path).context("--mesh")?;
+    let (solid, inside_out) = solid_mesh::read(&text).with_context(show)?;
+    let (face, deviation) = solid.most_skewed();
+    if deviation > NEAR_EQUILATERAL && !settings.allow_skew {
+        bail!(
+            "{}: edges of triangle {} deviate by {:.1} % from their mean, more than {:.0} %: give \
+             --allow-skew to put smaller boards on such faces",
+            show(),
+            face + 1,
+            100.0 * deviation,
+            100.0 * NEAR_EQUILATERAL
+        );
+    }
+    if inside_out {
+        say!("{}: its faces look inwards; they were turned", path.display());
+    }
+    let stem = path.file_stem().unwrap_or_default().to_string_lossy();
+    let name = settings.name.clone().unwrap_or_else(|| Name::like(&stem).to_string());
+    if settings.meshes.has_obj() && args.delivery.would_replace(&format!("{name}.obj"), &path) {
+        bail!("--name: {name}.obj would be written over the mesh: give another name or folder");
+    }
+    let faces = solid.faces();
+    let vertices: Vec<_> = solid.vertices().iter().map(|&v| v * scale).collect();
+    let (scaled, _) = ClosedMesh::new(&vertices, faces).with_context(show)?;
+    settings.name = Some(name);
+    run_with(SolidShape::Mesh(scaled), "solid", settings, &args)
+}
+
+/// Makes a solid, writes its files, and verifies what it wrote.
+fn run_with(
+    shape: SolidShape,
+    command: &str,
+    settings: SolidSettings,
+    args: &Args,
+) -> anyhow::Result<ExitCode> {
+    settings.check_use()?;
+    let meshes = meshes_of(&settings);
+    meshes.check_use(None)?;
+    settings.laser.check_use()?;
+    let spec = settings.spec(shape)?;
+    let paper = settings.paper()?;
+    let family = family_of(&spec)?;
+    let family = family.as_ref();
+    let name = settings.name.clone().unwrap_or_else(|| spec.shape.name().to_owned());
+    // What is cut is the net that is printed, or would be: the description has it in either case.
+    let net = settings.dxf && !settings.per_face;
+    let layout = (settings.printed() || net).then_some(&paper);
+    let solid = TargetSpec::Solid(spec.clone());
+    let printing = Printing::build(&name, &solid, family, layout)?;
+    let target = &printing.target;
+    args.delivery.check_beside(target)?;
+    let template = args
+        .save_template
+        .as_deref()
+        .map(|path| Template::new(path, settings.to_toml(command), args.delivery.overwrite));
+    let template = template.transpose()?;
+    let mut files = files(&settings, &printing, net, &spec, family)?;
+    let (textured, texture) = meshes.files(target, family, None)?;
+    files.extend(textured);
+    files.extend(settings.laser.files(&printing, family)?);
+    files.extend(pages(&settings, &printing, family)?);
+    let told = summary(target, &spec)? + &texture;
+    let delivered = args.delivery.deliver(&printing, family, &files, &told)?;
+    template.map_or(Ok(()), |template| template.write())?;
+    Ok(delivered)
+}
+
+/// The family of the tags, with that of square ones where there are both.
+fn family_of(spec: &SolidSpec) -> anyhow::Result<Option<Family>> {
+    let Some(tags) = &spec.tags else { return Ok(None) };
+    let family = family::resolve(&tags.family).context("--family")?;
+    let Some(squares) = &spec.square_tags else { return Ok(Some(family)) };
+    let squares = family::resolve(&squares.family).context("--square-family")?;
+    Ok(Some(family.with_squares(squares)))
+}
+
+impl Args {
+    /// What is given, and what a template says beyond it.
+    fn settings(&self, command: &str) -> anyhow::Result<SolidSettings> {
+        let (meshes, laser) = (self.meshes.clone(), self.laser.clone());
+        let given = SolidSettings { meshes, laser, ..self.settings.clone() };
+        let settings = match &self.template {
+            Some(path) => given.or(SolidSettings::read(path, command)?),
+            None => given,
+        };
+        settings.check_shape(command)?;
+        Ok(settings)
+    }
+}
+
+/// The meshes that are asked for; the glTF where nothing is.
+fn meshes_of(settings: &SolidSettings) -> Meshes {
+    let SolidSettings { stl, skeleton, dxf, .. } = *settings;
+    let bodies = stl || skeleton || dxf || settings.laser.is_any();
+    let meshes = settings.meshes.clone();
+    let nothing = !(bodies || settings.printed() || meshes.is_any());
+    if nothing { meshes.with_gltf() } else { meshes }
+}
+
+/// The description, bodies, and files to cut and to list. What can be refused is refused here, before anything is written.
+fn files(
+    settings: &SolidSettings,
+    printing: &Printing,
+    net: bool,
+    spec: &SolidSpec,
+    family: Option<&Family>,
+) -> anyhow::Result<Vec<File>> {
+    let name = &printing.target.name;
+    let mut files = vec![text_file(format!("{name}.json"), printing.to_json())];
+    if let Some(dialect) = settings.dsc()? {
+        let text = dsc::write(&printing.target, dialect).context("--dsc")?;
+        files.push(text_file(format!("{name}.dsc"), text));
+    }
+    let asked = [
+        (settings.stl, What::Stl),
+        (spec.skeleton.is_some(), What::Skeleton),
+        (settings.dxf, What::Panels),
+        (net, What::Net),
+    ];
+    for (_, what) in asked.into_iter().filter(|(is_asked, _)| *is_asked) {
+        let made = artifacts::make(printing, family, what, Making::default())?;
+        files.extend(made.into_iter().map(|(name, bytes)| bytes_file(name, bytes)));
+    }
+    Ok(files)
+}
+
+/// The pages that are asked for.
+fn pages(
+    settings: &SolidSettings,
+    printing: &Printing,
+    family: Option<&Family>,
+) -> anyhow::Result<Vec<File>> {
+    if !settings.printed() {
+        return Ok(Vec::new());
+    }
+    let artwork = artwork::draw(printing, family)?;
+    let SolidSettings { pdf, svg, png, .. } = *settings;
+    let dpi = settings.dpi.unwrap_or(DEFAULT_DPI);
+    Ok(written::drawn(&printing.target.name, artwork, written::Formats { pdf, svg, png }, dpi))
+}
+
+/// One line on what was made, and one on the panels of a skeleton.
+fn summary(target: &Target, spec: &SolidSpec) -> anyhow::Result<String> {
+    let corners: usize = target.panels.iter().map(|panel| panel.corners.len()).sum();
+    let size = match &spec.shape {
+        SolidShape::Cuboid(_) => spec.size(),
+        shape => {
+            format!("{} of {} mm edges", shape.name(), (spec.edge_mm * 1e3).round() / 1e3)
+        }
+    };
+    let mut text = format!(
+        "{}: {size}, {} faces, {corners} corners, tiles of {} mm",
+        target.name,
+        target.panels.len(),
+        range(target.panels.iter().map(|panel| panel.edge_mm), 3),
+    );
+    for kind in target.tilings() {
+        let tags = target.panels.iter().filter(|panel| panel.kind == kind).flat_map(|p| &p.tags);
+        let mut ids = tags.map(|tag| tag.id);
+        if let (Some(family), Some(first)) = (&target.family, ids.next()) {
+            let last = ids.next_back().unwrap_or(first);
+            text += &format!(", {}", tag_range(&family.of_tiling(kind).name, first, last));
+        }
+    }
+    if let Some(skeleton) = &spec.skeleton {
+        let solid = spec.polyhedron();
+        let made = Skeleton::new(&solid, skeleton)?;
+        let angles = solid.dihedral_angles_rad().into_iter().map(f64::to_degrees);
+        let angles: Vec<f64> = angles.collect();
+        text += &format!(
+            "\nskeleton: panels of {} mm, cut straight {:.2} mm inside the edges; faces meet at \
+             {}°, so that panels without ribs would need edges mitred by {}°",
+            skeleton.panel_thickness_mm,
+            made.panel_inset_mm,
+            range(angles.iter().copied(), 2),
+            range(angles.iter().map(|angle| 90.0 - angle / 2.0), 2),
+        );
+    }
+    Ok(text)
+}
+
+/// The least and the greatest of some numbers, or the one that all are.
+fn range(numbers: impl Iterator<Item = f64> + Clone, digits: usize) -> String {
+    let least = numbers.clone().fold(f64::INFINITY, f64::min);
+    let most = numbers.fold(f64::NEG_INFINITY, f64::max);
+    let [least, most] = [least, most].map(|number| format!("{number:.digits$}"));
+    if least == most { least } else { format!("{least} to {most}") }
+}

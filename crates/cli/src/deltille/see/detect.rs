@@ -1,0 +1,523 @@
+//! `deltille detect`.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+use std::sync::Mutex;
+
+use anyhow::{Context, bail};
+use clap::ValueEnum;
+
+use super::detector_options::FinderArgs;
+use crate::deltille::files::detection_tables::{self, Tables};
+use crate::deltille::files::images::{self, Images, Stems};
+use crate::deltille::files::images_at_once;
+use crate::output::{self, Overwrite, tell};
+use crate::run::{self, BAD_INPUT, FAILED, Interrupted};
+use crate::values::whole;
+use crate::{interrupt, progress};
+use deltille::clock;
+use deltille::detect::{Detection, Detector, InkEstimate};
+use deltille::export::kind::Kind;
+use deltille::export::tables::{EXTENSION, Picture};
+use deltille::export::{atomic, csv, detection, orpc, overlay};
+use deltille::photograph::{self, Photograph};
+use deltille::targets::Target;
+use deltille_core::words::{counted, shown};
+
+/// Arguments of `deltille detect`.
+#[derive(clap::Args)]
+pub struct Args {
+    /// Photographs (PNG, JPEG, TIFF, BMP, PGM or WebP), folders of them, patterns such as
+    /// 'day*/*.png', or - for a list on standard input, a path a line
+    #[arg(required = true, value_name = "IMAGE")]
+    images: Vec<PathBuf>,
+    #[command(flatten)]
+    finder: FinderArgs,
+    /// Folder for the results, named after the images [default: this folder]
+    #[arg(short, long, value_name = "FOLDER")]
+    output: Option<PathBuf>,
+    /// What to write; several may be given, separated by commas
+    #[arg(long, value_delimiter = ',', default_value = "json")]
+    format: Vec<Format>,
+    /// Write <image>.overlay.png too: corners, grid and ids drawn over the photograph
+    #[arg(long)]
+    overlay: bool,
+    /// Write into the JSON how long each stage took, ms; without, two runs write the same
+    #[arg(long)]
+    timing: bool,
+    /// Print each result on standard output as a line of JSON as soon as it is there; files are
+    /// written only where -o names a folder. Ink is then estimated from each image by itself, not from all, so that
+    /// corners differ slightly from those of a run without --stream; a known --ink gives the same
+    #[arg(long)]
+    stream: bool,
+    /// Read JPEG files of which a part is missing too, and note it in the result; without this they are errors
+    #[arg(long)]
+    accept_damaged: bool,
+    /// Leave out images whose results are there already, as after a stopped run
+    #[arg(long, conflicts_with = "stream")]
+    skip_existing: bool,
+    #[command(flatten)]
+    overwrite: Overwrite,
+    /// Images at a time [default: one per processor]
+    #[arg(short, value_name = "N", value_parser = whole(1..=1024u16))]
+    jobs: Option<u16>,
+}
+
+#[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum Format {
+    /// Everything, one file per image
+    Json,
+    /// The corner list of the reference detector
+    Orpc,
+    /// One corner a line, with a header
+    Csv,
+    /// corners.parquet and pictures.parquet, a row for each corner and for each image of the run; `calibrate` and
+    /// `rig` read them
+    Parquet,
+}
+
+/// What came of an image.
+enum Outcome {
+    Seen(Box<Found>),
+    Skipped,
+}
+
+/// What was found in an image.
+struct Found {
+    /// The line to print of it.
+    line: String,
+    /// What it says of the ink.
+    ink: Option<InkEstimate>,
+    /// Whether what was asked for is there: labels of the target, or some grid.
+    is_there: bool,
+    /// Its row, where tables are written.
+    row: Option<Picture>,
+}
+
+/// An image that was looked at.
+struct Seen {
+    /// Its place among all.
+    index: usize,
+    image: PathBuf,
+    /// Of its results.
+    stem: String,
+    ink: Option<InkEstimate>,
+}
+
+/// Detects in all images; an image that cannot be read is reported, and the rest go on.
+pub fn run(args: Args) -> anyhow::Result<ExitCode> {
+    let (targets, detector) = args.finder.detector()?;
+    if targets.len() > 1 && args.format.contains(&Format::Orpc) {
+        bail!("--format orpc: it has no names of targets: give one --target at a time");
+    }
+    let detector = if args.timing { detector.with_clock(clock::now) } else { detector };
+    let images = Images::of(&args.images)?;
+    // Clashes among images that are named are found before any work is done.
+    let mut named = Stems::default();
+    for image in images.named() {
+        args.check_results(&named.claim(image)?)?;
+    }
+    let new_folder = args.folder().filter(|folder| !folder.exists());
+    if let Some(folder) = args.folder() {
+        output::check_folder(folder).context("-o")?;
+        fs::create_dir_all(folder)
+            .with_context(|| format!("-o: cannot write to {}", folder.display()))?;
+        output::settle(folder).context("-o")?;
+    }
+    let limits = args.finder.limits();
+    let folder = args.tables();
+    let earlier = match folder {
+        Some(folder) => {
+            detection_tables::check(folder, args.overwrite)?;
+            if args.skip_existing {
+                detection_tables::earlier(folder, &limits)?
+            } else {
+                Vec::new()
+            }
+        }
+        None => Vec::new(),
+    };
+    let done: BTreeSet<&str> = earlier
+        .iter()
+        .filter(|picture| picture.found.is_ok())
+        .map(|picture| picture.image.as_str())
+        .collect();
+    let tables = folder.map(|folder| Tables::begin(folder, &targets)).transpose()?;
+    if tables.is_some() {
+        // Rows that are there are kept.
+        interrupt::keeps_results();
+    }
+
+    let bar = progress::bar(images.count().unwrap_or(0) as u64, "images");
+    let threads = rayon::ThreadPoolBuilder::new().num_threads(args.jobs.unwrap_or(0).into());
+    // One after the other, so that it is always the later one of two with one stem that is refused.
+    let mut stems = Stems::default();
+    let claimed = images.iter().map(|image| {
+        let image = image?;
+        stems.claim(&image)?;
+        Ok(image)
+    });
+    let go_on = if args.stream { "" } else { "; --skip-existing goes on from here" };
+    let report = Report::new(images.count() == Some(1), go_on);
+    let seen: Mutex<Vec<Seen>> = Mutex::default();
+    // Rows of images that are not seen, if they have one.
+    let unseen: Mutex<Vec<(usize, Option<Picture>)>> = Mutex::default();
+    let threads = threads.build()?;
+    images_at_once::for_each(&threads, &limits, claimed, |index, image| {
+        if interrupt::is_raised() {
+            return;
+        }
+        let name = image.as_ref().ok().map(|image| name_of(image));
+        let mut result = image.and_then(|image| {
+            let stem = images::stem(&image)?;
+            args.check_results(&stem)?;
+            if args.skip_existing
+                && args.results(&stem).iter().all(|(path, _)| path.exists())
+                && (folder.is_none() || done.contains(name_of(&image).as_str()))
+            {
+                return Ok(Outcome::Skipped);
+            }
+            let found = one_image(&args, &targets, &detector, &image, &stem)?;
+            let looked_at = Seen { index, image, stem, ink: found.ink };
+            seen.lock().expect("no thread panics here").push(looked_at);
+            Ok(Outcome::Seen(Box::new(found)))
+        });
+        if let Some(tables) = &tables {
+            let row = row_of(name, &mut result);
+            if !matches!(result, Ok(Outcome::Seen(_))) {
+                unseen.lock().expect("no thread panics here").push((index, row.clone()));
+            }
+            tables.add(index, row);
+        }
+        bar.inc(1);
+        bar.suspend(|| report.add(index, result));
+    });
+    bar.finish_and_clear();
+    let mut seen = seen.into_inner().expect("no thread panics here");
+    // In the order of the images, whichever was done first.
+    seen.sort_unstable_by_key(|seen| seen.index);
+    let mut again = None;
+    if args.stream {
+        tell_ink_of_all(&detector, &seen);
+    } else if !interrupt::is_raised() {
+        let unseen = unseen.into_inner().expect("no thread panics here");
+        again = see_again(&args, &targets, &detector, &seen, unseen, &threads, &report)?;
+    }
+    if let Some(tables) = tables {
+        let is_left = interrupt::is_raised();
+        // An interrupted run does not take the place of one that was not, unless it goes on with it.
+        let stays = is_left && !args.skip_existing && folder.is_some_and(detection_tables::are_in);
+        match again.filter(|_| !is_left) {
+            _ if stays => {}
+            Some(again) => again.finish(&earlier)?,
+            None => tables.finish(&earlier)?,
+        }
+    }
+    if let Some(folder) = new_folder {
+        // This removes only an empty folder.
+        let _ = fs::remove_dir(folder);
+    }
+    if interrupt::is_raised() {
+        return Err(Interrupted(report.standing()).into());
+    }
+    report.end()
+}
+
+/// Says, after each image was printed with its own ink, that all together have one by which corners are others.
+fn tell_ink_of_all(detector: &Detector, seen: &[Seen]) {
+    let found: Vec<Option<InkEstimate>> = seen.iter().map(|seen| seen.ink).collect();
+    if let Some(ink) = detector.ink_of_all(&found) {
+        let images = counted(ink.pictures as usize, "image");
+        tell!(
+            "note: --stream located the corners of each image with the ink of that image; without it they are located \
+             with the ink of all, {ink} ({images}), and differ"
+        );
+    }
+}
+
+/// Looks once more at all images, with what they say together of the ink: pictures that say little of it are seen
+/// with what all say. Tables are then written anew, with the rows of images that were not seen.
+fn see_again(
+    args: &Args,
+    targets: &[Target],
+    detector: &Detector,
+    seen: &[Seen],
+    unseen: Vec<(usize, Option<Picture>)>,
+    threads: &rayon::ThreadPool,
+    report: &Report,
+) -> anyhow::Result<Option<Tables>> {
+    let found: Vec<Option<InkEstimate>> = seen.iter().map(|seen| seen.ink).collect();
+    let known: Vec<InkEstimate> = found.iter().copied().flatten().collect();
+    let Some(ink) = InkEstimate::of_all(&known).filter(|ink| ink.used) else { return Ok(None) };
+    let mut tables = None;
+    if let Some(detector) = detector.with_ink_of(&found) {
+        let bar = progress::bar(seen.len() as u64, "images, with the ink of all");
+        let images = seen.iter().map(|seen| Ok(seen.image.clone()));
+        tables = args.tables().map(|folder| Tables::begin(folder, targets)).transpose()?;
+        if let Some(table) = &tables {
+            unseen.iter().for_each(|(index, row)| table.add(*index, row.clone()));
+        }
+        images_at_once::for_each(threads, &args.finder.limits(), images, |index, _| {
+            if interrupt::is_raised() {
+                return;
+            }
+            let Seen { index, image, stem, .. } = &seen[index];
+            let again = one_image(args, targets, &detector, image, stem);
+            again.as_ref().err().iter().for_each(|error| bar.suspend(|| report.fail_again(error)));
+            if let Some(tables) = &tables {
+                tables.add(
+                    *index,
+                    row_of(
+                        Some(name_of(image)),
+                        &mut again.map(|found| Outcome::Seen(Box::new(found))),
+                    ),
+                );
+            }
+            bar.inc(1);
+        });
+        bar.finish_and_clear();
+    }
+    tell!("ink: {ink} ({})", counted(ink.pictures as usize, "picture"));
+    Ok(tables)
+}
+
+/// The name of an image in its results.
+fn name_of(image: &Path) -> String {
+    image.file_name().unwrap_or_default().to_string_lossy().into_owned()
+}
+
+/// The row of an image in tables, if it has one.
+fn row_of(name: Option<String>, result: &mut anyhow::Result<Outcome>) -> Option<Picture> {
+    match result {
+        Ok(Outcome::Seen(found)) => found.row.take(),
+        Ok(Outcome::Skipped) => None,
+        Err(error) => Some(Picture::unread(name?, run::message(error))),
+    }
+}
+
+/// Prints what came of the images, in their order, as soon as it is known.
+struct Report {
+    /// A single image's error is the command's.
+    single: bool,
+    /// What to say of going on after an interruption.
+    go_on: &'static str,
+    state: Mutex<State>,
+}
+
+#[derive(Default)]
+struct State {
+    next: usize,
+    waiting: BTreeMap<usize, anyhow::Result<Outcome>>,
+    failed: usize,
+    skipped: usize,
+    found: usize,
+    error: Option<anyhow::Error>,
+}
+
+impl Report {
+    fn new(single: bool, go_on: &'static str) -> Self {
+        let report = Self { single, go_on, state: Mutex::default() };
+        interrupt::stands(report.standing());
+        report
+    }
+
+    /// How things stand.
+    fn standing(&self) -> String {
+        format!("{} images are done{}", self.done(), self.go_on)
+    }
+
+    fn add(&self, index: usize, result: anyhow::Result<Outcome>) {
+        self.tell(index, result);
+        interrupt::stands(self.standing());
+    }
+
+    fn tell(&self, index: usize, result: anyhow::Result<Outcome>) {
+        let mut state = self.state.lock().expect("no thread panics here");
+        state.waiting.insert(index, result);
+        loop {
+            let next = state.next;
+            let Some(result) = state.waiting.remove(&next) else { return };
+            state.next += 1;
+            match result {
+                Ok(Outcome::Skipped) => state.skipped += 1,
+                Ok(Outcome::Seen(found)) => {
+                    state.found += usize::from(found.is_there);
+                    // What cannot be printed is lost, as it would be with `println`.
+                    if let Err(error) = output::print(&found.line) {
+                        state.error.get_or_insert(error);
+                    }
+                }
+                Err(error) => {
+                    state.failed += 1;
+                    if self.single {
+                        state.error = Some(error);
+                    } else {
+                        run::report(&error);
+                    }
+                }
+            }
+        }
+    }
+
+    /// Counts an image that was seen, and cannot be seen or written once more.
+    fn fail_again(&self, error: &anyhow::Error) {
+        run::report(error);
+        self.state.lock().expect("no thread panics here").failed += 1;
+    }
+
+    fn done(&self) -> usize {
+        let state = self.state.lock().expect("no thread panics here");
+        state.next + state.waiting.len()
+    }
+
+    fn end(self) -> anyhow::Result<ExitCode> {
+        let State { next: all, failed, skipped, found, error, .. } =
+            self.state.into_inner().expect("no thread panics here");
+        if let Some(error) = error {
+            return Err(error);
+        }
+        if skipped > 0 {
+            tell!("{skipped} of {all} images skipped: their results are there");
+        }
+        if failed == 0 {
+            let nothing = found == 0 && skipped == 0;
+            return Ok(if nothing { ExitCode::from(FAILED) } else { ExitCode::SUCCESS });
+        }
+        tell!("error: {failed} of {all} images failed");
+        Ok(ExitCode::from(if failed == all { BAD_INPUT } else { FAILED }))
+    }
+}
+
+impl Args {
+    /// Where results go; none with `--stream` alone.
+    fn folder(&self) -> Option<&Path> {
+        match &self.output {
+            Some(folder) => Some(folder),
+            None if self.stream => None,
+            None => Some(Path::new(".")),
+        }
+    }
+
+    /// The folder of tables, where they are asked for.
+    fn tables(&self) -> Option<&Path> {
+        self.folder().filter(|_| self.format.contains(&Format::Parquet))
+    }
+
+    /// Formats with a file for each image that are asked for.
+    fn each(&self) -> impl Iterator<Item = Format> + '_ {
+        self.format.iter().copied().filter(|format| *format != Format::Parquet)
+    }
+
+    /// The files of an image's results.
+    fn results(&self, stem: &str) -> Vec<(PathBuf, Kind)> {
+        let Some(folder) = self.folder() else { return Vec::new() };
+        let formats = self.each().map(|format| (format.extension(), format.kind()));
+        let overlay = self.overlay.then(|| ("overlay.png", Kind::own_png()));
+        let all = formats.chain(overlay);
+        all.map(|(end, kind)| (folder.join(format!("{stem}.{end}")), kind)).collect()
+    }
+
+    /// A result may not take the place of a target, of the truth of a synthetic picture, or of
+    /// anything else.
+    fn check_results(&self, stem: &str) -> anyhow::Result<()> {
+        let mut results = self.results(stem).into_iter();
+        results.try_for_each(|(path, kind)| self.overwrite.check(&path, &kind))
+    }
+}
+
+impl Format {
+    fn extension(self) -> &'static str {
+        match self {
+            Self::Json => "json",
+            Self::Orpc => "orpc",
+            Self::Csv => "csv",
+            Self::Parquet => EXTENSION,
+        }
+    }
+
+    fn kind(self) -> Kind {
+        match self {
+            Self::Json => Kind::of_schema(detection::SCHEMA),
+            Self::Orpc => Kind::of(orpc::HEAD.as_bytes()),
+            Self::Csv => Kind::of(csv::HEADER.as_bytes()),
+            Self::Parquet => Kind::own_parquet(),
+        }
+    }
+
+    /// The text of an image's file; tables have none.
+    fn text(self, found: &Detection, target: Option<&Target>) -> String {
+        match self {
+            Self::Json => detection::write(found),
+            Self::Orpc => orpc::write(found, target),
+            Self::Csv => csv::write(found),
+            Self::Parquet => String::new(),
+        }
+    }
+}
+
+/// Detects in one image, writes its results, and says what was found.
+fn one_image(
+    args: &Args,
+    targets: &[Target],
+    detector: &Detector,
+    path: &Path,
+    stem: &str,
+) -> anyhow::Result<Found> {
+    let limits = args.finder.limits();
+    let Photograph { image, notes } =
+        photograph::read_with_notes(path, &limits, args.accept_damaged)?;
+    let mut found = detector.detect(&image, &name_of(path));
+    found.file = notes;
+    if let Some(folder) = args.folder() {
+        let path = |extension: &str| folder.join(format!("{stem}.{extension}"));
+        let text = |format: Format| {
+            (path(format.extension()), format.text(&found, targets.first()).into_bytes())
+        };
+        let mut files: Vec<(PathBuf, Vec<u8>)> = args.each().map(text).collect();
+        if args.overlay {
+            files.push((path("overlay.png"), overlay::png(&image, &found)?));
+        }
+        atomic::write_together(&files)?;
+    }
+    let line = if args.stream { detection::write_line(&found) } else { summary(path, &found) };
+    let is_there = match targets.is_empty() {
+        false => found.grids.iter().any(|grid| grid.panel.is_some()),
+        true => !found.grids.is_empty(),
+    };
+    let row = args.tables().map(|_| Picture::of(&found));
+    Ok(Found { line, ink: found.ink, is_there, row })
+}
+
+/// What was found in an image, in a line, and why there is no more.
+fn summary(path: &Path, found: &Detection) -> String {
+    let corners: usize = found.grids.iter().map(|grid| grid.corners.len()).sum();
+    let tags: usize = found.grids.iter().map(|grid| grid.tags.len()).sum();
+    let mut line = format!(
+        "{}: {}, {}",
+        path.display(),
+        counted(found.grids.len(), "grid"),
+        counted(corners, "corner")
+    );
+    let mut of_targets = BTreeMap::new();
+    for grid in &found.grids {
+        let count = grid.target.as_ref().map(|name| of_targets.entry(name).or_insert(0));
+        count.into_iter().for_each(|count| *count += grid.corners.len());
+    }
+    let shares = of_targets.iter().map(|(name, count)| format!("{count} of {name}"));
+    let shares = shares.collect::<Vec<_>>().join(", ");
+    if !shares.is_empty() {
+        line += &format!(" ({shares})");
+    }
+    if tags > 0 {
+        line += &format!(", {}", counted(tags, "tag"));
+    }
+    let mut lines = vec![line];
+    if let Some(damage) = &found.file.damage {
+        let grey = "pixels that it does not have are grey";
+        lines.push(format!("  the file is damaged ({damage}): {grey}"));
+    }
+    lines.extend(found.reasons.iter().map(|reason| format!("  {reason}")));
+    lines.iter().map(|line| shown(line) + "\n").collect()
+}

@@ -1,0 +1,132 @@
+//! `deltille refine`.
+
+use std::fmt::Write as _;
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+
+use anyhow::{Context, anyhow, bail};
+use clap::ValueEnum;
+use glam::DVec2;
+
+use crate::deltille::files::limits::ImageLimits;
+use crate::output::{self, Overwrite};
+use deltille::detect::{MAX_WINDOW_PX, RefineStatus, Refined, Refinement, Refiner, Tone};
+use deltille::export::csv;
+use deltille::lattice::GridKind;
+use deltille::limits::Limits;
+use deltille::photograph;
+use deltille::raster::AnyGray;
+
+/// Corners that are refined at a time: as many as of one picture.
+const MOST_SEEDS: usize = 20_000;
+
+/// Arguments of `deltille refine`.
+#[derive(clap::Args)]
+pub struct Args {
+    /// Photograph: PNG, JPEG, TIFF, BMP, PGM or WebP
+    #[arg(value_name = "IMAGE")]
+    image: PathBuf,
+    /// What meets at the corners
+    #[arg(long)]
+    kind: Kind,
+    /// Starts, `x,y` per line in px, pixel centres at integers; a header line is skipped
+    #[arg(long, value_name = "FILE")]
+    seeds: PathBuf,
+    /// How to refine
+    #[arg(long, default_value = "model")]
+    method: Method,
+    /// Side of the square of pixels that may be read, an odd number; the polynomial's window is
+    /// the largest 4r + 1 within it
+    #[arg(long, value_name = "PIXELS", default_value_t = 21, value_parser = window)]
+    window: usize,
+    /// The camera's tone curve: linear, srgb, a gamma such as 2.2, or auto: estimated from all these corners
+    #[arg(long, value_name = "CURVE", default_value = "auto")]
+    tone: Tone,
+    /// File for the results [default: standard output]
+    #[arg(short, long, value_name = "FILE")]
+    output: Option<PathBuf>,
+    #[command(flatten)]
+    limits: ImageLimits,
+    #[command(flatten)]
+    overwrite: Overwrite,
+}
+
+/// How corners are refined.
+#[derive(Clone, Copy, ValueEnum)]
+pub enum Method {
+    /// The paper's fit of a cubic (deltille) or quadric (checker); no covariances
+    Polynomial,
+    /// A blurred corner fitted to the pixels, with covariances
+    Model,
+}
+
+impl From<Method> for Refinement {
+    fn from(method: Method) -> Self {
+        match method {
+            Method::Polynomial => Self::Polynomial,
+            Method::Model => Self::Model,
+        }
+    }
+}
+
+#[derive(Clone, Copy, ValueEnum)]
+enum Kind {
+    /// Six triangles
+    Deltille,
+    /// Four squares
+    Checker,
+}
+
+fn window(text: &str) -> Result<usize, String> {
+    text.parse()
+        .ok()
+        .filter(|side| side % 2 == 1 && (9..=MAX_WINDOW_PX).contains(side))
+        .ok_or_else(|| format!("an odd number from 9 to {MAX_WINDOW_PX} is needed"))
+}
+
+/// Refines all seeds; a seed that no corner is near is reported in its line, not as an error.
+pub fn run(args: Args) -> anyhow::Result<ExitCode> {
+    let limits = args.limits.limits();
+    let seeds = read_seeds(&args.seeds, &limits).context("--seeds")?;
+    let kind = match args.kind {
+        Kind::Deltille => GridKind::Deltille,
+        Kind::Checker => GridKind::Checker,
+    };
+    let refiner = Refiner::new(kind, args.method.into(), args.window).with_tone(args.tone);
+    let refined: Vec<Refined> = match photograph::read_within(&args.image, &limits)? {
+        AnyGray::U8(image) => refiner.refine_all(&image, &seeds),
+        AnyGray::U16(image) => refiner.refine_all(&image, &seeds),
+    };
+    let table = table(&refined);
+    match &args.output {
+        Some(path) => output::write(path, table.as_bytes(), args.overwrite)?,
+        None => output::print(&table)?,
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+/// The results as CSV; covariances in px², empty where the method gives none.
+fn table(refined: &[Refined]) -> String {
+    let mut text = "x,y,cov_xx,cov_xy,cov_yy,status\n".to_owned();
+    for Refined { position: DVec2 { x, y }, cov, status, .. } in refined {
+        let cov = cov.map_or_else(|| ",,".to_owned(), |[xx, xy, yy]| format!("{xx},{xy},{yy}"));
+        let status = match status {
+            RefineStatus::Ok => "ok",
+            RefineStatus::Polynomial => "polynomial",
+            RefineStatus::Failed => "failed",
+        };
+        // Writing to a String cannot fail.
+        let _ = writeln!(text, "{x},{y},{cov},{status}");
+    }
+    text
+}
+
+fn read_seeds(path: &Path, limits: &Limits) -> anyhow::Result<Vec<DVec2>> {
+    let text = limits.read_text(path)?;
+    let seeds = csv::read_points(&text);
+    let seeds = seeds.map_err(|problem| anyhow!("{}: {problem}", path.display()))?;
+    if seeds.len() > MOST_SEEDS {
+        bail!("{}: {} points; at most {MOST_SEEDS} at a time", path.display(), seeds.len());
+    }
+    Ok(seeds)
+}

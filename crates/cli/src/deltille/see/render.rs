@@ -1,0 +1,175 @@
+//! `deltille render`.
+
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+
+use anyhow::{Context, bail};
+use glam::{DQuat, DVec3};
+use image::{DynamicImage, ImageBuffer, Luma};
+
+use crate::deltille::files::limits::ImageLimits;
+use crate::deltille::files::written::{bytes_file, text_file, write_all};
+use crate::deltille::files::{camera_file, target_file};
+use crate::output::{self, Overwrite, say, tell};
+use crate::values::number;
+use deltille::camera::{Camera, Pose};
+use deltille::export::kind::signed_png;
+use deltille::export::truth;
+use deltille::synth::{Light, scene_of_target};
+use deltille_core::quantity::{Range, blur_px, light_gradient, of_full_scale, place_mm};
+
+/// Arguments of `deltille render`.
+#[derive(clap::Args)]
+pub struct Args {
+    /// Description of the target: the .json of `deltille board` or `deltille icosahedron`
+    target: PathBuf,
+    /// The camera: a YAML file with width, height, focal_px, centre_px, model (pinhole, fisheye)
+    /// and distortion, or the camera file of ROS or OpenCV
+    #[arg(long, value_name = "FILE")]
+    camera: PathBuf,
+    /// Pose of the target in the camera frame (x right, y down, z forward): rotation vector in
+    /// radians and translation in mm
+    #[arg(long, value_name = "RX,RY,RZ,TX,TY,TZ", value_parser = numbers::<6>,
+          allow_hyphen_values = true, conflicts_with = "eye")]
+    pose: Option<[f64; 6]>,
+    /// Where the camera stands in the target frame, mm, instead of --pose
+    #[arg(long, value_name = "X,Y,Z", value_parser = numbers::<3>, allow_hyphen_values = true)]
+    eye: Option<[f64; 3]>,
+    /// What --eye looks at, mm [default: the middle of all corners]
+    #[arg(long, value_name = "X,Y,Z", value_parser = numbers::<3>, allow_hyphen_values = true,
+          requires = "eye")]
+    look_at: Option<[f64; 3]>,
+    /// What is up in the picture of --eye [default: 0,0,1, or 0,1,0 from straight above or below]
+    #[arg(long, value_name = "X,Y,Z", value_parser = numbers::<3>, allow_hyphen_values = true,
+          requires = "eye")]
+    up: Option<[f64; 3]>,
+    /// Standard deviation of the blur, px
+    #[arg(long, default_value_t = 0.8, value_name = "PX", allow_negative_numbers = true,
+          value_parser = number(blur_px::RANGE.least..=blur_px::RANGE.most))]
+    blur: f64,
+    /// Standard deviation of the noise, percent of full scale
+    #[arg(long, default_value_t = 1.0, value_name = "PERCENT", allow_negative_numbers = true,
+          value_parser = number(0.0..=100.0 * of_full_scale::RANGE.most))]
+    noise: f64,
+    /// Relative change of the light across and down the picture
+    #[arg(long, value_name = "ACROSS,DOWN", value_parser = gradient,
+          allow_hyphen_values = true, default_value = "0,0")]
+    gradient: [f64; 2],
+    /// Seed of the noise
+    #[arg(long, default_value_t = 0)]
+    seed: u64,
+    /// Bits of a pixel: 8 or 16
+    #[arg(long, default_value_t = 8, value_parser = depth)]
+    bits: u8,
+    /// Family file, where the target names a family that is not shipped
+    #[arg(long)]
+    family: Option<String>,
+    /// The picture, a .png file, or a folder for <target>-view.png; the true positions of all
+    /// corners in it are written beside it as .json
+    #[arg(short, long, value_name = "FILE", default_value = ".")]
+    output: PathBuf,
+    #[command(flatten)]
+    limits: ImageLimits,
+    #[command(flatten)]
+    overwrite: Overwrite,
+}
+
+/// Takes a picture of a target and writes it with its truth.
+pub fn run(args: Args) -> anyhow::Result<ExitCode> {
+    let limits = args.limits.limits();
+    let target = target_file::read(&args.target, &limits)?.target;
+    let family = target_file::family(&target, args.family.as_deref())?;
+    if !target.is_one_scene() {
+        bail!("{} has several loose boards: render targets of one board, or solids", target.name);
+    }
+    let camera = camera_file::read("--camera", &args.camera)?;
+    limits.check_pixels(camera.width, camera.height).with_context(|| {
+        let file = args.camera.display();
+        format!("--camera: {file}: a picture of {} × {} px", camera.width, camera.height)
+    })?;
+    let light = Light::default()
+        .blur_px(args.blur)
+        .noise(args.noise / 100.0)
+        .gradient(args.gradient.into())
+        .seed(args.seed);
+    let corners = || target.panels.iter().flat_map(|panel| &panel.corners);
+    let middle = corners().map(|c| c.target_mm).sum::<DVec3>();
+    let pose = args.camera_from_target(middle / corners().count() as f64)?;
+
+    let scene = scene_of_target(&target, family.as_ref())?;
+    let image = scene.render(&camera, &pose, &light);
+    let seen = scene.truth(&camera, &pose, 0.0).corners;
+    let path = output::file(&args.output, &format!("{}-view", target.name), "png")?;
+    let name = path.file_name().unwrap_or_default().to_string_lossy();
+    let truth = truth::write(&name, &target.name, &pose, &light, &seen);
+    let picture = match args.bits {
+        8 => picture(&camera, image.pixels().iter().map(|v| (v * 255.0 + 0.5) as u8)),
+        _ => picture(&camera, image.pixels().iter().map(|v| (v * 65535.0 + 0.5) as u16)),
+    };
+    let mut png = std::io::Cursor::new(Vec::new());
+    picture.context("the picture is empty")?.write_to(&mut png, image::ImageFormat::Png)?;
+    let truth_name = Path::new(&*name).with_extension("json").to_string_lossy().into_owned();
+    let files =
+        [text_file(truth_name, truth), bytes_file(name.into_owned(), signed_png(png.into_inner()))];
+    write_all(output::folder_of(&path), &files, args.overwrite)?;
+    say!("{}: {} corners in view", path.display(), seen.len());
+    if seen.is_empty() {
+        // In the frames of OpenCV's boards z points into the board.
+        let first = target.panels.first();
+        let is_away = first.is_some_and(|panel| panel.pose.matrix().z_axis.z < 0.0);
+        let side = if is_away { "z < 0" } else { "z > 0" };
+        tell!(
+            "warning: the camera looks past the target, or at its back: with --eye it looks at the \
+             middle of the target, whose front is on the side of {side} where it is a board"
+        );
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+/// The picture of a camera; `None` where it has other than so many pixels.
+fn picture<T>(camera: &Camera, pixels: impl Iterator<Item = T>) -> Option<DynamicImage>
+where
+    T: image::Primitive,
+    Luma<T>: image::Pixel<Subpixel = T>,
+    DynamicImage: From<ImageBuffer<Luma<T>, Vec<T>>>,
+{
+    ImageBuffer::from_raw(camera.width, camera.height, pixels.collect()).map(DynamicImage::from)
+}
+
+/// Reads the depth of a picture.
+fn depth(text: &str) -> Result<u8, String> {
+    let bits = text.parse().ok().filter(|bits| [8, 16].contains(bits));
+    bits.ok_or_else(|| "not 8 or 16".to_owned())
+}
+
+impl Args {
+    fn camera_from_target(&self, middle: DVec3) -> anyhow::Result<Pose> {
+        if let Some(pose) = &self.pose {
+            let rotation = DQuat::from_scaled_axis(DVec3::from_slice(&pose[..3]));
+            return Ok(Pose { rotation, translation: DVec3::from_slice(&pose[3..]) });
+        }
+        let Some(eye) = self.eye.map(DVec3::from) else {
+            bail!("give --pose, or --eye for where the camera stands");
+        };
+        let centre = self.look_at.map(DVec3::from).unwrap_or(middle);
+        let pose = Pose::viewing(eye, centre, self.up.map(DVec3::from));
+        pose.context("--up: it must not be parallel to the line of sight, nor --eye be --look-at")
+    }
+}
+
+/// So many numbers of a size that places have, separated by commas.
+fn numbers<const N: usize>(text: &str) -> Result<[f64; N], String> {
+    numbers_of(place_mm::RANGE, text)
+}
+
+/// A relative change of the light across and down a picture.
+fn gradient(text: &str) -> Result<[f64; 2], String> {
+    numbers_of(light_gradient::RANGE, text)
+}
+
+/// So many numbers of a range, separated by commas.
+fn numbers_of<const N: usize>(range: Range, text: &str) -> Result<[f64; N], String> {
+    let parsed = text.split(',').map(|word| range.parse(word));
+    let numbers = parsed.collect::<Result<Vec<f64>, _>>()?;
+    numbers.try_into().map_err(|v: Vec<f64>| format!("{} numbers instead of {N}", v.len()))
+}

@@ -1,0 +1,140 @@
+//! A target's printed page as a picture, with the places of its corners.
+//!
+//! The PDF is written, drawn by hayro, and its corners are the vertices of its own paths: the
+//! description of the target only says which of them are corners, and what they are called.
+
+use glam::DVec2;
+
+use super::mips::{Beyond, Footprint, Mips};
+use super::paths::Vertices;
+use crate::photographs::PhotographError;
+use deltille::artwork;
+use deltille::export::pdf;
+use deltille::family::Family;
+use deltille::lattice::GridKind;
+use deltille::layout::Printing;
+use deltille::verify::Document;
+
+/// Resolution asked for, px/mm: 1200 dpi. Large pages come coarser.
+const PX_PER_MM: f64 = 1200.0 / 25.4;
+
+/// A vertex of the paths this near to where a corner is stated is that corner, mm. Points are written
+/// in single precision.
+const SAME_MM: f64 = 0.01;
+
+/// Length of a tile's edge in bit-widths where no tag says it: those of the default tags.
+const UNTAGGED_BITS: f64 = 10.0;
+
+/// A corner on the page.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PageCorner {
+    /// Its id in the target.
+    pub id: u32,
+    /// Its panel.
+    pub panel: u32,
+    /// Lattice row.
+    pub row: i32,
+    /// Lattice column.
+    pub col: i32,
+    /// Where it is, mm from the lower left corner of the page, y up.
+    pub page_mm: DVec2,
+}
+
+/// A printed page.
+pub struct PrintedPage {
+    /// Width and height, mm.
+    pub size_mm: DVec2,
+    /// All corners on it.
+    pub corners: Vec<PageCorner>,
+    /// Length of a tile's edge, mm.
+    pub edge_mm: f64,
+    /// Width of a tag's bit along the edge, mm.
+    pub bit_mm: f64,
+    /// Whether labels of an untagged board can only be right up to half a turn.
+    pub half_turn: bool,
+    brightness: Mips,
+    px_per_mm: f64,
+}
+
+impl PrintedPage {
+    /// Prints the first page of a target. `family` is the family of its tags.
+    ///
+    /// # Errors
+    /// Where the target has no sheet, or the family is missing.
+    pub fn new(printing: &Printing, family: Option<&Family>) -> Result<Self, PhotographError> {
+        let (Some(panel), Some(sheet)) = (printing.target.panels.first(), printing.sheets.first())
+        else {
+            return Err(PhotographError::NoSheet);
+        };
+        if !sheet.pages.is_empty() {
+            return Err(PhotographError::SeveralPages);
+        }
+        let artwork = artwork::draw(printing, family)?;
+        let folder = tempfile::tempdir()?;
+        let path = folder.path().join("page.pdf");
+        pdf::write(&artwork, &path)?;
+        let document = Document::open(&path)?;
+        let page = document.render(0, PX_PER_MM)?;
+        let vertices = Vertices::of_first_page(&std::fs::read(&path)?)?;
+
+        let target = &printing.target;
+        let meeting = match panel.kind {
+            GridKind::Deltille => 3,
+            GridKind::Checker => 2,
+        };
+        let mut corners = Vec::new();
+        for placement in &sheet.placements {
+            let Some(panel) = target.panels.iter().find(|panel| panel.id == placement.panel) else {
+                continue;
+            };
+            for corner in &panel.corners {
+                let stated = placement.page_from_panel(corner.panel_mm);
+                let (page_mm, _) = vertices
+                    .meeting(stated, SAME_MM)
+                    .filter(|(_, contours)| *contours >= meeting)
+                    .ok_or(PhotographError::NoCorner { id: corner.id, at_mm: stated })?;
+                let (id, row, col) = (corner.id, corner.row, corner.col);
+                corners.push(PageCorner { id, panel: panel.id, row, col, page_mm });
+            }
+        }
+        let bits = family
+            .filter(|_| panel.border_bits.is_some())
+            .map_or(UNTAGGED_BITS, |family| family.cells().width(panel.tag_inset_bits()));
+        let [cols, rows] = panel.matrix;
+        Ok(Self {
+            size_mm: DVec2::new(page.width_mm, page.height_mm),
+            corners,
+            edge_mm: panel.edge_mm,
+            bit_mm: panel.edge_mm / bits,
+            half_turn: panel.kind == GridKind::Checker
+                && target.family.is_none()
+                && (rows + cols) % 2 == 0,
+            px_per_mm: page.px_per_mm,
+            brightness: Mips::new(page.image, Beyond::Border),
+        })
+    }
+
+    /// The middle of the box around all corners, mm, and the box's size.
+    pub fn board_mm(&self) -> (DVec2, DVec2) {
+        let places = || self.corners.iter().map(|corner| corner.page_mm);
+        let least = places().fold(DVec2::INFINITY, DVec2::min);
+        let most = places().fold(DVec2::NEG_INFINITY, DVec2::max);
+        (least.midpoint(most), most - least)
+    }
+
+    /// How white a small parallelogram of the page is on the average, 0 on ink to 1 on bare paper;
+    /// `None` beside the page. Its sides are in mm.
+    pub(crate) fn whiteness(&self, place: DVec2, footprint: &Footprint) -> Option<f32> {
+        let on_page = place.cmpge(DVec2::ZERO).all() && place.cmple(self.size_mm).all();
+        on_page.then(|| {
+            let from_top = DVec2::new(place.x, self.size_mm.y - place.y);
+            self.brightness.area(from_top * self.px_per_mm - 0.5, footprint) / 255.0
+        })
+    }
+
+    /// How a parallelogram with these sides, mm, is sampled.
+    pub(crate) fn footprint(&self, across: DVec2, down: DVec2) -> Footprint {
+        let px = |side: DVec2| side * DVec2::new(1.0, -1.0) * self.px_per_mm;
+        self.brightness.footprint(px(across), px(down))
+    }
+}

@@ -1,0 +1,428 @@
+//! Calibrations and rigs: files, pages, and what is said of them.
+
+use std::path::PathBuf;
+use std::sync::Arc;
+
+use deltille::calibrate as solver;
+use deltille::camera::CameraFile;
+use deltille::export::calibration::Residuals;
+use deltille::export::camera::{colmap, colmap_rig, kalibr};
+use deltille::export::saved;
+use deltille::layout::Printing;
+use deltille::limits::Limits;
+use deltille::report;
+use numpy::PyArray2;
+use pyo3::prelude::*;
+
+use super::calibrated_camera::CalibratedCamera;
+use super::pickled::{of_text, pickled, restored};
+use super::solving::Solved;
+use super::views::{Diagnosis, Excluded};
+use crate::boundary::arrays::{self, record};
+use crate::boundary::errors::{self, Raise, RaiseFile, raised, unlocked};
+use crate::boundary::text_file::save_text;
+use crate::see::detection::Targets;
+use crate::see::pose::Pose;
+use crate::targets::target::Target;
+
+/// A calibrated camera, with all that is said about it.
+#[pyclass(frozen, extends = CalibratedCamera, module = "deltille")]
+pub struct Calibration;
+
+/// Cameras that are fixed to each other, and where they are.
+#[pyclass(frozen, module = "deltille")]
+pub struct Rig {
+    pub solved: Arc<Solved>,
+}
+
+pub fn calibration(solved: Arc<Solved>) -> PyClassInitializer<Calibration> {
+    PyClassInitializer::from(CalibratedCamera { solved, index: 0 }).add_subclass(Calibration)
+}
+
+macro_rules! whole {
+    ($class:ident, $is_rig:literal, $self:ident: $kind:ty => $solved:expr) => {
+        #[pymethods]
+        impl $class {
+            /// What is to be said about it.
+            #[getter]
+            fn diagnoses($self: $kind) -> Vec<Diagnosis> {
+                let said = $solved.said().into_iter();
+                said.map(|(record, is_failure)| Diagnosis { record, is_failure }).collect()
+            }
+
+            /// Views and frames that took no part, and why.
+            #[getter]
+            fn excluded($self: $kind) -> Vec<Excluded> {
+                let one = |out: &solver::Excluded| Excluded {
+                    view: out.view.clone(),
+                    camera: out.camera.clone(),
+                    image: out.image.clone(),
+                    panel: out.panel,
+                    corners: out.corners,
+                    reason: errors::told(&out.reason),
+                };
+                if let Some(file) = $solved.in_file(None) {
+                    let all = file["excluded"].as_array().map_or(&[][..], Vec::as_slice);
+                    return all.iter().map(Excluded::read).collect();
+                }
+                $solved.estimate.excluded.iter().map(one).collect()
+            }
+
+            /// A-posteriori standard deviation of a coordinate, by whose square covariances are scaled.
+            #[getter]
+            fn sigma($self: $kind) -> f64 {
+                let file = $solved.in_file(None).and_then(|file| file["sigma"].as_f64());
+                file.unwrap_or($solved.estimate.sigma)
+            }
+
+            /// The deviation that was added to that of every corner, px; ``None`` with equal weights.
+            #[getter]
+            fn common_px($self: $kind) -> Option<f64> {
+                let file = $solved.in_file(None).and_then(|file| file["common_px"].as_f64());
+                file.or($solved.estimate.common_px)
+            }
+
+            /// Root mean square error of a coordinate in what was held out, px; ``None`` where nothing was.
+            #[getter]
+            fn held_out_rms_px($self: $kind) -> Option<f64> {
+                if let Some(file) = $solved.in_file(None) {
+                    return file["held_out"]["rms_px"].as_f64();
+                }
+                $solved.estimate.held_out.as_ref().map(|test| test.rms_px)
+            }
+
+            /// How far the sheet of the board is bent, mm, and how sure that is (F), where that was to be found:
+            /// ``bent_mm``, ``stretched_mm``, ``f_ratio``, ``is_significant``.
+            #[getter]
+            fn board_shape<'py>($self: $kind, py: Python<'py>) -> PyResult<Option<Bound<'py, PyAny>>> {
+                let data = $solved.estimate.shape.map(|found| {
+                    serde_json::json!({
+                        "bent_mm": found.bent_mm, "stretched_mm": found.stretched_mm,
+                        "f_ratio": found.f_ratio, "is_significant": found.is_significant(),
+                    })
+                });
+                data.map(|data| record(py, &data)).transpose()
+            }
+
+            /// The text of its file.
+            ///
+            /// Parameters
+            /// ----------
+            /// residuals : bool, optional
+            ///     Whether every corner is listed; what was loaded is written as it was.
+            ///
+            /// Returns
+            /// -------
+            /// str
+            #[pyo3(signature = (*, residuals = false))]
+            fn to_json($self: $kind, residuals: bool) -> PyResult<String> {
+                text_of(&$solved, residuals)
+            }
+
+            /// Writes a page that shows what the calibration is worth, and what would make it better.
+            ///
+            /// Parameters
+            /// ----------
+            /// path : path-like
+            ///     An ``.html`` file.
+            /// title : str, optional
+            /// overwrite : bool, optional
+            ///     Whether a file of another kind is replaced.
+            ///
+            /// Returns
+            /// -------
+            /// pathlib.Path
+            #[pyo3(signature = (path, *, title = None, overwrite = false))]
+            fn report(
+                $self: $kind,
+                py: Python<'_>,
+                path: PathBuf,
+                title: Option<&str>,
+                overwrite: bool,
+            ) -> PyResult<PathBuf> {
+                let solved = $solved.clone();
+                if !solved.is_whole() {
+                    let what = "a page needs the corners and all that is said of them: make it where the camera is \
+                                calibrated, or save with residuals=True and load with the target what has no diagnosis";
+                    return Err(errors::calibration(what.to_owned()));
+                }
+                let usual = if $is_rig { "rig" } else { "camera" };
+                let title = title.unwrap_or(usual).to_owned();
+                let page = unlocked(py, move || {
+                    let mut page = report::Report::new(&title, &solved.estimate);
+                    (page.diagnoses, page.stated) = (&solved.diagnoses, &solved.stated);
+                    (page.print, page.models) = (solved.print, &solved.models);
+                    page.html()
+                })?;
+                save_text(path, page, overwrite)
+            }
+        }
+    };
+}
+
+whole!(Calibration, false, self_: PyRef<'_, Self> => self_.as_super().solved);
+whole!(Rig, true, self_: PyRef<'_, Self> => self_.solved);
+
+#[pymethods]
+impl Calibration {
+    /// Reads a calibration: the ``.json`` of :meth:`save` or of ``deltille calibrate``.
+    ///
+    /// Parameters
+    /// ----------
+    /// path : path-like
+    /// target : Target, optional
+    ///     What was photographed, from which :attr:`ids` come.
+    ///
+    /// Returns
+    /// -------
+    /// Calibration
+    #[staticmethod]
+    #[pyo3(signature = (path, *, target = None))]
+    fn load(py: Python<'_>, path: PathBuf, target: Option<Targets>) -> PyResult<Py<Self>> {
+        let solved = read(&path, target, false)?;
+        Py::new(py, calibration(Arc::new(solved)))
+    }
+
+    /// Writes the calibration.
+    ///
+    /// Parameters
+    /// ----------
+    /// path : path-like
+    ///     A ``.json`` file, or that of another program.
+    /// format : str, optional
+    ///     ``"json"``, which :meth:`load` reads back, or a format of :meth:`Camera.save`; ``"nerfstudio"`` has the
+    ///     poses of the views too.
+    /// residuals : bool, optional
+    ///     Whether every corner is listed in the ``.json``.
+    /// overwrite : bool, optional
+    ///     Whether a file of another kind is replaced.
+    ///
+    /// Returns
+    /// -------
+    /// pathlib.Path
+    #[pyo3(signature = (path, format = "json", *, residuals = false, overwrite = false))]
+    fn save(
+        slf: PyRef<'_, Self>,
+        path: PathBuf,
+        format: &str,
+        residuals: bool,
+        overwrite: bool,
+    ) -> PyResult<PathBuf> {
+        let own = slf.as_super();
+        let text = match format {
+            "json" => text_of(&own.solved, residuals)?,
+            "own" => {
+                let camera = own.estimate().camera.clone();
+                let calibrated_with = own.solved.estimate.calibrated_with.clone();
+                let failed = saved::failures(&text_of(&own.solved, false)?).into_iter().next();
+                CameraFile { camera, calibrated_with, failed }.to_yaml()
+            }
+            _ => {
+                let stem = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+                let camera = own.estimate();
+                let views = camera.views.iter().map(|view| (view.image.as_str(), view.pose));
+                own.camera().text(format, &stem, &views.collect::<Vec<_>>())?
+            }
+        };
+        save_text(path, text, overwrite)
+    }
+
+    /// The target with its corners where they were measured; ``None`` where they were not.
+    #[getter]
+    fn measured_target(slf: PyRef<'_, Self>) -> PyResult<Option<Target>> {
+        let solved = &slf.as_super().solved;
+        let found = solved.estimate.map.as_ref().zip(solved.targets.first());
+        let measured = found.map(|(map, printing)| Printing {
+            target: map.on(&printing.target),
+            ..printing.clone()
+        });
+        measured.map(|printing| Target::with_family(printing, None)).transpose()
+    }
+
+    fn __repr__(slf: PyRef<'_, Self>) -> String {
+        slf.as_super().__repr__().replace("CalibratedCamera ", "Calibration ")
+    }
+
+    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> crate::Reduced<'py, (String, Vec<String>)> {
+        pickled(slf.py(), "_calibration", &slf.as_super().get().solved)
+    }
+
+    fn __eq__(slf: PyRef<'_, Self>, other: PyRef<'_, Self>) -> bool {
+        slf.as_super().solved.is_same(&other.as_super().solved)
+    }
+}
+
+/// A calibration that was pickled.
+#[pyfunction]
+pub fn _calibration(py: Python<'_>, json: &str, targets: Vec<String>) -> PyResult<Py<Calibration>> {
+    Py::new(py, calibration(Arc::new(restored(json, &targets)?)))
+}
+
+/// A rig that was pickled.
+#[pyfunction]
+pub fn _rig(json: &str, targets: Vec<String>) -> PyResult<Rig> {
+    Ok(Rig { solved: Arc::new(restored(json, &targets)?) })
+}
+
+#[pymethods]
+impl Rig {
+    /// Reads a rig: the ``.json`` of :meth:`save` or of ``deltille rig``.
+    ///
+    /// Parameters
+    /// ----------
+    /// path : path-like
+    /// target : Target or sequence of Target, optional
+    ///     What was photographed, from which the ids of corners come.
+    ///
+    /// Returns
+    /// -------
+    /// Rig
+    #[staticmethod]
+    #[pyo3(signature = (path, *, target = None))]
+    fn load(path: PathBuf, target: Option<Targets>) -> PyResult<Self> {
+        Ok(Self { solved: Arc::new(read(&path, target, true)?) })
+    }
+
+    /// The cameras by their names, in the order given; the first is the frame of the rig.
+    #[getter]
+    fn cameras<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, pyo3::types::PyDict>> {
+        let all = pyo3::types::PyDict::new(py);
+        for index in 0..self.solved.estimate.cameras.len() {
+            let camera = CalibratedCamera { solved: self.solved.clone(), index };
+            all.set_item(camera.name().to_owned(), Py::new(py, camera)?)?;
+        }
+        Ok(all)
+    }
+
+    /// Names of the frames: moments at which pictures were taken.
+    #[getter]
+    fn frames(&self) -> Vec<String> {
+        self.solved.estimate.frames.iter().map(|frame| frame.name.clone()).collect()
+    }
+
+    /// Where the target was in each frame: rig from target.
+    #[getter]
+    fn poses(&self) -> Vec<Pose> {
+        self.solved.estimate.frames.iter().map(|frame| Pose(frame.rig_from_target)).collect()
+    }
+
+    /// Standard deviations of these poses, frames × 6, float64: a rotation (rad) and a translation (mm) about the
+    /// rig's axes.
+    #[getter]
+    fn pose_sd<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray2<f64>> {
+        arrays::rows(py, self.solved.estimate.frames.iter().map(|frame| frame.pose_sd))
+    }
+
+    /// Root mean square error of a coordinate over all corners, px.
+    #[getter]
+    fn rms_px(&self) -> f64 {
+        let file = self.solved.in_file(None).and_then(|file| file["rms_px"].as_f64());
+        file.unwrap_or(self.solved.estimate.rms_px)
+    }
+
+    /// The targets with their panels where they were found, where that was asked for.
+    #[getter]
+    fn refined_targets(&self) -> PyResult<Vec<Target>> {
+        let estimate = &self.solved.estimate;
+        let all = self.solved.targets.iter().enumerate();
+        let refined = all.filter_map(|(index, printing)| {
+            let target = &printing.target;
+            let found = match self.solved.targets.len() {
+                1 => estimate.clone(),
+                _ => estimate.of_target(index),
+            };
+            let refined = found.has_refined_panels().then(|| found.refined(target));
+            let measured = found.map.as_ref().map(|map| map.on(refined.as_ref().unwrap_or(target)));
+            let target = measured.or(refined)?;
+            Some(Printing { target, ..printing.clone() })
+        });
+        refined.map(|printing| Target::with_family(printing, None)).collect()
+    }
+
+    /// Writes the rig.
+    ///
+    /// Parameters
+    /// ----------
+    /// path : path-like
+    ///     A ``.json`` file, or that of another program.
+    /// format : str, optional
+    ///     ``"json"``, which :meth:`load` reads back, ``"kalibr"``, ``"colmap"`` or ``"colmap-rig"``.
+    /// residuals : bool, optional
+    ///     Whether every corner is listed in the ``.json``.
+    /// overwrite : bool, optional
+    ///     Whether a file of another kind is replaced.
+    ///
+    /// Returns
+    /// -------
+    /// pathlib.Path
+    #[pyo3(signature = (path, format = "json", *, residuals = false, overwrite = false))]
+    fn save(
+        &self,
+        path: PathBuf,
+        format: &str,
+        residuals: bool,
+        overwrite: bool,
+    ) -> PyResult<PathBuf> {
+        let estimate = &self.solved.estimate;
+        let cameras = || estimate.cameras.iter();
+        let text = match format {
+            "json" => text_of(&self.solved, residuals)?,
+            "kalibr" => {
+                let placed = cameras().map(|found| (&found.camera, found.camera_from_rig));
+                kalibr(&placed.collect::<Vec<_>>(), &estimate.overlaps()).raise(errors::camera)?
+            }
+            "colmap" => colmap(&cameras().map(|found| &found.camera).collect::<Vec<_>>())
+                .raise(errors::camera)?,
+            "colmap-rig" => {
+                let placed = cameras().map(|f| (f.name.as_str(), &f.camera, f.camera_from_rig));
+                colmap_rig(&placed.collect::<Vec<_>>()).raise(errors::camera)?
+            }
+            _ => {
+                let what = format!("format: {format} is not json, kalibr, colmap or colmap-rig");
+                return Err(raised::CameraError::new_err(what));
+            }
+        };
+        save_text(path, text, overwrite)
+    }
+
+    fn __repr__(&self) -> String {
+        let found = &self.solved.estimate;
+        let (cameras, frames) = (found.cameras.len(), found.frames.len());
+        format!("<Rig: {cameras} cameras, {frames} frames, rms {:.4} px>", found.rms_px)
+    }
+
+    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> crate::Reduced<'py, (String, Vec<String>)> {
+        pickled(slf.py(), "_rig", &slf.get().solved)
+    }
+
+    fn __eq__(&self, other: &Self) -> bool {
+        self.solved.is_same(&other.solved)
+    }
+}
+
+/// The text of a file, with its corners where they are asked for.
+fn text_of(solved: &Solved, residuals: bool) -> PyResult<String> {
+    if residuals && !solved.has_corners() {
+        let what = "residuals: the file that this was loaded from has none: save them where it was calibrated";
+        return Err(errors::calibration(what.to_owned()));
+    }
+    let listed = if residuals { Residuals::Listed } else { Residuals::LeftOut };
+    Ok(solved.json(listed))
+}
+
+fn read(path: &std::path::Path, target: Option<Targets>, is_rig: bool) -> PyResult<Solved> {
+    let text = Limits::default().read_text(path).raise_of_file(path, errors::file)?;
+    let targets = target.map(|targets| targets.0).unwrap_or_default();
+    let targets = targets.iter().map(|target| (*target.printing).clone()).collect();
+    let wrong = |what: String| raised::FileError::new_err(format!("{}: {what}", path.display()));
+    let solved = of_text(&text, targets).map_err(|error| wrong(errors::told(&error)))?;
+    if is_rig && !solved.is_rig {
+        return Err(wrong(
+            "this is a calibration of one camera: read it by Calibration.load".to_owned(),
+        ));
+    }
+    if !is_rig && solved.is_rig {
+        return Err(wrong("this is a rig: read it by Rig.load".to_owned()));
+    }
+    Ok(solved)
+}

@@ -1,0 +1,534 @@
+//! Whether two calibrations differ, and where a target is.
+
+use std::sync::Arc;
+
+use deltille::calibrate::{
+    self, CameraEstimate, CameraMotion, Diagnosis, Estimate, Reference, Region, Words,
+    compare_boards, views,
+};
+use deltille::export::sheet::Sheet;
+use deltille::export::{comparison, pose};
+use deltille::glam::DVec2;
+use deltille::targets::TargetIdentity;
+use numpy::{PyArray1, PyArray2};
+use pyo3::prelude::*;
+
+use super::calibrated_camera::CalibratedCamera;
+use super::calibration::Rig;
+use super::solving::{Solved, print_scale_of};
+use crate::boundary::arrays::{self, distance};
+use crate::boundary::errors::{self, Raise, raised, unlocked};
+use crate::see::camera::Camera;
+use crate::see::detection::{Detection, Targets};
+use crate::see::pose::Pose;
+use crate::targets::target::Target;
+
+/// A camera as found, or as given.
+pub struct Compared(Estimate);
+
+impl Compared {
+    fn of(cameras: Vec<CameraEstimate>, calibrated_with: &[TargetIdentity]) -> Self {
+        let mut estimate = Estimate::default();
+        (estimate.cameras, estimate.calibrated_with) = (cameras, calibrated_with.to_vec());
+        Self(estimate)
+    }
+
+    /// Cameras of a calibration; the uncertainties of one that failed are not to be trusted.
+    fn of_solved(mut cameras: Vec<CameraEstimate>, solved: &Solved) -> Self {
+        if solved.said().iter().any(|(_, is_failure)| *is_failure) {
+            cameras.iter_mut().for_each(CameraEstimate::forget_uncertainties);
+        }
+        Self::of(cameras, &solved.estimate.calibrated_with)
+    }
+}
+
+impl<'a, 'py> FromPyObject<'a, 'py> for Compared {
+    type Error = PyErr;
+
+    fn extract(given: Borrowed<'a, 'py, PyAny>) -> PyResult<Self> {
+        if let Ok(rig) = given.cast::<Rig>() {
+            let solved = &rig.get().solved;
+            return Ok(Self::of_solved(solved.estimate.cameras.clone(), solved));
+        }
+        if let Ok(found) = given.cast::<CalibratedCamera>() {
+            let found = found.get();
+            return Ok(Self::of_solved(vec![found.estimate().clone()], &found.solved));
+        }
+        let camera = given.cast::<Camera>()?;
+        Ok(Self::of(vec![CameraEstimate::given("", camera.get().0.clone())], &[]))
+    }
+}
+
+/// Where cameras are compared.
+#[derive(FromPyObject)]
+pub enum Part {
+    Name(String),
+    Within([f64; 4]),
+}
+
+impl Part {
+    fn region(self) -> PyResult<Region> {
+        match self {
+            Self::Within([left, top, right, bottom]) if left < right && top < bottom => {
+                Ok(Region::Within(DVec2::new(left, top), DVec2::new(right, bottom)))
+            }
+            Self::Name(name) if name == "seen" => Ok(Region::Seen),
+            Self::Name(name) if name == "image" => Ok(Region::Image),
+            _ => {
+                let what = "region: give seen, image, or four pixels (left, top, right, bottom)";
+                Err(raised::CalibrationError::new_err(what))
+            }
+        }
+    }
+}
+
+/// How two calibrations of a camera differ over its image.
+#[pyclass(frozen, module = "deltille")]
+pub struct Comparison {
+    name: String,
+    found: calibrate::Comparison,
+}
+
+#[pymethods]
+impl Comparison {
+    /// Name of the camera.
+    #[getter]
+    fn name(&self) -> &str {
+        &self.name
+    }
+
+    /// Root mean square difference of a coordinate, px.
+    #[getter]
+    fn rms_px(&self) -> f64 {
+        self.found.rms_px
+    }
+
+    /// The same as the uncertainties of both have it, px; ``None`` where they are not known.
+    #[getter]
+    fn expected_px(&self) -> Option<f64> {
+        self.found.expected_px
+    }
+
+    /// The largest difference, px.
+    #[getter]
+    fn largest_px(&self) -> f64 {
+        self.found.largest_px()
+    }
+
+    /// How often chance makes them differ as much where the camera is the same.
+    #[getter]
+    fn chance(&self) -> Option<f64> {
+        self.found.chance
+    }
+
+    /// Why it cannot be judged whether the camera has changed, as a sentence; ``None`` where it can.
+    #[getter]
+    fn why_undecided(&self) -> Option<&'static str> {
+        self.found.why_undecided()
+    }
+
+    /// Whether they differ by more than chance makes; ``None`` where uncertainties are not known.
+    #[getter]
+    fn is_significant(&self) -> Option<bool> {
+        self.found.is_significant()
+    }
+
+    /// What the second camera sees is this motion of what the first one sees.
+    #[getter]
+    fn second_from_first(&self) -> Pose {
+        Pose(self.found.second_from_first)
+    }
+
+    /// Places of the first image that were compared, N × 2, float64, px.
+    #[getter]
+    fn pixels<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray2<f64>> {
+        arrays::rows(py, self.found.compared().map(|place| place.pixel.to_array()))
+    }
+
+    /// By how much the second camera differs there, N × 2, float64, px.
+    #[getter]
+    fn differences<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray2<f64>> {
+        arrays::rows(py, self.found.compared().map(|place| place.by.to_array()))
+    }
+
+    /// Standard deviations of a coordinate as the uncertainties of both have them, N, float64, px; NaN where they are
+    /// not known.
+    #[getter]
+    fn sd_px<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+        arrays::column(py, self.found.compared().map(|place| place.sd_px.unwrap_or(f64::NAN)))
+    }
+
+    /// The text that ``deltille compare`` writes.
+    fn to_json(&self) -> String {
+        comparison::write(&[&self.name], std::slice::from_ref(&self.found), &[])
+    }
+
+    fn __repr__(&self) -> String {
+        let said = told_significant(self.found.is_significant());
+        format!("<Comparison: {:.4} px rms{said}>", self.found.rms_px)
+    }
+}
+
+fn told_significant(is_significant: Option<bool>) -> &'static str {
+    match is_significant {
+        Some(true) => ", more than chance makes",
+        Some(false) => ", no more than chance makes",
+        None => ", cannot be judged",
+    }
+}
+
+/// How a camera of a rig is elsewhere than before.
+#[pyclass(frozen, module = "deltille")]
+pub struct Motion(CameraMotion);
+
+#[pymethods]
+impl Motion {
+    /// The camera from which it is seen.
+    #[getter]
+    fn of_frame(&self) -> &str {
+        &self.0.from
+    }
+
+    /// The camera.
+    #[getter]
+    fn name(&self) -> &str {
+        &self.0.to
+    }
+
+    /// By how much it is turned along its axes, 3, float64, rad.
+    #[getter]
+    fn turn_rad<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+        arrays::column(py, self.0.turn_rad.to_array())
+    }
+
+    /// By how much it is elsewhere along its axes, 3, float64, mm.
+    #[getter]
+    fn moved_mm<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+        arrays::column(py, self.0.moved_mm.to_array())
+    }
+
+    /// How often chance makes as large a motion; ``None`` where deviations are not known.
+    #[getter]
+    fn chance(&self) -> Option<f64> {
+        self.0.chance
+    }
+
+    /// Why it cannot be judged whether it has moved, as a sentence; ``None`` where it can.
+    #[getter]
+    fn why_undecided(&self) -> Option<&'static str> {
+        self.0.why_undecided()
+    }
+
+    /// Whether it moved by more than the deviations explain; ``None`` where these are not known.
+    #[getter]
+    fn is_significant(&self) -> Option<bool> {
+        self.0.is_significant()
+    }
+
+    fn __repr__(&self) -> String {
+        let CameraMotion { from, to, turn_rad, moved_mm, .. } = &self.0;
+        let (turn, moved) = (turn_rad.length(), moved_mm.length());
+        let said = told_significant(self.0.is_significant());
+        format!("<Motion of {to} from {from}: {turn:.6} rad, {moved:.4} mm{said}>")
+    }
+}
+
+fn compared(
+    py: Python<'_>,
+    pairs: &[(&CameraEstimate, &CameraEstimate)],
+    distance_mm: Option<f64>,
+    region: Region,
+) -> PyResult<Vec<Comparison>> {
+    let distance_mm = distance(distance_mm)?;
+    let found = unlocked(py, || {
+        let one = |(one, other): &(&CameraEstimate, &CameraEstimate)| {
+            calibrate::Comparison::of(one, other, distance_mm, region)
+        };
+        pairs.iter().map(one).collect::<Result<Vec<_>, _>>()
+    })?;
+    let found = found.raise(errors::calibration)?;
+    let named = pairs.iter().zip(found);
+    Ok(named.map(|((one, _), found)| Comparison { name: one.name.clone(), found }).collect())
+}
+
+/// Says whether two calibrations of a camera differ by more than chance.
+///
+/// Parameters
+/// ----------
+/// first, second : Calibration, CalibratedCamera or Camera
+///     Of a :class:`Camera` no uncertainty is known.
+/// distance_mm : float, optional
+///     How far the points are by which they are compared, mm; infinity if left out.
+/// region : str or (float, float, float, float), optional
+///     ``"seen"``, where both saw corners, ``"image"``, or pixels left, top, right, bottom.
+/// assume_target : bool, optional
+///     Whether they are compared even where both were calibrated with the same tags at different sizes.
+///
+/// Returns
+/// -------
+/// Comparison
+#[pyfunction]
+#[pyo3(signature = (first, second, *, distance_mm = None, region = None, assume_target = false))]
+pub fn compare(
+    py: Python<'_>,
+    first: Compared,
+    second: Compared,
+    distance_mm: Option<f64>,
+    region: Option<Part>,
+    assume_target: bool,
+) -> PyResult<Comparison> {
+    let region = region.map_or(Ok(Region::Seen), Part::region)?;
+    let (Compared(mut first), Compared(mut second)) = (first, second);
+    compare_boards(["first", "second"], [&mut first, &mut second], assume_target)
+        .raise(errors::calibration)?;
+    let ([one], [other]) = (first.cameras.as_slice(), second.cameras.as_slice()) else {
+        let what = "rigs are compared by compare_rigs";
+        return Err(raised::CalibrationError::new_err(what));
+    };
+    Ok(compared(py, &[(one, other)], distance_mm, region)?.remove(0))
+}
+
+/// Says whether two calibrations of a rig differ by more than chance: cameras of the same name, and where they are.
+///
+/// Parameters
+/// ----------
+/// first, second : Rig
+/// distance_mm, region, assume_target
+///     As of :func:`compare`.
+///
+/// Returns
+/// -------
+/// cameras : list of Comparison
+/// motions : list of Motion
+#[pyfunction]
+#[pyo3(signature = (first, second, *, distance_mm = None, region = None, assume_target = false))]
+pub fn compare_rigs(
+    py: Python<'_>,
+    first: PyRef<'_, Rig>,
+    second: PyRef<'_, Rig>,
+    distance_mm: Option<f64>,
+    region: Option<Part>,
+    assume_target: bool,
+) -> PyResult<(Vec<Comparison>, Vec<Motion>)> {
+    let region = region.map_or(Ok(Region::Seen), Part::region)?;
+    let of = |rig: &Rig| Compared::of_solved(rig.solved.estimate.cameras.clone(), &rig.solved).0;
+    let (mut first, mut second) = (of(&first), of(&second));
+    compare_boards(["first", "second"], [&mut first, &mut second], assume_target)
+        .raise(errors::calibration)?;
+    let others = &second.cameras;
+    let same = |one: &&CameraEstimate| others.iter().any(|other| other.name == one.name);
+    let own = first.cameras.iter().filter(same);
+    let pairs =
+        own.filter_map(|one| Some((one, others.iter().find(|other| other.name == one.name)?)));
+    let pairs: Vec<_> = pairs.collect();
+    if pairs.is_empty() {
+        let what = "no camera is in both: give two calibrations of the same rig";
+        return Err(raised::CalibrationError::new_err(what));
+    }
+    let found = compared(py, &pairs, distance_mm, region)?;
+    Ok((found, CameraMotion::of_rig(&pairs).into_iter().map(Motion).collect()))
+}
+
+/// Where a target is in a picture of a known camera.
+#[pyclass(frozen, module = "deltille")]
+pub struct Located {
+    asked: Asked,
+    estimate: Option<Arc<calibrate::Estimate>>,
+    why: Option<String>,
+    warnings: Vec<String>,
+    image: String,
+    target: String,
+}
+
+/// What a pose comes from.
+#[derive(Clone)]
+struct Asked {
+    detection: Detection,
+    camera: Camera,
+    target: Target,
+    print_scale: Option<[f64; 2]>,
+}
+
+impl Located {
+    fn view(&self) -> Option<&calibrate::ViewEstimate> {
+        self.estimate.as_ref()?.cameras.first()?.views.first()
+    }
+}
+
+#[pymethods]
+impl Located {
+    /// Camera from target; ``None`` where it is not known.
+    #[getter]
+    fn pose(&self) -> Option<Pose> {
+        self.view().map(|view| Pose(view.pose))
+    }
+
+    /// Standard deviations of the pose, 6, float64: a rotation (rad) and a translation (mm) about the camera's axes.
+    #[getter]
+    fn pose_sd<'py>(&self, py: Python<'py>) -> Option<Bound<'py, PyArray1<f64>>> {
+        let frame = self.estimate.as_ref()?.frames.first()?;
+        Some(arrays::column(py, frame.pose_sd))
+    }
+
+    /// Why there is no pose, as a sentence; ``None`` where there is one.
+    #[getter]
+    fn why(&self) -> Option<&str> {
+        self.why.as_deref()
+    }
+
+    /// What else is to be said, in sentences.
+    #[getter]
+    fn warnings(&self) -> Vec<String> {
+        self.warnings.clone()
+    }
+
+    /// Root mean square error of a coordinate, px; NaN without a pose.
+    #[getter]
+    fn rms_px(&self) -> f64 {
+        self.view().map_or(f64::NAN, |view| view.rms_px)
+    }
+
+    /// Residuals of the corners, N × 2, float64, px: detected less predicted position.
+    #[getter]
+    fn residuals<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray2<f64>> {
+        let corners = self.view().into_iter().flat_map(|view| &view.corners);
+        arrays::rows(py, corners.map(|corner| corner.residual.to_array()))
+    }
+
+    /// The line that ``deltille pose`` writes.
+    fn to_json(&self) -> String {
+        let found = self.estimate.as_ref().zip(self.view());
+        match found {
+            Some((estimate, view)) => pose::write_line(estimate, view, self.asked.target.target()),
+            None => pose::write_none(&self.image, &self.target, self.why.as_deref().unwrap_or("")),
+        }
+    }
+
+    fn __bool__(&self) -> bool {
+        self.estimate.is_some()
+    }
+
+    fn __reduce__<'py>(
+        slf: &Bound<'py, Self>,
+    ) -> crate::Reduced<'py, (Detection, Camera, Target, Option<[f64; 2]>)> {
+        let restore = slf.py().import("deltille._core")?.getattr("_located")?;
+        let Asked { detection, camera, target, print_scale } = slf.get().asked.clone();
+        Ok((restore, (detection, camera, target, print_scale)))
+    }
+
+    fn __repr__(&self) -> String {
+        match (self.view(), &self.why) {
+            (Some(view), _) => {
+                format!("<Located {}, rms {:.4} px>", Pose(view.pose).told(), view.rms_px)
+            }
+            (None, why) => format!("<Located nowhere: {}>", why.as_deref().unwrap_or("")),
+        }
+    }
+}
+
+/// Says where a target is in a picture of a known camera.
+///
+/// Parameters
+/// ----------
+/// detection : Detection
+///     What was found in the picture.
+/// camera : Camera
+///     The camera that took it.
+/// target : Target, optional
+///     The target; that of the detection if left out.
+/// print_scale : float or (float, float), optional
+///     Measured over stated length of the check bars, across and up the sheet.
+/// assume_target : bool, optional
+///     Whether the target is taken even where the detection names another one.
+///
+/// Returns
+/// -------
+/// Located
+///     Where there is no pose, :attr:`Located.why` says why.
+#[pyfunction]
+#[pyo3(name = "pose", signature = (detection, camera, target = None, *, print_scale = None,
+    assume_target = false))]
+pub fn pose_of(
+    py: Python<'_>,
+    detection: PyRef<'_, Detection>,
+    camera: PyRef<'_, Camera>,
+    target: Option<Targets>,
+    print_scale: Option<&Bound<'_, PyAny>>,
+    assume_target: bool,
+) -> PyResult<Located> {
+    let targets = target.map_or_else(|| detection.targets.clone(), |targets| targets.0);
+    let wrong = |what: &str| Err(raised::CalibrationError::new_err(what.to_owned()));
+    let [target] = targets.as_slice() else {
+        return match targets.is_empty() {
+            true => wrong("give a target: the detection does not know what was looked for"),
+            false => wrong("several targets were looked for: say which one"),
+        };
+    };
+    let print_scale = print_scale.map(print_scale_of).transpose()?;
+    let mut detection = detection.clone();
+    let reference = Reference::Target(target.target());
+    if assume_target {
+        Arc::make_mut(&mut detection.found).assume_targets(&[target.target().identity()]);
+    }
+    for grid in &detection.found.grids {
+        reference.check_labels(&detection.found, grid).raise(errors::calibration)?;
+    }
+    let (camera, target) = (camera.clone(), target.clone());
+    Asked { detection, camera, target, print_scale }.located(py)
+}
+
+/// A pose that was pickled: it is found again.
+#[pyfunction]
+pub fn _located(
+    py: Python<'_>,
+    detection: &Detection,
+    camera: &Camera,
+    target: &Target,
+    print_scale: Option<[f64; 2]>,
+) -> PyResult<Located> {
+    let (detection, camera, target) = (detection.clone(), camera.clone(), target.clone());
+    Asked { detection, camera, target, print_scale }.located(py)
+}
+
+impl Asked {
+    fn located(self, py: Python<'_>) -> PyResult<Located> {
+        unlocked(py, || self.solve())?
+    }
+
+    fn solve(self) -> PyResult<Located> {
+        let (found, printing) = (&self.detection.found, self.target.printing.clone());
+        let sheets = printing.sheets.clone();
+        let sheet = Sheet { print_scale: self.print_scale, shape: None, sheets };
+        let target = &printing.target;
+        let reference = Reference::Target(target);
+        let named = [(found.image.clone(), (**found).clone())];
+        let of = |why: Option<String>, estimate: Option<calibrate::Estimate>, warnings| Located {
+            estimate: estimate.map(Arc::new),
+            why,
+            warnings,
+            image: found.image.clone(),
+            target: target.name.to_string(),
+            asked: self.clone(),
+        };
+        let nowhere = |why: String| of(Some(why), None, Vec::new());
+        let mut views = match views(&named, &reference) {
+            Ok(shown) => shown.views,
+            Err(error) => return Ok(nowhere(errors::told(&error))),
+        };
+        sheet.put_on(Some(target), &mut views).raise(errors::calibration)?;
+        let panels = sheet.panels(&reference).raise(errors::calibration)?;
+        let camera = self.camera.0.clone();
+        let calibration = calibrate::Calibration::new(panels).camera("", views, camera);
+        match calibration.located(found).raise(errors::calibration)? {
+            Err(why) => Ok(nowhere(errors::told(&why))),
+            Ok(estimate) => {
+                let words = Words::new(&estimate, None);
+                let is_of_picture = |said: &&Diagnosis| !matches!(said, Diagnosis::LensEnds { .. });
+                let said = estimate.diagnose();
+                let said = said.iter().filter(is_of_picture).map(|said| words.sentence(said));
+                let warnings = said.collect();
+                Ok(of(None, Some(estimate), warnings))
+            }
+        }
+    }
+}

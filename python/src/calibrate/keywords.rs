@@ -1,0 +1,219 @@
+//! Calibrations as they are asked for, by keywords.
+
+use std::collections::BTreeMap;
+use std::path::PathBuf;
+use std::sync::Arc;
+
+use deltille::export::sheet::read_sheet;
+use deltille::limits::Limits;
+use deltille::targets;
+use pyo3::prelude::*;
+use pyo3::types::PyMapping;
+
+use super::calibration::{Calibration, Rig, calibration};
+use super::solving::{How, ModelChoice, OneCamera, Seen, named, solve};
+use crate::boundary::errors::{self, RaiseFile, raised};
+use crate::see::camera::Camera;
+use crate::see::detection::{Detection, Results, Targets};
+use crate::see::detector::sides;
+
+/// Calibrates a camera from detections.
+///
+/// Parameters
+/// ----------
+/// detections : sequence of Detection
+///     Of pictures of one camera; 20 or more with the board tilted by 20° to 45° are good.
+/// target : Target, optional
+///     What was photographed; that of the detections if left out.
+/// model : str, optional
+///     ``"radtan"``, ``"radtan5"``, ``"rational"``, ``"thin-prism"``, ``"kannala-brandt"``, ``"eucm"``,
+///     ``"double-sphere"``, ``"pupil"``, ``"spline"``, or ``"auto"``, which takes the one that holds views best that
+///     took no part.
+/// camera : Camera, optional
+///     A known camera, of which only the poses are found.
+/// grid : str, optional
+///     Without a target the tiling of an untagged board, ``"deltille"`` or ``"checker"``.
+/// rows, cols : int, optional
+///     Its rows and columns of corners, where they are known.
+/// edge_mm : float, optional
+///     The edge of its tiles, mm.
+/// hold_out : int, optional
+///     Every n-th view takes no part, and tells how well the others predict it.
+/// loss : str, optional
+///     How corners far off count: ``"huber"``, ``"cauchy"`` or ``"none"`` (least squares).
+/// weights : str, optional
+///     ``"covariance"`` of the detections, or ``"equal"``.
+/// board_shape : bool, optional
+///     Whether it is found, too, how the sheet is bent and stretched.
+/// measure_target : bool, optional
+///     Whether the place of every corner is found, too.
+/// shape : path-like, optional
+///     A file of a calibration with ``board_shape``, whose sheet this is.
+/// print_scale : float or (float, float), optional
+///     Measured over stated length of the check bars, across and up the sheet.
+/// distances_mm : sequence of float, optional
+///     For which the uncertainty of projections is told.
+/// names : sequence of str, optional
+///     Names of the views.
+/// assume_target : bool, optional
+///     Whether the target is taken even where the detections name another one.
+/// board_accuracy_mm : float, optional
+///     Standard deviation of the board's corners from the description, mm, for the observed deviations; 0.1, at most
+///     0.5 % of an edge, if left out, and of a measured target what it says of itself.
+///
+/// Returns
+/// -------
+/// Calibration
+///
+/// Raises
+/// ------
+/// CalibrationError
+///     Where views are too few, too much alike, or do not belong together.
+#[pyfunction]
+#[pyo3(signature = (detections, target = None, model = "radtan", *, camera = None, grid = None, rows = None,
+    cols = None, edge_mm = None, hold_out = None, loss = "huber", weights = "covariance", board_shape = false,
+    measure_target = false, shape = None, print_scale = None, distances_mm = None, names = None,
+    assume_target = false, board_accuracy_mm = None))]
+#[expect(clippy::too_many_arguments, reason = "keywords")]
+pub fn calibrate(
+    py: Python<'_>,
+    detections: Results<'_>,
+    target: Option<Targets>,
+    model: &str,
+    camera: Option<PyRef<'_, Camera>>,
+    grid: Option<&str>,
+    rows: Option<i64>,
+    cols: Option<i64>,
+    edge_mm: Option<f64>,
+    hold_out: Option<i64>,
+    loss: &str,
+    weights: &str,
+    board_shape: bool,
+    measure_target: bool,
+    shape: Option<PathBuf>,
+    print_scale: Option<&Bound<'_, PyAny>>,
+    distances_mm: Option<Vec<f64>>,
+    names: Option<Vec<String>>,
+    assume_target: bool,
+    board_accuracy_mm: Option<f64>,
+) -> PyResult<Py<Calibration>> {
+    let mut how = How::of(loss, weights, hold_out, distances_mm, print_scale, board_accuracy_mm)?;
+    (how.board_shape, how.measure_target) = (board_shape, measure_target);
+    how.assume_target = assume_target;
+    let target = target.or_else(|| of_detections(&detections.all, grid.is_some()));
+    let seen = Seen::of(target, grid, sides(rows, cols)?, edge_mm)?;
+    if let Some(path) = shape {
+        let text = Limits::default().read_text(&path).raise_of_file(&path, errors::file)?;
+        let sheet = read_sheet(&text, &seen.reference().identities());
+        let wrong = |error| {
+            raised::FileError::new_err(format!("{}: {}", path.display(), errors::told(&error)))
+        };
+        how.sheet = sheet.map_err(wrong)?;
+    }
+    let model = ModelChoice::of(model)?;
+    let names = detections.names(names);
+    let detections = named(py, &detections.all, names)?;
+    let known = camera.map(|camera| camera.0.clone());
+    let one = OneCamera { name: "camera".to_owned(), detections, known };
+    let solved = solve(py, seen, vec![one], false, model, how)?;
+    Py::new(py, calibration(Arc::new(solved)))
+}
+
+/// The targets that detections looked for, where nothing else is said.
+pub fn of_detections(detections: &[PyRef<'_, Detection>], is_grid: bool) -> Option<Targets> {
+    let first = detections.first().filter(|_| !is_grid)?;
+    (!first.targets.is_empty()).then(|| Targets(first.targets.clone()))
+}
+
+/// Calibrates cameras that are fixed to each other.
+///
+/// Parameters
+/// ----------
+/// cameras : dict of str to sequence of Detection
+///     What each camera saw; pictures of one moment have the same name. The first camera is the frame of the rig.
+/// target : Target or sequence of Target, optional
+///     What was photographed: one target, or several that do not move against each other; that of the detections if
+///     left out.
+/// model : str, optional
+///     As of :func:`calibrate`.
+/// known : dict of str to Camera, optional
+///     Cameras that are known and kept.
+/// refine_target : bool, optional
+///     Whether it is found, too, where the panels are on the target.
+/// hold_out, loss, weights, board_shape, measure_target, print_scale, distances_mm, assume_target,
+/// board_accuracy_mm
+///     As of :func:`calibrate`.
+///
+/// Returns
+/// -------
+/// Rig
+///
+/// Raises
+/// ------
+/// CalibrationError
+///     Where views are too few, or nothing ties the cameras to each other.
+#[pyfunction]
+#[pyo3(signature = (cameras, target = None, model = "radtan", *, known = None, refine_target = false,
+    hold_out = None, loss = "huber", weights = "covariance", board_shape = false, measure_target = false,
+    print_scale = None, distances_mm = None, assume_target = false, board_accuracy_mm = None))]
+#[expect(clippy::too_many_arguments, reason = "keywords")]
+pub fn rig(
+    py: Python<'_>,
+    cameras: &Bound<'_, PyMapping>,
+    target: Option<Targets>,
+    model: &str,
+    known: Option<BTreeMap<String, PyRef<'_, Camera>>>,
+    refine_target: bool,
+    hold_out: Option<i64>,
+    loss: &str,
+    weights: &str,
+    board_shape: bool,
+    measure_target: bool,
+    print_scale: Option<&Bound<'_, PyAny>>,
+    distances_mm: Option<Vec<f64>>,
+    assume_target: bool,
+    board_accuracy_mm: Option<f64>,
+) -> PyResult<Rig> {
+    let wrong = |what: String| Err(raised::CalibrationError::new_err(what));
+    let mut how = How::of(loss, weights, hold_out, distances_mm, print_scale, board_accuracy_mm)?;
+    (how.board_shape, how.measure_target) = (board_shape, measure_target);
+    how.assume_target = assume_target;
+    how.refine_target = refine_target;
+    if cameras.len()? < 2 && !refine_target {
+        return wrong(
+            "a rig has at least two cameras; calibrate takes one, and so does refine_target"
+                .to_owned(),
+        );
+    }
+    let mut known = known.unwrap_or_default();
+    let (mut all, mut target) = (Vec::new(), target);
+    for camera in cameras.items()?.iter() {
+        let (name, detections): (String, Bound<'_, PyAny>) = camera.extract()?;
+        targets::Name::new(&name)
+            .map_err(|error| raised::CalibrationError::new_err(errors::told(&error)))?;
+        let detections: Results<'_> = detections.extract()?;
+        target = target.or_else(|| of_detections(&detections.all, false));
+        let known = known.remove(&name).map(|camera| camera.0.clone());
+        let detections = named(py, &detections.all, None)?;
+        let is_same = |one: &deltille::detect::Detection, other: &deltille::detect::Detection| {
+            !one.grids.is_empty() && one.grids == other.grids
+        };
+        for other in &all {
+            let OneCamera { name: of, detections: theirs, .. } = other;
+            let twice =
+                detections.iter().find(|(_, own)| theirs.iter().any(|(_, it)| is_same(own, it)));
+            if let Some((picture, _)) = twice {
+                return wrong(format!(
+                    "{name}: {picture} has the same corners as a picture of {of}"
+                ));
+            }
+        }
+        all.push(OneCamera { name, detections, known });
+    }
+    if let Some(name) = known.keys().next() {
+        return wrong(format!("known: there is no camera {name}"));
+    }
+    let seen = Seen::of(target, None, [None, None], None)?;
+    let solved = solve(py, seen, all, true, ModelChoice::of(model)?, how)?;
+    Ok(Rig { solved: Arc::new(solved) })
+}

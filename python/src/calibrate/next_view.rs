@@ -1,0 +1,211 @@
+//! Which view of a target to take next.
+
+use deltille::calibrate::{Guide, Guided, Intrinsics, Reference, views};
+use deltille::export::next_view::write;
+use deltille_core::quantity::distance_mm;
+use numpy::PyArray2;
+use pyo3::prelude::*;
+
+use super::keywords::of_detections;
+use super::solving::{ModelChoice, Seen, assume, named};
+use crate::boundary::arrays::{self, number, whole};
+use crate::boundary::errors::{self, Raise, raised, unlocked};
+use crate::see::camera::Camera;
+use crate::see::detection::{Results, Targets};
+use crate::see::pose::Pose;
+
+/// A view that is proposed: where to hold the board so that the camera is known best.
+#[pyclass(frozen, module = "deltille")]
+pub struct NextView {
+    next: deltille::calibrate::NextView,
+    target: String,
+    views: usize,
+}
+
+#[pymethods]
+impl NextView {
+    /// How many views there are so far.
+    #[getter]
+    fn views(&self) -> usize {
+        self.views
+    }
+
+    /// What a person is to do; left and right are those of the picture.
+    #[getter]
+    fn words(&self) -> String {
+        self.next.to_string()
+    }
+
+    /// The pose of the target.
+    #[getter]
+    fn camera_from_target(&self) -> Pose {
+        Pose(self.next.camera_from_target)
+    }
+
+    /// Outlines of the panels that are seen from the front, N × 2 each, float64, px; they may reach beyond the image.
+    #[getter]
+    fn outlines<'py>(&self, py: Python<'py>) -> Vec<Bound<'py, PyArray2<f64>>> {
+        let outlines = self.next.outlines.iter();
+        outlines.map(|outline| arrays::rows(py, outline.iter().map(|at| at.to_array()))).collect()
+    }
+
+    /// An arrow from the middle of the board towards its upper side, 2 × 2, float64, px; ``None`` where the lens does not
+    /// see there.
+    #[getter]
+    fn upwards<'py>(&self, py: Python<'py>) -> Option<Bound<'py, PyArray2<f64>>> {
+        self.next.upwards.map(|ends| arrays::rows(py, ends.iter().map(|at| at.to_array())))
+    }
+
+    /// The corners that are expected to be found, N × 2, float64, px.
+    #[getter]
+    fn pixels<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray2<f64>> {
+        arrays::rows(py, self.next.corners.iter().map(|corner| corner.pixel.to_array()))
+    }
+
+    /// Panel id, row and column of each of them, N × 3, int64.
+    #[getter]
+    fn labels<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray2<i64>> {
+        let corners = self.next.corners.iter();
+        arrays::rows(
+            py,
+            corners.map(|c| [i64::from(c.panel.id()), i64::from(c.row), i64::from(c.col)]),
+        )
+    }
+
+    /// How far the middle of the board is from the camera, mm.
+    #[getter]
+    fn distance_mm(&self) -> f64 {
+        self.next.distance_mm
+    }
+
+    /// The angle between the board's normal and the line of sight, rad.
+    #[getter]
+    fn tilt_rad(&self) -> f64 {
+        self.next.tilt_rad
+    }
+
+    /// How sure projections at infinity are so far over the whole image, px; ``None`` before there is a camera.
+    #[getter]
+    fn uncertainty_px(&self) -> Option<f64> {
+        self.next.now_px
+    }
+
+    /// How sure they are expected to be with this view, px.
+    #[getter]
+    fn expected_px(&self) -> Option<f64> {
+        self.next.expected_px
+    }
+
+    /// Whether no more views are needed.
+    ///
+    /// Parameters
+    /// ----------
+    /// until_px : float, optional
+    ///     How sure projections are to be; if left out, whether this view would lower their uncertainty by less than
+    ///     3 %.
+    ///
+    /// Returns
+    /// -------
+    /// bool
+    #[pyo3(signature = (until_px = None))]
+    fn is_enough(&self, until_px: Option<f64>) -> bool {
+        self.next.is_enough(until_px)
+    }
+
+    /// The text that ``deltille guide`` writes.
+    fn to_json(&self) -> String {
+        write(&self.next, &self.target, self.views, self.next.is_enough(None))
+    }
+
+    fn __repr__(&self) -> String {
+        format!("<NextView {}: {}>", self.views + 1, self.next)
+    }
+}
+
+/// Says which view of a target to take next, so that projections are known best over the whole image.
+///
+/// Parameters
+/// ----------
+/// detections : sequence of Detection
+///     Of the pictures so far; none, one or two are fine.
+/// target : Target, optional
+///     What is photographed; that of the detections if left out.
+/// model : str, optional
+///     As of :func:`calibrate`, but ``"auto"`` and ``"spline"``.
+/// size_px : (int, int), optional
+///     Width and height of the pictures, before there is one.
+/// camera : Camera, optional
+///     The camera as it is nearly; all its parameters are found anew.
+/// nearest_mm, farthest_mm : float, optional
+///     Distances at which the board can be held and is in focus.
+/// avoid : sequence of NextView, optional
+///     Views that cannot be taken.
+/// assume_target : bool, optional
+///     As of :func:`calibrate`.
+///
+/// Returns
+/// -------
+/// NextView
+///
+/// Raises
+/// ------
+/// CalibrationError
+///     Where the size of the pictures is not known, or detections do not belong to the target.
+#[pyfunction]
+#[pyo3(signature = (detections, target = None, model = "radtan", *, size_px = None, camera = None,
+    nearest_mm = None, farthest_mm = None, avoid = None, assume_target = false))]
+#[expect(clippy::too_many_arguments, reason = "keywords")]
+pub fn next_view(
+    py: Python<'_>,
+    detections: Results<'_>,
+    target: Option<Targets>,
+    model: &str,
+    size_px: Option<(i64, i64)>,
+    camera: Option<PyRef<'_, Camera>>,
+    nearest_mm: Option<f64>,
+    farthest_mm: Option<f64>,
+    avoid: Option<Vec<PyRef<'_, NextView>>>,
+    assume_target: bool,
+) -> PyResult<NextView> {
+    let wrong = |what: &str| raised::CalibrationError::new_err(what.to_owned());
+    let target = target.or_else(|| of_detections(&detections.all, false));
+    let seen = Seen::of(target, None, [None; 2], None)?;
+    let [target] = seen.targets() else {
+        return Err(wrong("target: give one at a time"));
+    };
+    let checked = |name: &str, mm: Option<f64>| {
+        mm.map(|mm| number(name, mm, distance_mm::RANGE, errors::calibration)).transpose()
+    };
+    let nearest = checked("nearest_mm", nearest_mm)?;
+    let farthest = checked("farthest_mm", farthest_mm)?;
+    let intrinsics = match (&camera, ModelChoice::of(model)?) {
+        (Some(camera), _) => Intrinsics::Known(camera.0.clone()),
+        (None, ModelChoice(Some(model))) => model.into(),
+        (None, ModelChoice(None)) => {
+            return Err(wrong(
+                "model: auto chooses when the pictures are there: give the richest one",
+            ));
+        }
+    };
+    let of_pictures = detections.all.first().map(|first| [first.found.width, first.found.height]);
+    let of_camera = camera.map(|camera| [camera.0.width, camera.0.height]);
+    let side = |side: i64| whole("size_px", side, errors::calibration);
+    let size_px = size_px.map(|(width, height)| Ok::<_, PyErr>([side(width)?, side(height)?]));
+    let size = of_pictures.or(of_camera).or(size_px.transpose()?);
+    let size = size.ok_or_else(|| wrong("size_px: give it before there is a picture"))?;
+    let guide = Guide::new(target, size, intrinsics);
+    let guide = guide.ok_or_else(|| {
+        wrong("there is no guide to a target without corners, to a spline, or to a camera of another size")
+    })?;
+    let avoided: Vec<deltille::calibrate::NextView> =
+        avoid.unwrap_or_default().iter().map(|view| view.next.clone()).collect();
+    let guide = guide.within_mm(nearest, farthest).avoiding(&avoided);
+    let mut detections = named(py, &detections.all, None)?;
+    if assume_target {
+        assume(&mut detections, std::slice::from_ref(target));
+    }
+    let reference = Reference::Target(target);
+    let shown = views(&detections, &reference).raise(errors::calibration)?.views;
+    let Guided { next, .. } = unlocked(py, || guide.after(&reference, &shown))?;
+    Ok(NextView { next, target: target.name.to_string(), views: shown.len() })
+}

@@ -1,0 +1,451 @@
+//! From detections to calibrations: what is asked for, and the work.
+
+use std::collections::BTreeSet;
+use std::path::Path;
+use std::sync::Arc;
+
+use deltille::calibrate::{
+    Calibration, CalibrationError, Candidate, Diagnosis, Estimate, Excluded, Intrinsics, Loss,
+    Model, PanelPlace, Reference, UntaggedGrid, View, Weights, Words, views,
+};
+use deltille::export::calibration::{Print, Residuals};
+use deltille::export::sheet::Sheet;
+use deltille::export::{calibration, rig};
+use deltille::layout::Printing;
+use deltille::{camera, detect, targets};
+use deltille_core::quantity::{board_accuracy_mm, distance_mm, edge_mm, print_scale};
+use pyo3::prelude::*;
+use serde_json::Value;
+
+use crate::boundary::arrays::{number, vector, whole};
+use crate::boundary::errors::{self, Raise, raised};
+use crate::boundary::interrupt::interruptible;
+use crate::see::detection::{Detection, Targets};
+use crate::see::detector::{size, tiling};
+
+/// What was photographed.
+pub enum Seen {
+    /// Targets, of which there is at least one.
+    Targets {
+        targets: Vec<targets::Target>,
+        /// The same with their sheets.
+        printed: Vec<Printing>,
+    },
+    /// An untagged board.
+    Grid(UntaggedGrid),
+}
+
+impl Seen {
+    /// What is asked for: targets, or a grid with its edge.
+    pub fn of(
+        target: Option<Targets>,
+        grid: Option<&str>,
+        [rows, cols]: [Option<u32>; 2],
+        edge_mm: Option<f64>,
+    ) -> PyResult<Self> {
+        let wrong = |what: &str| Err(raised::CalibrationError::new_err(what.to_owned()));
+        match (target.map(|targets| targets.0).unwrap_or_default(), grid) {
+            (found, None) if found.is_empty() => wrong(
+                "give a target, or grid=\"deltille\" or \"checker\" with edge_mm for untagged boards",
+            ),
+            (found, None) => {
+                let own = |target: &crate::targets::target::Target| (*target.printing).clone();
+                let printed: Vec<Printing> = found.iter().map(own).collect();
+                let targets = printed.iter().map(|printing| printing.target.clone()).collect();
+                Ok(Self::Targets { targets, printed })
+            }
+            (found, Some(grid)) if found.is_empty() => {
+                let Some(edge_mm) = edge_mm else {
+                    return wrong("edge_mm: a board of a grid needs the edge of its tiles, mm");
+                };
+                let edge_mm = number("edge_mm", edge_mm, edge_mm::RANGE, errors::calibration)?;
+                let size = size(rows, cols)?.map(|(rows, cols)| [rows, cols]);
+                Ok(Self::Grid(UntaggedGrid { kind: tiling(grid)?, edge_mm, size }))
+            }
+            _ => wrong("give a target or a grid, not both"),
+        }
+    }
+
+    /// What views refer to.
+    pub fn reference(&self) -> Reference<'_> {
+        match self {
+            Self::Targets { targets, .. } => match targets.as_slice() {
+                [only] => Reference::Target(only),
+                several => Reference::Scene(several),
+            },
+            Self::Grid(grid) => Reference::Grid(*grid),
+        }
+    }
+
+    /// The targets, none of a grid.
+    pub fn targets(&self) -> &[targets::Target] {
+        match self {
+            Self::Targets { targets, .. } => targets,
+            Self::Grid(_) => &[],
+        }
+    }
+
+    /// The targets with their sheets, none of a grid.
+    fn printed(&self) -> &[Printing] {
+        match self {
+            Self::Targets { printed, .. } => printed,
+            Self::Grid(_) => &[],
+        }
+    }
+}
+
+/// How a calibration is solved.
+#[derive(Clone)]
+pub struct How {
+    pub loss: Loss,
+    pub weights: Weights,
+    pub hold_out: Option<usize>,
+    pub board_shape: bool,
+    pub measure_target: bool,
+    pub refine_target: bool,
+    pub distances_mm: Vec<f64>,
+    pub board_accuracy_mm: Option<f64>,
+    pub assume_target: bool,
+    pub sheet: Sheet,
+}
+
+impl How {
+    /// What the two functions have in common.
+    pub fn of(
+        loss: &str,
+        weights: &str,
+        hold_out: Option<i64>,
+        distances_mm: Option<Vec<f64>>,
+        print_scale: Option<&Bound<'_, PyAny>>,
+        accuracy_mm: Option<f64>,
+    ) -> PyResult<Self> {
+        let wrong = |what: &str| raised::CalibrationError::new_err(what.to_owned());
+        let loss = match loss {
+            "huber" => Loss::Huber,
+            "cauchy" => Loss::Cauchy,
+            "none" => Loss::Squared,
+            _ => return Err(wrong("loss: give huber, cauchy or none")),
+        };
+        let weights = match weights {
+            "covariance" => Weights::Covariance,
+            "equal" => Weights::Equal,
+            _ => return Err(wrong("weights: give covariance or equal")),
+        };
+        if hold_out.is_some_and(|every| every < 2) {
+            return Err(wrong("hold_out: every n-th view is kept out, n from 2"));
+        }
+        let hold_out = hold_out.map(|every| whole("hold_out", every, errors::calibration));
+        let distances_mm = distances_mm.unwrap_or_default();
+        for &mm in &distances_mm {
+            number("distances_mm", mm, distance_mm::RANGE, errors::calibration)?;
+        }
+        let print_scale = print_scale.map(print_scale_of).transpose()?;
+        let accuracy_mm = accuracy_mm.map(|mm| {
+            number("board_accuracy_mm", mm, board_accuracy_mm::RANGE, errors::calibration)
+        });
+        Ok(Self {
+            loss,
+            weights,
+            hold_out: hold_out.transpose()?,
+            board_shape: false,
+            measure_target: false,
+            refine_target: false,
+            distances_mm,
+            board_accuracy_mm: accuracy_mm.transpose()?,
+            assume_target: false,
+            sheet: Sheet { print_scale, ..Sheet::default() },
+        })
+    }
+}
+
+/// How a print came out across and up the sheet: measured over stated length, one number or two.
+pub fn print_scale_of(given: &Bound<'_, PyAny>) -> PyResult<[f64; 2]> {
+    match given.extract::<f64>() {
+        Ok(both) => Ok([number("print_scale", both, print_scale::RANGE, errors::calibration)?; 2]),
+        Err(_) => vector("print_scale", given, print_scale::RANGE, errors::calibration),
+    }
+}
+
+/// A model, or the choice of one.
+#[derive(Clone, Copy)]
+pub struct ModelChoice(pub Option<Model>);
+
+impl ModelChoice {
+    pub fn of(text: &str) -> PyResult<Self> {
+        match text {
+            "auto" => Ok(Self(None)),
+            _ => match text.parse() {
+                Ok(model) => Ok(Self(Some(model))),
+                Err(error) => {
+                    let what = format!("{}, or auto, which chooses one", errors::told(&error));
+                    Err(errors::calibration(what))
+                }
+            },
+        }
+    }
+
+    /// The model with the most parameters that may be chosen.
+    pub fn richest(self) -> Model {
+        self.0.unwrap_or(Model::ThinPrism)
+    }
+
+    pub fn name(self) -> String {
+        self.0.map_or("auto".to_owned(), |model| model.to_string())
+    }
+}
+
+/// Detections with the names of their views.
+pub type Named = Vec<(String, detect::Detection)>;
+
+/// Detections as views: named as they are asked to be, else after their pictures, else by their place. A picture that is
+/// there twice counts once.
+pub fn named(
+    py: Python<'_>,
+    detections: &[PyRef<'_, Detection>],
+    names: Option<Vec<String>>,
+) -> PyResult<Named> {
+    if names.as_ref().is_some_and(|names| names.len() != detections.len()) {
+        let what = "names: give as many as there are detections";
+        return Err(raised::CalibrationError::new_err(what));
+    }
+    let mut all: Named = Vec::new();
+    for (index, detection) in detections.iter().enumerate() {
+        let found = &detection.found;
+        let stem = Path::new(&found.image).file_stem().map(|stem| stem.to_string_lossy());
+        let name = names.as_ref().map(|names| names[index].clone());
+        let name = name.or(stem.map(|stem| stem.into_owned())).filter(|name| !name.is_empty());
+        let name = name.unwrap_or_else(|| format!("{index:04}"));
+        let is_same = |(_, other): &&(String, detect::Detection)| {
+            !found.grids.is_empty() && found.grids == other.grids
+        };
+        if let Some((first, _)) = all.iter().find(is_same) {
+            errors::warn(py, &format!("{name}: the same corners as in {first}, counted once"))?;
+            continue;
+        }
+        all.push((name, (**found).clone()));
+    }
+    Ok(all)
+}
+
+/// Takes detections for those of the targets that are given, whatever they name.
+pub fn assume(detections: &mut Named, targets: &[targets::Target]) {
+    let given: Vec<_> = targets.iter().map(targets::Target::identity).collect();
+    for (_, found) in detections {
+        found.assume_targets(&given);
+    }
+}
+
+/// What came of it.
+pub struct Solved {
+    pub estimate: Estimate,
+    pub diagnoses: Vec<Diagnosis>,
+    pub print: Print,
+    /// Where the target's file has its panels.
+    pub stated: Vec<PanelPlace>,
+    /// Models that were tried, by camera.
+    pub models: Vec<Vec<Candidate>>,
+    pub targets: Vec<Printing>,
+    pub model: String,
+    /// Whether it is a rig, which may have one camera.
+    pub is_rig: bool,
+    /// The file that it was read from, and what that says.
+    pub file: Option<(String, Value)>,
+}
+
+impl Solved {
+    /// One that was read from a file.
+    pub fn read(estimate: Estimate, targets: Vec<Printing>, model: String, text: &str) -> Self {
+        let whole: Option<Value> = serde_json::from_str(text).ok();
+        let file = whole.map(|whole| (text.to_owned(), whole));
+        let (diagnoses, models) = (Vec::new(), Vec::new());
+        Self {
+            estimate,
+            diagnoses,
+            print: Print::default(),
+            stated: Vec::new(),
+            models,
+            targets,
+            model,
+            is_rig: file.as_ref().is_some_and(|(_, whole)| whole.get("cameras").is_some()),
+            file,
+        }
+    }
+
+    /// What the file says that it was read from, of a camera where it has several.
+    pub fn in_file(&self, camera: Option<usize>) -> Option<&Value> {
+        let (_, whole) = self.file.as_ref()?;
+        Some(camera.and_then(|camera| whole["cameras"].get(camera)).unwrap_or(whole))
+    }
+
+    /// Whether all is known that a page shows: of a file the sentences alone are, not what they come from.
+    pub fn is_whole(&self) -> bool {
+        let is_said =
+            |file: &Value| file["diagnoses"].as_array().is_some_and(|all| !all.is_empty());
+        let is_lost = |file| self.targets.is_empty() || is_said(file);
+        self.has_corners() && !self.in_file(None).is_some_and(is_lost)
+    }
+
+    /// Whether the corners that it comes from are known.
+    pub fn has_corners(&self) -> bool {
+        self.estimate.cameras.iter().any(|camera| camera.corner_count() > 0)
+    }
+
+    /// What the programs write of it.
+    pub fn json(&self, residuals: Residuals) -> String {
+        if let Some((text, _)) = &self.file {
+            return text.clone();
+        }
+        let Self { estimate, diagnoses, print, .. } = self;
+        match self.is_rig {
+            true => rig::write(estimate, diagnoses, &self.model, *print, residuals),
+            false => calibration::write(estimate, diagnoses, *print, residuals).unwrap_or_default(),
+        }
+    }
+
+    /// Whether another one is the same, corner by corner.
+    pub fn is_same(&self, other: &Self) -> bool {
+        self.json(Residuals::Listed) == other.json(Residuals::Listed)
+    }
+
+    /// What is said of it, as plain data with a sentence each.
+    pub fn said(&self) -> Vec<(Value, bool)> {
+        if let Some(file) = self.in_file(None) {
+            let is_failure =
+                |record: &Value| record["kind"].as_str().is_some_and(calibration::is_failure);
+            return records_of(file)
+                .into_iter()
+                .map(|record| (record.clone(), is_failure(&record)))
+                .collect();
+        }
+        let file = serde_json::from_str(&self.json(Residuals::LeftOut)).unwrap_or_default();
+        let records = records_of(&file);
+        let words = Words::new(&self.estimate, self.print.scale);
+        let said = |diagnosis: &Diagnosis| {
+            let text = words.sentence(diagnosis);
+            let record = records.iter().find(|record| record["text"] == text.as_str());
+            let record = record.cloned().unwrap_or_else(|| serde_json::json!({ "text": text }));
+            (record, diagnosis.is_failure())
+        };
+        self.diagnoses.iter().map(said).collect()
+    }
+}
+
+/// What a file says of a calibration: what is wrong together, and the other diagnoses.
+fn records_of(file: &Value) -> Vec<Value> {
+    let all = ["findings", "diagnoses"].map(|list| file[list].as_array().cloned());
+    all.into_iter().flatten().flatten().collect()
+}
+
+/// A camera to be found, or known, with what it saw.
+pub struct OneCamera {
+    pub name: String,
+    pub detections: Named,
+    pub known: Option<camera::Camera>,
+}
+
+/// Calibrates cameras.
+pub fn solve(
+    py: Python<'_>,
+    seen: Seen,
+    cameras: Vec<OneCamera>,
+    is_rig: bool,
+    model: ModelChoice,
+    mut how: How,
+) -> PyResult<Solved> {
+    let seen = Arc::new(seen);
+    let (mut all, mut named) = (Vec::new(), Vec::new());
+    let (mut left_out, mut ink, mut panels) = (Vec::new(), Vec::new(), Vec::new());
+    let is_named = cameras.len() > 1;
+    {
+        if let [only] = seen.printed() {
+            how.sheet.sheets = only.sheets.clone();
+        }
+        let reference = seen.reference();
+        panels.extend(how.sheet.panels(&reference).raise(errors::calibration)?);
+        let mut taken: BTreeSet<(usize, String)> = BTreeSet::new();
+        for (index, mut camera) in cameras.into_iter().enumerate() {
+            if is_named
+                && let Some((twice, _)) =
+                    camera.detections.iter().find(|(name, _)| !taken.insert((index, name.clone())))
+            {
+                let what = format!("{}: two pictures are named {twice}", camera.name);
+                return Err(raised::CalibrationError::new_err(what));
+            }
+            ink.extend(camera.detections.iter().filter_map(|(_, found)| {
+                let ink = found.ink?;
+                Some(if let Seen::Grid(grid) = &*seen { ink.on_print(grid.edge_mm) } else { ink })
+            }));
+            if how.assume_target {
+                assume(&mut camera.detections, reference.targets());
+            }
+            named.extend(camera.detections.iter().flat_map(|(_, found)| found.targets.clone()));
+            let shown = views(&camera.detections, &reference).raise(errors::calibration)?;
+            let mut of_camera: Vec<View> = shown.views;
+            let name = is_named.then(|| camera.name.clone());
+            left_out.extend(
+                shown.left_out.into_iter().map(|(_, out)| Excluded { camera: name.clone(), ..out }),
+            );
+            let target = seen.targets().first();
+            how.sheet.put_on(target, &mut of_camera).raise(errors::calibration)?;
+            if of_camera.is_empty() {
+                let what = format!("{}: no picture shows the target", camera.name);
+                return Err(raised::CalibrationError::new_err(what));
+            }
+            let known = camera.known.map(Intrinsics::Known);
+            let intrinsics = known.unwrap_or(Intrinsics::Unknown(model.richest()));
+            all.push((camera.name, of_camera, intrinsics));
+        }
+    }
+    let print = Print { scale: how.sheet.print_scale, ink: detect::InkEstimate::of_all(&ink) };
+    let stated = panels.clone();
+    let of = seen.clone();
+    let solved = interruptible(py, move |stop| {
+        let mut calibration = Calibration::of(&of.reference(), panels)
+            .named_by(named)
+            .loss(how.loss)
+            .weights(how.weights)
+            .board_shape(how.board_shape)
+            .measure_target(how.measure_target)
+            .refine_panels(how.refine_target)
+            .distances_mm(how.distances_mm)
+            .hold_out(how.hold_out)
+            .stopped_by(stop.clone());
+        if let Some(mm) = how.board_accuracy_mm {
+            calibration = calibration.board_accuracy_mm(Some(mm));
+        }
+        let count = all.len();
+        for (name, views, intrinsics) in all {
+            calibration = calibration.camera(&name, views, intrinsics);
+        }
+        let mut models = vec![Vec::new(); count];
+        for (index, tried) in models.iter_mut().enumerate() {
+            if model.0.is_none() && calibration.cameras()[index].intrinsics.model().is_some() {
+                let (chosen, candidates) = calibration.choose_model(index)?;
+                calibration.set_intrinsics(index, chosen);
+                *tried = candidates;
+            }
+        }
+        let estimate = calibration.solve()?;
+        let diagnoses = calibration.explain(&estimate);
+        Ok::<_, CalibrationError>((estimate, diagnoses, models))
+    })?;
+    let (mut estimate, diagnoses, models) = solved.raise(errors::calibration)?;
+    let foreign = diagnoses.iter().find(|said| matches!(said, Diagnosis::ForeignCamera { .. }));
+    if let Some(foreign) = foreign {
+        let text = Words::new(&estimate, print.scale).sentence(foreign);
+        return Err(raised::CalibrationError::new_err(text));
+    }
+    if estimate.frames.is_empty() {
+        let what = "no view shows the target as this camera sees it";
+        return Err(raised::CalibrationError::new_err(what));
+    }
+    estimate.excluded.splice(0..0, left_out);
+    let targets = match &*seen {
+        Seen::Targets { printed, .. } => printed.clone(),
+        Seen::Grid(grid) => {
+            grid.target("board").and_then(Result::ok).map(Printing::from).into_iter().collect()
+        }
+    };
+    let model = model.name();
+    Ok(Solved { estimate, diagnoses, print, stated, models, targets, model, is_rig, file: None })
+}

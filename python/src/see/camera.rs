@@ -1,0 +1,332 @@
+//! Cameras: projection, and files of other programs.
+
+use std::path::PathBuf;
+
+use deltille::camera::{self, Lens};
+use deltille::export::camera as formats;
+use deltille::{camera_file, glam};
+use deltille_core::quantity::{Range, coefficient, focal_px, place_px};
+use deltille_core::words::shown;
+use glam::DVec2;
+use numpy::{PyArray1, PyArray2};
+use pyo3::prelude::*;
+use serde_json::json;
+
+use crate::boundary::arrays::{self, number, vector, whole};
+use crate::boundary::errors::{self, Raise, RaiseFile, raised, unlocked};
+use crate::boundary::text_file::save_text;
+
+/// A camera with its lens: where points are seen, and along which rays pixels look.
+///
+/// Pixel centres are at integers, y down; the camera frame has x right, y down, z forward.
+///
+/// Parameters
+/// ----------
+/// width, height : int
+///     Size of the image, px.
+/// focal_px : float or (float, float)
+///     Focal lengths along x and y, px.
+/// centre_px : (float, float), optional
+///     Principal point, px; the middle of the image if left out.
+/// model : str, optional
+///     ``"pinhole"`` (Brown–Conrady), ``"fisheye"`` (Kannala–Brandt), ``"eucm"``, ``"double-sphere"`` or ``"pupil"``; the
+///     names of :func:`calibrate` are taken too, of which ``"radtan"``, ``"radtan5"``, ``"rational"`` and
+///     ``"thin-prism"`` are a pinhole with 4, 5, 8 and 12 coefficients, and ``"kannala-brandt"`` is a fisheye.
+/// distortion : sequence of floats, optional
+///     Coefficients in the order of the model: of ``"pinhole"`` k1 k2 p1 p2 k3 k4 k5 k6 s1 s2 s3 s4 as in OpenCV, of
+///     ``"fisheye"`` k1 k2 k3 k4 or more; what is left out at the end is zero.
+///
+/// Raises
+/// ------
+/// CameraError
+///     Where this is no camera.
+#[pyclass(frozen, module = "deltille", eq)]
+#[derive(Clone, PartialEq)]
+pub struct Camera(pub camera::Camera);
+
+/// What focal lengths are, px.
+const FOCAL: Range = focal_px::RANGE;
+
+/// The lens of a camera file that a model is, and with how many coefficients at most.
+fn lens_of(model: &str) -> (&str, usize) {
+    match model {
+        "radtan" => ("pinhole", 4),
+        "radtan5" => ("pinhole", 5),
+        "rational" => ("pinhole", 8),
+        "thin-prism" => ("pinhole", 12),
+        "kannala-brandt" => ("fisheye", 4),
+        _ => (model, usize::MAX),
+    }
+}
+
+#[pymethods]
+impl Camera {
+    #[new]
+    #[pyo3(signature = (width, height, focal_px, centre_px = None, *, model = "pinhole", distortion = None))]
+    fn new(
+        width: i64,
+        height: i64,
+        focal_px: &Bound<'_, PyAny>,
+        centre_px: Option<&Bound<'_, PyAny>>,
+        model: &str,
+        distortion: Option<&Bound<'_, PyAny>>,
+    ) -> PyResult<Self> {
+        let width: u32 = whole("width", width, errors::camera)?;
+        let height: u32 = whole("height", height, errors::camera)?;
+        let focal = match focal_px.extract::<f64>() {
+            Ok(both) => [number("focal_px", both, FOCAL, errors::camera)?; 2],
+            Err(_) => vector("focal_px", focal_px, FOCAL, errors::camera)?,
+        };
+        let middle = [width, height].map(|side| (f64::from(side) - 1.0) / 2.0);
+        let centre = centre_px.map_or(Ok(middle), |centre| {
+            vector("centre_px", centre, place_px::RANGE, errors::camera)
+        })?;
+        let distortion = distortion
+            .map(|all| arrays::numbers("distortion", all, coefficient::RANGE, errors::camera));
+        let distortion = distortion.transpose()?.unwrap_or_default();
+        let (lens, most) = lens_of(model);
+        if distortion.len() > most {
+            let count = distortion.len();
+            let what = format!("distortion: {model} has {most} coefficients, not {count}");
+            return Err(errors::camera(what));
+        }
+        let text = json!({
+            "width": width, "height": height, "focal_px": focal,
+            "centre_px": centre, "model": lens, "distortion": distortion,
+        });
+        camera::Camera::from_yaml(&text.to_string()).map(Self).raise(errors::camera)
+    }
+
+    /// Reads a camera file: one of this package (``.yaml``), of ROS or OpenCV.
+    ///
+    /// Parameters
+    /// ----------
+    /// path : path-like
+    ///
+    /// Returns
+    /// -------
+    /// Camera
+    #[staticmethod]
+    fn load(py: Python<'_>, path: PathBuf) -> PyResult<Self> {
+        let file = camera_file::read_with_targets(&path).raise_of_file(&path, errors::file)?;
+        if let Some(failed) = &file.failed {
+            let what = format!("{}: the calibration failed: {}", path.display(), shown(failed));
+            errors::warn(py, &what)?;
+        }
+        Ok(Self(file.camera))
+    }
+
+    /// The camera of a text, as :meth:`load` reads it from files.
+    #[staticmethod]
+    fn from_yaml(text: &str) -> PyResult<Self> {
+        camera::Camera::from_yaml(text).map(Self).raise(errors::camera)
+    }
+
+    /// The text of this package's camera file.
+    fn to_yaml(&self) -> String {
+        self.0.to_yaml()
+    }
+
+    /// Writes a camera file.
+    ///
+    /// Parameters
+    /// ----------
+    /// path : path-like
+    ///     The file.
+    /// format : str, optional
+    ///     ``"own"``, which :meth:`load` reads back for every model, ``"opencv"``, ``"ros"``, ``"kalibr"``,
+    ///     ``"colmap"``, ``"nerfstudio"`` or ``"mrcal"``.
+    /// overwrite : bool, optional
+    ///     Whether a file of another kind is replaced.
+    ///
+    /// Returns
+    /// -------
+    /// pathlib.Path
+    ///
+    /// Raises
+    /// ------
+    /// CameraError
+    ///     Where the format has no such lens.
+    #[pyo3(signature = (path, format = "own", *, overwrite = false))]
+    fn save(&self, path: PathBuf, format: &str, overwrite: bool) -> PyResult<PathBuf> {
+        let stem = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+        save_text(path, self.text(format, &stem, &[])?, overwrite)
+    }
+
+    /// Width of the image, px.
+    #[getter]
+    fn width(&self) -> u32 {
+        self.0.width
+    }
+
+    /// Height of the image, px.
+    #[getter]
+    fn height(&self) -> u32 {
+        self.0.height
+    }
+
+    /// The lens: ``pinhole``, ``fisheye``, ``eucm``, ``double-sphere``, ``pupil`` or ``spline``.
+    #[getter]
+    fn model(&self) -> &'static str {
+        match self.0.lens {
+            Lens::BrownConrady(_) => "pinhole",
+            Lens::KannalaBrandt(_) => "fisheye",
+            Lens::ExtendedUnified(_) => "eucm",
+            Lens::DoubleSphere(_) => "double-sphere",
+            Lens::Pupil(_) => "pupil",
+            Lens::Spline(_) => "spline",
+        }
+    }
+
+    /// Names of all parameters: ``fx``, ``fy``, ``cx``, ``cy``, then those of the lens.
+    #[getter]
+    fn parameter_names(&self) -> Vec<String> {
+        self.0.parameter_names()
+    }
+
+    /// Values of all parameters, float64, in the order of :attr:`parameter_names`; lengths in px, of a pupil in mm.
+    #[getter]
+    fn parameters<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+        arrays::column(py, self.0.parameters())
+    }
+
+    /// The camera matrix of 3 × 3, float64, as OpenCV has it.
+    #[getter]
+    fn matrix<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray2<f64>> {
+        let ([fx, fy], [cx, cy]) = (self.0.focal_px.to_array(), self.0.centre_px.to_array());
+        arrays::rows(py, [[fx, 0.0, cx], [0.0, fy, cy], [0.0, 0.0, 1.0]])
+    }
+
+    /// The coefficients of distortion for OpenCV, float64: 4, 5, 8 or 12, of a fisheye the 4 of ``cv2.fisheye``.
+    ///
+    /// Raises
+    /// ------
+    /// CameraError
+    ///     Where OpenCV has no such lens.
+    #[getter]
+    fn distortion<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray1<f64>>> {
+        let found = formats::opencv_coefficients(&self.0).raise(errors::camera)?;
+        Ok(arrays::column(py, found.values))
+    }
+
+    /// Where points are seen.
+    ///
+    /// Parameters
+    /// ----------
+    /// points : array of N × 3
+    ///     Places in the camera frame, mm.
+    ///
+    /// Returns
+    /// -------
+    /// ndarray of N × 2, float64
+    ///     Pixels, which may lie outside the image; NaN where the lens does not reach.
+    fn project<'py>(
+        &self,
+        py: Python<'py>,
+        points: &Bound<'py, PyAny>,
+    ) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        let points = arrays::rows_of::<3>("points", points)?;
+        let seen = unlocked(py, || {
+            let seen =
+                |point: [f64; 3]| self.0.project(point.into()).unwrap_or(DVec2::NAN).to_array();
+            points.into_iter().map(seen).collect::<Vec<_>>()
+        })?;
+        Ok(arrays::rows(py, seen))
+    }
+
+    /// The directions in which pixels look.
+    ///
+    /// Parameters
+    /// ----------
+    /// pixels : array of N × 2
+    ///     Positions, px.
+    ///
+    /// Returns
+    /// -------
+    /// ndarray of N × 3, float64
+    ///     Unit vectors of the camera frame; NaN where the lens does not reach. See :meth:`rays` for a lens that is not
+    ///     central.
+    fn unproject<'py>(
+        &self,
+        py: Python<'py>,
+        pixels: &Bound<'py, PyAny>,
+    ) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        Ok(self.rays(py, pixels)?.1)
+    }
+
+    /// The rays along which pixels look.
+    ///
+    /// Parameters
+    /// ----------
+    /// pixels : array of N × 2
+    ///     Positions, px.
+    ///
+    /// Returns
+    /// -------
+    /// origins : ndarray of N × 3, float64
+    ///     Where they begin in the camera frame, mm: zero unless the lens is a ``pupil``.
+    /// directions : ndarray of N × 3, float64
+    ///     Unit vectors; NaN where the lens does not reach.
+    #[expect(clippy::type_complexity, reason = "two arrays")]
+    fn rays<'py>(
+        &self,
+        py: Python<'py>,
+        pixels: &Bound<'py, PyAny>,
+    ) -> PyResult<(Bound<'py, PyArray2<f64>>, Bound<'py, PyArray2<f64>>)> {
+        let pixels = arrays::rows_of::<2>("pixels", pixels)?;
+        let rays = unlocked(py, || {
+            let ray = |pixel: [f64; 2]| match self.0.unproject(pixel.into()) {
+                Some(ray) => (ray.origin.to_array(), ray.direction.to_array()),
+                None => ([f64::NAN; 3], [f64::NAN; 3]),
+            };
+            pixels.into_iter().map(ray).unzip::<_, _, Vec<_>, Vec<_>>()
+        })?;
+        Ok((arrays::rows(py, rays.0), arrays::rows(py, rays.1)))
+    }
+
+    fn __repr__(&self) -> String {
+        let (focal, centre) = (self.0.focal_px, self.0.centre_px);
+        format!(
+            "Camera({} × {} px, {}, focal_px=({:.2}, {:.2}), centre_px=({:.2}, {:.2}))",
+            self.0.width,
+            self.0.height,
+            self.model(),
+            focal.x,
+            focal.y,
+            centre.x,
+            centre.y
+        )
+    }
+
+    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> crate::Reduced<'py, (String,)> {
+        Ok((slf.get_type().getattr("from_yaml")?, (slf.get().to_yaml(),)))
+    }
+}
+
+impl Camera {
+    /// The text of a file of another program.
+    pub fn text(
+        &self,
+        format: &str,
+        name: &str,
+        views: &[(&str, camera::Pose)],
+    ) -> PyResult<String> {
+        let camera = &self.0;
+        let text = match format {
+            "own" => return Ok(camera.to_yaml()),
+            "opencv" => formats::opencv(camera),
+            "ros" => formats::ros(camera, name),
+            "kalibr" => formats::kalibr(&[(camera, camera::Pose::IDENTITY)], &[]),
+            "colmap" => formats::colmap(&[camera]),
+            "nerfstudio" => formats::nerfstudio(camera, views),
+            "mrcal" => formats::mrcal(camera),
+            _ => {
+                let known = "own, opencv, ros, kalibr, colmap, nerfstudio or mrcal";
+                return Err(raised::CameraError::new_err(format!(
+                    "format: {format} is not {known}"
+                )));
+            }
+        };
+        text.raise(errors::camera)
+    }
+}

@@ -1,0 +1,579 @@
+//! What was found in a picture.
+
+use std::collections::BTreeMap;
+use std::path::PathBuf;
+use std::sync::Arc;
+
+use deltille::calibrate::Reference;
+use deltille::detect::{self, GridCorner};
+use deltille::export::tables::{Picture, folder};
+use deltille::export::{csv, detection, orpc};
+use deltille::limits::Limits;
+use deltille::targets;
+use numpy::{PyArray1, PyArray2, PyArray3};
+use pyo3::exceptions::PyTypeError;
+use pyo3::prelude::*;
+use serde::{Deserialize, Serialize};
+
+use crate::boundary::arrays::{self, record};
+use crate::boundary::errors::{self, Raise, RaiseFile, raised};
+use crate::boundary::text_file::save_text;
+use crate::pickles;
+use crate::targets::families;
+use crate::targets::target::Target;
+
+/// Why a picture, or a grid in it, has no labels.
+#[pyclass(frozen, module = "deltille", eq)]
+#[derive(PartialEq, Serialize, Deserialize)]
+pub struct Reason(pub detect::Reason);
+
+#[pymethods]
+impl Reason {
+    /// The kind, such as ``"too_dark"``.
+    #[getter]
+    fn kind(&self) -> String {
+        let kind = serde_json::to_value(self.0.kind).unwrap_or_default();
+        kind.as_str().unwrap_or_default().to_owned()
+    }
+
+    /// What to do about it, as a sentence.
+    #[getter]
+    fn sentence(&self) -> String {
+        errors::told(&self.0)
+    }
+
+    /// Index of the grid that it is about; ``None`` for the whole picture.
+    #[getter]
+    fn grid(&self) -> Option<usize> {
+        self.0.grid
+    }
+
+    /// What was measured, by names with units.
+    #[getter]
+    fn figures(&self) -> BTreeMap<String, f64> {
+        self.0.figures.clone()
+    }
+
+    fn __str__(&self) -> String {
+        self.sentence()
+    }
+
+    fn __repr__(&self) -> String {
+        format!("<Reason {}: {}>", self.kind(), self.sentence())
+    }
+}
+
+pickles!(Reason);
+
+/// A tag that was read in a picture.
+#[pyclass(frozen, get_all, module = "deltille", eq)]
+#[derive(Clone, PartialEq, Serialize, Deserialize)]
+pub struct DecodedTag {
+    /// Id of the tag.
+    id: u32,
+    /// Name of its family.
+    family: String,
+    /// Id of the panel that it lies on; ``None`` where the grid has no labels.
+    panel: Option<u32>,
+    /// Row of the lower left vertex of its tile.
+    row: i32,
+    /// Column of that vertex.
+    col: i32,
+    /// Number of cells that were misread and corrected.
+    errors: u32,
+}
+
+pickles!(DecodedTag);
+
+#[pymethods]
+impl DecodedTag {
+    fn __repr__(&self) -> String {
+        format!("DecodedTag(id={}, family={:?}, errors={})", self.id, self.family, self.errors)
+    }
+}
+
+/// What was found in one picture: corners with their labels, places and covariances.
+///
+/// All arrays have a row for each of the N corners, in the same order, grid after grid; each access makes a new array.
+#[pyclass(frozen, module = "deltille")]
+#[derive(Clone)]
+pub struct Detection {
+    pub found: Arc<detect::Detection>,
+    pub targets: Vec<Target>,
+}
+
+/// A connected piece of a tiling in a picture.
+///
+/// The arrays are those of :class:`Detection`, of one grid.
+#[pyclass(frozen, module = "deltille")]
+#[derive(Clone)]
+pub struct Grid {
+    of: Detection,
+    index: usize,
+}
+
+impl Detection {
+    fn grids(&self) -> std::slice::Iter<'_, detect::Grid> {
+        self.found.grids.iter()
+    }
+
+    /// The target of a grid, where it is known.
+    fn target_of(&self, grid: &detect::Grid) -> Option<&targets::Target> {
+        let named =
+            |name: &String| self.targets.iter().find(|target| *target.target().name == **name);
+        let found = match &grid.target {
+            Some(name) => named(name),
+            None => self.targets.first(),
+        };
+        found.map(|found| found.target())
+    }
+
+    /// A detection with its targets, which are taken even where it names others if they are assumed.
+    fn of(
+        mut found: detect::Detection,
+        targets: Vec<Target>,
+        assume_target: bool,
+    ) -> PyResult<Self> {
+        if assume_target {
+            let given: Vec<_> = targets.iter().map(|target| target.target().identity()).collect();
+            found.assume_targets(&given);
+        }
+        Self { found: Arc::new(found), targets }.checked()
+    }
+
+    /// The same, where its labels are those of its targets: of others they would be places that were never seen.
+    fn checked(self) -> PyResult<Self> {
+        let labelled = self.found.grids.iter().filter(|grid| grid.panel.is_some());
+        for (grid, target) in labelled.filter_map(|grid| Some((grid, self.target_of(grid)?))) {
+            let reference = Reference::Target(target);
+            reference.check_labels(&self.found, grid).raise(errors::detection)?;
+        }
+        Ok(self)
+    }
+
+    /// Places of the corners of a grid on their target, mm.
+    fn places(&self, grid: &detect::Grid) -> Vec<[f64; 3]> {
+        let target = self.target_of(grid);
+        let panel = target.zip(grid.panel);
+        let panel =
+            panel.and_then(|(target, id)| target.panels.iter().find(|panel| panel.id == id));
+        let ids: BTreeMap<u32, usize> = panel.map_or_else(BTreeMap::new, |panel| {
+            panel.corners.iter().enumerate().map(|(index, corner)| (corner.id, index)).collect()
+        });
+        let place = |corner: &GridCorner| {
+            let index = corner.id.and_then(|id| ids.get(&id));
+            let place = panel.zip(index).map(|(panel, &i)| panel.place_mm(&panel.corners[i]));
+            place.map_or([f64::NAN; 3], |place| place.to_array())
+        };
+        grid.corners.iter().map(place).collect()
+    }
+}
+
+/// Ids for an array: −1 where there is none.
+fn id(id: Option<u32>) -> i64 {
+    id.map_or(-1, i64::from)
+}
+
+macro_rules! corner_arrays {
+    ($class:ident, $self:ident => $grids:expr, $of:expr) => {
+        #[pymethods]
+        impl $class {
+            /// Positions, N × 2, float64, px: x right, y down, pixel centres at integers.
+            #[getter]
+            fn pixels<'py>(&$self, py: Python<'py>) -> Bound<'py, PyArray2<f64>> {
+                let corners = $grids.flat_map(|grid| &grid.corners);
+                arrays::rows(py, corners.map(|corner| [corner.x, corner.y]))
+            }
+
+            /// Places on the target, N × 3, float64, mm; NaN where a corner has no label.
+            #[getter]
+            fn object_points<'py>(&$self, py: Python<'py>) -> Bound<'py, PyArray2<f64>> {
+                arrays::rows(py, $grids.flat_map(|grid| $of.places(grid)))
+            }
+
+            /// Ids in the target, N, int64; −1 where a corner has no label.
+            #[getter]
+            fn ids<'py>(&$self, py: Python<'py>) -> Bound<'py, PyArray1<i64>> {
+                let corners = $grids.flat_map(|grid| &grid.corners);
+                arrays::column(py, corners.map(|corner| id(corner.id)))
+            }
+
+            /// Lattice rows, N, int64: on the panel, or relative where the grid has no labels.
+            #[getter]
+            fn rows<'py>(&$self, py: Python<'py>) -> Bound<'py, PyArray1<i64>> {
+                let corners = $grids.flat_map(|grid| &grid.corners);
+                arrays::column(py, corners.map(|corner| i64::from(corner.row)))
+            }
+
+            /// Lattice columns, N, int64, alike.
+            #[getter]
+            fn cols<'py>(&$self, py: Python<'py>) -> Bound<'py, PyArray1<i64>> {
+                let corners = $grids.flat_map(|grid| &grid.corners);
+                arrays::column(py, corners.map(|corner| i64::from(corner.col)))
+            }
+
+            /// Covariances of the positions, N × 2 × 2, float64, px²; NaN where the method gives none.
+            #[getter]
+            fn covariances<'py>(&$self, py: Python<'py>) -> Bound<'py, PyArray3<f64>> {
+                let corners = $grids.flat_map(|grid| &grid.corners);
+                arrays::covariances(py, corners.map(|corner| corner.cov))
+            }
+
+            /// The tags that were read.
+            #[getter]
+            fn tags(&$self) -> Vec<DecodedTag> {
+                let of_grid = |grid: &detect::Grid| {
+                    let tag = |tag: &detect::DecodedTag| DecodedTag {
+                        id: tag.id,
+                        family: tag.family.clone(),
+                        panel: grid.panel,
+                        row: tag.row,
+                        col: tag.col,
+                        errors: tag.errors,
+                    };
+                    grid.tags.iter().map(tag).collect::<Vec<_>>()
+                };
+                $grids.flat_map(of_grid).collect()
+            }
+
+            /// Whether what was found is seen as in a mirror.
+            #[getter]
+            fn mirrored(&$self) -> bool {
+                let mut grids = $grids;
+                grids.any(|grid| grid.mirrored)
+            }
+
+            fn __len__(&$self) -> usize {
+                $grids.map(|grid| grid.corners.len()).sum()
+            }
+        }
+    };
+}
+
+corner_arrays!(Detection, self => self.found.grids.iter(), self);
+corner_arrays!(Grid, self => std::iter::once(&self.of.found.grids[self.index]), self.of);
+
+#[pymethods]
+impl Grid {
+    /// Id of the panel; ``None`` where the grid has no labels.
+    #[getter]
+    fn panel(&self) -> Option<u32> {
+        self.of.found.grids[self.index].panel
+    }
+
+    /// Name of the target that it belongs to, where several were looked for.
+    #[getter]
+    fn target(&self) -> Option<&str> {
+        self.of.found.grids[self.index].target.as_deref()
+    }
+
+    /// The tiling, ``"deltille"`` or ``"checker"``.
+    #[getter]
+    fn kind(&self) -> &'static str {
+        families::kind(self.of.found.grids[self.index].kind)
+    }
+
+    fn __repr__(&self) -> String {
+        let grid = &self.of.found.grids[self.index];
+        let panel = grid.panel.map_or("no labels".to_owned(), |panel| format!("panel {panel}"));
+        format!("<Grid {}: {panel}, {} corners>", self.kind(), grid.corners.len())
+    }
+
+    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> crate::Reduced<'py, (Detection, usize)> {
+        let restore = slf.py().import("deltille._core")?.getattr("_grid")?;
+        let own = slf.get();
+        Ok((restore, (own.of.clone(), own.index)))
+    }
+}
+
+#[pymethods]
+impl Detection {
+    /// Reads a detection: the ``.json`` of :meth:`save` or of ``deltille detect``.
+    ///
+    /// Parameters
+    /// ----------
+    /// path : path-like
+    /// target : Target or sequence of Target, optional
+    ///     What was looked for, from which :attr:`object_points` come.
+    /// assume_target : bool, optional
+    ///     Whether the target is taken even where the file names another one.
+    ///
+    /// Returns
+    /// -------
+    /// Detection
+    #[staticmethod]
+    #[pyo3(signature = (path, *, target = None, assume_target = false))]
+    fn load(path: PathBuf, target: Option<Targets>, assume_target: bool) -> PyResult<Self> {
+        let text = Limits::default().read_text(&path).raise_of_file(&path, errors::file)?;
+        let wrong = |error: PyErr| {
+            let what = format!("{}: {}", path.display(), error);
+            raised::FileError::new_err(what.replace("DetectionError: ", ""))
+        };
+        Self::from_json(&text, target, assume_target).map_err(wrong)
+    }
+
+    /// The detection of a text, as :meth:`load` reads it from files.
+    #[staticmethod]
+    #[pyo3(signature = (text, *, target = None, assume_target = false))]
+    fn from_json(text: &str, target: Option<Targets>, assume_target: bool) -> PyResult<Self> {
+        let found = detection::read(text).raise(errors::detection)?;
+        Self::of(found, target.map(|targets| targets.0).unwrap_or_default(), assume_target)
+    }
+
+    /// The text that ``deltille detect`` writes.
+    fn to_json(&self) -> String {
+        detection::write(&self.found)
+    }
+
+    /// Writes the detection.
+    ///
+    /// Parameters
+    /// ----------
+    /// path : path-like
+    /// format : str, optional
+    ///     ``"json"``, which :meth:`load` reads back, ``"csv"`` or ``"orpc"``.
+    /// overwrite : bool, optional
+    ///     Whether a file of another kind is replaced.
+    ///
+    /// Returns
+    /// -------
+    /// pathlib.Path
+    #[pyo3(signature = (path, format = "json", *, overwrite = false))]
+    fn save(&self, path: PathBuf, format: &str, overwrite: bool) -> PyResult<PathBuf> {
+        let target = self.targets.first().map(|target| target.target());
+        let text = match format {
+            "json" => detection::write(&self.found),
+            "csv" => csv::write(&self.found),
+            "orpc" => orpc::write(&self.found, target),
+            _ => {
+                let what = format!("format: {format} is not json, csv or orpc");
+                return Err(raised::DetectionError::new_err(what));
+            }
+        };
+        save_text(path, text, overwrite)
+    }
+
+    /// Name of the picture.
+    #[getter]
+    fn image(&self) -> &str {
+        &self.found.image
+    }
+
+    /// Width of the picture, px.
+    #[getter]
+    fn width(&self) -> u32 {
+        self.found.width
+    }
+
+    /// Height of the picture, px.
+    #[getter]
+    fn height(&self) -> u32 {
+        self.found.height
+    }
+
+    /// ``None``, by which results of many pictures are told from failures.
+    #[getter]
+    fn error(&self) -> Option<bool> {
+        None
+    }
+
+    /// The targets that were looked for.
+    #[getter]
+    fn targets(&self) -> Vec<Target> {
+        self.targets.clone()
+    }
+
+    /// The grids: labelled ones by the id of their panel, then the others, largest first.
+    #[getter(grids)]
+    fn all_grids(&self) -> Vec<Grid> {
+        (0..self.found.grids.len()).map(|index| Grid { of: self.clone(), index }).collect()
+    }
+
+    /// Ids of the panels on which the corners lie, N, int64; −1 where a corner has no label.
+    #[getter]
+    fn panels<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<i64>> {
+        let of = |grid: &detect::Grid| std::iter::repeat_n(id(grid.panel), grid.corners.len());
+        arrays::column(py, self.grids().flat_map(of).collect::<Vec<_>>())
+    }
+
+    /// Index of the grid of each corner, N, int64.
+    #[getter]
+    fn grid_indices<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<i64>> {
+        let of =
+            |(index, grid): (i64, &detect::Grid)| std::iter::repeat_n(index, grid.corners.len());
+        arrays::column(py, (0..).zip(&self.found.grids).flat_map(of).collect::<Vec<_>>())
+    }
+
+    /// Why nothing was found, or nothing was labelled; ``None`` where there is nothing to say.
+    #[getter]
+    fn why(&self) -> Option<Reason> {
+        self.found.reasons.first().cloned().map(Reason)
+    }
+
+    /// All reasons why there is no more.
+    #[getter]
+    fn reasons(&self) -> Vec<Reason> {
+        self.found.reasons.iter().cloned().map(Reason).collect()
+    }
+
+    /// What was found of the camera's tone curve: ``kappa``, ``kappa_deviation``, ``black``, ``white``, ``used`` and
+    /// others; ``None`` where it was not looked for.
+    #[getter]
+    fn tone<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyAny>>> {
+        self.found.tone.map(|tone| record(py, &tone)).transpose()
+    }
+
+    /// What was found of the spread of ink on the print: ``um``, ``um_deviation``, ``edges``, ``used`` and others;
+    /// ``None`` where it was not looked for.
+    #[getter]
+    fn ink<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyAny>>> {
+        self.found.ink.map(|ink| record(py, &ink)).transpose()
+    }
+
+    /// The targets that were looked for, by which results of different targets are told apart: ``name``, ``fingerprint``,
+    /// ``labels``, ``panels``, ``corners`` and ``edge_mm`` of each; empty where they are not known.
+    #[getter]
+    fn target_identities<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        record(py, &self.found.targets)
+    }
+
+    /// How EXIF says that the pixels are to be turned for a viewer, 2 to 8; ``None`` if not at all.
+    #[getter]
+    fn exif_orientation(&self) -> Option<u8> {
+        self.found.file.exif_orientation
+    }
+
+    /// Why some pixels do not come from the file; ``None`` of a whole one.
+    #[getter]
+    fn damage(&self) -> Option<&str> {
+        self.found.file.damage.as_deref()
+    }
+
+    fn __repr__(&self) -> String {
+        let corners: usize = self.grids().map(|grid| grid.corners.len()).sum();
+        let tags: usize = self.grids().map(|grid| grid.tags.len()).sum();
+        let why = self.found.reasons.first().map_or(String::new(), |why| format!(": {why}"));
+        let name = &self.found.image;
+        format!(
+            "<Detection {name}: {} grids, {corners} corners, {tags} tags{why}>",
+            self.found.grids.len()
+        )
+    }
+
+    fn __eq__(&self, other: &Self) -> bool {
+        self.found == other.found
+    }
+
+    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> crate::Reduced<'py, (String, Vec<Target>)> {
+        let restore = slf.py().import("deltille._core")?.getattr("_detection")?;
+        let own = slf.get();
+        Ok((restore, (own.to_json(), own.targets.clone())))
+    }
+}
+
+/// A detection that was pickled.
+#[pyfunction]
+pub fn _detection(json: &str, targets: Vec<PyRef<'_, Target>>) -> PyResult<Detection> {
+    let found = Arc::new(detection::read(json).raise(errors::detection)?);
+    Ok(Detection { found, targets: targets.iter().map(|target| (**target).clone()).collect() })
+}
+
+/// A grid that was pickled.
+#[pyfunction]
+pub fn _grid(of: &Detection, index: usize) -> PyResult<Grid> {
+    match index < of.found.grids.len() {
+        true => Ok(Grid { of: of.clone(), index }),
+        false => Err(raised::DetectionError::new_err(format!("there is no grid {index}"))),
+    }
+}
+
+/// A target, or several.
+pub struct Targets(pub Vec<Target>);
+
+impl<'a, 'py> FromPyObject<'a, 'py> for Targets {
+    type Error = PyErr;
+
+    fn extract(given: Borrowed<'a, 'py, PyAny>) -> PyResult<Self> {
+        if let Ok(target) = given.cast::<Target>() {
+            return Ok(Self(vec![target.get().clone()]));
+        }
+        let all = given.try_iter()?.map(|target| Ok(target?.cast::<Target>()?.get().clone()));
+        all.collect::<PyResult<_>>().map(Self)
+    }
+}
+
+/// What came of a picture: its name, and its detection or why it could not be read.
+type Row = (String, Option<Detection>, Option<String>);
+
+/// Detections from tables: Parquet files, or the folders that hold them.
+#[pyfunction]
+pub fn _tables(
+    paths: Vec<PathBuf>,
+    targets: Option<Targets>,
+    assume_target: bool,
+) -> PyResult<Vec<Row>> {
+    let mut files = Vec::new();
+    let first = paths.first().cloned().unwrap_or_default();
+    for path in paths {
+        if path.is_dir() {
+            files.extend(folder::files(&path).raise_of_file(&path, errors::file)?);
+        } else {
+            let other = folder::beside(&path).filter(|other| !files.contains(other));
+            files.extend(other);
+            files.push(path);
+        }
+    }
+    let targets = targets.map(|targets| targets.0).unwrap_or_default();
+    let row = |picture: Picture| match picture.found {
+        Ok(found) => {
+            let found = Detection::of(found, targets.clone(), assume_target)?;
+            Ok((picture.image, Some(found), None))
+        }
+        Err(why) => Ok((picture.image, None, Some(why))),
+    };
+    let read = folder::read(&files, &Limits::default()).raise_of_file(&first, errors::file)?;
+    read.pictures.into_iter().map(row).collect()
+}
+
+/// What `detect_many` gives, without the pictures that could not be read.
+pub struct Results<'py> {
+    pub all: Vec<PyRef<'py, Detection>>,
+    is_read: Vec<bool>,
+}
+
+impl Results<'_> {
+    /// The names of those that were read, of names of all.
+    pub fn names(&self, names: Option<Vec<String>>) -> Option<Vec<String>> {
+        let names = names?;
+        if names.len() != self.is_read.len() {
+            return Some(names);
+        }
+        let read = names.into_iter().zip(&self.is_read).filter(|(_, is_read)| **is_read);
+        Some(read.map(|(name, _)| name).collect())
+    }
+}
+
+impl<'a, 'py> FromPyObject<'a, 'py> for Results<'py> {
+    type Error = PyErr;
+
+    fn extract(given: Borrowed<'a, 'py, PyAny>) -> PyResult<Self> {
+        let wrong = |what: String| PyTypeError::new_err(format!("detections: {what}"));
+        if given.cast::<Detection>().is_ok() {
+            return Err(wrong("give a list of them, [detection]".to_owned()));
+        }
+        let (mut all, mut is_read) = (Vec::new(), Vec::new());
+        for one in given.try_iter()? {
+            let one = one?;
+            if let Ok(found) = one.cast::<Detection>() {
+                all.push(found.clone().borrow());
+                is_read.push(true);
+            } else if one.getattr("error").is_ok_and(|error| !error.is_none()) {
+                is_read.push(false);
+            } else {
+                let kind = one.get_type().qualname()?;
+                return Err(wrong(format!("{kind} is no Detection")));
+            }
+        }
+        Ok(Self { all, is_read })
+    }
+}

@@ -1,0 +1,113 @@
+//! How files are made of a target: formats and keywords of `files` and `save`.
+
+use deltille::export::artifacts::{Making, What};
+use deltille::export::mesh::{MAX_TEXTURE_PX, Resolution};
+use deltille::export::texture::MAX_TEXTURES;
+use deltille::targets::{Target, TargetSpec};
+use pyo3::prelude::*;
+
+use crate::boundary::errors::{self, Raise, raised};
+
+/// One format, or several.
+#[derive(FromPyObject)]
+pub enum Formats {
+    One(String),
+    Many(Vec<String>),
+}
+
+impl Formats {
+    /// What they stand for.
+    pub fn parsed(self) -> PyResult<Vec<What>> {
+        let names = match self {
+            Self::One(format) => vec![format],
+            Self::Many(formats) => formats,
+        };
+        names.iter().map(|name| name.parse().raise(errors::target)).collect()
+    }
+}
+
+/// Keywords as they are given.
+#[derive(Clone, Copy)]
+pub struct Keywords {
+    pub dpi: f64,
+    pub texture_dpi: Option<f64>,
+    pub texture_px: Option<i64>,
+    pub textures: Option<i64>,
+    pub plate_mm: Option<f64>,
+    pub inlay_mm: Option<f64>,
+    pub kerf_mm: Option<f64>,
+}
+
+impl Keywords {
+    /// How files of these formats are made of a target.
+    pub fn making(self, target: &Target, formats: &[What]) -> PyResult<Making> {
+        self.check_use(target, formats)?;
+        let is_no_dpi = |dpi: f64| !(1.0..=1e5).contains(&dpi);
+        if is_no_dpi(self.dpi) || self.texture_dpi.is_some_and(is_no_dpi) {
+            return Err(raised::TargetError::new_err("dpi: give dots per inch from 1 to 100000"));
+        }
+        let mut making = Making::default();
+        making.dpi = self.dpi;
+        making.mesh.resolution = match (self.texture_dpi, self.texture_px) {
+            (None, None) => Resolution::Usual,
+            (Some(dpi), None) => Resolution::Dpi(dpi),
+            (None, Some(px)) => {
+                let side = u32::try_from(px).ok().filter(|px| (1..=MAX_TEXTURE_PX).contains(px));
+                let refused = || format!("texture_px: give 1 to {MAX_TEXTURE_PX}");
+                Resolution::Side(side.ok_or_else(|| raised::TargetError::new_err(refused()))?)
+            }
+            (Some(_), Some(_)) => {
+                return Err(raised::TargetError::new_err(
+                    "texture_dpi and texture_px: give one of them",
+                ));
+            }
+        };
+        if let Some(textures) = self.textures {
+            let count = u32::try_from(textures).ok().filter(|n| (1..=MAX_TEXTURES).contains(n));
+            let refused = || format!("textures: give 1 to {MAX_TEXTURES}");
+            making.mesh.textures = count.ok_or_else(|| raised::TargetError::new_err(refused()))?;
+        }
+        making.mesh.plate_mm = self.plate_mm.unwrap_or(making.mesh.plate_mm);
+        making.mesh.inlay_mm = self.inlay_mm.unwrap_or(making.mesh.inlay_mm);
+        making.kerf_mm = self.kerf_mm.unwrap_or(making.kerf_mm);
+        Ok(making)
+    }
+
+    /// Refuses keywords that nothing asked for makes use of.
+    fn check_use(&self, target: &Target, formats: &[What]) -> PyResult<()> {
+        use What::{Gltf, LaserDxf, LaserSvg, Mjcf, Obj, Sdf, ThreeMf, Urdf, Usd};
+        let asked = |of: &[What]| formats.iter().any(|format| of.contains(format));
+        let textured = asked(&[Gltf, Obj, Sdf, Urdf, Mjcf, Usd]);
+        let is_solid = matches!(target.spec, TargetSpec::Solid(_));
+        if self.plate_mm.is_some() && is_solid {
+            return Err(raised::TargetError::new_err(
+                "plate_mm: a solid has no plate: leave it out",
+            ));
+        }
+        if self.plate_mm.is_some() && target.spec.two_sided_mm().is_some() {
+            let problem = "plate_mm: the plate is as thick as two_sided_mm says: leave it out";
+            return Err(raised::TargetError::new_err(problem));
+        }
+        let any = textured || asked(&[ThreeMf]);
+        let mesh = "a mesh among the formats, such as gltf";
+        let idle = [
+            ("texture_dpi", self.texture_dpi.is_some(), textured, mesh),
+            ("texture_px", self.texture_px.is_some(), textured, mesh),
+            ("textures", self.textures.is_some(), textured, mesh),
+            ("plate_mm", self.plate_mm.is_some(), any, mesh),
+            ("inlay_mm", self.inlay_mm.is_some(), asked(&[ThreeMf]), "3mf among the formats"),
+            (
+                "kerf_mm",
+                self.kerf_mm.is_some(),
+                asked(&[LaserDxf, LaserSvg]),
+                "laser-dxf or laser-svg among the formats",
+            ),
+        ];
+        match idle.into_iter().find(|(_, is_given, is_used, _)| *is_given && !is_used) {
+            Some((keyword, .., needed)) => Err(raised::TargetError::new_err(format!(
+                "{keyword}: it says nothing without {needed}, or leave it out"
+            ))),
+            None => Ok(()),
+        }
+    }
+}
