@@ -10,6 +10,8 @@
 //!
 //! What can be named in Python is listed below, in `_core`.
 
+#![allow(unreachable_pub, reason = "the interface is that of Python")]
+
 mod boundary;
 mod calibrate;
 mod programs;

@@ -1,6 +1,8 @@
 //! Whole commands and laws of the library. One program, as linking takes longer than running most of it; a part is run by
 //! its path: `cargo test --release --test it detect::reasons`.
 
+#![allow(unreachable_pub, reason = "tests have no interface")]
+
 mod calibrate;
 mod chapters;
 mod common;

@@ -17,7 +17,7 @@ const DIRECTIONS: usize = 64;
 
 /// The least covariance of a position estimated from the (2 · radius + 1)² pixels around it, of a camera whose
 /// tone curve is known.
-pub fn covariance(
+pub(crate) fn covariance(
     corner: &SimulatedCorner,
     radius: usize,
     noise: f64,
@@ -63,7 +63,7 @@ pub fn covariance(
 
 /// The mean length of a Gaussian error with this covariance: √(π/2) times the mean over directions
 /// of |L e|, L Lᵀ = C.
-pub fn mean_length(covariance: &Matrix2<f64>) -> Option<f64> {
+pub(crate) fn mean_length(covariance: &Matrix2<f64>) -> Option<f64> {
     let root = covariance.cholesky()?.l();
     let lengths = (0..DIRECTIONS).map(|i| {
         let (sin, cos) = (i as f64 * std::f64::consts::TAU / DIRECTIONS as f64).sin_cos();

@@ -14,6 +14,8 @@
 //! Values travel as JSON of the library's own formats, files as bytes. No module carries the families: a page fetches the
 //! file of the one that is asked for.
 
+#![allow(unreachable_pub, reason = "the interface is that of the page")]
+
 #[cfg(feature = "make")]
 pub mod codes;
 mod errors;

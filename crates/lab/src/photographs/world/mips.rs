@@ -20,7 +20,7 @@ pub(crate) struct Mips {
 }
 
 impl Mips {
-    pub fn new(picture: Gray<u8>, beyond: Beyond) -> Self {
+    pub(crate) fn new(picture: Gray<u8>, beyond: Beyond) -> Self {
         const LEAST_SIDE: usize = 8;
         let mut levels = vec![picture];
         while let Some(last) = levels.last()
@@ -37,7 +37,7 @@ impl Mips {
     /// The level is the first whose pixels are no smaller than the parallelogram's narrow side: samples that lie
     /// farther apart than pixels would displace edges along the rows by a sixteenth of that side. Along
     /// the other as many are taken as it is longer.
-    pub fn area(&self, middle: DVec2, footprint: &Footprint) -> f32 {
+    pub(crate) fn area(&self, middle: DVec2, footprint: &Footprint) -> f32 {
         let scale = footprint.scale;
         let level = &self.levels[footprint.level.min(self.levels.len() - 1)];
         let mut sum = 0.0;
@@ -54,7 +54,7 @@ impl Mips {
     }
 
     /// How an area of the first level is to be sampled, whose sides are `across` and `down`, px.
-    pub fn footprint(&self, across: DVec2, down: DVec2) -> Footprint {
+    pub(crate) fn footprint(&self, across: DVec2, down: DVec2) -> Footprint {
         Footprint::new(across, down, self.levels.len())
     }
 }

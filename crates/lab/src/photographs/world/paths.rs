@@ -23,7 +23,7 @@ pub(crate) struct Vertices(RTree<GeomWithData<[f64; 2], usize>>);
 
 impl Vertices {
     /// Reads the first page of a PDF.
-    pub fn of_first_page(pdf: &[u8]) -> Result<Self, PhotographError> {
+    pub(super) fn of_first_page(pdf: &[u8]) -> Result<Self, PhotographError> {
         let unreadable = |error: lopdf::Error| PhotographError::Paths(error.to_string());
         let document = Document::load_mem(pdf).map_err(unreadable)?;
         let page = document.page_iter().next();
@@ -44,7 +44,7 @@ impl Vertices {
     }
 
     /// The mean of the vertices within `radius_mm` of a place, and of how many contours they are.
-    pub fn meeting(&self, place: DVec2, radius_mm: f64) -> Option<(DVec2, usize)> {
+    pub(super) fn meeting(&self, place: DVec2, radius_mm: f64) -> Option<(DVec2, usize)> {
         let [least, most] = [place - radius_mm, place + radius_mm];
         let around = AABB::from_corners(least.to_array(), most.to_array());
         let near: Vec<_> = self.0.locate_in_envelope(around).collect();
