@@ -10,8 +10,8 @@ use anyhow::{Context, anyhow, bail};
 use serde::{Deserialize, Serialize};
 
 use super::finishing::{Finishing, Laser};
-use super::given::{is_false, is_usual, length};
 use super::meshes::{Meshes, PlateMeshes};
+use super::option_checks::{is_false, is_usual, length};
 use super::{logo, template};
 use crate::values::{number, whole};
 use deltille::export::dsc::Dialect;

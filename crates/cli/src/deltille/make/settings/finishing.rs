@@ -5,7 +5,7 @@
 use anyhow::{Context, bail};
 use serde::{Deserialize, Serialize};
 
-use super::given::{is_false, length, refuse_idle};
+use super::option_checks::{is_false, length, refuse_idle};
 use crate::deltille::files::written::{File, bytes_file};
 use deltille::artwork::CuttingError;
 use deltille::export::artifacts::{MakeError, Making, What, make};

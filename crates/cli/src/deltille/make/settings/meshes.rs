@@ -8,7 +8,7 @@ use std::ops::RangeInclusive;
 use anyhow::{Context, anyhow, bail};
 use serde::{Deserialize, Serialize};
 
-use super::given::{is_false, length, refuse_idle};
+use super::option_checks::{is_false, length, refuse_idle};
 use crate::deltille::files::written::{File, bytes_file};
 use crate::values::{number, whole};
 use deltille::export::artifacts::{Making, What, make, of_mesh};

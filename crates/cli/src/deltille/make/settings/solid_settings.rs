@@ -9,8 +9,8 @@ use serde::{Deserialize, Serialize};
 
 use super::board_settings::{DPI, PAPER, PRINT, TAGS, check_tags};
 use super::finishing::Laser;
-use super::given::{is_false, is_usual, length, refuse_idle};
 use super::meshes::Meshes;
+use super::option_checks::{is_false, is_usual, length, refuse_idle};
 use super::{logo, template};
 use crate::values::{number, whole};
 use deltille::export::dsc::Dialect;

@@ -1,4 +1,4 @@
-//! What options give: nothing, a length, or what is not used.
+//! Whether options say something, as lengths or at all.
 
 use anyhow::{Context, bail};
 
