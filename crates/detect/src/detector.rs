@@ -85,7 +85,7 @@ impl Detector {
     }
 
     /// A detector of several targets, each with its family, which looks for all in one pass over a picture;
-    /// [`Grid::target`] says which one a grid belongs to.
+    /// [`Grid::target`](crate::Grid::target) says which one a grid belongs to.
     ///
     /// # Errors
     /// Where two targets cannot be told apart.
