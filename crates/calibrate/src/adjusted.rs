@@ -1,7 +1,7 @@
 //! From views to an estimate: start, gross errors, adjustment, added unknowns, uncertainties.
 
-use super::adjust::gross_errors::{Gross, WrongFrame, within_pictures};
 use super::adjust::reweighting::Kept;
+use super::adjust::wrong_views::{Gross, WrongFrame, within_pictures};
 use super::error::CalibrationError;
 use super::estimate::values::{CameraEstimate, Estimate};
 use super::excluded::{Excluded, Reason};

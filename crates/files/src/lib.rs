@@ -9,6 +9,8 @@
 //! | [`target_file`] | targets from their files, with the families that they name |
 //! | [`camera_file`] | cameras from their files |
 //! | [`photograph`] | photographs in common formats as grey images |
+//! | `remap` | photographs undistorted or rectified |
+//! | `known_print` | what is known of a print (scale, bend, where panels lie), applied to views |
 //! | [`logo`] | logos from SVG |
 //! | [`export`] | artwork, targets and results to files and back, one module for each format |
 //! | [`report`] | a calibration as an HTML page |
@@ -17,6 +19,7 @@ pub mod camera_file;
 pub mod clock;
 pub mod export;
 pub mod family_file;
+mod known_print;
 pub mod limits;
 #[cfg(feature = "logo")]
 pub mod logo;
@@ -26,7 +29,6 @@ pub mod photograph;
 pub mod remap;
 #[cfg(feature = "report")]
 pub mod report;
-mod sheet;
 pub mod target_file;
 
-pub use sheet::SheetUseError;
+pub use known_print::SheetUseError;

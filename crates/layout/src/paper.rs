@@ -1,3 +1,5 @@
+//! Paper: sizes, orientation, margins, and what is asked for of a print.
+
 use std::fmt;
 use std::str::FromStr;
 
@@ -7,7 +9,7 @@ use crate::Logo;
 use deltille_core::targets::{format_mm, parse_length_mm};
 
 /// Sizes with a name: short and long side, mm (ISO 216; ANSI A and B, US legal).
-const NAMED: [(&str, [f64; 2]); 9] = [
+const SIZES: [(&str, [f64; 2]); 9] = [
     ("A0", [841.0, 1189.0]),
     ("A1", [594.0, 841.0]),
     ("A2", [420.0, 594.0]),
@@ -157,14 +159,14 @@ pub enum PaperError {
 impl PaperSize {
     /// The sizes tried, smallest first, when none is asked for: A4 to A0.
     pub fn automatic() -> impl Iterator<Item = PaperSize> {
-        let from_a4 = NAMED.iter().rev().skip_while(|(name, _)| *name != "A4");
+        let from_a4 = SIZES.iter().rev().skip_while(|(name, _)| *name != "A4");
         from_a4.map(|&(name, sides)| Self::named(name, sides))
     }
 
     /// What may be given, in words: the sizes with a name, and an example of another.
     pub fn choice() -> String {
         let (series, other): (Vec<&str>, Vec<&str>) =
-            NAMED.iter().map(|&(name, _)| name).partition(|name| name.starts_with('A'));
+            SIZES.iter().map(|&(name, _)| name).partition(|name| name.starts_with('A'));
         let (largest, smallest) = (series[0], series[series.len() - 1]);
         format!("{largest} to {smallest}, {}, or a size such as 297x420mm", other.join(", "))
     }
@@ -202,7 +204,7 @@ impl FromStr for PaperSize {
     fn from_str(text: &str) -> Result<Self, PaperError> {
         let unknown = || PaperError::Unknown(text.to_owned());
         let trimmed = text.trim();
-        if let Some(&(name, sides)) = NAMED.iter().find(|(n, _)| n.eq_ignore_ascii_case(trimmed)) {
+        if let Some(&(name, sides)) = SIZES.iter().find(|(n, _)| n.eq_ignore_ascii_case(trimmed)) {
             return Ok(Self::named(name, sides));
         }
         let (first, second) = trimmed.split_once(['x', 'X', '×']).ok_or_else(unknown)?;

@@ -1,7 +1,7 @@
 //! Unknowns that are added to an adjustment: how smooth splines are, the shape of a board, offsets of corners.
 
-use super::gross_errors::Gross;
 use super::reweighting::{Kept, Settled, settle, variance};
+use super::wrong_views::Gross;
 use crate::equations::minimise::{Minimum, Until, minimise};
 use crate::error::CalibrationError;
 use crate::input::calibration::Calibration;

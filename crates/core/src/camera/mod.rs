@@ -3,7 +3,15 @@
 //!
 //! The camera frame is right-handed: x right, y down, z forward, the origin at the centre of
 //! projection (of a lens that is not central, where its pupil is on the axis). Pixel centres lie at
-//! integer coordinates. Each model has a file of its own with its formula and its derivatives; which of its
+//! integer coordinates.
+//!
+//! 1. `law` is the trait that each lens model implements, in a file of its own; `lens` is the enum of models;
+//! 2. `pose`: a rotation and a translation;
+//! 3. `reach`: up to which angle a lens is valid;
+//! 4. `undistortion`, `rectification`: which pixel of a corrected picture is where;
+//! 5. `file`: camera files.
+//!
+//! Each model has a file of its own with its formula and its derivatives; which of its
 //! parameters a calibration finds, and from where it starts, is in `deltille_calibrate::Model`.
 
 mod brown_conrady;

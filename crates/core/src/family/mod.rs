@@ -1,4 +1,4 @@
-//! Code families: what a family is, how one is searched, checked, stored and decoded.
+//! Code families: what a family is, which words its rules admit, how it is checked, stored and decoded.
 //!
 //! A *family* of bits b and distance h is a list of b-bit codes such that any two of the words a
 //! camera may read off the tags, the codes and their turns by 120° and 240°, differ in at least h

@@ -1,5 +1,5 @@
-//! The lattices: where its vertices and tiles are, how it maps onto itself, and how the
-//! cells of a tag lie inside a tile. Everything else takes bit layout and rotation from here.
+//! The lattices: where their vertices (`vertex`) and tiles (`tile`) are, how they map onto themselves (`map`), and how the
+//! cells (`cells`) of a tag lie inside a tile. Everything else takes bit layout and rotation from here.
 //!
 //! ```text
 //!        row 2      ·───────·───────·

@@ -1,4 +1,9 @@
-//! Grey images: storage, sampling, blur, reading and writing.
+//! Grey images: pixel types, views, pyramids, blur and exact area coverage.
+//!
+//! 1. `intensity`: pixel types; `gray`: an image of one, `any_gray`: of 8 or 16 bits, as files have it;
+//! 2. `view`: pixels that somebody else holds, `image_view`: of any type; `luma`: grey values of colours;
+//! 3. `pyramid`: smaller copies; `blur`; `bands`: work on rows in parallel;
+//! 4. `coverage`: the exact area of outlines in every pixel.
 //!
 //! Row-major, y down, pixel centres at integer coordinates.
 

@@ -3,7 +3,7 @@
 use glam::DVec2;
 
 use super::edge::{End, MAX_CHORD_RAD, is_clean};
-use super::places::Places;
+use super::neighbours::Places;
 use crate::corners::saddles::Saddle;
 use crate::corners::sectors::turn;
 use deltille_core::raster::Pyramid;

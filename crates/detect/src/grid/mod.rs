@@ -2,7 +2,7 @@
 //!
 //! Comes in: corners with their half-edges. Goes out: grids ([`saddle_grid::SaddleGrid`]), lattice coordinates up to a motion.
 //!
-//! 1. `links` joins corners along clean edges (`edge`), by their neighbourhood (`places`).
+//! 1. `links` joins corners along clean edges (`edge`), by their neighbourhood (`neighbours`).
 //! 2. `grow` starts from four corners and grows tile by tile; `gaps` looks for what is missing, where tiles are narrow in the
 //!    frame of their neighbours (`rectified`), as often as an image of its size is worth (`effort`).
 //! 3. `parts` joins what a cover separates, where the map of a grid (`local_map`) continues.
@@ -21,9 +21,9 @@ pub(crate) mod grids;
 pub(crate) mod grow;
 pub(crate) mod links;
 pub(crate) mod local_map;
+pub(crate) mod neighbours;
 pub(crate) mod outline;
 pub(crate) mod parts;
-pub(crate) mod places;
 pub(crate) mod rectified;
 pub(crate) mod saddle_grid;
 pub(crate) mod tile_shape;

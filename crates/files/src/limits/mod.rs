@@ -1,4 +1,5 @@
-//! Limits on what is read, so that no file, whoever made it, exhausts memory or time.
+//! Limits on what is read, so that no file, whoever made it, exhausts memory or time. `guard` runs third-party
+//! code with a timeout, and turns its panics into errors.
 //!
 //! ```
 //! use deltille_files::limits::Limits;

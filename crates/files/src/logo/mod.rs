@@ -1,5 +1,8 @@
 //! A logo from an SVG: all that is painted as one black outline.
 //!
+//! `elements` reads the SVG and refuses what cannot be printed black, `painted` follows what is painted over what, with
+//! `crossings` and `area` for outlines.
+//!
 //! White is bare paper, and takes away from what was painted before; every other colour is black. Strokes become the
 //! areas that they cover. What has no outline is refused by its name: texts, pictures, gradients, patterns, masks,
 //! filters, what shines through.

@@ -7,6 +7,11 @@
 //! No two shapes overlap: a black tile is one path whose holes are the merged white cells of its
 //! tag, and white is bare paper. Two tiles share only a vertex, so that no renderer shows a seam.
 //!
+//! 1. `board` draws panels, marks and texts; `cells` the white of a tag, `check_bar`, `line` and `text` what is beside it;
+//! 2. `window` clips a sheet to pages; `gallery` shows single tags;
+//! 3. `atlas` packs the faces of a solid on a texture;
+//! 4. `cutting` and `laser` are drawings for machines.
+//!
 //! Frame: the page frame of [`SheetLayout`](crate::SheetLayout), origin at the lower-left
 //! corner of the page, x right, y up.
 

@@ -3,7 +3,7 @@
 use rayon::prelude::*;
 
 use super::budget::{Spent, is_past};
-use super::search::{Best, Start};
+use super::request::{Best, Start};
 use crate::algebra::arrange::Arranger;
 use crate::joint::{AllWords, Joint};
 use deltille_core::family::algebra::{Arrangement, CosetUnion, has_free_centre};

@@ -8,7 +8,7 @@ use std::time::Duration;
 use serde::{Deserialize, Serialize};
 
 use super::budget::Budget;
-use super::search::{Best, Start};
+use super::request::{Best, Start};
 use deltille_core::family::{Construction, Control, Family, FamilyError, Progress};
 
 /// What the legs of a search have found, to go on from there.

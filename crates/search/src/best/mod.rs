@@ -8,20 +8,20 @@
 //!
 //! Comes in: a [`Best`], what is asked for. Goes out: a family, at least as large as what is on record.
 //!
-//! 1. `search` is what is asked for, what a search starts from, and how many codes there can be.
+//! 1. `request` is what is asked for, what a search starts from, and how many codes there can be.
 //! 2. `budget` is how long it goes on, and how far it has come.
-//! 3. `legs` divides it into legs, so that it can be interrupted; `leg` is one of them.
+//! 3. `legs` divides it into legs, so that it can be interrupted; `one_leg` is one of them.
 //! 4. `sources` draws codes, and unions of their cosets.
 //! 5. `arranged` arranges these on the tag, the most promising first.
 
 mod arranged;
 mod budget;
-mod leg;
 mod legs;
-mod search;
+mod one_leg;
+mod request;
 mod sources;
 
 pub use budget::Budget;
 pub use legs::Checkpoint;
-pub use search::{Best, Start};
+pub use request::{Best, Start};
 pub use sources::DRAWS;

@@ -7,7 +7,7 @@ use rayon::prelude::*;
 
 use super::arranged::{Candidate, JUDGED_WORDS, Surest};
 use super::budget::{Spent, is_past};
-use super::search::{Best, LISTED_DIMENSIONS};
+use super::request::{Best, LISTED_DIMENSIONS};
 use crate::algebra::coset_graph::{CosetGraph, MAX_SYNDROME_BITS};
 use crate::algebra::quasicyclic::{Symmetry, random_code};
 use crate::algebra::{bch, residue};

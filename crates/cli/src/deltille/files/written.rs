@@ -1,4 +1,4 @@
-//! The files of a target, written all or none.
+//! The files of a command, written all or none.
 
 use std::fs;
 use std::path::{Path, PathBuf};

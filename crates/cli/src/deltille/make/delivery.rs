@@ -1,4 +1,4 @@
-//! The end of every command that makes a target: its files are written, told, and proved.
+//! The end of every command that makes a target: its files are written, reported and verified.
 
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;

@@ -4,6 +4,9 @@
 //! Everything that a calibration needs of detections is in them. What they leave out is in the JSON of a
 //! [detection](super::detection): the tags one by one, and how long each stage took.
 //!
+//! `column` is their schema, `write` and `read` are its two directions; `pages` checks what a file promises before it is unpacked, and
+//! `folder` finds the tables of a folder.
+//!
 //! ```
 //! use deltille_core::detection::Detection;
 //! use deltille_files::export::tables::{Picture, Reader, Writer};

@@ -4,7 +4,7 @@ use std::collections::HashSet;
 
 use super::arranged::{Candidate, Surest};
 use super::budget::{Budget, End, Spent, is_past};
-use super::search::{Best, LISTED_DIMENSIONS, Start};
+use super::request::{Best, LISTED_DIMENSIONS, Start};
 use crate::local::Search;
 use crate::polish::{Effort, polish};
 use crate::robust::with_the_most_codes;
