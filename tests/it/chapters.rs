@@ -170,3 +170,34 @@ fn circle(
     path.pop();
     false
 }
+
+/// Names of crates whose sources are in `crates`.
+const CRATES: [&str; 9] =
+    ["calibrate", "cli", "core", "detect", "files", "lab", "layout", "search", "verify"];
+
+/// Files such as `detect/labels/why.rs`, and modules such as `calibrate::start::consensus` or what is in them.
+#[test]
+fn the_architecture_names_what_there_is() {
+    let root = Path::new(crate::common::REPOSITORY);
+    let text = fs::read_to_string(root.join("docs/architecture.md")).unwrap();
+    let is_there = |names: &[&str]| {
+        let at = names[1..]
+            .iter()
+            .fold(root.join("crates").join(names[0]).join("src"), |at, name| at.join(name));
+        at.exists() || at.with_extension("rs").exists()
+    };
+    let mut count = 0;
+    for word in text.split('`').skip(1).step_by(2) {
+        let is_path = word.contains('/') && !word.contains([' ', ':']);
+        let names: Vec<&str> = word.split(if is_path { "/" } else { "::" }).collect();
+        if names.len() < 2 || !CRATES.contains(&names[0]) {
+            continue;
+        }
+        count += 1;
+        // A path of names may end in a type or a function, which its module's head may name.
+        let modules = names.iter().take_while(|name| name.starts_with(char::is_lowercase)).count();
+        let is_named = modules < 3 || is_there(&names[..modules - 1]);
+        assert!(is_there(&names[..modules]) || !is_path && is_named, "{word}");
+    }
+    assert!(count > 60, "{count} were read");
+}
