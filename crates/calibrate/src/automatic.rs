@@ -37,7 +37,7 @@ const COORDINATES_A_PARAMETER: usize = 10;
 /// Views that take part in the choice, evenly over the sequence.
 const MOST_VIEWS: usize = 60;
 
-/// Views that take part where nothing is to be chosen, only told.
+/// Views that take part where nothing is to be chosen, only reported.
 const VIEWS_TO_TELL: usize = 24;
 
 /// Every so many views are held out.

@@ -1,4 +1,4 @@
-//! Whether a board is held where it is to be, still, and sharp: when a picture is to be taken.
+//! Whether a board is in the proposed pose, still and in focus, so that a picture can be taken.
 
 use std::collections::BTreeMap;
 

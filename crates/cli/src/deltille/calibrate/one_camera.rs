@@ -26,7 +26,7 @@ use deltille::export::{calibration, saved};
 use deltille::targets::TargetIdentity;
 use deltille_core::words::{counted, places, shown};
 
-/// Correlations from here on are told: such parameters are hardly told apart.
+/// Correlations from here on are reported: such parameters can hardly be separated.
 const STRONG_CORRELATION: f64 = 0.98;
 
 /// Arguments of `deltille calibrate`.

@@ -5,7 +5,7 @@
 //!
 //! 1. `plan` proposes the board that suits a camera.
 //! 2. `board`, `solid`, and for other detectors `charuco`, `aprilgrid` and `circles` are the commands that make a target.
-//! 3. `settings` is what they are told; `single_panel` what boards for other detectors are told about paper, and the
+//! 3. `settings` is their settings; `single_panel` the settings of paper of boards for other detectors, and the
 //!    files of their pages.
 //! 4. `delivery` writes the files, tells of them and has them compared.
 //! 5. `verify` compares, at the end of the others or as a command of its own.

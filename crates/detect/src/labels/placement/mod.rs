@@ -29,7 +29,7 @@
 //! beyond the end of the panel. Comparison with the better of the two, with its best codes, only
 //! reduces the evidence.
 //!
-//! Where a single tag speaks for a placement, it must also be told from what natural pictures show: with the probabilities P
+//! Where a single tag speaks for a placement, it must also be distinguished from what natural pictures show: with the probabilities P
 //! of words w in these ([`deltille_core::family::NaturalWords`]),
 //!
 //! ```text
