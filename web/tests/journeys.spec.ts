@@ -415,7 +415,7 @@ test.describe("calibrate", () => {
       expect(worst, file).toBeLessThan(1e-6);
     }
     // Drawings are rounded to a tenth of a pixel; the page has no options.
-    const [drawn, others] = [(await press(page, "The whole report")).toString(), read("camera-report.html").replace("--print-scale", "scale")].map(split);
+    const [drawn, others] = [(await press(page, "The whole report")).toString(), read("camera-report.html").replace(/<span class="option">--print-scale(.?)<\/span>/, "scale$1")].map(split);
     expect(drawn?.words).toEqual(others?.words);
     expect(Math.max(...(drawn?.numbers ?? []).map((number, i) => Math.abs(number - (others?.numbers[i] ?? NaN))))).toBeLessThan(0.11);
 
