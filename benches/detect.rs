@@ -7,38 +7,34 @@ use std::time::Duration;
 
 use criterion::{Criterion, criterion_group, criterion_main};
 use deltille::camera::{Camera, Pose};
+use deltille::clock;
 use deltille::detect::{Detector, DetectorConfig, Refinement};
-use deltille::family::Family;
-use deltille::lattice::GridKind;
-use deltille::layout::{PaperSpec, Printing};
+use deltille::layout::Printing;
 use deltille::raster::Gray;
 use deltille::synth::{Light, scene_of_sheet};
-use deltille::targets::{BoardSpec, TagSpec, Target, TargetSpec};
-use deltille::{artwork, clock};
+use deltille::targets::{BoardSpec, Target};
 use glam::DVec3;
 
 /// A board of 10 × 11 corners with tags, seen at 35°.
-fn photograph() -> (Target, Family, Gray<u8>) {
-    let family = Family::shipped(&TagSpec::default().family).expect("a shipped family");
-    let spec = TargetSpec::Board(BoardSpec::new(GridKind::Deltille, 10, 11, 20.0));
-    let target = Printing::build("board", &spec, Some(&family), Some(&PaperSpec::default()))
-        .expect("a board that fits A3");
-    let sheets = artwork::draw(&target, Some(&family)).expect("a board that can be drawn").sheets;
+fn photograph() -> (Target, Gray<u8>) {
+    let spec = BoardSpec::deltille(10, 11, 20.0);
+    let target = Printing::new("board", spec).expect("a board that fits A4");
+    let sheets = target.draw().expect("a board that can be drawn").sheets;
     let scene = scene_of_sheet(&target, &sheets[0], 0);
     let centre = target.target.panels[0].middle_mm();
     let eye = centre + 420.0 * DVec3::new(0.4, -0.41, 0.82);
     let pose = Pose::looking_at(eye, centre, DVec3::Y);
     let light = Light::default().blur_px(0.8).noise(0.01).seed(1);
     let image = scene.render(&Camera::pinhole(1600, 1200, 75f64.to_radians()), &pose, &light);
-    (target.target, family, image.map(|v| (v * 255.0 + 0.5) as u8))
+    (target.target, image.map(|v| (v * 255.0 + 0.5) as u8))
 }
 
 fn detect(criterion: &mut Criterion) {
-    let (target, family, image) = photograph();
+    let (target, image) = photograph();
     for (name, refinement) in [("polynomial", Refinement::Polynomial), ("model", Refinement::Model)]
     {
         let config = DetectorConfig::default().refinement(refinement);
-        let detector = Detector::for_target(&target, Some(&family), config).with_clock(clock::now);
+        let detector = Detector::for_target(&target, config).unwrap().with_clock(clock::now);
         let stages: Vec<String> = detector.detect(&image, "").timing_ms.into_keys().collect();
         let mut group = criterion.benchmark_group(format!("detect, {name}"));
         for stage in stages {

@@ -22,8 +22,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     // The description: detection and calibration start from it.
     std::fs::write(folder.join("desk.json"), board.to_json())?;
 
-    let family = board.target.family()?;
-    let verdict = Verifier::new(&board, family.as_ref())?.verify_path(&path)?;
+    let verdict = Verifier::new(&board)?.verify_path(&path)?;
     println!("{verdict}");
     if !verdict.passed {
         return Err("the file is not what was asked for".into());

@@ -7,7 +7,6 @@
 use std::error::Error;
 use std::path::PathBuf;
 
-use deltille::artwork;
 use deltille::export::svg;
 use deltille::family::search::best::{Best, Budget};
 use deltille::family::{Control, certify};
@@ -30,7 +29,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let tags = TagSpec { family: "own16h7.json".to_owned(), ..TagSpec::default() };
     let spec = TargetSpec::Board(BoardSpec { tags: Some(tags), ..BoardSpec::deltille(5, 6, 20.0) });
     let board = Printing::build("own", &spec, Some(&family), Some(&PaperSpec::default()))?;
-    let drawn = artwork::draw(&board, Some(&family))?;
+    let drawn = board.draw()?;
     svg::write(&drawn, 0, &folder.join("own.svg"))?;
     std::fs::write(folder.join("own.json"), board.to_json())?;
     println!("{} tags on the board", board.target.panels[0].tags.len());

@@ -19,7 +19,7 @@ use deltille::targets::{BoardSpec, Target};
 fn main() -> Result<(), Box<dyn Error>> {
     let board = Target::new("desk", BoardSpec::deltille(6, 7, 20.0))?;
     let camera = Camera::pinhole(1280, 960, 1.0);
-    let scene = scene_of_target(&board, board.family()?.as_ref())?;
+    let scene = scene_of_target(&board)?;
 
     let detector = Detector::new(&board)?;
     let reference = Reference::Target(&board);

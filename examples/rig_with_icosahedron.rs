@@ -19,7 +19,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let spec = SolidSpec { edge_mm: 100.0, ..SolidSpec::new(SolidShape::Icosahedron) };
     let target = Target::new("ico", spec)?;
     // The solid as it is: every face lies a little off its place.
-    let mut scene = scene_of_target(&target, target.family()?.as_ref())?;
+    let mut scene = scene_of_target(&target)?;
     for (face, surface) in scene.surfaces.iter_mut().enumerate() {
         let off = DVec3::new((face as f64).sin(), (face as f64).cos(), 0.5);
         surface.target_from_surface.translation += 0.1 * off;

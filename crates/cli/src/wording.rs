@@ -94,6 +94,7 @@ const fn named(setting: Setting) -> (&'static str, &'static str) {
         Setting::TagsInBlack => ("deltille checkerboard", "--tags-in black"),
         Setting::TargetName => ("deltille board", "--name"),
         Setting::TargetToJson => ("deltille board", ""),
+        Setting::TargetSetFamily => ("deltille detect", "--family"),
         Setting::UntaggedGridEdgeMm => ("deltille calibrate", "--edge"),
         Setting::UntaggedGridKind => ("deltille calibrate", "--grid"),
         Setting::UntaggedGridSize => ("deltille calibrate", "--rows and --cols"),

@@ -115,6 +115,7 @@ settings! {
     TagTagsIn = "TagSpec::tags_in",
     TargetName = "Target::name",
     TargetToJson = "Target::to_json",
+    TargetSetFamily = "Target::set_family",
     UntaggedGridEdgeMm = "UntaggedGrid::edge_mm",
     UntaggedGridKind = "UntaggedGrid::kind",
     UntaggedGridSize = "UntaggedGrid::size",

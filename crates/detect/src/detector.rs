@@ -8,10 +8,10 @@ use crate::labels::grid_labels::Labels;
 use crate::refine::clearance::TagAreas;
 use deltille_core::Clock;
 use deltille_core::detection::{Detection, InkEstimate, ReasonKind};
-use deltille_core::family::{Family, FamilyError};
+use deltille_core::family::Family;
 use deltille_core::lattice::GridKind;
 use deltille_core::raster::{ImageView, Pyramid};
-use deltille_core::targets::{Target, TargetIdentity};
+use deltille_core::targets::{Target, TargetIdentity, UnknownCodes};
 
 /// Finds grids in images and labels their corners.
 ///
@@ -34,10 +34,10 @@ pub struct Detector {
 }
 
 impl Detector {
-    /// A detector of a target whose family is shipped.
+    /// A detector of a target with the default settings, see [`Self::for_target`].
     ///
     /// # Errors
-    /// Where it is not; give the family to [`Self::for_target`] then.
+    /// Where the family of its tags is unknown.
     ///
     /// ```
     /// use deltille_detect::Detector;
@@ -49,8 +49,8 @@ impl Detector {
     /// assert!(detection.grids.is_empty());
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
-    pub fn new(target: &Target) -> Result<Self, FamilyError> {
-        Ok(Self::for_target(target, target.family()?.as_ref(), DetectorConfig::default()))
+    pub fn new(target: &Target) -> Result<Self, UnknownCodes> {
+        Self::for_target(target, DetectorConfig::default())
     }
 
     /// A detector of grids whatever they belong to.
@@ -66,11 +66,15 @@ impl Detector {
         Self { main, other: None, targets: Vec::new() }
     }
 
-    /// A detector of a target; `family` is the family that the target names.
+    /// A detector of a target.
     ///
     /// An untagged panel is labelled where it is seen whole and nothing else of the target looks so;
     /// see [`Self::for_grid`] for which corner of a checkerboard is the first then.
-    pub fn for_target(target: &Target, family: Option<&Family>, config: DetectorConfig) -> Self {
+    ///
+    /// # Errors
+    /// Where the family of its tags is unknown, see [`Target::set_family`].
+    pub fn for_target(target: &Target, config: DetectorConfig) -> Result<Self, UnknownCodes> {
+        let family = target.family()?;
         let mut of_tilings = target.tilings().map(|kind| {
             let family = family.and_then(|family| family.of_tiling(kind));
             match target.tilings().count() {
@@ -81,14 +85,14 @@ impl Detector {
         let first = of_tilings.next();
         let other = of_tilings.next().map(Box::new);
         let main = first.unwrap_or_else(|| of_one_tiling(target, family, config));
-        Self { main, other, targets: vec![target.identity()] }
+        Ok(Self { main, other, targets: vec![target.identity()] })
     }
 
-    /// A detector of several targets, each with its family, which looks for all in one pass over a picture;
+    /// A detector of several targets, which looks for all in one pass over a picture;
     /// [`Grid::target`](crate::Grid::target) says which one a grid belongs to.
     ///
     /// # Errors
-    /// Where two targets cannot be told apart.
+    /// Where two targets cannot be distinguished, or the family of their tags is unknown.
     ///
     /// ```
     /// use deltille_detect::{Detector, DetectorConfig};
@@ -99,28 +103,25 @@ impl Detector {
     ///     tags.first_id = 100;
     /// }
     /// let [front, back] = [Target::new("front", front)?, Target::new("back", back)?];
-    /// let families = [front.family()?, back.family()?];
-    /// let scene = [(&front, families[0].as_ref()), (&back, families[1].as_ref())];
-    /// let detector = Detector::for_targets(&scene, DetectorConfig::default())?;
+    /// let detector = Detector::for_targets(&[&front, &back], DetectorConfig::default())?;
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
-    pub fn for_targets(
-        targets: &[(&Target, Option<&Family>)],
-        config: DetectorConfig,
-    ) -> Result<Self, SceneError> {
-        let all: Vec<&Target> = targets.iter().map(|(target, _)| *target).collect();
-        check_distinct(&all)?;
-        check_detectable(&all)?;
-        if let [(only, family)] = targets {
-            return Ok(Self::for_target(only, *family, config));
+    pub fn for_targets(targets: &[&Target], config: DetectorConfig) -> Result<Self, SceneError> {
+        check_distinct(targets)?;
+        check_detectable(targets)?;
+        if let [only] = targets {
+            return Ok(Self::for_target(only, config)?);
         }
+        let families = targets.iter().map(|target| target.family());
+        let families: Vec<Option<&Family>> = families.collect::<Result<_, _>>()?;
         let of_kind = |kind: GridKind| {
             // What of each target has this tiling, with the family of its tags.
-            let has_it = |(target, _): &&(&Target, Option<&Family>)| {
+            let has_it = |(target, _): &(&&Target, _)| {
                 kind_of(target) == kind || target.tilings().any(|own| own == kind)
             };
             let own: Vec<(Target, Option<&Family>)> = targets
                 .iter()
+                .zip(&families)
                 .filter(has_it)
                 .map(|(target, family)| {
                     let family = family.and_then(|family| family.of_tiling(kind));
@@ -141,7 +142,7 @@ impl Detector {
         };
         let mut of_kinds = [GridKind::Deltille, GridKind::Checker].into_iter().filter_map(of_kind);
         let main = of_kinds.next().ok_or(SceneError::Empty)?;
-        let targets = all.iter().map(|target| target.identity()).collect();
+        let targets = targets.iter().map(|target| target.identity()).collect();
         Ok(Self { main, other: of_kinds.next().map(Box::new), targets })
     }
 

@@ -7,7 +7,6 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use super::config::DetectorConfig;
 use super::detector::Detector;
 use super::levels::{MIN_LEVEL_SIDE, levels_of};
 use super::tiling::{CHECKER, DELTILLE, kind};
@@ -124,7 +123,7 @@ fn confirmed(image: ImageView, seen: &Sighting, spec: TargetSpec) -> Option<Reco
         _ => "board",
     };
     let target = Target::build(name, &spec, Some(seen.family)).ok()?;
-    let detector = Detector::for_target(&target, Some(seen.family), DetectorConfig::default());
+    let detector = Detector::new(&target).ok()?;
     let found = detector.detect(image, "");
     let labelled = found.grids.iter().filter(|grid| grid.panel.is_some());
     let shown: usize = labelled.map(|grid| grid.corners.len()).sum();
@@ -369,8 +368,7 @@ mod tests {
 
     /// A picture of a target from an eye that looks at a place of it, mm.
     fn picture(target: &Target, eye: [f64; 3], at: [f64; 3]) -> Gray<f32> {
-        let family = target.family().unwrap();
-        let scene = scene_of_target(target, family.as_ref()).unwrap();
+        let scene = scene_of_target(target).unwrap();
         let pose = Pose::looking_at(DVec3::from(eye), DVec3::from(at), DVec3::Y);
         let camera = Camera::pinhole(1280, 960, 1.0);
         scene.render(&camera, &pose, &Light::default())
@@ -407,8 +405,7 @@ mod tests {
             let target = board(&spec);
             // From above, and from behind the upper edge: upside down.
             for (eye, up) in [([140.0, 20.0, 330.0], 1.0), ([60.0, 160.0, 350.0], -1.0)] {
-                let family = target.family().unwrap();
-                let scene = scene_of_target(&target, family.as_ref()).unwrap();
+                let scene = scene_of_target(&target).unwrap();
                 let middle = DVec3::new(120.0, 80.0, 0.0);
                 let pose = Pose::looking_at(DVec3::from(eye), middle, up * DVec3::Y);
                 let image =

@@ -1,11 +1,11 @@
-//! Several targets in one picture: whether they can be told apart.
+//! Several targets in one picture: whether they can be distinguished.
 
 use std::collections::BTreeSet;
 
 use deltille_core::family::places;
 use deltille_core::lattice::GridKind;
 use deltille_core::setting::Setting::{BoardBoardId, TagFirstId};
-use deltille_core::targets::Target;
+use deltille_core::targets::{Target, UnknownCodes};
 
 /// Why targets cannot be looked for together. Messages say what to do about it.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
@@ -22,6 +22,9 @@ pub enum SceneError {
         /// The target.
         name: String,
     },
+    /// The codes of a target's tags are not known.
+    #[error(transparent)]
+    UnknownCodes(#[from] UnknownCodes),
     /// Targets of one name, by which results tell them apart.
     #[error("two targets are named {name}: give each its own name")]
     SameName {

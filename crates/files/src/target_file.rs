@@ -1,4 +1,4 @@
-//! Targets from files, and the families that they name.
+//! Targets from files, with the families that they name.
 
 use std::path::{Path, PathBuf};
 
@@ -120,12 +120,6 @@ pub fn without_poses(path: &Path, target: &Target) -> Option<String> {
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum TargetFamilyError {
-    /// A family for a target without tags.
-    #[error("{target} has no tags")]
-    NoTags {
-        /// The target's name.
-        target: String,
-    },
     /// The family that was given cannot be read.
     #[error(transparent)]
     Given(FamilyFileError),
@@ -157,24 +151,36 @@ pub enum TargetFamilyError {
     },
 }
 
-/// The family of a target: the one given, else by the name in the target, else by the path in its spec. Its codes must be
-/// those that the target was made with, perhaps with others after them, and as far apart as the family claims: what is read by it is believed by
-/// that. `None` of a target without tags.
+/// Sets the family of a target's tags: the one given, else by the name in the target, else by the path in its spec. Its codes
+/// must be those that the target was made with, perhaps with others after them, and as far apart as the family claims:
+/// decoding relies on that. A target without tags needs none.
 ///
 /// # Errors
-/// Where it cannot be read, has other codes, or some that are closer than it claims.
-pub fn family(target: &Target, given: Option<&str>) -> Result<Option<Family>, TargetFamilyError> {
-    let Some(wanted) = &target.family else {
-        return match given {
-            Some(_) => Err(TargetFamilyError::NoTags { target: target.name.to_string() }),
-            None => Ok(None),
-        };
-    };
+/// Where it cannot be read, has other codes, or some that are closer than it claims, or the target has no tags.
+pub fn set_family(target: &mut Target, given: Option<&str>) -> Result<(), TargetFamilyError> {
+    let name = target.name.to_string();
+    let other = |why| TargetFamilyError::Other { target: name, why };
+    match (&target.family, given) {
+        (None, None) => Ok(()),
+        (None, Some(_)) => Err(other(OtherFamily::NoTags)),
+        (Some(wanted), given) => {
+            let family = family(target, wanted, given)?;
+            target.set_family(&family).map_err(other)
+        }
+    }
+}
+
+/// The family that is wanted, checked.
+fn family(
+    target: &Target,
+    wanted: &FamilyRef,
+    given: Option<&str>,
+) -> Result<Family, TargetFamilyError> {
     // A file that is given is that of the square tags, where it has such, and there are others.
     let given = given.map(|given| family_file::resolve(given).map_err(TargetFamilyError::Given));
     let given = given.transpose()?;
     let Some(squares) = &wanted.squares else {
-        return Ok(Some(one_family(target, wanted, target.spec.family(), given)?));
+        return one_family(target, wanted, target.spec.family(), given);
     };
     let (of_squares, others): (Option<Family>, Option<Family>) = match given {
         Some(given) if given.kind() == GridKind::Checker => (Some(given), None),
@@ -182,7 +188,7 @@ pub fn family(target: &Target, given: Option<&str>) -> Result<Option<Family>, Ta
     };
     let family = one_family(target, wanted, target.spec.family(), others)?;
     let squares = one_family(target, squares, target.spec.square_family(), of_squares)?;
-    Ok(Some(family.with_squares(squares)))
+    Ok(family.with_squares(squares))
 }
 
 /// The family by its name, or the one at the path if that is it, and it is not the one of this name.

@@ -29,9 +29,8 @@ use deltille::calibrate::{
 };
 use deltille::camera::{BrownConrady, Camera, KannalaBrandt, Lens, Pose};
 use deltille::detect::Detector;
-use deltille::family::FamilyError;
 use deltille::synth::{Light, Scene, scene_of_target};
-use deltille::targets::{BoardSpec, Target, TargetError};
+use deltille::targets::{BoardSpec, Target, TargetError, UnknownCodes};
 use deltille_core::statistics::median;
 
 /// The board: 9 rows of 12 corners, 20 mm, about A4.
@@ -143,7 +142,7 @@ pub enum GuideExperimentError {
     Artwork(#[from] ArtworkError),
     /// A board that cannot be detected.
     #[error(transparent)]
-    Detector(#[from] FamilyError),
+    Detector(#[from] UnknownCodes),
 }
 
 /// The cameras: a webcam, a wide fisheye of 150° across, and a long lens of 12°.
@@ -184,7 +183,7 @@ pub fn run(
     let pictures = match setup.noise_px {
         Some(_) => None,
         None => {
-            let scene = scene_of_target(&board, board.family()?.as_ref())?;
+            let scene = scene_of_target(&board)?;
             Some((scene, Detector::new(&board)?))
         }
     };

@@ -23,12 +23,11 @@ use deltille::artwork::ArtworkError;
 use deltille::calibrate::{Calibration, CalibrationError, Estimate, Model, Reference, views};
 use deltille::camera::{BrownConrady, Camera, Lens, Pose};
 use deltille::detect::{Detection, Detector, DetectorConfig};
-use deltille::family::{Family, FamilyError};
 use deltille::lattice::GridKind;
 use deltille::synth::{Light, Scene, scene_of_target};
 use deltille::targets::{
     BoardSpec, ListFormat, ListedSpec, PanelPose, SolidShape, SolidSpec, Target, TargetError,
-    TargetSpec,
+    TargetSpec, UnknownCodes,
 };
 
 /// Cameras of the rig.
@@ -116,9 +115,9 @@ pub enum RigExperimentError {
     /// A target that cannot be made.
     #[error(transparent)]
     Target(#[from] TargetError),
-    /// A family that is not there.
+    /// The codes of its tags are not known.
     #[error(transparent)]
-    Family(#[from] FamilyError),
+    Family(#[from] UnknownCodes),
     /// A target that cannot be drawn.
     #[error(transparent)]
     Artwork(#[from] ArtworkError),
@@ -184,9 +183,9 @@ pub fn run(
     let world = World::new(setup);
     let mut outcomes = Vec::new();
     for object in Object::ALL {
-        let (stated, family) = target(object)?;
-        let scene = scene_of_target(&misplaced(&stated, setup.seed), Some(&family))?;
-        let detector = Detector::for_target(&stated, Some(&family), DetectorConfig::default());
+        let stated = target(object)?;
+        let scene = scene_of_target(&misplaced(&stated, setup.seed))?;
+        let detector = Detector::for_target(&stated, DetectorConfig::default())?;
         let pictures: Vec<(usize, usize)> = (0..CAMERAS)
             .flat_map(|camera| (0..setup.frames).map(move |frame| (camera, frame)))
             .collect();
@@ -236,7 +235,7 @@ fn picture(
 }
 
 /// The target as it is stated.
-fn target(object: Object) -> Result<(Target, Family), RigExperimentError> {
+fn target(object: Object) -> Result<Target, RigExperimentError> {
     let spec = match object {
         Object::Icosahedron => TargetSpec::Solid(SolidSpec {
             edge_mm: ICOSAHEDRON_MM,
@@ -248,16 +247,17 @@ fn target(object: Object) -> Result<(Target, Family), RigExperimentError> {
             TargetSpec::Board(BoardSpec { boards: 6, ..board })
         }
     };
-    let family = Family::shipped(spec.family().unwrap_or_default())?;
-    let target = Target::build(object.name(), &spec, Some(&family))?;
+    let target = Target::new(object.name(), spec)?;
     if object == Object::Icosahedron {
-        return Ok((target, family));
+        return Ok(target);
     }
     let faces: Vec<PanelPose> =
         (0..6).map(|face| cube_face(face, target.panels[face].field_mm())).collect();
     // Its boards are loose no more.
     let spec = TargetSpec::Listed(ListedSpec { format: ListFormat::DscFork });
-    Ok((Target { spec, ..target.with_poses(&faces) }, family))
+    let mut cube = target.with_poses(&faces);
+    cube.spec = spec;
+    Ok(cube)
 }
 
 /// The pose of a board of `field_mm` on a face of the cube: ±x, ±y, ±z.

@@ -73,17 +73,13 @@ impl Printing {
     ) -> Result<Self, TargetError> {
         let target = Target::build(name, spec, family)?;
         match paper {
-            Some(paper) => Self::on_paper(target, family, paper),
+            Some(paper) => Self::on_paper(target, paper),
             None => Ok(target.into()),
         }
     }
 
     /// Lays a target out on paper.
-    fn on_paper(
-        target: Target,
-        family: Option<&Family>,
-        paper: &PaperSpec,
-    ) -> Result<Self, TargetError> {
+    fn on_paper(target: Target, paper: &PaperSpec) -> Result<Self, TargetError> {
         logo_room::check(paper)?;
         let title = match &paper.note {
             Some(note) => format!("{} · {}", target.name, checked_note(note)?),
@@ -100,8 +96,10 @@ impl Printing {
                     face_sheet::sheets(&title, spec, panels, named.as_ref(), paper)?
                 }
             },
-            TargetSpec::Tags(spec) => family
-                .map_or(Ok(Vec::new()), |family| tag_sheet::sheets(&title, spec, family, paper))?,
+            TargetSpec::Tags(spec) => match target.family()? {
+                Some(family) => tag_sheet::sheets(&title, spec, family, paper)?,
+                None => Vec::new(),
+            },
             TargetSpec::Charuco(_) | TargetSpec::AprilGrid(_) | TargetSpec::Circles(_) => {
                 single_panel::sheets(&title, &target, paper)?
             }
@@ -123,8 +121,9 @@ impl Printing {
     /// The same under the name that is on the sheets: that of the plan, where the target was measured or refined.
     pub fn under_printed_name(&self) -> Cow<'_, Self> {
         let Some(plan) = &self.target.plan else { return Cow::Borrowed(self) };
-        let target = Target { name: plan.name.clone(), ..self.target.clone() };
-        Cow::Owned(Self { target, ..self.clone() })
+        let mut printing = self.clone();
+        printing.target.name = plan.name.clone();
+        Cow::Owned(printing)
     }
 
     /// On how many pages all its sheets are printed.

@@ -13,12 +13,11 @@ use crate::reading::names::{file_name, whole_of};
 use crate::reading::reader::{Artifact, OnDisk, Reader};
 use crate::verdict::Verdict;
 use crate::verifier::Verifier;
-use deltille_core::family::Family;
 use deltille_files::limits::Guard;
 use deltille_layout::Printing;
 
-/// Compares the artifact named `name` among `files` in memory with its target. `family` must be
-/// given if the target has tags. The extension of the name tells the [`Format`].
+/// Compares the artifact named `name` among `files` in memory with its target. The extension of the name tells the
+/// [`Format`].
 ///
 /// An artifact may consist of several files. All of them must be among `files`, in any order: the
 /// other pages of a net (`net-1.svg`, `net-2.svg`), the material library and the textures that an
@@ -28,7 +27,7 @@ use deltille_layout::Printing;
 /// a file is missing or cannot be read, or the target has no such artifact.
 ///
 /// # Errors
-/// When the family is not that of the target, the name tells no format or sheet, or a file is
+/// When the family of its tags is unknown, the name tells no format or sheet, or a file is
 /// missing or cannot be read at all.
 ///
 /// ```
@@ -42,23 +41,18 @@ use deltille_layout::Printing;
 /// let spec = BoardSpec { tags: None, ..BoardSpec::new(GridKind::Deltille, 4, 5, 20.0) };
 /// let spec = TargetSpec::Board(spec);
 /// let board = Printing::build("board", &spec, None, Some(&PaperSpec::default()))?;
-/// let mut artwork = artwork::draw(&board, None)?;
+/// let mut artwork = board.draw()?;
 /// let good = [Artifact::new("board.svg", svg::to_string(&artwork, 0))];
-/// assert!(verify(&board, None, "board.svg", &good)?.passed);
+/// assert!(verify(&board, "board.svg", &good)?.passed);
 ///
 /// artwork.sheets[0].shapes.remove(0);
 /// let bad = [Artifact::new("board.svg", svg::to_string(&artwork, 0))];
-/// let verdict = verify(&board, None, "board.svg", &bad)?;
+/// let verdict = verify(&board, "board.svg", &bad)?;
 /// assert!(verdict.to_string().contains("tile missing"), "{verdict}");
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
-pub fn verify(
-    printing: &Printing,
-    family: Option<&Family>,
-    name: &str,
-    files: &[Artifact],
-) -> Result<Verdict, VerifyError> {
-    Verifier::new(printing, family)?.verify(name, files)
+pub fn verify(printing: &Printing, name: &str, files: &[Artifact]) -> Result<Verdict, VerifyError> {
+    Verifier::new(printing)?.verify(name, files)
 }
 
 impl Verifier<'_> {

@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 
 use crate::reading::error::DocumentError;
+use deltille_core::targets::UnknownCodes;
 use deltille_layout::artwork::CuttingError;
 
 /// Why an artifact cannot be compared with its target.
@@ -73,12 +74,7 @@ pub enum VerifyError {
         /// Why.
         source: CuttingError,
     },
-    /// The target needs another family than the one given.
-    #[error("the target needs family {needed}: {given}")]
-    Family {
-        /// Name and fingerprint of the family of the target.
-        needed: String,
-        /// The family that was given instead.
-        given: String,
-    },
+    /// The codes of the target's tags are not known.
+    #[error(transparent)]
+    UnknownCodes(#[from] UnknownCodes),
 }

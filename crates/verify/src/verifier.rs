@@ -6,7 +6,7 @@ use std::sync::atomic::AtomicBool;
 use crate::error::VerifyError;
 use deltille_core::detection::{Ink, Tone};
 use deltille_core::family::Family;
-use deltille_core::targets::{OtherFamily, Target};
+use deltille_core::targets::Target;
 use deltille_detect::{Detector, DetectorConfig};
 use deltille_files::limits::{Guard, Limits};
 use deltille_layout::Printing;
@@ -21,7 +21,6 @@ pub(super) const PRINT_PX_PER_MM: f64 = 300.0 / 25.4;
 /// Compares artifacts with one target.
 pub struct Verifier<'a> {
     pub(crate) printing: Cow<'a, Printing>,
-    pub(crate) family: Option<&'a Family>,
     pub(crate) detector: Detector,
     pub(crate) limits: Limits,
     pub(crate) guard: Guard,
@@ -39,35 +38,14 @@ pub struct Progress {
 }
 
 impl<'a> Verifier<'a> {
-    /// A verifier for the artifacts of a target as it is printed; `family` must be given if the target has tags.
+    /// A verifier for the artifacts of a target as it is printed.
     ///
     /// # Errors
-    /// When the target needs another family.
-    pub fn new(printing: &'a Printing, family: Option<&'a Family>) -> Result<Self, VerifyError> {
-        let target = &printing.target;
-        for kind in target.tilings() {
-            let Some(needed) = target.family.as_ref().map(|family| family.of_tiling(kind)) else {
-                continue;
-            };
-            let family = family.map(|family| family.of_tiling(kind).unwrap_or(family));
-            let given = match family {
-                Some(family) => target.check_family(needed, family).err().map(|why| match why {
-                    OtherFamily::Codes { found, .. } => {
-                        format!("{} has fingerprint {found}", family.name())
-                    }
-                    why => format!("the target {why}"),
-                }),
-                None => Some("none is given".to_owned()),
-            };
-            if let Some(given) = given {
-                let needed = format!("{} with fingerprint {}", needed.name, needed.fingerprint);
-                return Err(VerifyError::Family { needed, given });
-            }
-        }
-        let detector = Detector::for_target(target, family, detector_config());
+    /// When the family of its tags is unknown.
+    pub fn new(printing: &'a Printing) -> Result<Self, VerifyError> {
+        let detector = Detector::for_target(&printing.target, detector_config())?;
         Ok(Self {
             printing: printing.under_printed_name(),
-            family,
             detector,
             limits: Limits::default(),
             guard: Guard::default(),
@@ -79,6 +57,11 @@ impl<'a> Verifier<'a> {
     /// The target, under the name that is on its prints.
     pub(crate) fn target(&self) -> &Target {
         &self.printing.target
+    }
+
+    /// The family of its tags, which was there when the detector was made.
+    pub(crate) fn family(&self) -> Option<&Family> {
+        self.target().family().ok().flatten()
     }
 
     /// The same verifier with other limits for reading artifacts than the default.

@@ -51,7 +51,7 @@ pub static SOLID: LazyLock<Printing> = LazyLock::new(|| {
 });
 
 static MESH: LazyLock<TexturedMesh> =
-    LazyLock::new(|| TexturedMesh::new(&SOLID.target, Some(&FAMILY), Meshing::default()).unwrap());
+    LazyLock::new(|| TexturedMesh::new(&SOLID.target, Meshing::default()).unwrap());
 
 /// Stem of the files of an extension, which tells what is in them.
 pub fn stem(extension: &str) -> &'static str {
@@ -76,8 +76,7 @@ pub fn target() -> Vec<u8> {
 
 pub fn detection() -> Vec<u8> {
     static TEXT: LazyLock<String> = LazyLock::new(|| {
-        let detector =
-            Detector::for_target(&BOARD.target, Some(&FAMILY), DetectorConfig::default());
+        let detector = Detector::for_target(&BOARD.target, DetectorConfig::default()).unwrap();
         detection::write(&detector.detect(&photograph(), "b.png"))
     });
     TEXT.clone().into_bytes()
@@ -142,7 +141,7 @@ pub fn ply() -> Vec<u8> {
 }
 
 pub fn threemf() -> Vec<u8> {
-    threemf::to_bytes(&InlaidBodies::new(&BOARD.target, Some(&FAMILY), Meshing::default()).unwrap())
+    threemf::to_bytes(&InlaidBodies::new(&BOARD.target, Meshing::default()).unwrap())
 }
 
 pub fn dxf() -> Vec<u8> {
@@ -150,12 +149,12 @@ pub fn dxf() -> Vec<u8> {
 }
 
 pub fn laser() -> Vec<u8> {
-    let drawing = artwork::to_laser(&BOARD, Some(&FAMILY), 0.1).unwrap();
+    let drawing = artwork::to_laser(&BOARD, 0.1).unwrap();
     laser_svg::text(&drawing, "b", &artwork::subject(&BOARD.target)).into_bytes()
 }
 
 pub fn pdf() -> Vec<u8> {
-    pdf_writer::to_bytes(&artwork::draw(&BOARD, Some(&FAMILY)).unwrap())
+    pdf_writer::to_bytes(&BOARD.draw().unwrap())
 }
 
 pub fn svg() -> Vec<u8> {
@@ -171,7 +170,7 @@ pub fn page_png() -> Vec<u8> {
 fn written(name: &str, write: impl Fn(&artwork::Artwork, &std::path::Path)) -> Vec<u8> {
     let folder = TempDir::new().unwrap();
     let path = folder.path().join(name);
-    write(&artwork::draw(&BOARD, Some(&FAMILY)).unwrap(), &path);
+    write(&BOARD.draw().unwrap(), &path);
     std::fs::read(path).unwrap()
 }
 

@@ -14,7 +14,7 @@ use deltille::verify::Verifier;
 use deltille_cli::deltille::BoardSettings;
 use glam::{DVec2, DVec3};
 
-use super::good::{BOARD, FAMILY, SOLID};
+use super::good::{BOARD, SOLID};
 
 /// A file, and what is in it.
 pub struct File<'a> {
@@ -140,7 +140,7 @@ pub fn solid(file: File) -> bool {
 }
 
 fn verify(target: &Printing, path: &Path) -> bool {
-    let verifier = Verifier::new(target, Some(&FAMILY)).expect("it was built with this family");
+    let verifier = Verifier::new(target).expect("it was built with this family");
     let Ok(verdict) = verifier.within(limits()).verify_path(path) else { return false };
     let sheets = verdict.sheets.iter().flat_map(|sheet| &sheet.findings);
     let faces = verdict.faces.iter().flat_map(|face| &face.findings);

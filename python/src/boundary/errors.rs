@@ -113,6 +113,7 @@ pub fn keyword(setting: Setting) -> String {
         Setting::TagsInBlack => "tags_in=\"black\"",
         Setting::TargetName => "name",
         Setting::TargetToJson => "Target.to_json",
+        Setting::TargetSetFamily => "family",
         Setting::UntaggedGridEdgeMm => "edge_mm",
         Setting::UntaggedGridKind => "grid",
         Setting::UntaggedGridSize => "rows and cols",

@@ -192,7 +192,7 @@ impl Detector {
                 return Err(wrong("give a target or a grid, not both".to_owned()));
             }
             (targets, None) => {
-                for family in targets.iter().filter_map(|target| target.family.as_ref()) {
+                for family in targets.iter().filter_map(|target| target.codes()) {
                     if let Some(limit) = max_errors.filter(|limit| *limit > family.correctable()) {
                         return Err(wrong(format!(
                             "max_errors: {limit} is more than the {} bits that {} can correct",
@@ -201,8 +201,7 @@ impl Detector {
                         )));
                     }
                 }
-                let each = targets.iter().map(|of| (of.target(), of.family.as_deref()));
-                let each = each.collect::<Vec<_>>();
+                let each: Vec<_> = targets.iter().map(|of| of.target()).collect();
                 detect::Detector::for_targets(&each, config).raise(errors::detection)?
             }
         };

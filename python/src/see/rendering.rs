@@ -224,7 +224,7 @@ pub fn render<'py>(
     };
     let name = own.target().name.to_string();
     let drawn = interruptible(py, move |_| {
-        let scene = scene_of_target(own.target(), own.family.as_deref())?;
+        let scene = scene_of_target(own.target())?;
         let image = scene.render(&camera, &pose.0, &light);
         Ok::<_, deltille::artwork::ArtworkError>((
             image,

@@ -62,7 +62,7 @@ pub fn build(
 ) -> PyResult<Target> {
     let printing = Printing::build(name, spec, family.as_deref(), Some(paper));
     let printing = printing.and_then(|printing| printing.finished(finish, paper.margin_mm));
-    Ok(Target { printing: Arc::new(printing.raise(errors::target)?), family })
+    Ok(Target { printing: Arc::new(printing.raise(errors::target)?) })
 }
 
 /// A class of flat targets: its name, that of its files, what must be given, keywords of its own with their defaults, and

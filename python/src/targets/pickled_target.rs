@@ -20,12 +20,14 @@ pub fn _target<'py>(
     family: Option<&str>,
     squares: Option<&str>,
 ) -> PyResult<Bound<'py, PyAny>> {
-    let target = Printing::from_json(json).raise(errors::target)?;
+    let mut target = Printing::from_json(json).raise(errors::target)?;
     let read = |text| deltille::family::Family::from_json(text).raise(errors::family);
     let [family, squares] = [family, squares].map(|text| text.map(read).transpose());
     let (family, squares) = (family?, squares?);
-    let family = deltille::family::Family::paired(family, squares);
-    let target = Target { printing: Arc::new(target), family: family.map(Arc::new) };
+    if let Some(family) = deltille::family::Family::paired(family, squares) {
+        target.target.set_family(&family).raise(errors::family)?;
+    }
+    let target = Target { printing: Arc::new(target) };
     macro_rules! of_class {
         ($($class:ident),*) => {
             match class_ {

@@ -31,7 +31,6 @@ use crate::pickles;
 #[derive(Clone)]
 pub struct Target {
     pub printing: Arc<Printing>,
-    pub family: Option<Arc<deltille::family::Family>>,
 }
 
 impl Target {
@@ -46,21 +45,30 @@ impl Target {
     }
 
     /// A target with the family that was given, else the one that it names.
-    pub fn with_family(printing: Printing, family: Option<FamilyChoice>) -> PyResult<Self> {
-        let target = &printing.target;
-        let family = match family {
-            Some(FamilyChoice::Family(family)) => Some(family),
+    pub fn with_family(mut printing: Printing, family: Option<FamilyChoice>) -> PyResult<Self> {
+        let target = &mut printing.target;
+        match family {
+            Some(FamilyChoice::Family(family)) => {
+                let name = target.name.to_string();
+                let other = |why| errors::family(format!("{name} {why}"));
+                target.set_family(&family).map_err(other)?;
+            }
             Some(FamilyChoice::Name(name)) => {
                 let name = name.to_string_lossy();
-                target_file::family(target, Some(&name)).raise(errors::family)?.map(Arc::new)
+                target_file::set_family(target, Some(&name)).raise(errors::family)?;
             }
-            None => target_file::family(target, None).raise(errors::family)?.map(Arc::new),
-        };
-        Ok(Self { printing: Arc::new(printing), family })
+            None => target_file::set_family(target, None).raise(errors::family)?,
+        }
+        Ok(Self { printing: Arc::new(printing) })
+    }
+
+    /// The family of its tags, which was looked up when it was made or read.
+    pub fn codes(&self) -> Option<&deltille::family::Family> {
+        self.target().family().ok().flatten()
     }
 
     fn made(&self, what: What, making: Making) -> PyResult<Files> {
-        make(&self.printing, self.family.as_deref(), what, making).raise(errors::target)
+        make(&self.printing, what, making).raise(errors::target)
     }
 }
 
@@ -182,7 +190,7 @@ impl Target {
     /// The family of the tags; ``None`` of a target without.
     #[getter]
     fn family(&self) -> Option<Family> {
-        self.family.clone().map(Family::from)
+        self.codes().map(|family| Arc::new(family.clone()).into())
     }
 
     /// Whether places of its corners were measured.
@@ -385,9 +393,7 @@ impl Target {
             }
         };
         let own = self.clone();
-        interruptible(py, move |stop| {
-            Verdict::of(&own.printing, own.family.as_deref(), proof, stop)
-        })?
+        interruptible(py, move |stop| Verdict::of(&own.printing, proof, stop))?
     }
 
     /// Makes the list of corners and tags that the reference detector reads.
@@ -447,10 +453,10 @@ impl Target {
     ) -> crate::Reduced<'py, (String, String, Option<String>, Option<String>)> {
         let restore = slf.py().import("deltille._core")?.getattr("_target")?;
         let own = slf.get();
-        let family = own.family.as_ref().map(|family| family.to_json());
+        let family = own.codes().map(|family| family.to_json());
         // A family has no file in common with that of its squares.
         let is_mixed = own.target().family.as_ref().is_some_and(|family| family.squares.is_some());
-        let squares = own.family.as_ref().filter(|_| is_mixed);
+        let squares = own.codes().filter(|_| is_mixed);
         let squares = squares.and_then(|family| family.of_tiling(GridKind::Checker));
         let squares = squares.map(|family| family.to_json());
         let class = slf.get_type().name()?.to_string();

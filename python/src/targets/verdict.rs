@@ -4,7 +4,6 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
 
 use deltille::export::artifacts::Files;
-use deltille::family::Family;
 use deltille::layout::Printing;
 use deltille::verify::{self, Artifact, Verifier};
 use pyo3::prelude::*;
@@ -30,11 +29,10 @@ impl Verdict {
     /// Compares a file by its name, which is on disk or in memory.
     pub fn of(
         printing: &Printing,
-        family: Option<&Family>,
         (name, files): (String, Option<Files>),
         stop: &AtomicBool,
     ) -> PyResult<Self> {
-        let verifier = Verifier::new(printing, family);
+        let verifier = Verifier::new(printing);
         let verifier = verifier.raise(errors::verify)?.stopped_by(stop);
         let path = Path::new(&name);
         let verdict = match files {

@@ -24,7 +24,7 @@ fn camera() -> Camera {
 
 /// The photograph of a board at a pose, as a PNG.
 fn photograph(target: &Target, pose: &Pose, seed: u64) -> Vec<u8> {
-    let scene = scene_of_target(target, target.family().unwrap().as_ref()).unwrap();
+    let scene = scene_of_target(target).unwrap();
     let light = Light::default().noise(0.01).seed(seed);
     let image = scene.render(&camera(), pose, &light).map(|grey| (255.0 * grey + 0.5) as u8);
     let (width, height) = (image.width() as u32, image.height() as u32);

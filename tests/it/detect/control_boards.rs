@@ -4,7 +4,6 @@
 //! Ten thousand of them: `cargo test --release --test it detect::control_boards -- --ignored --nocapture`.
 
 use crate::common::view::tilted;
-use deltille::artwork;
 use deltille::camera::Camera;
 use deltille::detect::{Detector, DetectorConfig};
 use deltille::family::Family;
@@ -42,7 +41,7 @@ fn board(family: &Family, first_id: u32, spacing: u32, cols: u32) -> Board {
     let spec = TargetSpec::Board(BoardSpec { tags: Some(tags), ..plain });
     let target =
         Printing::build("board", &spec, Some(family), Some(&PaperSpec::default())).unwrap();
-    let sheets = artwork::draw(&target, Some(family)).unwrap().sheets;
+    let sheets = target.draw().unwrap().sheets;
     let scene = scene_of_sheet(&target, &sheets[0], 0);
     let centre_mm = target.target.panels[0].middle_mm();
     Board { target: target.target, scene, centre_mm, bit_mm: EDGE_MM / bits_across }
@@ -102,8 +101,7 @@ fn labelled(boards: u64) -> Vec<String> {
         let image = gaussian(&image, rng.random_range(0.1..0.6) * bit_px);
         let exposure = if rng.random_bool(0.2) { 3.0 } else { 1.0 };
         let image = image.map(|v| (exposure * v.clamp(0.0, 1.0) * 255.0 + 0.5).min(255.0) as u8);
-        let detector =
-            Detector::for_target(&asked.target, Some(&family), DetectorConfig::default());
+        let detector = Detector::for_target(&asked.target, DetectorConfig::default()).unwrap();
         let found = detector.detect(&image, "control");
         let ids = found.grids.iter().flat_map(|g| &g.corners).filter(|c| c.id.is_some()).count();
         if ids > 0 {

@@ -36,7 +36,7 @@ static DETECTORS: LazyLock<Vec<(&str, Detector)>> = LazyLock::new(|| {
         ("deltille of 10 × 11", grid(GridKind::Deltille, Some((10, 11)))),
         ("checker", grid(GridKind::Checker, None)),
         ("checker of 8 × 11", grid(GridKind::Checker, Some((8, 11)))),
-        ("target", Detector::for_target(&target.target, Some(&family), config)),
+        ("target", Detector::for_target(&target.target, config).unwrap()),
     ]
 });
 

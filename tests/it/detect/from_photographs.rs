@@ -1,7 +1,6 @@
 //! From synthetic photographs to a camera: the whole way, with the truth at its end.
 
 use crate::common::view::tilted;
-use deltille::artwork;
 use deltille::calibrate::{Calibration, Model, Reference, views};
 use deltille::camera::{BrownConrady, Camera, KannalaBrandt, Lens};
 use deltille::detect::{Detector, DetectorConfig};
@@ -21,9 +20,9 @@ fn lenses_that_bend_edges_are_found_within_their_deviations() {
     let spec = TargetSpec::Board(BoardSpec::new(GridKind::Deltille, 8, 9, 18.0));
     let paper = PaperSpec::default();
     let target = Printing::build("board", &spec, Some(&family), Some(&paper)).unwrap();
-    let sheets = artwork::draw(&target, Some(&family)).unwrap().sheets;
+    let sheets = target.draw().unwrap().sheets;
     let scene = scene_of_sheet(&target, &sheets[0], 0);
-    let detector = Detector::for_target(&target.target, Some(&family), DetectorConfig::default());
+    let detector = Detector::for_target(&target.target, DetectorConfig::default()).unwrap();
 
     let barrel = BrownConrady { radial: [-0.3, 0.1, 0.0], ..BrownConrady::default() };
     let fisheye = KannalaBrandt { k: vec![0.05, -0.01, 0.002, 0.0] };

@@ -5,7 +5,6 @@
 use std::collections::BTreeMap;
 
 use crate::common::view::tilted;
-use deltille::artwork;
 use deltille::camera::{Camera, Pose};
 use deltille::detect::{Detection, Detector, DetectorConfig};
 use deltille::family::Family;
@@ -39,11 +38,10 @@ impl Board {
         let spec = TargetSpec::Board(BoardSpec { inverted, ..plain });
         let target =
             Printing::build("board", &spec, Some(&family), Some(&PaperSpec::default())).unwrap();
-        let sheets = artwork::draw(&target, Some(&family)).unwrap().sheets;
+        let sheets = target.draw().unwrap().sheets;
         let scene = scene_of_sheet(&target, &sheets[0], 0);
         let centre_mm = target.target.panels[0].middle_mm();
-        let detector =
-            Detector::for_target(&target.target, Some(&family), DetectorConfig::default());
+        let detector = Detector::for_target(&target.target, DetectorConfig::default()).unwrap();
         Self { target: target.target, scene, centre_mm, detector, bit_mm: EDGE_MM / bits_across }
     }
 

@@ -7,7 +7,6 @@ use std::path::{Path, PathBuf};
 use crate::common::data;
 use deltille::detect::{Detector, DetectorConfig, Grid, InkEstimate};
 use deltille::export::dsc;
-use deltille::family::Family;
 use deltille::lattice::GridKind;
 use deltille::photograph;
 use deltille::raster::Gray;
@@ -201,8 +200,7 @@ fn published_targets_decode_completely() {
         let folder = data("reference-boards");
         let text = std::fs::read_to_string(folder.join(format!("{name}.dsc"))).unwrap();
         let target = dsc::read(&text, name).unwrap();
-        let family = Family::shipped(&target.family.as_ref().unwrap().name).unwrap();
-        let detector = Detector::for_target(&target, Some(&family), DetectorConfig::default());
+        let detector = Detector::for_target(&target, DetectorConfig::default()).unwrap();
         let document = Document::open(&folder.join(format!("{name}.pdf"))).unwrap();
         assert_eq!(document.pages(), target.panels.len());
         for page in 0..document.pages() {

@@ -1,6 +1,5 @@
 //! A picture without labels says why, and what would help.
 
-use deltille::artwork;
 use deltille::camera::{Camera, Pose};
 use deltille::detect::{Detection, Detector, DetectorConfig, ReasonKind};
 use deltille::family::Family;
@@ -23,8 +22,8 @@ fn board(grid: GridKind, change: impl Fn(&mut BoardSpec)) -> Board {
     let family = spec.tags.as_ref().map(|tags| Family::shipped(&tags.family).unwrap());
     let (spec, paper) = (TargetSpec::Board(spec), PaperSpec::default());
     let target = Printing::build("board", &spec, family.as_ref(), Some(&paper)).unwrap();
-    let detector = Detector::for_target(&target.target, family.as_ref(), DetectorConfig::default());
-    let sheets = artwork::draw(&target, family.as_ref()).unwrap().sheets;
+    let detector = Detector::for_target(&target.target, DetectorConfig::default()).unwrap();
+    let sheets = target.draw().unwrap().sheets;
     let scene = scene_of_sheet(&target, &sheets[0], 0);
     Board { detector, scene, centre_mm: target.target.panels[0].middle_mm() }
 }

@@ -4,24 +4,20 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use deltille::camera::{Camera, KannalaBrandt, Lens, Pose};
 use deltille::detect::{Detector, DetectorConfig};
-use deltille::family::Family;
 use deltille::lattice::{ROW_HEIGHT, Tile, Vertex};
 use deltille::raster::Gray;
 use deltille::synth::{Light, Scene, TruthCorner, scene_of_target};
-use deltille::targets::{
-    ClosedMesh, Panel, Polyhedron, SolidShape, SolidSpec, TagSpec, Target, TargetSpec,
-};
+use deltille::targets::{ClosedMesh, Panel, Polyhedron, SolidShape, SolidSpec, TagSpec, Target};
 use glam::{DMat2, DVec2, DVec3};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-fn solid(shape: SolidShape, first_id: u32, board_id: u32) -> (Target, Family, Scene) {
+fn solid(shape: SolidShape, first_id: u32, board_id: u32) -> (Target, Scene) {
     let tags = TagSpec { first_id, ..TagSpec::default() };
     let spec = SolidSpec { board_id, tags: Some(tags), ..SolidSpec::new(shape) };
-    let family = Family::shipped("delTag25h7").unwrap();
-    let target = Target::build("solid", &TargetSpec::Solid(spec), Some(&family)).unwrap();
-    let scene = scene_of_target(&target, Some(&family)).unwrap();
-    (target, family, scene)
+    let target = Target::new("solid", spec).unwrap();
+    let scene = scene_of_target(&target).unwrap();
+    (target, scene)
 }
 
 fn eight_bits(image: &Gray<f32>) -> Gray<u8> {
@@ -56,7 +52,7 @@ fn area_in_pixel(triangle: [DVec2; 3], x: f64, y: f64) -> f64 {
 /// corner the picture agrees with the closed form to less than 0.002 px.
 #[test]
 fn corners_are_where_the_truth_says_to_a_five_hundredth_of_a_pixel() {
-    let (target, _, scene) = solid(SolidShape::Octahedron, 0, 0);
+    let (target, scene) = solid(SolidShape::Octahedron, 0, 0);
     let camera = Camera::pinhole(1200, 1000, 0.6);
     let light = Light::default().blur_px(0.0).noise(0.0);
     let mut rng = ChaCha8Rng::seed_from_u64(1);
@@ -101,8 +97,8 @@ fn corners_are_where_the_truth_says_to_a_five_hundredth_of_a_pixel() {
 /// Two objects in one picture, with other ids, are told apart.
 #[test]
 fn two_solids_in_one_picture_are_told_apart() {
-    let (a, family, scene_a) = solid(SolidShape::Icosahedron, 0, 0);
-    let (b, _, mut scene_b) = solid(SolidShape::Icosahedron, 120, 20);
+    let (a, scene_a) = solid(SolidShape::Icosahedron, 0, 0);
+    let (b, mut scene_b) = solid(SolidShape::Icosahedron, 120, 20);
     assert!(a.check_beside(&b).is_ok());
     let camera = Camera::pinhole(2600, 1400, 1.0);
     let pose =
@@ -113,7 +109,7 @@ fn two_solids_in_one_picture_are_told_apart() {
     let surfaces = scene_a.surfaces.iter().chain(&scene_b.surfaces).cloned().collect();
     let image = eight_bits(&Scene { surfaces }.render(&camera, &pose, &Light::default()));
     for (target, left) in [(&a, true), (&b, false)] {
-        let detector = Detector::for_target(target, Some(&family), DetectorConfig::default());
+        let detector = Detector::for_target(target, DetectorConfig::default()).unwrap();
         let detection = detector.detect(&image, "both");
         let labelled: Vec<_> = detection.grids.iter().filter(|g| g.panel.is_some()).collect();
         assert!(labelled.len() >= 3, "{}", labelled.len());
@@ -152,7 +148,7 @@ fn meet(triangle: [DVec3; 3], eye: DVec3, ray: DVec3) -> Option<f64> {
 #[test]
 fn hidden_parts_of_a_concave_solid_are_hidden() {
     let shape = SolidShape::Mesh(spikes());
-    let (target, _, scene) = solid(shape.clone(), 0, 0);
+    let (target, scene) = solid(shape.clone(), 0, 0);
     let outline = SolidSpec::new(shape).polyhedron().triangles_mm();
     let camera = Camera::pinhole(900, 900, 0.5);
     let light = Light::default().blur_px(0.0).noise(0.0);
@@ -219,8 +215,8 @@ fn hidden_parts_of_a_concave_solid_are_hidden() {
 /// covariance that says so, through a lens that bends the edges as through one that does not.
 #[test]
 fn every_corner_has_an_honest_covariance() {
-    let (target, family, scene) = solid(SolidShape::Icosahedron, 0, 0);
-    let detector = Detector::for_target(&target, Some(&family), DetectorConfig::default());
+    let (target, scene) = solid(SolidShape::Icosahedron, 0, 0);
+    let detector = Detector::for_target(&target, DetectorConfig::default()).unwrap();
     let fisheye = Lens::KannalaBrandt(KannalaBrandt { k: vec![-0.02, 0.003, 0.0, 0.0] });
     let cameras = [
         (Camera::pinhole(1280, 960, 1.0), 600.0),
@@ -288,8 +284,8 @@ fn how_seen(panel: &Panel, camera: &Camera, pose: &Pose, bits: f64) -> Option<(f
 #[test]
 #[ignore = "takes minutes; prints the figures"]
 fn three_hundred_views_of_an_icosahedron() {
-    let (target, family, scene) = solid(SolidShape::Icosahedron, 0, 0);
-    let detector = Detector::for_target(&target, Some(&family), DetectorConfig::default());
+    let (target, scene) = solid(SolidShape::Icosahedron, 0, 0);
+    let detector = Detector::for_target(&target, DetectorConfig::default()).unwrap();
     let bits = 5.0 + 3.0 * 1.5;
     let mut rng = ChaCha8Rng::seed_from_u64(2017);
     let (mut due, mut labelled, mut due_corners, mut found_corners) = (0, 0, 0, 0);
@@ -377,15 +373,13 @@ fn inverted_faces_are_labelled_and_bare_ones_are_not() {
         let mut spec = SolidSpec { inverted, ..SolidSpec::new(SolidShape::Octahedron) };
         spec.margin_mm = spec.comfortable_margin_mm().unwrap();
         spec.tags = spec.tags.filter(|_| tags);
-        let family = spec.tags.as_ref().map(|tags| Family::shipped(&tags.family).unwrap());
-        let spec = TargetSpec::Solid(spec);
-        let target = Target::build("o", &spec, family.as_ref()).unwrap();
-        let scene = scene_of_target(&target, family.as_ref()).unwrap();
+        let target = Target::new("o", spec).unwrap();
+        let scene = scene_of_target(&target).unwrap();
         let camera = Camera::pinhole(1200, 900, 1500.0);
         let eye = DVec3::new(260.0, 180.0, 330.0);
         let image =
             scene.render(&camera, &Pose::looking_at(eye, DVec3::ZERO, DVec3::Z), &Light::default());
-        let detector = Detector::for_target(&target, family.as_ref(), DetectorConfig::default());
+        let detector = Detector::for_target(&target, DetectorConfig::default()).unwrap();
         let grids = detector.detect(&eight_bits(&image), "o").grids;
         assert!(grids.iter().any(|grid| grid.corners.len() == 36), "{} grids", grids.len());
         assert!(grids.iter().all(|grid| grid.panel.is_some() == tags));

@@ -3,10 +3,8 @@
 use std::collections::BTreeMap;
 
 use crate::common::view::tilted;
-use deltille::artwork;
 use deltille::camera::{Camera, KannalaBrandt, Lens, Pose};
 use deltille::detect::{Detection, Detector, DetectorConfig};
-use deltille::family::Family;
 use deltille::lattice::GridKind;
 use deltille::layout::{PaperSpec, Printing};
 use deltille::raster::Gray;
@@ -18,27 +16,23 @@ use rand_chacha::ChaCha8Rng;
 
 struct Board {
     target: Target,
-    family: Option<Family>,
     scene: Scene,
     centre_mm: DVec3,
 }
 
 fn board(tags: Option<TagSpec>, inverted: bool) -> Board {
-    let family = tags.as_ref().map(|tags| Family::shipped(&tags.family).unwrap());
     let plain = BoardSpec::new(GridKind::Deltille, 8, 9, 18.0);
     let spec = BoardSpec { board_id: 4, tags, inverted, ..plain };
-    let paper = PaperSpec::default();
-    let target =
-        Printing::build("board", &TargetSpec::Board(spec), family.as_ref(), Some(&paper)).unwrap();
-    let sheets = artwork::draw(&target, family.as_ref()).unwrap().sheets;
+    let target = Printing::new("board", spec).unwrap();
+    let sheets = target.draw().unwrap().sheets;
     let scene = scene_of_sheet(&target, &sheets[0], 0);
     let centre_mm = target.target.panels[0].middle_mm();
-    Board { target: target.target, family, scene, centre_mm }
+    Board { target: target.target, scene, centre_mm }
 }
 
 impl Board {
     fn detector(&self) -> Detector {
-        Detector::for_target(&self.target, self.family.as_ref(), DetectorConfig::default())
+        Detector::for_target(&self.target, DetectorConfig::default()).unwrap()
     }
 
     fn seen_from(&self, rng: &mut ChaCha8Rng, distance_mm: f64, tilt: f64) -> Pose {
@@ -146,7 +140,7 @@ fn what_a_coarser_level_shows_whole_is_where_the_finest_shows_it() {
         let board = BoardSpec { tags: None, ..BoardSpec::new(kind, 8, 9, 18.0) };
         let spec = TargetSpec::Board(board);
         let target = Printing::build("board", &spec, None, Some(&PaperSpec::default())).unwrap();
-        let sheets = artwork::draw(&target, None).unwrap().sheets;
+        let sheets = target.draw().unwrap().sheets;
         let scene = scene_of_sheet(&target, &sheets[0], 0);
         let detector = |size| Detector::for_grid(kind, size, DetectorConfig::default());
         let (whole, any) = (detector(Some((8, 9))), detector(None));

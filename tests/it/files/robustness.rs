@@ -29,10 +29,10 @@ fn finite(found: &Detection) -> bool {
 }
 
 fn detectors() -> [Detector; 3] {
-    let (target, family) = board();
+    let (target, _family) = board();
     [
         Detector::for_grid(GridKind::Deltille, Some((5, 6)), DetectorConfig::default()),
-        Detector::for_target(&target.target, Some(&family), DetectorConfig::default()),
+        Detector::for_target(&target.target, DetectorConfig::default()).unwrap(),
         Detector::for_grid(GridKind::Checker, None, DetectorConfig::default()),
     ]
 }

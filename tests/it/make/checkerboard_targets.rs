@@ -6,16 +6,15 @@ use std::collections::BTreeMap;
 use crate::common::command::deltille;
 use crate::common::page::Page;
 use crate::common::view::tilted;
-use deltille::artwork;
 use deltille::camera::{Camera, KannalaBrandt, Lens, Pose};
 use deltille::detect::{Detection, Detector, DetectorConfig};
 use deltille::export::dsc::{self, Dialect};
 use deltille::family::{Decoder, Family, TagWords, square_names};
 use deltille::lattice::GridKind;
-use deltille::layout::{PaperSpec, Printing};
+use deltille::layout::Printing;
 use deltille::raster::Gray;
 use deltille::synth::{Light, Scene, Truth, scene_of_sheet};
-use deltille::targets::{BoardSpec, TagSpec, TagsIn, TargetSpec};
+use deltille::targets::{BoardSpec, TagSpec, TagsIn};
 use glam::{DVec2, DVec3};
 use proptest::prelude::*;
 use rand::{Rng, SeedableRng};
@@ -26,10 +25,8 @@ fn spec(rows: u32, cols: u32, tags_in: TagsIn) -> BoardSpec {
     BoardSpec { board_id: 4, tags, ..BoardSpec::new(GridKind::Checker, rows, cols, 20.0) }
 }
 
-fn build(spec: &BoardSpec) -> (Printing, Option<Family>) {
-    let family = spec.tags.as_ref().map(|tags| Family::shipped(&tags.family).unwrap());
-    let (spec, paper) = (TargetSpec::Board(spec.clone()), PaperSpec::default());
-    (Printing::build("board", &spec, family.as_ref(), Some(&paper)).unwrap(), family)
+fn build(spec: &BoardSpec) -> Printing {
+    Printing::new("board", spec.clone()).unwrap()
 }
 
 /// Every word with up to ⌊(h−1)/2⌋ wrong cells, in all four turns, is its tag and turn again.
@@ -74,9 +71,9 @@ struct Board {
 }
 
 fn board(spec: &BoardSpec) -> Board {
-    let (target, family) = build(spec);
-    let detector = Detector::for_target(&target.target, family.as_ref(), DetectorConfig::default());
-    let sheets = artwork::draw(&target, family.as_ref()).unwrap().sheets;
+    let target = build(spec);
+    let detector = Detector::for_target(&target.target, DetectorConfig::default()).unwrap();
+    let sheets = target.draw().unwrap().sheets;
     let scene = scene_of_sheet(&target, &sheets[0], 0);
     let centre_mm = target.target.panels[0].middle_mm();
     Board { detector, scene, centre_mm }
@@ -206,10 +203,10 @@ fn plain_boards_are_labelled_where_they_are_seen_whole() {
 
 #[test]
 fn several_boards_are_told_apart_by_their_tags() {
-    let (target, family) = build(&BoardSpec { boards: 3, ..spec(5, 7, TagsIn::Black) });
+    let target = build(&BoardSpec { boards: 3, ..spec(5, 7, TagsIn::Black) });
     let camera = Camera::pinhole(1280, 960, 0.9);
-    let sheets = artwork::draw(&target, family.as_ref()).unwrap().sheets;
-    let detector = Detector::for_target(&target.target, family.as_ref(), DetectorConfig::default());
+    let sheets = target.draw().unwrap().sheets;
+    let detector = Detector::for_target(&target.target, DetectorConfig::default()).unwrap();
     for (index, sheet) in sheets.iter().enumerate() {
         let scene = scene_of_sheet(&target, sheet, index);
         let centre = DVec3::new(60.0, 40.0, 0.0);
@@ -228,7 +225,7 @@ proptest! {
     ) {
         let mut spec = spec(rows, cols, TagsIn::Black);
         spec.tags.as_mut().unwrap().spacing = spacing;
-        let (target, _) = build(&spec);
+        let target = build(&spec);
         prop_assert_eq!(&Printing::from_json(&target.to_json()).unwrap(), &target);
         let dialect = if original { Dialect::Original } else { Dialect::Fork };
         let read = dsc::read(&dsc::write(&target.target, dialect).unwrap(), "board").unwrap();

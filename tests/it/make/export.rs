@@ -3,7 +3,7 @@
 use std::path::Path;
 use std::process::Command;
 
-use deltille::artwork::{self, Artwork, Paint, Part, Shape};
+use deltille::artwork::{Artwork, Paint, Part, Shape};
 use deltille::export::{pdf, png, svg};
 use deltille::family::Family;
 use deltille::lattice::GridKind;
@@ -22,7 +22,7 @@ fn tiny(inverted: bool) -> Artwork {
     let family = Family::shipped("delTag25h7").unwrap();
     let paper = PaperSpec::default();
     let target = Printing::build("tiny", &TargetSpec::Board(spec), Some(&family), Some(&paper));
-    artwork::draw(&target.unwrap(), Some(&family)).unwrap()
+    target.unwrap().draw().unwrap()
 }
 
 /// Without the outlines of the letters, which nobody reads.

@@ -61,9 +61,8 @@ fn board(mirrored: bool, white: bool, contour: bool) -> Printing {
 
 /// What is said of a file.
 fn said(target: &Printing, name: &str, bytes: impl Into<Vec<u8>>) -> String {
-    let family = target.target.family().unwrap();
     let file = [Artifact::new(name, bytes.into())];
-    verify(target, family.as_ref(), name, &file).unwrap().to_string()
+    verify(target, name, &file).unwrap().to_string()
 }
 
 #[test]
@@ -128,8 +127,7 @@ fn with_content(bytes: &[u8], (from, to): (&str, &str)) -> Vec<u8> {
 #[test]
 fn what_a_laser_would_do_wrong_is_named() {
     let target = board(false, false, false);
-    let family = target.target.family().unwrap();
-    let good = to_laser(&target, family.as_ref(), 0.2).unwrap();
+    let good = to_laser(&target, 0.2).unwrap();
     let file = |drawing: &CutDrawing, name: &str| match name {
         "desk-laser.dxf" => dxf::text(drawing),
         _ => laser_svg::text(drawing, "desk", &deltille::artwork::subject(&target.target)),

@@ -1,7 +1,7 @@
 //! Boards and solids with a hole in the middle of each tag, where no code uses the cells.
 
 use assert_cmd::Command;
-use deltille::artwork::{CutLayer, CutPath, draw, to_laser};
+use deltille::artwork::{CutLayer, CutPath, to_laser};
 use deltille::export::svg;
 use deltille::family::Family;
 use deltille::lattice::Vertex;
@@ -50,26 +50,26 @@ fn every_format_with_holes_is_proved() {
     }
 }
 
-/// A board, its family, and the page.
-fn board(hole_mm: Option<f64>) -> (Printing, Family) {
+/// A board of a family that is not shipped.
+fn board(hole_mm: Option<f64>) -> Printing {
     let folder = tempfile::tempdir().unwrap();
     let family = holed(folder.path());
     let tags = TagSpec { family: "holed".to_owned(), hole_mm, ..TagSpec::default() };
     let spec = BoardSpec { tags: Some(tags), ..BoardSpec::deltille(4, 5, 30.0) };
     let spec = TargetSpec::Board(spec);
-    (Printing::build("desk", &spec, Some(&family), Some(&PaperSpec::default())).unwrap(), family)
+    Printing::build("desk", &spec, Some(&family), Some(&PaperSpec::default())).unwrap()
 }
 
 #[test]
 fn holes_of_another_size_and_none_are_found() {
-    let (stated, family) = board(Some(1.5));
+    let stated = board(Some(1.5));
     for (hole_mm, passes) in
         [(Some(1.5), true), (Some(1.6), false), (Some(1.0), false), (None, false)]
     {
-        let (printed, _) = board(hole_mm);
-        let page = svg::to_string(&draw(&printed, Some(&family)).unwrap(), 0);
+        let printed = board(hole_mm);
+        let page = svg::to_string(&printed.draw().unwrap(), 0);
         let file = [Artifact::new("desk.svg", page.into_bytes())];
-        let proof = verify(&stated, Some(&family), "desk.svg", &file).unwrap();
+        let proof = verify(&stated, "desk.svg", &file).unwrap();
         assert_eq!(proof.passed, passes, "{hole_mm:?}: {proof}");
     }
 }
@@ -82,9 +82,9 @@ fn area(path: &CutPath) -> f64 {
 
 #[test]
 fn a_laser_cuts_the_holes_first() {
-    let (target, family) = board(Some(1.5));
+    let target = board(Some(1.5));
     let panel = &target.target.panels[0];
-    let drawing = to_laser(&target, Some(&family), 0.1).unwrap();
+    let drawing = to_laser(&target, 0.1).unwrap();
     let cut: Vec<_> = drawing.paths.iter().filter(|path| path.layer == CutLayer::Cut).collect();
     let (plate, holes) = cut.split_last().unwrap();
     assert_eq!(holes.len(), panel.tags.len());

@@ -99,11 +99,10 @@ fn boards_and_solids_are_two_bodies_to_print() {
 /// What is wrong with the bodies of a board, after they were changed.
 fn verdict_on(change: impl FnOnce(&mut InlaidBodies)) -> String {
     let board = Printing::new("desk", BoardSpec::deltille(3, 4, 20.0)).unwrap();
-    let family = board.target.family().unwrap();
-    let mut bodies = InlaidBodies::new(&board.target, family.as_ref(), Meshing::default()).unwrap();
+    let mut bodies = InlaidBodies::new(&board.target, Meshing::default()).unwrap();
     change(&mut bodies);
     let file = [Artifact::new("desk.3mf", threemf::to_bytes(&bodies))];
-    verify(&board, family.as_ref(), "desk.3mf", &file).unwrap().to_string()
+    verify(&board, "desk.3mf", &file).unwrap().to_string()
 }
 
 #[test]
@@ -143,8 +142,7 @@ fn bodies_that_were_changed_are_refused() {
 #[test]
 fn a_small_file_that_unpacks_to_a_large_one_is_not_unpacked() {
     let board = Printing::new("desk", BoardSpec::deltille(3, 4, 20.0)).unwrap();
-    let family = board.target.family().unwrap();
-    let bodies = InlaidBodies::new(&board.target, family.as_ref(), Meshing::default()).unwrap();
+    let bodies = InlaidBodies::new(&board.target, Meshing::default()).unwrap();
     let mut file = threemf::to_bytes(&bodies);
     // The length of the model, in its entry of the directory and before it.
     let name = b"3D/3dmodel.model";
@@ -153,7 +151,7 @@ fn a_small_file_that_unpacks_to_a_large_one_is_not_unpacked() {
     for (at, before) in [(names[names.len() - 2], 8), (names[names.len() - 1], 22)] {
         file[at - before..at - before + 4].copy_from_slice(&900_000_000u32.to_le_bytes());
     }
-    let verdict = verify(&board, family.as_ref(), "desk.3mf", &[Artifact::new("desk.3mf", file)]);
+    let verdict = verify(&board, "desk.3mf", &[Artifact::new("desk.3mf", file)]);
     let error = verdict.unwrap_err().to_string();
     assert!(error.contains("max_bytes"), "{error}");
 }

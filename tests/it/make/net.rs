@@ -6,7 +6,7 @@ use std::path::Path;
 
 use crate::common::command::deltille;
 use crate::common::verdict::{assert_found, findings};
-use deltille::artwork::{self, Artwork, Part};
+use deltille::artwork::{Artwork, Part};
 use deltille::export::{pdf, png, sheet_file_name, svg};
 use deltille::family::Family;
 use deltille::layout::{Label, LineKind, PaperSpec, Printing, SheetText, SolidSheets};
@@ -43,7 +43,7 @@ fn in_pieces() -> Printing {
 }
 
 fn draw(target: &Printing) -> Artwork {
-    artwork::draw(target, Some(&family())).unwrap()
+    target.draw().unwrap()
 }
 
 /// Writes an artwork and compares it with a target.
@@ -59,7 +59,7 @@ fn verify(target: &Printing, artwork: &Artwork, extension: &str) -> Verdict {
         }),
     }
     let first = if extension == "pdf" { folder.path().join("t.pdf") } else { path(0) };
-    Verifier::new(target, Some(&family())).unwrap().verify_path(&first).unwrap()
+    Verifier::new(target).unwrap().verify_path(&first).unwrap()
 }
 
 #[test]
@@ -230,11 +230,11 @@ fn a_turned_square_does_not_fold_into_the_cube() {
     let paper = PaperSpec::default();
     let cube = Printing::build("t", &TargetSpec::Solid(spec), Some(&family), Some(&paper)).unwrap();
     let verdict = |target: &Printing| {
-        let artwork = artwork::draw(target, Some(&family)).unwrap();
+        let artwork = target.draw().unwrap();
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("t.svg");
         svg::write(&artwork, 0, &path).unwrap();
-        Verifier::new(target, Some(&family)).unwrap().verify_path(&path).unwrap()
+        Verifier::new(target).unwrap().verify_path(&path).unwrap()
     };
     let whole = verdict(&cube);
     assert!(whole.passed && whole.sheets[0].fold.unwrap().edges == 12, "{whole}");

@@ -9,7 +9,7 @@ use deltille::lattice::GridKind;
 use deltille::layout::{PaperSpec, Printing};
 use deltille::layout::{Reach, Situation};
 use deltille::synth::{Light, scene_of_target};
-use deltille::targets::{BoardSpec, TagSpec, Target, TargetSpec};
+use deltille::targets::{BoardSpec, TagSpec, Target};
 use deltille_lab::photographs::photograph::take;
 use deltille_lab::photographs::scene::Scene;
 use deltille_lab::photographs::world::background::Studio;
@@ -65,14 +65,12 @@ fn boards_are_labelled_as_far_as_is_said() {
             distances_mm: [400.0, 1500.0],
             tilt_rad: 0.785,
         };
-        let family = tags.as_ref().map(|(_, family)| *family);
         let board = situation.board(kind, tags, &PaperSpec::default()).unwrap().spec;
-        let target = Target::build("plan", &TargetSpec::Board(board), family).unwrap();
-        let reach = Reach::of(&target, family);
+        let target = Target::new("plan", board).unwrap();
+        let reach = Reach::of(&target).unwrap();
         for tilt_deg in [0.0f64, 30.0, 45.0, 60.0] {
             let limit = reach.labelled_to_mm(situation.focal_px, tilt_deg.to_radians());
-            let [near, far] =
-                [0.9, 1.1].map(|part| labelled(&target, family, tilt_deg, part * limit));
+            let [near, far] = [0.9, 1.1].map(|part| labelled(&target, tilt_deg, part * limit));
             let what = format!("{kind:?}, {} tags, {tilt_deg}°, {limit:.0} mm", reach.tags);
             let least = if reach.tags > 0 { 6 } else { 5 };
             assert!(near >= least, "{what}: a tenth nearer {near} of 6 are labelled");
@@ -94,16 +92,11 @@ impl Windows {
     /// Sides of the picture, in edges of a tile: a square of (4.3 − 1)² edges takes the middles of twelve tiles.
     const SIDE_EDGES: f64 = 4.3;
 
-    fn new(family: &Family) -> Self {
+    fn new() -> Self {
         let spec = BoardSpec { tags: Some(TagSpec::dense()), ..BoardSpec::deltille(12, 12, 20.0) };
-        let (spec, paper) = (TargetSpec::Board(spec), PaperSpec::default());
-        let board = Printing::build("board", &spec, Some(family), Some(&paper)).unwrap();
-        let detector = Detector::for_target(&board.target, Some(family), DetectorConfig::default());
-        Self {
-            page: PrintedPage::new(&board, Some(family)).unwrap(),
-            studio: Studio::new(1),
-            detector,
-        }
+        let board = Printing::new("board", spec).unwrap();
+        let detector = Detector::for_target(&board.target, DetectorConfig::default()).unwrap();
+        Self { page: PrintedPage::new(&board).unwrap(), studio: Studio::new(1), detector }
     }
 
     /// How many are labelled with cells of such a size, px, in the area that the tilt leaves them.
@@ -139,7 +132,7 @@ fn patches_of_dense_boards_are_labelled_as_far_as_is_said() {
     };
     let tags = Some((TagSpec::dense(), &family));
     let plan = situation.board(GridKind::Deltille, tags, &PaperSpec::default()).unwrap();
-    let windows = Windows::new(&family);
+    let windows = Windows::new();
     for tilt_deg in [0.0f64, 45.0, 60.0] {
         let limit_mm = plan.patches_to_mm(situation.focal_px, tilt_deg.to_radians()).unwrap();
         let shortened = tilt_deg.to_radians().cos().sqrt();
@@ -157,7 +150,7 @@ fn patches_of_dense_boards_are_labelled_as_far_as_is_said() {
 #[test]
 #[ignore = "prints a table"]
 fn photographs_of_patches() {
-    let windows = Windows::new(&Family::shipped("dense9").unwrap());
+    let windows = Windows::new();
     for tilt_deg in [0.0, 45.0, 60.0] {
         for bit_px in [1.2, 1.3, 1.4, 1.5, 1.6, 1.7, 2.0, 3.0] {
             let labelled = windows.labelled(bit_px, tilt_deg);
@@ -167,9 +160,9 @@ fn photographs_of_patches() {
 }
 
 /// How many of six views from a distance, tilted to six sides, are labelled.
-fn labelled(target: &Target, family: Option<&Family>, tilt_deg: f64, distance: f64) -> usize {
-    let detector = Detector::for_target(target, family, DetectorConfig::default());
-    let scene = scene_of_target(target, family).unwrap();
+fn labelled(target: &Target, tilt_deg: f64, distance: f64) -> usize {
+    let detector = Detector::for_target(target, DetectorConfig::default()).unwrap();
+    let scene = scene_of_target(target).unwrap();
     let middle = target.panels[0].middle_mm();
     let tilt = tilt_deg.to_radians();
     let views = (0..6u64).filter(|&view| {

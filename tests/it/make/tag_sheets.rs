@@ -2,7 +2,6 @@
 
 use crate::common::folder::names;
 use crate::common::page::Page;
-use deltille::artwork;
 use deltille::export::svg;
 use deltille::family::Family;
 use deltille::layout::{PaperSpec, Printing};
@@ -62,10 +61,10 @@ fn verdict(ids: &[u32], edit: impl Fn(&str) -> String) -> deltille::verify::Verd
     };
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("tags.svg");
-    let drawn = artwork::draw(&build(ids), Some(&family)).unwrap();
+    let drawn = build(ids).draw().unwrap();
     std::fs::write(&path, edit(&svg::to_string(&drawn, 0))).unwrap();
     let target = build(&[5, 6, 7, 8]);
-    Verifier::new(&target, Some(&family)).unwrap().verify_path(&path).unwrap()
+    Verifier::new(&target).unwrap().verify_path(&path).unwrap()
 }
 
 #[test]

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use crate::common::verdict::assert_found;
-use deltille::artwork::{self, Artwork, Paint, Part, Shape, Sheet};
+use deltille::artwork::{Artwork, Paint, Part, Shape, Sheet};
 use deltille::export::{pdf, png, svg};
 use deltille::family::Family;
 use deltille::glam::DVec2;
@@ -62,7 +62,7 @@ fn board_on(spec: BoardSpec, paper: &PaperSpec) -> Board {
 
 impl Board {
     fn artwork(&self) -> Artwork {
-        artwork::draw(&self.target, Some(&self.family)).unwrap()
+        self.target.draw().unwrap()
     }
 
     fn verify(&self, artwork: &Artwork, format: Format) -> Verdict {
@@ -82,7 +82,7 @@ impl Board {
                 path("png")
             }
         };
-        Verifier::new(&self.target, Some(&self.family)).unwrap().verify_path(&path).unwrap()
+        Verifier::new(&self.target).unwrap().verify_path(&path).unwrap()
     }
 
     /// The first tag's tile.
@@ -153,7 +153,7 @@ fn swapped_tags_are_named() {
         let mut swapped = board.target.clone();
         let tags = &mut swapped.target.panels[0].tags;
         (tags[0].id, tags[1].id) = (tags[1].id, tags[0].id);
-        let artwork = artwork::draw(&swapped, Some(&board.family)).unwrap();
+        let artwork = swapped.draw().unwrap();
         let (row, col) = board.tag(0);
         let exchanged =
             json!({ "kind": "tag_reads", "id": 17, "row": row, "col": col, "reads": 18 });
@@ -261,7 +261,7 @@ fn a_short_check_bar_is_measured() {
     let board = board(spec());
     let mut short = board.target.clone();
     short.sheets[0].check_bars[0].to_mm.x -= 0.1;
-    let artwork = artwork::draw(&short, Some(&board.family)).unwrap();
+    let artwork = short.draw().unwrap();
     let bar = &board.target.sheets[0].check_bars[0];
     let length = bar.to_mm.x - bar.from_mm.x;
     for format in ALL {
@@ -328,7 +328,7 @@ fn words_erased_or_altered_and_spots_outside_the_board_are_found() {
     let mut altered = board.target.clone();
     let label = &mut altered.sheets[0].texts[0].text;
     *label = label.to_string().replace("edge 20 mm", "edge 21 mm").into();
-    let altered = artwork::draw(&altered, Some(&board.family)).unwrap();
+    let altered = altered.draw().unwrap();
     let mut erased = board.artwork();
     erased.sheets[0].shapes.retain(|shape| shape.part != (Part::Label { index: 1 }));
     let mut blot = board.artwork();
@@ -367,7 +367,7 @@ fn verify_toned(board: &Board, tone: impl Fn(u8) -> u8) -> Verdict {
     encoder.set_depth(info.bit_depth);
     encoder.set_pixel_dims(info.pixel_dims);
     encoder.write_header().unwrap().write_image_data(&pixels).unwrap();
-    Verifier::new(&board.target, Some(&board.family)).unwrap().verify_path(&path).unwrap()
+    Verifier::new(&board.target).unwrap().verify_path(&path).unwrap()
 }
 
 #[test]
@@ -415,7 +415,7 @@ fn a_logo_that_is_missing_moved_or_altered_is_found() {
     shape.path.apply_affine(Affine::translate((0.15, 0.0)));
     let mut altered = board.target.clone();
     altered.logo = Some(logo(45.0));
-    let altered = artwork::draw(&altered, Some(&board.family)).unwrap();
+    let altered = altered.draw().unwrap();
     let blot = |x: f64, y: f64| {
         let mut blot = board.artwork();
         let at = place.at_mm + place.height_mm * DVec2::new(x, y);

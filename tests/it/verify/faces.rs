@@ -4,9 +4,8 @@ use std::collections::BTreeMap;
 
 use deltille::artwork::subject;
 use deltille::export::artifacts::{Making, What, make};
-use deltille::family::Family;
 use deltille::lattice::GridKind;
-use deltille::layout::{PaperSpec, Printing};
+use deltille::layout::Printing;
 use deltille::targets::{BoardSpec, SolidShape, SolidSpec, TargetSpec};
 use deltille::verify::{Artifact, Verifier};
 use glam::DVec2;
@@ -25,33 +24,30 @@ fn with_pixels(paint: impl Fn(&mut GrayImage) + 'static) -> Damage {
 /// A mesh in all formats, in memory.
 struct Mesh {
     target: Printing,
-    family: Family,
     files: Vec<(String, Vec<u8>)>,
 }
 
 impl Mesh {
     fn new(spec: TargetSpec, textures: u32) -> Self {
-        let family = Family::shipped("delTag25h7").unwrap();
-        let paper = PaperSpec::default();
-        let target = Printing::build("m", &spec, Some(&family), Some(&paper)).unwrap();
+        let target = Printing::new("m", spec).unwrap();
         let mut making = Making::default();
         making.mesh.textures = textures;
         // Of MuJoCo, which takes parts of it, too.
-        let mut files = make(&target, Some(&family), What::Mjcf, making).unwrap();
+        let mut files = make(&target, What::Mjcf, making).unwrap();
         for what in [What::Sdf, What::Urdf, What::Usd, What::Gltf] {
-            for (name, bytes) in make(&target, Some(&family), what, making).unwrap() {
+            for (name, bytes) in make(&target, what, making).unwrap() {
                 if !files.iter().any(|(known, _)| *known == name) {
                     files.push((name, bytes));
                 }
             }
         }
-        Self { target, family, files }
+        Self { target, files }
     }
 
     fn passes(&self, name: &str, files: &[(String, Vec<u8>)]) -> bool {
         let files: Vec<Artifact> =
             files.iter().map(|(name, bytes)| Artifact::new(name.clone(), bytes.clone())).collect();
-        let verifier = Verifier::new(&self.target, Some(&self.family)).unwrap();
+        let verifier = Verifier::new(&self.target).unwrap();
         verifier.verify(name, &files).unwrap().passed
     }
 

@@ -33,7 +33,7 @@ fn icosahedron() -> SolidSpec {
 
 /// The pages of a target, one by one.
 fn pages(target: &Printing) -> Vec<Artifact> {
-    let artwork = artwork::draw(target, Some(&family())).unwrap();
+    let artwork = target.draw().unwrap();
     let count = artwork.sheets.len();
     let page = |index| {
         let name = sheet_file_name(&target.target.name, index, count, "svg");
@@ -44,7 +44,7 @@ fn pages(target: &Printing) -> Vec<Artifact> {
 
 /// What every target has.
 fn drawn(target: &Printing) -> Vec<Artifact> {
-    let artwork = artwork::draw(target, Some(&family())).unwrap();
+    let artwork = target.draw().unwrap();
     let named = |extension: &str| format!("{}.{extension}", target.target.name);
     let mut files = pages(target);
     files.push(Artifact::new(named("pdf"), pdf::to_bytes(&artwork)));
@@ -54,14 +54,14 @@ fn drawn(target: &Printing) -> Vec<Artifact> {
 
 /// A board in its four formats.
 fn board_files(target: &Printing) -> Vec<Artifact> {
-    let artwork = artwork::draw(target, Some(&family())).unwrap();
+    let artwork = target.draw().unwrap();
     let picture = png::to_bytes(&artwork.sheets[0], &artwork.title, DPI).unwrap();
     [drawn(target), vec![Artifact::new("b.png", picture)]].concat()
 }
 
 /// A solid in all its formats.
 fn solid_files(target: &Printing, spec: &SolidSpec) -> Vec<Artifact> {
-    let mesh = TexturedMesh::new(&target.target, Some(&family()), Meshing::default()).unwrap();
+    let mesh = TexturedMesh::new(&target.target, Meshing::default()).unwrap();
     let body = stl::to_bytes("i", &spec.polyhedron().triangles_mm());
     let cut = |drawing| dxf::text(&drawing);
     let more = [
@@ -100,7 +100,7 @@ fn replace<'a>(from: &'a str, to: &'a str) -> impl Fn(&mut Vec<u8>) + 'a {
 
 #[track_caller]
 fn compare(target: &Printing, name: &str, files: &[Artifact]) -> Verdict {
-    verify(target, Some(&family()), name, files).unwrap()
+    verify(target, name, files).unwrap()
 }
 
 #[track_caller]
@@ -125,12 +125,12 @@ fn a_board_is_proved_in_memory_and_every_change_is_found() {
         ("b.dsc", "delTag25h7", "delTag16h5", "family"),
     ] {
         let damaged = changed(&files, name, replace(from, to));
-        match verify(&target, Some(&family()), name, &damaged) {
+        match verify(&target, name, &damaged) {
             Ok(verdict) => assert_told(&verdict, said),
             Err(error) => panic!("{name}: {error}"),
         }
     }
-    let mut artwork = artwork::draw(&target, Some(&family())).unwrap();
+    let mut artwork = target.draw().unwrap();
     artwork.sheets[0].shapes.remove(0);
     for file in [
         Artifact::new("b.pdf", pdf::to_bytes(&artwork)),
@@ -151,14 +151,14 @@ fn a_solid_is_proved_in_memory_with_the_files_that_belong_together() {
         let verdict = compare(&target, file.name(), &files);
         assert!(verdict.passed, "{verdict}");
     }
-    let part = verify(&target, Some(&family()), "i.mtl", &files);
+    let part = verify(&target, "i.mtl", &files);
     assert!(matches!(part, Err(VerifyError::PartOf { .. })), "{part:?}");
 
     // What an artifact needs must be given.
     for (name, without) in [("i.obj", "i.mtl"), ("i.obj", "i-texture.png"), ("i.stl", "i.stl")] {
         let rest: Vec<Artifact> =
             files.iter().filter(|file| file.name() != without).cloned().collect();
-        let error = verify(&target, Some(&family()), name, &rest).unwrap_err();
+        let error = verify(&target, name, &rest).unwrap_err();
         assert_eq!(error.to_string(), format!("{without}: not among the files that are given"));
     }
     for (name, part, from, to, said) in [
@@ -188,14 +188,13 @@ fn a_solid_with_several_textures_is_proved_in_memory() {
         (What::Mjcf, "i.xml"),
         (What::Usd, "i.usda"),
     ] {
-        let files = artifacts::make(&target, Some(&family()), what, making).unwrap();
+        let files = artifacts::make(&target, what, making).unwrap();
         let files: Vec<Artifact> =
             files.into_iter().map(|(name, bytes)| Artifact::new(name, bytes)).collect();
         let verdict = compare(&target, name, &files);
         assert!(verdict.passed, "{verdict}");
         // Textures are counted together: none has more than half a megapixel.
-        let family = family();
-        let verifier = Verifier::new(&target, Some(&family)).unwrap();
+        let verifier = Verifier::new(&target).unwrap();
         let mut limits = Limits::default();
         limits.max_pixels = 500_000;
         let error = verifier.within(limits).verify(name, &files).unwrap_err().to_string();
@@ -215,8 +214,7 @@ fn labels_of_a_net_in_memory_are_compared_by_what_they_say() {
     assert_told(&compare(&target, name, &pages(&renumbered)), "differs from the description");
     assert_told(&compare(&renumbered, name, &pages(&renumbered)), "instead of face 3");
     assert_told(&compare(&target, name, &whole[..1]), "i-2.svg is missing");
-    let family = family();
-    let verifier = || Verifier::new(&target, Some(&family)).unwrap();
+    let verifier = || Verifier::new(&target).unwrap();
     let guarded = verifier().guarded_by(Guard::Timed).verify(name, &whole).unwrap();
     assert_eq!(verifier().verify(name, &whole).unwrap(), guarded);
 }

@@ -46,7 +46,7 @@ fn what_breaks_a_grammar_is_refused() {
     let family = Family::shipped("delTag25h7").unwrap();
     let spec = TargetSpec::Board(BoardSpec::new(GridKind::Deltille, 4, 5, 20.0));
     let target = Printing::build("g", &spec, Some(&family), Some(&PaperSpec::default())).unwrap();
-    let verifier = Verifier::new(&target, Some(&family)).unwrap();
+    let verifier = Verifier::new(&target).unwrap();
     let formats = [
         What::Svg,
         What::Dsc(Dialect::Fork),
@@ -59,7 +59,7 @@ fn what_breaks_a_grammar_is_refused() {
     ];
     let mut random = ChaCha8Rng::seed_from_u64(14);
     for what in formats {
-        let made = make(&target, Some(&family), what, Making::default()).unwrap();
+        let made = make(&target, what, Making::default()).unwrap();
         let is_text = |name: &str| !name.ends_with(".png");
         let shared = [".obj", ".mtl"].map(str::to_owned);
         for (file, bytes) in made.iter().filter(|(name, _)| is_text(name)) {

@@ -8,6 +8,7 @@
 //! | `see` | grey values, and frames of a webcam, to corners |
 //! | `solve` | corners to a camera and its page |
 //! | `codes` | codes of tags, looked at and damaged |
+//! | `family` | the family of a target, from its file |
 //! | `errors` | the library's words as exceptions |
 //!
 //! It is built once for each of the first five, as modules that a page loads when it needs them; `codes` comes with `make`.
@@ -19,6 +20,8 @@
 #[cfg(feature = "make")]
 pub mod codes;
 mod errors;
+#[cfg(any(feature = "prove", feature = "see"))]
+mod family;
 #[cfg(feature = "make")]
 pub mod make;
 #[cfg(feature = "photo")]

@@ -181,11 +181,10 @@ pub fn family_of_settings(settings: &str) -> Result<Option<String>, JsError> {
     Ok(wanted.spec()?.family().map(str::to_owned))
 }
 
-/// A target that was made, with the family of its tags.
+/// A target that was made.
 #[wasm_bindgen]
 pub struct Made {
     printing: Printing,
-    family: Option<Family>,
 }
 
 #[wasm_bindgen]
@@ -202,7 +201,7 @@ impl Made {
         let family = family.filter(|_| spec.family().is_some());
         let printing =
             Printing::build(&wanted.name, &spec, family.as_ref(), Some(&paper)).raise()?;
-        Ok(Self { printing, family })
+        Ok(Self { printing })
     }
 
     /// The description.
@@ -211,16 +210,18 @@ impl Made {
     }
 
     /// What it offers and from where a camera can use it, as JSON.
-    pub fn reach(&self) -> String {
-        let reach = Reach::of(&self.printing.target, self.family.as_ref());
-        serde_json::to_string(&reach).unwrap_or_default()
+    ///
+    /// # Errors
+    /// In words, where the family of its tags is unknown.
+    pub fn reach(&self) -> Result<String, JsError> {
+        serde_json::to_string(&Reach::of(&self.printing.target).raise()?).raise()
     }
 
     /// The nearest and the farthest distance, mm, at which a camera with a horizontal field of view, in degrees, and a
     /// width of its pictures, px, can use it; nothing where there are none.
     pub fn distances_mm(&self, field_of_view_deg: f64, width_px: f64) -> Option<Vec<f64>> {
         let focal_px = width_px / 2.0 / (field_of_view_deg.to_radians() / 2.0).tan();
-        let reach = Reach::of(&self.printing.target, self.family.as_ref());
+        let reach = Reach::of(&self.printing.target).ok()?;
         Some(reach.distances_mm(focal_px, width_px)?.to_vec())
     }
 
@@ -237,7 +238,7 @@ impl Made {
         let what: What = format.parse().raise()?;
         let mut making = Making::default();
         making.dpi = dpi;
-        let made = make(&self.printing, self.family.as_ref(), what, making).raise()?;
+        let made = make(&self.printing, what, making).raise()?;
         let files = Array::new();
         for (name, bytes) in made {
             files.push(&JsValue::from_str(&name));

@@ -1,12 +1,12 @@
 //! Files read back and compared with their target.
 
-use deltille_core::family::Family;
 use deltille_layout::Printing;
 use deltille_verify::{Artifact, Verifier};
 use js_sys::Uint8Array;
 use wasm_bindgen::prelude::*;
 
 use crate::errors::{Raise, told};
+use crate::family::set_family;
 
 /// Reads a file, or the pages of one, back and compares it with the target of a description, whose tags are those of the
 /// family's file: the verdict as JSON, with the line that `deltille verify` prints and a sentence for each finding.
@@ -20,9 +20,9 @@ pub fn prove(
     names: Vec<String>,
     contents: Vec<Uint8Array>,
 ) -> Result<String, JsError> {
-    let printing = Printing::from_json(target).raise()?;
-    let family = family.map(|file| Family::from_json(&file)).transpose().raise()?;
-    let verifier = Verifier::new(&printing, family.as_ref()).raise()?;
+    let mut printing = Printing::from_json(target).raise()?;
+    set_family(&mut printing.target, family)?;
+    let verifier = Verifier::new(&printing).raise()?;
     let files = names.iter().zip(&contents);
     let artifacts: Vec<_> =
         files.map(|(name, bytes)| Artifact::new(name.clone(), bytes.to_vec())).collect();

@@ -4,12 +4,13 @@ use deltille_core::detection::{Detection, InkEstimate, Watch};
 use deltille_core::family::Family;
 use deltille_core::lattice::GridKind;
 use deltille_core::raster::{AnyGray, FileNotes, Gray, grey_of_colours};
-use deltille_core::targets::{OtherFamily, Target};
+use deltille_core::targets::Target;
 use deltille_detect::{Detector, DetectorConfig};
 use deltille_files::export::{csv, detection, orpc};
 use wasm_bindgen::prelude::*;
 
 use crate::errors::Raise;
+use crate::family::set_family;
 
 /// A picture that is looked at.
 #[wasm_bindgen]
@@ -89,19 +90,9 @@ impl Finder {
     /// # Errors
     /// In words, where it is no description, or the family is another one.
     pub fn of_target(target: &str, family: Option<String>) -> Result<Self, JsError> {
-        let target = Target::from_json(target).raise()?;
-        let family = family.map(|file| Family::from_json(&file)).transpose().raise()?;
-        if let (Some(wanted), Some(given)) = (&target.family, &family)
-            && let Err(why) = target.check_family(wanted, given)
-        {
-            return Err(JsError::new(&match why {
-                OtherFamily::Codes { name, wanted, found } => format!(
-                    "the target has tags of another {name} than the one that is shipped: {wanted}, not {found}"
-                ),
-                why => format!("the target {why}"),
-            }));
-        }
-        let detector = Detector::for_target(&target, family.as_ref(), DetectorConfig::default());
+        let mut target = Target::from_json(target).raise()?;
+        set_family(&mut target, family)?;
+        let detector = Detector::new(&target).raise()?;
         Ok(Self { detector, target: Some(target) })
     }
 

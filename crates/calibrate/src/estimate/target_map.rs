@@ -69,7 +69,8 @@ impl TargetMap {
     /// Offsets are from the plan to where the views have a corner: what had moved the corners before, an
     /// earlier measurement or a print scale, is in them.
     pub fn on(&self, target: &Target) -> Target {
-        let mut measured = Target { plan: Some(target.printed()), ..target.clone() };
+        let mut measured = target.clone();
+        measured.plan = Some(target.printed());
         for (index, panel) in measured.panels.iter_mut().enumerate() {
             let of_panel = PanelRef::new(index, panel.id);
             let plan = panel.pose.to_pose().inverse();

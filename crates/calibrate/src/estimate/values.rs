@@ -264,7 +264,9 @@ impl Estimate {
             poses.map(|panel| PanelPose::from_pose(&panel.target_from_panel, panel.covariance));
         let name = Name::like(&format!("{}-refined", target.name.trim_end_matches("-refined")));
         let plan = Some(target.printed());
-        Target { name, plan, ..target.with_poses(&poses.collect::<Vec<_>>()) }
+        let mut refined = target.with_poses(&poses.collect::<Vec<_>>());
+        (refined.name, refined.plan) = (name, plan);
+        refined
     }
 
     /// How many unknowns were found beside the poses of the frames.

@@ -66,7 +66,7 @@ impl<'a> From<&'a (String, Detection)> for Named<'a> {
 /// let board = Target::new("desk", BoardSpec::deltille(4, 5, 20.0))?;
 /// let eye = DVec3::new(50.0, -60.0, 200.0);
 /// let pose = Pose::looking_at(eye, board.panels[0].middle_mm(), DVec3::Y);
-/// let scene = scene_of_target(&board, board.family()?.as_ref())?;
+/// let scene = scene_of_target(&board)?;
 /// let image = scene.render(&Camera::pinhole(640, 480, 1.0), &pose, &Light::default());
 /// let found = Detector::new(&board)?.detect(&image.map(|grey| (255.0 * grey) as u8), "desk.png");
 /// let shown = views([&found], &Reference::Target(&board))?;

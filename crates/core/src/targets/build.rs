@@ -1,9 +1,13 @@
-use crate::family::{Family, FamilyError, places};
+use crate::family::{Family, places};
 use crate::setting::Setting::{BoardBoardId, SolidBoardId, TargetName};
 use crate::targets::boards::capacity::TagSettings;
 use crate::targets::boards::{aprilgrid, board, charuco, circles, tag_sheet};
+use crate::targets::error::Problem;
+use crate::targets::family_ref::Codes;
 use crate::targets::solids::solid;
-use crate::targets::{FamilyRef, Name, Target, TargetError, TargetSpec};
+use crate::targets::{
+    FamilyRef, ListFormat, ListedSpec, Name, Panel, Target, TargetError, TargetSpec, json,
+};
 
 impl Target {
     /// Makes what `spec` asks for with a family that is shipped.
@@ -23,17 +27,6 @@ impl Target {
         Self::build(name, &spec, shipped_family(&spec)?.as_ref())
     }
 
-    /// The family of its tags, where it has tags.
-    ///
-    /// # Errors
-    /// Where that is not a family that is shipped.
-    pub fn family(&self) -> Result<Option<Family>, FamilyError> {
-        let shipped = |family: &FamilyRef| Family::shipped(&family.name);
-        let Some(family) = &self.family else { return Ok(None) };
-        let squares = family.squares.as_deref().map(shipped).transpose()?;
-        Ok(Family::paired(Some(shipped(family)?), squares))
-    }
-
     /// Makes what `spec` asks for. `family` holds the codes of the tags; an untagged target needs none.
     ///
     /// # Errors
@@ -44,6 +37,7 @@ impl Target {
         family: Option<&Family>,
     ) -> Result<Target, TargetError> {
         let name = Name::new(name).map_err(|problem| TargetError::invalid(TargetName, problem))?;
+        let codes = Codes::of(family.filter(|_| spec.family().is_some()));
         let (panels, family) = match spec {
             TargetSpec::Board(spec) => {
                 spec.check()?;
@@ -67,7 +61,25 @@ impl Target {
             TargetSpec::Circles(spec) => (circles::untied_panels(spec)?, None),
             TargetSpec::Listed(_) => return Err(TargetError::Listed),
         };
-        Ok(Target { name, spec: spec.clone(), family, panels, plan: None })
+        Ok(Target { name, spec: spec.clone(), family, panels, plan: None, codes })
+    }
+
+    /// A target of which only the corners are known, from a list of them.
+    ///
+    /// # Errors
+    /// The field at fault, and what is wrong with it.
+    #[doc(hidden)]
+    pub fn listed(
+        name: Name,
+        format: ListFormat,
+        family: FamilyRef,
+        panels: Vec<Panel>,
+    ) -> Result<Target, Problem> {
+        let spec = TargetSpec::Listed(ListedSpec { format });
+        let (family, codes) = (Some(family), Codes::default());
+        let target = Target { name, spec, family, panels, plan: None, codes };
+        json::check(&target)?;
+        Ok(target)
     }
 
     /// Checks that this target can be used together with another one: no tag of the same family

@@ -1,3 +1,4 @@
+use super::family_ref::UnknownCodes;
 use crate::setting::Setting::{
     self, BoardCols, BoardEdgeMm, BoardRows, PaperMarginMm, PaperPoster, PaperSize, TagFamily,
 };
@@ -9,6 +10,9 @@ pub enum TargetError {
     /// A family that is not shipped, and which are.
     #[error("{0}")]
     UnknownFamily(String),
+    /// The codes of a target's tags are not known.
+    #[error(transparent)]
+    UnknownCodes(#[from] UnknownCodes),
     /// A target that is known by its corners only has nothing to be made from.
     #[error("a listed target is read from its list, it cannot be made anew")]
     Listed,

@@ -1,9 +1,12 @@
-//! The family of a target's tags, by its name and its codes.
+//! The family of a target's tags: its name and fingerprint, and its codes where they are known.
+
+use std::sync::{Arc, OnceLock};
 
 use serde::{Deserialize, Serialize};
 
 use crate::family::Family;
 use crate::lattice::GridKind;
+use crate::setting::Setting::TargetSetFamily;
 
 /// Names a family so that a changed code table cannot go unnoticed.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -35,10 +38,51 @@ impl FamilyRef {
     }
 }
 
+/// The codes of a target's tags, where they were given or looked up. The target names them by their fingerprint, so targets
+/// are equal with and without them.
+#[derive(Clone, Debug, Default)]
+pub(in crate::targets) struct Codes(OnceLock<Arc<Family>>);
+
+impl Codes {
+    pub(in crate::targets) fn of(family: Option<&Family>) -> Self {
+        Self(family.map_or_else(OnceLock::new, |family| Arc::new(family.clone()).into()))
+    }
+
+    pub(in crate::targets) fn get(&self) -> Option<&Family> {
+        self.0.get().map(Arc::as_ref)
+    }
+
+    /// The codes that are known, else those that `found` is.
+    pub(in crate::targets) fn or(&self, found: Family) -> &Family {
+        self.0.get_or_init(|| Arc::new(found))
+    }
+}
+
+impl PartialEq for Codes {
+    fn eq(&self, _: &Self) -> bool {
+        true
+    }
+}
+
+/// The codes of a target's tags are not known.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error(
+    "{target} has tags of {family}, and no family with its codes is shipped: set the family with {TargetSetFamily}"
+)]
+pub struct UnknownCodes {
+    /// Name of the target.
+    pub target: String,
+    /// Name of the family.
+    pub family: String,
+}
+
 /// Why a family is not that of a target's tags.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum OtherFamily {
+    /// The target has no tags.
+    #[error("has no tags")]
+    NoTags,
     /// It has other codes.
     #[error("was made with fingerprint {wanted} of {name}, this one is {found}")]
     Codes {

@@ -7,6 +7,7 @@ use serde::{Deserialize, Serialize};
 
 use super::against_spec;
 use super::error::{Problem, problem};
+use super::family_ref::Codes;
 use crate::camera::is_rotation;
 use crate::json::{self, ReadError};
 use crate::lattice::{GridKind, Vertex};
@@ -141,7 +142,7 @@ where
     let file: TargetFile<S, F, L> = json::read(text)?;
     let TargetFile { name, fingerprint, plan, spec, family, panels, sheets, finish, logo, .. } =
         file;
-    let target = Target { name, spec, family, panels, plan };
+    let target = Target { name, spec, family, panels, plan, codes: Codes::default() };
     check(&target).and_then(|()| check_identity(&target, fingerprint))?;
     Ok((target, Printed { sheets: sheets.unwrap_or_default(), finish, logo }))
 }
@@ -153,7 +154,7 @@ pub fn write<S: Serialize, F: Serialize, L: Serialize>(
     printed: Printed<S, F, L>,
 ) -> String {
     let fingerprint = Some(target.identity().fingerprint);
-    let Target { name, spec, family, panels, plan } = target.clone();
+    let Target { name, spec, family, panels, plan, .. } = target.clone();
     let Printed { sheets, finish, logo } = printed;
     let (schema, sheets) = (SCHEMA.to_owned(), Some(sheets));
     let file =

@@ -36,7 +36,7 @@ pub use boards::{
 };
 pub use corner::{Corner, MeasuredPlace};
 pub use error::TargetError;
-pub use family_ref::{FamilyRef, OtherFamily};
+pub use family_ref::{FamilyRef, OtherFamily, UnknownCodes};
 pub use json::{SCHEMA, TargetFileError};
 pub use length::{BoxError, LengthError, parse_box_mm, parse_length_mm};
 pub use panel::{Outline, Panel, TagPlacement, TagsIn};

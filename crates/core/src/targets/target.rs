@@ -3,8 +3,10 @@
 use crate::family::Family;
 use crate::lattice::GridKind;
 use crate::targets::boards::capacity;
+use crate::targets::family_ref::Codes;
 use crate::targets::{
     FamilyRef, MeasuredPlace, Name, OtherFamily, Panel, PanelPose, TargetIdentity, TargetSpec,
+    UnknownCodes,
 };
 
 /// A target: its panels with their corners and tags, whatever they are printed on.
@@ -20,6 +22,7 @@ pub struct Target {
     pub panels: Vec<Panel>,
     /// Identity of the target as printed, where this one has measured corners or refined panels.
     pub plan: Option<TargetIdentity>,
+    pub(in crate::targets) codes: Codes,
 }
 
 impl Target {
@@ -79,11 +82,54 @@ impl Target {
         Some((self.family.as_ref()?.of_tiling(kind), ids))
     }
 
+    /// The family of its tags: the one that it was made with or given, else the shipped one of that name. `None` on an
+    /// untagged target.
+    ///
+    /// # Errors
+    /// Where none was given, and no shipped one has its codes.
+    pub fn family(&self) -> Result<Option<&Family>, UnknownCodes> {
+        let Some(named) = &self.family else { return Ok(None) };
+        if let Some(codes) = self.codes.get() {
+            return Ok(Some(codes));
+        }
+        let shipped = |named: &FamilyRef| Family::shipped(&named.name).ok();
+        let squares = named.squares.as_deref().and_then(shipped);
+        let found = Family::paired(shipped(named), squares);
+        let found = found.filter(|family| self.check_families(family).is_ok());
+        let unknown = || {
+            let squares = named.squares.iter().map(|squares| format!(" and {}", squares.name));
+            let family = squares.fold(named.name.clone(), |names, name| names + &name);
+            UnknownCodes { target: self.name.to_string(), family }
+        };
+        found.map(|family| Some(self.codes.or(family))).ok_or_else(unknown)
+    }
+
+    /// Sets the family of its tags, which a target that was read from a file needs where that is not shipped. A target of
+    /// both tilings needs a family with squares, see [`Family::with_squares`].
+    ///
+    /// # Errors
+    /// Where this is not the family that the target names.
+    pub fn set_family(&mut self, family: &Family) -> Result<(), OtherFamily> {
+        self.check_families(family)?;
+        self.codes = Codes::of(Some(family));
+        Ok(())
+    }
+
+    /// [`Self::check_family`] of each tiling.
+    fn check_families(&self, family: &Family) -> Result<(), OtherFamily> {
+        let named = self.family.as_ref().ok_or(OtherFamily::NoTags)?;
+        self.tilings().try_for_each(|kind| {
+            let own = family.of_tiling(kind).unwrap_or(family);
+            self.check_family(named.of_tiling(kind), own)
+        })
+    }
+
     /// Whether a family is one that the target names: it has the fingerprint, or had it before it grew, and all tags
     /// of the target then.
     ///
     /// # Errors
     /// Why it is not.
+    #[doc(hidden)]
     pub fn check_family(&self, named: &FamilyRef, family: &Family) -> Result<(), OtherFamily> {
         let of_family = self.panels.iter().filter(|panel| panel.kind == family.kind());
         for panel in of_family {
@@ -154,6 +200,7 @@ mod tests {
         let tags = TagSpec { family: "grown".to_owned(), ..TagSpec::default() };
         let spec = BoardSpec { tags: Some(tags), ..BoardSpec::deltille(8, 10, 20.0) };
         let mut board = Target::build("old", &TargetSpec::Board(spec), Some(&then)).unwrap();
+        assert_eq!(board.family(), Ok(Some(&then)));
         let named = board.family.clone().unwrap();
         assert_eq!(board.check_family(&named, &then), Ok(()));
         assert_eq!(board.check_family(&named, &now), Ok(()));
@@ -162,5 +209,35 @@ mod tests {
         board.panels[0].tags[0].id = 20;
         let why = board.check_family(&named, &now).unwrap_err();
         assert!(matches!(why, OtherFamily::Id { id: 20, codes: 20, .. }), "{why}");
+    }
+
+    /// Of one's own families a file has the name and the fingerprint; the codes are set, and no others can be.
+    #[test]
+    fn a_target_that_was_read_needs_its_own_family() {
+        let shipped = Family::shipped("delTag16h5").unwrap();
+        let of = |name: &str, codes: &[u64]| {
+            let source = Construction::Imported { source: "a test".to_owned() };
+            let dimension = shipped.dimension();
+            Family::new(name, dimension, 5, codes.to_vec(), Rules::NONE, source).unwrap()
+        };
+        // Whatever it is called: one that is shipped has that name, too.
+        for name in ["own", "delTag16h5"] {
+            let own = of(name, &shipped.codes()[1..]);
+            let tags = TagSpec { family: name.to_owned(), ..TagSpec::default() };
+            let spec = BoardSpec { tags: Some(tags), ..BoardSpec::deltille(8, 10, 20.0) };
+            let board = Target::build("board", &TargetSpec::Board(spec), Some(&own)).unwrap();
+            let mut read = Target::from_json(&board.to_json()).unwrap();
+            assert_eq!(read, board);
+            let (target, family) = ("board".to_owned(), name.to_owned());
+            assert_eq!(read.family(), Err(UnknownCodes { target, family }));
+            assert!(matches!(read.set_family(&shipped), Err(OtherFamily::Codes { .. })));
+            read.set_family(&own).unwrap();
+            assert_eq!(read.clone().family(), Ok(Some(&own)));
+        }
+        let mut plain =
+            Target::new("plain", BoardSpec { tags: None, ..BoardSpec::deltille(8, 10, 20.0) })
+                .unwrap();
+        assert_eq!(plain.family(), Ok(None));
+        assert_eq!(plain.set_family(&shipped), Err(OtherFamily::NoTags));
     }
 }

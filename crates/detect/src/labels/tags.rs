@@ -285,25 +285,25 @@ fn corner_contrast(image: ImageView, grid: &SaddleGrid, tile: Tile) -> f64 {
 mod tests {
     use glam::DVec3;
 
-    use crate::{Detector, DetectorConfig};
+    use crate::Detector;
     use deltille_core::camera::{Camera, Pose};
     use deltille_core::family::{Construction, Family, FreeCells, Rules};
     use deltille_core::lattice::GridKind;
-    use deltille_core::targets::{BoardSpec, TagSpec, TargetSpec};
-    use deltille_layout::artwork;
+    use deltille_core::targets::{BoardSpec, TagSpec, Target, TargetSpec};
+
     use deltille_layout::synth::{Light, scene_of_sheet};
     use deltille_layout::{PaperSpec, Printing};
 
-    /// Ids of the tags that are read of a board of 8 × 10 corners, each with the number of its wrong cells.
-    fn read_back(board: &Printing, printed: &Family, family: &Family) -> Vec<(u32, u32)> {
-        let sheets = artwork::draw(board, Some(printed)).unwrap().sheets;
-        let scene = scene_of_sheet(board, &sheets[0], 0);
+    /// Ids of the tags that are read of a printed board of 8 × 10 corners, each with the number of its wrong cells.
+    fn read_back(printed: &Printing, target: &Target) -> Vec<(u32, u32)> {
+        let sheets = printed.draw().unwrap().sheets;
+        let scene = scene_of_sheet(printed, &sheets[0], 0);
         let middle = DVec3::new(80.0, 60.0, 0.0);
         let pose = Pose::looking_at(DVec3::new(100.0, 20.0, 340.0), middle, DVec3::Y);
         let light = Light::default().noise(0.01);
         let image = scene.render(&Camera::pinhole(1280, 960, 1.0), &pose, &light);
         let image = image.map(|v| (v.clamp(0.0, 1.0) * 255.0 + 0.5) as u8);
-        let detector = Detector::for_target(&board.target, Some(family), DetectorConfig::default());
+        let detector = Detector::new(target).unwrap();
         let found = detector.detect(&image, "view");
         assert!(found.grids.iter().all(|grid| grid.kind == GridKind::Deltille));
         let tags = found.grids.iter().flat_map(|grid| &grid.tags);
@@ -313,13 +313,11 @@ mod tests {
     /// The largest tags, whose cells fill a machine word, are read like others, on inverted boards, too.
     #[test]
     fn tags_of_64_cells_are_read() {
-        let family = Family::shipped("d64h12").unwrap();
         for inverted in [false, true] {
             let tags = TagSpec { family: "d64h12".to_owned(), first_id: 77, ..TagSpec::default() };
             let spec = BoardSpec { tags: Some(tags), inverted, ..BoardSpec::deltille(8, 10, 20.0) };
-            let (spec, paper) = (TargetSpec::Board(spec), PaperSpec::default());
-            let board = Printing::build("board", &spec, Some(&family), Some(&paper)).unwrap();
-            let mut read = read_back(&board, &family, &family);
+            let board = Printing::new("board", spec).unwrap();
+            let mut read = read_back(&board, &board.target);
             read.sort_unstable();
             let printed = (77..).take(board.target.panels[0].tags.len()).map(|id| (id, 0));
             assert_eq!(read, printed.collect::<Vec<_>>(), "inverted: {inverted}");
@@ -344,12 +342,14 @@ mod tests {
             let tags = TagSpec { family: "holed".to_owned(), ..TagSpec::default() };
             let spec = BoardSpec { tags: Some(tags), ..BoardSpec::deltille(8, 10, 20.0) };
             let (spec, paper) = (TargetSpec::Board(spec), PaperSpec::default());
-            let board = Printing::build("board", &spec, Some(&family), Some(&paper)).unwrap();
-            let tags = board.target.panels[0].tags.len();
+            let board = Target::build("board", &spec, Some(&family)).unwrap();
+            let tags = board.panels[0].tags.len();
             for shown in [0, free, free & 0x5555_5555_5555, free & 0x0f0f_0f0f_0f0f] {
                 // As printed, or with something bright in the hole.
                 let printed = of(codes.iter().map(|code| code | shown).collect(), None);
-                let read = read_back(&board, &printed, &family);
+                let printed =
+                    Printing::build("board", &spec, Some(&printed), Some(&paper)).unwrap();
+                let read = read_back(&printed, &board);
                 let read: Vec<u32> = read.into_iter().map(|(_, errors)| errors).collect();
                 assert_eq!(read, vec![0; tags], "{} shows {shown:#x}", like.name());
             }

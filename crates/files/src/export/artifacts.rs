@@ -6,7 +6,7 @@
 //! use deltille_files::export::artifacts::{Making, What, make};
 //!
 //! let board = Printing::new("desk", BoardSpec::deltille(4, 5, 20.0))?;
-//! let files = make(&board, board.target.family()?.as_ref(), What::Svg, Making::default())?;
+//! let files = make(&board, What::Svg, Making::default())?;
 //! assert_eq!(files[0].0, "desk.svg");
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
@@ -26,7 +26,6 @@ use crate::export::writing::staging::Staging;
 use crate::export::{laser_file_name, sheet_file_name};
 use crate::limits::{Limits, ReadError};
 use crate::target_file;
-use deltille_core::family::Family;
 use deltille_core::setting::Setting::SolidSkeleton;
 use deltille_core::targets::{
     Skeleton, SolidSpec, Target, TargetError, TargetIdentity, TargetSpec,
@@ -185,26 +184,19 @@ pub type Files = Vec<(String, Vec<u8>)>;
 /// The files of one kind that are made of a target.
 ///
 /// # Errors
-/// Where the target has none of that kind, or its family is missing.
-pub fn make(
-    printing: &Printing,
-    family: Option<&Family>,
-    what: What,
-    making: Making,
-) -> Result<Files, MakeError> {
+/// Where the target has none of that kind, or the family of its tags is unknown.
+pub fn make(printing: &Printing, what: What, making: Making) -> Result<Files, MakeError> {
     let target = &printing.target;
     let name = &target.name;
     let named = |end: &str, bytes: Vec<u8>| vec![(format!("{name}{end}"), bytes)];
     Ok(match what {
         What::Json => named(".json", printing.to_json().into_bytes()),
-        What::Pdf | What::Svg | What::Png => drawn(printing, family, what, making)?,
+        What::Pdf | What::Svg | What::Png => drawn(printing, what, making)?,
         What::Dsc(dialect) => named(".dsc", dsc::write(target, dialect)?.into_bytes()),
         What::Gltf | What::Obj | What::Sdf | What::Urdf | What::Mjcf | What::Usd => {
-            of_mesh(&TexturedMesh::new(target, family, making.mesh)?, what)
+            of_mesh(&TexturedMesh::new(target, making.mesh)?, what)
         }
-        What::ThreeMf => {
-            named(".3mf", threemf::to_bytes(&InlaidBodies::new(target, family, making.mesh)?))
-        }
+        What::ThreeMf => named(".3mf", threemf::to_bytes(&InlaidBodies::new(target, making.mesh)?)),
         What::Stl => {
             named(".stl", stl::to_bytes(name, &solid(target)?.polyhedron().triangles_mm()))
         }
@@ -220,11 +212,11 @@ pub fn make(
         }
         What::Net => named("-net.dxf", dxf::text(&artwork::net_to_cut(printing)?).into_bytes()),
         What::LaserDxf => {
-            let drawing = artwork::to_laser(printing, family, making.kerf_mm)?;
+            let drawing = artwork::to_laser(printing, making.kerf_mm)?;
             vec![(laser_file_name(name, "dxf"), dxf::text(&drawing).into_bytes())]
         }
         What::LaserSvg => {
-            let drawing = artwork::to_laser(printing, family, making.kerf_mm)?;
+            let drawing = artwork::to_laser(printing, making.kerf_mm)?;
             let text = laser_svg::text(&drawing, name, &artwork::subject(target));
             vec![(laser_file_name(name, "svg"), text.into_bytes())]
         }
@@ -281,16 +273,11 @@ fn skeleton(target: &Target) -> Result<Skeleton, MakeError> {
 }
 
 /// The pages of a target.
-fn drawn(
-    printing: &Printing,
-    family: Option<&Family>,
-    what: What,
-    making: Making,
-) -> Result<Files, MakeError> {
+fn drawn(printing: &Printing, what: What, making: Making) -> Result<Files, MakeError> {
     if printing.sheets.is_empty() {
         return Err(MakeError::NoSheets(printing.target.name.to_string()));
     }
-    let artwork = artwork::draw(printing, family)?;
+    let artwork = printing.draw()?;
     let (name, count) = (&printing.target.name, artwork.sheets.len());
     let pages = 0..count;
     Ok(match what {

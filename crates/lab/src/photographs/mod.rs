@@ -133,17 +133,14 @@ pub struct Subject {
 }
 
 impl Subject {
-    /// A target that is there already. `family` is the family of its tags.
+    /// A target that is there already.
     ///
     /// # Errors
-    /// Where the target has no sheet, or the family is missing.
-    pub fn new(
-        name: &str,
-        printing: &Printing,
-        family: Option<&Family>,
-    ) -> Result<Self, PhotographError> {
-        let page = PrintedPage::new(printing, family)?;
-        let detector = Detector::for_target(&printing.target, family, DetectorConfig::default())
+    /// Where the target has no sheet, or the family of its tags is unknown.
+    pub fn new(name: &str, printing: &Printing) -> Result<Self, PhotographError> {
+        let page = PrintedPage::new(printing)?;
+        let detector = Detector::for_target(&printing.target, DetectorConfig::default())
+            .map_err(ArtworkError::from)?
             .with_clock(clock::now);
         Ok(Self { name: name.to_owned(), page, detector })
     }
@@ -156,7 +153,7 @@ impl Subject {
         let (spec, paper) = (TargetSpec::Board(kind.spec()), PaperSpec::default());
         let printing = Printing::build(kind.name(), &spec, family, Some(&paper))
             .expect("the boards of the experiment can be made");
-        Self::new(kind.name(), &printing, family)
+        Self::new(kind.name(), &printing)
     }
 }
 

@@ -7,7 +7,6 @@ use glam::DVec2;
 use super::board::draw_panel;
 use super::{ArtworkError, Sheet};
 use crate::Placement;
-use deltille_core::family::Family;
 use deltille_core::targets::{Face, Panel, Target};
 
 /// White between two faces, px: more than the filters of the first mipmap levels reach.
@@ -71,20 +70,14 @@ impl Atlas {
         DVec2::from(self.size_px.map(f64::from)) * (1e3 / f64::from(self.px_per_m))
     }
 
-    /// Draws what is on the faces, whose `panels` are in their order. `family` holds the codes of the tags; it may be
-    /// `None` for a target without tags only.
+    /// Draws what is on the faces, whose `panels` are in their order.
     ///
     /// # Errors
-    /// When the target has tags and the family is missing or lacks a code.
-    pub fn drawn(
-        &self,
-        target: &Target,
-        panels: &[Panel],
-        family: Option<&Family>,
-    ) -> Result<Sheet, ArtworkError> {
+    /// When the family of its tags is unknown or lacks a code.
+    pub fn drawn(&self, target: &Target, panels: &[Panel]) -> Result<Sheet, ArtworkError> {
         let mut shapes = Vec::new();
         for (panel, placement) in panels.iter().zip(&self.placements) {
-            shapes.extend(draw_panel(target, panel, placement, family)?);
+            shapes.extend(draw_panel(target, panel, placement)?);
         }
         let DVec2 { x: width_mm, y: height_mm } = self.size_mm();
         Ok(Sheet { width_mm, height_mm, shapes })

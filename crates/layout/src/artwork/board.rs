@@ -15,18 +15,14 @@ use deltille_core::targets::{Panel, TagPlacement, TagsIn, Target};
 const DISC_TOLERANCE_MM: f64 = 1e-4;
 
 /// Draws sheet `index` of a target, in the frame of the whole sheet, mm.
-pub(super) fn sheet(
-    printing: &Printing,
-    family: Option<&Family>,
-    index: usize,
-) -> Result<Sheet, ArtworkError> {
+pub(super) fn sheet(printing: &Printing, index: usize) -> Result<Sheet, ArtworkError> {
     let (target, layout) = (&printing.target, &printing.sheets[index]);
     let mut shapes = Vec::new();
     for placement in &layout.placements {
         let panel = target.panels.iter().find(|panel| panel.id == placement.panel);
         let panel =
             panel.ok_or(ArtworkError::NoSuchPanel { sheet: index + 1, panel: placement.panel })?;
-        shapes.extend(draw_panel(target, panel, placement, family)?);
+        shapes.extend(draw_panel(target, panel, placement)?);
     }
     shapes.extend(marks(layout, printing.logo.as_ref())?);
     Ok(Sheet { width_mm: layout.width_mm, height_mm: layout.height_mm, shapes })
@@ -112,7 +108,6 @@ pub(super) fn draw_panel(
     target: &Target,
     panel: &Panel,
     placement: &Placement,
-    family: Option<&Family>,
 ) -> Result<Vec<Shape>, ArtworkError> {
     let page_from_panel = Affine::translate((placement.origin_mm.x, placement.origin_mm.y))
         * Affine::rotate(placement.angle_rad);
@@ -127,7 +122,7 @@ pub(super) fn draw_panel(
     let mut drawn: BTreeMap<Tile, BezPath> =
         panel.dark_tiles().into_iter().map(|tile| (tile, tile_outline(panel, tile, 0.0))).collect();
     for tag in &panel.tags {
-        let (cells, word) = tag_word(target, panel, tag, family)?;
+        let (cells, word) = tag_word(target, panel, tag)?;
         let tile = panel.tag_tile(tag);
         if panel.tags_in == TagsIn::White {
             let margin = panel.tag_margin_bits() / cells.width(panel.tag_inset_bits());
@@ -160,21 +155,16 @@ pub(super) fn tag_word(
     target: &Target,
     panel: &Panel,
     tag: &TagPlacement,
-    family: Option<&Family>,
 ) -> Result<(TagCells, u64), ArtworkError> {
-    let Some(family) = family.and_then(|family| family.of_tiling(panel.kind)) else {
-        let named = target.family.as_ref().map(|family| family.of_tiling(panel.kind));
-        let name = named.map_or_else(String::new, |f| f.name.clone());
-        return Err(ArtworkError::FamilyMissing(name));
-    };
-    let word = family.code(tag.id).ok_or_else(|| ArtworkError::NoSuchTag {
+    let family = target.family()?.and_then(|family| family.of_tiling(panel.kind));
+    let word = family.and_then(|family| Some((family.cells(), family.code(tag.id)?)));
+    word.ok_or_else(|| ArtworkError::NoSuchTag {
         id: tag.id,
         row: tag.row,
         col: tag.col,
-        family: family.name().to_owned(),
-        len: family.len(),
-    })?;
-    Ok((family.cells(), word))
+        family: family.map_or_else(String::new, |family| family.name().to_owned()),
+        len: family.map_or(0, Family::len),
+    })
 }
 
 /// A polygon in the frame of its panel, mm, from points in the coordinates of a tile.

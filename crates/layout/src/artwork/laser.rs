@@ -135,14 +135,11 @@ fn faces_in_rows<'a>(target: &'a Target, faces: &[Face]) -> Vec<LaserBoard<'a>> 
 /// above it.
 ///
 /// # Errors
-/// When the target is neither made of boards nor a solid, its family is missing or lacks a code, or the beam is too wide.
-pub fn to_laser(
-    printing: &Printing,
-    family: Option<&Family>,
-    kerf_mm: f64,
-) -> Result<CutDrawing, CuttingError> {
+/// When the target is neither made of boards nor a solid, the family of its tags is unknown or lacks a code, or the beam is too wide.
+pub fn to_laser(printing: &Printing, kerf_mm: f64) -> Result<CutDrawing, CuttingError> {
     let boards = laser_boards(printing)?;
     let target = &printing.target;
+    let family = target.family().map_err(ArtworkError::from)?;
     let finest = target.panels.iter().map(|panel| finest_mm(panel, family));
     let most_mm = (KERF_PART * finest.fold(f64::INFINITY, f64::min)).min(WIDEST_KERF_MM);
     if !(0.0..=most_mm).contains(&kerf_mm) {
@@ -151,7 +148,7 @@ pub fn to_laser(
     let half = kerf_mm / 2.0;
     let mut paths = Vec::new();
     for board in &boards {
-        let dark = dark_outlines(target, board.panel, family, kerf_mm == 0.0)?;
+        let dark = dark_outlines(target, board.panel, kerf_mm == 0.0)?;
         let dark = dark.iter().map(|outline| moved_inwards(outline, half));
         paths.extend(dark.map(|outline| board.path(CutLayer::Engrave, &outline)));
         // Holes first: what is cut out may move.
@@ -181,7 +178,6 @@ fn finest_mm(panel: &Panel, family: Option<&Family>) -> f64 {
 fn dark_outlines(
     target: &Target,
     panel: &Panel,
-    family: Option<&Family>,
     simple: bool,
 ) -> Result<Vec<Vec<DVec2>>, ArtworkError> {
     if let Some(diameter) = panel.discs_mm {
@@ -198,7 +194,7 @@ fn dark_outlines(
         dark.push(panel.field_outline_mm());
     }
     for tag in &panel.tags {
-        dark.extend(tag_outlines(target, panel, tag, family, simple)?);
+        dark.extend(tag_outlines(target, panel, tag, simple)?);
     }
     dark.extend(holes(panel).map(|mut hole| {
         if panel.inverted {
@@ -230,10 +226,9 @@ fn tag_outlines(
     target: &Target,
     panel: &Panel,
     tag: &TagPlacement,
-    family: Option<&Family>,
     simple: bool,
 ) -> Result<Vec<Vec<DVec2>>, ArtworkError> {
-    let (cells, word) = board::tag_word(target, panel, tag, family)?;
+    let (cells, word) = board::tag_word(target, panel, tag)?;
     let inset = panel.tag_inset_bits();
     let width = cells.width(inset);
     let at = |cell: i32| (inset + f64::from(cell)) / width;
@@ -309,8 +304,8 @@ mod tests {
     }
 
     /// The area of what is drawn in the frame of a board, mm².
-    fn drawn(target: &Target, family: Option<&Family>) -> f64 {
-        let shapes = super::super::panel_shapes(target, &target.panels[0], family).unwrap();
+    fn drawn(target: &Target) -> f64 {
+        let shapes = super::super::panel_shapes(target, &target.panels[0]).unwrap();
         // Loops of white run the other way than those of black, inside a field as inside a tile.
         shapes.iter().map(|shape| even_odd(&shape.path)).sum()
     }
@@ -355,13 +350,11 @@ mod tests {
             }
             let printing = Printing::new("board", spec).unwrap();
             let target = &printing.target;
-            let family = target.family().unwrap();
-            let family = family.as_ref();
-            let exact = to_laser(&printing, family, 0.0).unwrap();
-            let black = drawn(target, family);
+            let exact = to_laser(&printing, 0.0).unwrap();
+            let black = drawn(target);
             prop_assert!((area(&exact, CutLayer::Engrave) / black - 1.0).abs() < 1e-9);
             let kerf = 0.1;
-            let narrow = to_laser(&printing, family, kerf).unwrap();
+            let narrow = to_laser(&printing, kerf).unwrap();
             let back = |path: &CutPath| match path.layer {
                 CutLayer::Engrave => moved_inwards(&path.points_mm, -kerf / 2.0),
                 _ => moved_inwards(&path.points_mm, kerf / 2.0),

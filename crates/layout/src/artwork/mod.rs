@@ -30,9 +30,8 @@ use glam::DVec2;
 use kurbo::{Affine, BezPath};
 
 use crate::{Finish, LineKind, Placement, Printing, SheetText};
-use deltille_core::family::Family;
 use deltille_core::lattice::GridKind;
-use deltille_core::targets::{Panel, Target};
+use deltille_core::targets::{Panel, Target, UnknownCodes};
 use deltille_core::words::counted;
 
 pub use atlas::Atlas;
@@ -146,9 +145,9 @@ pub enum Part {
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum ArtworkError {
-    /// The target has tags and no family was given.
-    #[error("the target has tags of family {0}: the family is needed to draw them")]
-    FamilyMissing(String),
+    /// The codes of its tags are not known.
+    #[error(transparent)]
+    Family(#[from] UnknownCodes),
     /// A tag id is not in the family.
     #[error("tag {id} at row {row}, column {col} is beyond the {len} codes of family {family}")]
     NoSuchTag {
@@ -174,16 +173,13 @@ pub enum ArtworkError {
     /// A text holds a character that the built-in font lacks.
     #[error(transparent)]
     Text(#[from] text::MissingGlyph),
-    /// The family is not shipped with the library; the message names those that are.
-    #[error("{0}")]
-    UnknownFamily(String),
 }
 
 impl Printing {
-    /// Draws every page of a target whose family, if any, is shipped with the library.
+    /// Draws every page of a target, in the page frame, mm.
     ///
     /// # Errors
-    /// When the family is not shipped or lacks a code, a sheet shows an unknown panel, or the font
+    /// When the family of its tags is unknown or lacks a code, a sheet shows an unknown panel, or the font
     /// lacks a character of a text.
     ///
     /// ```
@@ -195,49 +191,32 @@ impl Printing {
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
     pub fn draw(&self) -> Result<Artwork, ArtworkError> {
-        let family =
-            self.target.family().map_err(|e| ArtworkError::UnknownFamily(e.to_string()))?;
-        draw(self, family.as_ref())
-    }
-}
-
-/// Draws every page of a target, in the page frame, mm.
-///
-/// `family` holds the codes of the tags; it may be `None` for a target without tags only.
-///
-/// # Errors
-/// When the family is missing or lacks a code, a sheet shows an unknown panel, or the font lacks a
-/// character of a text.
-pub fn draw(printing: &Printing, family: Option<&Family>) -> Result<Artwork, ArtworkError> {
-    let mut sheets = Vec::with_capacity(printing.page_count());
-    for (index, layout) in printing.sheets.iter().enumerate() {
-        let sheet = board::sheet(printing, family, index)?;
-        if layout.pages.is_empty() {
-            sheets.push(sheet);
-            continue;
+        let mut sheets = Vec::with_capacity(self.page_count());
+        for (index, layout) in self.sheets.iter().enumerate() {
+            let sheet = board::sheet(self, index)?;
+            if layout.pages.is_empty() {
+                sheets.push(sheet);
+                continue;
+            }
+            for page in &layout.pages {
+                sheets.push(board::page(&sheet, self, layout, page)?);
+            }
         }
-        for page in &layout.pages {
-            sheets.push(board::page(&sheet, printing, layout, page)?);
+        if self.finish.mirrored {
+            sheets.iter_mut().for_each(Sheet::mirror);
         }
+        let (title, subject) = (self.target.name.to_string(), subject(&self.target));
+        Ok(Artwork { title, subject, sheets, finish: self.finish.clone() })
     }
-    if printing.finish.mirrored {
-        sheets.iter_mut().for_each(Sheet::mirror);
-    }
-    let (title, subject) = (printing.target.name.to_string(), subject(&printing.target));
-    Ok(Artwork { title, subject, sheets, finish: printing.finish.clone() })
 }
 
 /// Draws the tiles of one panel in the frame of the panel, mm.
 ///
 /// # Errors
-/// When the panel has tags and the family is missing or lacks a code.
-pub fn panel_shapes(
-    target: &Target,
-    panel: &Panel,
-    family: Option<&Family>,
-) -> Result<Vec<Shape>, ArtworkError> {
+/// When the family of its tags is unknown or lacks a code.
+pub fn panel_shapes(target: &Target, panel: &Panel) -> Result<Vec<Shape>, ArtworkError> {
     let placement = Placement { panel: panel.id, angle_rad: 0.0, origin_mm: DVec2::ZERO };
-    board::draw_panel(target, panel, &placement, family)
+    board::draw_panel(target, panel, &placement)
 }
 
 /// The outline of a text in the frame of its page, mm; to be filled by the even-odd rule.

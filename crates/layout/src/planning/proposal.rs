@@ -123,7 +123,7 @@ impl Situation {
         let family = tags.map(|(_, family)| family);
         // A board of tiles of one millimetre tells what of a tile must be seen.
         let unit = Target::build("plan", &TargetSpec::Board(spec.clone()), family)?;
-        let unit = Reach::of(&unit, family);
+        let unit = Reach::of(&unit).map_err(TargetError::from)?;
         let comfortable = if family.is_some() { COMFORTABLE_BIT_PX } else { COMFORTABLE_EDGE_PX };
         let px_at_far = self.focal_px / far_mm * shortening(family.is_some(), self.tilt_rad);
         spec.edge_mm = (comfortable / (unit.detail_mm * px_at_far)).ceil();
@@ -155,7 +155,8 @@ impl Situation {
         let found = smaller.take_while(|&sides| takes(sides)).find(|&sides| fits(sides));
         [spec.rows, spec.cols] = found.ok_or(Unsuited::Paper { edge_mm, far_mm })?;
         let target = Target::build("plan", &TargetSpec::Board(spec.clone()), family)?;
-        Ok(Proposal { spec, reach: Reach::of(&target, family), whole_from_mm })
+        let reach = Reach::of(&target).map_err(TargetError::from)?;
+        Ok(Proposal { spec, reach, whole_from_mm })
     }
 }
 

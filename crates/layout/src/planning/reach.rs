@@ -3,8 +3,7 @@
 use serde::Serialize;
 
 use deltille_core::detection::MIN_UNTAGGED_EDGE_PX;
-use deltille_core::family::Family;
-use deltille_core::targets::{Target, TargetSpec};
+use deltille_core::targets::{Target, TargetSpec, UnknownCodes};
 
 /// A cell of a tag that is so long leaves room for tilt, blur and noise, px; without these half of it is read.
 pub(super) const COMFORTABLE_BIT_PX: f64 = 2.0;
@@ -40,20 +39,24 @@ pub struct Reach {
 }
 
 impl Reach {
-    /// What a target offers; `family` is the one that it names.
+    /// What a target offers.
+    ///
+    /// # Errors
+    /// Where the family of its tags is unknown.
     ///
     /// ```
     /// use deltille_layout::Reach;
     /// use deltille_core::targets::{BoardSpec, Target};
     ///
     /// let board = Target::new("desk", BoardSpec::deltille(10, 11, 20.0))?;
-    /// let reach = Reach::of(&board, board.family()?.as_ref());
+    /// let reach = Reach::of(&board)?;
     /// assert_eq!((reach.corners, reach.tags, reach.ids_left), (110, 11, 332));
     /// let [near, far] = reach.distances_mm(1000.0, 1000.0).unwrap();
     /// assert!((near - reach.size_mm).abs() < 1e-9 && (far - 1052.6).abs() < 0.1);
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
-    pub fn of(target: &Target, family: Option<&Family>) -> Self {
+    pub fn of(target: &Target) -> Result<Self, UnknownCodes> {
+        let family = target.family()?;
         let family_of = |kind| family.and_then(|family| family.of_tiling(kind));
         let tagged = || target.panels.iter().filter(|panel| !panel.tags.is_empty());
         let cells = tagged().filter_map(|panel| {
@@ -83,7 +86,7 @@ impl Reach {
             (_, Some([least, most])) => (most - least).max_element(),
             (_, None) => 0.0,
         };
-        Self {
+        Ok(Self {
             corners: target.panels.iter().map(|panel| panel.corners.len()).sum(),
             bits: bits.sum(),
             tags: tagged().map(|panel| panel.tags.len()).sum(),
@@ -91,7 +94,7 @@ impl Reach {
             detail_mm: cell_mm.unwrap_or(edge_mm),
             needed_px: if cell_mm.is_some() { COMFORTABLE_BIT_PX } else { MIN_UNTAGGED_EDGE_PX },
             size_mm,
-        }
+        })
     }
 
     /// The distances at which it fills the width of the picture and at which its details are just large enough, mm, for a
@@ -128,7 +131,7 @@ mod tests {
     #[test]
     fn without_tags_tiles_must_be_seen() {
         let board = BoardSpec { tags: None, ..BoardSpec::new(GridKind::Checker, 7, 9, 30.0) };
-        let reach = Reach::of(&Target::new("board", board).unwrap(), None);
+        let reach = Reach::of(&Target::new("board", board).unwrap()).unwrap();
         assert_eq!((reach.corners, reach.tags, reach.ids_left), (63, 0, 0));
         assert_eq!((reach.detail_mm, reach.needed_px, reach.size_mm), (30.0, 7.0, 240.0));
         // 56 px are too few for eight tiles.
@@ -141,6 +144,6 @@ mod tests {
         let mut board = BoardSpec::deltille(10, 11, 20.0);
         board.tags.as_mut().unwrap().first_id = 300;
         let target = Target::new("board", board).unwrap();
-        assert_eq!(Reach::of(&target, target.family().unwrap().as_ref()).ids_left, 32);
+        assert_eq!(Reach::of(&target).unwrap().ids_left, 32);
     }
 }

@@ -2,7 +2,6 @@ use super::sheet::black_areas;
 use super::{Scene, Surface};
 use crate::artwork;
 use crate::artwork::ArtworkError;
-use deltille_core::family::Family;
 use deltille_core::polygon::rectangle;
 use deltille_core::targets::{Panel, Target, TargetSpec};
 
@@ -12,8 +11,8 @@ use deltille_core::targets::{Panel, Target, TargetSpec};
 /// Boards of one target are loose sheets that all lie in its origin; only a single one makes sense.
 ///
 /// # Errors
-/// Where the family is missing or lacks a code.
-pub fn scene_of_target(target: &Target, family: Option<&Family>) -> Result<Scene, ArtworkError> {
+/// Where the family of the tags is unknown or lacks a code.
+pub fn scene_of_target(target: &Target) -> Result<Scene, ArtworkError> {
     let faces = match &target.spec {
         TargetSpec::Solid(spec) => spec.faces().ok(),
         TargetSpec::Board(_)
@@ -33,7 +32,7 @@ pub fn scene_of_target(target: &Target, family: Option<&Family>) -> Result<Scene
             panel: panel.id,
             target_from_surface: panel.pose.to_pose(),
             paper_mm,
-            black_mm: black_areas(&artwork::panel_shapes(target, panel, family)?),
+            black_mm: black_areas(&artwork::panel_shapes(target, panel)?),
             corners: corners.collect(),
         })
     };

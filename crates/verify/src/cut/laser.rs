@@ -72,7 +72,7 @@ pub(crate) fn verify(
         return Ok(with(cut, vec![missing.into()]));
     };
     let kerf_mm = (by_mm / KERF_STEP_MM).round() * KERF_STEP_MM;
-    let stated = match artwork::to_laser(&verifier.printing, verifier.family, kerf_mm.max(0.0)) {
+    let stated = match artwork::to_laser(&verifier.printing, kerf_mm.max(0.0)) {
         Ok(stated) if kerf_mm >= 0.0 => stated,
         Ok(_) | Err(CuttingError::Kerf { .. }) => {
             return Ok(with(cut, vec![CutFinding::NoKerf { by_mm }.into()]));

@@ -37,7 +37,7 @@ pub(super) fn view(verifier: &Verifier, model: &Model, panel: &Panel) -> (View, 
     let centre = panel.middle_mm();
     let corners = || panel.corners.iter().map(|c| c.target_mm);
     let radius = corners().map(|c| c.distance(centre)).fold(0.0, f64::max) + 2.0 * panel.edge_mm;
-    let family = verifier.family.and_then(|family| family.of_tiling(panel.kind));
+    let family = verifier.family().and_then(|family| family.of_tiling(panel.kind));
     let cells = family.map(|family| family.cells().width(panel.tag_inset_bits()));
     let cell_mm = panel.edge_mm / cells.unwrap_or(UNTAGGED_CELLS);
     let px_per_mm = (CELL_PX / cell_mm).min(MAX_SIDE_PX / (2.0 * radius));

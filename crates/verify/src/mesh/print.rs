@@ -41,13 +41,13 @@ pub(super) fn check_print(
         verdict.findings.push(finding);
         return;
     }
-    let report = placed.check_tiles(verifier.family);
+    let report = placed.check_tiles(verifier.family());
     verdict.tags_exact = report.tags_exact;
     let on_panel = |place: DVec2| place + low;
     let are_right = report.findings.is_empty();
     let of_tiles = report.findings.into_iter().map(|finding| finding.moved(on_panel).into());
     verdict.findings.extend(of_tiles);
-    let family = verifier.family.and_then(|family| family.of_tiling(panel.kind));
+    let family = verifier.family().and_then(|family| family.of_tiling(panel.kind));
     let looks = family.map(|family| TagLooks::new(family, panel));
     let expected = expected(panel, family, looks.as_ref());
     let texels = Texels {

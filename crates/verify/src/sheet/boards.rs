@@ -138,7 +138,7 @@ fn check_panel(
         check_positions(placed, &found, verdict);
         verdict.findings.extend(missing);
     }
-    let report = placed.check_tiles(verifier.family);
+    let report = placed.check_tiles(verifier.family());
     verdict.tags_exact += report.tags_exact;
     if report.wrong_tiles as f64 <= MAX_WRONG_TILES * report.tiles as f64 {
         verdict.findings.extend(report.findings.into_iter().map(Finding::from));

@@ -56,7 +56,7 @@ pub(crate) fn wish_px_per_mm(verifier: &Verifier, layout: &SheetLayout) -> f64 {
     let here = panels.filter(|panel| layout.placements.iter().any(|p| p.panel == panel.id));
     let cells_mm = here.filter_map(|panel| {
         panel.border_bits?;
-        let family = verifier.family?.of_tiling(panel.kind)?;
+        let family = verifier.family()?.of_tiling(panel.kind)?;
         Some(panel.edge_mm / family.cells().width(panel.tag_inset_bits()))
     });
     cells_mm.map(|cell_mm| CELL_PX / cell_mm).fold(PRINT_PX_PER_MM, f64::max)

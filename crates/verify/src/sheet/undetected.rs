@@ -34,7 +34,7 @@ pub(super) fn check(verifier: &Verifier, panels: &[PlacedPanel], verdict: &mut S
             check_discs(placed, diameter_mm, verdict);
             continue;
         }
-        let report = placed.check_tiles(verifier.family);
+        let report = placed.check_tiles(verifier.family());
         verdict.tags_exact += report.tags_exact;
         if report.wrong_tiles > 0 {
             verdict.findings.push(TileFinding::TagMissing { id: panel.id }.into());

@@ -27,9 +27,8 @@ use deltille::export::{
     dxf, gltf, obj as obj_writer, pdf as pdf_writer, png as png_writer, stl as stl_writer,
     svg as svg_writer,
 };
-use deltille::family::Family;
 use deltille::lattice::GridKind;
-use deltille::layout::{PaperSpec, Printing};
+use deltille::layout::Printing;
 use deltille::targets::{BoardSpec, SolidShape, SolidSpec, TargetSpec};
 use deltille::verify::{Finding, Format, Verdict, Verifier, whole_of};
 use deltille_core::words::shown;
@@ -65,7 +64,6 @@ fn cases(file: &'static str, rows: Vec<Row>) -> Vec<Case> {
 /// A target with its files in a folder.
 struct Artifacts {
     target: Printing,
-    family: Family,
     folder: TempDir,
 }
 
@@ -89,8 +87,7 @@ static SOLID: LazyLock<Artifacts> = LazyLock::new(|| {
     artifacts.draw();
     let (target, write) =
         (&artifacts.target, |name: &str, bytes: &[u8]| artifacts.write(name, bytes));
-    let mesh =
-        TexturedMesh::new(&target.target, Some(&artifacts.family), Meshing::default()).unwrap();
+    let mesh = TexturedMesh::new(&target.target, Meshing::default()).unwrap();
     write("t.glb", &gltf::to_bytes(&mesh));
     write("t.obj", obj_writer::text(&mesh).as_bytes());
     write("t.mtl", obj_writer::material(&mesh).as_bytes());
@@ -113,7 +110,7 @@ static SPLIT: LazyLock<Artifacts> = LazyLock::new(|| {
     let mut making = Making::default();
     making.mesh.textures = 2;
     for what in [What::Gltf, What::Mjcf, What::Usd] {
-        let files = make(&artifacts.target, Some(&artifacts.family), what, making).unwrap();
+        let files = make(&artifacts.target, what, making).unwrap();
         files.iter().for_each(|(name, bytes)| artifacts.write(name, bytes));
     }
     artifacts
@@ -121,10 +118,8 @@ static SPLIT: LazyLock<Artifacts> = LazyLock::new(|| {
 
 impl Artifacts {
     fn new(name: &str, spec: &TargetSpec) -> Self {
-        let family = Family::shipped("delTag25h7").unwrap();
-        let paper = PaperSpec::default();
-        let target = Printing::build(name, spec, Some(&family), Some(&paper)).unwrap();
-        Self { target, family, folder: TempDir::new().unwrap() }
+        let target = Printing::new(name, spec.clone()).unwrap();
+        Self { target, folder: TempDir::new().unwrap() }
     }
 
     fn write(&self, name: &str, bytes: &[u8]) {
@@ -133,7 +128,7 @@ impl Artifacts {
 
     /// Writes the formats that all targets have.
     fn draw(&self) {
-        let artwork = artwork::draw(&self.target, Some(&self.family)).unwrap();
+        let artwork = self.target.draw().unwrap();
         let path =
             |extension| self.folder.path().join(format!("{}.{extension}", self.target.target.name));
         pdf_writer::write(&artwork, &path("pdf")).unwrap();
@@ -144,7 +139,7 @@ impl Artifacts {
     }
 
     fn verify(&self, path: &Path) -> Result<Verdict, String> {
-        let verifier = Verifier::new(&self.target, Some(&self.family)).unwrap();
+        let verifier = Verifier::new(&self.target).unwrap();
         verifier.verify_path(path).map_err(|error| error.to_string())
     }
 

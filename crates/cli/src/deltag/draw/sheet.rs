@@ -11,7 +11,6 @@ use crate::interrupt;
 use crate::output::{Overwrite, say};
 use crate::run::{FAILED, Interrupted};
 use crate::values::{Ids, name, whole};
-use deltille::artwork;
 use deltille::layout::{DEFAULT_MARGIN_MM, PaperSize, PaperSpec, Printing};
 use deltille::limits::Limits;
 use deltille::targets::{TagSheetSpec, TargetSpec, parse_length_mm};
@@ -113,7 +112,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
 
     let formats =
         Formats { pdf: args.pdf || !(args.svg || args.png), svg: args.svg, png: args.png };
-    let artwork = artwork::draw(&target, Some(&family))?;
+    let artwork = target.draw()?;
     let files = drawn(&name, artwork, formats, args.dpi.unwrap_or(300));
     let written = write_all(&args.output, &files, args.overwrite)?;
     for path in &written {
@@ -122,7 +121,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     if args.no_verify {
         return Ok(ExitCode::SUCCESS);
     }
-    let verifier = Verifier::new(&target, Some(&family))?;
+    let verifier = Verifier::new(&target)?;
     let verifier = verifier.within(Limits::NONE).stopped_by(interrupt::flag());
     let mut passed = true;
     for path in &written {

@@ -64,14 +64,14 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         Some((_, target)) => vec![target.into()],
         None => target_file::read_all_placed(&args.target, &limits).context("--target")?,
     };
-    let targets: Vec<Target> = printed.iter().map(|one| one.target.clone()).collect();
-    let families = target_file::families(&targets, args.family.as_deref())?;
+    let mut targets: Vec<Target> = printed.iter().map(|one| one.target.clone()).collect();
+    target_file::set_families(&mut targets, args.family.as_deref())?;
     let sheet = args.sheet.read(&limits, &Reference::Scene(&targets).identities(), &printed)?;
     if let [_, _, ..] = targets.as_slice() {
         // Refuses what is known of one sheet alone.
         sightings::panels(&Reference::Scene(&targets), &sheet)?;
     }
-    let each = targets.iter().zip(families.iter().map(Option::as_ref)).collect::<Vec<_>>();
+    let each: Vec<&Target> = targets.iter().collect();
     let detector = Detector::for_targets(&each, DetectorConfig::default()).context("--target")?;
     let camera = camera_file::read_for("--camera", &args.camera, &targets, args.assume_target)?;
     for target in &targets {

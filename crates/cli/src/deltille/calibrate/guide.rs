@@ -103,13 +103,13 @@ fn px(text: &str) -> Result<f64, String> {
 /// Proposes one view after the other until they are enough.
 pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let limits = args.limits.limits();
-    let printing: Printing = match (&args.target, args.grid.read_target()?) {
+    let mut printing: Printing = match (&args.target, args.grid.read_target()?) {
         (Some(path), _) => target_file::read_placed(path, &limits).context("--target")?,
         (None, Some((_, target))) => target.into(),
         (None, None) => bail!("give --target FILE, or --grid for an untagged board"),
     };
+    target_file::set_family(&mut printing.target, args.family.as_deref())?;
     let target = &printing.target;
-    let family = target_file::family(target, args.family.as_deref())?;
     ensure!(
         args.folder.is_dir(),
         "{}: is no folder: name the one that fills",
@@ -123,7 +123,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     );
     let sheet = args.sheet.read(&limits, &[target.identity()], std::slice::from_ref(&printing))?;
     let panels = sightings::panels(&reference, &sheet)?;
-    let detector = Detector::for_targets(&[(target, family.as_ref())], DetectorConfig::default());
+    let detector = Detector::for_targets(&[target], DetectorConfig::default());
     let detector = detector.context("--target")?;
     let near = args.camera.as_deref().map(|path| {
         camera_file::read_for("--camera", path, std::slice::from_ref(target), args.assume_target)

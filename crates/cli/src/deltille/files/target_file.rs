@@ -1,4 +1,4 @@
-//! Targets from files, and the families that they name.
+//! Targets from files, with the families that they name.
 
 use std::path::{Path, PathBuf};
 
@@ -6,7 +6,7 @@ use anyhow::{Context, anyhow, bail};
 
 use crate::output::tell;
 use deltille::detect::check_distinct;
-use deltille::family::{self, Family};
+use deltille::family;
 use deltille::layout::Printing;
 use deltille::limits::Limits;
 use deltille::target_file::{self, TargetFamilyError};
@@ -49,10 +49,10 @@ fn read_each(paths: &[PathBuf], limits: &Limits) -> anyhow::Result<Vec<Printing>
     Ok(targets)
 }
 
-/// The family of each of several targets; a file that is given is that of those which name its family.
-pub fn families(targets: &[Target], given: Option<&str>) -> anyhow::Result<Vec<Option<Family>>> {
+/// Sets the family of each of several targets; a file that is given is that of those which name its family.
+pub fn set_families(targets: &mut [Target], given: Option<&str>) -> anyhow::Result<()> {
     if let [only] = targets {
-        return Ok(vec![family(only, given)?]);
+        return set_family(only, given);
     }
     let name = given.map(|given| family::resolve(given).context("--family")).transpose()?;
     let name = name.map(|family| family.name().to_owned());
@@ -64,13 +64,15 @@ pub fn families(targets: &[Target], given: Option<&str>) -> anyhow::Result<Vec<O
     {
         bail!("--family: no target carries tags of {name}");
     }
-    let own = |target: &Target| family(target, given.filter(|_| names_it(target)));
-    targets.iter().map(own).collect()
+    targets.iter_mut().try_for_each(|target| {
+        let given = given.filter(|_| names_it(target));
+        set_family(target, given)
+    })
 }
 
-/// The family of a target, see [`target_file::family`].
-pub fn family(target: &Target, given: Option<&str>) -> anyhow::Result<Option<Family>> {
-    target_file::family(target, given).map_err(|error| match error {
+/// Sets the family of a target, see [`target_file::set_family`].
+pub fn set_family(target: &mut Target, given: Option<&str>) -> anyhow::Result<()> {
+    target_file::set_family(target, given).map_err(|error| match error {
         TargetFamilyError::Named { .. } => {
             anyhow!(error).context("give the family's file with --family")
         }

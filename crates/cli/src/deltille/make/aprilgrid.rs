@@ -63,8 +63,8 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let family = family.as_ref();
     let printing =
         args.printing.build("aprilgrid", &TargetSpec::AprilGrid(spec.clone()), family, is_made)?;
-    let mut files = args.printing.files(&printing, family, is_made)?;
-    let (meshes, texture) = args.meshes.files(&printing.target, family)?;
+    let mut files = args.printing.files(&printing, is_made)?;
+    let (meshes, texture) = args.meshes.files(&printing.target)?;
     files.extend(meshes);
     match spec.to_kalibr_yaml() {
         Some(yaml) => files.push(text_file(format!("{}.yaml", printing.target.name), yaml)),
@@ -83,5 +83,5 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         tag_range(family.map_or("", |family| family.name()), spec.first_id, last),
         page(&printing)
     );
-    args.printing.delivery.deliver(&printing, family, &files, &summary)
+    args.printing.delivery.deliver(&printing, &files, &summary)
 }

@@ -13,9 +13,8 @@ use super::settings::template::Template;
 use super::single_panel::idle_without_pages;
 use crate::deltille::files::written::{File, Formats, drawn, text_file};
 use crate::output::tell;
-use deltille::artwork;
 use deltille::export::dsc;
-use deltille::family::{self, Family, FamilyError, FamilyFileError, square_names};
+use deltille::family::{self, FamilyError, FamilyFileError, square_names};
 use deltille::lattice::GridKind;
 use deltille::layout::{Printing, tag_range};
 use deltille::targets::TargetSpec;
@@ -95,18 +94,18 @@ pub fn run(grid: GridKind, args: Args) -> anyhow::Result<ExitCode> {
         Template::new(path, text, args.delivery.overwrite)
     });
     let template = template.transpose()?;
-    let mut files = files(&plan, &printing, family.as_ref())?;
-    let (meshes, texture) = meshes.files(target, family.as_ref())?;
+    let mut files = files(&plan, &printing)?;
+    let (meshes, texture) = meshes.files(target)?;
     files.extend(meshes);
-    files.extend(laser.files(&printing, family.as_ref())?);
+    files.extend(laser.files(&printing)?);
     let told = summary(&printing) + &texture;
-    let delivered = args.delivery.deliver(&printing, family.as_ref(), &files, &told)?;
+    let delivered = args.delivery.deliver(&printing, &files, &told)?;
     template.map_or(Ok(()), |template| template.write())?;
     Ok(delivered)
 }
 
 /// The files of a plan. What can be refused is refused here, before anything is written.
-fn files(plan: &Plan, printing: &Printing, family: Option<&Family>) -> anyhow::Result<Vec<File>> {
+fn files(plan: &Plan, printing: &Printing) -> anyhow::Result<Vec<File>> {
     let name = &printing.target.name;
     let mut files = vec![text_file(format!("{name}.json"), printing.to_json())];
     if let Some(dialect) = plan.dsc {
@@ -115,7 +114,7 @@ fn files(plan: &Plan, printing: &Printing, family: Option<&Family>) -> anyhow::R
     }
     let formats = Formats { pdf: plan.pdf, svg: plan.svg, png: plan.png };
     if !printing.sheets.is_empty() {
-        files.extend(drawn(name, artwork::draw(printing, family)?, formats, plan.dpi));
+        files.extend(drawn(name, printing.draw()?, formats, plan.dpi));
     }
     Ok(files)
 }

@@ -62,8 +62,8 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let family = family.as_ref();
     let printing =
         args.printing.build("charuco", &TargetSpec::Charuco(spec.clone()), family, is_made)?;
-    let mut files = args.printing.files(&printing, family, is_made)?;
-    let (meshes, texture) = args.meshes.files(&printing.target, family)?;
+    let mut files = args.printing.files(&printing, is_made)?;
+    let (meshes, texture) = args.meshes.files(&printing.target)?;
     files.extend(meshes);
     let last = spec.first_id + spec.markers() - 1;
     let [columns, rows] = spec.squares;
@@ -75,5 +75,5 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         tag_range(&spec.dictionary, spec.first_id, last),
         page(&printing)
     );
-    args.printing.delivery.deliver(&printing, family, &files, &summary)
+    args.printing.delivery.deliver(&printing, &files, &summary)
 }

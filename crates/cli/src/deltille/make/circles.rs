@@ -41,7 +41,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     };
     let printing =
         args.printing.build("circles", &TargetSpec::Circles(spec.clone()), None, false)?;
-    let files = args.printing.files(&printing, None, false)?;
+    let files = args.printing.files(&printing, false)?;
     let summary = format!(
         "{}: {} × {} circles, spacing {} mm, diameter {} mm{}",
         printing.target.name,
@@ -51,5 +51,5 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         spec.diameter_mm,
         page(&printing)
     );
-    args.printing.delivery.deliver(&printing, None, &files, &summary)
+    args.printing.delivery.deliver(&printing, &files, &summary)
 }

@@ -11,7 +11,6 @@ use crate::deltille::files::limits::FileLimits;
 use crate::deltille::files::target_file;
 use crate::deltille::files::written::{File, same_file, write_all};
 use crate::output::{self, Overwrite, Telling, say};
-use deltille::family::Family;
 use deltille::layout::Printing;
 use deltille::limits::Limits;
 use deltille::targets::Target;
@@ -78,7 +77,6 @@ impl Delivery {
     pub fn deliver(
         &self,
         printing: &Printing,
-        family: Option<&Family>,
         files: &[File],
         summary: &str,
     ) -> anyhow::Result<ExitCode> {
@@ -102,8 +100,7 @@ impl Delivery {
             .cloned()
             .collect();
         // They were just made, however large.
-        let prove =
-            || verify::prove(printing, family, &artifacts, false, self.telling, Limits::NONE);
+        let prove = || verify::prove(printing, &artifacts, false, self.telling, Limits::NONE);
         let proof = (!self.no_verify && !artifacts.is_empty()).then(prove).transpose()?;
         let code = proof.as_ref().map_or(ExitCode::SUCCESS, Proof::code);
         if self.telling.is_json() {

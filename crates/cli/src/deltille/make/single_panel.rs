@@ -11,7 +11,6 @@ use super::settings::logo;
 use super::settings::option_checks::refuse_idle;
 use crate::deltille::files::written::{File, Formats, drawn, text_file};
 use crate::values::{name, whole};
-use deltille::artwork;
 use deltille::family::Family;
 use deltille::layout::{self, DEFAULT_MARGIN_MM, PaperSize, PaperSpec};
 use deltille::targets::{TargetSpec, parse_length_mm};
@@ -105,20 +104,15 @@ impl PrintingArgs {
     }
 
     /// The description of a target, and its pages; without a PDF that is not asked for where something else `is_made`.
-    pub fn files(
-        &self,
-        printing: &layout::Printing,
-        family: Option<&Family>,
-        is_made: bool,
-    ) -> anyhow::Result<Vec<File>> {
+    pub fn files(&self, printing: &layout::Printing, is_made: bool) -> anyhow::Result<Vec<File>> {
         let formats = Formats { pdf: self.is_pdf(is_made), svg: self.svg, png: self.png };
         let dpi = self.dpi.unwrap_or(DEFAULT_DPI);
         let name = &printing.target.name;
         let mut files = vec![text_file(format!("{name}.json"), printing.to_json())];
         if !printing.sheets.is_empty() {
-            files.extend(drawn(name, artwork::draw(printing, family)?, formats, dpi));
+            files.extend(drawn(name, printing.draw()?, formats, dpi));
         }
-        files.extend(self.laser.files(printing, family)?);
+        files.extend(self.laser.files(printing)?);
         Ok(files)
     }
 }

@@ -15,7 +15,6 @@ use super::settings::template::Template;
 use crate::deltille::files::written::{self, File, bytes_file, text_file};
 use crate::output::say;
 use crate::values::{number, whole};
-use deltille::artwork;
 use deltille::export::artifacts::{self, Making, What};
 use deltille::export::{dsc, solid_mesh};
 use deltille::family::{self, Family};
@@ -176,13 +175,12 @@ fn run_with(
     let spec = settings.spec(shape)?;
     let paper = settings.paper()?;
     let family = family_of(&spec)?;
-    let family = family.as_ref();
     let name = settings.name.clone().unwrap_or_else(|| spec.shape.name().to_owned());
     // What is cut is the net that is printed, or would be: the description has it in either case.
     let net = settings.dxf && !settings.per_face;
     let layout = (settings.printed() || net).then_some(&paper);
     let solid = TargetSpec::Solid(spec.clone());
-    let printing = Printing::build(&name, &solid, family, layout)?;
+    let printing = Printing::build(&name, &solid, family.as_ref(), layout)?;
     let target = &printing.target;
     args.delivery.check_beside(target)?;
     let template = args
@@ -190,13 +188,13 @@ fn run_with(
         .as_deref()
         .map(|path| Template::new(path, settings.to_toml(command), args.delivery.overwrite));
     let template = template.transpose()?;
-    let mut files = files(&settings, &printing, net, &spec, family)?;
-    let (textured, texture) = meshes.files(target, family, None)?;
+    let mut files = files(&settings, &printing, net, &spec)?;
+    let (textured, texture) = meshes.files(target, None)?;
     files.extend(textured);
-    files.extend(settings.laser.files(&printing, family)?);
-    files.extend(pages(&settings, &printing, family)?);
+    files.extend(settings.laser.files(&printing)?);
+    files.extend(pages(&settings, &printing)?);
     let told = summary(target, &spec)? + &texture;
-    let delivered = args.delivery.deliver(&printing, family, &files, &told)?;
+    let delivered = args.delivery.deliver(&printing, &files, &told)?;
     template.map_or(Ok(()), |template| template.write())?;
     Ok(delivered)
 }
@@ -239,7 +237,6 @@ fn files(
     printing: &Printing,
     net: bool,
     spec: &SolidSpec,
-    family: Option<&Family>,
 ) -> anyhow::Result<Vec<File>> {
     let name = &printing.target.name;
     let mut files = vec![text_file(format!("{name}.json"), printing.to_json())];
@@ -254,22 +251,18 @@ fn files(
         (net, What::Net),
     ];
     for (_, what) in asked.into_iter().filter(|(is_asked, _)| *is_asked) {
-        let made = artifacts::make(printing, family, what, Making::default())?;
+        let made = artifacts::make(printing, what, Making::default())?;
         files.extend(made.into_iter().map(|(name, bytes)| bytes_file(name, bytes)));
     }
     Ok(files)
 }
 
 /// The pages that are asked for.
-fn pages(
-    settings: &SolidSettings,
-    printing: &Printing,
-    family: Option<&Family>,
-) -> anyhow::Result<Vec<File>> {
+fn pages(settings: &SolidSettings, printing: &Printing) -> anyhow::Result<Vec<File>> {
     if !settings.printed() {
         return Ok(Vec::new());
     }
-    let artwork = artwork::draw(printing, family)?;
+    let artwork = printing.draw()?;
     let SolidSettings { pdf, svg, png, .. } = *settings;
     let dpi = settings.dpi.unwrap_or(DEFAULT_DPI);
     Ok(written::drawn(&printing.target.name, artwork, written::Formats { pdf, svg, png }, dpi))

@@ -16,7 +16,6 @@ use crate::run::{self, FAILED};
 use crate::{interrupt, progress};
 use deltille::export::kind::Kind;
 use deltille::export::{laser_file_name, sheet_file_name, stl, threemf};
-use deltille::family::Family;
 use deltille::layout::Printing;
 use deltille::limits::Limits;
 use deltille::targets::Target;
@@ -47,9 +46,9 @@ pub struct Args {
 /// Compares files with the target that they should show.
 pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let limits = args.limits.limits();
-    let printing = target_file::read(&args.target, &limits)?;
+    let mut printing = target_file::read(&args.target, &limits)?;
+    target_file::set_family(&mut printing.target, args.family.as_deref())?;
     let printing = printing.under_printed_name();
-    let family = target_file::family(&printing.target, args.family.as_deref())?;
     let folder = args.target.parent().unwrap_or(Path::new("."));
     let alone = args.artifacts.len() == 1;
     let artifacts = match args.artifacts.as_slice() {
@@ -73,7 +72,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         output::check_writable("--report", path)?;
     }
     interrupt::stands("not all was compared");
-    let proof = prove(&printing, family.as_ref(), &artifacts, alone, args.telling, limits)?;
+    let proof = prove(&printing, &artifacts, alone, args.telling, limits)?;
     if let Some(path) = &args.report {
         let json = serde_json::to_string_pretty(&proof).context("--report")? + "\n";
         output::write(path, json.as_bytes(), args.overwrite).context("--report")?;
@@ -92,7 +91,6 @@ const TICK: Duration = Duration::from_millis(200);
 /// unless one is verified `alone`.
 pub fn prove(
     printing: &Printing,
-    family: Option<&Family>,
     artifacts: &[PathBuf],
     alone: bool,
     telling: Telling,
@@ -103,7 +101,7 @@ pub fn prove(
         bar.set_length(total as u64);
         bar.set_position(done as u64);
     };
-    let verifier = Verifier::new(printing, family)?.within(limits).stopped_by(interrupt::flag());
+    let verifier = Verifier::new(printing)?.within(limits).stopped_by(interrupt::flag());
     let verifier = verifier.telling(&show);
     let mut proof = Proof::of(&printing.target);
     let mut done = BTreeSet::new();

@@ -339,10 +339,9 @@ impl PhotographsArgs {
     /// What is photographed.
     fn subjects(&self) -> anyhow::Result<Vec<Subject>> {
         if let Some(path) = &self.target {
-            let printing = target_file::read(path, &Limits::default())?;
-            let target = &printing.target;
-            let family = target_file::family(target, self.family.as_deref())?;
-            let subject = Subject::new(&target.name, &printing, family.as_ref());
+            let mut printing = target_file::read(path, &Limits::default())?;
+            target_file::set_family(&mut printing.target, self.family.as_deref())?;
+            let subject = Subject::new(&printing.target.name, &printing);
             return Ok(vec![subject.with_context(|| path.display().to_string())?]);
         }
         let wanted =

@@ -93,9 +93,11 @@ impl FinderArgs {
             let size = self.rows.zip(self.cols);
             return Ok((Vec::new(), Detector::for_grid(kind, size, config)));
         }
-        let targets = target_file::read_all(&self.target, &self.limits()).context("--target")?;
-        let families = target_file::families(&targets, self.family.as_deref())?;
-        for family in families.iter().flatten() {
+        let mut targets =
+            target_file::read_all(&self.target, &self.limits()).context("--target")?;
+        target_file::set_families(&mut targets, self.family.as_deref())?;
+        for target in &targets {
+            let Some(family) = target.family()? else { continue };
             if let Some(limit) = self.max_errors.filter(|limit| *limit > family.correctable()) {
                 bail!(
                     "--max-errors: {limit} is more than the {} bits that {} can correct",
@@ -104,7 +106,7 @@ impl FinderArgs {
                 );
             }
         }
-        let each = targets.iter().zip(families.iter().map(Option::as_ref)).collect::<Vec<_>>();
+        let each: Vec<&Target> = targets.iter().collect();
         let detector = Detector::for_targets(&each, config).context("--target")?;
         Ok((targets, detector))
     }

@@ -77,8 +77,8 @@ pub struct Args {
 /// Takes a picture of a target and writes it with its truth.
 pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let limits = args.limits.limits();
-    let target = target_file::read(&args.target, &limits)?.target;
-    let family = target_file::family(&target, args.family.as_deref())?;
+    let mut target = target_file::read(&args.target, &limits)?.target;
+    target_file::set_family(&mut target, args.family.as_deref())?;
     if !target.is_one_scene() {
         bail!("{} has several loose boards: render targets of one board, or solids", target.name);
     }
@@ -96,7 +96,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let middle = corners().map(|c| c.target_mm).sum::<DVec3>();
     let pose = args.camera_from_target(middle / corners().count() as f64)?;
 
-    let scene = scene_of_target(&target, family.as_ref())?;
+    let scene = scene_of_target(&target)?;
     let image = scene.render(&camera, &pose, &light);
     let seen = scene.truth(&camera, &pose, 0.0).corners;
     let path = output::file(&args.output, &format!("{}-view", target.name), "png")?;

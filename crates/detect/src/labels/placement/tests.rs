@@ -374,7 +374,7 @@ fn noisy_tags(noise: f64, views: u64, words_a_view: usize) -> NoisyTags {
     let family = Family::shipped("d36h11").unwrap();
     let target = board(&family, 0).unwrap();
     let labeller = TagLabeller::new(&target, &family, None).unwrap();
-    let scene = deltille_layout::synth::scene_of_target(&target, Some(&family)).unwrap();
+    let scene = deltille_layout::synth::scene_of_target(&target).unwrap();
     let panel = &target.panels[0];
     let camera = deltille_core::camera::Camera::pinhole(160, 160, 0.3);
     let bits_across = family.cells().width(panel.tag_inset_bits());

@@ -18,7 +18,6 @@ use spade::{ConstrainedDelaunayTriangulation, Point2, Triangulation};
 
 pub use super::meshing::{INLAY_MM, LEAST_INLAY_MM};
 use super::meshing::{MeshError, Meshing};
-use deltille_core::family::Family;
 use deltille_core::polygon::rectangle;
 use deltille_core::targets::{Panel, Polyhedron, Target, TargetSpec};
 use deltille_layout::artwork::{Part, Shape, panel_shapes, subject};
@@ -64,20 +63,16 @@ impl InlaidBodies {
     /// board's plane.
     ///
     /// # Errors
-    /// When the target is neither, or is several boards, its family is missing, or the inlay is as deep as the plate is
+    /// When the target is neither, or is several boards, the family of its tags is unknown, or the inlay is as deep as the plate is
     /// thick, or so deep that those of two faces meet.
-    pub fn new(
-        target: &Target,
-        family: Option<&Family>,
-        meshing: Meshing,
-    ) -> Result<Self, MeshError> {
+    pub fn new(target: &Target, meshing: Meshing) -> Result<Self, MeshError> {
         let name = target.name.to_string();
         if meshing.inlay_mm.is_nan() || meshing.inlay_mm < LEAST_INLAY_MM {
             return Err(MeshError::ThinInlay(meshing.inlay_mm));
         }
         let [white, black] = match (&target.spec, target.panels.as_slice()) {
             (spec, [panel]) if spec.is_on_plate() => {
-                plate(panel, &panel_shapes(target, panel, family)?, meshing)?
+                plate(panel, &panel_shapes(target, panel)?, meshing)?
             }
             (TargetSpec::Board(spec), _) if spec.two_sided_mm.is_some() => {
                 return Err(MeshError::TwoSides(name));
@@ -85,9 +80,7 @@ impl InlaidBodies {
             (TargetSpec::Board(_), panels) => {
                 return Err(MeshError::SeveralBoards(name, panels.len()));
             }
-            (TargetSpec::Solid(spec), _) => {
-                solid(target, family, &spec.polyhedron(), meshing.inlay_mm)?
-            }
+            (TargetSpec::Solid(spec), _) => solid(target, &spec.polyhedron(), meshing.inlay_mm)?,
             _ => return Err(MeshError::NoShape(name)),
         };
         Ok(Self { name, subject: subject(target), white, black })
@@ -121,12 +114,7 @@ fn plate(panel: &Panel, shapes: &[Shape], meshing: Meshing) -> Result<[Body; 2],
 }
 
 /// The white and the black body of a solid.
-fn solid(
-    target: &Target,
-    family: Option<&Family>,
-    solid: &Polyhedron,
-    inlay_mm: f64,
-) -> Result<[Body; 2], MeshError> {
+fn solid(target: &Target, solid: &Polyhedron, inlay_mm: f64) -> Result<[Body; 2], MeshError> {
     let planes: Vec<(DVec3, DVec3)> = (0..solid.faces.len())
         .map(|face| (solid.normal(face), solid.corners_mm(face)[0]))
         .collect();
@@ -145,7 +133,7 @@ fn solid(
             .into_iter()
             .map(|vertex| panel.pose.panel_from_target(vertex).truncate())
             .collect();
-        let face = Face::new(&outline, &panel_shapes(target, panel, family)?)?;
+        let face = Face::new(&outline, &panel_shapes(target, panel)?)?;
         let dark = face.dark_points().map(|point| below(panel, point, 0.0));
         most_mm = dark.fold(most_mm, |most, place| most.min(deepest(place, &planes, index)));
         let place = |point: DVec2, depth_mm: f64| below(panel, point, depth_mm);

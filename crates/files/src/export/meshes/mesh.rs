@@ -12,7 +12,7 @@ use crate::export::pages::png;
 use deltille_core::family::Family;
 use deltille_core::lattice::GridKind;
 use deltille_core::polygon::rectangle;
-use deltille_core::targets::{Panel, SolidSpec, Target, TargetSpec, triangles};
+use deltille_core::targets::{Panel, SolidSpec, Target, TargetError, TargetSpec, triangles};
 
 /// Cells along the edge of a tile without a tag, as if it had a small one: what is said of them speaks of eighths.
 pub const UNTAGGED_CELLS: f64 = 8.0;
@@ -102,13 +102,9 @@ impl TexturedMesh {
     /// Makes the mesh of a solid, or of a plate with a board, its quiet zone around it, whose front is the board's plane.
     ///
     /// # Errors
-    /// When the target is neither, or is several boards, its family is missing, or the texture would be too large, or
+    /// When the target is neither, or is several boards, the family of its tags is unknown, or the texture would be too large, or
     /// too coarse for the tags.
-    pub fn new(
-        target: &Target,
-        family: Option<&Family>,
-        meshing: Meshing,
-    ) -> Result<Self, MeshError> {
+    pub fn new(target: &Target, meshing: Meshing) -> Result<Self, MeshError> {
         let name = || target.name.to_string();
         let shape = match (&target.spec, target.panels.as_slice()) {
             (TargetSpec::Solid(spec), _) => Shape::Solid(spec),
@@ -132,7 +128,7 @@ impl TexturedMesh {
                 (Surface::Faces(&faces), target.panels.as_slice())
             }
         };
-        let cell_mm = smallest_cell_mm(target, family);
+        let cell_mm = smallest_cell_mm(target, target.family().map_err(TargetError::from)?);
         let is_square = target.panels.iter().any(|panel| panel.kind == GridKind::Checker);
         let needed = if is_square { LEAST_TEXELS_PER_SQUARE_BIT } else { LEAST_TEXELS_PER_BIT };
         let cell = match target.family {
@@ -145,7 +141,7 @@ impl TexturedMesh {
         let px_per_m = pictures.first().map_or(0.0, |first| f64::from(first.atlas.px_per_m));
         let (mut textures, mut textured) = (Vec::new(), Vec::new());
         for (texture, Picture { faces, atlas }) in pictures.into_iter().enumerate() {
-            let sheet = atlas.drawn(target, panels.get(faces).unwrap_or_default(), family)?;
+            let sheet = atlas.drawn(target, panels.get(faces).unwrap_or_default())?;
             let png = png::to_bytes(&sheet, &target.name, px_per_m * 0.0254)?;
             textures.push(Texture { png, size_px: atlas.size_px });
             let size_mm = atlas.size_mm();

@@ -99,7 +99,7 @@ mod tests {
     #[test]
     fn what_is_written_is_read_and_nothing_else() {
         let board = Printing::new("board", BoardSpec::deltille(3, 4, 20.0)).unwrap();
-        let drawing = to_laser(&board, board.target.family().unwrap().as_ref(), 0.15).unwrap();
+        let drawing = to_laser(&board, 0.15).unwrap();
         let good = text(&drawing, "board", "a board");
         let read_back = read(&good, "board", "a board").unwrap();
         assert_eq!(text(&read_back, "board", "a board"), good);

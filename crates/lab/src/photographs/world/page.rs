@@ -8,9 +8,8 @@ use glam::DVec2;
 use super::mips::{Beyond, Footprint, Mips};
 use super::paths::Vertices;
 use crate::photographs::PhotographError;
-use deltille::artwork;
+use deltille::artwork::ArtworkError;
 use deltille::export::pdf;
-use deltille::family::Family;
 use deltille::lattice::GridKind;
 use deltille::layout::Printing;
 use deltille::verify::Document;
@@ -57,11 +56,11 @@ pub struct PrintedPage {
 }
 
 impl PrintedPage {
-    /// Prints the first page of a target. `family` is the family of its tags.
+    /// Prints the first page of a target.
     ///
     /// # Errors
-    /// Where the target has no sheet, or the family is missing.
-    pub fn new(printing: &Printing, family: Option<&Family>) -> Result<Self, PhotographError> {
+    /// Where the target has no sheet, or the family of its tags is unknown.
+    pub fn new(printing: &Printing) -> Result<Self, PhotographError> {
         let (Some(panel), Some(sheet)) = (printing.target.panels.first(), printing.sheets.first())
         else {
             return Err(PhotographError::NoSheet);
@@ -69,7 +68,7 @@ impl PrintedPage {
         if !sheet.pages.is_empty() {
             return Err(PhotographError::SeveralPages);
         }
-        let artwork = artwork::draw(printing, family)?;
+        let artwork = printing.draw()?;
         let folder = tempfile::tempdir()?;
         let path = folder.path().join("page.pdf");
         pdf::write(&artwork, &path)?;
@@ -97,6 +96,7 @@ impl PrintedPage {
                 corners.push(PageCorner { id, panel: panel.id, row, col, page_mm });
             }
         }
+        let family = target.family().map_err(ArtworkError::from)?;
         let bits = family
             .filter(|_| panel.border_bits.is_some())
             .map_or(UNTAGGED_BITS, |family| family.cells().width(panel.tag_inset_bits()));

@@ -271,7 +271,7 @@ mod tests {
     fn the_build_item_stands_at_the_origin_and_lines_are_xml() {
         let spec = BoardSpec { tags: None, ..BoardSpec::new(GridKind::Deltille, 4, 5, 20.0) };
         let target = Target::build("b", &TargetSpec::Board(spec), None).unwrap();
-        let file = to_bytes(&InlaidBodies::new(&target, None, Meshing::default()).unwrap());
+        let file = to_bytes(&InlaidBodies::new(&target, Meshing::default()).unwrap());
         let words = Words::of(&target.into());
         let stated = frame(&words.title, &words.subject, INLAY);
         let parts = parts(&file, &Limits::default(), &mut Findings::default()).unwrap();

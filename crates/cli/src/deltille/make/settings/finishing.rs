@@ -9,7 +9,6 @@ use super::option_checks::{is_false, length, refuse_idle};
 use crate::deltille::files::written::{File, bytes_file};
 use deltille::artwork::CuttingError;
 use deltille::export::artifacts::{MakeError, Making, What, make};
-use deltille::family::Family;
 use deltille::layout::{Finish, Printing};
 
 /// Heading of these options.
@@ -110,14 +109,14 @@ impl Laser {
     }
 
     /// The drawings that are asked for.
-    pub fn files(&self, printing: &Printing, family: Option<&Family>) -> anyhow::Result<Vec<File>> {
+    pub fn files(&self, printing: &Printing) -> anyhow::Result<Vec<File>> {
         let mut making = Making::default();
         making.kerf_mm = length("kerf", &self.kerf)?.unwrap_or(0.0);
         let formats = [(LaserFormat::Dxf, What::LaserDxf), (LaserFormat::Svg, What::LaserSvg)];
         let asked = formats.into_iter().filter(|(format, _)| self.laser.contains(format));
         let mut files = Vec::new();
         for (_, what) in asked {
-            let made = make(printing, family, what, making);
+            let made = make(printing, what, making);
             let is_kerf = matches!(made, Err(MakeError::Cutting(CuttingError::Kerf { .. })));
             let made = made.context(if is_kerf { "--kerf" } else { "--laser" })?;
             files.extend(made.into_iter().map(|(name, bytes)| bytes_file(name, bytes)));

@@ -16,7 +16,6 @@ use deltille::export::inlay::InlaidBodies;
 use deltille::export::mesh::{MAX_TEXTURE_PX, MeshError, Meshing, Resolution, TexturedMesh};
 use deltille::export::texture::MAX_TEXTURES;
 use deltille::export::threemf;
-use deltille::family::Family;
 use deltille::targets::{Target, TargetSpec};
 
 /// Heading of these options.
@@ -156,23 +155,21 @@ impl Meshes {
     pub fn files(
         &self,
         target: &Target,
-        family: Option<&Family>,
         plate_mm: Option<f64>,
     ) -> anyhow::Result<(Vec<File>, String)> {
         let mut meshing = Meshing::default();
         meshing.plate_mm = plate_mm.unwrap_or(meshing.plate_mm);
         meshing.inlay_mm = length("inlay", &self.inlay)?.unwrap_or(meshing.inlay_mm);
         let (mut files, told) = match self.is_textured() {
-            true => self.textured(target, family, meshing)?,
+            true => self.textured(target, meshing)?,
             false => (Vec::new(), String::new()),
         };
         if self.threemf {
-            let bodies = InlaidBodies::new(target, family, meshing);
+            let bodies = InlaidBodies::new(target, meshing);
             let bodies = bodies.map_err(|error| refusal(&error, Some("--3mf")))?;
             files.push(bytes_file(format!("{}.3mf", target.name), threemf::to_bytes(&bodies)));
             if matches!(&target.spec, TargetSpec::Solid(spec) if spec.skeleton.is_some()) {
-                let skeleton =
-                    make(&target.clone().into(), family, What::Skeleton3mf, Making::default());
+                let skeleton = make(&target.clone().into(), What::Skeleton3mf, Making::default());
                 let skeleton = skeleton.context("--3mf")?.into_iter();
                 files.extend(skeleton.map(|(name, bytes)| bytes_file(name, bytes)));
             }
@@ -184,7 +181,6 @@ impl Meshes {
     fn textured(
         &self,
         target: &Target,
-        family: Option<&Family>,
         mut meshing: Meshing,
     ) -> anyhow::Result<(Vec<File>, String)> {
         let option = match (self.texture, self.texture_dpi) {
@@ -199,7 +195,7 @@ impl Meshes {
             (None, None) => None,
         };
         meshing.textures = self.textures.unwrap_or(meshing.textures);
-        let mesh = TexturedMesh::new(target, family, meshing);
+        let mesh = TexturedMesh::new(target, meshing);
         let mesh = mesh.map_err(|error| refusal(&error, option))?;
         let asked = [
             (self.gltf, What::Gltf),
@@ -257,12 +253,8 @@ impl PlateMeshes {
     }
 
     /// As [`Meshes::files`].
-    pub fn files(
-        &self,
-        target: &Target,
-        family: Option<&Family>,
-    ) -> anyhow::Result<(Vec<File>, String)> {
-        self.meshes.files(target, family, length("plate", &self.plate)?)
+    pub fn files(&self, target: &Target) -> anyhow::Result<(Vec<File>, String)> {
+        self.meshes.files(target, length("plate", &self.plate)?)
     }
 }
 

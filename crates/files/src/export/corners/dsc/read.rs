@@ -10,8 +10,7 @@ use deltille_core::lattice::{GridKind, Vertex};
 use deltille_core::quantity::{Range, border_bits, edge_mm, place_mm};
 use deltille_core::statistics::median;
 use deltille_core::targets::{
-    Corner, FamilyRef, ListFormat, ListedSpec, Name, Outline, Panel, PanelPose, TagPlacement,
-    TagsIn, Target, TargetSpec,
+    Corner, FamilyRef, ListFormat, Name, Outline, Panel, PanelPose, TagPlacement, TagsIn, Target,
 };
 use deltille_core::words::{counted, quoted};
 
@@ -80,16 +79,9 @@ fn read_in(text: &str, name: &str, units: &[Units]) -> Result<Target, DscError> 
     };
     let mut next_id = 0;
     let panels = blocks.iter().map(|block| block.panel(&mut next_id, units));
-    let target = Target {
-        name: Name::like(name),
-        spec: TargetSpec::Listed(ListedSpec { format }),
-        panels: panels.collect::<Result<_, _>>()?,
-        family: Some(family_ref(&family, &blocks)?),
-        plan: None,
-    };
-    deltille_core::targets::json::check(&target)
-        .map_err(|(field, problem)| DscError::Target(format!("{field}: {problem}")))?;
-    Ok(target)
+    let panels = panels.collect::<Result<_, _>>()?;
+    Target::listed(Name::like(name), format, family_ref(&family, &blocks)?, panels)
+        .map_err(|(field, problem)| DscError::Target(format!("{field}: {problem}")))
 }
 
 /// The family by its name in this crate, with its fingerprint where the crate has its codes.
