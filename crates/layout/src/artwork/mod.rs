@@ -1,6 +1,6 @@
 //! The drawing of a target in millimetres, independent of the file type.
 //!
-//! [`draw`] turns a target and the codes of its tags into sheets of shapes. Every exporter writes
+//! [`Printing::draw`] turns a target and its layout into sheets of shapes. Every exporter writes
 //! the same shapes, and text is included as glyph outlines, so that PDF, SVG and PNG show the same
 //! marks whatever fonts the reader has.
 //!
