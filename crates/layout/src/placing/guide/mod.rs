@@ -11,22 +11,23 @@
 //!   │ ├──┴──┴──┴──┤        │
 //!   └──────────────────────┘
 //! ```
+//!
+//! 1. `model`: what the picture shows, as lines; 2. `steps`: what to do. The page puts both where there is room.
 
-use std::f64::consts::TAU;
+mod model;
+mod steps;
 
 use glam::{DVec2, DVec3};
 
+use self::model::{Model, THICK_MM, THIN_MM, View};
+use self::steps::steps;
 use super::arrangement::{Footprint, fit_upright};
 use super::margin_marks::ADVANCE_CAPS;
-use crate::paper::{Orientation, PaperSize, PaperSpec, SolidSheets};
+use crate::paper::{Orientation, PaperSize, PaperSpec};
 use crate::{Label, LineKind, SheetLayout, SheetLine, SheetText};
-use deltille_core::lattice::{GridKind, Tile};
-use deltille_core::polygon::rectangle;
 use deltille_core::setting::Setting::PaperMarginMm;
 use deltille_core::targets::format_mm;
-use deltille_core::targets::{
-    BoardSpec, Corner, Incircle, Panel, Polyhedron, SolidSpec, Target, TargetError, TargetSpec,
-};
+use deltille_core::targets::{Incircle, Target, TargetError, TargetSpec};
 use deltille_core::words::counted;
 
 /// Sides of the paper that is taken as it is, mm: what is printed at a desk. Else the page is an A4.
@@ -47,28 +48,12 @@ const MARK_MM: f64 = 4.0;
 const BLANK_MM: f64 = 5.0;
 /// Least share of the room between name and ruler that the picture takes, and the most.
 const PICTURE_SHARE: (f64, f64) = (0.35, 0.62);
-/// Width of lines of the picture and of marks of the ruler, mm.
-const THICK_MM: f64 = 0.3;
-const THIN_MM: f64 = 0.15;
-/// Pieces of a line of which each is hidden as a whole, or not at all.
-const PIECES: usize = 60;
-/// Most tiles of a board that are drawn in the picture: beyond this they run together.
-const MOST_TILES: usize = 250;
-/// Thickness of the plate in the picture, in its diagonals.
-const PLATE_PART: f64 = 0.02;
-/// Sides of the polygon that stands for a circle.
-const DISC_SIDES: usize = 24;
-/// Heights of the lines by which a black tile is hatched, in its own.
-const HATCHING: [f64; 6] = [0.0, 0.16, 0.32, 0.48, 0.64, 0.8];
 /// Length of the axes in the picture, mm.
 const AXIS_MM: f64 = 12.0;
 /// Faces seen at a lower angle than this sine have no number.
 const LEAST_SINE: f64 = 0.2;
 /// Capital heights of the numbers of faces, mm.
 const NUMBER_CAP_MM: std::ops::RangeInclusive<f64> = 1.5..=6.0;
-/// From where solids are seen, and in the frame of its panel a board.
-const SOLID_FROM: DVec3 = DVec3::new(0.55, -0.75, 0.42);
-const BOARD_FROM: DVec3 = DVec3::new(-0.3, 0.4, 0.85);
 
 /// The page for a target that was laid out on `paper`.
 pub(crate) fn sheet(
@@ -296,265 +281,6 @@ fn height(steps: &[Vec<String>]) -> f64 {
 }
 
 /// From where a model is seen, by parallel light.
-#[derive(Clone, Copy)]
-struct View {
-    right: DVec3,
-    up: DVec3,
-    towards: DVec3,
-}
-
-impl View {
-    /// Seen from a direction, the axis `upwards` upright in the picture.
-    fn from(direction: DVec3, upwards: DVec3) -> Self {
-        let towards = direction.normalize();
-        let right = upwards.cross(towards).normalize();
-        Self { right, up: towards.cross(right), towards }
-    }
-
-    fn projected(&self, point: DVec3) -> DVec2 {
-        DVec2::new(point.dot(self.right), point.dot(self.up))
-    }
-}
-
-/// What the picture shows, in the target frame, mm.
-struct Model {
-    view: View,
-    /// The faces that hide what is behind them; of a solid those with numbers.
-    faces: Vec<Vec<DVec3>>,
-    /// Where the upper end of each of these is.
-    up: Vec<DVec3>,
-    numbers: Vec<String>,
-    /// Lines with their widths on the page.
-    lines: Vec<([DVec3; 2], f64)>,
-}
-
-impl Model {
-    fn of(target: &Target) -> Self {
-        match (&target.spec, target.panels.first()) {
-            (TargetSpec::Solid(spec), _) => Self::of_solid(&spec.polyhedron(), &target.panels),
-            (_, Some(panel)) => Self::of_board(panel),
-            (_, None) => Self::blank(BOARD_FROM, DVec3::Y),
-        }
-    }
-
-    fn blank(from: DVec3, upwards: DVec3) -> Self {
-        let view = View::from(from, upwards);
-        let (faces, up, numbers) = (Vec::new(), Vec::new(), Vec::new());
-        Self { view, faces, up, numbers, lines: Vec::new() }
-    }
-
-    fn of_solid(solid: &Polyhedron, panels: &[Panel]) -> Self {
-        let edges = solid
-            .edges()
-            .into_iter()
-            .map(|ends| (ends.map(|end| solid.vertices_mm[end]), THICK_MM));
-        Self {
-            faces: (0..solid.faces.len()).map(|face| solid.corners_mm(face)).collect(),
-            up: panels.iter().map(|panel| panel.pose.matrix().y_axis).collect(),
-            numbers: (0..panels.len()).map(|face| face.to_string()).collect(),
-            lines: edges.collect(),
-            ..Self::blank(SOLID_FROM, DVec3::Z)
-        }
-    }
-
-    /// A board on its plate, with its black tiles.
-    fn of_board(panel: &Panel) -> Self {
-        let at = |point: DVec2| panel.pose.target_from_panel(point);
-        let plate = rectangle(panel.field_mm()).map(at);
-        let front = panel.pose.matrix();
-        let depth = PLATE_PART * plate[0].distance(plate[2]);
-        let behind = plate.map(|corner| corner - depth * panel.pose.matrix().z_axis);
-        let next = |i: usize| (i + 1) % 4;
-        let rims = (0..4).map(|i| vec![plate[next(i)], plate[i], behind[i], behind[next(i)]]);
-        let edges = (0..4).flat_map(|i| {
-            [[plate[i], plate[next(i)]], [plate[i], behind[i]], [behind[i], behind[next(i)]]]
-        });
-        let tiles = tile_lines(panel).into_iter().map(|line| (line.map(at), THIN_MM));
-        Self {
-            faces: [plate.to_vec()].into_iter().chain(rims).collect(),
-            lines: edges.map(|edge| (edge, THICK_MM)).chain(tiles).collect(),
-            ..Self::blank(front * BOARD_FROM, front * DVec3::Y)
-        }
-    }
-
-    /// The pieces of a line that no face hides, in the picture.
-    fn seen_of(&self, [from, to]: [DVec3; 2]) -> Vec<[DVec2; 2]> {
-        let at = |share: f64| from.lerp(to, share / PIECES as f64);
-        let mut pieces: Vec<[usize; 2]> = Vec::new();
-        for piece in (0..PIECES).filter(|&piece| !self.is_hidden(at(piece as f64 + 0.5), None)) {
-            match pieces.last_mut() {
-                Some([_, end]) if *end == piece => *end = piece + 1,
-                _ => pieces.push([piece, piece + 1]),
-            }
-        }
-        let ends = |piece: [usize; 2]| piece.map(|end| self.view.projected(at(end as f64)));
-        pieces.into_iter().map(ends).collect()
-    }
-
-    /// Whether a face other than `own` is between a point and the eye.
-    fn is_hidden(&self, point: DVec3, own: Option<usize>) -> bool {
-        let others = self.faces.iter().enumerate().filter(|(index, _)| Some(*index) != own);
-        others.into_iter().any(|(_, face)| self.hides(face, point))
-    }
-
-    /// Whether a flat, convex face hides a point: whether the ray from there to the eye passes through its inside.
-    fn hides(&self, face: &[DVec3], point: DVec3) -> bool {
-        let normal = (1..face.len() - 1)
-            .map(|i| (face[i] - face[0]).cross(face[i + 1] - face[0]))
-            .sum::<DVec3>()
-            .normalize_or_zero();
-        let slope = normal.dot(self.view.towards);
-        let reach = face[0].distance(face[1]);
-        let distance = normal.dot(face[0] - point) / slope;
-        // Not what lies in the face itself, or in one seen edge-on.
-        if slope.abs() < 1e-9 || distance < 1e-6 * reach {
-            return false;
-        }
-        let through = point + distance * self.view.towards;
-        (0..face.len()).all(|i| {
-            let (a, b) = (face[i], face[(i + 1) % face.len()]);
-            normal.cross(b - a).normalize_or_zero().dot(through - a) > 1e-6 * reach
-        })
-    }
-}
-
-/// Outlines and hatching of the black tiles of a panel, in its frame, mm; none where they are too many to be seen.
-fn tile_lines(panel: &Panel) -> Vec<[DVec2; 2]> {
-    let tiles = panel.dark_tiles();
-    if tiles.len().max(panel.corners.len()) > MOST_TILES || panel.corners.is_empty() {
-        return Vec::new();
-    }
-    if let Some(diameter) = panel.discs_mm {
-        let rim = |corner: &Corner, n: usize| {
-            let angle = TAU * n as f64 / DISC_SIDES as f64;
-            corner.panel_mm + diameter / 2.0 * DVec2::from_angle(angle)
-        };
-        let of_disc = |corner| (0..DISC_SIDES).map(move |n| [rim(corner, n), rim(corner, n + 1)]);
-        return panel.corners.iter().flat_map(of_disc).collect();
-    }
-    let of_tile = |tile: Tile| {
-        let [a, b, c] = tile.frame().map(|vertex| panel.lattice_mm(vertex));
-        let last = match panel.kind {
-            GridKind::Deltille => c,
-            GridKind::Checker => b + c - a,
-        };
-        let sides = [[a, c], [b, last]];
-        // Of a triangle it is a point.
-        let top = (panel.kind == GridKind::Checker).then_some([c, last]);
-        let hatched = HATCHING.map(|part| sides.map(|[foot, top]| foot.lerp(top, part)));
-        sides.into_iter().chain(top).chain(hatched)
-    };
-    tiles.into_iter().flat_map(of_tile).collect()
-}
-
-/// What to do with the sheets of a target.
-fn steps(target: &Target, sheets: &[SheetLayout], paper: &PaperSpec) -> Vec<String> {
-    let name = &target.name;
-    let mut steps = vec![
-        "Print at 100 %, without \"fit to page\", on matt paper. Measure the lines of stated length on each sheet, \
-         across and along: if they are off, print again, or multiply all lengths by what you found."
-            .to_owned(),
-    ];
-    match &target.spec {
-        TargetSpec::Solid(spec) => steps.extend(steps_of_solid(spec, paper)),
-        _ => steps.extend(steps_of_board(target, sheets)),
-    }
-    match &target.spec {
-        TargetSpec::Circles(_) => steps.push(format!(
-            "Keep {name}.json: target_mm says where every circle is, in the order in which OpenCV's findCirclesGrid finds them."
-        )),
-        TargetSpec::Solid(SolidSpec { tags: None, .. }) => steps.push(format!(
-            "Keep {name}.json: target_mm says where every corner is. Without tags faces look alike: this finds their corners as \
-             grids, and which face a grid is must be told by other means before a camera can be made of it:\n\
-             deltille detect photos --target {name}.json -o corners"
-        )),
-        _ => {
-            steps.push(format!(
-                "Keep {name}.json: it says where every corner is. To find corners in photographs:\n\
-                 deltille detect photos --target {name}.json -o corners"
-            ));
-            steps.push(format!(
-                "Ten photographs or more, near, tilted and to the rims, make a camera:\n\
-                 deltille calibrate corners --target {name}.json --model auto --report camera.html"
-            ));
-        }
-    }
-    steps
-}
-
-fn steps_of_board(target: &Target, sheets: &[SheetLayout]) -> Vec<String> {
-    let mut steps = Vec::new();
-    if sheets.iter().any(|sheet| !sheet.pages.is_empty()) {
-        let trim = "Trim pages along the line at their left and upper end, and lay them on the crosses of the pages that they name.";
-        steps.push(trim.to_owned());
-    }
-    if sheets.iter().any(|sheet| sheet.placements.len() > 1) {
-        steps.push("Cut the boards apart along the lines; each has a label of its own.".to_owned());
-    }
-    let flat = "Lay a straightedge on it: what bends by a millimetre is worth less than a smaller board that does not.";
-    steps.push(match &target.spec {
-        TargetSpec::Board(BoardSpec { two_sided_mm: Some(mm), .. }) => format!(
-            "Cut both sides from mark to mark and glue them without bubbles on the two sides of a plate that stays flat and is as \
-             large, so that they are {} apart with their paper; or print them on the plate, turned about its upright edge. The \
-             marks of one side lie behind those of the other. {flat}",
-            format_mm(*mm)
-        ),
-        _ => format!(
-            "Glue it without bubbles on a plate that stays flat: glass, aluminium composite or a stone tile, larger than the \
-             tiles by a fifth of an edge all around. {flat}"
-        ),
-    });
-    steps
-}
-
-fn steps_of_solid(spec: &SolidSpec, paper: &PaperSpec) -> Vec<String> {
-    let mut steps = Vec::new();
-    match (paper.solids, &spec.skeleton) {
-        (SolidSheets::PerFace, skeleton) => {
-            let onto = match skeleton {
-                Some(_) => {
-                    "Glue each panel on the seat of its number in the printed skeleton, its edges as numbered: edges of \
-                            the same number meet."
-                }
-                None => {
-                    "Glue each face where the picture has its number, its edges as numbered: edges of the same number meet."
-                }
-            };
-            steps.push(
-                "Cut each face from mark to mark, with a ruler and a sharp knife.".to_owned(),
-            );
-            steps.push(onto.to_owned());
-        }
-        (_, skeleton) => {
-            steps.push(
-                "Cut along lines that are drawn through. Score dashed lines and fold them away from the print; score dash-dotted \
-                 ones from behind and fold them towards it; leave dotted ones."
-                    .to_owned(),
-            );
-            steps.push(
-                "Glue tabs under the faces that they name: edges of the same number meet. Begin with one vertex and close \
-                 the solid last where it stands."
-                    .to_owned(),
-            );
-            if skeleton.is_some() {
-                steps.push("Or cut the faces apart, and glue each on the seat of its number in the printed skeleton.".to_owned());
-            }
-        }
-    }
-    steps.push(
-        "Compare with the pictures: numbers run as printed, arrows show the upper end of each face."
-            .to_owned(),
-    );
-    let by_hand = "By hand faces come to lie within some tenths of a millimetre.";
-    steps.push(match spec.tags {
-        Some(_) => format!(
-            "{by_hand} With several cameras or many views, deltille rig --refine-target measures where they are."
-        ),
-        None => by_hand.to_owned(),
-    });
-    steps
-}
-
 /// A text in lines of at most so many characters, broken at blanks.
 fn wrapped(text: &str, most: usize) -> Vec<String> {
     let mut lines: Vec<String> = Vec::new();
@@ -574,7 +300,7 @@ fn wrapped(text: &str, most: usize) -> Vec<String> {
 mod tests {
     use super::*;
     use crate::Printing;
-    use deltille_core::targets::SolidShape;
+    use deltille_core::targets::{BoardSpec, SolidShape, SolidSpec};
 
     fn guide(spec: impl Into<TargetSpec>) -> SheetLayout {
         let target = Printing::new("target", spec).unwrap();
@@ -582,24 +308,6 @@ mod tests {
     }
 
     /// Of an icosahedron that hides nothing but its own back, every edge of a face towards the eye is seen, whole, and
-    /// no other.
-    #[test]
-    fn a_convex_solid_shows_the_faces_towards_the_eye() {
-        let solid = SolidSpec::new(SolidShape::Icosahedron);
-        let target = Printing::new("target", solid.clone()).unwrap();
-        let model = Model::of(&target.target);
-        let (polyhedron, edges) = (solid.polyhedron(), solid.polyhedron().edges());
-        let is_front = |face: usize| polyhedron.normal(face).dot(model.view.towards) > 0.0;
-        for (edge, (line, _)) in edges.iter().zip(&model.lines) {
-            let mut faces =
-                (0..20).filter(|&f| edge.iter().all(|v| polyhedron.faces[f].contains(v)));
-            let seen = model.seen_of(*line);
-            assert_eq!(!seen.is_empty(), faces.any(is_front), "{edge:?}");
-            let length: f64 = seen.iter().map(|[a, b]| a.distance(*b)).sum();
-            let [a, b] = line.map(|end| model.view.projected(end));
-            assert!(seen.is_empty() || (length - a.distance(b)).abs() < 1e-9, "{edge:?}");
-        }
-    }
 
     #[test]
     fn everything_lies_on_the_page_and_says_what_to_do() {
