@@ -45,11 +45,6 @@ fn the_guide_has_the_sizes_of_the_shipped_families() {
             assert!((stated / rate).ln().abs() < 0.15, "{name}: {cell} for {rate:e}");
         }
     }
-    let readme = read("README.md");
-    for (name, text) in [("d25h7", &readme), ("d25h9", &readme), ("d36h9", &readme)] {
-        let codes = format!("{name} ({}", written(Family::shipped(name).unwrap().len()));
-        assert!(text.contains(&codes), "{codes}");
-    }
 }
 
 /// A rate as the guide writes it: 4.5·10⁻⁴, or 1.3 %.
