@@ -1,7 +1,8 @@
-"""Detections of very many views, to measure how long a calibration takes: many_views.py FOLDER VIEWS.
+"""Detections of very many views, to measure how long a calibration takes: many_views.py FOLDER VIEWS
+[ROWS COLS OFF_MM].
 
-A board of 10 × 11 corners, 20 mm apart, before a camera of 1600 × 1200 px with a mild lens; the corners have noise of
-0.05 px. Then, for time and memory:
+A board of 10 × 11 corners, 20 mm apart, or of others over 220 mm that are off their places, before a camera of 1600 ×
+1200 px with a mild lens; the corners have noise of 0.05 px. Then, for time and memory:
 
     /usr/bin/time -v deltille calibrate FOLDER --grid checker --rows 10 --cols 11 --edge 20mm --model radtan5 -o OUT
 """
@@ -12,7 +13,7 @@ import sys
 
 import numpy as np
 
-ROWS, COLS, EDGE_MM = 10, 11, 20.0
+ROWS, COLS, WIDTH_MM = 10, 11, 220.0
 WIDTH, HEIGHT, FOCAL_PX = 1600, 1200, 1000.0
 K1, K2, P1, P2, K3 = -0.2, 0.06, 1e-4, -2e-4, 0.0
 NOISE_PX, MARGIN_PX = 0.05, 10.0
@@ -46,11 +47,13 @@ def view(random, board):
             return pixels + random.normal(0, NOISE_PX, pixels.shape)
 
 
-def main(folder, views):
+def main(folder, views, rows=ROWS, cols=COLS, off_mm=0.0):
     folder.mkdir(parents=True, exist_ok=True)
     random = np.random.default_rng(1)
-    rows, cols = (axis.ravel() for axis in np.mgrid[:ROWS, :COLS])
-    board = np.stack([cols, rows, 0 * rows], 1) * EDGE_MM
+    rows, cols = (axis.ravel() for axis in np.mgrid[:rows, :cols])
+    board = np.stack([cols, rows, 0 * rows], 1) * (WIDTH_MM / (cols.max() + 1))
+    if off_mm > 0:
+        board += random.normal(0, off_mm, board.shape)
     variance = NOISE_PX**2
     for index in range(views):
         corners = [
@@ -63,4 +66,4 @@ def main(folder, views):
         (folder / f"{name}.json").write_text(json.dumps(found | {"grids": [grid]}))
 
 
-main(pathlib.Path(sys.argv[1]), int(sys.argv[2]))
+main(pathlib.Path(sys.argv[1]), *map(int, sys.argv[2:5]), *map(float, sys.argv[5:]))

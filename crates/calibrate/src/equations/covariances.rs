@@ -5,8 +5,9 @@ use std::collections::BTreeSet;
 
 use nalgebra::{DMatrix, DVector, Matrix3, Matrix6, SMatrix};
 
+use super::cholesky::{cholesky, inverse};
 use super::layout::Layout;
-use super::normal::{Normal, Part, Reduced};
+use super::normal::{Normal, PARTS_AT_A_TIME, Part, Reduced};
 
 /// The covariance of all unknowns for residuals of variance 1: of the shared ones, of each frame's pose, and
 /// of each corner's offset.
@@ -68,11 +69,17 @@ impl Normal {
     pub(crate) fn covariances(&self, layout: &Layout) -> Option<Covariances> {
         let Reduced { matrix, inverses, .. } = self.reduced(Damping::NONE)?;
         let Inverse { matrix: kept, root, loose, tied } = self.invert(matrix)?;
-        let of_part = |(part, inverse): (&Part, DMatrix<f64>)| {
-            let through = &part.b * &inverse;
-            inverse + through.tr_mul(&(&kept * &through))
-        };
-        let parts: Vec<_> = self.parts.iter().zip(inverses).map(of_part).collect();
+        let mut parts = Vec::with_capacity(inverses.len());
+        for first in (0..inverses.len()).step_by(PARTS_AT_A_TIME) {
+            let some = first..(first + PARTS_AT_A_TIME).min(inverses.len());
+            let through = self.through(&inverses, some.clone());
+            let carried = &kept * &through;
+            for (index, inverse) in inverses[some].iter().enumerate() {
+                let (first, size) = (index * inverse.nrows(), inverse.nrows());
+                let carried = carried.columns(first, size);
+                parts.push(inverse + through.columns(first, size).tr_mul(&carried));
+            }
+        }
         let (frames, corners) = match (layout.frames, layout.corners) {
             (Some(first), _) => (blocks(&kept, first), parts.iter().map(fixed).collect()),
             (None, Some(first)) => (parts.iter().map(fixed).collect(), blocks(&kept, first)),
@@ -88,38 +95,44 @@ impl Normal {
         let n = matrix.nrows();
         let scale = DVector::from_fn(n, |i, _| 1.0 / matrix[(i, i)].max(f64::MIN_POSITIVE).sqrt());
         let scaled = DMatrix::from_fn(n, n, |i, j| matrix[(i, j)] * scale[i] * scale[j]);
-        let inverse = scaled.cholesky()?.inverse();
+        let inverse = inverse(&cholesky(scaled)?);
         Some(DMatrix::from_fn(n, n, |i, j| inverse[(i, j)] * scale[i] * scale[j]))
     }
 
-    /// The solution of the equations for a right side of shared unknowns and corners' offsets, in this
-    /// order, which is zero for the poses of frames. `None` where a corner is open by itself.
+    /// The solutions of the equations for right sides (columns) of shared unknowns and corners' offsets, in this
+    /// order, which are zero for the poses of frames. `None` where a corner is open by itself.
     pub(crate) fn solve_without_frames(
         &self,
         layout: &Layout,
         found: &Covariances,
-        right: &DVector<f64>,
-    ) -> Option<DVector<f64>> {
+        right: &DMatrix<f64>,
+    ) -> Option<DMatrix<f64>> {
         if layout.corners.is_some() {
             return Some(&found.kept * right);
         }
-        let mut of_kept = DVector::zeros(layout.count);
-        of_kept.rows_mut(0, self.shared).copy_from(&right.rows(0, self.shared));
-        let mut of_parts = Vec::with_capacity(self.parts.len());
-        for (index, part) in self.parts.iter().enumerate() {
-            let whole = part.c.clone().cholesky()?;
-            let own = right.rows(self.shared + 3 * index, 3).into_owned();
-            of_kept -= &part.b * whole.solve(&own);
-            of_parts.push((whole, own));
-        }
+        let shared = self.shared;
+        let mut of_parts = right.rows(shared, right.nrows() - shared).into_owned();
+        self.solve_parts(&mut of_parts)?;
+        let mut of_kept = DMatrix::zeros(layout.count, right.ncols());
+        of_kept.rows_mut(0, shared).copy_from(&right.rows(0, shared));
+        of_kept.gemm(-1.0, &self.b, &of_parts, 1.0);
         let kept = &found.kept * of_kept;
-        let mut solution = DVector::zeros(right.len());
-        solution.rows_mut(0, self.shared).copy_from(&kept.rows(0, self.shared));
-        for (index, (part, (whole, own))) in self.parts.iter().zip(of_parts).enumerate() {
-            let own = whole.solve(&(own - part.b.tr_mul(&kept)));
-            solution.rows_mut(self.shared + 3 * index, 3).copy_from(&own);
-        }
+        let mut carried = (kept.transpose() * &self.b).transpose();
+        self.solve_parts(&mut carried)?;
+        let mut solution = right.clone();
+        solution.rows_mut(0, shared).copy_from(&kept.rows(0, shared));
+        solution.rows_mut(shared, carried.nrows()).copy_from(&(of_parts - carried));
         Some(solution)
+    }
+
+    /// Solves the equations of each part by itself.
+    fn solve_parts(&self, right: &mut DMatrix<f64>) -> Option<()> {
+        let mut first = 0;
+        for Part { c, .. } in &self.parts {
+            c.clone().cholesky()?.solve_mut(&mut right.rows_mut(first, c.nrows()));
+            first += c.nrows();
+        }
+        Some(())
     }
 
     /// The inverse of the reduced equations; the root is that of what all frames share, which alone may be open.
@@ -130,7 +143,7 @@ impl Normal {
             return Some(self.invert_shared(reduced));
         }
         let own = reduced.view((shared, shared), (others, others)).into_owned();
-        let own = own.cholesky()?.inverse();
+        let own = inverse(&cholesky(own)?);
         let across = reduced.view((shared, 0), (others, shared));
         let through = &own * across;
         let of_shared = reduced.view((0, 0), (shared, shared)) - across.tr_mul(&through);

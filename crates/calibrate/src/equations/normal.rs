@@ -11,10 +11,13 @@
 //! through them, nor a corner with another corner but through frames: of the two the one that has more
 //! unknowns is eliminated, and the other is kept.
 
-use nalgebra::{DMatrix, DVector, Matrix6, Vector6};
+use std::ops::Range;
+
+use nalgebra::{DMatrix, DMatrixView, DVector, Matrix6, Vector6};
 use rayon::prelude::*;
 
 use super::block::{Local, OfCorner};
+use super::cholesky::{cholesky, subtract_product};
 use super::layout::Layout;
 use super::step::Step;
 use crate::input::loss::Loss;
@@ -26,7 +29,6 @@ use deltille_core::damping::Damping;
 /// The equations of unknowns that are eliminated: a frame, or a corner.
 #[derive(Clone, Debug)]
 pub(super) struct Part {
-    pub b: DMatrix<f64>,
     pub c: DMatrix<f64>,
     pub right: DVector<f64>,
 }
@@ -39,6 +41,8 @@ pub(crate) struct Normal {
     pub(super) shared: usize,
     pub(super) a: DMatrix<f64>,
     right: DVector<f64>,
+    /// What is between what is kept (rows) and parts, one after the other (columns).
+    pub(super) b: DMatrix<f64>,
     /// Frames, or corners.
     pub(super) parts: Vec<Part>,
 }
@@ -52,20 +56,18 @@ impl Normal {
         loss: Loss,
     ) -> Option<Self> {
         let n = layout.count;
-        let part = |size: usize| Part {
-            b: DMatrix::zeros(n, size),
-            c: DMatrix::zeros(size, size),
-            right: DVector::zeros(size),
+        let (count, size) = match (layout.frames, &problem.map) {
+            (Some(_), Some(map)) => (map.len(), 3),
+            _ => (problem.frames.len(), 6),
         };
+        let part = Part { c: DMatrix::zeros(size, size), right: DVector::zeros(size) };
         let mut normal = Self {
             cost: 0.0,
             shared: layout.shared,
             a: DMatrix::zeros(n, n),
             right: DVector::zeros(n),
-            parts: match (layout.frames, &problem.map) {
-                (Some(_), Some(map)) => vec![part(3); map.len()],
-                _ => vec![part(6); problem.frames.len()],
-            },
+            b: DMatrix::zeros(n, size * count),
+            parts: vec![part; count],
         };
         let blocks: Vec<_> = problem.blocks.iter().zip(&whitening.blocks).collect();
         for some in blocks.chunks(BLOCKS_AT_A_TIME) {
@@ -165,10 +167,10 @@ impl Normal {
                 self.right[first + i] += right;
                 continue;
             }
-            let part = &mut self.parts[frame];
             for (&row, value) in local.columns.iter().zip(of_shared) {
-                part.b[(row, i)] += value;
+                self.b[(row, 6 * frame + i)] += value;
             }
+            let part = &mut self.parts[frame];
             for (j, value) in of_frame.iter().enumerate() {
                 part.c[(i, j)] += value;
                 if j < i {
@@ -190,7 +192,7 @@ impl Normal {
                     self.a[(row, column)] += values[k];
                 }
                 for (i, values) in of_frame.iter().enumerate() {
-                    self.parts[frame].b[(row, i)] += values[k];
+                    self.b[(row, 6 * frame + i)] += values[k];
                 }
                 for l in 0..=k {
                     self.a[(row, first + 3 * corner.index + l)] += corner.own[(k, l)];
@@ -202,7 +204,7 @@ impl Normal {
                     of_frame.iter().enumerate().map(|(i, of)| (first + 6 * frame + i, of));
                 let of_shared = local.columns.iter().copied().zip(of_shared);
                 for (row, values) in of_shared.chain(of_frame) {
-                    part.b[(row, k)] += values[k];
+                    self.b[(row, 3 * corner.index + k)] += values[k];
                 }
                 for l in 0..3 {
                     part.c[(k, l)] += corner.own[(k, l)];
@@ -217,8 +219,10 @@ impl Normal {
     pub(crate) fn step(&self, layout: &Layout, damping: Damping) -> Option<Step> {
         let Reduced { matrix, right, inverses } = self.reduced(damping)?;
         let kept = solve_scaled(matrix, right)?;
-        let parts = self.parts.iter().zip(inverses);
-        let parts = parts.map(|(part, inverse)| inverse * (&part.right - part.b.tr_mul(&kept)));
+        let parts = self.parts.iter().zip(inverses).enumerate();
+        let parts = parts.map(|(index, (part, inverse))| {
+            inverse * (&part.right - self.between(index..index + 1).tr_mul(&kept))
+        });
         let (frames, corners) = layout.split(&kept, &parts.collect::<Vec<_>>());
         let shared = kept.rows(0, self.shared).into_owned();
         let step = Step { shared, frames, corners };
@@ -235,30 +239,41 @@ impl Normal {
         shared + of_frames.chain(of_corners).sum::<f64>()
     }
 
+    /// B of some parts.
+    pub(super) fn between(&self, parts: Range<usize>) -> DMatrixView<'_, f64> {
+        let size = self.b.ncols() / self.parts.len().max(1);
+        self.b.columns(size * parts.start, size * parts.len())
+    }
+
+    /// B C⁻¹ of some parts.
+    pub(super) fn through(&self, inverses: &[DMatrix<f64>], parts: Range<usize>) -> DMatrix<f64> {
+        let mut through = DMatrix::zeros(self.b.nrows(), self.between(parts.clone()).ncols());
+        for (index, part) in parts.enumerate() {
+            let (inverse, b) = (&inverses[part], self.between(part..part + 1));
+            through.columns_mut(b.ncols() * index, b.ncols()).gemm(1.0, &b, inverse, 0.0);
+        }
+        through
+    }
+
     /// What is left of the equations when parts are eliminated. `None` where a frame's pose is open by itself.
     pub(crate) fn reduced(&self, damping: Damping) -> Option<Reduced> {
         let grown = |diagonal: f64| damping.grown(diagonal);
         let (mut matrix, mut right) = (self.a.clone(), self.right.clone());
         (0..matrix.nrows()).for_each(|i| matrix[(i, i)] = grown(matrix[(i, i)]));
         let mut inverses = Vec::with_capacity(self.parts.len());
-        for parts in self.parts.chunks(PARTS_AT_A_TIME) {
-            let columns = parts.iter().map(|part| part.c.nrows()).sum();
-            let mut through = DMatrix::zeros(matrix.nrows(), columns);
-            let mut across = DMatrix::zeros(columns, matrix.nrows());
-            let mut first = 0;
-            for Part { b, c, right: of_part } in parts {
+        for first in (0..self.parts.len()).step_by(PARTS_AT_A_TIME) {
+            let parts = first..(first + PARTS_AT_A_TIME).min(self.parts.len());
+            for Part { c, .. } in &self.parts[parts.clone()] {
                 let mut c = c.clone();
                 (0..c.nrows()).for_each(|i| c[(i, i)] = grown(c[(i, i)]));
-                let inverse = c.cholesky()?.inverse();
-                let through_part = b * &inverse;
-                right -= &through_part * of_part;
-                through.columns_mut(first, b.ncols()).copy_from(&through_part);
-                across.rows_mut(first, b.ncols()).tr_copy_from(b);
-                first += b.ncols();
-                inverses.push(inverse);
+                inverses.push(c.cholesky()?.inverse());
             }
-            matrix.gemm(-1.0, &through, &across, 1.0);
+            let through = self.through(&inverses, parts.clone());
+            let of_parts = self.parts[parts.clone()].iter().flat_map(|part| part.right.iter());
+            right -= &through * DVector::from_iterator(through.ncols(), of_parts.copied());
+            subtract_product(&mut matrix, &through, &self.between(parts).transpose());
         }
+        matrix.fill_upper_triangle_with_lower_triangle();
         Some(Reduced { matrix, right, inverses })
     }
 }
@@ -271,7 +286,7 @@ pub(crate) struct Reduced {
 }
 
 /// Parts whose share of the reduced equations is taken away at a time: as one product of matrices.
-const PARTS_AT_A_TIME: usize = 64;
+pub(super) const PARTS_AT_A_TIME: usize = 64;
 
 /// Solves symmetric equations after scaling their diagonal to 1.
 fn solve_scaled(matrix: DMatrix<f64>, right: DVector<f64>) -> Option<DVector<f64>> {
@@ -281,7 +296,7 @@ fn solve_scaled(matrix: DMatrix<f64>, right: DVector<f64>) -> Option<DVector<f64
     }
     let scale = DVector::from_fn(n, |i, _| 1.0 / matrix[(i, i)].max(f64::MIN_POSITIVE).sqrt());
     let scaled = DMatrix::from_fn(n, n, |i, j| matrix[(i, j)] * scale[i] * scale[j]);
-    let solution = scaled.cholesky()?.solve(&right.component_mul(&scale));
+    let solution = cholesky(scaled)?.solve(&right.component_mul(&scale));
     Some(solution.component_mul(&scale))
 }
 

@@ -110,16 +110,12 @@ pub(crate) fn drawn_to_plan(
     let pulls = DMatrix::from_fn(sheets.nrows(), sheets.ncols(), |i, mode| {
         accuracy_mm * map.prior_mm[i % 3].powi(-2) * sheets[(i, mode)]
     });
-    let off = pulls.column_iter().map(|pull| {
-        let mut right = DVector::zeros(layout.shared + pull.len());
-        right.rows_mut(layout.shared, pull.len()).copy_from(&(pull * whitening.sigma.powi(2)));
-        normal.solve_without_frames(layout, found, &right)
-    });
-    let off = off.collect::<Option<Vec<_>>>()?;
-    if off.is_empty() {
+    if pulls.ncols() == 0 {
         return None;
     }
-    let off = DMatrix::from_columns(&off);
+    let mut right = DMatrix::zeros(layout.shared + pulls.nrows(), pulls.ncols());
+    right.rows_mut(layout.shared, pulls.nrows()).copy_from(&(&pulls * whitening.sigma.powi(2)));
+    let off = normal.solve_without_frames(layout, found, &right)?;
     let of_corners = off.rows(layout.shared, sheets.nrows());
     let said = pulls.tr_mul(&(&sheets * accuracy_mm - of_corners));
     let precision = DMatrix::identity(off.ncols(), off.ncols()) + (&said + said.transpose()) * 0.5;

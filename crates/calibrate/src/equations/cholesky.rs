@@ -1,0 +1,102 @@
+//! Factors, inverses and products of symmetric matrices by blocks of columns.
+//!
+//! nalgebra factors and inverts column by column. A matrix that is larger than the caches is then read from memory once
+//! for each column; by blocks nearly all of the work is products of matrices, which read it once for each block.
+
+use nalgebra::{Cholesky, DMatrix, Dyn};
+
+/// Columns of a block.
+const WIDTH: usize = 64;
+
+/// The first column and the number of columns of each block.
+fn blocks(n: usize) -> impl Iterator<Item = (usize, usize)> {
+    (0..n).step_by(WIDTH).map(move |first| (first, WIDTH.min(n - first)))
+}
+
+/// The Cholesky factor of a symmetric matrix, of which only the lower triangle is read; `None` where it is not
+/// positive definite.
+pub(super) fn cholesky(mut matrix: DMatrix<f64>) -> Option<Cholesky<f64, Dyn>> {
+    let n = matrix.nrows();
+    for (first, count) in blocks(n) {
+        let (before, mut own) = matrix.columns_range_pair_mut(..first, first..first + count);
+        let across = before.rows(first, count).transpose();
+        own.rows_mut(first, n - first).gemm(-1.0, &before.rows(first, n - first), &across, 1.0);
+        let factor = own.rows(first, count).into_owned().cholesky()?.unpack();
+        own.rows_mut(first, count).copy_from(&factor);
+        let mut below = own.rows_mut(first + count, n - first - count);
+        let mut turned = below.transpose();
+        factor.solve_lower_triangular_mut(&mut turned);
+        below.tr_copy_from(&turned);
+    }
+    Some(Cholesky::pack_dirty(matrix))
+}
+
+/// The inverse of a symmetric matrix from its factor L: the square of L⁻¹.
+pub(super) fn inverse(factor: &Cholesky<f64, Dyn>) -> DMatrix<f64> {
+    let lower = factor.l_dirty();
+    let n = lower.nrows();
+    let mut root = DMatrix::zeros(n, n);
+    for (first, count) in blocks(n) {
+        let (above, mut own) = root.rows_range_pair_mut(..first, first..first + count);
+        let across = lower.view((first, 0), (count, first));
+        own.columns_mut(0, first).gemm(-1.0, &across, &above.columns(0, first), 0.0);
+        own.columns_mut(first, count).fill_with_identity();
+        let own_lower = lower.view((first, first), (count, count));
+        own_lower.solve_lower_triangular_mut(&mut own.columns_mut(0, first + count));
+    }
+    let turned = root.transpose();
+    let mut inverse = DMatrix::zeros(n, n);
+    for (first, count) in blocks(n) {
+        let mut own = inverse.view_mut((first, first), (n - first, count));
+        let left = turned.view((first, first), (n - first, n - first));
+        own.gemm(1.0, &left, &root.view((first, first), (n - first, count)), 0.0);
+    }
+    inverse.fill_upper_triangle_with_lower_triangle();
+    inverse
+}
+
+/// Takes the product of two matrices, which is symmetric, away from the lower triangle of a matrix.
+pub(super) fn subtract_product(
+    matrix: &mut DMatrix<f64>,
+    left: &DMatrix<f64>,
+    right: &DMatrix<f64>,
+) {
+    let n = matrix.nrows();
+    for (first, count) in blocks(n) {
+        let mut own = matrix.view_mut((first, first), (n - first, count));
+        own.gemm(-1.0, &left.rows(first, n - first), &right.columns(first, count), 1.0);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The same as by nalgebra, of one block, of several, and of several and a part.
+    #[test]
+    fn factors_and_inverses_are_those_of_nalgebra() {
+        for n in [0, 1, WIDTH, 3 * WIDTH, 3 * WIDTH + 7] {
+            let any = |i: usize, j: usize| ((i * 31 + j * 17) % 103) as f64 / 103.0 - 0.5;
+            let half = DMatrix::from_fn(n, n + 5, any);
+            let mut matrix = DMatrix::identity(n, n);
+            subtract_product(&mut matrix, &-&half, &half.transpose());
+            matrix.fill_upper_triangle_with_lower_triangle();
+            let whole = DMatrix::identity(n, n) + &half * half.transpose();
+            assert!(
+                (&matrix - &whole).iter().fold(0.0, |most: f64, v| most.max(v.abs())) < 1e-12,
+                "product of {n}"
+            );
+            let (found, expected) = (cholesky(matrix).unwrap(), whole.cholesky().unwrap());
+            assert!(
+                (found.l() - expected.l()).iter().fold(0.0, |most: f64, v| most.max(v.abs()))
+                    < 1e-11,
+                "factor of {n}"
+            );
+            let off = inverse(&found) - expected.inverse();
+            assert!(
+                off.iter().fold(0.0, |most: f64, v| most.max(v.abs())) < 1e-11,
+                "inverse of {n}"
+            );
+        }
+    }
+}
