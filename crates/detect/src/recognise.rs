@@ -35,8 +35,8 @@ const MOST_TILES: usize = 600;
 /// Evidence from which tags are there by no chance, nats: once in a million, for each of the ways to read them.
 const LEAST_EVIDENCE: f64 = 18.0;
 
-/// A corner that is seen beyond a board costs as much as so many that are not seen on it: a cover hides corners, and nothing
-/// makes them. Three is not derived.
+/// A corner that is seen beyond a board costs as much as so many that are not seen on it: a cover hides corners, and next to
+/// nothing makes them. So an outer row is believed from a quarter of its corners on; with 1 it would be half.
 const COST_BEYOND: usize = 3;
 
 /// Rows and columns that a board may have beyond what is seen.

@@ -32,7 +32,8 @@ const CIRCLES: [f64; 3] = [0.5, 0.7, 0.9];
 /// The mean of them.
 const MEAN_CIRCLE: f64 = CIRCLES[1];
 
-/// Least blur of a start, px. The fit finds the blur anew; the value is not derived.
+/// Least blur of a start, px. The fit finds the blur anew: from 0.15 to 2.4 errors differ by 3 % at most, but those of sharp
+/// squares in windows of 9 px are 15 % larger at 0.3 and 60 % at 1.2. Corners of a grid start from the grid's blur.
 const MIN_START_BLUR_PX: f64 = 0.6;
 
 /// Largest blur of a start, as a part of the window's radius: of a larger one the window shows the middle alone.
