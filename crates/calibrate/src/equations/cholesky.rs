@@ -55,7 +55,7 @@ pub(super) fn inverse(factor: &Cholesky<f64, Dyn>) -> DMatrix<f64> {
     inverse
 }
 
-/// Takes the product of two matrices, which is symmetric, away from the lower triangle of a matrix.
+/// Takes the product of two matrices, which is symmetric, away from the blocks of a matrix on its diagonal and below.
 pub(super) fn subtract_product(
     matrix: &mut DMatrix<f64>,
     left: &DMatrix<f64>,
@@ -65,6 +65,16 @@ pub(super) fn subtract_product(
     for (first, count) in blocks(n) {
         let mut own = matrix.view_mut((first, first), (n - first, count));
         own.gemm(-1.0, &left.rows(first, n - first), &right.columns(first, count), 1.0);
+    }
+}
+
+/// Makes the blocks of a symmetric matrix above its diagonal those below.
+pub(super) fn fill_upper_blocks(matrix: &mut DMatrix<f64>) {
+    let n = matrix.nrows();
+    for (first, count) in blocks(n) {
+        let (after, others) = (first + count, n - first - count);
+        let below = matrix.view((after, first), (others, count)).transpose();
+        matrix.view_mut((first, after), (count, others)).copy_from(&below);
     }
 }
 
@@ -80,7 +90,7 @@ mod tests {
             let half = DMatrix::from_fn(n, n + 5, any);
             let mut matrix = DMatrix::identity(n, n);
             subtract_product(&mut matrix, &-&half, &half.transpose());
-            matrix.fill_upper_triangle_with_lower_triangle();
+            fill_upper_blocks(&mut matrix);
             let whole = DMatrix::identity(n, n) + &half * half.transpose();
             assert!(
                 (&matrix - &whole).iter().fold(0.0, |most: f64, v| most.max(v.abs())) < 1e-12,

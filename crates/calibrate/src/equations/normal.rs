@@ -17,7 +17,7 @@ use nalgebra::{DMatrix, DMatrixView, DVector, Matrix6, Vector6};
 use rayon::prelude::*;
 
 use super::block::{Local, OfCorner};
-use super::cholesky::{cholesky, subtract_product};
+use super::cholesky::{cholesky, fill_upper_blocks, subtract_product};
 use super::layout::Layout;
 use super::step::Step;
 use crate::input::loss::Loss;
@@ -269,11 +269,14 @@ impl Normal {
                 inverses.push(c.cholesky()?.inverse());
             }
             let through = self.through(&inverses, parts.clone());
-            let of_parts = self.parts[parts.clone()].iter().flat_map(|part| part.right.iter());
-            right -= &through * DVector::from_iterator(through.ncols(), of_parts.copied());
+            for (index, Part { right: of_part, .. }) in self.parts[parts.clone()].iter().enumerate()
+            {
+                let size = of_part.len();
+                right -= through.columns(size * index, size) * of_part;
+            }
             subtract_product(&mut matrix, &through, &self.between(parts).transpose());
         }
-        matrix.fill_upper_triangle_with_lower_triangle();
+        fill_upper_blocks(&mut matrix);
         Some(Reduced { matrix, right, inverses })
     }
 }
