@@ -64,7 +64,7 @@ impl Calibration {
     ) -> Result<(Settled, f64), CalibrationError> {
         let flat = settled.minimum.normal.cost;
         let mut problem = settled.minimum.problem;
-        let observations = problem.blocks.iter().flat_map(|block| &block.observations);
+        let observations = problem.blocks.iter().flat_map(|block| block.observations.iter());
         problem.shape = Some(Shape::flat(observations.map(|seen| seen.panel_mm)));
         // Compared under the same weights.
         let bent = minimise(problem, &settled.whitening, self.loss, Until::Fine)

@@ -387,7 +387,7 @@ fn place_anew(problem: &mut Problem, frame: usize, wrong: &BTreeSet<PanelRef>) {
     let Some(largest) = blocks.clone().max_by_key(|block| block.observations.len()) else { return };
     let sightings = blocks
         .filter(|block| block.camera == largest.camera)
-        .map(|block| Sighting { panel: block.panel, observations: block.observations.clone() });
+        .map(|block| Sighting { panel: block.panel, observations: block.observations.to_vec() });
     let CameraUnknowns { camera, camera_from_rig, .. } = &problem.cameras[largest.camera];
     let panels: Vec<Pose> = problem.panel_places().collect();
     let pose = estimate_pose(camera, &panels, &sightings.collect::<Vec<_>>());
@@ -515,7 +515,7 @@ fn moved(settled: &Settled, panel: PanelRef) -> Option<Moved> {
         }
     }
     let place = found.panels[panel.index()].target_from_panel;
-    let seen = || of_panel().flat_map(|block| &block.observations).map(|seen| seen.panel_mm);
+    let seen = || of_panel().flat_map(|block| block.observations.iter()).map(|seen| seen.panel_mm);
     let middle = seen().sum::<DVec3>() / seen().count().max(1) as f64;
     (2 * count.outliers < count.corners).then(|| Moved {
         by_mm: place.apply(middle).distance(stated.apply(middle)),

@@ -70,7 +70,8 @@ impl Normal {
             parts: vec![part; count],
         };
         let blocks: Vec<_> = problem.blocks.iter().zip(&whitening.blocks).collect();
-        for some in blocks.chunks(BLOCKS_AT_A_TIME) {
+        let most = blocks.iter().map(|(block, _)| block.observations.len()).max().unwrap_or(0);
+        for some in blocks.chunks((CORNERS_AT_A_TIME / most.max(1)).max(1)) {
             let locals = some.par_iter().map(|(block, whitening_of)| {
                 Local::of(problem, layout, block, whitening_of, loss, whitening.sigma)
             });
@@ -303,11 +304,13 @@ fn solve_scaled(matrix: DMatrix<f64>, right: DVector<f64>) -> Option<DVector<f64
     Some(solution.component_mul(&scale))
 }
 
-/// Blocks whose equations are held at a time: enough for every thread, little for the memory.
-const BLOCKS_AT_A_TIME: usize = 256;
+/// Corners whose equations are held at a time, in whole blocks: enough for every thread, little for the memory.
+const CORNERS_AT_A_TIME: usize = 100_000;
 
 #[cfg(test)]
 mod tests {
+    use std::sync::Arc;
+
     use rand::{Rng, SeedableRng};
     use rand_chacha::ChaCha8Rng;
 
@@ -398,7 +401,8 @@ mod tests {
                     Block { camera: camera as usize, frame, panel, observations: seen.collect() };
                 let residuals = problem.residuals(&block).expect("all corners are in sight");
                 let mut block = block;
-                for (seen, residual) in block.observations.iter_mut().zip(residuals) {
+                let seen = Arc::make_mut(&mut block.observations).iter_mut();
+                for (seen, residual) in seen.zip(residuals) {
                     let noise = [0; 2].map(|_| rng.random_range(-0.5..0.5));
                     seen.pixel = DVec2::from(noise) - residual;
                 }

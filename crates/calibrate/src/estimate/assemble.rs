@@ -349,7 +349,7 @@ fn target_map(
 
 fn board_shape(minimum: &Minimum, covariance: &DMatrix<f64>, f_ratio: f64) -> Option<BoardShape> {
     let (shape, first): (Shape, usize) = minimum.problem.shape.zip(minimum.layout.shape)?;
-    let seen = minimum.problem.blocks.iter().flat_map(|block| &block.observations);
+    let seen = minimum.problem.blocks.iter().flat_map(|block| block.observations.iter());
     let offsets = seen.map(|seen| shape.offset(seen.panel_mm));
     let (low, high, beside) = offsets.fold((0.0, 0.0, 0.0), |(low, high, beside), d| {
         (d.z.min(low), d.z.max(high), d.truncate().length().max(beside))

@@ -113,6 +113,9 @@ impl Problem {
     /// The same with only the corners for which `kept` holds.
     pub(crate) fn with_corners(&self, kept: &[Vec<bool>]) -> Problem {
         let of_block = |(block, kept): (&Block, &Vec<bool>)| {
+            if kept.iter().all(|kept| *kept) {
+                return block.clone();
+            }
             let kept = block.observations.iter().zip(kept).filter(|(_, kept)| **kept);
             Block { observations: kept.map(|(seen, _)| *seen).collect(), ..*block }
         };

@@ -54,7 +54,7 @@ impl CornerMap {
         let mut index = BTreeMap::new();
         let mut corners: Vec<MappedCorner> = Vec::new();
         for block in blocks {
-            for &Observation { row, col, panel_mm, .. } in &block.observations {
+            for &Observation { row, col, panel_mm, .. } in block.observations.iter() {
                 let at = *index.entry((block.panel.index(), row, col)).or_insert(corners.len());
                 if at == corners.len() {
                     let panel = block.panel;

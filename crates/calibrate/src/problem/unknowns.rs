@@ -1,5 +1,7 @@
 //! Cameras, targets and panels with what of them is unknown, and the observations of a block.
 
+use std::sync::Arc;
+
 use nalgebra::{Matrix6, Vector6};
 
 use super::roughness::Roughness;
@@ -82,8 +84,8 @@ pub(crate) struct Block {
     pub frame: usize,
     /// The panel.
     pub panel: PanelRef,
-    /// The corners.
-    pub observations: Vec<Observation>,
+    /// The corners, which copies of a problem share.
+    pub observations: Arc<[Observation]>,
 }
 
 impl CameraUnknowns {

@@ -112,7 +112,7 @@ const LEAST_FREE: f64 = 0.25;
 /// The covariances of all corners, `None` where no corner has one. A corner without one among
 /// others that have one was the hardest to refine: it gets the largest variance of all.
 fn covariances(problem: &Problem) -> Option<Vec<Vec<[f64; 3]>>> {
-    let all = || problem.blocks.iter().flat_map(|block| &block.observations);
+    let all = || problem.blocks.iter().flat_map(|block| block.observations.iter());
     let largest = all().filter_map(|o| o.cov).map(|[xx, _, yy]| xx.max(yy)).fold(0.0, f64::max);
     let of = |block: &Block| {
         block.observations.iter().map(|o| o.cov.unwrap_or([largest, 0.0, largest])).collect()

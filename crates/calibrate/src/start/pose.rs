@@ -199,7 +199,7 @@ pub(crate) fn blocks(sightings: &[Sighting], frame: usize) -> impl Iterator<Item
         camera: 0,
         frame,
         panel: sighting.panel,
-        observations: sighting.observations.clone(),
+        observations: sighting.observations.as_slice().into(),
     })
 }
 

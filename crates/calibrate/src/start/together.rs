@@ -79,7 +79,9 @@ pub(crate) fn start(
                     camera: index,
                     frame,
                     panel: sighting.panel,
-                    observations: symmetries.rotated(target, rotated, &sighting.observations),
+                    observations: symmetries
+                        .rotated(target, rotated, &sighting.observations)
+                        .into(),
                 }
             }));
         }

@@ -145,7 +145,8 @@ impl StateEquations {
         let free = if matches!(unknowns.camera.lens, Lens::Spline(_)) { Vec::new() } else { free };
         let of_camera = || problem.blocks.iter().filter(|block| block.camera == camera);
         let panels: BTreeSet<usize> = of_camera().map(|block| block.panel.index()).collect();
-        let places = || of_camera().flat_map(|block| &block.observations).map(|seen| seen.panel_mm);
+        let places =
+            || of_camera().flat_map(|block| block.observations.iter()).map(|seen| seen.panel_mm);
         let middle = places().sum::<DVec3>() / places().count().max(1) as f64;
         let reach = places().map(|at| at.distance(middle)).fold(f64::MIN_POSITIVE, f64::max);
         let equations = Equations { problem, whitening, loss, camera, free, middle, reach };
