@@ -140,6 +140,10 @@ impl LensLaw for BrownConrady {
         self.prism.copy_from_slice(&values[8..12]);
     }
 
+    fn least_coefficients(&self) -> Option<usize> {
+        Some(0)
+    }
+
     fn image(&self, point: DVec3, by_parameters: &mut [[f64; 2]]) -> Option<Imaged> {
         if point.z <= MIN_FORWARD * point.length() {
             return None;

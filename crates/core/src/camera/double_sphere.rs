@@ -2,6 +2,7 @@ use glam::{DVec2, DVec3};
 
 use super::extended_unified::{by_height, limit, quotient};
 use super::law::{Imaged, LensLaw, Ray};
+use crate::quantity::{self, Range};
 
 /// Double sphere model (Usenko, Demmel and Cremers 2018):
 ///
@@ -39,6 +40,10 @@ impl LensLaw for DoubleSphere {
 
     fn set_parameters(&mut self, values: &[f64]) {
         [self.xi, self.alpha] = [values[0], values[1]];
+    }
+
+    fn ranges(&self) -> &'static [Range] {
+        &[quantity::xi::RANGE, quantity::alpha::RANGE]
     }
 
     fn image(&self, point: DVec3, by_parameters: &mut [[f64; 2]]) -> Option<Imaged> {

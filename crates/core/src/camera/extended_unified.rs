@@ -1,6 +1,7 @@
 use glam::{DVec2, DVec3};
 
 use super::law::{Imaged, LensLaw, Ray};
+use crate::quantity::{self, Range};
 
 /// Extended unified camera model, EUCM (Khomutenko, Garcia and Martinet 2016):
 ///
@@ -36,6 +37,10 @@ impl LensLaw for ExtendedUnified {
 
     fn set_parameters(&mut self, values: &[f64]) {
         [self.alpha, self.beta] = [values[0], values[1]];
+    }
+
+    fn ranges(&self) -> &'static [Range] {
+        &[quantity::alpha::RANGE, quantity::beta::RANGE]
     }
 
     fn image(&self, point: DVec3, by_parameters: &mut [[f64; 2]]) -> Option<Imaged> {

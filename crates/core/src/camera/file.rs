@@ -16,14 +16,9 @@
 //! # Ok::<(), deltille_core::camera::CameraFileError>(())
 //! ```
 //!
-//! | `model` | `distortion` |
-//! |---|---|
-//! | `pinhole` | k1 k2 p1 p2 k3 k4 k5 k6 s1 s2 s3 s4; what is left out at the end is zero |
-//! | `fisheye` | k1 k2 k3 k4 or more; what is left out is zero |
-//! | `eucm` | α β |
-//! | `double-sphere` | ξ α |
-//! | `pupil` | k1 k2 k3 k4 k5 p1 p2 e1 e2 e3 |
-//! | `spline` | dx dy of each knot, row by row; `spline` has `degree`, `columns`, `rows`, `fov_x_deg` |
+//! `model` is the name of a [`LensKind`], `distortion` the parameters of the lens in their order. Of `pinhole` and `fisheye`
+//! what is left out at the end is zero; beside those of `spline` there is `spline` with `degree`, `columns`, `rows` and
+//! `fov_x_deg`.
 //!
 //! A ROS or OpenCV file has `image_width`, `image_height`, `camera_matrix`, `distortion_model`
 //! (`plumb_bob`, `rational_polynomial`, `equidistant`; OpenCV names none) and
@@ -38,10 +33,8 @@ use crate::identity::TargetIdentity;
 use crate::quantity;
 use crate::reading::in_words;
 
-use super::{
-    BrownConrady, Camera, DoubleSphere, ExtendedUnified, KannalaBrandt, Lens, MAX_LENS_PARAMETERS,
-    Pupil, Spline, SplineGrid,
-};
+use super::kannala_brandt::LEAST_TERMS;
+use super::{Camera, Lens, LensKind, MAX_LENS_PARAMETERS, SplineGrid};
 
 /// Most bytes of a camera file. A hundredth of it is more than most have, and readers of YAML take time with the square
 /// of it.
@@ -49,9 +42,6 @@ const MAX_BYTES: usize = 50_000;
 
 /// Most lists and maps within each other; a camera has two.
 const MAX_DEPTH: usize = 16;
-
-/// Terms of a fisheye's polynomial that are there even when a file has fewer.
-const LEAST_TERMS: usize = 4;
 
 /// What is wrong with a camera file.
 #[derive(Debug, thiserror::Error)]
@@ -83,8 +73,8 @@ struct Own {
     height: u32,
     focal_px: DVec2,
     centre_px: DVec2,
-    #[serde(default)]
-    model: Model,
+    #[serde(default = "pinhole")]
+    model: LensKind,
     /// The grid of a spline.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     spline: Option<SplineGrid>,
@@ -105,18 +95,6 @@ pub struct CameraFile {
     pub calibrated_with: Vec<TargetIdentity>,
     /// Why the calibration failed, so that the camera is not to be used; `None` where it did not.
     pub failed: Option<String>,
-}
-
-#[derive(Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-enum Model {
-    #[default]
-    Pinhole,
-    Fisheye,
-    Eucm,
-    DoubleSphere,
-    Pupil,
-    Spline,
 }
 
 #[derive(Deserialize)]
@@ -151,50 +129,8 @@ impl Matrix {
     }
 }
 
-impl Model {
-    fn of(lens: &Lens) -> Self {
-        match lens {
-            Lens::BrownConrady(_) => Self::Pinhole,
-            Lens::KannalaBrandt(_) => Self::Fisheye,
-            Lens::ExtendedUnified(_) => Self::Eucm,
-            Lens::DoubleSphere(_) => Self::DoubleSphere,
-            Lens::Pupil(_) => Self::Pupil,
-            Lens::Spline(_) => Self::Spline,
-        }
-    }
-
-    /// A lens of this model that has `count` parameters, or as many as it always has; `None` where that is a spline
-    /// without grid, or another lens with one.
-    fn lens(self, count: usize, grid: Option<SplineGrid>) -> Option<Lens> {
-        if (self == Self::Spline) != grid.is_some() {
-            return None;
-        }
-        Some(match self {
-            Self::Pinhole => Lens::BrownConrady(BrownConrady::default()),
-            Self::Fisheye => {
-                let terms = count.clamp(LEAST_TERMS, MAX_LENS_PARAMETERS);
-                Lens::KannalaBrandt(KannalaBrandt { k: vec![0.0; terms] })
-            }
-            Self::Eucm => Lens::ExtendedUnified(ExtendedUnified::default()),
-            Self::DoubleSphere => Lens::DoubleSphere(DoubleSphere::default()),
-            Self::Pupil => Lens::Pupil(Pupil::default()),
-            Self::Spline => Lens::Spline(Spline::new(grid?)),
-        })
-    }
-
-    /// The ranges of the parameters of its lens, from the first; those without one have that of coefficients.
-    fn ranges(self) -> &'static [quantity::Range] {
-        match self {
-            Self::Eucm => &[quantity::alpha::RANGE, quantity::beta::RANGE],
-            Self::DoubleSphere => &[quantity::xi::RANGE, quantity::alpha::RANGE],
-            Self::Pinhole | Self::Fisheye | Self::Pupil | Self::Spline => &[],
-        }
-    }
-
-    /// Whether coefficients that are left out at the end of the list are zero.
-    fn ends_early(self) -> bool {
-        matches!(self, Self::Pinhole | Self::Fisheye)
-    }
+fn pinhole() -> LensKind {
+    LensKind::BrownConrady
 }
 
 impl Camera {
@@ -246,24 +182,28 @@ impl CameraFile {
         let spline = spline.map(SplineGrid::checked).transpose();
         let spline = spline.map_err(|problem| key("spline", problem.to_string()))?;
         let lens = model
-            .lens(distortion.len(), spline)
+            .lens(distortion.len().clamp(LEAST_TERMS, MAX_LENS_PARAMETERS), spline)
             .ok_or_else(|| key("spline", "the model `spline` has it, and no other".to_owned()))?;
         let count = lens.names().len();
-        while model != Model::Spline && distortion.len() > count && distortion.last() == Some(&0.0)
+        while model != LensKind::Spline
+            && distortion.len() > count
+            && distortion.last() == Some(&0.0)
         {
             distortion.pop();
         }
-        if model == Model::Spline && distortion.len() != count {
+        if model == LensKind::Spline && distortion.len() != count {
             let problem = format!("there are {} numbers, the grid has {count}", distortion.len());
             return Err(key("distortion", problem));
         }
-        if distortion.len() > count || distortion.len() < count && !model.ends_early() {
+        if distortion.len() > count
+            || distortion.len() < count && lens.least_coefficients().is_none()
+        {
             let names = lens.names().join(" ");
             let problem = format!("there are {} numbers, the model has {names}", distortion.len());
             return Err(key("distortion", problem));
         }
         distortion.resize(count, 0.0);
-        for ((name, &number), range) in lens.names().iter().zip(&distortion).zip(model.ranges()) {
+        for ((name, &number), range) in lens.names().iter().zip(&distortion).zip(lens.ranges()) {
             let in_range = range.check(number);
             in_range.map_err(|what| key("distortion", format!("{name}: {what}")))?;
         }
@@ -275,10 +215,10 @@ impl CameraFile {
     /// The text of the file, with every digit.
     pub fn to_yaml(&self) -> String {
         let Camera { width, height, focal_px, centre_px, lens } = &self.camera;
-        let model = Model::of(lens);
         let mut distortion = lens.parameters();
-        let least = if model == Model::Fisheye { LEAST_TERMS } else { 0 };
-        while model.ends_early() && distortion.len() > least && distortion.last() == Some(&0.0) {
+        while lens.least_coefficients().is_some_and(|least| distortion.len() > least)
+            && distortion.last() == Some(&0.0)
+        {
             distortion.pop();
         }
         let spline = match lens {
@@ -290,7 +230,7 @@ impl CameraFile {
             height: *height,
             focal_px: *focal_px,
             centre_px: *centre_px,
-            model,
+            model: lens.kind(),
             spline,
             distortion,
             calibrated_with: self.calibrated_with.clone(),
@@ -339,8 +279,8 @@ fn from_foreign(text: &str) -> Result<Own, CameraFileError> {
         return Err(key("camera_matrix", problem));
     }
     let model = match file.distortion_model.as_deref() {
-        None | Some("plumb_bob" | "rational_polynomial") => Model::Pinhole,
-        Some("equidistant" | "fisheye") => Model::Fisheye,
+        None | Some("plumb_bob" | "rational_polynomial") => LensKind::BrownConrady,
+        Some("equidistant" | "fisheye") => LensKind::KannalaBrandt,
         Some(other) => return Err(key("distortion_model", format!("`{other}` is not known"))),
     };
     Ok(Own {
@@ -373,20 +313,14 @@ mod tests {
 
     #[test]
     fn every_model_is_written_and_read() {
-        for (model, values) in [
-            (Model::Pinhole, vec![-0.1, 0.02, 1e-4, -2e-4, 0.1, 0.2, 0.0, 0.3]),
-            (Model::Fisheye, vec![0.1, -0.02, 0.0, 0.0]),
-            (Model::Fisheye, vec![0.1, -0.02, 0.0, 0.0, 1.0 / 3.0]),
-            (Model::Eucm, vec![0.6, 1.1]),
-            (Model::DoubleSphere, vec![-0.2, 0.6]),
-            (Model::Pupil, (1..=10).map(|i| f64::from(i) / 7.0).collect()),
-            (Model::Spline, (1..=40).map(|i| f64::from(i) / 700.0).collect()),
-        ] {
-            let grid = SplineGrid::new(3, [5, 4], 90).ok().filter(|_| model == Model::Spline);
-            let lens = model.lens(values.len(), grid).unwrap();
-            let mut all = values.clone();
-            all.resize(lens.names().len(), 0.0);
-            let camera = Camera::centred(640, 480, 321.0, lens.with_parameters(&all));
+        // Of a perspective lens the last ones are zero here.
+        let short = (LensKind::BrownConrady, 8);
+        for (kind, count) in LensKind::ALL.iter().map(|kind| (*kind, 40)).chain([short]) {
+            let grid = SplineGrid::new(3, [5, 4], 90).ok().filter(|_| kind == LensKind::Spline);
+            let lens = kind.lens(5, grid).unwrap();
+            let value = |i: usize| if i < count { (i + 1) as f64 / 700.0 } else { 0.0 };
+            let values: Vec<f64> = (0..lens.names().len()).map(value).collect();
+            let camera = Camera::centred(640, 480, 321.0, lens.with_parameters(&values));
             let text = camera.to_yaml();
             assert_eq!(Camera::from_yaml(&text).unwrap(), camera, "{text}");
             let short = format!("{text}- 1.0\n").replace("- 1.0\n", "- .nan\n");

@@ -3,6 +3,9 @@ use glam::{DVec2, DVec3};
 use super::equidistant::{self, Angle};
 use super::law::{Imaged, LensLaw, Ray};
 
+/// Terms of the polynomial that are there even when a file has fewer.
+pub(super) const LEAST_TERMS: usize = 4;
+
 /// Equidistant fisheye polynomial (Kannala and Brandt 2006), with four terms as in OpenCV's
 /// fisheye module, or more:
 ///
@@ -29,6 +32,10 @@ impl LensLaw for KannalaBrandt {
 
     fn set_parameters(&mut self, values: &[f64]) {
         self.k.copy_from_slice(values);
+    }
+
+    fn least_coefficients(&self) -> Option<usize> {
+        Some(LEAST_TERMS)
     }
 
     fn image(&self, point: DVec3, by_parameters: &mut [[f64; 2]]) -> Option<Imaged> {

@@ -2,6 +2,8 @@
 
 use glam::{DVec2, DVec3};
 
+use crate::quantity::Range;
+
 /// A half-line in the camera frame, along which a pixel looks.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Ray {
@@ -38,6 +40,17 @@ pub(super) trait LensLaw {
 
     /// Takes other values, as many as there are names.
     fn set_parameters(&mut self, values: &[f64]);
+
+    /// The ranges of its parameters, from the first; those without one have that of coefficients.
+    fn ranges(&self) -> &'static [Range] {
+        &[]
+    }
+
+    /// How many coefficients a camera file has at least, where those left out at the end are zero; `None` where all are
+    /// there.
+    fn least_coefficients(&self) -> Option<usize> {
+        None
+    }
 
     /// The image of a point, and in `by_parameters` the derivatives of x', y' by each parameter;
     /// `None` where the formula has no value that a search may pass through.

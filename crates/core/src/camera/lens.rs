@@ -1,49 +1,107 @@
 use glam::{DVec2, DVec3};
+use serde::{Deserialize, Serialize};
 
 use super::law::{Imaged, LensLaw, Ray};
-use super::{BrownConrady, DoubleSphere, ExtendedUnified, KannalaBrandt, Knots, Pupil, Spline};
+use super::{
+    BrownConrady, DoubleSphere, ExtendedUnified, KannalaBrandt, Knots, Pupil, Spline, SplineGrid,
+};
+use crate::quantity::Range;
 
 /// Most parameters that a lens has which all matter everywhere: of a spline only some do.
 pub const MAX_LENS_PARAMETERS: usize = 12;
 
-/// How a point of the camera frame becomes a point of the normalised image plane.
-#[derive(Clone, Debug, PartialEq)]
-pub enum Lens {
+/// The enum of lenses, from a line for each: its type, the name of its model in camera files, what messages call it, and
+/// how it begins with so many coefficients, and with a grid where it has one.
+macro_rules! lenses {
+    ($($(#[$doc:meta])* $lens:ident $name:literal $title:literal $given:pat => $start:expr,)*) => {
+        /// How a point of the camera frame becomes a point of the normalised image plane.
+        #[derive(Clone, Debug, PartialEq)]
+        pub enum Lens {
+            $($(#[$doc])* $lens($lens),)*
+        }
+
+        /// What kind of lens it is.
+        #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+        pub enum LensKind {
+            $($(#[$doc])* #[serde(rename = $name)] $lens,)*
+        }
+
+        impl LensKind {
+            /// All kinds.
+            pub const ALL: &[Self] = &[$(Self::$lens),*];
+
+            /// The name of the model in camera files.
+            pub fn name(self) -> &'static str {
+                match self {
+                    $(Self::$lens => $name,)*
+                }
+            }
+
+            /// What messages call a lens, such as `a double sphere lens`.
+            pub fn title(self) -> &'static str {
+                match self {
+                    $(Self::$lens => $title,)*
+                }
+            }
+
+            /// A lens from which a search may start, with so many coefficients if it can have any number; `None` where
+            /// it is a spline without grid, or another lens with one.
+            pub fn lens(self, count: usize, grid: Option<SplineGrid>) -> Option<Lens> {
+                match (self, (count, grid)) {
+                    $((Self::$lens, $given) => Some(Lens::$lens($start)),)*
+                    _ => None,
+                }
+            }
+        }
+
+        impl Lens {
+            fn law(&self) -> &dyn LensLaw {
+                match self {
+                    $(Self::$lens(lens) => lens,)*
+                }
+            }
+
+            fn law_mut(&mut self) -> &mut dyn LensLaw {
+                match self {
+                    $(Self::$lens(lens) => lens,)*
+                }
+            }
+
+            /// Its kind.
+            pub fn kind(&self) -> LensKind {
+                match self {
+                    $(Self::$lens(_) => LensKind::$lens,)*
+                }
+            }
+        }
+    };
+}
+
+lenses! {
     /// Perspective with polynomial or rational distortion; sees less than 180°.
-    BrownConrady(BrownConrady),
+    BrownConrady "pinhole" "a perspective lens" (_, None) => BrownConrady::default(),
     /// Equidistant polynomial; sees more than 180° where its polynomial grows.
-    KannalaBrandt(KannalaBrandt),
+    KannalaBrandt "fisheye" "a fisheye polynomial" (count, None) => KannalaBrandt { k: vec![0.0; count] },
     /// Extended unified model; sees more than 180°.
-    ExtendedUnified(ExtendedUnified),
+    ExtendedUnified "eucm" "an EUCM lens" (_, None) => ExtendedUnified::default(),
     /// Double sphere; sees more than 180°.
-    DoubleSphere(DoubleSphere),
+    DoubleSphere "double-sphere" "a double sphere lens" (_, None) => DoubleSphere::default(),
     /// Equidistant polynomial with a moving entrance pupil: not central.
-    Pupil(Pupil),
+    Pupil "pupil" "a fisheye with a moving pupil" (_, None) => Pupil::default(),
     /// Stereographic with a correction by a spline; sees more than 180°.
-    Spline(Spline),
+    Spline "spline" "a spline" (_, Some(grid)) => Spline::new(grid),
 }
 
 impl Lens {
-    fn law(&self) -> &dyn LensLaw {
-        match self {
-            Self::BrownConrady(lens) => lens,
-            Self::KannalaBrandt(lens) => lens,
-            Self::ExtendedUnified(lens) => lens,
-            Self::DoubleSphere(lens) => lens,
-            Self::Pupil(lens) => lens,
-            Self::Spline(lens) => lens,
-        }
+    /// The ranges of its parameters, from the first; those without one have that of coefficients.
+    pub fn ranges(&self) -> &'static [Range] {
+        self.law().ranges()
     }
 
-    fn law_mut(&mut self) -> &mut dyn LensLaw {
-        match self {
-            Self::BrownConrady(lens) => lens,
-            Self::KannalaBrandt(lens) => lens,
-            Self::ExtendedUnified(lens) => lens,
-            Self::DoubleSphere(lens) => lens,
-            Self::Pupil(lens) => lens,
-            Self::Spline(lens) => lens,
-        }
+    /// How many coefficients a camera file has at least, where those left out at the end are zero; `None` where all are
+    /// there.
+    pub fn least_coefficients(&self) -> Option<usize> {
+        self.law().least_coefficients()
     }
 
     /// The names of its parameters, such as `k1`, in the order of [`Self::parameters`].

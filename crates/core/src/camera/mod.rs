@@ -39,7 +39,7 @@ pub use extended_unified::ExtendedUnified;
 pub use file::{CameraFile, CameraFileError};
 pub use kannala_brandt::KannalaBrandt;
 pub use law::{Imaged, Ray};
-pub use lens::{Lens, MAX_LENS_PARAMETERS};
+pub use lens::{Lens, LensKind, MAX_LENS_PARAMETERS};
 pub use pose::{Pose, is_rotation};
 pub use pupil::Pupil;
 pub use rectification::{Rectification, RectificationError};
