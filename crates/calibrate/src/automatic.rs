@@ -12,23 +12,9 @@ use super::estimate::values::{CameraEstimate, Estimate, ViewEstimate};
 use super::input::calibration::{Calibration, CameraViews};
 use super::input::observation::View;
 use super::input::sample::evenly;
-use super::model::Model;
+use super::model::{Model, TRIED};
 use super::problem::whitening::{MEDIAN_OF_CHI_SQUARED_2, OUTLIER_SIGMA};
 use deltille_core::statistics::median;
-
-/// Models that are tried, those with fewer parameters first.
-const TRIED: [Model; 10] = [
-    Model::Radtan,
-    Model::Eucm,
-    Model::DoubleSphere,
-    Model::Radtan5,
-    Model::KannalaBrandt(4),
-    Model::KannalaBrandt(6),
-    Model::Rational,
-    Model::Pupil,
-    Model::ThinPrism,
-    Model::SPLINE,
-];
 
 /// A spline is tried where corners have so many coordinates for each of its parameters: with fewer what is expected of
 /// its knots would hold it as much as they do, which tells nothing that a smaller model does not.

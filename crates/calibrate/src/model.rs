@@ -1,14 +1,14 @@
 //! Models of lenses: names, where their search starts, which parameters are free, smaller and richer ones.
 
 use std::f64::consts::FRAC_PI_2;
-use std::fmt;
+use std::mem::discriminant;
 use std::str::FromStr;
+use std::{fmt, iter};
 
 use glam::DVec2;
 
 use deltille_core::camera::{
-    BrownConrady, DoubleSphere, ExtendedUnified, KannalaBrandt, Lens, MAX_LENS_PARAMETERS,
-    PROJECTION_PARAMETERS, Pupil, Spline, SplineGrid,
+    DoubleSphere, Lens, LensKind, MAX_LENS_PARAMETERS, PROJECTION_PARAMETERS, SplineGrid,
 };
 
 /// Terms of a Kannala–Brandt polynomial unless said otherwise.
@@ -62,39 +62,182 @@ pub enum Model {
 #[error("{0}")]
 pub struct ModelError(String);
 
-impl Model {
-    const NAMED: [(&str, Model); 9] = [
-        ("radtan", Self::Radtan),
-        ("radtan5", Self::Radtan5),
-        ("rational", Self::Rational),
-        ("thin-prism", Self::ThinPrism),
-        ("kannala-brandt", Self::KannalaBrandt(TERMS)),
-        ("eucm", Self::Eucm),
-        ("double-sphere", Self::DoubleSphere),
-        ("pupil", Self::Pupil),
-        ("spline", Self::SPLINE),
-    ];
+/// What is known of a model.
+struct Facts {
+    /// What it is asked for by.
+    name: &'static str,
+    /// The model, of those with a number the one that the name alone stands for.
+    model: Model,
+    /// Its lens.
+    lens: LensKind,
+    /// How many parameters of the lens it has at most, from the first; the others are zero.
+    found: usize,
+    /// What help texts say of it.
+    help: &'static str,
+    /// What errors say of its name.
+    forms: &'static str,
+    /// See [`Model::richer`].
+    richer: &'static [Model],
+}
 
+impl Facts {
+    /// Whether they are of this model, with whatever number.
+    fn is_of(&self, model: Model) -> bool {
+        discriminant(&self.model) == discriminant(&model)
+    }
+}
+
+/// A model of which nothing more is to be said.
+const PLAIN: Facts = Facts {
+    name: "",
+    model: Model::Radtan,
+    lens: LensKind::BrownConrady,
+    found: usize::MAX,
+    help: "",
+    forms: "",
+    richer: &[],
+};
+
+/// The models, in the order in which they are listed; those of one lens with fewer parameters first.
+const MODELS: [Facts; 9] = [
+    Facts {
+        name: "radtan",
+        model: Model::Radtan,
+        lens: LensKind::BrownConrady,
+        found: 4,
+        help: "k1 k2 p1 p2",
+        richer: &[Model::Rational, Model::ThinPrism, Model::KannalaBrandt(TERMS)],
+        ..PLAIN
+    },
+    Facts {
+        name: "radtan5",
+        model: Model::Radtan5,
+        lens: LensKind::BrownConrady,
+        found: 5,
+        help: "and k3",
+        richer: &[Model::Rational, Model::ThinPrism, Model::KannalaBrandt(TERMS)],
+        ..PLAIN
+    },
+    Facts {
+        name: "rational",
+        model: Model::Rational,
+        lens: LensKind::BrownConrady,
+        found: 8,
+        help: "and k4 k5 k6",
+        richer: &[Model::ThinPrism, Model::KannalaBrandt(TERMS)],
+        ..PLAIN
+    },
+    Facts {
+        name: "thin-prism",
+        model: Model::ThinPrism,
+        lens: LensKind::BrownConrady,
+        help: "and s1 … s4",
+        richer: &[Model::KannalaBrandt(TERMS)],
+        ..PLAIN
+    },
+    Facts {
+        name: "kannala-brandt",
+        model: Model::KannalaBrandt(TERMS),
+        lens: LensKind::KannalaBrandt,
+        help: "4 terms; kannala-brandt-5 …",
+        forms: "with 4 terms; kannala-brandt-5 and so on up to 12",
+        richer: &[Model::KannalaBrandt(MORE_TERMS), Model::Pupil],
+        ..PLAIN
+    },
+    Facts {
+        name: "eucm",
+        model: Model::Eucm,
+        lens: LensKind::ExtendedUnified,
+        richer: &[Model::KannalaBrandt(TERMS), Model::Pupil],
+        ..PLAIN
+    },
+    Facts {
+        name: "double-sphere",
+        model: Model::DoubleSphere,
+        lens: LensKind::DoubleSphere,
+        richer: &[Model::KannalaBrandt(TERMS), Model::Pupil],
+        ..PLAIN
+    },
+    Facts {
+        name: "pupil",
+        model: Model::Pupil,
+        lens: LensKind::Pupil,
+        help: "fisheye with a moving entrance pupil",
+        ..PLAIN
+    },
+    Facts {
+        name: "spline",
+        model: Model::SPLINE,
+        lens: LensKind::Spline,
+        help: "any smooth lens, of degree 3; spline-2; spline-3-16x12 with so many knots",
+        forms: "of degree 3; spline-2; with as many knots as you say: spline-3-16x12",
+        ..PLAIN
+    },
+];
+
+/// Those that are tried where the model is to be chosen; of two that hold the views alike and have as many parameters,
+/// the first is taken.
+pub(super) const TRIED: [Model; 10] = [
+    Model::Radtan,
+    Model::Eucm,
+    Model::DoubleSphere,
+    Model::Radtan5,
+    Model::KannalaBrandt(TERMS),
+    Model::KannalaBrandt(MORE_TERMS),
+    Model::Rational,
+    Model::Pupil,
+    Model::ThinPrism,
+    Model::SPLINE,
+];
+
+/// The models with what is said of each, as a list in a sentence.
+fn listed(said: impl Fn(&Facts) -> &'static str) -> String {
+    let model = |facts: &Facts| match said(facts) {
+        "" => facts.name.to_owned(),
+        said => format!("{} ({said})", facts.name),
+    };
+    let [before @ .., last] = &MODELS.each_ref().map(model);
+    format!("{}, or {last}", before.join(", "))
+}
+
+impl Model {
     /// A cubic spline with as many knots as it takes.
     pub const SPLINE: Self = Self::Spline { degree: SPLINE_DEGREE, knots: None };
 
+    /// The models by name; of those with a number the one that the name alone stands for.
+    pub fn named() -> impl Iterator<Item = (&'static str, Self)> {
+        MODELS.iter().map(|facts| (facts.name, facts.model))
+    }
+
+    /// What may be asked for, in words, with what each is.
+    pub fn choice() -> String {
+        listed(|facts| facts.help)
+    }
+
+    fn facts(self) -> &'static Facts {
+        MODELS.iter().find(|facts| facts.is_of(self)).expect("every model is in the table")
+    }
+
+    /// What kind of lens it has.
+    pub fn kind(self) -> LensKind {
+        self.facts().lens
+    }
+
+    /// How many parameters of its lens it has, from the first; the others are zero.
+    pub fn found(self) -> usize {
+        self.lens().names().len().min(self.facts().found)
+    }
+
     /// A lens of this model to start from: near the axis its radius is that of the angle.
     pub fn lens(self) -> Lens {
-        match self {
-            Self::Radtan | Self::Radtan5 | Self::Rational | Self::ThinPrism => {
-                Lens::BrownConrady(BrownConrady::default())
-            }
-            Self::KannalaBrandt(terms) => {
-                Lens::KannalaBrandt(KannalaBrandt { k: vec![0.0; terms] })
-            }
-            Self::Eucm => Lens::ExtendedUnified(ExtendedUnified::default()),
-            Self::DoubleSphere => Lens::DoubleSphere(DoubleSphere::default()),
-            Self::Pupil => Lens::Pupil(Pupil::default()),
+        let (terms, grid) = match self {
+            Self::KannalaBrandt(terms) => (terms, None),
             Self::Spline { degree, knots } => {
-                let grid = SplineGrid::over(degree, knots.unwrap_or(SPLINE_KNOTS), DVec2::ONE);
-                Lens::Spline(Spline::new(grid))
+                (0, Some(SplineGrid::over(degree, knots.unwrap_or(SPLINE_KNOTS), DVec2::ONE)))
             }
-        }
+            _ => (0, None),
+        };
+        self.kind().lens(terms, grid).expect("a spline has a grid, and no other lens")
     }
 
     /// The lenses to start from, each with its focal length over that of an ideal camera.
@@ -120,68 +263,39 @@ impl Model {
 
     /// Which of the camera's parameters it has.
     pub fn free(self) -> Vec<bool> {
-        let lens = match self {
-            Self::Radtan => 4,
-            Self::Radtan5 => 5,
-            Self::Rational => 8,
-            _ => self.lens().names().len(),
-        };
         let count = PROJECTION_PARAMETERS.len();
-        let free = (0..count + self.lens().names().len()).map(|i| i < count + lens).collect();
-        without_gauge(&self.lens(), free)
+        let (lens, found) = (self.lens(), self.found());
+        let free = (0..lens.names().len()).map(|i| i < found);
+        without_gauge(&lens, iter::repeat_n(true, count).chain(free).collect())
     }
 
     /// The next one that has fewer of the same parameters, where there is one.
     pub fn smaller(self) -> Option<Self> {
         match self {
-            Self::Radtan5 => Some(Self::Radtan),
-            Self::Rational => Some(Self::Radtan5),
-            Self::ThinPrism => Some(Self::Rational),
             Self::KannalaBrandt(terms) if terms > TERMS => Some(Self::KannalaBrandt(terms - 1)),
-            Self::Radtan
-            | Self::KannalaBrandt(_)
-            | Self::Eucm
-            | Self::DoubleSphere
-            | Self::Pupil
-            | Self::Spline { .. } => None,
+            _ => {
+                let before = MODELS.iter().take_while(|facts| !facts.is_of(self));
+                before.filter(|facts| facts.lens == self.kind()).last().map(|facts| facts.model)
+            }
         }
     }
 
     /// Those that may hold a lens where this one does not, the simplest first.
     pub fn richer(self) -> &'static [Self] {
         match self {
-            Self::Radtan | Self::Radtan5 => {
-                &[Self::Rational, Self::ThinPrism, Self::KannalaBrandt(TERMS)]
-            }
-            Self::Rational => &[Self::ThinPrism, Self::KannalaBrandt(TERMS)],
-            Self::ThinPrism => &[Self::KannalaBrandt(TERMS)],
-            Self::KannalaBrandt(terms) if terms < MORE_TERMS => {
-                &[Self::KannalaBrandt(MORE_TERMS), Self::Pupil]
-            }
-            Self::KannalaBrandt(_) => &[Self::Pupil],
-            Self::Eucm | Self::DoubleSphere => &[Self::KannalaBrandt(TERMS), Self::Pupil],
-            Self::Pupil | Self::Spline { .. } => &[],
+            Self::KannalaBrandt(terms) if terms >= MORE_TERMS => &[Self::Pupil],
+            _ => self.facts().richer,
         }
     }
 
-    /// Models to be compared with it, and it: those for lenses of its kind, fewer parameters first.
+    /// Models to be compared with it, and it: of those that are tried the ones for lenses of its kind, and the polynomial
+    /// for any; no spline.
     pub(super) fn neighbours(self) -> Vec<Self> {
-        let of_kind = match self.is_perspective() {
-            true => [
-                Self::Radtan,
-                Self::Radtan5,
-                Self::KannalaBrandt(4),
-                Self::Rational,
-                Self::ThinPrism,
-            ],
-            false => [
-                Self::Eucm,
-                Self::DoubleSphere,
-                Self::KannalaBrandt(TERMS),
-                Self::KannalaBrandt(MORE_TERMS),
-                Self::Pupil,
-            ],
+        let is_alike = |other: &Self| {
+            let is_of_any = *other == Self::KannalaBrandt(TERMS);
+            (other.is_perspective() == self.is_perspective() || is_of_any) && *other != Self::SPLINE
         };
+        let of_kind: Vec<Self> = TRIED.into_iter().filter(is_alike).collect();
         let own = Some(self).filter(|own| !of_kind.contains(own));
         of_kind.into_iter().chain(own).collect()
     }
@@ -195,7 +309,7 @@ impl Model {
 
     /// Whether it sees no more than a half-space.
     pub(super) fn is_perspective(self) -> bool {
-        matches!(self.lens(), Lens::BrownConrady(_))
+        self.kind() == LensKind::BrownConrady
     }
 }
 
@@ -203,7 +317,7 @@ impl FromStr for Model {
     type Err = ModelError;
 
     fn from_str(text: &str) -> Result<Self, ModelError> {
-        if let Some(&(_, model)) = Self::NAMED.iter().find(|(name, _)| *name == text) {
+        if let Some((_, model)) = Self::named().find(|(name, _)| *name == text) {
             return Ok(model);
         }
         if let Some((degree, knots)) = text.strip_prefix("spline-").and_then(spline) {
@@ -215,18 +329,16 @@ impl FromStr for Model {
         let terms = text.strip_prefix("kannala-brandt-").and_then(|terms| terms.parse().ok());
         match terms.filter(|terms| (TERMS..=MAX_LENS_PARAMETERS).contains(terms)) {
             Some(terms) => Ok(Self::KannalaBrandt(terms)),
-            None => Err(ModelError(format!(
-                "`{text}` is no model: radtan, radtan5, rational, thin-prism, kannala-brandt (with 4 terms; \
-                 kannala-brandt-5 and so on up to 12), eucm, double-sphere, pupil, or spline (of degree 3; spline-2; \
-                 with as many knots as you say: spline-3-16x12)"
-            ))),
+            None => {
+                Err(ModelError(format!("`{text}` is no model: {}", listed(|facts| facts.forms))))
+            }
         }
     }
 }
 
 impl fmt::Display for Model {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
-        match (Self::NAMED.iter().find(|(_, model)| model == self), self) {
+        match (Self::named().find(|(_, model)| model == self), self) {
             (Some((name, _)), _) => f.write_str(name),
             (None, Self::KannalaBrandt(terms)) => write!(f, "kannala-brandt-{terms}"),
             (None, Self::Spline { degree, knots: None }) => write!(f, "spline-{degree}"),
