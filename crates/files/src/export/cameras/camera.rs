@@ -11,6 +11,7 @@ use glam::{DMat3, DMat4};
 use serde_json::json;
 
 use crate::export::GENERATOR;
+use deltille_calibrate::Model;
 use deltille_core::camera::{Camera, Lens, Pose, SplineGrid};
 use deltille_core::name;
 
@@ -23,50 +24,107 @@ pub struct FormatError {
     /// The lens of the camera.
     lens: String,
     /// The models of the format.
-    models: &'static str,
+    models: String,
 }
 
-/// The lens models that other programs share, with their coefficients.
-enum Shared<'a> {
-    /// Coefficients k1 k2 p1 p2 k3 k4 k5 k6 s1 s2 s3 s4, and how many of them are needed.
-    Perspective(&'a [f64], usize),
-    /// Coefficients k1 k2 k3 k4 (Kannala–Brandt).
-    Equidistant(&'a [f64]),
-    /// Any other model.
-    Other,
+/// A model of a program: the largest of ours that it holds, how many coefficients it has, and what it is called there.
+type Theirs = (Model, usize, &'static str);
+
+/// As many coefficients as the lens has.
+const ALL: usize = usize::MAX;
+
+/// The models of a program, those with fewer coefficients first.
+pub(super) struct Models {
+    pub(super) format: &'static str,
+    models: &'static [Theirs],
 }
 
-impl<'a> Shared<'a> {
-    fn of(camera: &Camera, parameters: &'a [f64]) -> Self {
-        let needed = parameters.iter().rposition(|&k| k != 0.0).map_or(0, |last| last + 1);
-        match camera.lens {
-            Lens::BrownConrady(_) => Self::Perspective(parameters, needed),
-            Lens::KannalaBrandt(_) if needed <= 4 => Self::Equidistant(&parameters[..4]),
-            _ => Self::Other,
-        }
+/// Perspective lenses have no name.
+pub(super) const OPENCV: Models = Models {
+    format: "opencv",
+    models: &[
+        (Model::Radtan, 4, ""),
+        (Model::Radtan5, 5, ""),
+        (Model::Rational, 8, ""),
+        (Model::ThinPrism, 12, ""),
+        (Model::KannalaBrandt(4), 4, "fisheye"),
+    ],
+};
+
+pub(super) const ROS: Models = Models {
+    format: "ros",
+    models: &[
+        (Model::Radtan, 5, "plumb_bob"),
+        (Model::Radtan5, 5, "plumb_bob"),
+        (Model::Rational, 8, "rational_polynomial"),
+        (Model::KannalaBrandt(4), 4, "equidistant"),
+    ],
+};
+
+/// The camera and its distortion; where there is none, what is found of the lens comes before its focal lengths.
+pub(super) const KALIBR: Models = Models {
+    format: "kalibr",
+    models: &[
+        (Model::Radtan, 4, "pinhole radtan"),
+        (Model::KannalaBrandt(4), 4, "pinhole equidistant"),
+        (Model::Eucm, ALL, "eucm none"),
+        (Model::DoubleSphere, ALL, "ds none"),
+    ],
+};
+
+pub(super) const COLMAP: Models = Models {
+    format: "colmap",
+    models: &[
+        (Model::Radtan, 4, "OPENCV"),
+        (Model::Radtan5, 8, "FULL_OPENCV"),
+        (Model::Rational, 8, "FULL_OPENCV"),
+        (Model::KannalaBrandt(4), 4, "OPENCV_FISHEYE"),
+    ],
+};
+
+pub(super) const NERFSTUDIO: Models = Models {
+    format: "nerfstudio",
+    models: &[
+        (Model::Radtan, 5, "OPENCV"),
+        (Model::Radtan5, 5, "OPENCV"),
+        (Model::KannalaBrandt(4), 4, "OPENCV_FISHEYE"),
+    ],
+};
+
+pub(super) const MRCAL: Models = Models {
+    format: "mrcal",
+    models: &[
+        (Model::Radtan, 4, "OPENCV4"),
+        (Model::Radtan5, 5, "OPENCV5"),
+        (Model::Rational, 8, "OPENCV8"),
+        (Model::ThinPrism, 12, "OPENCV12"),
+        (Model::SPLINE, ALL, "SPLINED_STEREOGRAPHIC"),
+    ],
+};
+
+impl Models {
+    /// What ours are called that it carries.
+    pub(super) fn names(&self) -> Vec<String> {
+        self.models.iter().map(|(model, ..)| model.to_string()).collect()
     }
-}
 
-/// The error that names the lens of the camera and the models of the format.
-fn refuse<T>(
-    camera: &Camera,
-    format: &'static str,
-    models: &'static str,
-) -> Result<T, FormatError> {
-    let names = camera.lens.names();
-    let values = camera.lens.parameters();
-    let used = values.iter().rposition(|&k| k != 0.0).map_or(0, |last| last + 1);
-    let lens = match camera.lens {
-        Lens::BrownConrady(_) => "a perspective lens",
-        Lens::KannalaBrandt(_) => "a fisheye polynomial",
-        Lens::ExtendedUnified(_) => "an EUCM lens",
-        Lens::DoubleSphere(_) => "a double sphere lens",
-        Lens::Pupil(_) => "a fisheye with a moving pupil",
-        Lens::Spline(_) => {
-            return Err(FormatError { format, lens: "a spline".to_owned(), models });
+    /// What the lens of a camera is called, and its coefficients.
+    fn of(&self, camera: &Camera) -> Result<(&'static str, Vec<f64>), FormatError> {
+        let mut values = camera.lens.parameters();
+        let needed = values.iter().rposition(|&k| k != 0.0).map_or(0, |last| last + 1);
+        let holds =
+            |(model, count, _): &&Theirs| model.kind() == camera.lens.kind() && needed <= *count;
+        if let Some(&(_, count, name)) = self.models.iter().find(holds) {
+            values.resize(if count == ALL { values.len() } else { count }, 0.0);
+            return Ok((name, values));
         }
-    };
-    Err(FormatError { format, lens: format!("{lens} with {}", names[..used].join(" ")), models })
+        let title = camera.lens.kind().title();
+        let lens = match camera.lens {
+            Lens::Spline(_) => title.to_owned(),
+            _ => format!("{title} with {}", camera.lens.names()[..needed].join(" ")),
+        };
+        Err(FormatError { format: self.format, lens, models: self.names().join(", ") })
+    }
 }
 
 /// The camera as YAML for OpenCV `FileStorage`; focal lengths and principal point in px.
@@ -110,17 +168,8 @@ pub struct Coefficients {
 /// # Errors
 /// When OpenCV has no such lens model.
 pub fn opencv_coefficients(camera: &Camera) -> Result<Coefficients, FormatError> {
-    let parameters = camera.lens.parameters();
-    match Shared::of(camera, &parameters) {
-        Shared::Perspective(k, needed) => {
-            let count = [4, 5, 8, 12].into_iter().find(|&count| count >= needed).unwrap_or(12);
-            Ok(Coefficients { is_fisheye: false, values: k[..count].to_vec() })
-        }
-        Shared::Equidistant(k) => Ok(Coefficients { is_fisheye: true, values: k.to_vec() }),
-        Shared::Other => {
-            refuse(camera, "opencv", "radtan, radtan5, rational, thin-prism, kannala-brandt")
-        }
-    }
+    let (name, values) = OPENCV.of(camera)?;
+    Ok(Coefficients { is_fisheye: !name.is_empty(), values })
 }
 
 fn opencv_matrix(rows: usize, cols: usize, data: &[f64]) -> String {
@@ -135,13 +184,7 @@ fn opencv_matrix(rows: usize, cols: usize, data: &[f64]) -> String {
 /// # Errors
 /// When ROS has no such lens model.
 pub fn ros(camera: &Camera, name: &str) -> Result<String, FormatError> {
-    let parameters = camera.lens.parameters();
-    let (model, coefficients) = match Shared::of(camera, &parameters) {
-        Shared::Perspective(k, 0..=5) => ("plumb_bob", &k[..5]),
-        Shared::Perspective(k, 6..=8) => ("rational_polynomial", &k[..8]),
-        Shared::Equidistant(k) => ("equidistant", k),
-        _ => return refuse(camera, "ros", "radtan, radtan5, rational, kannala-brandt"),
-    };
+    let (model, coefficients) = ROS.of(camera)?;
     let [fx, _, cx, _, fy, cy, ..] = matrix(camera);
     let matrix_of = |rows: usize, cols: usize, data: &[f64]| {
         format!("\n  rows: {rows}\n  cols: {cols}\n  data: [{}]\n", list(data))
@@ -155,7 +198,7 @@ pub fn ros(camera: &Camera, name: &str) -> Result<String, FormatError> {
         camera.height,
         serde_json::Value::from(name),
         matrix_of(3, 3, &matrix(camera)),
-        matrix_of(1, coefficients.len(), coefficients),
+        matrix_of(1, coefficients.len(), &coefficients),
         matrix_of(3, 3, &one),
         matrix_of(3, 4, &projection),
     ))
@@ -191,18 +234,11 @@ pub fn kalibr(cameras: &[(&Camera, Pose)], overlaps: &[Vec<usize>]) -> Result<St
 }
 
 fn kalibr_camera(camera: &Camera) -> Result<String, FormatError> {
-    let parameters = camera.lens.parameters();
+    let (name, mut coefficients) = KALIBR.of(camera)?;
+    let (model, distortion) = name.split_once(' ').unwrap_or_default();
     let ends = [camera.focal_px, camera.centre_px].map(|v| v.to_array()).concat();
-    let plain = |model| (model, [&parameters[..], &ends[..]].concat(), "none", Vec::new());
-    let (model, intrinsics, distortion, coefficients) = match &camera.lens {
-        Lens::ExtendedUnified(_) => plain("eucm"),
-        Lens::DoubleSphere(_) => plain("ds"),
-        _ => match Shared::of(camera, &parameters) {
-            Shared::Perspective(k, 0..=4) => ("pinhole", ends.to_vec(), "radtan", k[..4].to_vec()),
-            Shared::Equidistant(k) => ("pinhole", ends.to_vec(), "equidistant", k.to_vec()),
-            _ => return refuse(camera, "kalibr", "radtan, kannala-brandt, eucm, double-sphere"),
-        },
-    };
+    let before = if distortion == "none" { std::mem::take(&mut coefficients) } else { Vec::new() };
+    let intrinsics = [before, ends].concat();
     Ok(format!(
         "  camera_model: {model}\n  intrinsics: [{}]\n  distortion_model: {distortion}\n  \
          distortion_coeffs: [{}]\n  resolution: [{}, {}]\n",
@@ -219,23 +255,18 @@ fn kalibr_camera(camera: &Camera) -> Result<String, FormatError> {
 /// # Errors
 /// When mrcal has no such lens model.
 pub fn mrcal(camera: &Camera) -> Result<String, FormatError> {
-    let parameters = camera.lens.parameters();
-    let (model, coefficients) = match (&camera.lens, Shared::of(camera, &parameters)) {
-        (Lens::Spline(spline), _) => {
+    let (model, coefficients) = MRCAL.of(camera)?;
+    let grid = match &camera.lens {
+        Lens::Spline(spline) => {
             let SplineGrid { degree, columns, rows, fov_x_deg } = spline.grid();
-            let of_grid = format!("order={degree}_Nx={columns}_Ny={rows}_fov_x_deg={fov_x_deg}");
-            (format!("SPLINED_STEREOGRAPHIC_{of_grid}"), &parameters[..])
+            format!("_order={degree}_Nx={columns}_Ny={rows}_fov_x_deg={fov_x_deg}")
         }
-        (_, Shared::Perspective(k, needed)) => {
-            let count = [4, 5, 8, 12].into_iter().find(|&count| count >= needed).unwrap_or(12);
-            (format!("OPENCV{count}"), &k[..count])
-        }
-        _ => return refuse(camera, "mrcal", "radtan, radtan5, rational, thin-prism, spline"),
+        _ => String::new(),
     };
     let [focal, centre] = [camera.focal_px, camera.centre_px].map(|v| v.to_array());
-    let intrinsics = [&focal, &centre, coefficients].concat();
+    let intrinsics = [&focal, &centre, &coefficients[..]].concat();
     Ok(format!(
-        "# {GENERATOR}\n{{\n    'lensmodel': 'LENSMODEL_{model}',\n    'intrinsics': [ {} ],\n    \
+        "# {GENERATOR}\n{{\n    'lensmodel': 'LENSMODEL_{model}{grid}',\n    'intrinsics': [ {} ],\n    \
          'extrinsics': [ 0, 0, 0, 0, 0, 0 ],\n    'imagersize': [ {}, {} ]\n}}\n",
         list(&intrinsics),
         camera.width,
@@ -288,15 +319,9 @@ pub fn colmap_rig(cameras: &[(&str, &Camera, Pose)]) -> Result<String, FormatErr
 
 /// Name and parameters of a COLMAP camera.
 fn colmap_camera(camera: &Camera) -> Result<(&'static str, Vec<f64>), FormatError> {
-    let parameters = camera.lens.parameters();
-    let (model, coefficients) = match Shared::of(camera, &parameters) {
-        Shared::Perspective(k, 0..=4) => ("OPENCV", &k[..4]),
-        Shared::Perspective(k, 5..=8) => ("FULL_OPENCV", &k[..8]),
-        Shared::Equidistant(k) => ("OPENCV_FISHEYE", k),
-        _ => return refuse(camera, "colmap", "radtan, radtan5, rational, kannala-brandt"),
-    };
+    let (model, coefficients) = COLMAP.of(camera)?;
     let [focal, centre] = [camera.focal_px, camera.centre_px + 0.5].map(|v| v.to_array());
-    Ok((model, [&focal, &centre, coefficients].concat()))
+    Ok((model, [&focal, &centre, &coefficients[..]].concat()))
 }
 
 /// The `transforms.json` of nerfstudio: the camera, and for each image the inverse of its
@@ -306,14 +331,7 @@ fn colmap_camera(camera: &Camera) -> Result<(&'static str, Vec<f64>), FormatErro
 /// # Errors
 /// When nerfstudio has no such lens model.
 pub fn nerfstudio(camera: &Camera, views: &[(&str, Pose)]) -> Result<String, FormatError> {
-    let parameters = camera.lens.parameters();
-    let (model, names, coefficients) = match Shared::of(camera, &parameters) {
-        Shared::Perspective(k, 0..=5) => {
-            ("OPENCV", ["k1", "k2", "p1", "p2", "k3"].as_slice(), &k[..5])
-        }
-        Shared::Equidistant(k) => ("OPENCV_FISHEYE", ["k1", "k2", "k3", "k4"].as_slice(), k),
-        _ => return refuse(camera, "nerfstudio", "radtan, radtan5, kannala-brandt"),
-    };
+    let (model, coefficients) = NERFSTUDIO.of(camera)?;
     let frames = views.iter().map(|(image, camera_from_target)| {
         let back = camera_from_target.inverse();
         let flip = DMat3::from_diagonal(glam::DVec3::new(1.0, -1.0, -1.0));
@@ -330,8 +348,8 @@ pub fn nerfstudio(camera: &Camera, views: &[(&str, Pose)]) -> Result<String, For
         "cx": camera.centre_px.x + 0.5, "cy": camera.centre_px.y + 0.5,
         "frames": frames.collect::<Vec<_>>(),
     });
-    for (name, value) in names.iter().zip(coefficients) {
-        file[*name] = json!(value);
+    for (name, value) in camera.lens.names().iter().zip(coefficients) {
+        file[name] = json!(value);
     }
     Ok(deltille_core::json::to_text(&file, 3))
 }
@@ -355,7 +373,6 @@ fn list(values: &[f64]) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use deltille_calibrate::Model;
 
     fn camera(model: Model, count: usize) -> Camera {
         let lens = model.lens();

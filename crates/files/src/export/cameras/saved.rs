@@ -13,10 +13,12 @@ use super::sheet::StoredShape;
 use super::{calibration, rig};
 use deltille_calibrate::{
     BoardShape, CameraEstimate, Corner, CornerOffset, Coverage, Estimate, Excluded, FrameEstimate,
-    Model, ObservedCovariance, PanelRef, Parameter, ProjectionUncertainty, Reason, Reference,
+    ObservedCovariance, PanelRef, Parameter, ProjectionUncertainty, Reason, Reference,
     SHAPE_COEFFICIENTS as COUNT, TargetEstimate, TargetMap, ViewEstimate,
 };
-use deltille_core::camera::{Camera, Lens, Pose, Spline, SplineGrid, is_rotation};
+use deltille_core::camera::{
+    Camera, Lens, LensKind, PROJECTION_PARAMETERS, Pose, SplineGrid, is_rotation,
+};
 use deltille_core::json;
 use deltille_core::json::ReadError;
 use deltille_core::quantity;
@@ -559,18 +561,11 @@ impl SavedProjection {
     }
 }
 
-/// The lens model whose camera has parameters of these names.
+/// The lens whose camera has parameters of these names.
 fn lens_of(names: &[&str], spline: Option<SplineGrid>) -> Option<Lens> {
-    let terms = names.len().saturating_sub(4);
-    let models = [
-        Model::Radtan,
-        Model::Eucm,
-        Model::DoubleSphere,
-        Model::Pupil,
-        Model::KannalaBrandt(terms),
-    ];
-    let spline = spline.map(|grid| Lens::Spline(Spline::new(grid)));
-    let mut lenses = models.into_iter().map(Model::lens).chain(spline);
+    let terms = names.len().saturating_sub(PROJECTION_PARAMETERS.len());
+    let of_kind = |kind: &LensKind| [None, spline].map(|grid| kind.lens(terms, grid));
+    let mut lenses = LensKind::ALL.iter().flat_map(of_kind).flatten();
     lenses.find(|lens| Camera::centred(1, 1, 1.0, lens.clone()).parameter_names() == names)
 }
 
