@@ -4,7 +4,9 @@ use std::fmt::Display;
 use std::ops::RangeInclusive;
 use std::str::FromStr;
 
+use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use deltille::Name;
+use deltille::export::named::{Format, named};
 use deltille::targets::parse_length_mm;
 use deltille_core::quantity::distance_mm;
 
@@ -52,6 +54,12 @@ pub fn number(
 ) -> impl Fn(&str) -> Result<f64, String> + Clone + Send + Sync + 'static {
     let wanted = format!("write a number from {} to {}", range.start(), range.end());
     move |text| text.parse().ok().filter(|v| range.contains(v)).ok_or_else(|| wanted.clone())
+}
+
+/// A format of a table, by its name.
+pub fn format<F: Format>(all: &'static [F]) -> impl TypedValueParser<Value = &'static F> {
+    let value = |format: &F| PossibleValue::new(format.name()).help(format.help());
+    PossibleValuesParser::new(all.iter().map(value)).try_map(move |name| named(all, &name))
 }
 
 /// A name that can be the stem of a file and the name of a family.

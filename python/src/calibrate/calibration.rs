@@ -6,8 +6,8 @@ use std::sync::Arc;
 use deltille::calibrate as solver;
 use deltille::camera::CameraFile;
 use deltille::export::calibration::Residuals;
-use deltille::export::camera::{colmap, colmap_rig, kalibr};
-use deltille::export::saved;
+use deltille::export::named::named;
+use deltille::export::{Placed, RIG_FORMATS, saved};
 use deltille::layout::Printing;
 use deltille::limits::Limits;
 use deltille::report;
@@ -346,7 +346,7 @@ impl Rig {
     /// path : path-like
     ///     A ``.json`` file, or that of another program.
     /// format : str, optional
-    ///     ``"json"``, which :meth:`load` reads back, ``"kalibr"``, ``"colmap"`` or ``"colmap-rig"``.
+    ///     ``"json"``, which :meth:`load` reads back, or one for other programs, such as ``"kalibr"``.
     /// residuals : bool, optional
     ///     Whether every corner is listed in the ``.json``.
     /// overwrite : bool, optional
@@ -364,23 +364,18 @@ impl Rig {
         overwrite: bool,
     ) -> PyResult<PathBuf> {
         let estimate = &self.solved.estimate;
-        let cameras = || estimate.cameras.iter();
-        let text = match format {
-            "json" => text_of(&self.solved, residuals)?,
-            "kalibr" => {
-                let placed = cameras().map(|found| (&found.camera, found.camera_from_rig));
-                kalibr(&placed.collect::<Vec<_>>(), &estimate.overlaps()).raise(errors::camera)?
-            }
-            "colmap" => colmap(&cameras().map(|found| &found.camera).collect::<Vec<_>>())
-                .raise(errors::camera)?,
-            "colmap-rig" => {
-                let placed = cameras().map(|f| (f.name.as_str(), &f.camera, f.camera_from_rig));
-                colmap_rig(&placed.collect::<Vec<_>>()).raise(errors::camera)?
-            }
-            _ => {
-                let what = format!("format: {format} is not json, kalibr, colmap or colmap-rig");
-                return Err(raised::CameraError::new_err(what));
-            }
+        let text = if format == "json" {
+            text_of(&self.solved, residuals)?
+        } else {
+            let files = RIG_FORMATS.iter().flat_map(|format| format.files);
+            let file = named(files, format).map_err(|what| {
+                let what = what.replacen("is not", "is not json,", 1);
+                raised::CameraError::new_err(format!("format: {what}"))
+            })?;
+            let found = estimate.cameras.iter();
+            let placed = found.map(|found| (&*found.name, &found.camera, found.camera_from_rig));
+            let placed: Vec<Placed> = placed.collect();
+            file.text(&placed, &estimate.overlaps()).raise(errors::camera)?
         };
         save_text(path, text, overwrite)
     }

@@ -26,9 +26,8 @@ use crate::see::detector::sides;
 /// target : Target, optional
 ///     What was photographed; that of the detections if left out.
 /// model : str, optional
-///     ``"radtan"``, ``"radtan5"``, ``"rational"``, ``"thin-prism"``, ``"kannala-brandt"``, ``"eucm"``,
-///     ``"double-sphere"``, ``"pupil"``, ``"spline"``, or ``"auto"``, which takes the one that holds views best that
-///     took no part.
+///     That of ``deltille calibrate --model``: ``"radtan"`` for usual lenses, ``"kannala-brandt"`` for fisheyes, and
+///     others, or ``"auto"``, which takes the one that holds views best that took no part.
 /// camera : Camera, optional
 ///     A known camera, of which only the poses are found.
 /// grid : str, optional

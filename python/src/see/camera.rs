@@ -2,8 +2,10 @@
 
 use std::path::PathBuf;
 
-use deltille::camera::{self, Lens};
-use deltille::export::camera as formats;
+use deltille::calibrate::Model;
+use deltille::camera::{self, CameraFile};
+use deltille::export::named::named;
+use deltille::export::{CAMERA_FORMATS, Written, camera as formats};
 use deltille::{camera_file, glam};
 use deltille_core::quantity::{Range, coefficient, focal_px, place_px};
 use deltille_core::words::shown;
@@ -49,13 +51,9 @@ const FOCAL: Range = focal_px::RANGE;
 
 /// The lens of a camera file that a model is, and with how many coefficients at most.
 fn lens_of(model: &str) -> (&str, usize) {
-    match model {
-        "radtan" => ("pinhole", 4),
-        "radtan5" => ("pinhole", 5),
-        "rational" => ("pinhole", 8),
-        "thin-prism" => ("pinhole", 12),
-        "kannala-brandt" => ("fisheye", 4),
-        _ => (model, usize::MAX),
+    match Model::named().find(|(name, of_name)| *name == model && of_name.kind().name() != *name) {
+        Some((_, of_name)) => (of_name.kind().name(), of_name.found()),
+        None => (model, usize::MAX),
     }
 }
 
@@ -134,8 +132,8 @@ impl Camera {
     /// path : path-like
     ///     The file.
     /// format : str, optional
-    ///     ``"own"``, which :meth:`load` reads back for every model, ``"opencv"``, ``"ros"``, ``"kalibr"``,
-    ///     ``"colmap"``, ``"nerfstudio"`` or ``"mrcal"``.
+    ///     ``"own"``, which :meth:`load` reads back for every model, or that of another program, such as ``"opencv"``, of
+    ///     ``deltille.typing.CameraFormat``.
     /// overwrite : bool, optional
     ///     Whether a file of another kind is replaced.
     ///
@@ -168,14 +166,7 @@ impl Camera {
     /// The lens: ``pinhole``, ``fisheye``, ``eucm``, ``double-sphere``, ``pupil`` or ``spline``.
     #[getter]
     fn model(&self) -> &'static str {
-        match self.0.lens {
-            Lens::BrownConrady(_) => "pinhole",
-            Lens::KannalaBrandt(_) => "fisheye",
-            Lens::ExtendedUnified(_) => "eucm",
-            Lens::DoubleSphere(_) => "double-sphere",
-            Lens::Pupil(_) => "pupil",
-            Lens::Spline(_) => "spline",
-        }
+        self.0.lens.kind().name()
     }
 
     /// Names of all parameters: ``fx``, ``fy``, ``cx``, ``cy``, then those of the lens.
@@ -311,22 +302,11 @@ impl Camera {
         name: &str,
         views: &[(&str, camera::Pose)],
     ) -> PyResult<String> {
-        let camera = &self.0;
-        let text = match format {
-            "own" => return Ok(camera.to_yaml()),
-            "opencv" => formats::opencv(camera),
-            "ros" => formats::ros(camera, name),
-            "kalibr" => formats::kalibr(&[(camera, camera::Pose::IDENTITY)], &[]),
-            "colmap" => formats::colmap(&[camera]),
-            "nerfstudio" => formats::nerfstudio(camera, views),
-            "mrcal" => formats::mrcal(camera),
-            _ => {
-                let known = "own, opencv, ros, kalibr, colmap, nerfstudio or mrcal";
-                return Err(raised::CameraError::new_err(format!(
-                    "format: {format} is not {known}"
-                )));
-            }
-        };
+        let format = named(CAMERA_FORMATS, format)
+            .map_err(|what| raised::CameraError::new_err(format!("format: {what}")))?;
+        let (camera, calibrated_with) = (self.0.clone(), Vec::new());
+        let file = CameraFile { camera, calibrated_with, failed: None };
+        let text = format.text(&Written { file: &file, name, views });
         text.raise(errors::camera)
     }
 }

@@ -14,9 +14,13 @@ pub mod artifacts;
 mod cameras;
 mod corners;
 mod meshes;
+pub mod named;
 mod pages;
 mod writing;
 
+pub use cameras::format::{
+    CAMERA_FORMATS, CameraFormat, Overlaps, Placed, RIG_FORMATS, RigFile, RigFormat, Written,
+};
 pub use cameras::{
     calibration, camera, comparison, next_view, pose, rig, saved, sheet, truth, undistortion,
 };

@@ -5,7 +5,6 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use anyhow::{Context, ensure};
-use clap::ValueEnum;
 
 use super::report_page::check_images;
 use super::sightings::{Sightings, SightingsArgs};
@@ -19,10 +18,12 @@ use crate::deltille::files::written::{
 };
 use crate::output::{self, Overwrite, tell};
 use crate::run::{FAILED, report};
-use deltille::calibrate::{CameraEstimate, Estimate, Intrinsics, Source};
+use crate::values::format;
+use deltille::calibrate::{CameraEstimate, Estimate, Intrinsics, Model, Source};
 use deltille::camera::{Camera, CameraFile, Lens, PROJECTION_PARAMETERS, Pose, SplineGrid};
-use deltille::export::camera::{FormatError, colmap, kalibr, mrcal, nerfstudio, opencv, ros};
-use deltille::export::{calibration, saved};
+use deltille::export::camera::FormatError;
+use deltille::export::named::Format;
+use deltille::export::{CAMERA_FORMATS, CameraFormat, Written, calibration, saved};
 use deltille::targets::TargetIdentity;
 use deltille_core::words::{counted, places, shown};
 
@@ -34,12 +35,12 @@ const STRONG_CORRELATION: f64 = 0.98;
 pub struct Args {
     #[command(flatten)]
     sightings: SightingsArgs,
-    /// What is to be found beside fx, fy, cx, cy: radtan (k1 k2 p1 p2), radtan5 (and k3), rational
-    /// (and k4 k5 k6), thin-prism (and s1 … s4), kannala-brandt (4 terms; kannala-brandt-5 …),
-    /// eucm, double-sphere, pupil (fisheye with a moving entrance pupil), or spline (any smooth lens, of
-    /// degree 3; spline-2; spline-3-16x12 with so many knots), whose fx, fy, cx, cy are kept; auto takes
-    /// the one that holds views best that took no part in finding it
-    #[arg(long, required_unless_present = "fixed_intrinsics")]
+    /// The model.
+    #[arg(long, required_unless_present = "fixed_intrinsics", help = format!(
+        "What is to be found beside fx, fy, cx, cy: {}, whose fx, fy, cx, cy are kept; auto takes the one that holds \
+         views best that took no part in finding it",
+        Model::choice()
+    ))]
     model: Option<ModelChoice>,
     /// Find only the poses of this camera: its file, as written by this command, ROS or OpenCV
     #[arg(long, value_name = "CAMERA", conflicts_with_all = ["model", "holdout", "board_shape"])]
@@ -47,8 +48,8 @@ pub struct Args {
     #[command(flatten)]
     solve: SolveArgs,
     /// What to write; several may be given, separated by commas
-    #[arg(long, value_delimiter = ',', default_value = "own")]
-    format: Vec<Format>,
+    #[arg(long, value_delimiter = ',', default_value = "own", value_parser = format(CAMERA_FORMATS))]
+    format: Vec<&'static CameraFormat>,
     /// Folder of the photographs, for small pictures on the page
     #[arg(long, value_name = "FOLDER", requires = "report")]
     images: Option<PathBuf>,
@@ -58,25 +59,6 @@ pub struct Args {
     output: Option<PathBuf>,
     #[command(flatten)]
     overwrite: Overwrite,
-}
-
-#[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
-enum Format {
-    /// <name>.yaml, which every command here reads, and <name>.json with uncertainties, poses and,
-    /// with --residuals, every corner
-    Own,
-    /// <name>-opencv.yaml
-    Opencv,
-    /// <name>-ros.yaml
-    Ros,
-    /// <name>-camchain.yaml
-    Kalibr,
-    /// <name>-cameras.txt
-    Colmap,
-    /// <name>-transforms.json
-    Nerfstudio,
-    /// <name>.cameramodel
-    Mrcal,
 }
 
 /// Calibrates, writes the camera, and tells how good it is.
@@ -196,7 +178,7 @@ impl Args {
             failed: saved::failures(json).into_iter().next(),
         };
         for format in &self.format {
-            if file.failed.is_some() && *format != Format::Own {
+            if file.failed.is_some() && !format.is_own() {
                 // No other program would read the reason.
                 tell!(
                     "warning: --format {}: not written, as the calibration failed",
@@ -204,46 +186,15 @@ impl Args {
                 );
                 continue;
             }
-            match format.texts(stem, &file, views, json) {
-                Ok(texts) => {
-                    files.extend(texts.into_iter().map(|(name, text)| text_file(name, text)))
-                }
+            match format.text(&Written { file: &file, name: stem, views }) {
+                Ok(text) => files.push(text_file(format!("{stem}{}", format.end), text)),
                 Err(error) => refused.push(error),
+            }
+            if format.is_own() {
+                files.push(text_file(format!("{stem}.json"), json.to_owned()));
             }
         }
         (files, refused)
-    }
-}
-
-impl Format {
-    /// What the option calls it.
-    fn name(self) -> String {
-        self.to_possible_value().map_or(String::new(), |value| value.get_name().to_owned())
-    }
-
-    /// The names and texts of its files.
-    fn texts(
-        self,
-        stem: &str,
-        file: &CameraFile,
-        views: &[(&str, Pose)],
-        json: &str,
-    ) -> Result<Vec<(String, String)>, FormatError> {
-        let camera = &file.camera;
-        let named = |end: &str, text: String| (format!("{stem}{end}"), text);
-        Ok(match self {
-            Self::Own => {
-                vec![named(".yaml", file.to_yaml()), named(".json", json.to_owned())]
-            }
-            Self::Opencv => vec![named("-opencv.yaml", opencv(camera)?)],
-            Self::Ros => vec![named("-ros.yaml", ros(camera, stem)?)],
-            Self::Kalibr => {
-                vec![named("-camchain.yaml", kalibr(&[(camera, Pose::IDENTITY)], &[])?)]
-            }
-            Self::Colmap => vec![named("-cameras.txt", colmap(&[camera])?)],
-            Self::Mrcal => vec![named(".cameramodel", mrcal(camera)?)],
-            Self::Nerfstudio => vec![named("-transforms.json", nerfstudio(camera, views)?)],
-        })
     }
 }
 

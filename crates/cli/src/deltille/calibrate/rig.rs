@@ -4,7 +4,6 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use anyhow::{Context, bail, ensure};
-use clap::ValueEnum;
 
 use super::report_page::check_images;
 use super::sightings;
@@ -20,14 +19,15 @@ use crate::deltille::files::written::{
 use crate::deltille::files::{camera_file, target_file};
 use crate::output::{Overwrite, check_folder, fixed, say, tell};
 use crate::run::{FAILED, report};
+use crate::values::format;
 use deltille::calibrate::{
     Calibration, CameraViews, Estimate, Excluded, Intrinsics, Reference, TargetMap,
 };
 use deltille::camera::{Camera, CameraFile, Pose};
 use deltille::detect::{Detection, InkEstimate};
 use deltille::export::calibration::Print;
-use deltille::export::camera::{FormatError, colmap, colmap_rig, kalibr};
-use deltille::export::{rig, saved};
+use deltille::export::camera::FormatError;
+use deltille::export::{RIG_FORMATS, RigFile, RigFormat, rig, saved};
 use deltille::layout::Printing;
 use deltille::report::target_map_svg;
 use deltille::targets::{Name, Target};
@@ -66,8 +66,8 @@ pub struct Args {
     #[arg(long, value_name = "NAME=FOLDER", value_parser = named, requires = "report")]
     images: Vec<(String, PathBuf)>,
     /// What to write beside rig.json and <camera>.yaml; several may be given, separated by commas
-    #[arg(long, value_delimiter = ',')]
-    format: Vec<Format>,
+    #[arg(long, value_delimiter = ',', value_parser = format(RIG_FORMATS))]
+    format: Vec<&'static RigFormat>,
     /// Folder for rig.json, <camera>.yaml and the refined target
     #[arg(short, long, value_name = "FOLDER", default_value = ".")]
     output: PathBuf,
@@ -75,14 +75,6 @@ pub struct Args {
     limits: FileLimits,
     #[command(flatten)]
     overwrite: Overwrite,
-}
-
-#[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
-enum Format {
-    /// camchain.yaml
-    Kalibr,
-    /// cameras.txt and rig_config.json
-    Colmap,
 }
 
 fn named(text: &str) -> Result<(String, PathBuf), String> {
@@ -252,8 +244,13 @@ impl Args {
             }
             return Ok((files, refused));
         }
+        let overlaps = found.overlaps();
         for format in &self.format {
-            match format.files(cameras, found) {
+            let text = |file: &RigFile| {
+                let text = file.text(cameras, &overlaps)?;
+                Ok(text_file(file.file.to_owned(), text))
+            };
+            match format.files.iter().map(text).collect::<Result<Vec<_>, _>>() {
                 Ok(of_format) => files.extend(of_format),
                 Err(error) => refused.push(error),
             }
@@ -353,26 +350,6 @@ fn check_named(option: &str, given: &[(String, PathBuf)], cameras: &[&str]) -> a
 /// What was given for a camera.
 fn of_name<'a>(given: &'a [(String, PathBuf)], name: &str) -> Option<&'a Path> {
     given.iter().find(|(of, _)| of == name).map(|(_, path)| path.as_path())
-}
-
-impl Format {
-    fn files(
-        self,
-        cameras: &[(&str, &Camera, Pose)],
-        found: &Estimate,
-    ) -> Result<Vec<File>, FormatError> {
-        let alone: Vec<&Camera> = cameras.iter().map(|(_, camera, _)| *camera).collect();
-        let placed: Vec<(&Camera, Pose)> = cameras.iter().map(|(_, c, pose)| (*c, *pose)).collect();
-        Ok(match self {
-            Self::Kalibr => {
-                vec![text_file("camchain.yaml".to_owned(), kalibr(&placed, &found.overlaps())?)]
-            }
-            Self::Colmap => vec![
-                text_file("cameras.txt".to_owned(), colmap(&alone)?),
-                text_file("rig_config.json".to_owned(), colmap_rig(cameras)?),
-            ],
-        })
-    }
 }
 
 /// The largest deviations of a place and a turn.
