@@ -6,8 +6,9 @@ use std::sync::Arc;
 
 use deltille::calibrate::Reference;
 use deltille::detect::{self, GridCorner};
+use deltille::export::named::named;
 use deltille::export::tables::{Picture, folder};
-use deltille::export::{csv, detection, orpc};
+use deltille::export::{DETECTION_FORMATS, detection};
 use deltille::limits::Limits;
 use deltille::targets;
 use numpy::{PyArray1, PyArray2, PyArray3};
@@ -331,7 +332,7 @@ impl Detection {
     /// ----------
     /// path : path-like
     /// format : str, optional
-    ///     ``"json"``, which :meth:`load` reads back, ``"csv"`` or ``"orpc"``.
+    ///     ``"json"``, which :meth:`load` reads back, or one for other programs, such as ``"csv"``.
     /// overwrite : bool, optional
     ///     Whether a file of another kind is replaced.
     ///
@@ -341,15 +342,10 @@ impl Detection {
     #[pyo3(signature = (path, format = "json", *, overwrite = false))]
     fn save(&self, path: PathBuf, format: &str, overwrite: bool) -> PyResult<PathBuf> {
         let target = self.targets.first().map(|target| target.target());
-        let text = match format {
-            "json" => detection::write(&self.found),
-            "csv" => csv::write(&self.found),
-            "orpc" => orpc::write(&self.found, target),
-            _ => {
-                let what = format!("format: {format} is not json, csv or orpc");
-                return Err(raised::DetectionError::new_err(what));
-            }
-        };
+        let of_image = DETECTION_FORMATS.iter().filter(|format| format.is_of_one_image());
+        let format = named(of_image, format)
+            .map_err(|what| raised::DetectionError::new_err(format!("format: {what}")))?;
+        let text = format.text(&self.found, target).unwrap_or_default();
         save_text(path, text, overwrite)
     }
 

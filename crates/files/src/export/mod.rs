@@ -24,6 +24,7 @@ pub use cameras::format::{
 pub use cameras::{
     calibration, camera, comparison, next_view, pose, rig, saved, sheet, truth, undistortion,
 };
+pub use corners::format::{DETECTION_FORMATS, DetectionFormat};
 #[cfg(feature = "overlay")]
 pub use corners::overlay;
 #[cfg(feature = "parquet")]

@@ -7,7 +7,6 @@ use std::process::ExitCode;
 use std::sync::Mutex;
 
 use anyhow::{Context, bail};
-use clap::ValueEnum;
 
 use super::detector_options::FinderArgs;
 use crate::deltille::files::detection_tables::{self, Tables};
@@ -15,13 +14,14 @@ use crate::deltille::files::images::{self, Images, Stems};
 use crate::deltille::files::images_at_once;
 use crate::output::{self, Overwrite, tell};
 use crate::run::{self, BAD_INPUT, FAILED, Interrupted};
-use crate::values::whole;
+use crate::values::{format, whole};
 use crate::{interrupt, progress};
 use deltille::clock;
 use deltille::detect::{Detection, Detector, InkEstimate};
 use deltille::export::kind::Kind;
-use deltille::export::tables::{EXTENSION, Picture};
-use deltille::export::{atomic, csv, detection, orpc, overlay};
+use deltille::export::named::Format;
+use deltille::export::tables::Picture;
+use deltille::export::{DETECTION_FORMATS, DetectionFormat, atomic, detection, overlay};
 use deltille::photograph::{self, Photograph};
 use deltille::targets::Target;
 use deltille_core::words::{counted, shown};
@@ -39,8 +39,8 @@ pub struct Args {
     #[arg(short, long, value_name = "FOLDER")]
     output: Option<PathBuf>,
     /// What to write; several may be given, separated by commas
-    #[arg(long, value_delimiter = ',', default_value = "json")]
-    format: Vec<Format>,
+    #[arg(long, value_delimiter = ',', default_value = "json", value_parser = format(DETECTION_FORMATS))]
+    format: Vec<&'static DetectionFormat>,
     /// Write <image>.overlay.png too: corners, grid and ids drawn over the photograph
     #[arg(long)]
     overlay: bool,
@@ -63,19 +63,6 @@ pub struct Args {
     /// Images at a time [default: one per processor]
     #[arg(short, value_name = "N", value_parser = whole(1..=1024u16))]
     jobs: Option<u16>,
-}
-
-#[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
-enum Format {
-    /// Everything, one file per image
-    Json,
-    /// The corner list of the reference detector
-    Orpc,
-    /// One corner a line, with a header
-    Csv,
-    /// corners.parquet and pictures.parquet, a row for each corner and for each image of the run; `calibrate` and
-    /// `rig` read them
-    Parquet,
 }
 
 /// What came of an image.
@@ -109,8 +96,10 @@ struct Seen {
 /// Detects in all images; an image that cannot be read is reported, and the rest go on.
 pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let (targets, detector) = args.finder.detector()?;
-    if targets.len() > 1 && args.format.contains(&Format::Orpc) {
-        bail!("--format orpc: it has no names of targets: give one --target at a time");
+    let of_one = args.format.iter().find(|format| format.is_of_one_target);
+    if let Some(format) = of_one.filter(|_| targets.len() > 1) {
+        let name = format.name();
+        bail!("--format {name}: it has no names of targets: give one --target at a time");
     }
     let detector = if args.timing { detector.with_clock(clock::now) } else { detector };
     let images = Images::of(&args.images)?;
@@ -402,18 +391,18 @@ impl Args {
 
     /// The folder of tables, where they are asked for.
     fn tables(&self) -> Option<&Path> {
-        self.folder().filter(|_| self.format.contains(&Format::Parquet))
+        self.folder().filter(|_| !self.format.iter().all(|format| format.is_of_one_image()))
     }
 
     /// Formats with a file for each image that are asked for.
-    fn each(&self) -> impl Iterator<Item = Format> + '_ {
-        self.format.iter().copied().filter(|format| *format != Format::Parquet)
+    fn each(&self) -> impl Iterator<Item = &'static DetectionFormat> + '_ {
+        self.format.iter().copied().filter(|format| format.is_of_one_image())
     }
 
     /// The files of an image's results.
     fn results(&self, stem: &str) -> Vec<(PathBuf, Kind)> {
         let Some(folder) = self.folder() else { return Vec::new() };
-        let formats = self.each().map(|format| (format.extension(), format.kind()));
+        let formats = self.each().map(|format| (format.name(), format.kind()));
         let overlay = self.overlay.then(|| ("overlay.png", Kind::own_png()));
         let all = formats.chain(overlay);
         all.map(|(end, kind)| (folder.join(format!("{stem}.{end}")), kind)).collect()
@@ -424,36 +413,6 @@ impl Args {
     fn check_results(&self, stem: &str) -> anyhow::Result<()> {
         let mut results = self.results(stem).into_iter();
         results.try_for_each(|(path, kind)| self.overwrite.check(&path, &kind))
-    }
-}
-
-impl Format {
-    fn extension(self) -> &'static str {
-        match self {
-            Self::Json => "json",
-            Self::Orpc => "orpc",
-            Self::Csv => "csv",
-            Self::Parquet => EXTENSION,
-        }
-    }
-
-    fn kind(self) -> Kind {
-        match self {
-            Self::Json => Kind::of_schema(detection::SCHEMA),
-            Self::Orpc => Kind::of(orpc::HEAD.as_bytes()),
-            Self::Csv => Kind::of(csv::HEADER.as_bytes()),
-            Self::Parquet => Kind::own_parquet(),
-        }
-    }
-
-    /// The text of an image's file; tables have none.
-    fn text(self, found: &Detection, target: Option<&Target>) -> String {
-        match self {
-            Self::Json => detection::write(found),
-            Self::Orpc => orpc::write(found, target),
-            Self::Csv => csv::write(found),
-            Self::Parquet => String::new(),
-        }
     }
 }
 
@@ -472,10 +431,11 @@ fn one_image(
     found.file = notes;
     if let Some(folder) = args.folder() {
         let path = |extension: &str| folder.join(format!("{stem}.{extension}"));
-        let text = |format: Format| {
-            (path(format.extension()), format.text(&found, targets.first()).into_bytes())
+        let text = |format: &&DetectionFormat| {
+            let text = format.text(&found, targets.first())?;
+            Some((path(format.name()), text.into_bytes()))
         };
-        let mut files: Vec<(PathBuf, Vec<u8>)> = args.each().map(text).collect();
+        let mut files: Vec<(PathBuf, Vec<u8>)> = args.format.iter().filter_map(text).collect();
         if args.overlay {
             files.push((path("overlay.png"), overlay::png(&image, &found)?));
         }

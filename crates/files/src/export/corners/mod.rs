@@ -1,11 +1,12 @@
 //! What was found in photographs, and lists of boards.
 //!
-//! [`detection`] is the JSON of a detection, [`csv`], [`orpc`] and `tables` have the same for others, `overlay` shows it over the
-//! photograph; [`dsc`] and [`tp`] list boards and their poses, [`npy`] arrays.
+//! [`detection`] is the JSON of a detection, [`csv`], [`orpc`] and `tables` have the same for others; `format` lists them.
+//! `overlay` shows it over the photograph; [`dsc`] and [`tp`] list boards and their poses, [`npy`] arrays.
 
 pub mod csv;
 pub mod detection;
 pub mod dsc;
+pub(super) mod format;
 pub mod npy;
 pub mod orpc;
 #[cfg(feature = "overlay")]
