@@ -75,9 +75,9 @@ impl Keywords {
 
     /// Refuses keywords that nothing asked for makes use of.
     fn check_use(&self, target: &Target, formats: &[What]) -> PyResult<()> {
-        use What::{Gltf, LaserDxf, LaserSvg, Mjcf, Obj, Sdf, ThreeMf, Urdf, Usd};
+        use What::{LaserDxf, LaserSvg, ThreeMf};
         let asked = |of: &[What]| formats.iter().any(|format| of.contains(format));
-        let textured = asked(&[Gltf, Obj, Sdf, Urdf, Mjcf, Usd]);
+        let textured = asked(&What::TEXTURED);
         let is_solid = matches!(target.spec, TargetSpec::Solid(_));
         if self.plate_mm.is_some() && is_solid {
             return Err(raised::TargetError::new_err(

@@ -85,40 +85,57 @@ pub enum What {
 
 /// A text that is nothing that can be made.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error(
-    "`{0}` is no format: json, pdf, svg, png, dsc, dsc-original, gltf, obj, sdf, urdf, mjcf, usd, 3mf, stl, skeleton, \
-     skeleton-3mf, panels, net, laser-dxf, laser-svg or kalibr"
-)]
+#[error("`{0}` is no format: {choice}", choice = What::choice())]
 pub struct WhatError(String);
+
+impl What {
+    /// All by name. What has several names is listed by the first.
+    pub const NAMED: [(&str, Self); 24] = [
+        ("json", Self::Json),
+        ("pdf", Self::Pdf),
+        ("svg", Self::Svg),
+        ("png", Self::Png),
+        ("dsc", Self::Dsc(Dialect::Fork)),
+        ("dsc-fork", Self::Dsc(Dialect::Fork)),
+        ("dsc-original", Self::Dsc(Dialect::Original)),
+        ("gltf", Self::Gltf),
+        ("glb", Self::Gltf),
+        ("obj", Self::Obj),
+        ("sdf", Self::Sdf),
+        ("urdf", Self::Urdf),
+        ("mjcf", Self::Mjcf),
+        ("usd", Self::Usd),
+        ("usda", Self::Usd),
+        ("3mf", Self::ThreeMf),
+        ("stl", Self::Stl),
+        ("skeleton", Self::Skeleton),
+        ("skeleton-3mf", Self::Skeleton3mf),
+        ("panels", Self::Panels),
+        ("net", Self::Net),
+        ("laser-dxf", Self::LaserDxf),
+        ("laser-svg", Self::LaserSvg),
+        ("kalibr", Self::Kalibr),
+    ];
+
+    /// What has textures.
+    pub const TEXTURED: [Self; 6] =
+        [Self::Gltf, Self::Obj, Self::Sdf, Self::Urdf, Self::Mjcf, Self::Usd];
+
+    fn choice() -> String {
+        let mut named = Self::NAMED.to_vec();
+        named.dedup_by_key(|(_, what)| *what);
+        let names: Vec<&str> = named.iter().map(|(name, _)| *name).collect();
+        let (last, before) = names.split_last().unwrap_or((&"", &[]));
+        format!("{} or {last}", before.join(", "))
+    }
+}
 
 impl FromStr for What {
     type Err = WhatError;
 
     fn from_str(text: &str) -> Result<Self, WhatError> {
-        Ok(match text {
-            "json" => Self::Json,
-            "pdf" => Self::Pdf,
-            "svg" => Self::Svg,
-            "png" => Self::Png,
-            "dsc" | "dsc-fork" => Self::Dsc(Dialect::Fork),
-            "dsc-original" => Self::Dsc(Dialect::Original),
-            "gltf" | "glb" => Self::Gltf,
-            "obj" => Self::Obj,
-            "sdf" => Self::Sdf,
-            "urdf" => Self::Urdf,
-            "mjcf" => Self::Mjcf,
-            "usd" | "usda" => Self::Usd,
-            "3mf" => Self::ThreeMf,
-            "stl" => Self::Stl,
-            "skeleton" => Self::Skeleton,
-            "skeleton-3mf" => Self::Skeleton3mf,
-            "panels" => Self::Panels,
-            "net" => Self::Net,
-            "laser-dxf" => Self::LaserDxf,
-            "laser-svg" => Self::LaserSvg,
-            "kalibr" => Self::Kalibr,
-            _ => return Err(WhatError(text.to_owned())),
-        })
+        let found = Self::NAMED.iter().find(|(name, _)| *name == text);
+        found.map(|(_, what)| *what).ok_or_else(|| WhatError(text.to_owned()))
     }
 }
 

@@ -109,7 +109,20 @@ impl Meshes {
 
     /// Whether any with a texture is asked for.
     fn is_textured(&self) -> bool {
-        self.gltf || self.obj || self.sdf || self.urdf || self.mjcf || self.usd
+        self.textured_formats().next().is_some()
+    }
+
+    /// What is asked for that has textures.
+    fn textured_formats(&self) -> impl Iterator<Item = What> {
+        let formats = [
+            (self.gltf, What::Gltf),
+            (self.obj, What::Obj),
+            (self.sdf, What::Sdf),
+            (self.urdf, What::Urdf),
+            (self.mjcf, What::Mjcf),
+            (self.usd, What::Usd),
+        ];
+        formats.into_iter().filter(|(is_asked, _)| *is_asked).map(|(_, what)| what)
     }
 
     /// These, and the glTF.
@@ -197,18 +210,9 @@ impl Meshes {
         meshing.textures = self.textures.unwrap_or(meshing.textures);
         let mesh = TexturedMesh::new(target, meshing);
         let mesh = mesh.map_err(|error| refusal(&error, option))?;
-        let asked = [
-            (self.gltf, What::Gltf),
-            (self.obj, What::Obj),
-            (self.sdf, What::Sdf),
-            (self.urdf, What::Urdf),
-            (self.mjcf, What::Mjcf),
-            (self.usd, What::Usd),
-        ];
-        let asked = asked.into_iter().filter(|(asked, _)| *asked);
         // Scenes have the files of the OBJ in common.
         let files: BTreeMap<String, Vec<u8>> =
-            asked.flat_map(|(_, what)| of_mesh(&mesh, what)).collect();
+            self.textured_formats().flat_map(|what| of_mesh(&mesh, what)).collect();
         let files = files.into_iter().map(|(name, bytes)| bytes_file(name, bytes)).collect();
         Ok((files, told(&mesh)))
     }
