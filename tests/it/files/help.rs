@@ -6,7 +6,6 @@ use std::path::Path;
 
 use clap::error::{ContextKind, ContextValue, Error, ErrorKind};
 use clap::{Arg, Command, CommandFactory};
-use deltille::layout::PaperSize;
 use deltille_cli::{deltag::Deltag, deltille::Deltille};
 
 use crate::common::page::Page;
@@ -161,18 +160,4 @@ fn a_help_text() {
     let mut page = Page::default();
     page.run(&std::env::temp_dir(), "deltille refine --help");
     page.is("help");
-}
-
-#[test]
-fn paper_sizes_are_those_of_the_library() {
-    let read = |path| fs::read_to_string(Path::new(crate::common::REPOSITORY).join(path)).unwrap();
-    let choice = PaperSize::choice();
-    let (names, _) = choice.split_once(", or").unwrap();
-    assert!(read("docs/printing.md").contains(names), "{names}");
-    let page = read("web/src/make.ts");
-    let (_, listed) = page.split_once("const papers = [").unwrap();
-    let listed = listed.split(']').next().unwrap().split(", ").map(|name| name.trim_matches('"'));
-    assert!(
-        listed.clone().count() > 4 && listed.clone().all(|name| name.parse::<PaperSize>().is_ok())
-    );
 }

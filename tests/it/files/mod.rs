@@ -2,6 +2,7 @@ mod help;
 mod hostile;
 #[cfg(unix)]
 mod interrupt;
+mod lists;
 mod numbers;
 mod pictures;
 mod readers;
