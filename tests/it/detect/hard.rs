@@ -133,7 +133,7 @@ fn tags_of_two_pixels_a_bit_decode_at_45_degrees() {
 }
 
 #[test]
-#[ignore = "rates for docs/measurements.md"]
+#[ignore = "rates for docs/benchmarks.md"]
 fn rates_of_small_tags() {
     for bit_px in [2.0, 2.0 / 45f64.to_radians().cos(), 3.5] {
         let (whole, tags) = small_tags(100, bit_px);

@@ -145,7 +145,7 @@ fn patches_of_dense_boards_are_labelled_as_far_as_is_said() {
     }
 }
 
-/// Prints how many are labelled, by the size of a cell and the tilt, for docs/measurements.md:
+/// Prints how many are labelled, by the size of a cell and the tilt, for docs/benchmarks.md:
 /// `cargo test --release --test it -- --ignored --nocapture photographs_of_patches`.
 #[test]
 #[ignore = "prints a table"]

@@ -34,8 +34,8 @@ const HELD_S: f64 = 0.4;
 /// Detections that are farther apart than this say nothing of the motion between, s.
 const FORGOTTEN_S: f64 = 1.0;
 
-/// A blur beyond which corners are not taken, px, deviation: there their error is three times that at a pixel
-/// (`docs/measurements.md`, refined corners).
+/// Largest blur at which corners are accepted, px (1σ): their error is then two and a half times that at a blur of 1 px
+/// (`docs/benchmarks.md`, Corner accuracy).
 const MOST_BLUR_PX: f64 = 3.0;
 
 /// A corner that is known worse than this, px, shows a picture that is smeared or dark, where the blur is not told.

@@ -14,8 +14,8 @@ const FILLED: f64 = 0.9;
 const LEAST: [u32; 2] = [4, 5];
 const MOST: u32 = 40;
 
-/// A cell of a place code from which on patches of three by four tiles are labelled where pictures are sharp, px: by
-/// photographs of printed pages (docs/measurements.md). Tilted cells need as much height: there are none to spare.
+/// Smallest cell of a place code at which patches of three by four tiles are labelled in sharp images, px, measured on
+/// photographs of printed pages (docs/benchmarks.md, Dense boards). Tilted cells need the same height.
 const PATCH_BIT_PX: f64 = 1.4;
 
 /// A camera, and from where it is to see a board.

@@ -149,9 +149,9 @@ impl TagSpec {
     /// Tags for a checkerboard: aprilTag36h11 in every second row and column, so that each corner
     /// touches one tag at most.
     ///
-    /// In black squares the border has two bits: with one, cells come so near to the corners that
-    /// these are found half as precisely (docs/measurements.md). In white squares it has the one bit
-    /// that every reader of AprilTags knows.
+    /// In black squares the border has two bits: with one, cells are so close to the corners that a
+    /// sixth of these is lost in squares of 28 px (docs/benchmarks.md, Labels). In white squares it
+    /// has one bit, which every reader of AprilTags supports.
     pub fn for_squares(tags_in: TagsIn) -> Self {
         Self {
             family: "aprilTag36h11".to_owned(),
