@@ -126,8 +126,8 @@ fn command_lines_in_help_texts_and_in_the_guide_are_understood() {
         }
     }
     assert!(wrong.is_empty(), "{}", wrong.join("\n"));
-    // As many as there are at least, so that none is passed over.
-    assert!(count[0] > 50 && count[1] > 80 && count[2] > 150, "{count:?}");
+    // About as many as exist, so that none is skipped.
+    assert!(count[0] > 50 && count[1] > 80 && count[2] > 100, "{count:?}");
 }
 
 #[test]

@@ -20,8 +20,8 @@
 //!
 //! Edges have curvatures κ where a lens bends them, which are given: a window is too small to tell
 //! them from the position. (u, v) are pixels from the window's centre, f is the blurred corner of
-//! [`crate::refine::blurred_corner`]. The blur s holds the pixel's own box as a variance of 1/12: against
-//! exact integration that costs nothing measurable from 0.5 px of blur upwards (docs/measurements).
+//! [`crate::refine::blurred_corner`]. The blur s includes the pixel's own box as a variance of 1/12. From
+//! 0.5 px of blur on, the model reaches the bound of exact integration (docs/benchmarks.md, Corner accuracy).
 //! The slopes g are drawn to 0 by a weak prior, all else is free.
 //!
 //! The covariance is σ² (JᵀJ + prior)⁻¹ with the noise σ estimated from the residuals. It is honest
