@@ -147,7 +147,7 @@ fn every_option_is_told_in_its_help_and_in_the_guide() {
             let short = argument.get_short().map(|short| format!("-{short}"));
             let mut forms = [long, short].into_iter().flatten().peekable();
             if forms.peek().is_some() && !forms.any(|form| words.contains(&&*form)) {
-                missing.push(format!("{name} {argument}: not in docs/"));
+                missing.push(format!("{name} {}: not in docs/", argument.get_id()));
             }
         }
     }
