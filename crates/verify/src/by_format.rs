@@ -1,4 +1,4 @@
-//! The extension of a name tells the format, and the format which comparison an artifact goes through.
+//! Selects the comparison for an artifact by the format of its file name.
 
 use std::path::Path;
 
@@ -16,19 +16,18 @@ use crate::verifier::Verifier;
 use deltille_files::limits::Guard;
 use deltille_layout::Printing;
 
-/// Compares the artifact named `name` among `files` in memory with its target. The extension of the name tells the
-/// [`Format`].
+/// Compares the artifact named `name`, one of `files` in memory, with its target. The extension of the name
+/// determines the [`Format`].
 ///
-/// An artifact may consist of several files. All of them must be among `files`, in any order: the
-/// other pages of a net (`net-1.svg`, `net-2.svg`), the material library and the textures that an
-/// OBJ names. Other files are ignored.
+/// An artifact may consist of several files, all of which must be among `files`, in any order: the other pages of a
+/// net (`net-1.svg`, `net-2.svg`), or the material library and textures that an OBJ names. Other files are ignored.
 ///
-/// Deviations of the artifact are in the [`Verdict`]. An error means that nothing can be compared:
-/// a file is missing or cannot be read, or the target has no such artifact.
+/// The [`Verdict`] contains the deviations of the artifact. An error means that nothing can be compared: a file is
+/// missing or cannot be read, or the target does not have this artifact.
 ///
 /// # Errors
-/// When the family of its tags is unknown, the name tells no format or sheet, or a file is
-/// missing or cannot be read at all.
+/// Returns an error if the tag family is unknown, the name does not determine a format or sheet, or a file is missing
+/// or unreadable.
 ///
 /// ```
 /// use deltille_layout::artwork;
@@ -56,24 +55,23 @@ pub fn verify(printing: &Printing, name: &str, files: &[Artifact]) -> Result<Ver
 }
 
 impl Verifier<'_> {
-    /// Compares the artifact named `name` among files in memory with the target. A PDF shows all
-    /// sheets, an SVG or PNG the one that its name tells. All files of the artifact must be among
-    /// `files`: all pages of [`set_of`](Self::set_of) for a net, material library and textures for
-    /// an OBJ.
+    /// Compares the artifact named `name`, one of `files` in memory, with the target. A PDF contains all sheets, an
+    /// SVG or PNG the one given by its name. All files of the artifact must be among `files`: all pages of
+    /// [`set_of`](Self::set_of) for a net, material library and textures for an OBJ.
     ///
     /// # Errors
-    /// When the name tells no format or sheet, or a file is missing or cannot be read at all.
+    /// Returns an error if the name does not determine a format or sheet, or a file is missing or unreadable.
     pub fn verify(&self, name: &str, files: &[Artifact]) -> Result<Verdict, VerifyError> {
         let reader = Reader { files: &files, limits: self.limits, guard: self.guard };
         compare(self, &reader, Path::new(name))
     }
 
-    /// Reads an artifact from disk, with the files beside it that belong to it, and compares it as
-    /// [`verify`](Self::verify) does. Third-party readers run on a thread of their own, for at most
+    /// Reads an artifact from disk, with the neighbouring files that belong to it, and compares it as
+    /// [`verify`](Self::verify) does. Third-party readers run on a separate thread, for at most
     /// [`Limits::max_seconds`](deltille_files::limits::Limits::max_seconds) in each step.
     ///
     /// # Errors
-    /// When the name tells no format or sheet, or a file is missing or cannot be read at all.
+    /// Returns an error if the name does not determine a format or sheet, or a file is missing or unreadable.
     pub fn verify_path(&self, path: &Path) -> Result<Verdict, VerifyError> {
         let files = OnDisk(self.limits);
         compare(self, &Reader { files: &files, limits: self.limits, guard: Guard::Timed }, path)

@@ -1,4 +1,4 @@
-//! Why an artifact cannot be compared with its target.
+//! Reasons why an artifact cannot be compared with its target.
 
 use std::path::PathBuf;
 
@@ -6,7 +6,7 @@ use crate::reading::error::DocumentError;
 use deltille_core::targets::UnknownCodes;
 use deltille_layout::artwork::CuttingError;
 
-/// Why an artifact cannot be compared with its target.
+/// The reason why an artifact cannot be compared with its target.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum VerifyError {
@@ -14,7 +14,7 @@ pub enum VerifyError {
     #[error(transparent)]
     Document(#[from] DocumentError),
     /// The comparison was cancelled by the caller.
-    #[error("interrupted before all was compared")]
+    #[error("interrupted before the comparison finished")]
     Cancelled,
     /// The target has no sheets of paper.
     #[error("{}: target {target} has no sheets: it was not laid out on paper", path.display())]
@@ -24,27 +24,27 @@ pub enum VerifyError {
         /// Name of the target.
         target: String,
     },
-    /// The file name has no extension of a known [`Format`](crate::Format).
+    /// The file name does not end in the extension of a known [`Format`](crate::Format).
     #[error(
-        "{}: only .pdf, .svg, .png, .glb, .obj, .sdf, .urdf, .xml (MuJoCo), .usda, .3mf, .stl, .dsc and .dxf files are \
-         compared with their target",
+        "{}: unsupported file type (supported: .pdf, .svg, .png, .glb, .obj, .sdf, .urdf, .xml (MuJoCo), .usda, .3mf, \
+         .stl, .dsc, .dxf)",
         path.display()
     )]
     OtherKind {
         /// The file.
         path: PathBuf,
     },
-    /// The file is a part of another artifact.
-    #[error("{}: it is compared with {whole}: name that", path.display())]
+    /// The file is part of another artifact.
+    #[error("{}: this file is part of {whole}; verify that file instead", path.display())]
     PartOf {
         /// The file.
         path: PathBuf,
-        /// The file that it is a part of.
+        /// The file that it is part of.
         whole: String,
     },
-    /// The file name does not tell which sheet the file shows.
+    /// The file name does not say which sheet the file shows.
     #[error(
-        "{}: the target has {sheets} sheets; name the file {example} for the first",
+        "{}: the file name does not say which of the {sheets} sheets it shows; rename it, {example} for the first",
         path.display()
     )]
     WhichSheet {
@@ -52,12 +52,13 @@ pub enum VerifyError {
         path: PathBuf,
         /// Number of sheets.
         sheets: usize,
-        /// An example of a name that does.
+        /// Example of a valid file name.
         example: String,
     },
-    /// The file name does not tell what is cut: panels or net.
+    /// The file name does not say which drawing the file contains.
     #[error(
-        "{}: name the file {target}-panels.dxf, {target}-net.dxf or {target}-laser.dxf, for what it shows",
+        "{}: the file name does not say which drawing this is; rename it {target}-panels.dxf, {target}-net.dxf or \
+         {target}-laser.dxf",
         path.display()
     )]
     WhichDrawing {
@@ -66,15 +67,15 @@ pub enum VerifyError {
         /// Name of the target.
         target: String,
     },
-    /// The target has no such drawing for a cutter.
+    /// The target does not have this drawing for a cutter.
     #[error("{}: {source}", path.display())]
     NothingToCut {
         /// The file.
         path: PathBuf,
-        /// Why.
+        /// The reason.
         source: CuttingError,
     },
-    /// The codes of the target's tags are not known.
+    /// The codes of the target's tags are unknown.
     #[error(transparent)]
     UnknownCodes(#[from] UnknownCodes),
 }

@@ -1,5 +1,5 @@
-//! Verification of corner lists for other detectors, as `.dsc`: boards, corners and tags must be
-//! those of the target, with positions in millimetres.
+//! Verification of corner lists for other detectors (`.dsc`): boards, corners and tags must be those of the target,
+//! with positions in millimetres.
 
 use std::path::Path;
 
@@ -14,7 +14,7 @@ use crate::verifier::Verifier;
 use deltille_core::targets::{Panel, Target};
 use deltille_files::export::dsc::{self, Dialect};
 
-/// Largest deviation of a position or an edge, mm, by the number of digits.
+/// Largest accepted deviation of a position or an edge length, mm, given the number of digits written.
 const LIST_TOLERANCE_MM: f64 = 1e-6;
 
 /// Reads a `.dsc` and compares it with the target.
@@ -25,7 +25,7 @@ pub(super) fn verify(
 ) -> Result<Verdict, DocumentError> {
     let text = &reader.read_text(path)?;
     if text.lines().next().is_none_or(|head| head.split(',').count() != 4) {
-        let problem = "not a .dsc: it does not start with a line `id,A,B,size`";
+        let problem = "not a .dsc: the first line is not `id,A,B,size`";
         return Err(DocumentError::unreadable(path, problem));
     }
     let mut list = ListVerdict::default();
@@ -34,7 +34,7 @@ pub(super) fn verify(
         match dsc::read_in_mm(text, &verifier.target().name) {
             Ok(listed) => {
                 findings = compare(&listed, verifier.target(), &mut list);
-                findings.extend(written_otherwise(text, &listed).filter(|_| findings.is_empty()));
+                findings.extend(differently_written(text, &listed).filter(|_| findings.is_empty()));
             }
             Err(error) => findings.push(ListFinding::Listed { problem: error.to_string() }.into()),
         }
@@ -42,12 +42,12 @@ pub(super) fn verify(
     Ok(Verdict { list: Some(list), ..Verdict::new(path, Format::Dsc, findings) })
 }
 
-/// Lines with anything but words, numbers and commas: readers differ in what they pass over.
+/// Finds lines with anything other than words, numbers and commas: readers skip different characters.
 fn unlisted(text: &str) -> Vec<Finding> {
     let plain = |c: char| c.is_ascii_alphanumeric() || matches!(c, ',' | '.' | '-');
     let lines = text.split_terminator('\n').enumerate();
     let odd = lines.filter(|(_, line)| line.is_empty() || !line.chars().all(plain));
-    let construct = "a blank or a character other than of words and numbers";
+    let construct = "a blank or a special character";
     let finding = |index| ConstructFinding::Construct {
         place: format!("line {}", index + 1),
         construct: construct.to_owned(),
@@ -55,16 +55,20 @@ fn unlisted(text: &str) -> Vec<Finding> {
     odd.map(|(index, _)| finding(index).into()).collect()
 }
 
-/// The first line that is not written as what is read of it is: readers take numbers, and the order of
-/// lines, each in their way.
-fn written_otherwise(text: &str, listed: &Target) -> Option<Finding> {
+/// Finds the first line that differs from how its own content would be written: readers parse numbers, and the order
+/// of lines, differently.
+fn differently_written(text: &str, listed: &Target) -> Option<Finding> {
     let dialect = Dialect::of(listed);
-    let anew = dsc::write(listed, dialect).unwrap_or_default();
-    if text == anew {
+    let rewritten = dsc::write(listed, dialect).unwrap_or_default();
+    if text == rewritten {
         return None;
     }
-    let same = text.lines().zip(anew.lines()).take_while(|(found, anew)| found == anew).count();
-    let construct = "a number or an order that is written otherwise".to_owned();
+    let same = text
+        .lines()
+        .zip(rewritten.lines())
+        .take_while(|(found, rewritten)| found == rewritten)
+        .count();
+    let construct = "a number or an order that is not as deltille writes it".to_owned();
     Some(ConstructFinding::Construct { place: format!("line {}", same + 1), construct }.into())
 }
 
@@ -87,13 +91,13 @@ fn compare(listed: &Target, target: &Target, list: &mut ListVerdict) -> Vec<Find
     }
     for panel in &listed.panels {
         if !target.panels.iter().any(|stated| stated.id == panel.id) {
-            problems.push(format!("board {} is listed, which the target does not have", panel.id));
+            problems.push(format!("board {} is listed, but is not part of the target", panel.id));
         }
     }
     problems.into_iter().map(|problem| ListFinding::Listed { problem }.into()).collect()
 }
 
-/// Compares a board; the number of columns and rows is only in one dialect that of the corners.
+/// Compares a board. The numbers of columns and rows are those of the corners in only one dialect.
 fn compare_board(
     found: &Panel,
     stated: &Panel,
@@ -103,7 +107,7 @@ fn compare_board(
 ) {
     let board = format!("board {}", stated.id);
     if found.kind != stated.kind {
-        return problems.push(format!("{board} is of another kind of grid"));
+        return problems.push(format!("{board} has a different kind of grid"));
     }
     if matrix && found.matrix != stated.matrix {
         let [[a, b], [c, d]] = [found.matrix, stated.matrix];
@@ -144,7 +148,7 @@ fn compare_corners(
     }
     let extra = found.corners.len().saturating_sub(stated.corners.len());
     if extra > 0 {
-        problems.push(format!("board {} lists {extra} corners too many", stated.id));
+        problems.push(format!("board {} lists {extra} extra corners", stated.id));
     }
 }
 
@@ -163,6 +167,6 @@ fn compare_tags(found: &Panel, stated: &Panel, list: &mut ListVerdict, problems:
     }
     for tag in found.tags.iter().filter(|tag| at(stated, tag.row, tag.col).is_none()) {
         let (id, row, col) = (tag.id, tag.row, tag.col);
-        problems.push(format!("board {}: tag {id} is listed at row {row} col {col}", stated.id));
+        problems.push(format!("board {}: unexpected tag {id} at row {row} col {col}", stated.id));
     }
 }

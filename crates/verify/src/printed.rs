@@ -1,4 +1,4 @@
-//! Printed pages: which page of which file shows which sheet, what each shows, and the net that comes of them.
+//! Printed pages: which page of which file shows which sheet, what each page shows, and the net folded from them.
 
 use std::path::{Path, PathBuf};
 use std::sync::atomic::Ordering;
@@ -46,7 +46,7 @@ pub(crate) fn verify(
     let documents: Vec<Document> =
         files.iter().map(|file| Document::read_by(reader, file)).collect::<Result<_, _>>()?;
     let stated = verifier.printing.page_count();
-    // For each page of the target the page of a file that shows it.
+    // The page of a file that shows each page of the target.
     let sources: Vec<Option<Source>> = match format {
         Format::Pdf => {
             let found = documents[0].pages();
@@ -81,7 +81,7 @@ pub(crate) fn verify(
             true => page(verifier, pages[0], index)?,
             false => pages_together(verifier, &pages, index, before)?,
         };
-        verifier.tell(first, stated);
+        verifier.report_progress(first, stated);
         verdicts.push(verdict);
         seen.push(found);
     }
@@ -93,7 +93,7 @@ pub(crate) fn verify(
     Ok(Verdict { sheets: verdicts, ..verdict })
 }
 
-/// Constructs that are not permitted, in files that belong together.
+/// Returns the constructs that are not allowed in files that belong together.
 fn refused(
     verifier: &Verifier,
     reader: &Reader,
@@ -128,8 +128,8 @@ fn page(
     Ok((verdict, seen))
 }
 
-/// Compares a sheet that is printed on several pages, with so many pages of other sheets `before` it: first the area around the window of each
-/// page, then the sheet assembled from all windows.
+/// Compares a sheet that is printed on several pages, after `before` pages of other sheets. Compares the area around
+/// the window of each page first, then the sheet assembled from all windows.
 fn pages_together(
     verifier: &Verifier,
     sources: &[Source],
@@ -151,14 +151,14 @@ fn pages_together(
         let of_page = verdict.findings.into_iter();
         findings.extend(of_page.map(|finding| finding.on_page(label.clone())));
         check_bars_mm.extend(verdict.check_bars_mm);
-        // Kept no finer than the sheet is looked at.
+        // Keep no finer resolution than the assembled sheet has.
         pages.push(if wish > most {
             source.render(marks, most, verifier.printing.finish.mirrored)?.0
         } else {
             page
         });
-        // The whole sheet is compared after them.
-        verifier.tell(before + pages.len() - 1, verifier.printing.page_count());
+        // The whole sheet is compared after its pages.
+        verifier.report_progress(before + pages.len() - 1, verifier.printing.page_count());
     }
     let (sheet, different) = assemble::assemble(&pages, layout, wish.min(most));
     let mut verdict = SheetVerdict::new(index, &sheet, different);

@@ -1,4 +1,4 @@
-//! Which files hold the pages of a target, by their names.
+//! The files that contain the pages of a target, by their names.
 
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
@@ -13,8 +13,8 @@ use crate::verifier::Verifier;
 use deltille_files::export::sheet_file_name;
 
 impl Verifier<'_> {
-    /// The files that are verified together with `path`: all pages of a net, or of a board over several pages, where
-    /// each is a file of its own. Any other file is verified by itself.
+    /// Returns the files that are verified together with `path`: all pages of a net, or of a board over several
+    /// pages, if each page has its own file. Any other file is verified alone.
     pub fn set_of(&self, path: &Path) -> Vec<PathBuf> {
         let in_parts = self.printing.sheets.iter().any(|sheet| !sheet.pages.is_empty());
         match in_parts || printed_net::is_net(&self.printing) {
@@ -23,7 +23,7 @@ impl Verifier<'_> {
         }
     }
 
-    /// The files of all pages when `path` holds one of them; `path` alone when it holds all.
+    /// Returns the files of all pages if `path` contains one of them, or `path` alone if it contains all.
     pub fn pages_with(&self, path: &Path) -> Vec<PathBuf> {
         let single = matches!(Format::of(path), Some(Format::Svg | Format::Png));
         let count = self.printing.page_count();
@@ -37,7 +37,7 @@ impl Verifier<'_> {
         (0..count).map(file).collect()
     }
 
-    /// The verdict on a set of pages of which some are missing.
+    /// Creates the verdict on a set of pages with missing files.
     pub(crate) fn without(pages: &[PathBuf], format: Format, missing: &[&PathBuf]) -> Verdict {
         let findings =
             missing.iter().map(|page| PageFinding::PageMissing { page: file_name(page) }.into());
@@ -45,7 +45,7 @@ impl Verifier<'_> {
         Verdict { artifact: of_all(pages), ..verdict }
     }
 
-    /// The page that a file of a single page shows, by its name.
+    /// Returns the page shown by a single-page file, from the name of the file.
     pub(crate) fn sheet_of(&self, path: &Path) -> Result<usize, VerifyError> {
         let count = self.printing.page_count();
         let stem = path.file_stem().unwrap_or_default().to_string_lossy();
@@ -61,11 +61,11 @@ impl Verifier<'_> {
         }
     }
 
-    /// Verdicts on sets of pages that `named` does not name completely. A single page may be named
-    /// alone if it can be verified by itself and `alone` is set; pages of a net are always
-    /// completed by [`set_of`](Self::set_of).
+    /// Returns verdicts on the sets of pages that `named` gives only in part. If `alone` is set, a single page may be
+    /// named without the others when it can be verified alone; [`set_of`](Self::set_of) always completes the pages of
+    /// a net.
     pub fn left_out(&self, named: &[PathBuf], alone: bool) -> Vec<Verdict> {
-        // A folder may be named in several ways.
+        // Several paths may name the same folder.
         let absolute = |path: &PathBuf| std::path::absolute(path).unwrap_or_else(|_| path.clone());
         let named: Vec<PathBuf> = named.iter().map(absolute).collect();
         let sets: BTreeSet<Vec<PathBuf>> = named.iter().map(|path| self.pages_with(path)).collect();

@@ -1,4 +1,4 @@
-//! Verdicts: the result for an artifact as a whole, for its sheets and its faces, and as text.
+//! Verdicts on an artifact, its sheets and its faces, as values and as text.
 
 use std::fmt;
 use std::path::Path;
@@ -18,16 +18,16 @@ use deltille_core::words::counted;
 pub struct Verdict {
     /// File name of the artifact.
     pub artifact: String,
-    /// Kind of file.
+    /// Format of the file.
     pub format: Format,
-    /// Whether the artifact is what the target says; true when nothing was found wrong.
+    /// Whether the artifact agrees with the target, that is, has no findings.
     pub passed: bool,
     /// Findings about the file as a whole.
     pub findings: Vec<Finding>,
-    /// The pages of a document, in order; empty for other files.
+    /// Pages of a document, in order; empty for other files.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub sheets: Vec<SheetVerdict>,
-    /// The faces of a mesh, in order; empty for other files.
+    /// Faces of a mesh, in order; empty for other files.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub faces: Vec<FaceVerdict>,
     /// Result for a body to print; `None` for other files.
@@ -44,7 +44,7 @@ pub struct Verdict {
     pub cut: Option<CutVerdict>,
 }
 
-/// The result for a list of boards.
+/// The result for a list of boards for other detectors.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 #[non_exhaustive]
 pub struct ListVerdict {
@@ -52,7 +52,7 @@ pub struct ListVerdict {
     pub boards: usize,
     /// Corners of these boards that are listed.
     pub corners: usize,
-    /// Tags of these boards that are listed in their places.
+    /// Tags of these boards that are listed at their positions.
     pub tags: usize,
     /// Largest distance of a listed corner from its stated position, mm.
     pub max_deviation_mm: f64,
@@ -62,15 +62,15 @@ pub struct ListVerdict {
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 #[non_exhaustive]
 pub struct CutVerdict {
-    /// Outlines that were found in their places.
+    /// Outlines found at their positions.
     pub outlines: usize,
-    /// Lines to fold that were found in their places.
+    /// Fold lines found at their positions.
     pub folds: usize,
-    /// Engraved outlines that were found in their places.
+    /// Engraved outlines found at their positions.
     pub engraved: usize,
     /// Largest distance of a point of these from its stated position, mm.
     pub max_deviation_mm: f64,
-    /// Allowance for the width of a laser's beam in the drawing of a board, mm.
+    /// Allowance for the width of the laser beam in the drawing of a board, mm.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub kerf_mm: Option<f64>,
 }
@@ -79,21 +79,21 @@ pub struct CutVerdict {
 #[derive(Clone, Debug, PartialEq, Serialize)]
 #[non_exhaustive]
 pub struct BodyVerdict {
-    /// Triangles of its surface.
+    /// Number of triangles of its surface.
     pub triangles: usize,
     /// Volume of the body, mm³.
     pub volume_mm3: f64,
-    /// Seats of a skeleton that have their depth and outline.
+    /// Number of seats of a skeleton with the stated depth and outline.
     pub seats: usize,
     /// Largest distance of a vertex, or of the floor of a seat, from its stated position, mm.
     pub max_deviation_mm: f64,
 }
 
-/// The result for a black body that is inlaid into a white one.
+/// The result for a black body inlaid in a white one.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 #[non_exhaustive]
 pub struct InlayVerdict {
-    /// Triangles of both.
+    /// Number of triangles of both bodies.
     pub triangles: usize,
     /// Depth of the black body, mm.
     pub inlay_mm: f64,
@@ -112,19 +112,19 @@ pub struct InlayVerdict {
 pub struct FaceVerdict {
     /// Panel id.
     pub panel: u32,
-    /// Resolution at which it was looked at, px/mm.
+    /// Resolution of the rendered face, px/mm.
     pub px_per_mm: f64,
     /// Corners that the target has on this face.
     pub corners: usize,
-    /// Corners that were found with the right label.
+    /// Corners found with the right label.
     pub corners_found: usize,
     /// Tags that the target has on this face.
     pub tags: usize,
-    /// Tags that read without a wrong bit.
+    /// Tags read without a wrong bit.
     pub tags_exact: usize,
     /// Largest distance of a found corner on the mesh from its stated position, mm.
     pub max_deviation_mm: f64,
-    /// The findings.
+    /// Findings about this face.
     pub findings: Vec<Finding>,
 }
 
@@ -132,12 +132,12 @@ pub struct FaceVerdict {
 #[derive(Clone, Debug, PartialEq, Serialize)]
 #[non_exhaustive]
 pub struct SheetVerdict {
-    /// Whether its corners are the middles of circles.
+    /// Whether its corners are the centres of circles.
     #[serde(skip)]
     pub has_discs: bool,
-    /// Sheet of the target, counted from 1.
+    /// Number of the sheet of the target, from 1.
     pub sheet: usize,
-    /// Resolution at which it was looked at, px/mm.
+    /// Resolution of the rendered page, px/mm.
     pub px_per_mm: f64,
     /// Page size as the file states it, mm.
     pub size_mm: DVec2,
@@ -145,20 +145,20 @@ pub struct SheetVerdict {
     pub check_bars_mm: Vec<(f64, Option<f64>)>,
     /// Corners that the target has on this sheet.
     pub corners: usize,
-    /// Corners that were found with the right label.
+    /// Corners found with the right label.
     pub corners_found: usize,
     /// Tags that the target has on this sheet.
     pub tags: usize,
-    /// Tags that read exactly as stated, in every cell.
+    /// Tags that read exactly as stated in every cell.
     pub tags_exact: usize,
     /// Largest distance of a found corner from its stated position, mm.
     pub max_deviation_mm: f64,
     /// Number of pages on which the sheet is printed.
     pub pages: usize,
-    /// Result of folding a net.
+    /// Result of folding the net.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub fold: Option<FoldVerdict>,
-    /// The findings.
+    /// Findings about this sheet.
     pub findings: Vec<Finding>,
 }
 
@@ -166,18 +166,18 @@ pub struct SheetVerdict {
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 #[non_exhaustive]
 pub struct FoldVerdict {
-    /// Largest distance of a folded corner from its stated position in space, and of the ends of
-    /// the two sides of an edge from each other, mm.
+    /// Largest distance of a folded corner from its stated position in space, or between the ends of the two sides of
+    /// an edge, mm.
     pub max_deviation_mm: f64,
-    /// Edges whose second side is on this sheet and meets the first.
+    /// Number of edges whose second side is on this sheet and meets the first.
     pub edges: usize,
 }
 
-/// Most findings named in the line for people; the JSON report has all.
+/// Number of findings named in the line of text; the JSON report lists all.
 const NAMED: usize = 4;
 
 impl Verdict {
-    /// The verdict on a file as a whole; what was found of its parts is added.
+    /// Creates the verdict on a file as a whole; the caller adds the results for its parts.
     pub(super) fn new(path: &Path, format: Format, findings: Vec<Finding>) -> Self {
         Self {
             artifact: file_name(path),
@@ -193,14 +193,14 @@ impl Verdict {
         }
     }
 
-    /// The same with what the inspection of the file found.
+    /// Adds the findings of the inspection of the file.
     pub(super) fn with(mut self, refused: Vec<Finding>) -> Self {
         self.passed &= refused.is_empty();
         self.findings.extend(refused);
         self
     }
 
-    /// Goes on with what its surfaces show.
+    /// Writes how many corners and tags the surfaces show.
     fn corners_and_tags(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let sum = |count: fn(&SheetVerdict) -> usize| self.sheets.iter().map(count).sum::<usize>();
         let deviation = self.sheets.iter().map(|s| s.max_deviation_mm).fold(0.0, f64::max);
@@ -248,7 +248,7 @@ impl fmt::Display for InlayVerdict {
 }
 
 impl fmt::Display for Verdict {
-    /// One line: what was proved, or what is wrong.
+    /// Writes one line: what was verified, or what is wrong.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "{}: ", self.artifact)?;
         if let Some(list) = self.list.as_ref().filter(|_| self.passed) {
@@ -296,7 +296,7 @@ impl fmt::Display for Verdict {
                 write!(f, "{pages} pages, ")?;
             }
             let corners = sum(|s| s.corners_found);
-            // A sheet of single tags has none.
+            // A sheet of single tags has no corners.
             if corners > 0 {
                 let what =
                     if self.sheets.iter().all(|s| s.has_discs) { "circle" } else { "corner" };
@@ -347,7 +347,7 @@ impl fmt::Display for Verdict {
 }
 
 impl SheetVerdict {
-    /// The verdict on a page of which only its size was looked at.
+    /// Creates the verdict on a page of which only the size has been checked.
     pub(crate) fn new(index: usize, page: &Page, findings: Vec<Finding>) -> Self {
         Self {
             sheet: index + 1,

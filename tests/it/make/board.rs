@@ -1,4 +1,4 @@
-//! `deltille board`: what it writes, its templates, and what it refuses.
+//! `deltille board`: its output, its templates, and its errors.
 
 use std::path::Path;
 
@@ -32,7 +32,7 @@ fn rows_and_columns_are_enough() {
 }
 
 #[test]
-fn a_symbolic_link_is_replaced_by_force_which_is_told() {
+fn force_replaces_a_symbolic_link_and_reports_it() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
     let made = |args: &str| deltille(at).args(args.split(' ')).assert();
@@ -74,7 +74,7 @@ fn a_paper_alone_is_filled() {
 }
 
 #[test]
-fn a_saved_template_makes_the_same_board_and_options_win_over_it() {
+fn a_saved_template_reproduces_the_board_and_options_override_it() {
     let folder = tempfile::tempdir().unwrap();
     let args = "board --rows 5 --cols 6 --paper A5 --tag-spacing 2 --invert --save-template t.toml";
     deltille(folder.path()).args(args.split(' ')).assert().success();
@@ -110,7 +110,7 @@ fn dense_boards_have_a_place_code_in_every_tile_also_by_template_and_on_solids()
         panic!("a board")
     };
     assert_eq!(spec.tags.map(|tags| (tags.family, tags.spacing)), Some(("d25h7".to_owned(), 3)));
-    // Boards of other ids show other words.
+    // Boards with other ids show other words.
     let ids = |target: &Printing| -> Vec<u32> {
         target.target.panels.iter().flat_map(|panel| &panel.tags).map(|tag| tag.id).collect()
     };
@@ -121,13 +121,13 @@ fn dense_boards_have_a_place_code_in_every_tile_also_by_template_and_on_solids()
     deltille(folder.path()).args("verify d.json".split(' ')).assert().success();
 }
 
-/// Boards beside each other are not taken for one.
+/// Boards next to each other are not mistaken for one board.
 #[test]
-fn boards_that_are_packed_on_a_sheet_are_proved_each() {
+fn each_board_packed_on_a_sheet_is_verified() {
     let folder = tempfile::tempdir().unwrap();
     for (args, boards, sheets) in [
         ("board --rows 3 --cols 4 --boards 4", 4, 1),
-        // Without an edge, the largest that fits: one board fills the paper.
+        // Without --edge, the largest that fits: one board fills the paper.
         ("board --rows 4 --cols 5 --boards 2 --paper A4", 2, 2),
         ("board --dense --rows 5 --cols 6 --edge 8mm --boards 9 --paper A4 --invert", 9, 2),
         ("checkerboard --rows 4 --cols 5 --edge 15mm --tags t36h11 --boards 7 --paper A4", 7, 2),
@@ -141,7 +141,8 @@ fn boards_that_are_packed_on_a_sheet_are_proved_each() {
     }
 }
 
-/// A note stands on every label, of its sheet and of each board that is cut out, in a line of its own below the board.
+/// The note is on every label, both of the sheet and of each board that is cut out, on a separate line below the
+/// board.
 #[test]
 fn a_note_goes_with_every_board_that_is_cut_out() {
     let folder = tempfile::tempdir().unwrap();
@@ -188,7 +189,7 @@ fn every_sample_template_makes_a_board() {
 }
 
 #[test]
-fn what_cannot_be_made_is_refused_with_the_option_to_change() {
+fn impossible_boards_are_rejected_with_the_option_to_change() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
     let mut page = Page::default();
@@ -277,7 +278,7 @@ fn what_cannot_be_made_is_refused_with_the_option_to_change() {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(24))]
 
-    /// Whatever the numbers: a board, or one line, and never half of one.
+    /// Any numbers give either a board or a one-line error, and never part of a board.
     #[test]
     fn numbers_of_any_size_make_a_board_or_one_line(
         rows in prop_oneof!["[0-9]{1,2}", "-?[0-9]{1,12}", "NaN|inf|1e9|"],

@@ -1,5 +1,5 @@
-//! `deltille checkerboard`: what it writes and refuses, and tagged checkerboards on synthetic
-//! photographs, where the truth is exact.
+//! `deltille checkerboard`: its output and errors, and tagged checkerboards in synthetic images with exact ground
+//! truth.
 
 use std::collections::BTreeMap;
 
@@ -29,9 +29,9 @@ fn build(spec: &BoardSpec) -> Printing {
     Printing::new("board", spec.clone()).unwrap()
 }
 
-/// Every word with up to ⌊(h−1)/2⌋ wrong cells, in all four turns, is its tag and turn again.
+/// Every word with up to ⌊(h−1)/2⌋ wrong cells decodes to its tag and rotation, in all four rotations.
 #[test]
-fn square_tags_keep_their_distance_and_are_decoded_in_every_turn() {
+fn square_tags_keep_their_distance_and_decode_in_every_rotation() {
     for name in square_names() {
         let family = Family::shipped(name).unwrap();
         let words = TagWords::of(GridKind::Checker, family.dimension());
@@ -51,7 +51,7 @@ fn square_tags_keep_their_distance_and_are_decoded_in_every_turn() {
     }
 }
 
-/// The words of a square tag in its four turns.
+/// Returns the words of a square tag in its four rotations.
 fn turns_of(words: &TagWords, code: u64) -> [u64; 4] {
     let once = words.turn(code);
     let twice = words.turn(once);
@@ -80,7 +80,7 @@ fn board(spec: &BoardSpec) -> Board {
 }
 
 impl Board {
-    /// An image and its truth from `tilt` off the normal, turned about the line of sight.
+    /// Returns an image and its ground truth, viewed at `tilt` from the normal and rotated about the line of sight.
     fn seen(
         &self,
         rng: &mut ChaCha8Rng,
@@ -96,7 +96,7 @@ impl Board {
     }
 }
 
-/// Distance of every corner with an id from the true one; panics on a wrong label.
+/// Returns the distance of every labelled corner from the true position; panics on a wrong label.
 fn errors(detection: &Detection, truth: &Truth) -> Vec<f64> {
     let by_id: BTreeMap<u32, _> = truth.corners.iter().map(|c| (c.id, c)).collect();
     let labelled = detection.grids.iter().filter(|grid| grid.panel.is_some());
@@ -112,7 +112,7 @@ fn errors(detection: &Detection, truth: &Truth) -> Vec<f64> {
         .collect()
 }
 
-/// The outermost corners are the narrowest, and nothing but the panel's margin lies beyond them.
+/// The outermost corners are the narrowest, with nothing but the panel's margin beyond them.
 #[test]
 fn the_outermost_corners_are_found_through_a_fisheye_lens() {
     let lens = Lens::KannalaBrandt(KannalaBrandt { k: vec![0.01, -0.005, 0.0, 0.0] });
@@ -125,7 +125,7 @@ fn the_outermost_corners_are_found_through_a_fisheye_lens() {
         let mm = rng.random_range(60.0..160.0);
         let (detection, truth) = board.seen(&mut rng, &camera, mm, tilt);
         let is_outermost = |row: i32, col: i32| row == 0 || row == 7 || col == 0 || col == 10;
-        // Windows end at the border of the picture.
+        // Windows end at the border of the image.
         let seen = truth.corners.iter().filter(|c| camera.sees(DVec2::new(c.x, c.y), 8.0));
         let ids: Vec<u32> = seen.filter(|c| is_outermost(c.row, c.col)).map(|c| c.id).collect();
         errors(&detection, &truth);
@@ -170,7 +170,7 @@ fn tagged_checkerboards_are_labelled_whichever_squares_carry_the_tags() {
     }
 }
 
-/// A part of the board with a tag in it is enough for absolute labels.
+/// A part of the board with one tag in it is enough for absolute labels.
 #[test]
 fn partial_views_are_labelled_by_few_tags() {
     let board = board(&spec(8, 11, TagsIn::Black));
@@ -189,7 +189,7 @@ fn partial_views_are_labelled_by_few_tags() {
 }
 
 #[test]
-fn plain_boards_are_labelled_where_they_are_seen_whole() {
+fn plain_boards_are_labelled_where_they_are_fully_visible() {
     let camera = Camera::pinhole(1280, 960, 0.9);
     for inverted in [false, true] {
         let board = board(&BoardSpec { tags: None, inverted, ..spec(6, 9, TagsIn::Black) });
@@ -202,7 +202,7 @@ fn plain_boards_are_labelled_where_they_are_seen_whole() {
 }
 
 #[test]
-fn several_boards_are_told_apart_by_their_tags() {
+fn several_boards_are_distinguished_by_their_tags() {
     let target = build(&BoardSpec { boards: 3, ..spec(5, 7, TagsIn::Black) });
     let camera = Camera::pinhole(1280, 960, 0.9);
     let sheets = target.draw().unwrap().sheets;
@@ -259,7 +259,7 @@ fn a_checkerboard_is_written_verified_and_found_again() {
     }
     deltille(at, "verify tags.json").success();
 
-    page.title("What cannot be made");
+    page.title("Rejected");
     for args in [
         "--tags delTag25h7",
         "--tags 16h5",
@@ -274,8 +274,8 @@ fn a_checkerboard_is_written_verified_and_found_again() {
     page.is("checkerboard");
 }
 
-/// Reads the tags of the sheets with another program: OpenCV those in white squares from the whole
-/// page, those in black squares one by one on white, since it looks for black on white.
+/// Reads the tags of the sheets with OpenCV. Tags in white squares are read from the whole page, those in black
+/// squares one by one on white, because OpenCV searches for black on white.
 const OPENCV: &str = r#"
 import json, sys, cv2, numpy as np
 detector = cv2.aruco.ArucoDetector(

@@ -1,4 +1,4 @@
-//! `.dsc` descriptions: round trips in both dialects, the files of other programs, bad files.
+//! `.dsc` descriptions: round trips in both dialects, files of other programs, invalid files.
 
 use deltille::export::dsc::{self, Dialect, DscError};
 use deltille::family::Family;
@@ -20,7 +20,7 @@ fn board(rows: u32, cols: u32, edge_mm: f64, boards: u32) -> Target {
     Target::build("board", &TargetSpec::Board(spec), Some(&family)).unwrap()
 }
 
-/// A triangular face with `side` corners along its base, in the plane turned by `pose`.
+/// A triangular face with `side` corners along its base, in the plane given by `pose`.
 fn face(side: i32, pose: PanelPose) -> Target {
     let mut target = board(2, 2, 10.0, 1);
     let panel = Panel {
@@ -53,7 +53,7 @@ fn face(side: i32, pose: PanelPose) -> Target {
     target
 }
 
-/// What a `.dsc` carries of a panel.
+/// Returns the parts of a panel that a `.dsc` contains.
 fn carried(panel: &Panel) -> (u32, [u32; 2], &[Corner], &[TagPlacement], Option<f64>) {
     (panel.id, panel.matrix, &panel.corners, &panel.tags, panel.border_bits)
 }
@@ -162,7 +162,7 @@ fn squares_are_counted_from_the_top_in_the_original_dialect() {
 }
 
 #[test]
-fn what_a_dialect_cannot_say_is_refused() {
+fn targets_that_a_dialect_cannot_express_are_rejected() {
     let whole = board(4, 4, 20.0, 1);
     let but = |change: fn(&mut Target)| {
         let mut target = whole.clone();
@@ -182,7 +182,7 @@ fn what_a_dialect_cannot_say_is_refused() {
 }
 
 #[test]
-fn bad_files_are_refused_with_the_line() {
+fn invalid_files_are_rejected_with_the_line() {
     let good = "0,3,3,20\ndelTag25h7,1.5\n0,0,0,0,0,0\n-1,1,0,20,0,0\n-1,0,1,10,17.3,0\n";
     assert!(dsc::read(good, "x").is_ok());
     let cases = [

@@ -1,4 +1,4 @@
-//! What the writers write: reviewed as text, and drawn by other programs than wrote it.
+//! Output of the writers: reviewed as text, and rendered by programs other than the writers.
 
 use std::path::Path;
 use std::process::Command;
@@ -25,7 +25,7 @@ fn tiny(inverted: bool) -> Artwork {
     target.unwrap().draw().unwrap()
 }
 
-/// Without the outlines of the letters, which nobody reads.
+/// Removes the outlines of the letters, which nobody reviews.
 fn without_text(mut artwork: Artwork) -> Artwork {
     let shapes = &mut artwork.sheets[0].shapes;
     shapes.retain(|shape| !matches!(shape.part, Part::Label { .. }));
@@ -63,8 +63,8 @@ fn the_same_artwork_gives_the_same_bytes() {
     assert_eq!(png(), png());
 }
 
-/// Mean difference of two pictures of the same page, grey levels, and the share of pixels that
-/// differ by more than half the range.
+/// Returns the mean difference of two images of the same page, grey levels, and the fraction of pixels that differ by
+/// more than half the range.
 fn difference(a: &Gray<u8>, b: &Gray<u8>) -> (f64, f64) {
     let (width, height) = (a.width().min(b.width()), a.height().min(b.height()));
     let (mut sum, mut far) = (0u64, 0u64);
@@ -95,7 +95,7 @@ fn poppler_shows_the_same() {
     compare_formats(true);
 }
 
-/// A tile, a field, a stroke and text look the same in every format, whoever draws them.
+/// A tile, a field, a stroke and text look the same in every format and renderer.
 fn compare_formats(with_poppler: bool) {
     let folder = TempDir::new().unwrap();
     for inverted in [false, true] {
@@ -123,16 +123,16 @@ fn compare_formats(with_poppler: bool) {
     }
 }
 
-/// A PDF drawn by poppler at 10 px/mm.
+/// Renders a PDF with poppler at 10 px/mm.
 fn poppler(pdf: &Path) -> Gray<u8> {
     let stem = pdf.with_file_name("poppler");
     let run = Command::new("pdftoppm")
         .args(["-r", "254", "-gray", "-png", "-singlefile"])
         .args([pdf, &stem])
         .status();
-    assert!(run.unwrap().success(), "pdftoppm refuses the file");
+    assert!(run.unwrap().success(), "pdftoppm rejects the file");
     match photograph::read(stem.with_extension("png")).unwrap() {
-        // Pure K is not quite black on poppler's screen.
+        // Poppler does not render pure K as quite black.
         AnyGray::U8(image) => {
             let black = f64::from(*image.pixels().iter().min().unwrap());
             image.map(|v| ((f64::from(v) - black) * 255.0 / (255.0 - black)).round() as u8)
@@ -158,7 +158,7 @@ fn sizes_are_exact() {
 }
 
 #[test]
-fn files_that_are_no_artifacts_are_refused_in_one_line() {
+fn files_that_are_not_artifacts_are_rejected_in_one_line() {
     let folder = TempDir::new().unwrap();
     let file = |name: &str| folder.path().join(name);
     let whole = pdf::to_bytes(&tiny(false));

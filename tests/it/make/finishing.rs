@@ -1,5 +1,5 @@
-//! Boards for glass, print shops and lasers: mirrored, with spot colours, as outlines to engrave. Made, proved, and refused
-//! where they were changed. `tests/independent/finishes.py` reads them with other programs.
+//! Boards for glass, print shops and lasers: mirrored, with spot colours, and as outlines to engrave. They are
+//! generated, verified, and rejected after changes. `tests/independent/finishes.py` reads them with other programs.
 
 use crate::common::page::Page;
 use deltille::artwork::{CutDrawing, CutLayer, to_laser};
@@ -48,7 +48,7 @@ fn boards_are_made_for_glass_print_shops_and_lasers() {
     page.is("finishes");
 }
 
-/// A board, finished.
+/// Creates a board with a finish.
 fn board(mirrored: bool, white: bool, contour: bool) -> Printing {
     let finish = Finish {
         mirrored,
@@ -59,19 +59,19 @@ fn board(mirrored: bool, white: bool, contour: bool) -> Printing {
     board.finished(finish, 5.0).unwrap()
 }
 
-/// What is said of a file.
+/// Returns the verdict on a file.
 fn said(target: &Printing, name: &str, bytes: impl Into<Vec<u8>>) -> String {
     let file = [Artifact::new(name, bytes.into())];
     verify(target, name, &file).unwrap().to_string()
 }
 
 #[test]
-fn pages_are_turned_over_where_they_are_said_to_be_and_nowhere_else() {
+fn pages_are_mirrored_exactly_where_the_description_says_so() {
     let [plain, pane] = [false, true].map(|mirrored| board(mirrored, false, false));
     let page = |target: &Printing| svg::to_string(&target.draw().unwrap(), 0);
     assert!(said(&pane, "desk.svg", page(&pane)).contains("verified, 12 corners"));
     let wrong = said(&pane, "desk.svg", page(&plain));
-    assert!(wrong.contains("board 0 is not mirrored, as it should be"), "{wrong}");
+    assert!(wrong.contains("board 0 is not mirrored, but should be"), "{wrong}");
     let wrong = said(&plain, "desk.svg", page(&pane));
     assert!(wrong.contains("board 0 is mirrored"), "{wrong}");
 }
@@ -92,15 +92,15 @@ fn spot_colours_are_those_of_the_description() {
         let wrong = said(described, "desk.pdf", bytes(printed));
         assert!(wrong.contains("FAILED") && wrong.contains(problem), "{problem}: {wrong}");
     }
-    // The right spaces, but the white is not used, or lines are in black.
+    // The right colour spaces, but white is unused, or lines are black.
     for (change, problem) in [
         (("/White cs\n1 scn\n", ""), "a mark before any operator k"),
         (("/Overprint gs\n", ""), "a mark that does not overprint"),
-        (("/Contour CS\n1 SCN\n", ""), "a line that is not in the colour of the contour"),
+        (("/Contour CS\n1 SCN\n", ""), "a line that is not in the contour colour"),
         (("1 scn", "0.5 scn"), "operator scn with [0.5]"),
         (
             ("/Contour CS\n1 SCN\n", "/Contour CS\n1 SCN\n0.3 w\n9 9 m\n9 60 l\nS\n"),
-            "lines to cut along that are not",
+            "cut lines that are not",
         ),
     ] {
         let wrong = said(&stated, "desk.pdf", with_content(&bytes(&stated), change));
@@ -108,7 +108,7 @@ fn spot_colours_are_those_of_the_description() {
     }
 }
 
-/// A PDF of one page whose content has other words instead of some.
+/// Returns a one-page PDF with some of its content replaced.
 fn with_content(bytes: &[u8], (from, to): (&str, &str)) -> Vec<u8> {
     let mut document = lopdf::Document::load_mem(bytes).unwrap();
     for object in document.objects.values_mut() {
@@ -125,7 +125,7 @@ fn with_content(bytes: &[u8], (from, to): (&str, &str)) -> Vec<u8> {
 }
 
 #[test]
-fn what_a_laser_would_do_wrong_is_named() {
+fn errors_in_a_laser_drawing_are_named() {
     let target = board(false, false, false);
     let good = to_laser(&target, 0.2).unwrap();
     let file = |drawing: &CutDrawing, name: &str| match name {
@@ -138,13 +138,13 @@ fn what_a_laser_would_do_wrong_is_named() {
         (|d| drop(d.paths.remove(3)), "the path on ENGRAVE from"),
         (|d| d.paths[3].points_mm.iter_mut().for_each(|p| p.x += 0.05), "is off by 0.050 mm"),
         (|d| d.paths.retain(|path| path.layer == CutLayer::Engrave), "the path on CUT from"),
-        (|d| d.paths[3].layer = CutLayer::Cut, "which this target cannot have"),
+        (|d| d.paths[3].layer = CutLayer::Cut, "which is impossible for this target"),
         (
             |d| {
                 let cut = d.paths.iter_mut().find(|path| path.layer == CutLayer::Cut).unwrap();
                 cut.points_mm.iter_mut().for_each(|p| *p *= 0.9);
             },
-            "which this target cannot have",
+            "which is impossible for this target",
         ),
     ];
     for (change, problem) in changes {

@@ -1,4 +1,4 @@
-//! Boards and solids with a hole in the middle of each tag, where no code uses the cells.
+//! Boards and solids with a hole in the centre of each tag, where no code uses the cells.
 
 use assert_cmd::Command;
 use deltille::artwork::{CutLayer, CutPath, to_laser};
@@ -12,7 +12,7 @@ use deltille::verify::{Artifact, verify};
 use crate::common::command::deltille;
 use crate::common::folder::names;
 
-/// A family of 16 bits whose central cell is free, `families/holed.json` in a folder.
+/// Writes a family of 16 bits with a free central cell to `families/holed.json` in a folder.
 pub fn holed(folder: &std::path::Path) -> Family {
     let search = "gen-family d16h5 --free centre --method lexicode --name holed";
     let mut deltag = Command::cargo_bin("deltag").unwrap();
@@ -22,7 +22,7 @@ pub fn holed(folder: &std::path::Path) -> Family {
 }
 
 #[test]
-fn every_format_with_holes_is_proved() {
+fn every_format_with_holes_is_verified() {
     let folder = tempfile::tempdir().unwrap();
     holed(folder.path());
     for (command, file_count) in [
@@ -50,7 +50,7 @@ fn every_format_with_holes_is_proved() {
     }
 }
 
-/// A board of a family that is not shipped.
+/// Creates a board with a family that is not shipped.
 fn board(hole_mm: Option<f64>) -> Printing {
     let folder = tempfile::tempdir().unwrap();
     let family = holed(folder.path());
@@ -61,7 +61,7 @@ fn board(hole_mm: Option<f64>) -> Printing {
 }
 
 #[test]
-fn holes_of_another_size_and_none_are_found() {
+fn missing_holes_and_holes_of_the_wrong_size_are_found() {
     let stated = board(Some(1.5));
     for (hole_mm, passes) in
         [(Some(1.5), true), (Some(1.6), false), (Some(1.0), false), (None, false)]
@@ -74,7 +74,7 @@ fn holes_of_another_size_and_none_are_found() {
     }
 }
 
-/// The area on the left of a path, mm².
+/// Returns the area to the left of a path, mm².
 fn area(path: &CutPath) -> f64 {
     let next = path.points_mm.iter().cycle().skip(1);
     path.points_mm.iter().zip(next).map(|(from, to)| from.perp_dot(*to) / 2.0).sum()
@@ -89,7 +89,7 @@ fn a_laser_cuts_the_holes_first() {
     let (plate, holes) = cut.split_last().unwrap();
     assert_eq!(holes.len(), panel.tags.len());
     assert!(area(plate) > 1e4);
-    // The beam takes away 0.05 mm beside its path, so that the holes are as wide as stated.
+    // The beam removes 0.05 mm beside its path, so the holes are as wide as stated.
     for hole in holes {
         let area = -area(hole);
         assert!((area / (0.7f64.powi(2) * std::f64::consts::PI) - 1.0).abs() < 1e-3, "{area}");
@@ -103,7 +103,7 @@ fn a_laser_cuts_the_holes_first() {
 }
 
 #[test]
-fn what_has_no_room_for_a_hole_is_refused() {
+fn holes_without_room_are_rejected() {
     let folder = tempfile::tempdir().unwrap();
     holed(folder.path());
     for (arguments, problem) in [
@@ -134,9 +134,9 @@ fn what_has_no_room_for_a_hole_is_refused() {
     assert_eq!(names(folder.path()), ["families"]);
 }
 
-/// Whatever reads a description asks whether its family has room for the holes.
+/// Every reader of a description checks whether its family has room for the holes.
 #[test]
-fn a_hole_that_is_written_into_a_description_by_hand_is_refused() {
+fn a_hole_added_to_a_description_by_hand_is_rejected() {
     let folder = tempfile::tempdir().unwrap();
     deltille(folder.path(), "board --rows 4 --cols 5 --edge 30mm --svg").success();
     let path = folder.path().join("board.json");
@@ -156,7 +156,7 @@ fn a_hole_that_is_written_into_a_description_by_hand_is_refused() {
 }
 
 #[test]
-fn a_family_may_have_the_name_of_one_that_ships() {
+fn a_family_may_have_the_name_of_a_shipped_one() {
     let folder = tempfile::tempdir().unwrap();
     let search = "gen-family d16h5 --free centre --method lexicode -o own";
     let mut deltag = Command::cargo_bin("deltag").unwrap();

@@ -1,4 +1,4 @@
-//! Boards as plates, and models for simulators: made, proved, and refused where they were changed.
+//! Boards as plates and models for simulators: generated, verified, and rejected after changes.
 //! `tests/independent/simulators.py` opens them with simulators.
 
 use crate::common::command::deltille;
@@ -11,7 +11,7 @@ use deltille::targets::BoardSpec;
 use deltille::verify::{Artifact, verify};
 use glam::DVec3;
 
-/// What a target is in all formats of meshes.
+/// Options that write a target in all mesh formats.
 const ALL: &str = "--gltf --obj --sdf --urdf --mjcf --usd --texture 1024";
 
 #[test]
@@ -40,7 +40,7 @@ fn faces_are_shared_among_textures() {
     let at = folder.path();
     let mut page = Page::default();
     let all = "--gltf --obj --sdf --urdf --mjcf --usd";
-    // Two textures for four faces, one for each, and as many as the error proposes.
+    // Two textures for four faces, one for each face, and as many as the error message suggests.
     page.run(
         at,
         &format!("deltille tetrahedron --edge 100mm --tiles 6 --name four {all} --textures 2"),
@@ -53,18 +53,18 @@ fn faces_are_shared_among_textures() {
     page.run(at, "deltille octahedron --edge 100mm --gltf --texture 700 --textures 2");
     page.run(at, "deltille cube --edge 80mm --tiles 6 --usd --texture-dpi 300 --textures 5");
     page.run(at, &format!("deltille board --rows 5 --cols 6 --edge 30mm --two-sided 4mm --name door {all} --textures 2"));
-    page.title("Parts are compared with what they are parts of");
+    page.title("Parts are compared with the whole they belong to");
     for file in ["four.mtl", "four-texture-2.png", "four-2.obj"] {
         page.run(at, &format!("deltille verify four.json {file}"));
     }
-    page.title("A mesh of another number of textures than the model for MuJoCo");
+    page.title("A mesh with a different number of textures than the MuJoCo model");
     deltille(at, "tetrahedron --edge 100mm --tiles 6 --name four --obj --textures 3 --no-verify")
         .success();
     page.run(at, "deltille verify four.json four.xml");
     page.run(at, "deltille verify four.json four.usda");
     page.is("several-textures");
 
-    // Textures that no mesh shows any more are named; one that is missing is told once, whatever meshes show it.
+    // Textures that no mesh shows any more are named. A missing texture is reported once, whichever meshes show it.
     let again = "tetrahedron --edge 100mm --tiles 6 --name each --obj --textures 3 --no-verify";
     let said = deltille(at, again).success();
     let said = String::from_utf8(said.get_output().stderr.clone()).unwrap();
@@ -96,7 +96,7 @@ fn boards_and_solids_are_two_bodies_to_print() {
     page.is("inlays");
 }
 
-/// What is wrong with the bodies of a board, after they were changed.
+/// Returns the verdict on the bodies of a board after a change.
 fn verdict_on(change: impl FnOnce(&mut InlaidBodies)) -> String {
     let board = Printing::new("desk", BoardSpec::deltille(3, 4, 20.0)).unwrap();
     let mut bodies = InlaidBodies::new(&board.target, Meshing::default()).unwrap();
@@ -106,7 +106,7 @@ fn verdict_on(change: impl FnOnce(&mut InlaidBodies)) -> String {
 }
 
 #[test]
-fn bodies_that_were_changed_are_refused() {
+fn changed_bodies_are_rejected() {
     assert!(verdict_on(|_| {}).contains("verified, two closed bodies"));
     let moved = |body: &mut Body, by: DVec3| body.vertices_mm.iter_mut().for_each(|v| *v += by);
     for (verdict, expected) in [
@@ -140,11 +140,11 @@ fn bodies_that_were_changed_are_refused() {
 }
 
 #[test]
-fn a_small_file_that_unpacks_to_a_large_one_is_not_unpacked() {
+fn a_small_file_with_a_very_large_content_is_not_unpacked() {
     let board = Printing::new("desk", BoardSpec::deltille(3, 4, 20.0)).unwrap();
     let bodies = InlaidBodies::new(&board.target, Meshing::default()).unwrap();
     let mut file = threemf::to_bytes(&bodies);
-    // The length of the model, in its entry of the directory and before it.
+    // The length of the model, in its directory entry and before it.
     let name = b"3D/3dmodel.model";
     let names: Vec<usize> =
         (0..file.len() - name.len()).filter(|&at| file[at..].starts_with(name)).collect();
@@ -157,7 +157,7 @@ fn a_small_file_that_unpacks_to_a_large_one_is_not_unpacked() {
 }
 
 #[test]
-fn models_that_were_changed_are_refused() {
+fn changed_models_are_rejected() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
     deltille(at, &format!("board --rows 3 --cols 4 --edge 30mm --name desk {ALL}")).success();
@@ -192,7 +192,7 @@ fn models_that_were_changed_are_refused() {
 }
 
 #[test]
-fn meshes_that_cannot_be_made_are_refused_in_a_line() {
+fn impossible_meshes_are_rejected_in_one_line() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
     let mut page = Page::default();
@@ -224,7 +224,7 @@ fn meshes_that_cannot_be_made_are_refused_in_a_line() {
     page.is("no-meshes");
 }
 
-/// An OBJ whose vertices were moved, with the normals that follow.
+/// Returns an OBJ with moved vertices and matching normals.
 fn moved(obj: &str, place: impl Fn(DVec3) -> DVec3) -> String {
     let numbers = |line: &str| {
         let mut words = line.split_whitespace().skip(1).map(|word| word.parse::<f64>().unwrap());
@@ -248,7 +248,7 @@ fn moved(obj: &str, place: impl Fn(DVec3) -> DVec3) -> String {
 }
 
 #[test]
-fn bodies_of_another_shape_are_named_though_the_print_is_right() {
+fn bodies_of_the_wrong_shape_are_named_even_if_the_print_is_right() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
     deltille(at, "board --rows 3 --cols 4 --edge 30mm --name desk --obj --texture 1024").success();

@@ -1,5 +1,5 @@
-//! The nets of solids: printed, read back, folded; and nets broken on purpose, each of which must
-//! fail for the right reason.
+//! The nets of solids, printed, read back and folded; and nets with deliberate faults, each of which must fail for
+//! the right reason.
 
 use std::f64::consts::TAU;
 use std::path::Path;
@@ -20,7 +20,7 @@ fn family() -> Family {
     Family::shipped("delTag25h7").unwrap()
 }
 
-/// A tetrahedron that is small enough for every test.
+/// A tetrahedron small enough for every test.
 fn net(paper: &PaperSpec) -> Printing {
     let spec = SolidSpec {
         edge_mm: 70.0,
@@ -63,7 +63,7 @@ fn verify(target: &Printing, artwork: &Artwork, extension: &str) -> Verdict {
 }
 
 #[test]
-fn a_net_is_proved_in_every_format_on_one_page_and_on_several() {
+fn a_net_is_verified_in_every_format_on_one_page_and_on_several() {
     for (target, pages) in [(net(&PaperSpec::default()), 1), (tiled(), 4)] {
         assert_eq!(target.page_count(), pages);
         assert_eq!(Printing::from_json(&target.to_json()).unwrap(), target);
@@ -79,7 +79,7 @@ fn a_net_is_proved_in_every_format_on_one_page_and_on_several() {
 }
 
 #[test]
-fn a_net_in_pieces_is_proved_and_folded_across_its_sheets() {
+fn a_net_in_pieces_is_verified_and_folded_across_its_sheets() {
     let target = in_pieces();
     assert!(target.sheets.len() > 1);
     assert!(target.sheets.iter().all(|sheet| sheet.pages.is_empty()));
@@ -90,7 +90,7 @@ fn a_net_in_pieces_is_proved_and_folded_across_its_sheets() {
     let verdict = verify(&target, &draw(&target), "pdf");
     let edges: usize = verdict.sheets.iter().map(|sheet| sheet.fold.unwrap().edges).sum();
     assert_eq!(edges, 6);
-    // A number that leads from one sheet to another.
+    // A number that refers from one sheet to another.
     let mut renumbered = target.clone();
     let texts = &mut renumbered.sheets[0].texts;
     texts.iter_mut().find(|text| is_of_edge(text)).unwrap().text = Label::Edge(9);
@@ -116,7 +116,7 @@ fn a_board_larger_than_the_paper_is_a_poster() {
         shape.path = Affine::translate((0.4, 0.0)) * &shape.path;
     }
     assert_found(&verify(&target, &shifted, "pdf"), [json!({ "kind": "pages_differ" })]);
-    // Windows that cut tiles and cells to slivers leave these out.
+    // Windows that cut tiles and cells into slivers ignore the slivers.
     for edge_mm in [18.0, 25.0] {
         let size = Some("A5".parse().unwrap());
         let paper = PaperSpec { size, poster: true, ..PaperSpec::default() };
@@ -125,23 +125,23 @@ fn a_board_larger_than_the_paper_is_a_poster() {
         let verdict = verify(&target, &draw(&target), "svg");
         assert!(verdict.passed, "{verdict}");
     }
-    // A page in the place of another is found in single files, too.
+    // A swapped page is also found in single files.
     let mut swapped = draw(&target);
     swapped.sheets.swap(0, 1);
     assert!(!verify(&target, &swapped, "svg").passed);
-    // Without it, the board is refused.
+    // Without it, the board is rejected.
     let paper = PaperSpec { poster: false, ..paper };
     let error = Printing::build("t", &spec, Some(&family()), Some(&paper)).unwrap_err();
     assert!(error.to_string().contains("`PaperSpec::poster`"), "{error}");
 }
 
-/// The panel of another placement in the place of this one, as if the layout were wrong.
+/// Puts the panel of another placement at this one, as if the layout were wrong.
 fn swap(target: &mut Printing, a: usize, b: usize) {
     let placements = &mut target.sheets[0].placements;
     (placements[a].panel, placements[b].panel) = (placements[b].panel, placements[a].panel);
 }
 
-/// A placement turned about the middle of its face.
+/// Rotates a placement about the middle of its face.
 fn turn(target: &mut Printing, at: usize) {
     let TargetSpec::Solid(spec) = &target.target.spec else { panic!("a solid") };
     let placement = &mut target.sheets[0].placements[at];
@@ -160,7 +160,7 @@ fn is_of_edge(text: &SheetText) -> bool {
     matches!(text.text, Label::Edge(_) | Label::Tab { .. })
 }
 
-/// Description and print agree, and are both wrong: only the fold tells.
+/// Description and print agree and are both wrong: only folding reveals it.
 #[test]
 fn a_wrong_layout_does_not_fold_into_the_solid() {
     let whole = net(&PaperSpec::default());
@@ -222,9 +222,9 @@ fn a_wrong_layout_does_not_fold_into_the_solid() {
     }
 }
 
-/// The same of a cube: a face turned by a right angle has its sides where they were.
+/// The same for a cube: the sides of a face rotated by 90° coincide with the original ones.
 #[test]
-fn a_turned_square_does_not_fold_into_the_cube() {
+fn a_rotated_square_does_not_fold_into_the_cube() {
     let spec = SolidSpec { edge_mm: 70.0, ..SolidSpec::new(SolidShape::Cube) };
     let family = Family::shipped("aprilTag36h11").unwrap();
     let paper = PaperSpec::default();
@@ -249,9 +249,9 @@ fn a_turned_square_does_not_fold_into_the_cube() {
     assert_found(&verdict(&swapped), [elsewhere]);
 }
 
-/// The print differs from a right description.
+/// The print differs from a correct description.
 #[test]
-fn a_wrong_print_is_told_from_its_description() {
+fn a_print_that_differs_from_its_description_fails() {
     let whole = net(&PaperSpec::default());
     let mut swapped = whole.clone();
     swap(&mut swapped, 0, 2);
@@ -278,7 +278,7 @@ fn a_wrong_print_is_told_from_its_description() {
         shapes.remove(first);
         assert_found(&verify(&whole, &erased, "pdf"), [line(kind)]);
     }
-    // A fold drawn through would be cut.
+    // A fold line drawn through would be cut.
     let mut through = whole.clone();
     let lines = &mut through.sheets[0].lines;
     lines.iter_mut().find(|line| line.kind == LineKind::Fold).unwrap().kind = LineKind::Cut;
@@ -302,7 +302,7 @@ fn pages_that_do_not_join_are_found() {
     assert_found(&verify(&target, &unnamed, "svg"), [on_page]);
 }
 
-/// The report of `verify` on a file.
+/// Returns the report of `verify` on a file.
 fn report(folder: &Path, args: &str, code: i32) -> Value {
     deltille(folder, &format!("verify {args} --report r.json")).code(code);
     serde_json::from_slice(&std::fs::read(folder.join("r.json")).unwrap()).unwrap()
@@ -336,7 +336,7 @@ fn a_net_larger_than_the_paper_takes_several_pages() {
     let at = folder.path();
     deltille(at, "octahedron --edge 130mm --tiles 7 --pdf --svg --paper A4 --allow-seams")
         .success();
-    // Any of the files stands for all; one that is missing is named.
+    // Any of the files stands for all; a missing file is named.
     let whole = report(at, "octahedron.json octahedron-3.svg", 0);
     let sheet = &whole["artifacts"][0]["sheets"][0];
     assert_eq!((&sheet["pages"], &sheet["corners_found"]), (&3.into(), &120.into()));
@@ -346,8 +346,8 @@ fn a_net_larger_than_the_paper_takes_several_pages() {
     assert_eq!(cut["artifacts"][0]["findings"], serde_json::json!([missing]));
 }
 
-/// An octahedron of unit edges with a tetrahedron on each face, as OBJ: 24 equilateral triangles,
-/// concave along the edges of the octahedron.
+/// Returns an octahedron of unit edges with a tetrahedron on each face, as OBJ: 24 equilateral triangles, concave
+/// along the edges of the octahedron.
 fn spikes() -> String {
     let reach = 0.5f64.sqrt();
     let mut text = String::new();
@@ -373,11 +373,11 @@ fn spikes() -> String {
     text
 }
 
-/// A concave mesh: its net folds both ways, on paper and for a cutter.
+/// A concave mesh: its net folds in both directions, on paper and for a cutter.
 #[test]
 fn a_concave_mesh_prints_as_a_net_and_as_single_faces() {
     let folder = tempfile::tempdir().unwrap();
-    // A name that is no name of a shape.
+    // A name that is not the name of a shape.
     std::fs::write(folder.path().join("icosahedron.obj"), spikes()).unwrap();
     let mesh = "solid --mesh icosahedron.obj --edge 60mm --tiles 7 --face-margin 4mm";
     deltille(folder.path(), &format!("{mesh} --pdf --dxf")).success();
@@ -391,7 +391,7 @@ fn a_concave_mesh_prints_as_a_net_and_as_single_faces() {
         lines.filter(|line| line.kind == kind).count()
     };
     let (folds, valleys) = (count(LineKind::Fold), count(LineKind::Valley));
-    // The 12 edges of the octahedron are valleys, whether they join faces or tabs.
+    // The 12 edges of the octahedron are valley folds, whether they join faces or tabs.
     assert_eq!((folds, valleys), (24, 12));
     let dxf = std::fs::read_to_string(folder.path().join("icosahedron-net.dxf")).unwrap();
     let lines = |layer: &str| dxf.matches(&format!("\nLINE\n  8\n{layer}\n")).count();

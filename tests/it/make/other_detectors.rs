@@ -1,5 +1,5 @@
-//! Targets that other programs define: what is written, verified, found again and refused. Whether the other programs
-//! find them is asked by `tests/independent`.
+//! Targets defined by other programs: written, verified, detected and rejected. `tests/independent` checks whether
+//! the other programs find them.
 
 use crate::common::command::deltille;
 use crate::common::page::Page;
@@ -27,10 +27,10 @@ fn charuco_boards_are_written_verified_and_found_again() {
         let stated = panel.corners.iter().find(|c| (c.row, c.col) == (corner.row, corner.col));
         assert_eq!(corner.id, stated.map(|corner| corner.id));
     }
-    // Of the markers those that have four corners around them.
+    // Only markers with four corners around them.
     assert_eq!((grid.corners.len(), grid.tags.len()), (12, 3));
 
-    page.title("What cannot be made");
+    page.title("Rejected");
     for args in [
         "--squares 8",
         "--squares 8x2",
@@ -68,7 +68,7 @@ fn april_grids_are_written_with_the_file_of_kalibr_and_found_again() {
     assert!(grid.corners.iter().all(|c| c.id == Some((8 * c.row + c.col) as u32)));
     assert_eq!((grid.corners.len(), grid.tags.len()), (48, 12));
 
-    page.title("What cannot be made");
+    page.title("Rejected");
     for args in [
         "--tags 6",
         "--tags 1x6",
@@ -94,7 +94,7 @@ fn circles_are_written_and_verified() {
     ] {
         assert!(page.run(at, &format!("deltille circles {args}")).status.success(), "{args}");
     }
-    page.title("A circle that is missing, and circles of another size");
+    page.title("A missing circle, and circles of the wrong size");
     let svg = std::fs::read_to_string(at.join("plain.svg")).unwrap();
     let json = std::fs::read_to_string(at.join("plain.json")).unwrap();
     let start = svg.find("<path").unwrap();
@@ -107,7 +107,7 @@ fn circles_are_written_and_verified() {
     std::fs::write(at.join("larger.json"), larger).unwrap();
     assert_eq!(page.run(at, "deltille verify larger.json plain.svg").status.code(), Some(1));
 
-    page.title("What cannot be made or found");
+    page.title("Rejected");
     for args in ["--circles 1x5", "--circles 7x5 --diameter 19mm", "--circles 7x5 --spacing 0.5mm"]
     {
         page.refused(at, &format!("deltille circles -o out {args}"));

@@ -1,4 +1,4 @@
-//! `deltille plan`: boards that are proposed, and whether they are seen from where it says.
+//! `deltille plan`: proposed boards, and whether they are detected at the stated distances.
 
 use crate::common::command::deltille;
 use crate::common::page::Page;
@@ -17,7 +17,7 @@ use deltille_lab::photographs::world::page::PrintedPage;
 use glam::DVec3;
 
 #[test]
-fn boards_are_proposed_and_made() {
+fn proposed_boards_can_be_generated() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
     let mut page = Page::default();
@@ -50,10 +50,10 @@ fn boards_are_proposed_and_made() {
     page.is("plan");
 }
 
-/// A tenth nearer than it says boards are labelled, a tenth farther at most half of them: views by the synthesiser, blurred as
-/// sharp pictures are.
+/// A tenth closer than stated, boards are labelled; a tenth farther away, at most half of them are. The views are
+/// synthetic and blurred like sharp photographs.
 #[test]
-fn boards_are_labelled_as_far_as_is_said() {
+fn boards_are_labelled_up_to_the_stated_distance() {
     let family = Family::shipped("delTag25h7").unwrap();
     let tags = || Some((TagSpec::default(), &family));
     for (kind, tags) in
@@ -79,7 +79,7 @@ fn boards_are_labelled_as_far_as_is_said() {
     }
 }
 
-/// Photographs of a printed board of place codes in which twelve of its tiles or so are whole, and nothing else is.
+/// Images of a printed board of place codes in which about twelve whole tiles are visible and nothing else.
 struct Windows {
     page: PrintedPage,
     studio: Studio,
@@ -89,7 +89,7 @@ struct Windows {
 impl Windows {
     const VIEWS: u64 = 24;
 
-    /// Sides of the picture, in edges of a tile: a square of (4.3 − 1)² edges takes the middles of twelve tiles.
+    /// Side of the image, in tile edges: a square of (4.3 − 1)² edges contains the middles of twelve tiles.
     const SIDE_EDGES: f64 = 4.3;
 
     fn new() -> Self {
@@ -99,7 +99,7 @@ impl Windows {
         Self { page: PrintedPage::new(&board).unwrap(), studio: Studio::new(1), detector }
     }
 
-    /// How many are labelled with cells of such a size, px, in the area that the tilt leaves them.
+    /// Counts the images that are labelled, with cells of `bit_px` px in the area that the tilt leaves them.
     fn labelled(&self, bit_px: f64, tilt_deg: f64) -> usize {
         let upright_px = bit_px / tilt_deg.to_radians().cos().sqrt();
         let edge_px = self.page.edge_mm / self.page.bit_mm * bit_px;
@@ -119,10 +119,10 @@ impl Windows {
     }
 }
 
-/// The same of patches of boards with place codes: a tenth nearer than it says half of them are labelled and more, a tenth
-/// farther half of them at most.
+/// The same for patches of boards with place codes: a tenth closer than stated, at least half of them are labelled; a
+/// tenth farther away, at most half.
 #[test]
-fn patches_of_dense_boards_are_labelled_as_far_as_is_said() {
+fn patches_of_dense_boards_are_labelled_up_to_the_stated_distance() {
     let family = Family::shipped("dense9").unwrap();
     let situation = Situation {
         focal_px: 700.0,
@@ -145,8 +145,8 @@ fn patches_of_dense_boards_are_labelled_as_far_as_is_said() {
     }
 }
 
-/// Prints how many are labelled, by the size of a cell and the tilt, for docs/benchmarks.md:
-/// `cargo test --release --test it -- --ignored --nocapture photographs_of_patches`.
+/// Prints how many patches are labelled, by cell size and tilt, for docs/benchmarks.md: `cargo test --release
+/// --test it -- --ignored --nocapture photographs_of_patches`.
 #[test]
 #[ignore = "prints a table"]
 fn photographs_of_patches() {
@@ -159,7 +159,7 @@ fn photographs_of_patches() {
     }
 }
 
-/// How many of six views from a distance, tilted to six sides, are labelled.
+/// Counts how many of six views at a distance, tilted in six directions, are labelled.
 fn labelled(target: &Target, tilt_deg: f64, distance: f64) -> usize {
     let detector = Detector::for_target(target, DetectorConfig::default()).unwrap();
     let scene = scene_of_target(target).unwrap();

@@ -1,4 +1,4 @@
-//! What a target can have beside its faces: a back, the ids of its tags, a page to take along, a template.
+//! Additions to the faces of a target: a back, printed tag ids, a guide page, a template.
 
 use std::path::Path;
 
@@ -11,9 +11,9 @@ fn read(path: &Path) -> Printing {
     Printing::from_json(&std::fs::read_to_string(path).unwrap()).unwrap()
 }
 
-/// The pages are proved with the ids in their white tiles, and the proof sees when one of them is another.
+/// Pages with ids in their white tiles are verified, and a wrong id is found.
 #[test]
-fn ids_in_small_type_are_proved_with_their_tiles() {
+fn ids_in_small_type_are_verified_with_their_tiles() {
     let folder = tempfile::tempdir().unwrap();
     let args = "board --rows 6 --cols 7 --tag-ids --guide-page --svg --pdf";
     deltille(folder.path(), args).success();
@@ -30,7 +30,7 @@ fn ids_in_small_type_are_proved_with_their_tiles() {
 }
 
 #[test]
-fn nets_have_ids_and_a_guide_too_and_are_folded_all_the_same() {
+fn nets_with_ids_and_a_guide_are_still_folded() {
     let folder = tempfile::tempdir().unwrap();
     let args = "octahedron --edge 110mm --tiles 7 --pdf --tag-ids --guide-page";
     let said = deltille(folder.path(), args).success();
@@ -41,8 +41,8 @@ fn nets_have_ids_and_a_guide_too_and_are_folded_all_the_same() {
     assert!(guide.placements.is_empty() && nets.iter().all(|net| !net.placements.is_empty()));
 }
 
-/// The corners of the back lie behind the front, seen from there in the same order, on pages that fit each other when they are
-/// printed on both sides of a sheet.
+/// The corners of the back lie behind those of the front, in the same order seen from the front, on pages that match
+/// when printed on both sides of a sheet.
 #[test]
 fn two_sides_of_a_board_lie_behind_each_other() {
     let folder = tempfile::tempdir().unwrap();
@@ -66,7 +66,7 @@ fn two_sides_of_a_board_lie_behind_each_other() {
     assert_eq!(target, read(&folder.path().join("again/board.json")));
 }
 
-/// From behind the back is seen, and both views tell the same place of the target.
+/// From behind, the back is visible; both views give the same position of the target.
 #[test]
 fn a_board_with_two_sides_is_one_target_for_poses() {
     let folder = tempfile::tempdir().unwrap();
@@ -92,7 +92,7 @@ fn a_board_with_two_sides_is_one_target_for_poses() {
 }
 
 #[test]
-fn a_template_makes_a_solid_again_and_options_win_over_it() {
+fn a_template_reproduces_a_solid_and_options_override_it() {
     let folder = tempfile::tempdir().unwrap();
     let args = "tetrahedron --edge 12cm --tiles 7 --family d25h7 --per-face --pdf --skeleton --wall 5mm --name t \
                 --save-template t.toml";
@@ -109,8 +109,8 @@ fn a_template_makes_a_solid_again_and_options_win_over_it() {
     assert!(said.contains("was made for `tetrahedron`, not `octahedron`"), "{said}");
 }
 
-/// A logo goes with every kind of target, is proved in every format, and its file draws it again; the board is the same
-/// without it.
+/// Every kind of target can carry a logo. It is verified in every format and drawn from the target file; the board is
+/// the same without it.
 #[test]
 fn every_kind_of_target_carries_a_logo() {
     let folder = tempfile::tempdir().unwrap();
@@ -145,7 +145,7 @@ fn every_kind_of_target_carries_a_logo() {
 }
 
 #[test]
-fn a_template_keeps_the_logo_and_what_cannot_be_printed_is_refused_in_a_line() {
+fn a_template_keeps_the_logo_and_unprintable_logos_are_rejected_in_one_line() {
     let folder = tempfile::tempdir().unwrap();
     let write = |name: &str, body: &str| {
         let svg = format!(r#"<svg xmlns="http://www.w3.org/2000/svg">{body}</svg>"#);

@@ -1,4 +1,4 @@
-//! `deltag sheet`: tags to true scale, read back from what was written.
+//! `deltag sheet`: tags at true scale, read back from the written files.
 
 use crate::common::folder::names;
 use crate::common::page::Page;
@@ -30,7 +30,7 @@ fn sheets_are_written_in_every_format_and_verified() {
     }
     let text = std::fs::read_to_string(at.join("all-1/all-1.svg")).unwrap();
     assert!(text.contains("fingerprint"), "the fingerprint is in the metadata");
-    page.title("What cannot be made");
+    page.title("Rejected");
     for args in [
         "d36h9",
         "d16h5 --edge 1mm",
@@ -50,7 +50,7 @@ fn sheets_are_written_in_every_format_and_verified() {
     page.is("deltag-sheet");
 }
 
-/// A sheet of four tags, after an edit of its tags' codes or of its SVG.
+/// Returns the verdict on a sheet of four tags after an edit of its tag codes or of its SVG.
 fn verdict(ids: &[u32], edit: impl Fn(&str) -> String) -> deltille::verify::Verdict {
     let family = Family::shipped("delTag25h7").unwrap();
     let build = |ids: &[u32]| {
@@ -68,7 +68,7 @@ fn verdict(ids: &[u32], edit: impl Fn(&str) -> String) -> deltille::verify::Verd
 }
 
 #[test]
-fn a_wrong_sheet_is_refused_with_the_reason() {
+fn a_wrong_sheet_is_rejected_with_the_reason() {
     let same = str::to_owned;
     assert!(verdict(&[5, 6, 7, 8], same).passed);
 

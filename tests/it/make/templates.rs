@@ -1,5 +1,5 @@
-//! Templates remember all that is said of the product: whatever option is given, the template that is saved makes the
-//! same files without it.
+//! Templates record everything that determines the product: for every option, the saved template reproduces the same
+//! files without it.
 
 use std::collections::BTreeSet;
 use std::path::Path;
@@ -9,7 +9,7 @@ use crate::common::folder::names;
 
 use super::holes::holed;
 
-/// Options that say where files go, what is read and how it is told: they are of a run, not of a target.
+/// Options about output locations, inputs and reporting: they belong to a run, not to a target.
 const OF_A_RUN: [&str; 16] = [
     "template",
     "save-template",
@@ -29,7 +29,7 @@ const OF_A_RUN: [&str; 16] = [
     "max-seconds",
 ];
 
-/// The options of a command, as its help shows them.
+/// Returns the options of a command, as shown in its help.
 fn options(command: &str) -> BTreeSet<String> {
     let folder = tempfile::tempdir().unwrap();
     let said = deltille(folder.path(), &format!("{command} --help")).success();
@@ -42,7 +42,7 @@ fn options(command: &str) -> BTreeSet<String> {
         let is_option = line.len() > name.len() || said.contains(&format!(", --{name}"));
         is_option.then(|| name[..end.unwrap_or(name.len())].to_owned())
     };
-    // What a help says of an option may go on with the name of another one, farther right.
+    // The help text of an option may continue with the name of another option, farther to the right.
     let is_shown = |line: &&str| {
         let name = line.trim_start();
         name.starts_with('-') && (1..=6).contains(&(line.len() - name.len()))
@@ -50,7 +50,7 @@ fn options(command: &str) -> BTreeSet<String> {
     said.lines().filter(is_shown).filter_map(option).collect()
 }
 
-/// Makes the target of each case, and again of its template; says which options were given.
+/// Generates the target of each case, and again from its template. Returns the options that were given.
 fn made_twice(command: &str, cases: &[&str]) -> BTreeSet<String> {
     let mut given = BTreeSet::new();
     for case in cases {
@@ -86,7 +86,7 @@ const LOGO: &str =
 const PRISM: &str = "v 0 0 0\nv 120 0 0\nv 60 103.923048454 0\nv 0 0 150\nv 120 0 150\nv 60 103.923048454 150\n\
                      f 1 3 2\nf 4 5 6\nf 1 2 5 4\nf 2 3 6 5\nf 3 1 4 6\n";
 
-/// The cases give every option that the command has.
+/// Checks that the cases give every option of the command.
 fn are_all(command: &str, given: &BTreeSet<String>) {
     let of_run: BTreeSet<String> = OF_A_RUN.map(str::to_owned).into();
     let forgotten: Vec<_> = options(command)
@@ -147,7 +147,7 @@ fn every_option_of_a_solid_is_in_its_template() {
 }
 
 #[test]
-fn options_win_over_what_a_template_says_of_meshes_lasers_and_inks() {
+fn options_override_the_meshes_lasers_and_inks_of_a_template() {
     let folder = tempfile::tempdir().unwrap();
     let made = |args: &str, files: &[&str]| {
         deltille(folder.path(), &format!("{args} -o made --no-verify")).success();
@@ -158,7 +158,7 @@ fn options_win_over_what_a_template_says_of_meshes_lasers_and_inks() {
     let saved = ["board-laser.dxf", "board.glb", "board.json", "board.pdf"];
     made(&format!("{all} --save-template t.toml"), &saved);
     made("board --template t.toml", &saved);
-    // Pages without spot colours, another size of the texture, another format of the drawing, another thickness.
+    // Pages without spot colours, a different texture size, drawing format and thickness.
     let other = "board --template t.toml --svg --texture 900 --laser svg --two-sided 4mm";
     made(other, &["board-1.svg", "board-2.svg", "board-laser.svg", "board.glb", "board.json"]);
 
@@ -195,10 +195,10 @@ fn options_win_over_what_a_template_says_of_meshes_lasers_and_inks() {
     }
 }
 
-/// Which tags there are is said as a whole: options replace what a template says of it, and what they do not replace must
-/// go with them.
+/// The tags are specified as a whole: options replace what a template says about them, and must be compatible with
+/// what remains.
 #[test]
-fn tags_that_are_given_replace_those_of_a_template() {
+fn given_tags_replace_those_of_a_template() {
     let folder = tempfile::tempdir().unwrap();
     let (tagged, bare, dense) =
         ("family = \"d36h9\"\ntag-spacing = 2\n", "untagged = true\n", "dense = true\n");

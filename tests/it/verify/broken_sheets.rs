@@ -1,4 +1,4 @@
-//! Sheets broken on purpose: each must fail verification, and for the right reason.
+//! Sheets with deliberate faults: each must fail verification, and for the right reason.
 
 use std::path::PathBuf;
 
@@ -85,20 +85,20 @@ impl Board {
         Verifier::new(&self.target).unwrap().verify_path(&path).unwrap()
     }
 
-    /// The first tag's tile.
+    /// Returns the position of the tile of a tag.
     fn tag(&self, index: usize) -> (i32, i32) {
         let tag = self.target.target.panels[0].tags[index];
         (tag.row, tag.col)
     }
 }
 
-/// The shape of a tile.
+/// Returns the shape of a tile.
 fn tile(artwork: &mut Artwork, (row, col): (i32, i32)) -> &mut Shape {
     let is_it = |shape: &&mut Shape| matches!(shape.part, Part::Tile { row: r, col: c, .. } if (r, c) == (row, col));
     artwork.sheets[0].shapes.iter_mut().find(is_it).expect("the tile is drawn")
 }
 
-/// Exchanges black and white in one cell: with the even-odd rule a loop more toggles its inside.
+/// Swaps black and white in one cell: under the even-odd rule, an additional loop toggles its inside.
 fn flip(board: &Board, artwork: &mut Artwork, at: (i32, i32), bit: u32) {
     let (panel, placement) = (&board.target.target.panels[0], board.target.sheets[0].placements[0]);
     assert_eq!(placement.angle_rad, 0.0);
@@ -209,7 +209,7 @@ fn a_scale_is_named_with_its_value() {
 }
 
 #[test]
-fn stretching_turning_and_shifting_are_told_apart() {
+fn stretching_rotation_and_shift_are_distinguished() {
     let board = board(spec());
     let changes = [
         (
@@ -271,7 +271,7 @@ fn a_short_check_bar_is_measured() {
         let (stated, found) = verdict.sheets[0].check_bars_mm[0];
         assert!((stated - length).abs() < 1e-9);
         let off = found.unwrap() - (length - 0.1);
-        // The renderers draw either end to within a 32nd of a pixel.
+        // The renderers draw each end to within a 32nd of a pixel.
         assert!(off.abs() < 2.0 / 32.0 * 25.4 / DPI, "{off}: {verdict}");
     }
     let mut none = board.artwork();
@@ -281,7 +281,7 @@ fn a_short_check_bar_is_measured() {
 }
 
 #[test]
-fn another_page_size_or_number_is_named() {
+fn a_wrong_page_size_or_page_count_is_named() {
     let board = board(spec());
     let mut artwork = board.artwork();
     artwork.sheets[0].width_mm += 0.2;
@@ -298,13 +298,13 @@ fn another_page_size_or_number_is_named() {
 fn dirt_and_holes_in_tiles_are_found() {
     let board = board(spec());
     let mut artwork = board.artwork();
-    // A hairline of 0.1 mm across a black tile, as a seam between two halves would show.
+    // A hairline of 0.1 mm across a black tile, like a seam between two halves.
     let shape = tile(&mut artwork, (1, 3));
     let bounds = kurbo::Shape::bounding_box(&shape.path);
     let (x, y) = bounds.center().into();
     let seam = kurbo::Rect::new(x - 4.0, y - 0.05, x + 4.0, y + 0.05);
     shape.path.extend(kurbo::Shape::path_elements(&seam, 0.1));
-    // A spot of half a millimetre in the white tile beside it.
+    // A spot of half a millimetre in the adjacent white tile.
     let spot = kurbo::Rect::new(bounds.x1 - 0.25, y - 0.25, bounds.x1 + 0.25, y + 0.25);
     let path = kurbo::Shape::to_path(&spot, 0.1);
     artwork.sheets[0].shapes.push(Shape {
@@ -350,7 +350,7 @@ fn words_erased_or_altered_and_spots_outside_the_board_are_found() {
     }
 }
 
-/// Verifies a picture of the sheet whose grey values were changed.
+/// Verifies an image of the sheet with changed grey values.
 fn verify_toned(board: &Board, tone: impl Fn(u8) -> u8) -> Verdict {
     let folder = TempDir::new().unwrap();
     let path = folder.path().join("b.png");
@@ -371,7 +371,7 @@ fn verify_toned(board: &Board, tone: impl Fn(u8) -> u8) -> Verdict {
 }
 
 #[test]
-fn wrong_tones_and_other_boards_are_called_that() {
+fn wrong_tones_and_other_boards_are_named() {
     let whole = board(spec());
     let is = |kind| json!({ "kind": kind, "panel": 3 });
     assert_found(&verify_toned(&whole, |v| 255 - v), [is("inverted")]);

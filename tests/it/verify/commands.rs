@@ -1,4 +1,4 @@
-//! `deltille verify` as a user meets it.
+//! `deltille verify` from the user's point of view.
 
 use std::fs;
 use std::path::Path;
@@ -8,7 +8,7 @@ use crate::common::page::Page;
 use serde_json::Value;
 use tempfile::TempDir;
 
-/// A folder with a small board in every format.
+/// Creates a folder with a small board in every format.
 fn board() -> TempDir {
     let folder = TempDir::new().unwrap();
     let args = "board --rows 3 --cols 4 --edge 20mm --name b --pdf --svg --png --dsc";
@@ -16,7 +16,7 @@ fn board() -> TempDir {
     folder
 }
 
-/// A text file with something in it replaced.
+/// Replaces part of a text file.
 fn edit(path: &Path, from: &str, to: &str) {
     let text = fs::read_to_string(path).unwrap();
     let edited = text.replacen(from, to, 1);
@@ -25,7 +25,7 @@ fn edit(path: &Path, from: &str, to: &str) {
 }
 
 #[test]
-fn a_damaged_usd_is_told_by_its_line() {
+fn a_finding_names_the_damaged_line_of_a_usd() {
     let folder = TempDir::new().unwrap();
     let at = folder.path();
     deltille(at, "board --rows 3 --cols 4 --name b --usd --no-verify").success();
@@ -37,14 +37,17 @@ fn a_damaged_usd_is_told_by_its_line() {
     };
     edit(&usd, "upAxis", "upaxis");
     let said = verdict();
-    assert!(said.contains("line 6: `upaxis") && said.contains("make it again"), "{said}");
+    assert!(said.contains("line 6: `upaxis") && said.contains("generate it again"), "{said}");
     fs::write(&usd, whole.lines().take(9).collect::<Vec<_>>().join("\n")).unwrap();
     let said = verdict();
-    assert!(said.contains("line 10: the file ends") && said.contains("make it again"), "{said}");
+    assert!(
+        said.contains("line 10: the file ends") && said.contains("generate it again"),
+        "{said}"
+    );
 }
 
 #[test]
-fn what_verify_says() {
+fn verify_reports_match_the_snapshot() {
     let mut page = Page::default();
     let verify = |page: &mut Page, at: &Path, args: &str, code: i32| -> Value {
         let output = page.run(at, &format!("deltille verify {args} --report r.json"));
@@ -61,7 +64,7 @@ fn what_verify_says() {
     );
     assert_eq!(report["artifacts"][0]["sheets"][0]["corners_found"], 12);
 
-    page.title("A tile is gone");
+    page.title("A tile is missing");
     let text = fs::read_to_string(at.join("b.svg")).unwrap();
     let tile = text.lines().find(|line| line.contains("id=\"tile-0-r1-c1\"")).unwrap();
     edit(&at.join("b.svg"), tile, "");
@@ -74,7 +77,7 @@ fn what_verify_says() {
     assert!(kinds(0, "/sheets/0/findings").contains(&"tile_colour"), "{report}");
     assert_eq!(kinds(1, "/sheets/0/findings"), [""; 0]);
 
-    page.title("Not every viewer shows it alike, and another tag is listed");
+    page.title("A construct that viewers may render differently, and a wrong tag in the list");
     let folder = board();
     let at = folder.path();
     let hidden = "<style>@media print { * { display: none } }</style><title>";
@@ -116,10 +119,10 @@ fn what_verify_says() {
     let args = "board --rows 3 --cols 4 --edge 20mm --boards 3 --name b --svg --no-verify";
     deltille(at, args).success();
     verify(&mut page, at, "b.json", 0);
-    page.title("One too many");
+    page.title("One page too many");
     fs::write(at.join("b-4.svg"), "").unwrap();
     verify(&mut page, at, "b.json", 0);
-    page.title("One by itself, and two without the third");
+    page.title("One page alone, and two without the third");
     verify(&mut page, at, "b.json b-2.svg", 0);
     verify(&mut page, at, "b.json b-1.svg b-3.svg", 1);
     page.title("One is missing, then two");
@@ -128,9 +131,7 @@ fn what_verify_says() {
     fs::remove_file(at.join("b-3.svg")).unwrap();
     verify(&mut page, at, "b.json", 1);
 
-    page.title(
-        "A net without a page, a page that is empty, and a file that is none, do not end the run",
-    );
+    page.title("A missing page of a net, an empty page and a missing file do not end the run");
     let folder = TempDir::new().unwrap();
     let at = folder.path();
     let args = "tetrahedron --edge 90mm --paper A5 --name t --svg --stl --no-verify";

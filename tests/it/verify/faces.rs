@@ -1,4 +1,4 @@
-//! Every texel that a mesh shows is compared, to the last one at the edges of its faces.
+//! Every texel that a mesh shows is compared, including the last one at the edges of its faces.
 
 use std::collections::BTreeMap;
 
@@ -13,7 +13,7 @@ use image::{GrayImage, Luma};
 
 use crate::verify::damaged::{Damage, glb, png};
 
-/// Paints on a picture, and keeps the rest of the file.
+/// Paints on an image and keeps the rest of the file.
 fn with_pixels(paint: impl Fn(&mut GrayImage) + 'static) -> Damage {
     png::pixels(move |mut picture| {
         paint(&mut picture);
@@ -32,7 +32,7 @@ impl Mesh {
         let target = Printing::new("m", spec).unwrap();
         let mut making = Making::default();
         making.mesh.textures = textures;
-        // Of MuJoCo, which takes parts of it, too.
+        // For MuJoCo, which also uses parts of it.
         let mut files = make(&target, What::Mjcf, making).unwrap();
         for what in [What::Sdf, What::Urdf, What::Usd, What::Gltf] {
             for (name, bytes) in make(&target, what, making).unwrap() {
@@ -51,7 +51,7 @@ impl Mesh {
         verifier.verify(name, &files).unwrap().passed
     }
 
-    /// The files with a changed texture.
+    /// Returns the files with a changed texture.
     fn painted(
         &self,
         texture: &str,
@@ -64,8 +64,8 @@ impl Mesh {
         self.files.iter().map(change).collect()
     }
 
-    /// For each edge between a face and what is beside it on a texture: the texture, the middle of the edge and the way
-    /// into the face, texels.
+    /// Returns, for each edge between a face and its surroundings on a texture: the texture, the middle of the edge,
+    /// and the direction into the face, texels.
     fn edges(&self) -> Vec<(String, DVec2, DVec2)> {
         let text = |end: &str| {
             let file = self.files.iter().find(|(name, _)| name.ends_with(end)).unwrap();
@@ -140,7 +140,7 @@ fn solid(inverted: bool) -> TargetSpec {
 
 #[test]
 fn a_wrong_texel_at_any_edge_of_a_face_is_found() {
-    // The field of an inverted plate ends with its face: a texel that its edge crosses is grey.
+    // The field of an inverted plate ends with its face, and texels crossed by its edge are grey.
     let cases = [
         (board(|_| {}), 1, 0.6),
         (board(|spec| spec.inverted = true), 1, 2.5),

@@ -1,4 +1,4 @@
-//! Artifacts that were never on disk: made, compared and damaged as bytes.
+//! Artifacts that are generated, compared and damaged as bytes, without files on disk.
 
 use deltille::artwork;
 use deltille::export::artifacts::{self, Making, What};
@@ -31,7 +31,7 @@ fn icosahedron() -> SolidSpec {
     SolidSpec { edge_mm: 60.0, tiles: 7, margin_mm: 4.0, ..SolidSpec::new(SolidShape::Icosahedron) }
 }
 
-/// The pages of a target, one by one.
+/// Returns the pages of a target as separate files.
 fn pages(target: &Printing) -> Vec<Artifact> {
     let artwork = target.draw().unwrap();
     let count = artwork.sheets.len();
@@ -42,7 +42,7 @@ fn pages(target: &Printing) -> Vec<Artifact> {
     (0..count).map(page).collect()
 }
 
-/// What every target has.
+/// Returns the artifacts that every target has.
 fn drawn(target: &Printing) -> Vec<Artifact> {
     let artwork = target.draw().unwrap();
     let named = |extension: &str| format!("{}.{extension}", target.target.name);
@@ -52,14 +52,14 @@ fn drawn(target: &Printing) -> Vec<Artifact> {
     files
 }
 
-/// A board in its four formats.
+/// Returns a board in its four formats.
 fn board_files(target: &Printing) -> Vec<Artifact> {
     let artwork = target.draw().unwrap();
     let picture = png::to_bytes(&artwork.sheets[0], &artwork.title, DPI).unwrap();
     [drawn(target), vec![Artifact::new("b.png", picture)]].concat()
 }
 
-/// A solid in all its formats.
+/// Returns a solid in all its formats.
 fn solid_files(target: &Printing, spec: &SolidSpec) -> Vec<Artifact> {
     let mesh = TexturedMesh::new(&target.target, Meshing::default()).unwrap();
     let body = stl::to_bytes("i", &spec.polyhedron().triangles_mm());
@@ -76,20 +76,20 @@ fn solid_files(target: &Printing, spec: &SolidSpec) -> Vec<Artifact> {
     [drawn(target), more.to_vec()].concat()
 }
 
-/// The same files with other bytes in one.
+/// Returns the files, with changed bytes in one of them.
 fn changed(files: &[Artifact], name: &str, change: impl Fn(&mut Vec<u8>)) -> Vec<Artifact> {
     let change = |file: &Artifact| {
         let mut bytes = file.bytes().to_vec();
         if file.name() == name {
             change(&mut bytes);
-            assert_ne!(bytes, file.bytes(), "{name} is as it was");
+            assert_ne!(bytes, file.bytes(), "{name} is unchanged");
         }
         Artifact::new(file.name(), bytes)
     };
     files.iter().map(change).collect()
 }
 
-/// Replaces the first of some bytes.
+/// Replaces the first occurrence of some bytes.
 fn replace<'a>(from: &'a str, to: &'a str) -> impl Fn(&mut Vec<u8>) + 'a {
     move |bytes| {
         let mut windows = bytes.windows(from.len());
@@ -110,7 +110,7 @@ fn assert_told(verdict: &Verdict, said: &str) {
 }
 
 #[test]
-fn a_board_is_proved_in_memory_and_every_change_is_found() {
+fn a_board_is_verified_in_memory_and_every_change_is_found() {
     let target = board();
     let files = board_files(&target);
     for file in &files {
@@ -142,7 +142,7 @@ fn a_board_is_proved_in_memory_and_every_change_is_found() {
 }
 
 #[test]
-fn a_solid_is_proved_in_memory_with_the_files_that_belong_together() {
+fn a_solid_is_verified_in_memory_with_the_files_that_belong_together() {
     let spec = icosahedron();
     let target = build("i", TargetSpec::Solid(spec.clone()), PaperSpec::default());
     let files = solid_files(&target, &spec);
@@ -154,12 +154,12 @@ fn a_solid_is_proved_in_memory_with_the_files_that_belong_together() {
     let part = verify(&target, "i.mtl", &files);
     assert!(matches!(part, Err(VerifyError::PartOf { .. })), "{part:?}");
 
-    // What an artifact needs must be given.
+    // All files of an artifact must be given.
     for (name, without) in [("i.obj", "i.mtl"), ("i.obj", "i-texture.png"), ("i.stl", "i.stl")] {
         let rest: Vec<Artifact> =
             files.iter().filter(|file| file.name() != without).cloned().collect();
         let error = verify(&target, name, &rest).unwrap_err();
-        assert_eq!(error.to_string(), format!("{without}: not among the files that are given"));
+        assert_eq!(error.to_string(), format!("{without}: not among the given files"));
     }
     for (name, part, from, to, said) in [
         ("i.obj", "i.obj", "\nvn 0", "\nvn 1", "normals"),
@@ -174,9 +174,9 @@ fn a_solid_is_proved_in_memory_with_the_files_that_belong_together() {
     assert_told(&compare(&target, "i.stl", &flipped), "FAILED");
 }
 
-/// Each face must have its own of several textures, in every format.
+/// Each face must have the right one of several textures, in every format.
 #[test]
-fn a_solid_with_several_textures_is_proved_in_memory() {
+fn a_solid_with_several_textures_is_verified_in_memory() {
     let spec = SolidSpec { tiles: 6, ..SolidSpec::new(SolidShape::Tetrahedron) };
     let target = build("i", TargetSpec::Solid(spec), PaperSpec::default());
     let mut making = Making::default();
@@ -193,7 +193,7 @@ fn a_solid_with_several_textures_is_proved_in_memory() {
             files.into_iter().map(|(name, bytes)| Artifact::new(name, bytes)).collect();
         let verdict = compare(&target, name, &files);
         assert!(verdict.passed, "{verdict}");
-        // Textures are counted together: none has more than half a megapixel.
+        // The limit applies to all textures together: none has more than half a megapixel.
         let verifier = Verifier::new(&target).unwrap();
         let mut limits = Limits::default();
         limits.max_pixels = 500_000;
@@ -202,9 +202,9 @@ fn a_solid_with_several_textures_is_proved_in_memory() {
     }
 }
 
-/// The words on the sheets of a net are data in its description: a print of others is told by them.
+/// The texts on the sheets of a net are part of its description, so a print with other texts differs from it.
 #[test]
-fn labels_of_a_net_in_memory_are_compared_by_what_they_say() {
+fn labels_of_a_net_in_memory_are_compared_by_their_text() {
     let paper = PaperSpec { size: Some("A4".parse().unwrap()), ..PaperSpec::default() };
     let target = build("i", TargetSpec::Solid(icosahedron()), paper);
     let whole = pages(&target);
@@ -212,7 +212,7 @@ fn labels_of_a_net_in_memory_are_compared_by_what_they_say() {
     let renumbered = Printing::from_json(&renumbered).unwrap();
     let name = whole[0].name();
     assert_told(&compare(&target, name, &pages(&renumbered)), "differs from the description");
-    assert_told(&compare(&renumbered, name, &pages(&renumbered)), "instead of face 3");
+    assert_told(&compare(&renumbered, name, &pages(&renumbered)), "instead of face number 3");
     assert_told(&compare(&target, name, &whole[..1]), "i-2.svg is missing");
     let verifier = || Verifier::new(&target).unwrap();
     let guarded = verifier().guarded_by(Guard::Timed).verify(name, &whole).unwrap();

@@ -1,6 +1,6 @@
-//! Mutations of the grammar of text formats: none passes.
+//! Mutations of the grammar of text formats: none may pass.
 //!
-//! `tests/independent/mutants.py` asks other programs about what does pass.
+//! `tests/independent/mutants.py` checks with other programs what does pass.
 
 use deltille::export::artifacts::{Making, What, make};
 use deltille::export::dsc::Dialect;
@@ -12,16 +12,16 @@ use deltille::verify::{Artifact, Verifier};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-/// Mutants of each file.
+/// Number of mutants of each file.
 const MUTANTS: usize = 40;
 
-/// Characters that the grammars are made of. A DXF has none of them but in its comment.
+/// Characters of the grammars. A DXF contains them only in its comment.
 const STRUCTURE: &[u8] = b"()[]{}<>\"',=/:#";
 
-/// The bytes with one character of their grammar deleted, doubled, moved or exchanged for another.
+/// Returns the bytes with one grammar character deleted, doubled, moved or replaced by another.
 fn mutant(bytes: &[u8], random: &mut ChaCha8Rng) -> (String, Vec<u8>) {
     let marks: Vec<usize> = (0..bytes.len()).filter(|&at| STRUCTURE.contains(&bytes[at])).collect();
-    // Those at the beginning and the end, and any between, where most are in lists of numbers.
+    // Those at the beginning and end, and any in between, which mostly belong to lists of numbers.
     let at = match random.random_range(0..3) {
         0 => marks[random.random_range(0..marks.len().min(60))],
         1 => marks[marks.len() - 1 - random.random_range(0..marks.len().min(60))],
@@ -42,7 +42,7 @@ fn mutant(bytes: &[u8], random: &mut ChaCha8Rng) -> (String, Vec<u8>) {
 }
 
 #[test]
-fn what_breaks_a_grammar_is_refused() {
+fn files_that_break_a_grammar_are_rejected() {
     let family = Family::shipped("delTag25h7").unwrap();
     let spec = TargetSpec::Board(BoardSpec::new(GridKind::Deltille, 4, 5, 20.0));
     let target = Printing::build("g", &spec, Some(&family), Some(&PaperSpec::default())).unwrap();

@@ -1,8 +1,10 @@
-//! Verification of two bodies to print, as 3MF: both closed, the black one inlaid into the white one, and the surface that
-//! they have in common compared like a printed page, face by face; a skeleton is one body, see [`super::shape`].
+//! Verification of two bodies for 3D printing, as 3MF. Both must be closed, with the black one inlaid in the white
+//! one; their common surface is compared like a printed page, face by face. A skeleton is a single body, see
+//! [`super::shape`].
 //!
-//! Vertices lie on a face, below it on the floor of the inlay, or on the back of a plate; triangles are level or upright.
-//! So the outline that is seen on the surface is that of the bodies all the way down, and volumes follow from areas.
+//! Vertices lie on a face, below it on the floor of the inlay, or on the back of a plate; triangles are level or
+//! upright. The outline visible on the surface is therefore the outline of the bodies at every depth, and volumes
+//! follow from areas.
 
 use std::collections::BTreeSet;
 use std::path::Path;
@@ -33,13 +35,13 @@ use deltille_files::export::inlay::Body;
 use deltille_files::export::threemf;
 use deltille_layout::SheetLayout;
 
-/// Tolerance of coordinates, mm: they are written as decimals, with nine digits after the point.
+/// Tolerance of coordinates, mm: they are written as decimals with nine digits after the point.
 const SLACK_MM: f64 = 1e-5;
 
 /// Relative tolerance of areas and volumes.
 const RELATIVE_SLACK: f64 = 1e-6;
 
-/// Part of a pixel that both bodies or neither may cover: a thousandth of a millimetre along its side.
+/// Largest fraction of a pixel that both bodies, or neither, may cover: a thousandth of a millimetre along its side.
 const MOST_BESIDE: f32 = 0.01;
 
 type Triangle = [DVec3; 3];
@@ -47,15 +49,16 @@ type Triangle = [DVec3; 3];
 /// A face with a board.
 struct Face<'a> {
     panel: &'a Panel,
-    /// Counter-clockwise in the panel frame, mm.
+    /// Outline of the face, counter-clockwise in the panel frame, mm.
     outline: Vec<DVec2>,
 }
 
-/// Reads the 3MF of a board, a solid or a skeleton, as it is named, and compares it with the target.
+/// Reads the 3MF of a board, a solid or a skeleton, as its name says, and compares it with the target.
 ///
 /// # Errors
 ///
-/// The file cannot be read, or the target has no such bodies. Deviations are findings of the verdict.
+/// Returns an error if the file cannot be read or the target does not have these bodies. Deviations are findings of
+/// the verdict.
 pub(crate) fn verify(
     verifier: &Verifier,
     reader: &Reader,
@@ -127,7 +130,7 @@ fn inlaid(verifier: &Verifier, path: &Path, bodies: &[Body; 2]) -> Result<Verdic
             let problem = problem.map(|problem| MeshFinding::Body { problem }.into());
             let mut sheet = SheetVerdict::new(index, &page, problem.into_iter().collect());
             whole::compare(verifier, &page, &layout, &mut sheet);
-            verifier.tell(done.fetch_add(1, Ordering::Relaxed) + 1, faces.len());
+            verifier.report_progress(done.fetch_add(1, Ordering::Relaxed) + 1, faces.len());
             sheet
         })
         .collect();
@@ -141,7 +144,7 @@ fn triangles_of(body: &Body) -> Vec<Triangle> {
     body.triangles.iter().map(places).collect()
 }
 
-/// The faces of a target that is one board or a solid.
+/// Returns the faces of a target that is one board or a solid.
 fn faces<'a>(verifier: &'a Verifier) -> Option<Vec<Face<'a>>> {
     let panels = &verifier.target().panels;
     match (&verifier.target().spec, panels.as_slice()) {
@@ -162,7 +165,7 @@ fn faces<'a>(verifier: &'a Verifier) -> Option<Vec<Face<'a>>> {
 }
 
 impl Face<'_> {
-    /// Whether a point lies in the outline.
+    /// Whether a point lies within the outline.
     fn is_in(&self, point: DVec2) -> bool {
         let next = self.outline.iter().cycle().skip(1);
         self.outline
@@ -171,7 +174,7 @@ impl Face<'_> {
             .all(|(&from, &to)| (to - from).normalize_or_zero().perp_dot(point - from) >= -SLACK_MM)
     }
 
-    /// The triangles in the face that look outwards, in its frame.
+    /// Returns the triangles of the face that point outwards, in its frame.
     fn front(&self, triangles: &[Triangle]) -> Vec<[DVec2; 3]> {
         let flat =
             triangles.iter().map(|triangle| triangle.map(|v| self.panel.pose.panel_from_target(v)));
@@ -182,7 +185,7 @@ impl Face<'_> {
         fronts.collect()
     }
 
-    /// Whether a triangle lies in this face or below it, at these depths, level or upright, and has an area.
+    /// Whether a triangle lies on this face or below it at one of these depths, is level or upright, and has an area.
     fn has(&self, triangle: &Triangle, depths_mm: &[f64]) -> bool {
         let flat = triangle.map(|v| self.panel.pose.panel_from_target(v));
         let is_near = |v: DVec3| {
@@ -201,7 +204,7 @@ impl Face<'_> {
     }
 }
 
-/// Why a body is not closed: every edge must have one triangle on either side.
+/// Returns why a body is not closed: every edge must have one triangle on either side.
 fn not_closed(body: &Body) -> Option<String> {
     let mut edges = BTreeSet::new();
     for &[a, b, c] in &body.triangles {
@@ -215,7 +218,7 @@ fn not_closed(body: &Body) -> Option<String> {
     is_open.then(|| "the surface is open".to_owned())
 }
 
-/// A triangle that is neither on a face nor a wall or the floor of an inlay.
+/// Returns a triangle that is neither on a face nor a wall or the floor of an inlay.
 fn wrong_shape(
     faces: &[Face],
     triangles: &[Vec<Triangle>; 2],
@@ -237,7 +240,7 @@ fn wrong_shape(
     })
 }
 
-/// Whether the bodies do not fill the faces and the whole together.
+/// Checks that the bodies together fill the faces and the whole.
 fn not_filled(
     verifier: &Verifier,
     faces: &[Face],
@@ -249,7 +252,7 @@ fn not_filled(
         let (found, stated) = (area(white) + area(black), polygon::area(&face.outline));
         if !same(found, stated) {
             let [found, stated] = [found, stated].map(|mm2| mm2 / 1e2);
-            return Some(format!("{found:.2} cm² of the {stated:.2} cm² of a face are there"));
+            return Some(format!("the bodies cover {found:.2} cm² of a face of {stated:.2} cm²"));
         }
     }
     let stated = match (&verifier.target().spec, inlay.plate_mm) {
@@ -264,12 +267,12 @@ fn not_filled(
         .then(|| format!("{white:.2} cm³ white and {black:.2} cm³ black instead of {whole:.2} cm³"))
 }
 
-/// Area of triangles, mm².
+/// Returns the area of triangles, mm².
 fn area(triangles: &[[DVec2; 3]]) -> f64 {
     triangles.iter().map(|corners| polygon::area(corners)).sum()
 }
 
-/// A face as a page, what it should show, and where both bodies or neither of them are.
+/// Returns a face as a page, its expected appearance, and where both bodies or neither of them lie.
 fn surface(
     verifier: &Verifier,
     face: &Face,

@@ -1,9 +1,9 @@
-//! Verification of bodies to print, as STL, and of skeletons as 3MF: a closed surface with its normals outwards and of the
-//! stated shape.
+//! Verification of bodies for 3D printing, as STL, and of skeletons, as 3MF: a closed surface of the stated shape
+//! with its normals outwards.
 //!
-//! A skeleton, which holds a panel on each face, is probed from outside with rays: on the ribs they
-//! must hit the plane of the face, in the seats they must stop deeper by the thickness of a panel,
-//! and through the windows they must pass. Then it is compared triangle by triangle, as the solid is.
+//! A skeleton carries a panel on each face. It is probed from outside with rays, which must hit the plane of the face
+//! on the ribs, stop deeper by the panel thickness in the seats, and pass through the windows. It is then compared
+//! triangle by triangle, as a solid is.
 //!
 //! ```text
 //!      ray   ray      ray    ray
@@ -36,19 +36,19 @@ use deltille_core::targets::{
 };
 use deltille_files::export::{stl, threemf};
 
-/// Tolerance of the distance of a stated unit normal from that of its triangle: vertices are in
-/// single precision, and some triangles are small.
+/// Tolerance of the difference between a stated unit normal and that of its triangle: vertices are in single
+/// precision, and some triangles are small.
 const NORMAL_SLACK: f64 = 1e-3;
 
-/// Tolerance of the ratio of the volumes from 1, as vertices are in single precision.
+/// Tolerance of the ratio of the volumes from 1: vertices are in single precision.
 const VOLUME_SLACK: f64 = 1e-4;
 
-/// Rays start this far above a face, mm, and keep this distance from the lines where ribs, seats and
-/// windows meet, mm: on such a line the depth is not defined.
+/// Rays start this far above a face, mm, and keep this distance from the lines where ribs, seats and windows meet,
+/// mm: the depth is undefined on those lines.
 const ABOVE_MM: f64 = 0.5;
 const BESIDE_MM: f64 = 0.02;
 
-/// Number of triangles nearest to the stated centroid that are compared: some share a centroid.
+/// Number of triangles nearest to the stated centroid to compare: some triangles share a centroid.
 const SAME_MIDDLE: usize = 4;
 
 /// Positions along a side of a face, as fractions of its length, at which rays are sent.
@@ -58,7 +58,8 @@ const PLACES: [f64; 3] = [0.15, 0.5, 0.85];
 ///
 /// # Errors
 ///
-/// The file cannot be read, or the target has no such body. Deviations are findings of the verdict.
+/// Returns an error if the file cannot be read or the target does not have this body. Deviations are findings of the
+/// verdict.
 pub(crate) fn verify(
     verifier: &Verifier,
     reader: &Reader,
@@ -71,11 +72,12 @@ pub(crate) fn verify(
     Ok(compare(verifier, path, &load_stl(reader, path)?, Format::Stl)?.with(refused))
 }
 
-/// Compares the triangles of a solid or of its skeleton, as the file is named, with the target.
+/// Compares the triangles of a solid or of its skeleton, as the file name says, with the target.
 ///
 /// # Errors
 ///
-/// The target is no solid, or the file is named as a skeleton and the target has none. Deviations are findings of the verdict.
+/// Returns an error if the target is not a solid, or if the file is named as a skeleton and the target has none.
+/// Deviations are findings of the verdict.
 pub(super) fn compare(
     verifier: &Verifier,
     path: &Path,
@@ -85,7 +87,7 @@ pub(super) fn compare(
     let unreadable = |problem: &str| DocumentError::unreadable(path, problem);
     let target = verifier.target();
     let TargetSpec::Solid(spec) = &target.spec else {
-        return Err(unreadable("the target is no solid"));
+        return Err(unreadable("the target is not a solid"));
     };
     let artifact = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
     let solid = spec.polyhedron();
@@ -118,7 +120,7 @@ pub(super) fn compare(
         let wrong_seats = skeleton.map_or_else(Vec::new, |(skeleton, spec)| {
             check_seats(facets, &solid, &skeleton, spec, &mut body)
         });
-        // Where a seat is wrong, its triangles would only repeat that.
+        // If a seat is wrong, its triangles would only repeat that finding.
         if wrong_seats.is_empty() {
             check_triangles(facets, &stated, &mut body, &mut findings);
         }
@@ -127,8 +129,8 @@ pub(super) fn compare(
     Ok(Verdict { body: Some(body), ..Verdict::new(path, format, findings) })
 }
 
-/// Findings unless the surface is closed, in one piece and oriented outwards, and the stated normals
-/// are those of the triangles.
+/// Returns findings unless the surface is closed, in one piece and oriented outwards, and the stated normals are
+/// those of the triangles.
 fn check_surface(facets: &[Facet]) -> Vec<Finding> {
     let mut findings = Vec::new();
     let vertices: Vec<DVec3> = facets.iter().flat_map(|facet| facet.vertices_mm).collect();
@@ -140,7 +142,7 @@ fn check_surface(facets: &[Facet]) -> Vec<Finding> {
         Err(error) => Some(error.to_string()),
     };
     findings.extend(problem.map(|problem| MeshFinding::Body { problem }.into()));
-    // NaN compares as false, so it is asked for separately.
+    // NaN compares as false, so check it separately.
     let wrong = facets.iter().filter(|facet| {
         let [a, b, c] = facet.vertices_mm;
         let off = facet.normal.distance((b - a).cross(c - a).normalize_or_zero());
@@ -153,9 +155,8 @@ fn check_surface(facets: &[Facet]) -> Vec<Finding> {
     findings
 }
 
-/// Adds findings unless the file has the stated triangles, mm, and no others; the order of triangles
-/// is free, and so is the vertex with which each begins. A wrong volume is reported as a wrong scale,
-/// as every triangle would only repeat it.
+/// Adds findings unless the file has exactly the stated triangles, mm. Triangles may come in any order and begin with
+/// any vertex. A wrong volume is reported as a wrong scale, which would otherwise be repeated for every triangle.
 fn check_triangles(
     facets: &[Facet],
     stated: &[[DVec3; 3]],
@@ -167,7 +168,7 @@ fn check_triangles(
         let [found, stated] = [body.volume_mm3, volume_mm3].map(|mm3| mm3 / 1e3);
         let scale = (found / stated).cbrt();
         let problem =
-            format!("volume of {found:.1} cm³ instead of {stated:.1} cm³, as of scale {scale:.4}");
+            format!("volume of {found:.1} cm³ instead of {stated:.1} cm³(scale {scale:.4})");
         findings.push(MeshFinding::Body { problem }.into());
         return;
     }
@@ -188,7 +189,7 @@ fn check_triangles(
         if nearest > MESH_TOLERANCE_MM {
             let [x, y, z] = middle(triangle);
             let problem = format!(
-                "triangle {index}, around ({x:.2}, {y:.2}, {z:.2}) mm, is not there; the nearest is off by \
+                "triangle {index}, around ({x:.2}, {y:.2}, {z:.2}) mm, is missing; the nearest is off by \
                  {nearest:.3} mm"
             );
             findings.push(MeshFinding::Body { problem }.into());
@@ -198,8 +199,8 @@ fn check_triangles(
     }
 }
 
-/// Findings about faces whose ribs, seats and windows do not have the stated depths, mm, found by
-/// rays along the inward normal of each face; counts the seats that agree.
+/// Returns findings about faces whose ribs, seats and windows do not have the stated depths, mm, found by rays along
+/// the inward normal of each face. Counts the seats that agree.
 fn check_seats(
     facets: &[Facet],
     solid: &Polyhedron,
@@ -236,8 +237,8 @@ fn check_seats(
                     if off > MESH_TOLERANCE_MM {
                         let below = stated.map_or("open".to_owned(), |mm| format!("{mm:.3} mm"));
                         let problem = format!(
-                            "face {face}: {inset:.2} mm from its edge the skeleton is {found:.3} \
-                             mm below it instead of {below}"
+                            "face {face}: {inset:.2} mm from its edge, the skeleton has a depth of {found:.3} \
+                             mm instead of {below}"
                         );
                         return (face, most, Some(problem));
                     }
@@ -256,8 +257,8 @@ fn check_seats(
     findings
 }
 
-/// Distance along a ray with a unit direction to the first triangle that it hits, mm; infinite where
-/// it hits none.
+/// Returns the distance along a ray with a unit direction to the first triangle that it hits, mm; infinity if it hits
+/// none.
 fn depth(facets: &[Facet], from: DVec3, direction: DVec3) -> f64 {
     let meets = facets.iter().filter_map(|facet| {
         let [a, b, c] = facet.vertices_mm;

@@ -1,17 +1,17 @@
-//! Constructs that are not permitted, collected while a file is inspected.
+//! Collects the constructs that are not allowed while a file is inspected.
 
 use crate::finding::any::{Finding, PageFinding};
 use crate::finding::construct::ConstructFinding;
 
-/// Most findings that are listed for a file.
+/// Maximum number of findings listed for a file.
 const MOST_LISTED: usize = 64;
 
-/// Constructs that are not permitted, collected while a file is inspected.
+/// Constructs that are not allowed, collected while a file is inspected.
 #[derive(Default)]
 pub(super) struct Findings(pub(super) Vec<Finding>);
 
 impl Findings {
-    /// Adds a construct, such as "element <image>", and where it is, such as "line 12".
+    /// Adds a construct, such as "element <image>", with its location, such as "line 12".
     pub(super) fn add(&mut self, place: impl Into<String>, construct: impl Into<String>) {
         if !self.is_full() {
             let (place, construct) = (place.into(), construct.into());
@@ -19,7 +19,7 @@ impl Findings {
         }
     }
 
-    /// Adds a line that is not the one that the program writes.
+    /// Adds a line that differs from the one that the program writes.
     pub(super) fn add_other_line(&mut self, place: String, found: String) {
         if !self.is_full() {
             self.0.push(ConstructFinding::OtherLine { place, found }.into());
@@ -38,7 +38,7 @@ impl Findings {
         }
     }
 
-    /// Adds hidden content unless `holds`; the file is rendered and compared all the same.
+    /// Adds hidden content unless `holds`; the file is still rendered and compared.
     pub(super) fn unseen_unless(
         &mut self,
         holds: bool,
@@ -51,18 +51,17 @@ impl Findings {
         }
     }
 
-    /// Whether the file has a construct that is not permitted, so that it is not rendered.
+    /// Whether the file has a construct that is not allowed, and is therefore not rendered.
     pub(super) fn refuse(&self) -> bool {
         refuse(&self.0)
     }
 
-    /// Whether as many findings are listed as are listed at all; more are dropped.
+    /// Whether the list of findings is full; further findings are dropped.
     pub(super) fn is_full(&self) -> bool {
         self.0.len() >= MOST_LISTED
     }
 
-    /// Adds the findings of a file that belongs to this one, such as a texture, with its name before
-    /// the places.
+    /// Adds the findings of a file that belongs to this one, such as a texture, with its name before the locations.
     pub(super) fn add_of(&mut self, file: &str, other: Findings) {
         for finding in other.0 {
             match finding {
@@ -81,9 +80,8 @@ impl Findings {
     }
 }
 
-/// Whether a file has a construct that not every viewer shows alike, or another line than the program writes, so that it
-/// is not rendered.
-/// Hidden content alone does not prevent that.
+/// Whether a file has a construct that viewers may render differently, or a line other than the program writes, and
+/// is therefore not rendered. Hidden content alone does not prevent rendering.
 pub(crate) fn refuse(findings: &[Finding]) -> bool {
     let refuses = |finding: &Finding| {
         use ConstructFinding::{Construct, OtherLine};

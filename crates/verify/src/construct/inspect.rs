@@ -1,4 +1,4 @@
-//! Which list a file is compared with, by its format.
+//! Selects the list of permitted constructs by the format of a file.
 
 use std::path::Path;
 
@@ -16,13 +16,13 @@ use deltille_files::export::inlay::Body;
 use deltille_files::export::scene;
 use deltille_layout::Printing;
 
-/// Inspects a printed page, a mesh or a body: constructs that are not permitted, texts that are not
-/// those of the target, and the files that belong to it, as an OBJ names them. Returns the findings
-/// and the contents of those files.
+/// Inspects a printed page, a mesh or a body: constructs that are not allowed, texts that are not those of the
+/// target, and the files that belong to it, such as those named in an OBJ. Returns the findings and the contents of
+/// those files.
 ///
 /// # Errors
 ///
-/// A file cannot be read at all, or exceeds the limits.
+/// Returns an error if a file cannot be read or exceeds the limits.
 pub(crate) fn check(
     reader: &Reader,
     path: &Path,
@@ -47,7 +47,7 @@ pub(crate) fn check(
         Format::Sdf => model(&bytes, &scene::sdf(&words.title)),
         Format::Urdf => model(&bytes, &scene::urdf(&words.title)),
         Format::Mjcf => model(&bytes, &scene::mjcf(&words.title, textures_of_mjcf(&bytes))),
-        // Their readers know nothing but what is written.
+        // Their readers parse exactly what the program writes.
         Format::Obj | Format::Usda | Format::ThreeMf | Format::Dsc | Format::Dxf => {
             Ok(Findings::default())
         }
@@ -55,11 +55,12 @@ pub(crate) fn check(
     Ok((found.0, Vec::new()))
 }
 
-/// Inspects a 3MF that should have bodies of these names, and returns the findings, and the bodies unless there are any.
+/// Inspects a 3MF that should have bodies with these names. Returns the findings, and the bodies if there are no
+/// findings.
 ///
 /// # Errors
 ///
-/// The file cannot be read at all, or exceeds the limits.
+/// Returns an error if the file cannot be read or exceeds the limits.
 pub(crate) fn bodies(
     reader: &Reader,
     path: &Path,
@@ -72,12 +73,12 @@ pub(crate) fn bodies(
     Ok((found.0, bodies))
 }
 
-/// Compares what the model for MuJoCo at `path` takes of the OBJ beside it, `mesh`, which was inspected: its textures, and
-/// its parts where there are several.
+/// Checks what the MuJoCo model at `path` uses of the inspected OBJ beside it, `mesh`: its textures, and its parts if
+/// there are several.
 ///
 /// # Errors
 ///
-/// A file cannot be read at all.
+/// Returns an error if a file cannot be read.
 pub(crate) fn check_parts(
     reader: &Reader,
     path: &Path,
@@ -88,12 +89,12 @@ pub(crate) fn check_parts(
     Ok(obj::check_parts(reader, mesh, count, &Words::of(printing))?.0)
 }
 
-/// Number of textures of a model for MuJoCo.
+/// Returns the number of textures of a MuJoCo model.
 fn textures_of_mjcf(bytes: &[u8]) -> usize {
     std::str::from_utf8(bytes).map_or(1, |text| usda::textures_by(text, "<texture "))
 }
 
-/// Inspects a model that puts the mesh of an OBJ in its place and does nothing else.
+/// Inspects a model that only places the mesh of an OBJ.
 fn model(bytes: &[u8], stated: &str) -> Result<Findings, String> {
     let mut found = Findings::default();
     usda::same_lines(text(bytes)?, stated, str::to_owned, &mut found);

@@ -1,16 +1,19 @@
-//! Inspection of the constructs of a file against a list of those that every viewer shows alike.
+//! Inspection of a file against a list of constructs that every viewer renders the same way.
 //!
-//! Comes in: the bytes of a file. Goes out: what in it is not on the list; then it is not rendered.
+//! Input: the bytes of a file. Output: the constructs that are not on the list; a file with such constructs is not
+//! rendered.
 //!
-//! 1. `inspect` chooses the list by the format.
-//! 2. `words` has the texts that a file must carry.
-//! 3. `pages` has the lists of PDF and SVG, `meshes` those of meshes and bodies, `png` that of pages and textures.
-//! 4. `findings` collects what is not on them. `text` and `zlib` read what all formats have in common.
+//! 1. `inspect` selects the list by the format.
+//! 2. `words` contains the texts that a file must carry.
+//! 3. `pages` contains the lists for PDF and SVG, `meshes` those for meshes and bodies, `png` that for pages and
+//!    textures.
+//! 4. `findings` collects the constructs that are not on the lists. `text` and `zlib` read what several formats
+//!    share.
 //!
-//! Rendering a file proves what one program shows. Scripts, animations, rules for print, layers,
-//! blend modes, vertex colours or a second scene make other programs show something else. So each
-//! format has a list of the constructs that its writer here uses and the reader interprets exactly;
-//! anything else is named and refused, known as harmful or not.
+//! A rendered file shows only what one program makes of it. Scripts, animations, print rules, layers, blend modes,
+//! vertex colours or a second scene make other programs show something else. Each format therefore has a list of the
+//! constructs that its writer here uses and the reader interprets exactly; anything else is named and rejected,
+//! whether known to be harmful or not.
 
 pub(super) mod findings;
 pub(super) mod inspect;

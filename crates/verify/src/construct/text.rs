@@ -1,20 +1,20 @@
-//! Words, numbers and names in a text, as all readers take them.
+//! Words, numbers and names in a text, as all readers interpret them.
 
-/// Most characters of a number: readers differ in how many they take.
+/// Maximum number of characters of a number: readers accept different lengths.
 const MOST_DIGITS: usize = 40;
 
-/// The content of a text file.
+/// Returns the content of a text file.
 pub(super) fn text(bytes: &[u8]) -> Result<&str, String> {
     std::str::from_utf8(bytes).map_err(|_| "not a text file in UTF-8".to_owned())
 }
 
-/// The first characters of a text that is quoted in a finding.
+/// Returns the first characters of a text for quotation in a finding.
 pub(super) fn start(text: &str, characters: usize) -> String {
     text.chars().take(characters).collect()
 }
 
-/// A decimal number as all readers take it: digits on both sides of a point, without an exponent or
-/// a plus, and no more of them than any reader has room for.
+/// Parses a decimal number that all readers accept: digits on both sides of a point, without an exponent or plus
+/// sign, and no longer than any reader accepts.
 pub(super) fn decimal(word: &str) -> Option<f64> {
     let digits = |part: &str| !part.is_empty() && part.bytes().all(|byte| byte.is_ascii_digit());
     let size = word.strip_prefix('-').unwrap_or(word);
@@ -23,8 +23,7 @@ pub(super) fn decimal(word: &str) -> Option<f64> {
     plain.then(|| word.parse().ok()).flatten()
 }
 
-/// Whether a name is that of a file in the same folder on every system: without a path, a drive or
-/// control characters.
+/// Whether a name denotes a file in the same folder on every system: it has no path, drive or control characters.
 pub(super) fn is_plain_file_name(name: &str) -> bool {
     let listed = |c: char| !matches!(c, '/' | '\\' | ':') && !c.is_control();
     !name.is_empty() && name != ".." && name.trim() == name && name.chars().all(listed)

@@ -1,4 +1,4 @@
-//! What the texts in a file must say.
+//! The texts that a file must contain.
 
 use serde_json::Value;
 
@@ -6,23 +6,22 @@ use deltille_files::export::mesh::extras;
 use deltille_layout::artwork::{drawn_lines, subject};
 use deltille_layout::{Finish, LineKind, Printing, SheetLayout};
 
-/// What the texts in a file must say about the target: they are read by people and programs that do
-/// not look at the picture.
+/// The texts that a file must contain about the target. People and programs read them without seeing the page.
 pub(super) struct Words {
-    /// Its name.
+    /// Name of the target.
     pub title: String,
-    /// One line on what it is.
+    /// One line that describes the target.
     pub subject: String,
     /// The same facts as JSON, for programs.
     extras: Value,
-    /// How its pages are printed.
+    /// Print finish of its pages.
     pub finish: Finish,
-    /// Number of lines to cut along on each sheet.
+    /// Number of cut lines on each sheet.
     pub cut_lines: Vec<usize>,
 }
 
 impl Words {
-    /// The texts that belong to a target.
+    /// Creates the texts for a target.
     pub(super) fn of(printing: &Printing) -> Self {
         let target = &printing.target;
         let (title, finish) = (target.name.to_string(), printing.finish.clone());
@@ -33,7 +32,7 @@ impl Words {
         Self { title, subject: subject(target), extras: extras(target), finish, cut_lines }
     }
 
-    /// Whether data in a mesh is that of the target; any version of the program may have written it.
+    /// Whether data in a mesh describes the target; any version of the program may have written it.
     pub(super) fn are_extras(&self, found: &Value) -> bool {
         let creator = found["generator"].as_str().is_some_and(is_creator);
         let mut stated = self.extras.clone();
@@ -42,7 +41,7 @@ impl Words {
     }
 }
 
-/// Whether words name this program in any of its versions.
+/// Whether a text names this program, in any version.
 pub(super) fn is_creator(words: &str) -> bool {
     let version = words.strip_prefix("deltille ").unwrap_or_default();
     !version.is_empty() && version.chars().all(|c| c.is_ascii_digit() || c == '.')

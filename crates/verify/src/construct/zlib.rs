@@ -1,14 +1,14 @@
-//! Packed data that end with their checksum, and are no longer than they may be.
+//! Decompression with verified checksum and length.
 
 use flate2::{Decompress, FlushDecompress, Status};
 
-/// Decompresses zlib data block by block and returns its length: `None` unless the stream ends with
-/// the last byte, its checksum is right, and it is no longer than `most`.
+/// Decompresses zlib data block by block and returns the decompressed length. Returns `None` unless the stream ends
+/// with the last byte, its checksum is right, and the output is at most `most` bytes long.
 pub(super) fn unpack(packed: &[u8], most: u64, each: impl FnMut(&[u8])) -> Option<u64> {
     unpack_by(Decompress::new(true), packed, most, each)
 }
 
-/// Likewise by a stream that expects a head and a checksum, or none.
+/// Does the same with a stream that expects a zlib header and checksum, or neither.
 pub(super) fn unpack_by(
     mut stream: Decompress,
     packed: &[u8],

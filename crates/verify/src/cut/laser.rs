@@ -1,9 +1,9 @@
 //! Verification of drawings of boards and faces for a laser or a plotter, as `.dxf` or `.svg`.
 //!
-//! The kerf is measured: it follows from how much longer the outline of the first plate is than the edge of that plate. Every outline must then be where
-//! the target with that kerf has it. Independently of that, what is engraved is given back the half of the kerf that the beam
-//! takes, and the board that comes of it is looked at by the detector like a printed page. An SVG is drawn by resvg, too,
-//! and must show nothing else than was read.
+//! The kerf is measured: it follows from the difference between the length of the first plate's outline and the edge
+//! of that plate. Every outline must then be where the target has it with that kerf. Independently of that, the half
+//! kerf that the beam removes is given back to the engraved areas, and the detector examines the resulting board like
+//! a printed page. resvg also renders an SVG, which must show nothing but the parsed outlines.
 
 use std::path::Path;
 
@@ -32,18 +32,18 @@ use deltille_files::export::{laser_file_name, laser_svg};
 use deltille_layout::artwork;
 use deltille_layout::artwork::{CutDrawing, CutLayer, CuttingError, LaserBoard};
 
-/// Kerfs nearer to a round one than this are that, mm: coordinates are written with four digits.
+/// Kerfs closer than this to a round value are taken as that value, mm: coordinates are written with four digits.
 const KERF_STEP_MM: f64 = 1e-4;
 
-/// Most difference of the ink of a pixel as drawn by resvg, which samples it, from its coverage, and by a hairline.
+/// Largest difference between the ink of a pixel as sampled by resvg and its coverage, including a hairline.
 const MOST_INK: f64 = 0.25;
 
-/// Whether a file is such a drawing by its name.
+/// Whether a file name is that of a drawing for a laser.
 pub(crate) fn is_named(target: &Target, path: &Path) -> bool {
     let name = file_name(path);
     let ending = |extension: &str| laser_file_name("", extension);
     let ends = ["dxf", "svg"].iter().any(|extension| name.ends_with(&ending(extension)));
-    // A page of a target whose name ends so.
+    // Exclude a page of a target whose own name ends like that.
     ends && !name.starts_with(&format!("{}.", target.name))
 }
 
@@ -51,7 +51,8 @@ pub(crate) fn is_named(target: &Target, path: &Path) -> bool {
 ///
 /// # Errors
 ///
-/// The file cannot be read, or the target has no such drawing. Deviations are findings of the verdict.
+/// Returns an error if the file cannot be read or the target does not have this drawing. Deviations are findings of
+/// the verdict.
 pub(crate) fn verify(
     verifier: &Verifier,
     reader: &Reader,
@@ -82,9 +83,9 @@ pub(crate) fn verify(
     cut.kerf_mm = Some(kerf_mm);
     let found = if format == Format::Svg { moved(found, &stated) } else { found };
     let mut findings = outlines::compare(found.clone(), stated, &mut cut);
-    // What is drawn is looked at only where its outlines are in their places, so that it is small enough.
+    // Render the drawing only if its outlines are at their positions, so that it is small enough.
     if format == Format::Svg && findings.is_empty() {
-        findings = drawn_otherwise(reader, path, &found)?;
+        findings = differs_when_rendered(reader, path, &found)?;
     }
     let mut verdict = with(cut, findings);
     if verdict.passed {
@@ -94,7 +95,7 @@ pub(crate) fn verify(
     Ok(verdict)
 }
 
-/// The drawing in a file, or why it is refused.
+/// Returns the drawing in a file, or the reason why it is rejected.
 fn read(
     verifier: &Verifier,
     reader: &Reader,
@@ -109,7 +110,7 @@ fn read(
         Format::Svg => {
             let subject = artwork::subject(verifier.target());
             laser_svg::read(&text, &verifier.target().name, &subject).map_err(|line| {
-                refused(line, "something that is not written for a laser".to_owned())
+                refused(line, "an element that does not belong in a drawing for a laser".to_owned())
             })
         }
         _ => match dxf::read(&text) {
@@ -120,7 +121,7 @@ fn read(
     })
 }
 
-/// The kerf for which the first outline to cut is drawn, mm, by its length; `None` where there is none.
+/// Returns the kerf of the first cut outline, mm, from its length; `None` without an outline.
 fn kerf_of(found: &CutDrawing, boards: &[LaserBoard]) -> Option<f64> {
     let length = |outline: &[DVec2]| {
         let next = outline.iter().cycle().skip(1);
@@ -129,13 +130,13 @@ fn kerf_of(found: &CutDrawing, boards: &[LaserBoard]) -> Option<f64> {
     let board = boards.first()?;
     let holes = if board.panel.hole_mm.is_some() { board.panel.tags.len() } else { 0 };
     let cut = found.paths.iter().filter(|path| path.layer == CutLayer::Cut).nth(holes)?;
-    // All edges are moved by the same length, so that corners stay and lengths grow evenly.
+    // All edges move by the same distance, so corners stay and lengths grow evenly.
     let finished = length(&board.plate_mm);
     let by_a_millimetre = length(&artwork::moved_inwards(&board.plate_mm, -0.5)) - finished;
     Some((length(&cut.points_mm) - finished) / by_a_millimetre)
 }
 
-/// A drawing moved so that what is cut begins where it does in the stated one: an SVG begins anywhere.
+/// Moves a drawing so that its cut outlines start where the stated ones do: the origin of an SVG is arbitrary.
 fn moved(mut found: CutDrawing, stated: &CutDrawing) -> CutDrawing {
     let lower_left = |drawing: &CutDrawing| {
         let cuts = drawing.paths.iter().filter(|path| path.layer == CutLayer::Cut);
@@ -148,8 +149,8 @@ fn moved(mut found: CutDrawing, stated: &CutDrawing) -> CutDrawing {
     found
 }
 
-/// The first place where an SVG, as resvg draws it, shows something else than the outlines that were read.
-fn drawn_otherwise(
+/// Returns the first location where an SVG, as resvg renders it, differs from the parsed outlines.
+fn differs_when_rendered(
     reader: &Reader,
     path: &Path,
     found: &CutDrawing,
@@ -163,7 +164,7 @@ fn drawn_otherwise(
     }
     let finest = (MAX_PIXELS / size.element_product()).sqrt();
     let page = document.render(0, PRINT_PX_PER_MM.min(finest))?;
-    // The drawing is in the middle of the picture.
+    // The drawing is in the centre of the image.
     let origin = (size - DVec2::new(right - left, upper - lower)) / 2.0 - DVec2::new(left, lower);
     let mut cover = Coverage::new(page.image.width(), page.image.height());
     for path in found.paths.iter().filter(|path| path.layer == CutLayer::Engrave) {
@@ -181,7 +182,7 @@ fn drawn_otherwise(
     }))
 }
 
-/// The boards as they are when they are engraved, compared like printed pages.
+/// Compares the boards as they are after engraving, like printed pages.
 fn surfaces(
     verifier: &Verifier,
     boards: &[LaserBoard],

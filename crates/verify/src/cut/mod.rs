@@ -1,9 +1,9 @@
-//! Drawings for machines that cut.
+//! Drawings for cutting machines.
 //!
-//! Comes in: a `.dxf` or `.svg`. Goes out: which outlines are not in their places.
+//! Input: a `.dxf` or `.svg`. Output: the outlines that are not at their positions.
 //!
 //! 1. `outlines` compares the paths of panels and nets for a cutter.
-//! 2. `laser` measures the kerf of boards for a laser first, and looks at what is engraved like at a printed page.
+//! 2. `laser` first measures the kerf of boards for a laser, then compares the engraved surface like a printed page.
 
 pub(super) mod laser;
 pub(super) mod outlines;

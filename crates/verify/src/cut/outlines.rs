@@ -1,5 +1,5 @@
-//! Verification of drawings for a cutter, as `.dxf`: outlines, folds and numbers must be those of
-//! the target, each on its layer and in its place.
+//! Verification of drawings for a cutter (`.dxf`): outlines, folds and numbers must be those of the target, each on
+//! its layer and at its position.
 
 use std::path::Path;
 
@@ -16,14 +16,13 @@ use deltille_files::export::dxf::{self, DxfError};
 use deltille_layout::artwork;
 use deltille_layout::artwork::{CutDrawing, CutLayer, CutPath};
 
-/// Largest deviation of a point, mm: a hundredth of the accuracy of a cutter.
+/// Largest accepted deviation of a point, mm: a hundredth of the accuracy of a cutter.
 const CUT_TOLERANCE_MM: f64 = 0.001;
 
-/// A path within this distance of a stated one is that path, moved, mm.
+/// Distance within which a path is treated as a displaced stated path, mm.
 const MOVED_MM: f64 = 20.0;
 
-/// Reads a `.dxf` and compares it with the target's panels or its net, as the name of
-/// the file tells.
+/// Reads a `.dxf` and compares it with the target's panels or its net, as the file name says.
 pub(crate) fn verify(
     verifier: &Verifier,
     reader: &Reader,
@@ -44,7 +43,7 @@ pub(crate) fn verify(
     Ok(Verdict { cut: Some(cut), ..Verdict::new(path, Format::Dxf, findings) })
 }
 
-/// The drawing that the target states.
+/// Returns the drawing of the target.
 fn stated(verifier: &Verifier, path: &Path) -> Result<CutDrawing, VerifyError> {
     let target = verifier.target();
     let stem = path.file_stem().unwrap_or_default().to_string_lossy();
@@ -59,14 +58,14 @@ fn stated(verifier: &Verifier, path: &Path) -> Result<CutDrawing, VerifyError> {
     drawing.map_err(|source| VerifyError::NothingToCut { path: path.to_owned(), source })
 }
 
-/// Finds every stated path among those of the file, and names what is left on either side.
+/// Matches every stated path with a path of the file, and reports the unmatched ones on either side.
 pub(super) fn compare(found: CutDrawing, stated: CutDrawing, cut: &mut CutVerdict) -> Vec<Finding> {
     let mut left: Vec<CutPath> = found.paths;
     let mut missing = Vec::new();
     for path in stated.paths.into_iter().flat_map(pieces) {
         match nearest(&left, &path).filter(|(_, by_mm)| *by_mm <= CUT_TOLERANCE_MM) {
             Some((index, by_mm)) => {
-                // Paths are found in the order in which they were written.
+                // Paths are matched in the order in which they were written.
                 left.remove(index);
                 cut.count(path.layer, by_mm);
             }
@@ -92,7 +91,7 @@ pub(super) fn compare(found: CutDrawing, stated: CutDrawing, cut: &mut CutVerdic
     findings
 }
 
-/// An open path in its straight pieces.
+/// Splits an open path into its straight segments.
 fn pieces(path: CutPath) -> Vec<CutPath> {
     if path.closed {
         return vec![path];
@@ -101,7 +100,7 @@ fn pieces(path: CutPath) -> Vec<CutPath> {
     pieces.map(|ends| CutPath { points_mm: ends.to_vec(), ..path.clone() }).collect()
 }
 
-/// The path of the same kind that is nearest to a stated one, and the largest distance of a point.
+/// Returns the nearest path of the same kind to a stated one, and the largest distance of a point.
 fn nearest(paths: &[CutPath], stated: &CutPath) -> Option<(usize, f64)> {
     let mut best: Option<(usize, f64)> = None;
     for (index, path) in paths.iter().enumerate() {

@@ -1,11 +1,11 @@
-//! Printed pages read back as pictures, by other code than wrote them: hayro for PDF, resvg for SVG,
-//! the image crates for PNG.
+//! Printed pages rendered by code independent of their writer: hayro for PDF, resvg for SVG, the image crates for
+//! PNG.
 //!
-//! Comes in: a file that was inspected. Goes out: each [`Page`] as a picture.
+//! Input: an inspected file. Output: each [`Page`] as an image.
 //!
-//! 1. `opened` parses a document, and renders its pages.
-//! 2. `pdf`, `svg` and `png` do so for one format each, within what `drawing` says of size and time.
-//! 3. `page` is the picture, in millimetres.
+//! 1. `opened` parses a document and renders its pages.
+//! 2. `pdf`, `svg` and `png` do this for one format each, within the limits of size and time in `drawing`.
+//! 3. `page` is the rendered image, in millimetres.
 //!
 //! [`Page`]: page::Page
 

@@ -1,4 +1,4 @@
-//! A document of printed pages, which are rendered one by one.
+//! A document of printed pages, rendered one at a time.
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -29,17 +29,17 @@ enum Content {
 }
 
 impl Document {
-    /// Reads a `.pdf`, `.svg` or `.png` file that is in memory, within limits.
+    /// Parses a `.pdf`, `.svg` or `.png` file in memory, within limits.
     ///
     /// # Errors
-    /// When it is not of the format of its extension, is damaged, or exceeds a limit.
+    /// Returns an error if the file does not have the format of its extension, is damaged, or exceeds a limit.
     pub fn read(artifact: &Artifact, limits: &Limits) -> Result<Self, DocumentError> {
         let files = std::slice::from_ref(artifact);
         let reader = Reader { files: &files, limits: *limits, guard: Guard::Here };
         Self::read_by(&reader, Path::new(artifact.name()))
     }
 
-    /// Reads a file.
+    /// Reads and parses a file.
     pub(crate) fn read_by(reader: &Reader, path: &Path) -> Result<Self, DocumentError> {
         let unreadable = |problem: String| DocumentError::unreadable(path, problem);
         let Some(format) = Format::of(path).filter(|format| format.is_document()) else {
@@ -56,12 +56,12 @@ impl Document {
         Ok(Self { path: path.to_owned(), content: Arc::new(content), format, limits, guard })
     }
 
-    /// Format of the file.
+    /// Returns the format of the file.
     pub fn format(&self) -> Format {
         self.format
     }
 
-    /// Number of pages.
+    /// Returns the number of pages.
     pub fn pages(&self) -> usize {
         match &*self.content {
             Content::Pdf(pdf) => pdf.pages(),
@@ -69,7 +69,7 @@ impl Document {
         }
     }
 
-    /// Width and height of a page (counted from 0) as the file states them, mm.
+    /// Returns width and height of a page (counted from 0) as stated in the file, mm.
     pub fn size_mm(&self, page: usize) -> DVec2 {
         match &*self.content {
             Content::Pdf(pdf) => pdf.size_mm(page),
@@ -78,30 +78,30 @@ impl Document {
         }
     }
 
-    /// The error about a page that is far larger than stated.
+    /// Creates the error about a page that is far larger than stated.
     pub(crate) fn too_large(&self, found_mm: DVec2, stated_mm: DVec2) -> DocumentError {
         let problem = format!(
-            "a page of {} x {} mm instead of {} x {} mm is not looked at",
+            "the page measures {} x {} mm instead of {} x {} mm; too large to compare",
             found_mm.x, found_mm.y, stated_mm.x, stated_mm.y
         );
         DocumentError::unreadable(&self.path, problem)
     }
 
-    /// Greatest difference of the stated size from the true one that the format allows, mm.
+    /// Returns the largest difference between stated and true size that the format allows, mm.
     pub fn size_tolerance_mm(&self) -> f64 {
         match &*self.content {
-            // Points in single precision, and decimals written.
+            // Points in single precision, written as decimals.
             Content::Pdf(_) | Content::Svg(_) => 1e-3,
-            // Whole pixels: half of one, and as much again for the rounding of the resolution.
+            // Whole pixels: half a pixel, and the same again for the rounding of the resolution.
             Content::Png(png) => 0.5001 / png.px_per_mm() + 1e-3,
         }
     }
 
-    /// Renders a page (counted from 0) on white. `px_per_mm` is a wish: a PNG has its own
-    /// resolution, and large pages are rendered coarser to bound the memory.
+    /// Renders a page (counted from 0) on white. `px_per_mm` is the desired resolution: a PNG has its own, and large
+    /// pages are rendered more coarsely to limit memory.
     ///
     /// # Errors
-    /// When the page cannot be rendered, or exceeds a limit.
+    /// Returns an error if the page cannot be rendered or exceeds a limit.
     pub fn render(&self, page: usize, px_per_mm: f64) -> Result<Page, DocumentError> {
         let DVec2 { x: width_mm, y: height_mm } = self.size_mm(page);
         let most = (MAX_PIXELS / (width_mm * height_mm)).sqrt();
@@ -113,10 +113,11 @@ impl Document {
         let image = match &*self.content {
             Content::Png(png) => png.image().clone(),
             _ => {
-                // A page of no breadth has a pixel across, and as many along as it is long.
+                // Render a page of zero width one pixel wide, and as long as it is.
                 let [width, height] = [width_mm, height_mm].map(|mm| pixels(mm, px_per_mm));
                 if width.saturating_mul(height) as f64 > 2.0 * MAX_PIXELS {
-                    let problem = format!("a page of {width_mm} x {height_mm} mm cannot be drawn");
+                    let problem =
+                        format!("a page of {width_mm} x {height_mm} mm cannot be rendered");
                     return Err(DocumentError::unreadable(&self.path, problem));
                 }
                 let end = self.guard.end(self.limits.time());
@@ -134,15 +135,15 @@ impl Document {
     /// Opens a `.pdf`, `.svg` or `.png` file within the default limits.
     ///
     /// # Errors
-    /// When the file cannot be read, is not of the format of its extension, or exceeds a limit.
+    /// Returns an error if the file cannot be read, does not have the format of its extension, or exceeds a limit.
     pub fn open(path: &Path) -> Result<Self, DocumentError> {
         Self::open_within(path, &Limits::default())
     }
 
-    /// Opens a `.pdf`, `.svg` or `.png` file within other limits than the default.
+    /// Opens a `.pdf`, `.svg` or `.png` file within limits other than the default.
     ///
     /// # Errors
-    /// When the file cannot be read, is not of the format of its extension, or exceeds a limit.
+    /// Returns an error if the file cannot be read, does not have the format of its extension, or exceeds a limit.
     pub fn open_within(path: &Path, limits: &Limits) -> Result<Self, DocumentError> {
         let files = OnDisk(*limits);
         Self::read_by(&Reader { files: &files, limits: *limits, guard: Guard::Timed }, path)

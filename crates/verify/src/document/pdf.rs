@@ -16,14 +16,14 @@ use deltille_core::raster::Gray;
 
 const MM_PER_PT: f64 = 25.4 / 72.0;
 
-/// Number of rows of pixels rendered at a time, which bounds the memory for a large page.
+/// Number of pixel rows rendered at a time, which limits the memory for a large page.
 const BAND: usize = 1024;
 
 /// A parsed PDF with at least one page.
 pub(super) struct Pdf(hayro_syntax::Pdf);
 
 impl Pdf {
-    /// Parses a PDF; the error says why that fails.
+    /// Parses a PDF. Returns an error with the reason if that fails.
     pub(super) fn parse(bytes: Arc<Vec<u8>>) -> Result<Self, String> {
         let pdf = hayro_syntax::Pdf::new(bytes)
             .map_err(|_| "not a readable PDF; it may be truncated".to_owned())?;
@@ -35,18 +35,18 @@ impl Pdf {
         self.0.pages().len()
     }
 
-    /// Width and height of the visible part of a page, mm, as it is shown, after its rotation.
+    /// Returns width and height of the visible part of a page, mm, after its rotation.
     pub(super) fn size_mm(&self, index: usize) -> DVec2 {
         let page = &self.0.pages()[index];
         let visible = page.intersected_crop_box();
         let unit: f64 = page.raw().get::<f64>("UserUnit").unwrap_or(1.0) * MM_PER_PT;
         let size = DVec2::new(visible.width(), visible.height()) * unit;
-        // Turned by 90° or 270° when the render size says so.
+        // Rotated by 90° or 270° if the render size says so.
         let (upright, shown) = (page.base_dimensions(), page.render_dimensions());
         if upright == shown { size } else { size.yx() }
     }
 
-    /// Renders a page at a resolution; after the time `end` the rest stays white.
+    /// Renders a page at a resolution; what is not rendered by the time `end` stays white.
     pub(super) fn render(&self, index: usize, px_per_mm: f64, end: Option<Instant>) -> Gray<u8> {
         let page = &self.0.pages()[index];
         let DVec2 { x: width_mm, y: height_mm } = self.size_mm(index);
@@ -65,8 +65,8 @@ impl Pdf {
     }
 }
 
-/// Stretches the grey values so that the darkest pixel is 0 and the brightest 255: pure K is not
-/// quite black on screen.
+/// Stretches the grey values so that the darkest pixel is 0 and the brightest 255: pure K is not quite black on
+/// screen.
 fn stretch(mut image: Gray<u8>) -> Gray<u8> {
     let (least, most) = image.pixels().iter().fold((255, 0), |(lo, hi), &v| (v.min(lo), v.max(hi)));
     if most - least.min(most) >= 128 {
@@ -79,8 +79,8 @@ fn stretch(mut image: Gray<u8>) -> Gray<u8> {
     image
 }
 
-/// Renders a band of a page, of this width and height, px, from row `y` on, and appends its grey
-/// values; `scale` is in px per unit of the page.
+/// Renders a band of a page with this width and height, px, starting at row `y`, and appends its grey values. `scale`
+/// is in px per unit of the page.
 fn band<'a>(
     page: &'a Page<'a>,
     cache: &RenderCache<'a>,
@@ -89,7 +89,7 @@ fn band<'a>(
     y: usize,
     grey: &mut Vec<u8>,
 ) {
-    // The renderer counts in 16 bits: of a page wider than 65535 px, the rest is filled with white.
+    // The renderer counts in 16 bits, so the part of a page beyond 65535 px stays white.
     let side = |n: usize| u16::try_from(n).unwrap_or(u16::MAX);
     let mut context = RenderContext::new(side(width), side(height));
     let transform = Affine::translate((0.0, -(y as f64)))
@@ -108,7 +108,7 @@ fn band<'a>(
     }
 }
 
-/// Conversion of a transform of hayro to one of kurbo; hayro's own is private to its crates.
+/// Converts a hayro transform to a kurbo one; hayro's own conversion is private to its crates.
 trait ToKurbo {
     fn to_kurbo_affine(self) -> Affine;
 }

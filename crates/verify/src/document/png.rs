@@ -1,4 +1,4 @@
-//! A page as a PNG: decoded by the image crate, with the size on paper from its resolution.
+//! A page as a PNG: decoded by the image crate, with its size on paper from the resolution.
 
 use std::io::Cursor;
 
@@ -11,9 +11,9 @@ use deltille_files::limits::Limits;
 
 /// A PNG with its resolution.
 pub(super) struct Png {
-    /// Its pixels, or of a very large one the means of squares of them.
+    /// The pixels, or in a very large image the means of squares of pixels.
     image: Gray<u8>,
-    /// Side of such a square, px; 1 where the pixels are those of the file.
+    /// Side of such a square, px; 1 if the pixels are those of the file.
     reduced: usize,
     /// Width and height of the file, px.
     size_px: [usize; 2],
@@ -22,8 +22,8 @@ pub(super) struct Png {
 }
 
 impl Png {
-    /// Decodes a PNG. The error says why that fails: it is damaged or too large, states no resolution
-    /// in pixels per metre, or its pixels are not square.
+    /// Decodes a PNG. Returns an error with the reason if it is damaged or too large, states no resolution in pixels
+    /// per metre, or its pixels are not square.
     pub(super) fn parse(bytes: &[u8], limits: &Limits) -> Result<Self, String> {
         let broken = |error: &dyn std::fmt::Display| format!("not a readable PNG ({error})");
         let reader =
@@ -34,11 +34,12 @@ impl Png {
             }
             Some(dims) if dims.unit == png::Unit::Meter => {
                 let (x, y) = (dims.xppu, dims.yppu);
-                return Err(format!("its pixels are not square: {x} and {y} in a metre"));
+                return Err(format!("its pixels are not square: {x} × {y} per metre"));
             }
             _ => {
                 return Err(
-                    "it states no resolution in pixels per metre: its size is unknown".into()
+                    "it states no resolution in pixels per metre, so its physical size is unknown"
+                        .into(),
                 );
             }
         };
@@ -50,7 +51,7 @@ impl Png {
         let grey = reader.decode().map_err(|error| broken(&error))?.into_luma8();
         let (width, height) = (grey.width() as usize, grey.height() as usize);
         let image = Gray::from_vec(width, height, grey.into_raw());
-        let mut image = image.ok_or("its pixels do not fill it")?;
+        let mut image = image.ok_or("it has too few pixels")?;
         let reduced = ((width * height) as f64 / MAX_PIXELS).sqrt().ceil().max(1.0) as usize;
         if reduced > 1 {
             image = means(&image, reduced);
@@ -58,29 +59,29 @@ impl Png {
         Ok(Self { image, reduced, size_px: [width, height], px_per_mm })
     }
 
-    /// Width and height on paper, mm.
+    /// Returns width and height on paper, mm.
     pub(super) fn size_mm(&self) -> DVec2 {
         DVec2::from(self.size_px.map(|px| px as f64)) / self.px_per_mm
     }
 
-    /// The resolution of the file.
+    /// Returns the resolution of the file.
     pub(super) fn px_per_mm(&self) -> f64 {
         self.px_per_mm
     }
 
-    /// The resolution of the [`image`](Self::image).
+    /// Returns the resolution of the [`image`](Self::image).
     pub(super) fn image_px_per_mm(&self) -> f64 {
         self.px_per_mm / self.reduced as f64
     }
 
-    /// Its grey values, at the resolution [`image_px_per_mm`](Self::image_px_per_mm).
+    /// Returns its grey values at the resolution [`image_px_per_mm`](Self::image_px_per_mm).
     pub(super) fn image(&self) -> &Gray<u8> {
         &self.image
     }
 }
 
-/// The means of squares of `side` × `side` pixels; squares that reach over the right or the lower
-/// edge count white there.
+/// Returns the means of squares of `side` × `side` pixels; squares that extend beyond the right or lower edge count
+/// white there.
 fn means(image: &Gray<u8>, side: usize) -> Gray<u8> {
     let [width, height] = [image.width(), image.height()];
     let paper = u64::from(u8::MAX);

@@ -20,7 +20,7 @@ pub(super) struct Svg {
 }
 
 impl Svg {
-    /// Parses an SVG; the error says why that fails, such as a width that is no length.
+    /// Parses an SVG. Returns an error with the reason if that fails, such as a width that is not a length.
     pub(super) fn parse(bytes: &[u8]) -> Result<Self, String> {
         let text = std::str::from_utf8(bytes).map_err(|_| "not a text file".to_owned())?;
         let xml = roxmltree::Document::parse(text)
@@ -37,18 +37,18 @@ impl Svg {
         Ok(Self { tree, size_mm })
     }
 
-    /// Width and height on paper, mm, as the file states them.
+    /// Returns width and height on paper as stated in the file, mm.
     pub(super) fn size_mm(&self) -> DVec2 {
         self.size_mm
     }
 
-    /// Renders the page at a resolution; after the time `end` the rest stays white. It is an error if
-    /// the renderer panics.
+    /// Renders the page at a resolution; what is not rendered by the time `end` stays white. Returns an error if the
+    /// renderer panics.
     pub(super) fn render(&self, px_per_mm: f64, end: Option<Instant>) -> Result<Gray<u8>, String> {
         let [width, height] = self.size_mm.to_array().map(|mm| pixels(mm, px_per_mm));
         let scale = px_per_mm * self.size_mm.x / f64::from(self.tree.size().width());
         let mut grey = Vec::with_capacity(width * height);
-        // Blocks are drawn on other threads, where a panic would otherwise end the program.
+        // Blocks are rendered on other threads, where a panic would otherwise end the program.
         let is_broken = AtomicBool::new(false);
         let blank = |block: Block| vec![0; block.width * block.height * SUBPIXELS * SUBPIXELS];
         let coverage = |block| {
@@ -73,8 +73,8 @@ impl Svg {
         }
     }
 
-    /// Coverage by ink, 0 to 255, of the subpixels of a block of the page; `scale` is in px per unit of
-    /// the drawing.
+    /// Returns the ink coverage, 0 to 255, of the subpixels of a block of the page. `scale` is in px per unit of the
+    /// drawing.
     fn coverage(&self, block: Block, scale: f64) -> Vec<u8> {
         let size = [block.width, block.height].map(|n| (n * SUBPIXELS) as u32);
         let mut pixmap = Pixmap::new(size[0], size[1]).expect("a block has pixels");
@@ -88,7 +88,7 @@ impl Svg {
     }
 }
 
-/// A length with an absolute unit, mm; px are CSS pixels of 1/96 inch, and so are bare numbers.
+/// Parses a length with an absolute unit, mm. A px is a CSS pixel of 1/96 inch, and so is a bare number.
 fn length_mm(text: &str) -> Option<f64> {
     let number = text.trim().trim_end_matches(|c: char| c.is_ascii_alphabetic());
     let mm = match text.trim()[number.len()..].to_ascii_lowercase().as_str() {

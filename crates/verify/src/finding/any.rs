@@ -1,4 +1,4 @@
-//! Any deviation of an artifact, also where it is of one page among several.
+//! All kinds of deviations of an artifact, and deviations of its pages.
 
 use glam::DVec2;
 use serde::Serialize;
@@ -13,42 +13,41 @@ use crate::finding::mesh::MeshFinding;
 use crate::finding::tile::TileFinding;
 use deltille_core::words::counted;
 
-/// One deviation of an artifact from its target; in JSON its `kind` is that of the specific
-/// finding.
+/// One deviation of an artifact from its target. In JSON, `kind` is that of the specific finding.
 #[derive(Clone, Debug, PartialEq, Serialize, thiserror::Error)]
 #[serde(untagged)]
 #[non_exhaustive]
 pub enum Finding {
-    /// About the constructs of the file.
+    /// A construct of the file.
     #[error(transparent)]
     Construct(#[from] ConstructFinding),
-    /// About its pages.
+    /// The pages of the file.
     #[error(transparent)]
     Page(#[from] PageFinding),
-    /// About marks outside the tiles.
+    /// Marks outside the tiles.
     #[error(transparent)]
     Mark(#[from] MarkFinding),
-    /// About a board.
+    /// A board.
     #[error(transparent)]
     Board(#[from] BoardFinding),
-    /// About a tile.
+    /// A tile.
     #[error(transparent)]
     Tile(#[from] TileFinding),
-    /// About the fold of a net.
+    /// The fold of a net.
     #[error(transparent)]
     Fold(#[from] FoldFinding),
-    /// About a mesh or a body.
+    /// A mesh or a body.
     #[error(transparent)]
     Mesh(#[from] MeshFinding),
-    /// About a list for other detectors.
+    /// A list for other detectors.
     #[error(transparent)]
     List(#[from] ListFinding),
-    /// About a drawing for a cutter.
+    /// A drawing for a cutter.
     #[error(transparent)]
     Cut(#[from] CutFinding),
 }
 
-/// A deviation of the pages of a file. Lengths in mm.
+/// A deviation in the pages of a file. Lengths in mm.
 #[derive(Clone, Debug, PartialEq, Serialize, thiserror::Error)]
 #[serde(tag = "kind", rename_all = "snake_case")]
 #[non_exhaustive]
@@ -61,13 +60,13 @@ pub enum PageFinding {
         /// Sheets of the target.
         stated: usize,
     },
-    /// A page that is a file of its own is missing, or was not named with the others.
-    #[error("{page} is missing, or not named with the others")]
+    /// A page in its own file is missing, or was not given with the others.
+    #[error("{page} is missing or was not given with the others")]
     PageMissing {
         /// File name of the page.
         page: String,
     },
-    /// The page has another size.
+    /// The page has the wrong size.
     #[error(
         "page of {:.3} x {:.3} mm instead of {:.3} x {:.3} mm",
         found_mm.x, found_mm.y, stated_mm.x, stated_mm.y
@@ -78,15 +77,15 @@ pub enum PageFinding {
         /// Width and height in the target.
         stated_mm: DVec2,
     },
-    /// A deviation on one of the pages on which a sheet is printed.
+    /// A deviation on one of several pages that carry a sheet.
     #[error("page {page}: {finding}")]
     OnPage {
-        /// The page's label.
+        /// Label of the page.
         page: String,
         /// The deviation.
         finding: Box<Finding>,
     },
-    /// Two pages show different things where they overlap.
+    /// Two pages differ where they overlap.
     #[error(
         "pages {} and {} differ where they overlap, at ({:.2}, {:.2}) mm",
         pages[0], pages[1], at_mm.x, at_mm.y
@@ -100,12 +99,12 @@ pub enum PageFinding {
 }
 
 impl Finding {
-    /// The same, on one of several pages.
+    /// The same finding, on one of several pages.
     pub(crate) fn on_page(self, page: String) -> Self {
         PageFinding::OnPage { page, finding: Box::new(self) }.into()
     }
 
-    /// Whether the rest of the sheet is as stated: a tag, a tile or a corner is wrong, not a board.
+    /// Whether only a tag, a tile or a corner is wrong and the rest of the sheet is as stated.
     pub(crate) fn is_local(&self) -> bool {
         match self {
             Self::Tile(finding) => !matches!(finding, TileFinding::TagMissing { .. }),

@@ -1,4 +1,4 @@
-//! Deviations of a board: as a whole, or of its corners and tags.
+//! Deviations of a whole board, or of its corners and tags.
 
 use glam::DVec2;
 use serde::Serialize;
@@ -11,29 +11,29 @@ use deltille_core::words::counted;
 #[serde(tag = "kind", rename_all = "snake_case")]
 #[non_exhaustive]
 pub enum BoardFinding {
-    /// The panel was not recognised.
-    #[error("board {panel} not recognised")]
+    /// The panel was not detected.
+    #[error("board {panel} was not detected")]
     PanelMissing {
-        /// Its id.
+        /// Panel id.
         panel: u32,
     },
-    /// The picture shows another board: its corners are not those of the target.
-    #[error("shows another board: {} instead of {stated}", counted(*found, "corner"))]
+    /// The page shows another board: its corners are not those of the target.
+    #[error("shows a different board: {} instead of {stated}", counted(*found, "corner"))]
     AnotherBoard {
         /// Corners that were found.
         found: usize,
         /// Corners that the target has on the sheet.
         stated: usize,
     },
-    /// Black and white are exchanged.
-    #[error("board {panel} is inverted (black and white exchanged)")]
+    /// Black and white are swapped.
+    #[error("board {panel} is inverted (black and white swapped)")]
     Inverted {
         /// Panel id.
         panel: u32,
     },
-    /// Black and white tiles differ too little.
+    /// Black and white tiles have too little contrast.
     #[error(
-        "contrast of board {panel} too low: black tiles have {:.0} % ink, white ones {:.0} %",
+        "contrast of board {panel} is too low: {:.0} % ink in black tiles, {:.0} % in white tiles",
         100.0 * ink[1], 100.0 * ink[0]
     )]
     Contrast {
@@ -42,44 +42,44 @@ pub enum BoardFinding {
         /// Ink of white and black tiles, 0 to 1.
         ink: [f64; 2],
     },
-    /// A panel was recognised that belongs on another sheet.
-    #[error("shows board {panel} of another sheet")]
+    /// A detected panel belongs on another sheet.
+    #[error("shows board {panel}, which belongs on another sheet")]
     PanelForeign {
-        /// Its id.
+        /// Panel id.
         panel: u32,
     },
-    /// The panel is seen as in a mirror.
+    /// The panel is mirrored.
     #[error("board {panel} is mirrored")]
     Mirrored {
-        /// Its id.
+        /// Panel id.
         panel: u32,
     },
-    /// The panel is not the mirror image that it should be.
-    #[error("board {panel} is not mirrored, as it should be")]
+    /// The panel is not mirrored, although the target says so.
+    #[error("board {panel} is not mirrored, but should be")]
     NotMirrored {
-        /// Its id.
+        /// Panel id.
         panel: u32,
     },
     /// The panel is larger or smaller than stated.
     #[error("scale {scale:.4}")]
     Scale {
-        /// Its id.
+        /// Panel id.
         panel: u32,
-        /// Found over stated length.
+        /// Found length divided by stated length.
         scale: f64,
     },
     /// The panel is stretched: its scales along the page's axes differ.
     #[error("stretched: scale {:.4} along x, {:.4} along y", scale[0], scale[1])]
     Stretched {
-        /// Its id.
+        /// Panel id.
         panel: u32,
-        /// Found over stated length along x and y.
+        /// Found length divided by stated length, along x and y.
         scale: [f64; 2],
     },
     /// The panel is rotated on the page.
-    #[error("turned by {:.3}°", shown_angle(*angle_deg))]
+    #[error("rotated by {:.3}°", shown_angle(*angle_deg))]
     Turned {
-        /// Its id.
+        /// Panel id.
         panel: u32,
         /// Angle, degrees, counter-clockwise.
         angle_deg: f64,
@@ -87,9 +87,9 @@ pub enum BoardFinding {
     /// The panel is shifted on the page.
     #[error("shifted by ({:.3}, {:.3}) mm", shown(by_mm.x), shown(by_mm.y))]
     Shifted {
-        /// Its id.
+        /// Panel id.
         panel: u32,
-        /// Found minus stated position of its middle.
+        /// Found minus stated position of its centre.
         by_mm: DVec2,
     },
     /// A corner was not found.
@@ -104,7 +104,7 @@ pub enum BoardFinding {
     },
     /// A single corner is displaced on an otherwise correct panel.
     #[error(
-        "corner {id} at row {row} col {col} off by ({:.3}, {:.3}) mm",
+        "corner {id} at row {row} col {col} is off by ({:.3}, {:.3}) mm",
         shown(by_mm.x), shown(by_mm.y)
     )]
     CornerOff {
@@ -117,7 +117,7 @@ pub enum BoardFinding {
         /// Found minus stated position.
         by_mm: DVec2,
     },
-    /// A disc has another size.
+    /// A disc has the wrong diameter.
     #[error(
         "circle {id} at row {row} col {col} has a diameter of {found_mm:.3} mm instead of {stated_mm:.3} mm"
     )]
@@ -128,21 +128,21 @@ pub enum BoardFinding {
         row: i32,
         /// Lattice column.
         col: i32,
-        /// That of a disc with as much ink.
+        /// Diameter of a disc with the same amount of ink.
         found_mm: f64,
-        /// Stated.
+        /// Stated diameter.
         stated_mm: f64,
     },
     /// A corner was found where the target has none.
-    #[error("a corner at ({:.2}, {:.2}) mm where none should be", at_mm.x, at_mm.y)]
+    #[error("unexpected corner at ({:.2}, {:.2}) mm", at_mm.x, at_mm.y)]
     CornerExtra {
         /// Its position.
         at_mm: DVec2,
     },
-    /// The detector reads a tag that the target does not have there.
-    #[error("tag {id} is read at row {row} col {col}, where it should not be")]
+    /// The detector reads a tag where the target has none, or a different one.
+    #[error("unexpected tag {id} at row {row} col {col}")]
     TagExtra {
-        /// The id that it reads.
+        /// The detected id.
         id: u32,
         /// Lattice row.
         row: i32,
@@ -151,14 +151,14 @@ pub enum BoardFinding {
     },
 }
 
-/// An angle in degrees as it is shown: half a turn is that in either direction.
+/// Rounds an angle in degrees for display, and shows −180° as 180°.
 fn shown_angle(angle_deg: f64) -> f64 {
     let angle_deg = shown(angle_deg);
     if angle_deg == -180.0 { 180.0 } else { angle_deg }
 }
 
 impl BoardFinding {
-    /// Whether the board is as stated but for a corner or a tag.
+    /// Whether only a corner or a tag is wrong and the rest of the board is as stated.
     pub(crate) fn is_local(&self) -> bool {
         matches!(
             self,

@@ -1,34 +1,33 @@
-//! Constructs that are not permitted.
+//! Constructs that are not allowed.
 
 use serde::Serialize;
 
-/// A construct that is not permitted, or hidden content.
+/// A construct that is not allowed, or hidden content.
 #[derive(Clone, Debug, PartialEq, Serialize, thiserror::Error)]
 #[serde(tag = "kind", rename_all = "snake_case")]
 #[non_exhaustive]
 pub enum ConstructFinding {
-    /// The file has a construct that not every viewer shows alike, so that other programs may show
-    /// something else than is seen here.
-    #[error("{place}: {construct}: not every viewer shows that alike")]
+    /// The file has a construct that viewers may render differently. Other programs may then show something else than
+    /// this verification sees.
+    #[error("{place}: {construct} (viewers may render it differently)")]
     Construct {
-        /// Its place, in the terms of the format.
+        /// Its location, in the terms of the format.
         place: String,
         /// The construct or problem.
         construct: String,
     },
-    /// A line of a text format is not the one that the program writes.
-    #[error("{place}: {found}: the file was damaged or edited since it was written: make it again")]
+    /// A line of a text format differs from the one that the program writes.
+    #[error("{place}: {found}: the file was damaged or edited; generate it again")]
     OtherLine {
-        /// Its place, such as `line 12`.
+        /// Its location, such as `line 12`.
         place: String,
-        /// What is there: how the line begins, or that the file ends.
+        /// The beginning of the line found there, or that the file ends.
         found: String,
     },
-    /// Content that no picture of the page shows: texts that are not those of the target, or marks
-    /// beside the page.
+    /// Content that is not visible on the page: text that differs from the target's, or marks beyond the page.
     #[error("{place}: {problem}")]
     Unseen {
-        /// Its place, in the terms of the format.
+        /// Its location, in the terms of the format.
         place: String,
         /// The construct or problem.
         problem: String,

@@ -18,7 +18,7 @@ pub enum CutFinding {
         layer: &'static str,
         /// Its stated start.
         at_mm: DVec2,
-        /// Largest distance of a point.
+        /// Largest distance of a point from its stated position.
         by_mm: f64,
     },
     /// A path to cut, fold or engrave is missing.
@@ -29,9 +29,9 @@ pub enum CutFinding {
         /// Its stated start.
         at_mm: DVec2,
     },
-    /// A path that the target does not have.
+    /// The target does not have this path.
     #[error(
-        "a path on {layer} from ({:.2}, {:.2}) mm that should not be there",
+        "unexpected path on {layer} from ({:.2}, {:.2}) mm",
         at_mm.x, at_mm.y
     )]
     PathExtra {
@@ -40,16 +40,16 @@ pub enum CutFinding {
         /// Its start.
         at_mm: DVec2,
     },
-    /// The plate of a board is as much larger than stated as no kerf makes it.
-    #[error("the outline to cut is that of a kerf of {by_mm:.3} mm, which this target cannot have")]
+    /// The plate of a board exceeds its stated size by more than any possible kerf.
+    #[error("the cut outline implies a kerf of {by_mm:.3} mm, which is impossible for this target")]
     NoKerf {
-        /// By how much the first outline to cut is larger than its finished plate, along a line across it.
+        /// By how much the first cut outline is larger than its finished plate, measured across the plate.
         by_mm: f64,
     },
-    /// A drawing as other programs show it has something else in a place.
-    #[error("drawn otherwise around ({:.2}, {:.2}) mm", at_mm.x, at_mm.y)]
+    /// The drawing, rendered as by other programs, differs from its paths.
+    #[error("the rendered drawing differs from its paths near ({:.2}, {:.2}) mm", at_mm.x, at_mm.y)]
     DrawnOtherwise {
-        /// The place, from the lower left corner of the drawing.
+        /// The location, from the lower left corner of the drawing.
         at_mm: DVec2,
     },
 }

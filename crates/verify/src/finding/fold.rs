@@ -9,13 +9,13 @@ use deltille_core::words::counted;
 #[serde(tag = "kind", rename_all = "snake_case")]
 #[non_exhaustive]
 pub enum FoldFinding {
-    /// A face is connected to no other by a fold.
-    #[error("board {panel} hangs on no other by a fold")]
+    /// No fold connects a face to another face.
+    #[error("no fold connects board {panel} to another board")]
     FaceLoose {
         /// Panel id.
         panel: u32,
     },
-    /// A face is printed in the place of another.
+    /// A face is printed at the location of another face.
     #[error("board {panel} is printed where board {instead} belongs")]
     FaceElsewhere {
         /// Panel id.
@@ -23,23 +23,23 @@ pub enum FoldFinding {
         /// Panel that belongs there.
         instead: u32,
     },
-    /// A face is rotated in its place.
-    #[error("board {panel} is turned by {angle_deg:.0}° in its place")]
+    /// A face is rotated at its location.
+    #[error("board {panel} is rotated by {angle_deg:.0}°")]
     FaceTurned {
         /// Panel id.
         panel: u32,
         /// Angle, degrees, counter-clockwise.
         angle_deg: f64,
     },
-    /// Corners of a face, after folding, are not at their stated positions.
-    #[error("board {panel}, folded, is off by {by_mm:.3} mm")]
+    /// After folding, the corners of a face are not at their stated positions.
+    #[error("board {panel} is off by {by_mm:.3} mm after folding")]
     FoldOff {
         /// Panel id.
         panel: u32,
-        /// Largest deviation.
+        /// Largest distance from a stated position.
         by_mm: f64,
     },
-    /// Two sides that should meet do not.
+    /// Two sides that should meet are apart.
     #[error(
         "the edges of boards {} and {} are {gap_mm:.3} mm apart when folded",
         panels[0], panels[1]
@@ -47,41 +47,41 @@ pub enum FoldFinding {
     EdgeOpen {
         /// Panels of the faces.
         panels: [u32; 2],
-        /// Their distance.
+        /// Distance between the two sides.
         gap_mm: f64,
     },
-    /// Two sides that meet do not carry the same single number.
+    /// Two sides that meet do not carry one and the same number.
     #[error(
-        "the edge between boards {} and {} has {} on the first, {} on the second",
+        "the edge between boards {} and {} carries {} on the first and {} on the second",
         panels[0], panels[1], enumerate(&numbers[0]), enumerate(&numbers[1])
     )]
     EdgeNumbers {
         /// Panels of the faces.
         panels: [u32; 2],
-        /// The numbers found along each.
+        /// The numbers found along each side.
         numbers: [Vec<usize>; 2],
     },
     /// A face does not carry its number exactly once.
-    #[error("board {panel} carries {} instead of face {stated}", enumerate(names))]
+    #[error("board {panel} carries {} instead of face number {stated}", enumerate(names))]
     FaceNumber {
         /// Panel id.
         panel: u32,
-        /// The numbers found in it.
+        /// The numbers found on the face.
         names: Vec<usize>,
-        /// Its number.
+        /// The number of the face.
         stated: usize,
     },
-    /// A tab names another face than the one under which its edge leads.
+    /// A tab names the wrong face.
     #[error("a tab of board {panel} names face {named} instead of {stated}")]
     TabNames {
         /// Panel id of the face that the tab is attached to.
         panel: u32,
-        /// The face that it names.
+        /// The face that the tab names.
         named: usize,
-        /// The face under which it is to be glued.
+        /// The face to which the tab must be glued.
         stated: usize,
     },
-    /// A cut edge has no tab, or two.
+    /// A cut edge does not have exactly one tab.
     #[error(
         "the edge between boards {} and {} has {tabs} tabs instead of one",
         panels[0], panels[1]
@@ -102,7 +102,7 @@ pub enum FoldFinding {
     },
 }
 
-/// Numbers as part of a sentence.
+/// Joins numbers for use in a sentence.
 fn enumerate(numbers: &[usize]) -> String {
     let numbers: Vec<String> = numbers.iter().map(usize::to_string).collect();
     if numbers.is_empty() { "no number".to_owned() } else { numbers.join(" and ") }

@@ -7,10 +7,10 @@ use serde::Serialize;
 #[serde(tag = "kind", rename_all = "snake_case")]
 #[non_exhaustive]
 pub enum ListFinding {
-    /// The list is not that of the target.
+    /// The list differs from the target.
     #[error("{problem}")]
     Listed {
-        /// The difference in words.
+        /// Description of the difference.
         problem: String,
     },
 }

@@ -10,45 +10,45 @@ use deltille_layout::{Label, LineKind};
 #[serde(tag = "kind", rename_all = "snake_case")]
 #[non_exhaustive]
 pub enum MarkFinding {
-    /// A check bar has another length, or is missing.
+    /// A check bar has the wrong length or is missing.
     #[error("check bar {bar} {}", measured(*found_mm, *stated_mm))]
     CheckBar {
-        /// Which bar, from 1.
+        /// Number of the bar, from 1.
         bar: usize,
-        /// Measured; `None` when an end was not found.
+        /// Measured length; `None` when an end was not found.
         found_mm: Option<f64>,
-        /// Stated.
+        /// Stated length.
         stated_mm: f64,
     },
-    /// A check bar of the stated length is drawn otherwise.
+    /// A check bar has the stated length but is drawn differently.
     #[error("check bar {bar} differs from the description")]
     CheckBarDiffers {
-        /// Which bar, from 1.
+        /// Number of the bar, from 1.
         bar: usize,
     },
-    /// A text is missing, or differs.
+    /// A text is missing or differs.
     #[error("label {text} differs from the description")]
     TextDiffers {
-        /// Which text of the sheet, from 1.
+        /// Number of the text on the sheet, from 1.
         text: usize,
         /// The stated text.
         stated: Label,
     },
-    /// A logo is missing, or differs.
+    /// A logo is missing or differs.
     #[error("logo {logo} differs from the description")]
     LogoDiffers {
-        /// Which logo of the sheet, from 1.
+        /// Number of the logo on the sheet, from 1.
         logo: usize,
     },
-    /// A line is missing, or differs.
-    #[error("line {line}, to {}, differs from the description", purpose.name())]
+    /// A line is missing or differs.
+    #[error("{} line {line} differs from the description", purpose.name())]
     LineDiffers {
-        /// Which line of the sheet, from 1.
+        /// Number of the line on the sheet, from 1.
         line: usize,
         /// Its purpose.
         purpose: LineKind,
     },
-    /// A disc is not round, or not solid.
+    /// A disc is not round or not solid.
     #[error("circle at row {row} col {col} differs from the description")]
     DiscDiffers {
         /// Lattice row.
@@ -56,10 +56,10 @@ pub enum MarkFinding {
         /// Lattice column.
         col: i32,
     },
-    /// Ink, or on a black field a lack of it, outside the tiles, texts, check bars and logos.
+    /// Ink outside the tiles, texts, check bars and logos, or missing ink on a black field.
     #[error("spot of {area_mm2:.3} mm² at ({:.2}, {:.2}) mm", at_mm.x, at_mm.y)]
     Spot {
-        /// The middle of the spot.
+        /// Centre of the spot.
         at_mm: DVec2,
         /// Its area, mm².
         area_mm2: f64,
@@ -67,7 +67,7 @@ pub enum MarkFinding {
 }
 
 impl MarkFinding {
-    /// The same finding with its position converted to another frame.
+    /// Returns the finding with its position converted to another frame.
     pub(crate) fn moved(self, place: impl Fn(DVec2) -> DVec2) -> Self {
         match self {
             Self::Spot { at_mm, area_mm2 } => Self::Spot { at_mm: place(at_mm), area_mm2 },
@@ -76,10 +76,10 @@ impl MarkFinding {
     }
 }
 
-/// The measurement of a check bar in words.
+/// Describes the measurement of a check bar.
 fn measured(found_mm: Option<f64>, stated_mm: f64) -> String {
     match found_mm {
         Some(found_mm) => format!("measures {found_mm:.3} mm instead of {stated_mm:.3} mm"),
-        None => "not found".to_owned(),
+        None => "was not found".to_owned(),
     }
 }

@@ -13,7 +13,7 @@ use deltille_core::words::counted;
 pub enum MeshFinding {
     /// A corner of a mesh is displaced.
     #[error(
-        "corner {id} at row {row} col {col} off by ({:.3}, {:.3}, {:.3}) mm",
+        "corner {id} at row {row} col {col} is off by ({:.3}, {:.3}, {:.3}) mm",
         shown(by_mm.x), shown(by_mm.y), shown(by_mm.z)
     )]
     CornerOff3d {
@@ -26,10 +26,10 @@ pub enum MeshFinding {
         /// Found minus stated position in the target frame.
         by_mm: DVec3,
     },
-    /// The surface of a body is not the stated one.
+    /// The surface of a body differs from the stated one.
     #[error("{problem}")]
     Body {
-        /// The deviation in words.
+        /// Description of the deviation.
         problem: String,
     },
     /// Triangles of a mesh have wrong normals.
@@ -38,7 +38,7 @@ pub enum MeshFinding {
         /// Number of triangles.
         triangles: usize,
     },
-    /// A tag of a mesh is not read, or reads with wrong bits.
+    /// A tag on a mesh is not read, or is read with wrong bits.
     #[error("tag {id} at row {row} col {col} {}", how_read(*errors))]
     TagInexact {
         /// Stated id.
@@ -52,10 +52,10 @@ pub enum MeshFinding {
     },
 }
 
-/// The reading of a tag in words.
+/// Describes how a tag was read.
 fn how_read(errors: Option<u32>) -> String {
     match errors {
-        Some(errors) => format!("read with {}", counted(errors as usize, "wrong bit")),
-        None => "not read".to_owned(),
+        Some(errors) => format!("is read with {}", counted(errors as usize, "wrong bit")),
+        None => "is not read".to_owned(),
     }
 }

@@ -1,10 +1,10 @@
-//! Deviations of an artifact as values, each with its place and figures.
+//! Deviations of an artifact as values, each with its location and numbers.
 //!
-//! Comes in: what a comparison found. Goes out: a [`Finding`], as a sentence and as JSON.
+//! Input: what a comparison found. Output: a [`Finding`], as a sentence and as JSON.
 //!
-//! 1. `construct` is about a file, `board`, `tile` and `mark` are about what a page shows, `fold` about a net.
-//! 2. `mesh` is about meshes and bodies, `list` and `cut` about files for other detectors and cutters.
-//! 3. `any` is one of these, or about the pages of a file.
+//! 1. `construct` is about a file; `board`, `tile` and `mark` are about a page; `fold` is about a net.
+//! 2. `mesh` is about meshes and bodies; `list` and `cut` are about files for other detectors and cutters.
+//! 3. `any` is one of these, or a finding about the pages of a file.
 //! 4. `shown` rounds numbers for all sentences.
 //!
 //! [`Finding`]: any::Finding

@@ -1,6 +1,6 @@
-//! Numbers as they are shown in a finding.
+//! Rounding of numbers in findings.
 
-/// A length in mm or an angle as it is shown: a tiny negative number is not shown as −0.
+/// Rounds a length in mm or an angle for display; a tiny negative number becomes 0, not −0.
 pub(crate) fn shown(value: f64) -> f64 {
     (value * 1e3).round() / 1e3 + 0.0
 }

@@ -1,9 +1,9 @@
-//! Deviations of tiles, and of the cells of tags.
+//! Deviations of tiles and of the cells of tags.
 
 use glam::DVec2;
 use serde::Serialize;
 
-/// A deviation of a tile or of the tag in it. Lengths in mm in the page frame.
+/// A deviation of a tile or of its tag. Lengths in mm in the page frame.
 #[derive(Clone, Debug, PartialEq, Serialize, thiserror::Error)]
 #[serde(tag = "kind", rename_all = "snake_case")]
 #[non_exhaustive]
@@ -28,15 +28,15 @@ pub enum TileFinding {
         row: i32,
         /// Column of the tile's lower-left vertex.
         col: i32,
-        /// The middle of the spot.
+        /// Centre of the spot.
         at_mm: DVec2,
         /// Its area, mm².
         area_mm2: f64,
     },
-    /// An edge of a tile, or of a cell in it, is displaced.
+    /// An edge of a tile or of one of its cells is displaced.
     #[error(
-        "an edge at ({:.2}, {:.2}) mm in the tile at row {row} col {col} is {:.3} mm beside its \
-         place, towards {}",
+        "an edge at ({:.2}, {:.2}) mm in the tile at row {row} col {col} is displaced by {:.3} mm \
+         towards {}",
         at_mm.x, at_mm.y, by_mm.abs(), lighter_or_darker(*by_mm)
     )]
     EdgeMoved {
@@ -44,12 +44,12 @@ pub enum TileFinding {
         row: i32,
         /// Column of the tile's lower-left vertex.
         col: i32,
-        /// Its position.
+        /// Position of the edge.
         at_mm: DVec2,
-        /// Displacement, mm, positive where there is more black.
+        /// Displacement, mm; positive where there is too much black.
         by_mm: f64,
     },
-    /// A tag reads as another one of its family.
+    /// A tag reads as a different one of its family, or is rotated.
     #[error("tag {id} at row {row} col {col} {}", what_reads(*id, *reads))]
     TagReads {
         /// Stated id.
@@ -58,13 +58,13 @@ pub enum TileFinding {
         row: i32,
         /// Lattice column.
         col: i32,
-        /// The id that it reads.
+        /// The id that is read.
         reads: u32,
         /// Counter-clockwise rotation, in thirds of a turn.
         turns: u8,
     },
-    /// A tag has too many wrong cells to be corrected.
-    #[error("tag {id} at row {row} col {col} unreadable: {} bits differ", bits.len())]
+    /// A tag has too many wrong cells for correction.
+    #[error("tag {id} at row {row} col {col} is unreadable: {} bits differ", bits.len())]
     TagUnreadable {
         /// Stated id.
         id: u32,
@@ -72,11 +72,11 @@ pub enum TileFinding {
         row: i32,
         /// Lattice column.
         col: i32,
-        /// Wrong cells, by bit.
+        /// Wrong cells, by bit index.
         bits: Vec<u32>,
     },
     /// A tag has wrong cells that decoding would correct.
-    #[error("tag {id} at row {row} col {col} damaged: {}", bits_differ(bits.len()))]
+    #[error("tag {id} at row {row} col {col} is damaged: {}", bits_differ(bits.len()))]
     TagDamaged {
         /// Stated id.
         id: u32,
@@ -84,11 +84,11 @@ pub enum TileFinding {
         row: i32,
         /// Lattice column.
         col: i32,
-        /// Wrong cells, by bit.
+        /// Wrong cells, by bit index.
         bits: Vec<u32>,
     },
     /// A tag on a sheet of single tags is not at its stated position.
-    #[error("tag {id} is not where it should be")]
+    #[error("tag {id} is not at its stated position")]
     TagMissing {
         /// Stated id.
         id: u32,
@@ -96,7 +96,7 @@ pub enum TileFinding {
 }
 
 impl TileFinding {
-    /// The same finding with its position converted to another frame.
+    /// Returns the finding with its position converted to another frame.
     pub(crate) fn moved(self, place: impl Fn(DVec2) -> DVec2) -> Self {
         match self {
             Self::Blemish { row, col, at_mm, area_mm2 } => {
@@ -110,18 +110,18 @@ impl TileFinding {
     }
 }
 
-/// The reading of a tag in words, where it differs.
+/// Describes how a tag reads where that differs from the target.
 fn what_reads(id: u32, reads: u32) -> String {
-    if id == reads { "is turned".to_owned() } else { format!("reads {reads}") }
+    if id == reads { "is rotated".to_owned() } else { format!("reads {reads}") }
 }
 
-/// The number of differing bits in words.
+/// States the number of differing bits.
 fn bits_differ(bits: usize) -> String {
     let differ = if bits == 1 { "bit differs" } else { "bits differ" };
     format!("{bits} {differ}")
 }
 
-/// In which way a tile has the wrong colour.
+/// Describes how the colour of a tile is wrong.
 fn tile_differs(row: i32, col: i32, should_be_black: bool) -> String {
     match should_be_black {
         true => format!("tile missing at row {row} col {col}"),
@@ -129,7 +129,7 @@ fn tile_differs(row: i32, col: i32, should_be_black: bool) -> String {
     }
 }
 
-/// To which side an edge lies that is so far beside its place, positive where more is black.
+/// The colour towards which an edge is displaced; `by_mm` is positive where there is too much black.
 fn lighter_or_darker(by_mm: f64) -> &'static str {
     if by_mm > 0.0 { "white" } else { "black" }
 }

@@ -1,4 +1,4 @@
-//! A face before a virtual camera: every detected corner is projected back onto the mesh.
+//! A face seen by a virtual camera: every detected corner is projected back onto the mesh.
 
 use std::collections::BTreeSet;
 
@@ -19,10 +19,10 @@ use deltille_core::lattice::Vertex;
 use deltille_core::raster::Gray;
 use deltille_core::targets::{Corner, Panel, TagPlacement};
 
-/// How exactly a corner is located in the picture, px: of a board of more than a metre that is more than the tolerance.
+/// Accuracy of a corner's position in the image, px; on boards larger than a metre this exceeds the tolerance.
 const LOCATED_PX: f64 = 0.04;
 
-/// And in pixels of the texture: between two of them it is interpolated, which moves edges along its rows or columns.
+/// The same in pixels of the texture: interpolation between two of them moves edges along its rows or columns.
 const LOCATED_TEXELS: f64 = 0.15;
 
 pub(super) fn check_face(verifier: &Verifier, model: &Model, panel: &Panel) -> FaceVerdict {
@@ -64,7 +64,7 @@ pub(super) fn check_face(verifier: &Verifier, model: &Model, panel: &Panel) -> F
     let is_off =
         |finding: &Finding| matches!(finding, Finding::Mesh(MeshFinding::CornerOff3d { .. }));
     if verdict.findings.iter().any(is_off) {
-        // All other deviations follow from that.
+        // All other deviations follow from this one.
         return verdict;
     }
     check_print(verifier, model, panel, px_per_mm, &mut verdict);
@@ -72,7 +72,7 @@ pub(super) fn check_face(verifier: &Verifier, model: &Model, panel: &Panel) -> F
         return verdict;
     }
     let own = || detection.grids.iter().filter(|grid| grid.panel == Some(panel.id));
-    // Tags at the rim, which have no corner of the board at some of theirs, were compared cell by cell alone.
+    // Tags at the rim without board corners at some of their vertices were compared cell by cell only.
     let is_read = |tag: &&TagPlacement| {
         panel.tag_tile(tag).vertices().all(|vertex| panel.corner_at(vertex).is_some())
     };
@@ -92,17 +92,17 @@ pub(super) fn check_face(verifier: &Verifier, model: &Model, panel: &Panel) -> F
     verdict
 }
 
-/// A corner that is seen in the picture of a face.
+/// A corner seen in the image of a face.
 struct Seen<'a> {
-    /// The panel that it is of.
+    /// The panel that it belongs to.
     panel: &'a Panel,
     stated: &'a Corner,
-    /// Where it is on the mesh, mm; not a number where its ray misses that.
+    /// Position on the mesh, mm; NaN if its ray misses the mesh.
     at_mm: DVec3,
 }
 
-/// The corners in the picture of a face: those of all panels that are labelled, or, where the panel has no tags, those
-/// that are near to its own.
+/// Returns the corners in the image of a face: those of all labelled panels, or, for a panel without tags, those near
+/// its own.
 fn seen_corners<'a>(
     verifier: &'a Verifier,
     panel: &'a Panel,
@@ -131,8 +131,8 @@ fn seen_corners<'a>(
     all
 }
 
-/// Compares every corner with where it should be on the mesh; neighbouring faces in the picture must be where they belong,
-/// too.
+/// Compares every corner with its stated position on the mesh. Neighbouring faces in the image must be at their
+/// positions, too.
 fn check_corners(model: &Model, panel: &Panel, seen: &[Seen], verdict: &mut FaceVerdict) {
     let mut found = BTreeSet::new();
     let located_mm = LOCATED_PX.max(LOCATED_TEXELS * texel_px(model, panel, verdict.px_per_mm))
@@ -147,7 +147,7 @@ fn check_corners(model: &Model, panel: &Panel, seen: &[Seen], verdict: &mut Face
             found.insert(stated.id);
             verdict.max_deviation_mm = verdict.max_deviation_mm.max(deviation_mm);
         }
-        // A ray that misses the mesh counts as off.
+        // A ray that misses the mesh counts as a deviation.
         if deviation_mm.is_nan() || deviation_mm > tolerance_mm {
             let (id, row, col) = (stated.id, stated.row, stated.col);
             verdict.findings.push(MeshFinding::CornerOff3d { id, row, col, by_mm }.into());
@@ -162,7 +162,7 @@ fn check_corners(model: &Model, panel: &Panel, seen: &[Seen], verdict: &mut Face
     verdict.findings.extend(missing.map(finding));
 }
 
-/// Side of the largest pixel of the texture on the front of a panel, px of a picture of it.
+/// Returns the size of the largest pixel of the texture on the front of a panel, px of an image of it.
 fn texel_px(model: &Model, panel: &Panel, px_per_mm: f64) -> f64 {
     let sides = model.triangles.iter().filter_map(|triangle| {
         let is_front = |v: &DVec3| panel.pose.panel_from_target(*v).z.abs() <= MESH_TOLERANCE_MM;

@@ -1,4 +1,4 @@
-//! A virtual camera before a face.
+//! A virtual camera in front of a face.
 
 use glam::{DVec2, DVec3};
 
@@ -9,30 +9,30 @@ use deltille_core::camera::{Camera, Pose};
 use deltille_core::targets::Panel;
 use deltille_files::export::mesh::{LEAST_TEXELS_PER_BIT, UNTAGGED_CELLS};
 
-/// Deviation of a corner of a neighbouring face, seen at a grazing angle, mm: less than half a
-/// tile of any board that is detected so.
+/// Tolerance of a corner of a neighbouring face seen at a grazing angle, mm: less than half a tile of any board
+/// detected like this.
 pub(super) const GRAZING_TOLERANCE_MM: f64 = 1.0;
 
-/// Coarser textures than are made, of so many px of the picture, are allowed no more.
+/// Largest size of a texture pixel that widens the tolerance, px of the image: coarser textures are never written.
 pub(super) const MOST_TEXEL_PX: f64 = CELL_PX / LEAST_TEXELS_PER_BIT;
 
-/// Edge of a tag's cell in the picture, px.
+/// Edge of a tag cell in the image, px.
 const CELL_PX: f64 = 8.0;
 
-/// Longest side of a picture, px.
+/// Longest side of an image, px.
 const MAX_SIDE_PX: f64 = 4000.0;
 
-/// Distance of the camera in radii of the face, and its step aside, so that it sees the face at an
-/// angle of 11°, where depth matters.
+/// Distance of the camera in radii of the face, and its sideways offset, so that it sees the face at an angle of 11°,
+/// where depth matters.
 const DISTANCE: f64 = 6.0;
 const ASIDE: f64 = 1.2;
 
-/// The camera's roll, 15°: no edge of triangles or squares runs along rows or columns of pixels, where samples would see
-/// it in steps.
+/// Roll of the camera, 15°: no edge of a triangle or square runs along rows or columns of pixels, where samples would
+/// see it as steps.
 const ROLL_RAD: f64 = std::f64::consts::PI / 12.0;
 
-/// A camera before a face, from where the target says that it is; on one side of it from where
-/// nothing hides the face, if there is one.
+/// Returns a camera in front of the stated position of a face, on a side from which nothing hides the face, if there
+/// is one.
 pub(super) fn view(verifier: &Verifier, model: &Model, panel: &Panel) -> (View, f64) {
     let centre = panel.middle_mm();
     let corners = || panel.corners.iter().map(|c| c.target_mm);

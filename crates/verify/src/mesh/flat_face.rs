@@ -1,5 +1,5 @@
-//! The texture of a face of a mesh, drawn flat as seen from its front, so that a face is checked like
-//! a printed page.
+//! The texture of a mesh face, drawn flat as seen from its front, so that the face can be compared like a printed
+//! page.
 
 use glam::{DVec2, DVec3};
 
@@ -12,7 +12,8 @@ use deltille_core::raster::Gray;
 use deltille_core::targets::{Panel, TargetSpec};
 use deltille_layout::Placement;
 
-/// Greatest distance of the triangles of a face from the plane of its panel, and of their corners from its outline, mm.
+/// Largest distance of the triangles of a face from the plane of its panel, and of their corners from its outline,
+/// mm.
 const IN_PLANE_MM: f64 = 0.25;
 
 /// Samples of the texture per pixel of the page along each axis.
@@ -21,12 +22,12 @@ const SAMPLES: usize = 2;
 /// A triangle on the front of a face.
 pub(super) struct Front<'a> {
     pub triangle: &'a Triangle,
-    /// Its corners in the panel frame, mm: those of the face, where they are near to them.
+    /// Its corners in the panel frame, mm: replaced by those of the face where they are close.
     pub flat: [DVec2; 3],
 }
 
-/// The triangles of a mesh that lie on a face with this outline, counter-clockwise in the frame of its panel, mm, and are
-/// seen from its front.
+/// Returns the triangles of a mesh that lie on a face and are visible from its front. `outline` is that of the face,
+/// counter-clockwise in the panel frame, mm.
 pub(super) fn front<'a>(model: &'a Model, panel: &Panel, outline: &[DVec2]) -> Vec<Front<'a>> {
     let sides = || outline.iter().zip(outline.iter().cycle().skip(1));
     let is_in = |p: DVec2| {
@@ -47,10 +48,11 @@ pub(super) fn front<'a>(model: &'a Model, panel: &Panel, outline: &[DVec2]) -> V
     front.collect()
 }
 
-/// The texture of a loaded mesh on the face of a panel, seen from its front, as a page, and the
-/// placement of the panel on that page; white where no triangle is in the face.
+/// Returns the texture of a loaded mesh on the face of a panel, seen from its front, as a page, and the placement of
+/// the panel on that page. The page is white where no triangle lies on the face.
 ///
-/// `area_mm` is the left, lower, right and upper end of the page in the panel frame, and `px_per_mm` its resolution.
+/// `area_mm` contains the left, lower, right and upper bound of the page in the panel frame; `px_per_mm` is its
+/// resolution.
 pub(super) fn face_page(
     model: &Model,
     panel: &Panel,
@@ -64,10 +66,10 @@ pub(super) fn face_page(
         [width_mm, height_mm].map(|mm| (mm * px_per_mm).ceil().max(1.0) as usize * SAMPLES);
     let scale = px_per_mm * SAMPLES as f64;
     let mut shades = vec![u8::MAX; width * height];
-    // Side of the largest pixel of the texture, px of the page: it smears edges by as much.
+    // Size of the largest texture pixel, px of the page: it smears edges by the same amount.
     let mut texel_px = 0.0f64;
     for Front { triangle, flat } in front {
-        // In samples of the page, whose centres are integers; y runs down there and up on the panel.
+        // In samples of the page, with centres at integers; y points down there and up on the panel.
         let [a, b, c] =
             flat.map(|p| DVec2::new(p.x - left, upper - p.y) * scale - DVec2::splat(0.5));
         let area = (b - a).perp_dot(c - a);
@@ -102,7 +104,7 @@ pub(super) fn face_page(
     (page, Placement { panel: panel.id, angle_rad: 0.0, origin_mm: DVec2::new(-left, -lower) })
 }
 
-/// The outline of a panel's face, or of the side of a plate, counter-clockwise in the panel frame, mm.
+/// Returns the outline of a panel's face, or of the side of a plate, counter-clockwise in the panel frame, mm.
 pub(super) fn face_outline_mm(verifier: &Verifier, panel: &Panel) -> Vec<DVec2> {
     let of_plate = || rectangle(panel.field_mm()).to_vec();
     let TargetSpec::Solid(spec) = &verifier.target().spec else { return of_plate() };

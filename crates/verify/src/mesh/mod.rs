@@ -1,12 +1,12 @@
-//! Meshes with textures: boards and solids as other programs show them.
+//! Textured meshes: boards and solids as other programs show them.
 //!
-//! Comes in: a loaded mesh. Goes out: a verdict on each face, and on the surface.
+//! Input: a loaded mesh. Output: a verdict on each face and on the surface.
 //!
-//! 1. `simulator` finds the mesh that a model for a simulator puts in its place.
-//! 2. `textured` runs the following on it; `measures` says how exact a mesh must be.
-//! 3. `face_view` puts a camera before a face; `face` projects every corner that it sees back onto the mesh.
-//! 4. `flat_face` draws the texture flat; `print` compares that like a page, and with `texels` texel by texel.
-//! 5. `surface` looks at what is no print.
+//! 1. `simulator` finds the mesh that a simulator model places.
+//! 2. `textured` runs the following steps on it; `measures` contains their tolerances.
+//! 3. `face_view` places a camera in front of a face; `face` projects every detected corner back onto the mesh.
+//! 4. `flat_face` draws the texture flat; `print` compares the result like a page, and with `texels` texel by texel.
+//! 5. `surface` checks what is not printed.
 
 mod face;
 mod face_view;

@@ -1,4 +1,4 @@
-//! The texture on a face, compared like a printed page and then texel by texel.
+//! Comparison of the texture of a face, like a printed page and then texel by texel.
 
 use glam::DVec2;
 
@@ -16,10 +16,10 @@ use crate::verdict::FaceVerdict;
 use crate::verifier::Verifier;
 use deltille_core::targets::Panel;
 
-/// White around a face in its picture, px.
+/// White margin around a face in its image, px.
 const AROUND_PX: f64 = 8.0;
 
-/// Compares the texture on the face, tile by tile and cell by cell, and looks for other marks.
+/// Compares the texture of the face tile by tile and cell by cell, and searches for other marks.
 pub(super) fn check_print(
     verifier: &Verifier,
     model: &Model,
@@ -29,7 +29,7 @@ pub(super) fn check_print(
 ) {
     let outline = face_outline_mm(verifier, panel);
     let front = front(model, panel, &outline);
-    // Texels just beside the face are on the page, too.
+    // Texels just outside the face are on the page, too.
     let around_mm = DVec2::splat(AROUND_PX / px_per_mm);
     let low = outline.iter().copied().reduce(DVec2::min).unwrap_or_default() - around_mm;
     let high = outline.iter().copied().reduce(DVec2::max).unwrap_or_default() + around_mm;

@@ -1,5 +1,5 @@
-//! Verification of models for simulators that name the mesh in an OBJ: the model must put it where the target is, and
-//! the OBJ must be that of the target.
+//! Verification of simulator models that name the mesh of an OBJ: the model must place the mesh at the target frame,
+//! and the OBJ must be that of the target.
 
 use std::path::Path;
 
@@ -12,7 +12,7 @@ use crate::reading::reader::Reader;
 use crate::verdict::Verdict;
 use crate::verifier::Verifier;
 
-/// Compares a `.sdf`, `.urdf` or MuJoCo's `.xml`, and the mesh that it shows, with the target.
+/// Compares a `.sdf`, `.urdf` or MuJoCo `.xml`, and the mesh that it shows, with the target.
 pub(crate) fn verify(
     verifier: &Verifier,
     reader: &Reader,

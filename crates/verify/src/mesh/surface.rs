@@ -1,4 +1,5 @@
-//! What of a mesh is no print: its size, its vertices, whether it is closed, and what lies beside its faces.
+//! Checks of a mesh that are independent of the print: its size, its vertices, whether it is closed, and what lies
+//! beside its faces.
 
 use std::collections::BTreeSet;
 
@@ -24,12 +25,12 @@ pub(super) fn sides(target: &Target) -> &[Panel] {
     &target.panels[..count.min(target.panels.len())]
 }
 
-/// What of a plate is on no side with a board, and should be white and behind all of them.
+/// Checks the parts of a plate outside the sides with boards: they must be white and behind all boards.
 pub(super) fn beside_boards(model: &Model, sides: &[Panel]) -> Option<Finding> {
     let problem = model.triangles.iter().find_map(|triangle| {
         let heights = |side: &Panel| triangle.vertices_mm.map(|v| side.pose.panel_from_target(v).z);
         if sides.iter().flat_map(heights).any(|z| z > MESH_TOLERANCE_MM) {
-            return Some("a part of the plate stands before the board");
+            return Some("a part of the plate protrudes in front of the board");
         }
         if sides.iter().any(|side| heights(side).iter().all(|z| z.abs() <= MESH_TOLERANCE_MM)) {
             return None;
@@ -43,8 +44,8 @@ pub(super) fn beside_boards(model: &Model, sides: &[Panel]) -> Option<Finding> {
     problem.map(|problem| MeshFinding::Body { problem: problem.to_owned() }.into())
 }
 
-/// Largest distance from the origin on the mesh over that on the target's solid, and the latter,
-/// mm.
+/// Returns the ratio of the largest distance from the origin on the mesh to that on the target's solid, and the
+/// latter, mm.
 pub(super) fn scale(verifier: &Verifier, model: &Model) -> Option<(f64, f64)> {
     let TargetSpec::Solid(spec) = &verifier.target().spec else { return None };
     let radius = |lengths: &mut dyn Iterator<Item = f64>| lengths.fold(0.0, f64::max);
@@ -54,8 +55,8 @@ pub(super) fn scale(verifier: &Verifier, model: &Model) -> Option<(f64, f64)> {
     Some((found / stated, stated))
 }
 
-/// What is wrong with a mesh beside its faces: triangles of a solid that lie on none of them, or in another order, textures
-/// of different resolutions, or ink in a texture that no triangle shows.
+/// Checks a mesh beside its faces: triangles of a solid that lie on no face or are in a different order, textures of
+/// different resolutions, and ink in a texture that no triangle shows.
 pub(super) fn not_on_faces(verifier: &Verifier, model: &Model) -> Option<Finding> {
     let body = |problem: String| Some(MeshFinding::Body { problem }.into());
     let panels = match &verifier.target().spec {
@@ -70,21 +71,23 @@ pub(super) fn not_on_faces(verifier: &Verifier, model: &Model) -> Option<Finding
         return body(format!("{on_faces} of {all} triangles lie on the faces"));
     }
     if !fronts.iter().zip(&model.triangles).all(|(front, next)| std::ptr::eq(*front, next)) {
-        return body("triangles in another order than that of the faces".to_owned());
+        return body("triangles in a different order than the faces".to_owned());
     }
     let texels = || fronts.iter().map(|triangle| model.texel_mm(triangle));
     let (finest, coarsest) = (texels().fold(f64::INFINITY, f64::min), texels().fold(0.0, f64::max));
     if coarsest > (1.0 + TEXEL_SLACK) * finest {
-        return body(format!("textures of {finest:.4} to {coarsest:.4} mm for a pixel"));
+        return body(format!(
+            "textures with different pixel sizes: {finest:.4} to {coarsest:.4} mm"
+        ));
     }
     let [texture, column, row] = texels::hidden(model)?;
     body(format!(
-        "ink at column {column}, row {row} of texture {}, which no face shows",
+        "ink at column {column}, row {row} of texture {}, in an area that no face shows",
         texture + 1
     ))
 }
 
-/// What is wrong with the surface where everything on it is right: its vertices, and that it is closed.
+/// Checks the surface if everything on it is right: its vertices, and that it is closed.
 pub(super) fn wrong_surface(verifier: &Verifier, model: &Model) -> Option<Finding> {
     let stated: Vec<DVec3> = match &verifier.target().spec {
         TargetSpec::Solid(spec) => spec.polyhedron().vertices_mm,
@@ -103,7 +106,7 @@ pub(super) fn wrong_surface(verifier: &Verifier, model: &Model) -> Option<Findin
             let Some(index) = index_of(place) else {
                 let DVec3 { x, y, z } = place;
                 return body(format!(
-                    "a vertex at ({}, {}, {}) mm where the body has none",
+                    "unexpected vertex at ({}, {}, {}) mm",
                     shown(x),
                     shown(y),
                     shown(z)
@@ -137,10 +140,10 @@ pub(super) fn wrong_surface(verifier: &Verifier, model: &Model) -> Option<Findin
     })
 }
 
-/// Relative tolerance of a volume: that of vertices that are off by what they may, on the smallest bodies.
+/// Relative tolerance of a volume: that of vertices displaced within their tolerance, on the smallest bodies.
 const VOLUME_SLACK: f64 = 0.1;
 
-/// The vertices of the plate of a board: the corners of its field, and those behind them by the thickness that it has.
+/// Returns the vertices of the plate of a board: the corners of its field, and those behind them by its thickness.
 fn plate_vertices(panel: &Panel, thickness_mm: Option<f64>, model: &Model) -> Vec<DVec3> {
     let front = rectangle(panel.field_mm()).map(|corner| panel.pose.target_from_panel(corner));
     let vertices = model.triangles.iter().flat_map(|triangle| triangle.vertices_mm);

@@ -1,4 +1,4 @@
-//! Comparison of the texture on a face, texel by texel, over all that a viewer shows of it.
+//! Comparison of the texture of a face, texel by texel, over everything that a viewer shows of it.
 //!
 //! ```text
 //!    ·───·───·     A viewer interpolates between the four texels around a point, so a triangle
@@ -20,10 +20,10 @@ use crate::panel::pattern::{EDGE_PX, PROBES, Pattern};
 use deltille_core::raster::Gray;
 use deltille_core::targets::Panel;
 
-/// Least area of a triangle on the texture of a printed face, squared texels.
+/// Minimum area of a triangle on the texture of a printed face, squared texels.
 const LEAST_AREA: f64 = 1e-6;
 
-/// Texels at exactly the distance of one are not shown: their weight is 0.
+/// Texels at a distance of exactly one are not shown: their weight is 0.
 const OPEN: f64 = 1e-6;
 
 /// A face and its texture.
@@ -33,13 +33,13 @@ pub(super) struct Texels<'a> {
     pub pattern: &'a Pattern<'a>,
     /// Outline of the black field of an inverted panel, counter-clockwise, mm.
     pub field: Vec<DVec2>,
-    /// Whether the field is the whole face, so that its outline is no printed edge.
+    /// Whether the field is the whole face, so that its outline is not a printed edge.
     pub fills_face: bool,
 }
 
 impl Texels<'_> {
-    /// Marks the pixels of a page on which a texel of `front` has the wrong colour; those of tiles only if they are
-    /// `with_tiles`. An error says why the texture cannot be compared.
+    /// Marks the pixels of a page where a texel of `front` has the wrong colour; those on tiles only if `with_tiles`
+    /// is set. Returns an error if the texture cannot be compared.
     pub(super) fn wrong(
         &self,
         front: &[Front],
@@ -53,7 +53,7 @@ impl Texels<'_> {
             let (texture, size) = self.model.texture(triangle);
             let corners = triangle.uv.map(|uv| uv * size - 0.5);
             let panel_from_texel = affine(corners, *flat)
-                .ok_or("a triangle of a printed face shows no area of the texture")?;
+                .ok_or("a triangle of a printed face has no area on the texture")?;
             let rows: Vec<_> = rows(corners, texture).collect();
             let texel_mm = self.model.texel_mm(triangle);
             let found: Vec<DVec2> = (rows.into_par_iter())
@@ -76,7 +76,7 @@ impl Texels<'_> {
         Ok(wrong)
     }
 
-    /// Whether a texel at a place on the panel, mm, has a colour that is wrong there, and is no part of an edge.
+    /// Whether a texel at a position on the panel, mm, has the wrong colour and is not part of an edge.
     fn is_wrong(&self, light: u8, place: DVec2, texel_mm: f64, with_tiles: bool) -> bool {
         let ink = 1.0 - f64::from(light) / 255.0;
         let at = place / self.panel.edge_mm;
@@ -89,7 +89,7 @@ impl Texels<'_> {
         if !with_tiles && self.pattern.has_tile_at(at) {
             return false;
         }
-        // Where edges are drawn: within the tolerance of positions, and what drawing smears.
+        // Around drawn edges: within the tolerance of positions, plus the smear of drawing.
         let smear_mm = EDGE_PX * texel_mm;
         let near_mm = smear_mm + MESH_TOLERANCE_MM;
         let field_mm = if self.fills_face { smear_mm } else { near_mm };
@@ -104,7 +104,7 @@ impl Texels<'_> {
         })
     }
 
-    /// How far a place lies within the field of an inverted panel, mm.
+    /// Returns how far a position lies within the field of an inverted panel, mm.
     fn inside_mm(&self, place: DVec2) -> f64 {
         let next = self.field.iter().cycle().skip(1);
         let depths = self
@@ -116,7 +116,8 @@ impl Texels<'_> {
     }
 }
 
-/// The map from texels to the panel, mm, by the corners of a triangle on both; `None` where it has no area on the texture.
+/// Returns the map from texels to the panel, mm, given the corners of a triangle on both; `None` if it has no area on
+/// the texture.
 fn affine(texels: [DVec2; 3], flat: [DVec2; 3]) -> Option<DAffine2> {
     let sides = |[a, b, c]: [DVec2; 3]| DMat2::from_cols(b - a, c - a);
     let of_texture = sides(texels);
@@ -125,10 +126,10 @@ fn affine(texels: [DVec2; 3], flat: [DVec2; 3]) -> Option<DAffine2> {
     Some(DAffine2::from_mat2_translation(matrix, flat[0] - matrix * texels[0]))
 }
 
-/// The rows of a texture of which a triangle shows something, each with its columns. Texels have whole numbers.
+/// Returns the rows of a texture that a triangle shows in part, each with its columns. Texels are at integers.
 fn rows(corners: [DVec2; 3], texture: &Gray<u8>) -> impl Iterator<Item = (usize, Range<usize>)> {
     let (width, height) = (texture.width(), texture.height());
-    // From the first to behind the last that lies less than one from an extent.
+    // From the first to past the last one within a distance of one of an extent.
     let reached = |[low, high]: [f64; 2], size: usize| {
         let last = size as f64 - 1.0;
         let first = (low - 1.0 + OPEN).ceil().clamp(0.0, last) as usize;
@@ -141,7 +142,7 @@ fn rows(corners: [DVec2; 3], texture: &Gray<u8>) -> impl Iterator<Item = (usize,
     };
     let across = extent(&mut corners.iter().map(|corner| corner.y));
     reached(across, height).map(move |row| {
-        // The part of the triangle less than a row from this one; beyond the edge of the texture its last row is shown.
+        // The part of the triangle within one row of this one; beyond the edge of the texture its last row is shown.
         let first = if row == 0 { f64::NEG_INFINITY } else { row as f64 - 1.0 };
         let last = if row + 1 == height { f64::INFINITY } else { row as f64 + 1.0 };
         let sides = (0..3).map(|i| [corners[i], corners[(i + 1) % 3]]);
@@ -158,7 +159,7 @@ fn rows(corners: [DVec2; 3], texture: &Gray<u8>) -> impl Iterator<Item = (usize,
     })
 }
 
-/// Whether the triangles show so much of the textures that they share parts of them: each has its own.
+/// Whether the triangles show so much of the textures that they must share parts of them; each should have its own.
 pub(super) fn are_shared(model: &Model) -> bool {
     let area = |triangle: &Triangle| {
         let (_, size) = model.texture(triangle);
@@ -170,7 +171,7 @@ pub(super) fn are_shared(model: &Model) -> bool {
     shown > pixels as f64
 }
 
-/// A texel that is not white although no triangle shows it, as the texture and its column and row: coarser levels of a
+/// Finds a texel that is not white although no triangle shows it, as texture, column and row: coarser levels of a
 /// texture would blend it into a face.
 pub(super) fn hidden(model: &Model) -> Option<[usize; 3]> {
     (0..model.textures.len()).find_map(|index| {
@@ -200,9 +201,9 @@ pub(super) fn hidden(model: &Model) -> Option<[usize; 3]> {
 mod tests {
     use super::*;
 
-    /// Every texel that takes part in the interpolation at a point of a triangle is among its rows.
+    /// Every texel used for interpolation at a point of a triangle is among its rows.
     #[test]
-    fn all_texels_that_interpolation_takes_are_in_the_rows() {
+    fn all_interpolated_texels_are_in_the_rows() {
         let texture = Gray::<u8>::new(12, 9);
         let corners = [DVec2::new(1.3, 0.2), DVec2::new(10.9, 3.7), DVec2::new(4.4, 7.9)];
         let mut listed = [[false; 12]; 9];

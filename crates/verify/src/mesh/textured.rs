@@ -1,4 +1,4 @@
-//! A mesh with textures as a whole: what tells that it is another one, then face by face.
+//! A textured mesh as a whole: first whether it is a different mesh, then face by face.
 
 use std::path::Path;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -26,14 +26,14 @@ use deltille_files::export::mesh::PLATE_TRIANGLES;
 /// Tolerance of a unit normal.
 const NORMAL_SLACK: f64 = 1e-4;
 
-/// A mesh this much larger or smaller, relative, is not looked at any further.
+/// A mesh whose size differs by more than this, relative, is not examined further.
 const MAX_SCALE_ERROR: f64 = 0.05;
 
 /// Reads a mesh with its textures, and compares it with the target.
 ///
 /// # Errors
 ///
-/// A file is missing or cannot be read. Deviations are findings of the verdict.
+/// Returns an error if a file is missing or cannot be read. Deviations are findings of the verdict.
 pub(crate) fn verify(
     verifier: &Verifier,
     reader: &Reader,
@@ -58,7 +58,7 @@ fn compare(verifier: &Verifier, path: &Path, model: Model, format: Format) -> Ve
         findings.push(BoardFinding::Scale { panel: verifier.target().panels[0].id, scale }.into());
     }
     let stated = match &verifier.target().spec {
-        // As many as the faces have, all of which are looked at: there is nothing else.
+        // If all triangles lie on compared faces, there is nothing else to check.
         TargetSpec::Solid(spec) => Some(spec.polyhedron().triangles_mm().len()),
         spec if spec.is_on_plate() => {
             findings.extend(beside_boards(&model, sides(verifier.target())));
@@ -77,7 +77,7 @@ fn compare(verifier: &Verifier, path: &Path, model: Model, format: Format) -> Ve
     if model.triangles.iter().flat_map(|triangle| &triangle.uv).any(is_beyond)
         || texels::are_shared(&model)
     {
-        let problem = "triangles that share a part of a texture, or lie beyond it".to_owned();
+        let problem = "triangles that share part of a texture or extend beyond it".to_owned();
         findings.push(MeshFinding::Body { problem }.into());
         return Verdict::new(path, format, findings);
     }
@@ -95,7 +95,7 @@ fn compare(verifier: &Verifier, path: &Path, model: Model, format: Format) -> Ve
         let check = |panel| {
             let verdict = check_face(verifier, &model, panel);
             let done = done.fetch_add(1, Ordering::Relaxed) + 1;
-            verifier.tell(done, verifier.target().panels.len());
+            verifier.report_progress(done, verifier.target().panels.len());
             verdict
         };
         faces = panels.map(check).collect();

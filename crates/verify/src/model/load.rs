@@ -1,9 +1,8 @@
-//! Textured meshes, `.glb` and `.obj`, loaded through the gltf and tobj crates, as other programs
-//! load them, and the lists of a `.usda`.
+//! Loaders for textured meshes: `.glb` and `.obj` through the gltf and tobj crates, as other programs load them, and
+//! the lists of a `.usda`.
 //!
-//! Whatever the format, positions are returned in millimetres, and texture coordinates with the
-//! origin in the upper left corner. The files were inspected before, see [`construct`], so that
-//! nothing is interpreted here beyond what every viewer shows alike.
+//! All formats return positions in millimetres, and texture coordinates with the origin in the upper left corner. The
+//! files have already been inspected, see [`construct`], so every viewer interprets them as the code here does.
 //!
 //! [`construct`]: crate::construct
 
@@ -27,8 +26,8 @@ use deltille_files::limits::Limits;
 ///
 /// # Errors
 ///
-/// The file cannot be read or exceeds the limits, the crate that loads it refuses it, a vertex lacks
-/// its normal or texture coordinate, or there are no triangles, or some without texture.
+/// Returns an error if the file cannot be read or exceeds the limits, its loader rejects it, a vertex lacks a normal
+/// or texture coordinate, there are no triangles, or some have no texture.
 pub(crate) fn load(
     reader: &Reader,
     path: &Path,
@@ -48,15 +47,15 @@ pub(crate) fn load(
     Ok(model)
 }
 
-/// Loads a `.glb`; the error says what is wrong with it.
+/// Loads a `.glb`. Returns an error that says what is wrong with it.
 fn glb(bytes: &[u8], limits: &Limits) -> Result<Model, String> {
     let file = gltf::Gltf::from_slice(bytes).map_err(|error| format!("not glTF: {error}"))?;
-    let blob = file.blob.as_deref().ok_or("it has no binary part")?;
+    let blob = file.blob.as_deref().ok_or("it has no binary chunk")?;
     let mut triangles = Vec::new();
-    // By index: for each child, the crate would count through all nodes.
+    // By index: the crate would search through all nodes for each child.
     let nodes: Vec<gltf::Node> = file.nodes().collect();
     let roots = file.default_scene().into_iter().flat_map(|scene| scene.nodes());
-    // Every node is reached once, as was checked before, so this ends.
+    // The inspection has shown that every node is reached once, so this ends.
     let mut open: Vec<(usize, DMat4)> = roots.map(|node| (node.index(), DMat4::IDENTITY)).collect();
     while let Some((index, parent)) = open.pop() {
         let here = visit(&nodes[index], parent, blob, &mut triangles)?;
@@ -75,7 +74,7 @@ fn glb(bytes: &[u8], limits: &Limits) -> Result<Model, String> {
     model(triangles, textures, limits)
 }
 
-/// Adds the triangles of a node, converted from the metres of glTF to mm; returns the transform from the node to the
+/// Adds the triangles of a node, converted from the metres of glTF to mm. Returns the transform from the node to the
 /// scene.
 fn visit(
     node: &gltf::Node,
@@ -158,17 +157,17 @@ fn usda(bytes: &[u8], parts: &[Artifact], limits: &Limits) -> Result<Model, Stri
     let uvs: Vec<DVec2> =
         uvs.as_chunks::<2>().0.iter().map(|&[u, v]| DVec2::new(u, 1.0 - v)).collect();
     if take("int[] faceVertexCounts")?.iter().any(|&count| count != 3.0) {
-        return Err("a face that is no triangle".to_owned());
+        return Err("a face that is not a triangle".to_owned());
     }
     let indices: Vec<u32> =
         take("int[] faceVertexIndices")?.into_iter().map(|index| index as u32).collect();
     let [least, most] = [DVec3::min, DVec3::max]
         .map(|pick| metres.iter().copied().reduce(pick).unwrap_or_default());
     if extent.len() != 2 || extent[0].distance(least) + extent[1].distance(most) > 1e-6 {
-        return Err("an extent that is not that of the points".to_owned());
+        return Err("an extent that does not match the points".to_owned());
     }
     let positions: Vec<DVec3> = metres.into_iter().map(|place| place * 1e3).collect();
-    // Normals and texture coordinates are of the corners of faces, one after the other.
+    // Normals and texture coordinates belong to the corners of faces, in order.
     let corners: Vec<u32> = (0..indices.len() as u32).collect();
     let mut triangles = Vec::new();
     add(&mut triangles, 0, &indices, &positions, (&corners, &normals), (&corners, &uvs))?;
@@ -178,7 +177,7 @@ fn usda(bytes: &[u8], parts: &[Artifact], limits: &Limits) -> Result<Model, Stri
     model(triangles, parts.iter().map(|part| Some(part.bytes())), limits)
 }
 
-/// Gives each triangle the texture of its subset; each must be in one.
+/// Assigns each triangle the texture of its subset; each must be in exactly one.
 fn of_subsets(
     triangles: &mut [Triangle],
     subsets: impl Iterator<Item = Vec<f64>>,
@@ -188,7 +187,7 @@ fn of_subsets(
         for face in faces {
             let face = face as usize;
             if !left.remove(&face) {
-                return Err("a face in two subsets, or one that is not there".to_owned());
+                return Err("a face that is in two subsets or does not exist".to_owned());
             }
             triangles[face].texture = texture;
         }
@@ -196,7 +195,7 @@ fn of_subsets(
     if left.is_empty() { Ok(()) } else { Err("a face in no subset".to_owned()) }
 }
 
-/// A model with its textures decoded; they have no more pixels together than a picture may have.
+/// Creates a model with decoded textures; together they have no more pixels than one image may have.
 fn model<'a>(
     triangles: Vec<Triangle>,
     pictures: impl Iterator<Item = Option<&'a [u8]>>,
@@ -213,8 +212,8 @@ fn model<'a>(
     }
 }
 
-/// Adds the triangles of a texture from indexed lists: three entries each of the indices into positions, mm, and of
-/// those into normals and texture coordinates.
+/// Adds the triangles of a texture from indexed lists: three indices each into positions, mm, and three into normals
+/// and texture coordinates.
 fn add(
     triangles: &mut Vec<Triangle>,
     texture: usize,
@@ -225,7 +224,7 @@ fn add(
 ) -> Result<(), String> {
     fn pick<T: Copy>(list: &[T], at: Option<&u32>) -> Result<T, String> {
         let found = at.and_then(|&at| list.get(at as usize)).copied();
-        found.ok_or_else(|| "an index points nowhere".to_owned())
+        found.ok_or_else(|| "an index is out of range".to_owned())
     }
     for first in (0..indices.len() / 3).map(|i| 3 * i) {
         let three = [first, first + 1, first + 2];
@@ -245,10 +244,10 @@ fn add(
     Ok(())
 }
 
-/// Decodes a texture to grey values, after so many pixels of others.
+/// Decodes a texture to grey values; `before` counts the pixels of all textures so far.
 fn image(bytes: &[u8], before: &mut u64, limits: &Limits) -> Result<Gray<u8>, String> {
     let broken = |error: &dyn std::fmt::Display| format!("its texture: {error}");
-    // Only PNG comes so far.
+    // The inspection accepts only PNG.
     let mut reader = image::ImageReader::with_format(Cursor::new(bytes), image::ImageFormat::Png);
     reader.no_limits();
     let decoder = reader.into_decoder().map_err(|error| broken(&error))?;

@@ -6,20 +6,20 @@ use deltille_core::raster::Gray;
 
 /// A loaded mesh with its textures, in the target frame.
 pub(crate) struct Model {
-    /// Its triangles, each with a texture that is there.
+    /// Its triangles, each with an existing texture.
     pub triangles: Vec<Triangle>,
     /// Its textures as grey values.
     pub textures: Vec<Gray<u8>>,
 }
 
 impl Model {
-    /// The texture of a triangle, and its size, px.
+    /// Returns the texture of a triangle, and its size, px.
     pub(crate) fn texture(&self, triangle: &Triangle) -> (&Gray<u8>, DVec2) {
         let texture = &self.textures[triangle.texture];
         (texture, DVec2::new(texture.width() as f64, texture.height() as f64))
     }
 
-    /// Side of a pixel of its texture on a triangle, mm.
+    /// Returns the size of a texture pixel on a triangle, mm.
     pub(crate) fn texel_mm(&self, triangle: &Triangle) -> f64 {
         let (_, size_px) = self.texture(triangle);
         let [a, b, c] = triangle.uv.map(|uv| uv * size_px);
@@ -34,15 +34,14 @@ pub(crate) struct Triangle {
     pub vertices_mm: [DVec3; 3],
     /// Stated normals in the target frame.
     pub normals: [DVec3; 3],
-    /// Texture coordinates, 0 to 1: (0, 0) is the upper left corner of the texture, (1, 1) the lower
-    /// right one.
+    /// Texture coordinates, 0 to 1: (0, 0) is the upper left corner of the texture, (1, 1) the lower right corner.
     pub uv: [DVec2; 3],
-    /// Which texture they are of.
+    /// Index of its texture.
     pub texture: usize,
 }
 
 impl Triangle {
-    /// Normal that follows from the order of the vertices; its length is twice the area, mm².
+    /// Returns the normal given by the order of the vertices; its length is twice the area, mm².
     pub(crate) fn winding(&self) -> DVec3 {
         let [a, b, c] = self.vertices_mm;
         (b - a).cross(c - a)

@@ -1,10 +1,11 @@
-//! Meshes read back, by other code than wrote them.
+//! Meshes read back by code independent of their writer.
 //!
-//! Comes in: a file that was inspected. Goes out: its triangles, and what a camera sees of them.
+//! Input: an inspected file. Output: its triangles, and the view of a camera on them.
 //!
-//! 1. `load` reads a mesh with textures through the gltf and tobj crates, as other programs do; `stl` one without.
-//! 2. `mesh` is that as values.
-//! 3. `view` is a virtual camera before it.
+//! 1. `load` reads a textured mesh through the gltf and tobj crates, as other programs do; `stl` reads an untextured
+//!    one.
+//! 2. `mesh` is the mesh as values.
+//! 3. `view` is a virtual camera in front of it.
 
 pub(super) mod load;
 pub(super) mod mesh;

@@ -1,5 +1,5 @@
-//! Binary STL, read by code of its own: a header of 80 bytes, the number of triangles, and 50 bytes
-//! for each: normal, three vertices, and two attribute bytes.
+//! A separate reader for binary STL: a header of 80 bytes, the number of triangles, and 50 bytes for each: normal,
+//! three vertices, and two attribute bytes.
 
 use std::path::Path;
 
@@ -8,7 +8,7 @@ use glam::{DVec3, Vec3};
 use crate::reading::error::DocumentError;
 use crate::reading::reader::Reader;
 
-/// Number of bytes before the triangles, and of a triangle.
+/// Number of bytes before the triangles, and of one triangle.
 const HEAD: usize = 84;
 const TRIANGLE: usize = 50;
 
@@ -24,8 +24,8 @@ pub(crate) struct Facet {
 ///
 /// # Errors
 ///
-/// The file cannot be read, is too short, has no triangles, or its length is not that of the number
-/// of triangles that it states; text STL is refused by that as well.
+/// Returns an error if the file cannot be read, is too short, has no triangles, or its length does not match the
+/// number of triangles that it states. The last condition also rejects text STL.
 pub(crate) fn load_stl(reader: &Reader, path: &Path) -> Result<Vec<Facet>, DocumentError> {
     let unreadable = |problem: &str| DocumentError::unreadable(path, problem);
     let bytes = reader.read(path)?;
@@ -34,7 +34,9 @@ pub(crate) fn load_stl(reader: &Reader, path: &Path) -> Result<Vec<Facet>, Docum
     };
     let count = u32::from_le_bytes([head[80], head[81], head[82], head[83]]) as usize;
     if count == 0 || Some(body.len()) != count.checked_mul(TRIANGLE) {
-        return Err(unreadable("not a binary STL: its length is not that of its triangles"));
+        return Err(unreadable(
+            "not a binary STL: its length does not match its number of triangles",
+        ));
     }
     let facets = body.chunks_exact(TRIANGLE).map(|record| {
         let vectors: Vec<DVec3> = record.as_chunks::<12>().0[..4].iter().map(vector).collect();
@@ -43,7 +45,7 @@ pub(crate) fn load_stl(reader: &Reader, path: &Path) -> Result<Vec<Facet>, Docum
     Ok(facets.collect())
 }
 
-/// Three numbers in single precision, little endian.
+/// Returns three little-endian numbers in single precision.
 fn vector(bytes: &[u8; 12]) -> DVec3 {
     let number =
         |i: usize| f32::from_le_bytes([bytes[i], bytes[i + 1], bytes[i + 2], bytes[i + 3]]);

@@ -1,5 +1,5 @@
-//! A virtual camera before a loaded mesh: renders it with its texture, and finds the point of the
-//! mesh behind a pixel.
+//! A virtual camera in front of a loaded mesh: renders it with its texture, and finds the point of the mesh behind a
+//! pixel.
 
 use glam::{DVec2, DVec3};
 
@@ -13,7 +13,7 @@ const SAMPLES: usize = 2;
 /// Grey value around the mesh, between the black and white of the print.
 const BACKGROUND: u8 = 128;
 
-/// A pinhole camera before a loaded mesh.
+/// A pinhole camera in front of a loaded mesh.
 pub(crate) struct View {
     /// The camera; it has no distortion.
     pub camera: Camera,
@@ -22,8 +22,8 @@ pub(crate) struct View {
 }
 
 impl View {
-    /// Renders the mesh: at each sample the texture of the nearest triangle whose front, by the order
-    /// of its vertices, faces the camera. A triangle with a vertex that is not projected is left out.
+    /// Renders the mesh: each sample shows the texture of the nearest triangle whose front, by the order of its
+    /// vertices, faces the camera. Skips a triangle with a vertex that cannot be projected.
     pub(crate) fn render(&self, model: &Model) -> Gray<u8> {
         let [width, height] = [self.camera.width, self.camera.height].map(|n| n as usize * SAMPLES);
         let mut nearest = vec![0.0f32; width * height];
@@ -56,8 +56,8 @@ impl View {
                     if weights.iter().any(|&w| w < 0.0) {
                         continue;
                     }
-                    // Texture coordinates over z and 1/z are affine on the screen, so these are
-                    // interpolated; 1/z also tells which triangle is nearest.
+                    // Texture coordinates over z and 1/z are affine on the screen, so these are interpolated; 1/z
+                    // also determines which triangle is nearest.
                     let per_z = [0, 1, 2].map(|i| weights[i] / seen[i].z);
                     let inverse_z: f64 = per_z.iter().sum();
                     let at = y * width + x;
@@ -79,8 +79,8 @@ impl View {
         })
     }
 
-    /// The first point of a front side of the mesh on the ray of a pixel, in the target frame, mm;
-    /// `None` where the ray hits nothing.
+    /// Returns the first point of a front side of the mesh on the ray of a pixel, in the target frame, mm; `None` if
+    /// the ray hits nothing.
     pub(crate) fn meet(&self, model: &Model, pixel: DVec2) -> Option<DVec3> {
         let target_from_camera = self.camera_from_target.inverse();
         let eye = target_from_camera.translation;
@@ -104,7 +104,7 @@ impl View {
     }
 }
 
-/// The three values, if all are there.
+/// Returns the three values if all are present.
 fn all<T: Copy>(values: [Option<T>; 3]) -> Option<[T; 3]> {
     let [a, b, c] = values;
     Some([a?, b?, c?])

@@ -1,5 +1,6 @@
-//! Folding: a face is laid where it is stated to be, and the others are turned about their common edges by the angles between
-//! the faces. Of several faces that may be the first, the one is taken with which the fewest are off.
+//! Folding: one face is placed at its stated position, and the others are rotated about the common edges by the
+//! angles between the faces. Several faces are tried as the first; the one that leaves the fewest faces displaced is
+//! used.
 
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
 
@@ -9,14 +10,14 @@ use crate::finding::fold::FoldFinding;
 use crate::net::motion::{FOLD_TOLERANCE_MM, SpaceFromPage};
 use crate::net::printed_net::{Net, Side};
 
-/// Most roots tried where the first leads to a contradiction: it may be the misprinted face itself.
+/// Number of roots tried if the first leads to a contradiction: that root may be the misprinted face itself.
 const MOST_ROOTS: usize = 32;
 
-/// The face of the solid in whose place a printed face comes to lie when the net is folded.
+/// The face of the solid at whose position a printed face ends when the net is folded.
 pub(super) struct Place {
     /// Index of the face that belongs there.
     slot: usize,
-    /// Vertices of the solid where the corners of the printed outline come to lie.
+    /// Vertices of the solid where the corners of the printed outline end.
     vertices: Vec<usize>,
     /// Pose of the part of the page with this face.
     pub space_from_page: SpaceFromPage,
@@ -24,18 +25,18 @@ pub(super) struct Place {
 
 /// The faces of a piece after folding.
 pub(super) struct Folded {
-    /// Index of each face that was reached, and its place.
+    /// Index of each face that was reached, and its position.
     pub places: Vec<(usize, Place)>,
     /// Deviations from the target.
     pub findings: Vec<FoldFinding>,
-    /// Whether a face is in the place of another, rotated, or was not reached.
+    /// Whether a face is at the position of another, rotated, or not reached.
     pub misplaced: bool,
-    /// Largest distance of a folded corner from its stated position, mm, of faces in their places.
+    /// Largest distance of a folded corner from its stated position, mm, over faces at their own positions.
     pub deviation_mm: f64,
 }
 
 impl Net {
-    /// The pieces of a sheet: faces that hang together by folds, the largest piece first.
+    /// Returns the pieces of a sheet: sets of faces connected by folds, the largest first.
     pub(super) fn pieces(&self, sheet: usize) -> Vec<Vec<usize>> {
         let mut left: BTreeSet<usize> =
             (0..self.faces.len()).filter(|&face| self.faces[face].sheet == sheet).collect();
@@ -55,8 +56,8 @@ impl Net {
         pieces
     }
 
-    /// Whether faces lack the fold by which they belong to another piece: whether a side of theirs is neither folded nor
-    /// numbered.
+    /// Whether faces lack the fold that connects them to another piece, that is, whether one of their sides is
+    /// neither folded nor numbered.
     pub(super) fn is_broken_off(&self, members: &[usize]) -> bool {
         let mut sides = members.iter().flat_map(|&face| self.sides_of(face));
         sides.any(|at| {
@@ -64,8 +65,8 @@ impl Net {
         })
     }
 
-    /// Folds the faces of a piece, `members`, about several roots and returns the result with the
-    /// fewest findings: if a misprinted face is the root, all others are off.
+    /// Folds the faces of a piece, `members`, about several roots and returns the result with the fewest findings: if
+    /// the root is a misprinted face, all other faces are displaced.
     pub(super) fn best_fold(&self, members: &[usize]) -> Folded {
         let mut best: Option<Folded> = None;
         for &root in members.iter().take(MOST_ROOTS) {
@@ -87,11 +88,11 @@ impl Net {
         best.unwrap_or(nothing)
     }
 
-    /// Lays `root` in its stated place, and folds the others one after the other, breadth first.
+    /// Places `root` at its stated position, and folds the others one after the other, breadth first.
     fn fold(&self, members: &[usize], root: usize) -> Folded {
         let face = &self.faces[root];
         let pose = &self.poses[root];
-        // space_from_panel · panel_from_page, with the inverse turn as a rotation about z.
+        // space_from_panel · panel_from_page, with the inverse rotation about z.
         let back = DVec2::new(face.page_from_panel.turn.x, -face.page_from_panel.turn.y);
         let columns = [DVec2::X, DVec2::Y].map(|axis| back.rotate(axis).extend(0.0));
         let linear = pose.linear * DMat3::from_cols(columns[0], columns[1], DVec3::Z);
@@ -115,13 +116,13 @@ impl Net {
         self.judge(members, places)
     }
 
-    /// The place of the face whose side `own` is folded against a `side` of a face that lies in the
-    /// place `parent`; `None` where the solid has no face across that edge. The fold is turned by the
-    /// angle between the stated normals of the two places about their edge.
+    /// Returns the position of the face whose side `own` is folded against the `side` of a face at position `parent`;
+    /// `None` if the solid has no face across that edge. The fold rotates by the angle between the stated normals of
+    /// the two positions, about their common edge.
     fn across(&self, parent: &Place, side: Side, own: Side) -> Option<Place> {
         let [a, b] = [0, 1].map(|end| parent.vertices[(side.side + end) % parent.vertices.len()]);
         let &Side { face: slot, side: slot_side } = self.along.get(&[b, a])?;
-        // The child's side runs from b to a, as that of the slot does, if that has as many corners.
+        // The child's side runs from b to a, as the side of that position does if it has the same number of corners.
         let (there, count) = (&self.faces[slot].vertices, self.faces[own.face].vertices.len());
         if there.len() != count {
             return None;
@@ -137,7 +138,7 @@ impl Net {
         Some(Place { slot, vertices, space_from_page })
     }
 
-    /// Compares the places of the faces with their own, and folded corners with stated ones.
+    /// Compares the positions of the faces with their own, and folded corners with stated ones.
     fn judge(&self, members: &[usize], places: BTreeMap<usize, Place>) -> Folded {
         let (mut findings, mut deviation_mm, mut misplaced) = (Vec::new(), 0.0f64, false);
         for &index in members {

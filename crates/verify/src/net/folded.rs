@@ -1,4 +1,4 @@
-//! Folds a net, and adds what deviates to the verdicts of its sheets.
+//! Folds a net, and adds the deviations to the verdicts of its sheets.
 
 use crate::finding::any::Finding;
 use crate::finding::fold::FoldFinding;
@@ -7,8 +7,8 @@ use crate::sheet::boards::Seen;
 use crate::verdict::{FoldVerdict, SheetVerdict};
 use deltille_layout::Printing;
 
-/// Folds the net that was detected, and adds what deviates to the verdicts of the sheets, which are
-/// in the order of `seen`. If a face was not detected, nothing is checked: the sheet lacks it anyway.
+/// Folds the detected net, and adds the deviations to the verdicts of the sheets, which are in the order of `seen`.
+/// If a face was not detected, checks nothing: the sheet has a finding about that face anyway.
 pub(crate) fn check(printing: &Printing, seen: &[Seen], verdicts: &mut [SheetVerdict]) {
     let Some(net) = Net::new(printing, seen) else { return };
     let mut carried = vec![None; net.faces.len()];
@@ -31,7 +31,7 @@ pub(crate) fn check(printing: &Printing, seen: &[Seen], verdicts: &mut [SheetVer
             }
         }
     }
-    // Edges of faces that lie in each other's places would only repeat that.
+    // Edges of swapped faces would only repeat that finding.
     let mut edges = vec![0; verdicts.len()];
     if !misplaced {
         for edge in net.edges() {

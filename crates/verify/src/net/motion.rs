@@ -2,8 +2,8 @@
 
 use glam::{DMat3, DVec2, DVec3};
 
-/// Largest distance of a folded corner, or of an end of an edge, from its stated position, mm: that
-/// of meshes, see [`MESH_TOLERANCE_MM`](crate::MESH_TOLERANCE_MM).
+/// Largest accepted distance of a folded corner, or of an end of an edge, from its stated position, mm: the same as
+/// for meshes, see [`MESH_TOLERANCE_MM`](crate::MESH_TOLERANCE_MM).
 pub const FOLD_TOLERANCE_MM: f64 = 0.05;
 
 /// A rigid motion of the plane, mm: `page = turn · panel + shift`, where `turn` is a unit complex
@@ -15,9 +15,8 @@ pub(super) struct Rigid {
 }
 
 impl Rigid {
-    /// The least-squares rigid motion that takes the first point of each pair to the second; `None`
-    /// where the points do not determine the rotation. With p and q as complex numbers about their
-    /// means, turn ∝ Σ p̄ q.
+    /// Returns the least-squares rigid motion that maps the first point of each pair to the second; `None` if the
+    /// points do not determine the rotation. With p and q as complex numbers about their means, turn ∝ Σ p̄ q.
     pub(super) fn fit(pairs: &[(DVec2, DVec2)]) -> Option<Self> {
         let n = pairs.len() as f64;
         let p0 = pairs.iter().map(|(p, _)| *p).sum::<DVec2>() / n;
@@ -33,8 +32,8 @@ impl Rigid {
     }
 }
 
-/// A pose of a plane in the target frame, mm: `space = linear · (x, y, 0) + shift` with a rotation
-/// `linear`. The plane is that of the page, or of a panel.
+/// A pose of a plane in the target frame, mm: `space = linear · (x, y, 0) + shift` with a rotation `linear`. The
+/// plane is that of the page or of a panel.
 #[derive(Clone, Copy)]
 pub(super) struct SpaceFromPage {
     pub linear: DMat3,
@@ -46,8 +45,8 @@ impl SpaceFromPage {
         self.linear * p.extend(0.0) + self.shift
     }
 
-    /// The same pose followed by a rotation by an angle about the line from the first to the second of
-    /// two points of the page.
+    /// Returns the pose followed by a rotation by an angle about the line from the first to the second of two points
+    /// of the page.
     pub(super) fn folded(&self, [p, q]: [DVec2; 2], angle_rad: f64) -> Self {
         let (a, b) = (self.apply(p), self.apply(q));
         let turn = DMat3::from_axis_angle((b - a).normalize_or(DVec3::X), angle_rad);

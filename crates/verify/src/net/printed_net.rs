@@ -1,4 +1,4 @@
-//! The net as it was detected: its faces, the folds between them, and the numbers on their sides.
+//! The detected net: its faces, the folds between them, and the numbers on their sides.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -11,36 +11,35 @@ use deltille_core::targets::TargetSpec;
 use deltille_layout::artwork;
 use deltille_layout::{Label, Printing, SheetLayout};
 
-/// Two sides within this distance of each other on the paper are one fold, mm: more than the error
-/// of any acceptable print, less than the width of any tab.
+/// Largest distance at which two sides on the paper form one fold, mm: more than the error of any acceptable print,
+/// less than the width of any tab.
 const COMMON_MM: f64 = 0.2;
 
-/// Whether the sheets of a target are a net: whether faces of a solid are joined by folds.
+/// Whether the sheets of a target are a net, that is, whether folds connect faces of a solid.
 pub(crate) fn is_net(printing: &Printing) -> bool {
     let folds = |sheet: &SheetLayout| sheet.lines.iter().any(|line| line.kind.joins_faces());
     matches!(printing.target.spec, TargetSpec::Solid(_)) && printing.sheets.iter().any(folds)
 }
 
-/// A face of the net as it was detected. Side i runs from vertex i to vertex i + 1.
+/// A detected face of the net. Side i runs from vertex i to vertex i + 1.
 pub(super) struct PrintedFace {
     /// Panel id.
     pub panel: u32,
-    /// Index of the sheet that it is on.
+    /// Index of its sheet.
     pub sheet: usize,
-    /// Its outline on the page, counter-clockwise, mm: the stated one at the detected pose.
+    /// Its outline on the page, counter-clockwise, mm: the stated outline at the detected pose.
     outline_mm: Vec<DVec2>,
     /// Its pose on the page, fitted to the detected corners.
     pub page_from_panel: Rigid,
     /// Indices of the vertices of the solid at the corners of its outline.
     pub vertices: Vec<usize>,
-    /// The detected corners: the position on the page and the stated one in the target frame, mm.
+    /// The detected corners: position on the page, and stated position in the target frame, mm.
     pub corners: Vec<(DVec2, DVec3)>,
     /// Edge numbers printed along each of its sides.
     pub numbers: Vec<Vec<usize>>,
-    /// Tabs on its sides: the side, and the number of the face under which the tab says that it is
-    /// to be glued.
+    /// Tabs on its sides: the side, and the number of the face to which the tab says it must be glued.
     pub under: Vec<(usize, usize)>,
-    /// Face numbers printed in it.
+    /// Face numbers printed on it.
     pub names: Vec<usize>,
 }
 
@@ -53,7 +52,7 @@ pub(super) struct Side {
     pub side: usize,
 }
 
-/// The net as it was detected, and the solid that is to come of it.
+/// The detected net, and the solid into which it should fold.
 pub(super) struct Net {
     /// All faces, in the order of the target's panels.
     pub faces: Vec<PrintedFace>,
@@ -63,14 +62,14 @@ pub(super) struct Net {
     pub poses: Vec<SpaceFromPage>,
     /// The side that runs from one vertex of the solid to another.
     pub along: BTreeMap<[usize; 2], Side>,
-    /// The side of another face from which each side is separated by a fold only.
+    /// For each folded side, the side of the other face.
     pub folds: BTreeMap<Side, Side>,
     /// Sides along which a tab is folded.
     pub tabs: BTreeSet<Side>,
 }
 
 impl Net {
-    /// The net of a target from the corners detected on each sheet; `None` where a face is missing.
+    /// Creates the net of a target from the corners detected on each sheet; `None` if a face is missing.
     pub(super) fn new(printing: &Printing, seen: &[Seen]) -> Option<Self> {
         let target = &printing.target;
         let TargetSpec::Solid(spec) = &target.spec else { return None };
@@ -123,25 +122,25 @@ impl Net {
         Some(net)
     }
 
-    /// Ends of a side on the page, mm.
+    /// Returns the ends of a side on the page, mm.
     pub(super) fn ends(&self, Side { face, side }: Side) -> [DVec2; 2] {
         let outline = &self.faces[face].outline_mm;
         [outline[side], outline[(side + 1) % outline.len()]]
     }
 
-    /// The sides of a face.
+    /// Returns the sides of a face.
     pub(super) fn sides_of(&self, face: usize) -> impl Iterator<Item = Side> + use<> {
         (0..self.faces[face].vertices.len()).map(move |side| Side { face, side })
     }
 
-    /// The sides of all faces on a sheet.
+    /// Returns the sides of all faces on a sheet.
     fn sides_on(&self, sheet: usize) -> impl Iterator<Item = Side> {
         let faces = (0..self.faces.len()).filter(move |&face| self.faces[face].sheet == sheet);
         faces.flat_map(|face| self.sides_of(face))
     }
 
-    /// Notes which sides of two faces lie on one fold line of the layout, and which side of a single
-    /// face does, so that a tab hangs on it.
+    /// Records which sides of two faces lie on one fold line of the layout, and which side of a single face does, so
+    /// that a tab is attached to it.
     fn find_folds(&mut self, sheet: usize, layout: &SheetLayout) {
         let sides: Vec<_> = self.sides_on(sheet).map(|side| (side, self.ends(side))).collect();
         for line in layout.lines.iter().filter(|line| line.kind.joins_faces()) {
@@ -161,8 +160,8 @@ impl Net {
         }
     }
 
-    /// Assigns each printed number to the face in which it stands, or to a side: within a face the
-    /// nearest side of that face, outside all faces, as on a tab, the nearest side without a fold.
+    /// Assigns each printed number to the face that contains it, or to a side: within a face the nearest side of that
+    /// face, outside all faces, as on a tab, the nearest side without a fold.
     fn read_numbers(&mut self, sheet: usize, layout: &SheetLayout) {
         for text in &layout.texts {
             if !text.text.is_number() {
@@ -201,7 +200,7 @@ impl Net {
     }
 }
 
-/// Distance of a point from a segment of positive length, mm.
+/// Returns the distance of a point from a segment of positive length, mm.
 fn distance(at: DVec2, [p, q]: [DVec2; 2]) -> f64 {
     let along = ((at - p).dot(q - p) / (q - p).length_squared()).clamp(0.0, 1.0);
     at.distance(p + (q - p) * along)

@@ -1,4 +1,4 @@
-//! The edges of the folded solid: their two sides meet, and where they are cut they carry the same number.
+//! The edges of the folded solid: their two sides must meet, and cut sides must carry the same number.
 
 use std::collections::BTreeMap;
 
@@ -12,19 +12,19 @@ pub(super) struct Edge {
 }
 
 impl Net {
-    /// All edges of the solid, each once.
+    /// Returns all edges of the solid, each once.
     pub(super) fn edges(&self) -> Vec<Edge> {
         let forward = self.along.iter().filter(|([a, b], _)| a < b);
         let both = forward.filter_map(|([a, b], &one)| Some([one, *self.along.get(&[*b, *a])?]));
         both.map(|sides| Edge { sides }).collect()
     }
 
-    /// Distance of the two sides of an edge after folding, mm, if they belong together: folded
-    /// against each other on the page, or cut, with the same single number, and with one tab.
+    /// Returns the distance between the two sides of an edge after folding, mm, if they belong together: either
+    /// folded against each other on the page, or cut, with the same single number and one tab.
     ///
     /// # Errors
     ///
-    /// The finding, where they do not belong together or lie apart.
+    /// Returns the finding if they do not belong together or are apart.
     pub(super) fn check_edge(
         &self,
         edge: &Edge,
@@ -54,7 +54,7 @@ impl Net {
         }
     }
 
-    /// Findings about the number printed in a face and the faces that its tabs name.
+    /// Returns findings about the number printed on a face and the faces that its tabs name.
     pub(super) fn check_words(&self, index: usize) -> Vec<FoldFinding> {
         let face = &self.faces[index];
         let mut findings = Vec::new();
@@ -72,7 +72,7 @@ impl Net {
         findings
     }
 
-    /// Findings about edge numbers that stand on more than two sides.
+    /// Returns findings about edge numbers on more than two sides.
     pub(super) fn numbers_used_twice(&self) -> Vec<FoldFinding> {
         let mut count = BTreeMap::<usize, usize>::new();
         let numbers = self.faces.iter().flat_map(|face| face.numbers.iter().flatten());

@@ -1,4 +1,4 @@
-//! Least-squares affine map from stated to found positions of corners.
+//! Least-squares affine map from stated to found corner positions.
 
 use glam::DVec2;
 use nalgebra::{Matrix3, Vector3};
@@ -16,7 +16,7 @@ impl AffineMap {
     pub(crate) const IDENTITY: AffineMap =
         AffineMap { linear: [[1.0, 0.0], [0.0, 1.0]], shift: DVec2::ZERO };
 
-    /// Least-squares fit over pairs (stated, found); `None` unless the stated points span the
+    /// Fits the map by least squares to pairs (stated, found). Returns `None` unless the stated points span the
     /// plane.
     pub(crate) fn fit(pairs: &[(DVec2, DVec2)]) -> Option<Self> {
         if pairs.len() < 3 {
@@ -42,7 +42,7 @@ impl AffineMap {
         DVec2::from(self.linear.map(|[by_x, by_y]| by_x * x + by_y * y)) + self.shift
     }
 
-    /// The inverse map; `None` for a degenerate map.
+    /// Returns the inverse map, `None` for a degenerate map.
     pub(crate) fn inverse(&self) -> Option<Self> {
         let [[a, b], [c, d]] = self.linear;
         let det = a * d - b * c;
@@ -52,12 +52,12 @@ impl AffineMap {
         (det != 0.0 && det.is_finite()).then_some(Self { linear, shift })
     }
 
-    /// Lengths of the images of the unit vectors: the scales along x and y.
+    /// Returns the lengths of the images of the unit vectors: the scales along x and y.
     pub(crate) fn scales(&self) -> [f64; 2] {
         [0, 1].map(|i| self.linear[0][i].hypot(self.linear[1][i]))
     }
 
-    /// Counter-clockwise rotation of the mean of both axes, rad.
+    /// Returns the counter-clockwise rotation of the mean of both axes, rad.
     pub(crate) fn turn_rad(&self) -> f64 {
         let [[a, b], [c, d]] = self.linear;
         (c - b).atan2(a + d)
@@ -69,7 +69,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_scaled_turned_and_shifted_grid_is_recovered() {
+    fn a_scaled_rotated_and_shifted_grid_is_recovered() {
         let (scale, turn) = (0.99, 0.02_f64);
         let truth = AffineMap {
             linear: [

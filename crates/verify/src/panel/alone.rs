@@ -1,4 +1,4 @@
-//! Detection of a single panel without tags, with all else left out.
+//! Detection of a single panel without tags, with everything else masked.
 
 use glam::DVec2;
 
@@ -9,20 +9,21 @@ use deltille_core::raster::{Gray, ImageView, Intensity};
 use deltille_core::targets::Panel;
 use deltille_detect::Detector;
 
-/// An unlabelled corner is taken for a stated one within this many edges of it: less than half the
-/// way to the next.
+/// Distance within which an unlabelled corner is matched to a stated one, in edges: less than half the way to the
+/// next.
 pub(crate) const MATCH_EDGES: f64 = 0.25;
 
-/// How much of what is around the tiles of a panel is looked at with it alone, in edges: less than any corner lies within.
+/// Margin around the tiles of a panel that is detected alone, in edges: no corner lies this close to the outline.
 const ALONE_EDGES: f64 = 0.05;
 
-/// What is looked at of a panel without tags where it is looked at alone: its tiles and a little more, mm.
+/// Returns the outline of what is kept of a panel without tags that is detected alone: its tiles and a small margin,
+/// mm.
 pub(crate) fn outline_alone(panel: &Panel) -> Vec<DVec2> {
     panel.outline_around_mm(ALONE_EDGES * panel.edge_mm)
 }
 
-/// Corners of a panel without tags whose neighbours are left out: a grid may go on over a fold, where nothing tells
-/// faces apart. `outline_px` is convex.
+/// Detects the corners of a panel without tags while its neighbours are masked: a grid may continue over a fold,
+/// where nothing distinguishes the faces. `outline_px` is convex.
 pub(crate) fn detect_alone<T: Intensity>(
     panel: &Panel,
     mut image: Gray<T>,

@@ -1,9 +1,8 @@
 //! Subpixel positions of the edges of tiles and cells.
 //!
-//! A pixel that an edge crosses may have any grey value and tells little by itself. But an edge
-//! that is displaced by d px has d px² of ink too much or too little along each px of its length,
-//! whichever pixels it crosses: over a square of pixels these add up, while rounding and smear of
-//! single pixels do not.
+//! A pixel on an edge may have any grey value and says little on its own. But an edge displaced by d px causes d px²
+//! of excess or missing ink along each px of its length, whichever pixels it crosses. Over a square of pixels these
+//! add up, while rounding and smear of single pixels do not.
 
 use std::collections::BTreeMap;
 
@@ -14,20 +13,20 @@ use crate::panel::pattern::{Expected, Pattern};
 use crate::panel::placed::PlacedPanel;
 use deltille_core::lattice::Tile;
 
-/// Side of the squares over which ink is added up, px: shorter than the side of a cell that is drawn for a check.
+/// Side of the squares over which ink is summed, px: shorter than the side of a rendered cell.
 const SQUARE: usize = 8;
 
-/// Pixels so near to one that an edge crosses are added up with it, px.
+/// Distance within which pixels beside one on an edge are summed with it, px.
 const NEAR: usize = 2;
 
-/// Samples per pixel and axis of a pixel that an edge crosses.
+/// Samples per axis of a pixel on an edge.
 const SAMPLES: usize = 4;
 
 /// An edge that is displaced.
 pub(crate) struct MovedEdge {
     pub tile: Tile,
     pub at_mm: DVec2,
-    /// Mean over the length looked at.
+    /// Mean displacement over the examined length, mm.
     pub by_mm: f64,
 }
 
@@ -55,8 +54,7 @@ impl LatticeFromPx {
 }
 
 impl PlacedPanel<'_> {
-    /// The edges that are displaced by more than `tolerance_px`: for each tile the one that is
-    /// displaced most.
+    /// Returns the edges that are displaced by more than `tolerance_px`: for each tile the most displaced one.
     pub(crate) fn moved_edges(
         &self,
         expected: &BTreeMap<Tile, Expected>,
@@ -108,11 +106,11 @@ impl PlacedPanel<'_> {
         moved.collect()
     }
 
-    /// Displacement of edges in the square of pixels whose first is `low`, px, positive where there
-    /// is too much ink; `None` where there is no edge.
+    /// Returns the displacement of edges in the square of pixels that begins at `low`, px, positive for excess ink;
+    /// `None` without an edge.
     fn displaced(&self, low: [usize; 2], is_black: &impl Fn(DVec2) -> bool) -> Option<f64> {
         const SIDE: usize = SQUARE + 2 * NEAR;
-        // Corner of a pixel, counted from that of the nearest pixel that counts.
+        // Corner of a pixel relative to the corner of the nearest pixel that counts.
         let corner = |x: usize, y: usize| {
             is_black(DVec2::new((low[0] + x) as f64, (low[1] + y) as f64) - NEAR as f64 - 0.5)
         };
@@ -149,7 +147,7 @@ impl PlacedPanel<'_> {
     }
 }
 
-/// Part of a pixel that is black.
+/// Returns the fraction of a pixel that is black.
 fn covered([x, y]: [usize; 2], is_black: &impl Fn(DVec2) -> bool) -> f64 {
     let sample = |i: usize| (i as f64 + 0.5) / SAMPLES as f64 - 0.5;
     let samples = (0..SAMPLES).flat_map(|j| (0..SAMPLES).map(move |i| (i, j)));

@@ -1,12 +1,12 @@
-//! One panel in a picture of it.
+//! One panel on a page.
 //!
-//! Comes in: a page, and a panel where it is stated. Goes out: its tiles and tags, right or wrong.
+//! Input: a page, and a panel at its stated position. Output: its tiles and tags, right or wrong.
 //!
-//! 1. `placed` joins both: panel, page and picture coordinates, by an `affine_map` where the board is found elsewhere;
-//!    `text_area` is what texts in the tiles take.
-//! 2. `tones` tells whether black and white are those of a print. `alone` detects a panel without tags.
-//! 3. `pattern` says what every point should look like, with a `tile_table` for every pixel.
-//! 4. `tiles` compares every pixel of tiles and cells, `edges` their edges to parts of a pixel.
+//! 1. `placed` relates panel, page and image coordinates, by an `affine_map` if the board is found elsewhere;
+//!    `text_area` is the area of texts in the tiles.
+//! 2. `tones` checks whether black and white are those of a print. `alone` detects a panel without tags.
+//! 3. `pattern` is the expected appearance of every point, with a `tile_table` for every pixel.
+//! 4. `tiles` compares every pixel of tiles and cells, `edges` their edges with subpixel accuracy.
 //! 5. `spots` joins wrong pixels.
 
 pub(super) mod affine_map;

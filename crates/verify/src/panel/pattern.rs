@@ -1,4 +1,4 @@
-//! What every point of a panel should look like: its tiles, and the cells of their tags.
+//! The expected appearance of every point of a panel: its tiles, and the cells of their tags.
 
 use std::collections::BTreeMap;
 
@@ -9,19 +9,19 @@ use deltille_core::family::Family;
 use deltille_core::lattice::{Cell, GridKind, TagCells, Tile};
 use deltille_core::targets::{Panel, TagPlacement};
 
-/// Pixels nearer than this to a change of colour are ignored, px: the half diagonal of a pixel
-/// (0.71), over which an edge is smeared, 0.02 mm at 300 dpi (0.24), and some blur.
+/// Pixels closer than this to a change of colour are ignored, px: the half diagonal of a pixel (0.71), over which an
+/// edge is smeared, 0.02 mm at 300 dpi (0.24), and some blur.
 pub(crate) const EDGE_PX: f64 = 1.25;
 
-/// Directions in which an edge is looked for beside a pixel: so many that no tip of a tile or cell,
-/// of 60°, fits between two of them and reaches the pixel.
+/// Number of directions in which an edge is searched for beside a pixel: enough that no 60° tip of a tile or cell
+/// fits between two of them and reaches the pixel.
 pub(crate) const PROBES: u32 = 24;
 
 /// The expected appearance of a tile.
 pub(crate) struct Expected<'a> {
-    /// Black, as a whole or around its tag.
+    /// Whether the tile is black, as a whole or around its tag.
     pub black: bool,
-    /// Black and white are exchanged.
+    /// Whether black and white are swapped.
     inverted: bool,
     pub tag: Option<ExpectedTag<'a>>,
 }
@@ -39,7 +39,7 @@ impl Expected<'_> {
     }
 }
 
-/// The expected appearance of all tiles of a panel; `family` is that of its tiling.
+/// Returns the expected appearance of all tiles of a panel; `family` is that of its tiling.
 pub(crate) fn expected<'a>(
     panel: &Panel,
     family: Option<&Family>,
@@ -58,7 +58,7 @@ pub(crate) fn expected<'a>(
     expected.collect()
 }
 
-/// The colours of a panel at any point.
+/// The colours of a panel at every point.
 pub(crate) struct Pattern<'a> {
     panel: &'a Panel,
     table: TileTable<&'a Expected<'a>>,
@@ -94,16 +94,16 @@ pub(crate) struct ExpectedTag<'a> {
     pub looks: &'a TagLooks,
 }
 
-/// The places of the cells of the tags of a panel, in tile coordinates.
+/// The positions of the tag cells of a panel, in tile coordinates.
 pub(crate) struct TagLooks {
     pub cells: TagCells,
-    /// From the edges of the tile to the border, and to the cells, bit-widths.
+    /// Distance from the edges of the tile to the border, and to the cells, bit widths.
     margin: f64,
     pub inset: f64,
     width: f64,
-    /// Radius of the hole in the middle of a triangle, edges.
+    /// Radius of the hole in the centre of a triangle, edges.
     hole: Option<f64>,
-    /// Bit of each cell, in rows of `columns` places, two to a column: inverted, upright.
+    /// Bit of each cell, in rows of `columns` positions, two per column: inverted, upright.
     bits: Vec<Option<u32>>,
     columns: usize,
 }
@@ -135,10 +135,10 @@ impl TagLooks {
         Self { cells, margin, inset, width, hole, bits, columns }
     }
 
-    /// The region at tile coordinates.
+    /// Returns the region at tile coordinates.
     fn region(&self, p: DVec2) -> Region {
         if let Some(radius) = self.hole {
-            // The edges that the coordinates are along meet at 60°.
+            // The edges along the coordinate axes meet at 60°.
             let from_middle = p - 1.0 / 3.0;
             let squared = from_middle.length_squared() + from_middle.x * from_middle.y;
             if squared < radius * radius {
@@ -156,7 +156,7 @@ impl TagLooks {
         }
     }
 
-    /// The bit of the cell at tile coordinates (u, v); `None` beside the cells.
+    /// Returns the bit of the cell at tile coordinates (u, v), `None` outside the cells.
     pub(crate) fn bit(&self, p: DVec2) -> Option<u32> {
         let DVec2 { x: u, y: v } = p * self.width - self.inset;
         if u < 0.0 || v < 0.0 {

@@ -1,4 +1,4 @@
-//! A panel on its page, where it is stated and where it was found.
+//! A panel on its page, at its stated and its found position.
 
 use std::collections::BTreeSet;
 
@@ -12,7 +12,7 @@ use deltille_core::statistics::median;
 use deltille_core::targets::Panel;
 use deltille_layout::{Placement, SheetLayout, SheetText};
 
-/// Tiles of one colour are alike where the ink of nine in ten is so near to their median.
+/// Tiles of one colour agree if the ink of nine in ten is this close to their median.
 const TONE_SPREAD: f64 = 0.1;
 
 /// A panel on its page, as found.
@@ -22,9 +22,9 @@ pub(crate) struct PlacedPanel<'a> {
     pub placement: &'a Placement,
     /// From stated to found page positions.
     pub found_from_stated: AffineMap,
-    /// Where the panel's x axis points on the page.
+    /// Direction of the panel's x axis on the page.
     along: DVec2,
-    /// The corners of rectangles around texts where they are stated, px: what is in them is compared by itself.
+    /// Corners of the rectangles around texts at their stated positions, px: their content is compared separately.
     texts: Vec<[DVec2; 4]>,
 }
 
@@ -39,7 +39,7 @@ impl<'a> PlacedPanel<'a> {
         Self { page, panel, placement, found_from_stated, along, texts: Vec::new() }
     }
 
-    /// The same among the texts of its sheet, some of which may stand in its tiles.
+    /// Adds the texts of its sheet, some of which may lie in its tiles.
     pub(crate) fn among(mut self, layout: &SheetLayout) -> Self {
         let [left, lower, right, upper] = self.panel.bounds_mm();
         let rectangle = |text: &SheetText| {
@@ -51,30 +51,30 @@ impl<'a> PlacedPanel<'a> {
         self
     }
 
-    /// Whether a pixel belongs to a text, or one within `near_px` of it.
+    /// Whether a text lies within `near_px` of a pixel.
     pub(crate) fn is_text(&self, px: DVec2, near_px: f64) -> bool {
         self.texts.iter().any(|corners| {
             (0..4).all(|i| {
                 let (a, b) = (corners[i], corners[(i + 1) % 4]);
-                // Counter-clockwise on the page, so clockwise in the picture.
+                // Counter-clockwise on the page, and therefore clockwise in the image.
                 (b - a).normalize_or_zero().perp_dot(px - a) <= near_px
             })
         })
     }
 
-    /// Stated page position of a point of the panel.
+    /// Returns the stated page position of a point of the panel.
     pub(crate) fn page_from_panel(&self, point: DVec2) -> DVec2 {
         self.along.rotate(point) + self.placement.origin_mm
     }
 
-    /// Stated panel position of a point of the page.
+    /// Returns the stated panel position of a point of the page.
     pub(crate) fn panel_from_page(&self, point: DVec2) -> DVec2 {
         let back = DVec2::new(self.along.x, -self.along.y);
         back.rotate(point - self.placement.origin_mm)
     }
 
-    /// The ink of the tiles that should be white and black, in the middle of plain tiles; `None`
-    /// where those of one colour are not alike, so that the picture shows something else.
+    /// Returns the ink of tiles that should be white and black, in the centre of plain tiles. Returns `None` if the
+    /// tiles of one colour disagree, so that the page shows something else.
     pub(crate) fn tones(&self) -> Option<[f64; 2]> {
         let tagged: BTreeSet<Tile> =
             self.panel.tags.iter().map(|tag| self.panel.tag_tile(tag)).collect();
@@ -100,12 +100,12 @@ impl<'a> PlacedPanel<'a> {
         Some([tone(white)?, tone(black)?])
     }
 
-    /// Picture positions of a tile's A, B and C.
+    /// Returns the image positions of a tile's A, B and C.
     pub(crate) fn frame_px(&self, tile: Tile) -> [DVec2; 3] {
         tile.frame().map(|vertex| self.px_of(vertex))
     }
 
-    /// Picture position of a vertex.
+    /// Returns the image position of a vertex.
     pub(crate) fn px_of(&self, vertex: Vertex) -> DVec2 {
         let stated = self.page_from_panel(self.panel.lattice_mm(vertex));
         self.page.px_from_page(self.found_from_stated.apply(stated))

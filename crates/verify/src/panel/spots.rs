@@ -1,14 +1,14 @@
-//! Wrong pixels that are connected are one spot.
+//! Connected wrong pixels, each group reported as one spot.
 
 use glam::DVec2;
 
 use crate::document::page::Page;
 use crate::finding::mark::MarkFinding;
 
-/// Most spots of a page that are listed; with more it is dirty all over.
+/// Maximum number of spots listed for a page; a page with more is dirty all over.
 const MOST_SPOTS: usize = 200;
 
-/// Names each connected spot of wrong pixels of a page.
+/// Returns a finding for each connected spot of wrong pixels on a page.
 pub(crate) fn named(page: &Page, mut wrong: Vec<bool>) -> Vec<MarkFinding> {
     let (width, height) = (page.image.width(), page.image.height());
     let mut spots = Vec::new();

@@ -1,4 +1,4 @@
-//! The area of a text in the picture.
+//! The area of a text in the image.
 
 use glam::DVec2;
 use kurbo::{Affine, Point, Rect, Shape as _};
@@ -7,11 +7,11 @@ use crate::document::page::Page;
 use deltille_layout::SheetText;
 use deltille_layout::artwork;
 
-/// White around a mark that belongs to it, px.
+/// White margin around a mark that belongs to it, px.
 pub(crate) const BLANK_PX: f64 = 3.0;
 
-/// The corners of a rectangle around a text, with the blank that belongs to it, px; `None` where it has no ink, or cannot be
-/// drawn.
+/// Returns the corners of the rectangle around a text, including the margin that belongs to it, px; `None` if it has
+/// no ink or cannot be rendered.
 pub(super) fn rectangle_px(page: &Page, text: &SheetText) -> Option<[DVec2; 4]> {
     let path = artwork::text_outline(text).ok().filter(|path| !path.is_empty())?;
     let along = Affine::rotate(-text.angle_rad);

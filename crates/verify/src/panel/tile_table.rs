@@ -1,13 +1,13 @@
-//! What belongs to the tiles of a panel, found as fast as for every pixel of a page.
+//! Lookup table for values of tiles, fast enough for every pixel of a page.
 
 use deltille_core::lattice::{Orientation, Tile};
 
-/// Values of tiles, as a table over all places between their ends.
+/// Values of tiles, as a table over all positions within their extent.
 pub(crate) struct TileTable<T> {
     first: [i32; 2],
     /// Rows and columns.
     size: [usize; 2],
-    /// Two places for each: the inverted triangle, and the other tile.
+    /// Two positions per row and column: the inverted triangle, and the other tile.
     values: Vec<Option<T>>,
 }
 

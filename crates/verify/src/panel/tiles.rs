@@ -1,7 +1,7 @@
 //! Verification of every tile and every cell of a tag, pixel by pixel.
 //!
-//! This is independent of detection, and stricter: a cell that decoding would correct, a hairline
-//! or a spot inside a tile is found.
+//! This is independent of detection, and stricter: it finds a cell that decoding would correct, and a hairline or
+//! spot inside a tile.
 
 use std::cell::OnceCell;
 use std::collections::BTreeMap;
@@ -17,16 +17,16 @@ use deltille_core::family::{Decoder, Family};
 use deltille_core::lattice::{GridKind, Tile, Vertex};
 use deltille_core::targets::TagPlacement;
 
-/// Every so many of these are enough to count pixels.
+/// One pixel in this many, along each axis, is enough to count pixels.
 const COARSE: usize = 3;
 
-/// Tolerance of the positions of edges, px: twice the effect of rounding on edges along pixels, on
-/// pages as they are drawn (0.02 mm at 300 dpi), and on pages that are resampled from others.
+/// Tolerance of edge positions, px: twice the effect of rounding on edges along pixels, on rendered pages (0.02 mm at
+/// 300 dpi) and on pages resampled from others.
 const MOVED_EDGE_PX: f64 = 0.25;
 const SMEARED_MOVED_EDGE_PX: f64 = 0.5;
 
-/// And of edges in a coarse texture, in its pixels: between two of them a picture is interpolated, which moves an edge along
-/// rows or columns by up to a tenth, and its ends by more.
+/// The same for edges in a coarse texture, in its pixels: interpolation between two of them moves edges along a row
+/// or column by up to a tenth, and their ends by more.
 const MOVED_EDGE_TEXELS: f64 = 0.35;
 
 /// Counted pixels.
@@ -34,7 +34,7 @@ const MOVED_EDGE_TEXELS: f64 = 0.35;
 struct Tally {
     checked: usize,
     wrong: usize,
-    /// Sum of the positions of wrong pixels.
+    /// Sum of the positions of the wrong pixels.
     moment: DVec2,
 }
 
@@ -44,13 +44,13 @@ impl Tally {
     }
 }
 
-/// The outcome for one panel.
+/// The result for one panel.
 #[derive(Debug, Default)]
 pub(crate) struct TileReport {
     pub findings: Vec<TileFinding>,
     pub tags_exact: usize,
     pub tiles: usize,
-    /// Tiles of the wrong colour.
+    /// Number of tiles of the wrong colour.
     pub wrong_tiles: usize,
 }
 
@@ -59,7 +59,7 @@ impl<'a> PlacedPanel<'a> {
     pub(crate) fn check_tiles(&self, family: Option<&Family>) -> TileReport {
         let family = family.and_then(|family| family.of_tiling(self.panel.kind));
         let looks = family.map(|family| TagLooks::new(family, self.panel));
-        // Needed only where something is wrong.
+        // Needed only if something is wrong.
         let decoder = OnceCell::new();
         let mut report = TileReport::default();
         let expected = expected(self.panel, family, looks.as_ref());
@@ -83,7 +83,7 @@ impl<'a> PlacedPanel<'a> {
         report
     }
 
-    /// Counts wrong pixels, by cell; the key `None` is what is around the cells, or a plain tile.
+    /// Counts wrong pixels by cell; the key `None` is the area around the cells, or a plain tile.
     fn compare(&self, tile: Tile, expected: &Expected) -> BTreeMap<Option<u32>, Tally> {
         let [a, b, c] = self.frame_px(tile);
         let (ab, ac) = (b - a, c - a);
@@ -103,7 +103,7 @@ impl<'a> PlacedPanel<'a> {
             GridKind::Deltille => u >= 0.0 && v >= 0.0 && u + v <= 1.0,
             GridKind::Checker => u >= 0.0 && v >= 0.0 && u <= 1.0 && v <= 1.0,
         };
-        // Parts of the tile's heights that a circle reaches.
+        // Fractions of the tile's heights that a circle covers.
         let reach = further.iter().fold(DVec2::ZERO, |most, off| most.max(off.abs()));
         let slanting = further.iter().map(|off| off.element_sum().abs()).fold(0.0, f64::max);
         let clear_of_edges = |p: DVec2| {
@@ -134,7 +134,7 @@ impl<'a> PlacedPanel<'a> {
                 let black = black_at(p);
                 let found = 1.0 - f64::from(image.at(x, y)) / 255.0;
                 let error = (found - f64::from(u8::from(black))).abs();
-                // A plain tile is of one colour wherever its edges are far enough.
+                // A plain tile has one colour wherever its edges are far enough away.
                 let is_far = expected.tag.is_none() && clear_of_edges(p);
                 let is_uniform = |around: &[DVec2], step: usize| {
                     is_far
@@ -145,7 +145,7 @@ impl<'a> PlacedPanel<'a> {
                 };
                 let is_wrong = error > most_at_edges && is_uniform(&around, 1)
                     || error > MAX_INK_ERROR && is_uniform(&further, 1);
-                // Most pixels are right, and those that are need not be looked at as closely.
+                // Most pixels are right, and those need no closer examination.
                 if !is_wrong && !is_uniform(&around, COARSE) {
                     continue;
                 }
@@ -157,7 +157,7 @@ impl<'a> PlacedPanel<'a> {
                 }
             }
         }
-        // Cells too small for a pixel clear of their edges are judged by their centres.
+        // Cells too small to contain a pixel clear of their edges are judged by their centres.
         if let Some(tag) = &expected.tag {
             for bit in 0..tag.looks.cells.dimension().bits() {
                 tallies.entry(Some(bit)).or_insert_with(|| {
@@ -220,7 +220,7 @@ impl<'a> PlacedPanel<'a> {
     }
 }
 
-/// The finding about a tag whose cells `flipped` have the wrong colour.
+/// Returns the finding about a tag whose cells `flipped` have the wrong colour.
 fn read_tag(
     tag: &ExpectedTag,
     flipped: &[u32],

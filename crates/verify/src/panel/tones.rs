@@ -1,17 +1,16 @@
-//! Whether black and white of a panel are those of the print.
+//! Checks whether black and white of a panel are those of the print.
 
 use crate::finding::any::Finding;
 use crate::finding::board::BoardFinding;
 use crate::panel::placed::PlacedPanel;
 
-/// Tolerance of the ink in the middle of a tile from 0 or 1: the effect of rounding to 255 grey
-/// values.
+/// Tolerance of the ink in the centre of a tile from 0 or 1: the effect of rounding to 255 grey values.
 const MAX_TONE_ERROR: f64 = 0.01;
 
 /// Difference of ink below which a sheet is called blank rather than faint.
 const MIN_CONTRAST: f64 = 0.03;
 
-/// Whether the tiles lie where they should, but are too grey, or black for white.
+/// Returns a finding if the tiles are at their positions but too grey, or have swapped colours.
 pub(crate) fn wrong_tones(placed: &PlacedPanel) -> Option<Finding> {
     let panel = placed.panel.id;
     let ink @ [white, black] = placed.tones()?;

@@ -1,10 +1,10 @@
-//! Why an artifact cannot be read.
+//! Reasons why an artifact cannot be read.
 
 use std::path::{Path, PathBuf};
 
 use deltille_files::limits::ReadError;
 
-/// Why an artifact cannot be read.
+/// The reason why an artifact cannot be read.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum DocumentError {
@@ -12,12 +12,12 @@ pub enum DocumentError {
     #[error(transparent)]
     Read(#[from] ReadError),
     /// A file that belongs to the artifact is not among those in memory.
-    #[error("{}: not among the files that are given", path.display())]
+    #[error("{}: not among the given files", path.display())]
     Absent {
         /// The file.
         path: PathBuf,
     },
-    /// The file is not of the format of its extension, states no physical size, or exceeds the
+    /// The file does not have the format of its extension, states no physical size, or exceeds the
     /// [`Limits`](deltille_files::limits::Limits).
     #[error("{}: {problem}", path.display())]
     Unreadable {
@@ -29,7 +29,7 @@ pub enum DocumentError {
 }
 
 impl DocumentError {
-    /// An error about the content of a file.
+    /// Creates an error about the content of a file.
     pub(crate) fn unreadable(path: &Path, problem: impl Into<String>) -> Self {
         Self::Unreadable { path: path.to_owned(), problem: problem.into() }
     }

@@ -1,4 +1,4 @@
-//! The format of an artifact, by the extension of its name.
+//! The format of an artifact, from the extension of its file name.
 
 use std::path::Path;
 
@@ -37,7 +37,7 @@ pub enum Format {
 }
 
 impl Format {
-    /// All formats with the extensions of their files.
+    /// All formats with their file extensions.
     pub const ALL: [(Self, &str); 13] = [
         (Self::Pdf, "pdf"),
         (Self::Svg, "svg"),
@@ -54,7 +54,7 @@ impl Format {
         (Self::ThreeMf, "3mf"),
     ];
 
-    /// The format by the extension of a file name; `None` for other extensions.
+    /// Returns the format for the extension of a file name, `None` for an unknown extension.
     pub fn of(path: &Path) -> Option<Self> {
         let extension = path.extension()?.to_string_lossy().to_lowercase();
         Self::ALL.iter().find(|(_, known)| *known == extension).map(|(format, _)| *format)

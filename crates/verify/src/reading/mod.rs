@@ -1,10 +1,10 @@
 //! Files, in memory or on disk, within limits.
 //!
-//! Comes in: names of files, and where their bytes are. Goes out: bytes, and what the names say.
+//! Input: file names and the source of their bytes. Output: the bytes, and the meaning of the names.
 //!
-//! 1. `names` tells which file is a part of which artifact, `format` what an extension stands for.
-//! 2. `reader` takes bytes from artifacts in memory or on disk, and runs code of others on them.
-//! 3. `error` says why something cannot be read.
+//! 1. `names` says which file is part of which artifact, and `format` what an extension stands for.
+//! 2. `reader` reads artifacts from memory or disk, and runs third-party code on them.
+//! 3. `error` says why an artifact cannot be read.
 
 pub(super) mod error;
 pub(super) mod format;

@@ -14,17 +14,17 @@ pub struct Artifact {
 }
 
 impl Artifact {
-    /// A file with this name, such as `board-2.svg`, and these bytes.
+    /// Creates a file with a name, such as `board-2.svg`, and its content.
     pub fn new(name: impl Into<String>, bytes: impl Into<Vec<u8>>) -> Self {
         Self { name: name.into(), bytes: Arc::new(bytes.into()) }
     }
 
-    /// A file whose bytes are shared.
+    /// Creates a file that shares its bytes.
     pub(crate) fn of(name: String, bytes: Arc<Vec<u8>>) -> Self {
         Self { name, bytes }
     }
 
-    /// The name, whose extension tells the format and whose number tells the page.
+    /// The file name: its extension gives the format, its number the page.
     pub fn name(&self) -> &str {
         &self.name
     }
@@ -35,12 +35,12 @@ impl Artifact {
     }
 }
 
-/// Files, by name.
+/// Files by name.
 pub(crate) trait Files {
-    /// Whether there is such a file.
+    /// Whether the file exists.
     fn has(&self, path: &Path) -> bool;
 
-    /// The bytes of a file; an error where there is none, or it is not to be read.
+    /// Returns the bytes of a file, or an error if it is missing or exceeds a limit.
     fn read(&self, path: &Path) -> Result<Arc<Vec<u8>>, DocumentError>;
 }
 
@@ -57,7 +57,7 @@ impl Files for &[Artifact] {
     }
 }
 
-/// The files on disk, read within limits.
+/// Files on disk, read within limits.
 pub(crate) struct OnDisk(pub(crate) Limits);
 
 impl Files for OnDisk {
@@ -79,23 +79,23 @@ pub(crate) struct Reader<'a> {
 }
 
 impl Reader<'_> {
-    /// Whether there is such a file.
+    /// Whether the file exists.
     pub(crate) fn has(&self, path: &Path) -> bool {
         self.files.has(path)
     }
 
-    /// The bytes of a file.
+    /// Returns the bytes of a file.
     pub(crate) fn read(&self, path: &Path) -> Result<Arc<Vec<u8>>, DocumentError> {
         self.files.read(path)
     }
 
-    /// The text of a file.
+    /// Returns the text of a file.
     pub(crate) fn read_text(&self, path: &Path) -> Result<String, DocumentError> {
         let text = String::from_utf8(Arc::unwrap_or_clone(self.read(path)?));
         text.map_err(|_| ReadError::NotText { path: path.to_owned() }.into())
     }
 
-    /// Runs third-party code on the file of that name; it may panic, or never end.
+    /// Runs third-party code, which may panic or never end, on the file with this name.
     pub(crate) fn run<T: Send + 'static>(
         &self,
         path: &Path,
@@ -105,7 +105,7 @@ impl Reader<'_> {
     }
 }
 
-/// Runs third-party code on the file of that name.
+/// Runs third-party code on the file with this name.
 pub(crate) fn run<T: Send + 'static>(
     path: &Path,
     limits: &Limits,

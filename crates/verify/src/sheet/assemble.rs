@@ -1,7 +1,7 @@
-//! Assembly of the pages of a sheet that is larger than the paper into one picture.
+//! Assembly of the pages of a sheet that is larger than the paper into one image.
 //!
-//! Every pixel of the sheet is taken from the page in whose window it lies deepest; the other pages
-//! that show it must agree.
+//! Every pixel of the sheet comes from the page in whose window it lies deepest; the other pages that show it must
+//! agree.
 
 use glam::DVec2;
 use rayon::prelude::*;
@@ -11,20 +11,20 @@ use crate::finding::any::{Finding, PageFinding};
 use deltille_core::raster::Gray;
 use deltille_layout::{SheetLayout, SheetPage};
 
-/// Pages differ where the ink of a pixel does by more than this: an edge that lies 0.05 mm off at
-/// 300 dpi changes a pixel by 0.6, the pixels of two pages lying between each other by up to 0.5.
+/// Largest accepted difference of ink between pages at a pixel: an edge displaced by 0.05 mm at 300 dpi changes a
+/// pixel by 0.6, and interpolation between the pixels of two pages by up to 0.5.
 const MAX_DIFFERENCE: f64 = 0.7;
 
-/// Nearer than this to the rim of a window nothing is compared, mm: it cuts through pixels.
+/// Width of the rim of a window where nothing is compared, mm: it cuts through pixels.
 const RIM_MM: f64 = 0.3;
 
-/// The first place, from above, where two pages of a sheet differ.
+/// The first location, from the top, where two pages of a sheet differ.
 struct Difference {
     pages: [usize; 2],
     at_px: [usize; 2],
 }
 
-/// Lays pages, one for each of the layout's, together at a resolution.
+/// Assembles pages, one for each page of the layout, at a resolution.
 pub(crate) fn assemble(
     pages: &[Page],
     layout: &SheetLayout,
@@ -32,7 +32,7 @@ pub(crate) fn assemble(
 ) -> (Page, Vec<Finding>) {
     let size_px =
         [layout.width_mm, layout.height_mm].map(|mm| ((mm * px_per_mm).round() as usize).max(1));
-    // Between two pixels of a page lie at most so many of the sheet; each is the mean of a pixel's area.
+    // Number of sheet pixels between two pixels of a page; each is the mean over the area of one pixel.
     let coarsest = pages.iter().map(|page| page.px_per_mm).fold(f64::INFINITY, f64::min);
     let mut sheet = Page {
         width_mm: layout.width_mm,
@@ -91,15 +91,15 @@ pub(crate) fn assemble(
     (sheet, findings)
 }
 
-/// Depth of a position of the sheet in the window of a page, mm; negative outside.
+/// Returns how deep a position of the sheet lies within the window of a page, mm; negative outside.
 fn depth_mm(page: &SheetPage, place: DVec2) -> f64 {
     let [left, lower, right, upper] = page.window_mm;
     let DVec2 { x, y } = place + page.sheet_at_mm;
     (x - left).min(right - x).min(y - lower).min(upper - y)
 }
 
-/// The ink of a page at a position of the sheet, as a pixel of the sheet sees it: the mean of as
-/// many samples as the page has pixels there.
+/// Returns the ink of a page at a position of the sheet, averaged as by a pixel of the sheet: over as many samples as
+/// the page has pixels there.
 fn ink(page: &Page, window: &SheetPage, place: DVec2, px_per_mm: f64) -> f64 {
     let middle = page.px_from_page(place + window.sheet_at_mm);
     let ratio = page.px_per_mm / px_per_mm;

@@ -1,34 +1,33 @@
-//! Measurement of check bars in a picture, independent of how they were drawn.
+//! Measurement of check bars in an image, independent of how they were drawn.
 
 use glam::DVec2;
 
 use crate::document::page::Page;
 
-/// Distances from the line at which the end strokes are met, mm: beyond the line's own thickness
-/// and within strokes that reach 1 mm to either side.
+/// Distances from the line at which the end strokes are sampled, mm: beyond the line's own thickness and within
+/// strokes that extend 1 mm to either side.
 const OFFSETS_MM: std::ops::RangeInclusive<f64> = 0.4..=0.8;
 
-/// How far beyond its expected end a stroke is looked for: at least so far, mm,
+/// Minimum distance beyond the expected end at which a stroke is searched for, mm.
 const REACH_MM: f64 = 3.0;
-/// or so far in lengths of the bar. Inwards it is looked for up to the middle, so that a bar much
-/// shorter than stated is measured too.
+/// The same as a fraction of the bar's length; the larger one counts. Inwards the search extends to the middle, so
+/// that a bar much shorter than stated is measured, too.
 const REACH: f64 = 0.05;
 
-/// Ink that a stroke has at least at its darkest, 0 to 1; below it is dirt.
+/// Minimum ink of a stroke at its darkest point, 0 to 1; less is dirt.
 const MIN_INK: f64 = 0.2;
 
-/// Ink below which a sample is paper: half a grey level. Interpolation between white pixels leaves
-/// a trace of rounding, which must not make a stroke endless.
+/// Ink below which a sample is paper: half a grey level. Interpolation between white pixels leaves a trace of
+/// rounding, which must not extend a stroke.
 const PAPER_INK: f64 = 0.5 / 255.0;
 
-/// Distances from the middle of a stroke at which the bar's line is met inwards and is not met
-/// outwards, mm.
+/// Distances from the middle of a stroke at which the bar's line is present inwards and absent outwards, mm.
 const LINE_MM: f64 = 0.6;
-/// Greatest offset of the line from its expected place, mm.
+/// Largest offset of the line from its expected position, mm.
 const LINE_BESIDE_MM: f64 = 0.25;
 
-/// The distance between the outer edges of the end strokes of a bar near `ends_mm` on the page, mm;
-/// `None` where one is missing.
+/// Returns the distance between the outer edges of the end strokes of a bar near `ends_mm` on the page, mm; `None` if
+/// a stroke is missing.
 pub(super) fn measure(page: &Page, ends_mm: [DVec2; 2]) -> Option<f64> {
     let [from, to] = ends_mm.map(|end| page.px_from_page(end));
     let way = to - from;
@@ -43,14 +42,13 @@ pub(super) fn measure(page: &Page, ends_mm: [DVec2; 2]) -> Option<f64> {
     Some((length + start + end) / page.px_per_mm)
 }
 
-/// Distance of the outer edge of the stroke beyond `end` in direction `outwards`, px; negative
-/// inwards.
+/// Returns the distance of the outer edge of the stroke beyond `end` in direction `outwards`, px; negative inwards.
 ///
-/// Ink is sampled at whole pixels along lines parallel to the bar. A stroke is what is dark on all
-/// of them, with the bar's line on its inner side alone; the one nearest to the expected end counts.
-/// From the middle of a pixel that it fills, the ink of the pixels beyond adds up to its edge, whatever
-/// the resolution and wherever the pixels lie: edge = place + ½ + Σ ink. (Its centre of gravity would
-/// not do: a pixel's ink counts in the pixel's middle, up to ⅛ px² too far out.)
+/// Ink is sampled at whole pixels along lines parallel to the bar. A stroke is dark on all of these lines and has the
+/// bar's line on its inner side only; the stroke nearest to the expected end counts. From the middle of a pixel that
+/// the stroke fills, the ink of the pixels beyond adds up to its edge, independent of resolution and pixel positions:
+/// edge = position + ½ + Σ ink. (The centre of gravity would be wrong: a pixel's ink counts in the middle of the
+/// pixel, up to ⅛ px² too far out.)
 fn outer_edge(
     page: &Page,
     end: DVec2,
@@ -67,7 +65,7 @@ fn outer_edge(
         .collect();
     let first = -inner_reach.ceil();
     let count = (inner_reach.ceil() + outer_reach.ceil()) as usize + 1;
-    // Along a bar that follows the pixels, their middles.
+    // The middles of the pixels along a bar that is aligned with them.
     let axis = usize::from(outwards.y.abs() > outwards.x.abs());
     let to_middle = (end[axis].round() - end[axis]) / outwards[axis];
     let position = |i: usize| first + to_middle + i as f64;
@@ -105,8 +103,8 @@ mod tests {
     use super::*;
     use deltille_core::raster::{Coverage, Gray};
 
-    /// A bar of 60 mm from (`x`, 10) on a page of 80 × 20 mm, drawn by exact coverage, or the same
-    /// standing upright; white is as white as in a picture.
+    /// A bar of 60 mm from (`x`, 10) on a page of 80 × 20 mm, drawn by exact coverage, or the same bar upright; white
+    /// is as bright as on a rendered page.
     fn page(px_per_mm: f64, x: f64, upright: bool) -> Page {
         let rectangles = [
             [0.0, -1.0, 0.3, 1.0],
@@ -146,14 +144,14 @@ mod tests {
                 let x = 9.0 + f64::from(phase) / 10.0 / px_per_mm;
                 for upright in [false, true] {
                     let page = page(px_per_mm, x, upright);
-                    // Where the ends are expected lies between pixels as well.
+                    // The expected ends lie between pixels as well.
                     for (length, shift) in [(60.0, 0.0), (60.0, 0.013), (50.0, 0.0), (66.0, 0.0)] {
                         let ends = [x + shift, x + shift + length].map(|along| {
                             DVec2::from(if upright { (10.0, along) } else { (along, 10.0) })
                         });
                         let found = measure(&page, ends);
                         let off = found.map(|mm| (mm - 60.0).abs());
-                        // Within reach beyond the stated end only where the bar is longer.
+                        // Beyond the stated end the search range is limited, so only longer bars are within it.
                         if length == 50.0 {
                             assert_eq!(found, None);
                         } else {

@@ -1,4 +1,4 @@
-//! Verification of the panels of a page: detected against stated corners.
+//! Verification of the panels of a page: detected corners against stated ones.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -19,20 +19,18 @@ use deltille_core::targets::{Corner, Panel};
 use deltille_detect::Detector;
 use deltille_layout::SheetLayout;
 
-/// Greatest share of tiles of the wrong colour that are named one by one; with more, the picture
-/// does not show the panel.
+/// Largest fraction of tiles of the wrong colour that are listed one by one; with more, the page does not show the
+/// panel.
 const MAX_WRONG_TILES: f64 = 0.25;
 
-/// Greatest share of corners missing, or more than stated; beyond it the picture shows another
-/// board.
+/// Largest fraction of missing or additional corners; with more, the page shows another board.
 const MAX_MISSING: f64 = 0.25;
 
-/// Positions of the corners detected on a sheet, mm in the frame of the sheet: by panel id, then by
-/// corner id.
+/// Positions of the detected corners on a sheet, mm in the frame of the sheet: by panel id, then by corner id.
 pub(crate) type Seen = BTreeMap<u32, BTreeMap<u32, DVec2>>;
 
-/// Compares all panels of a page; tells where on the page the first of them lies, and where the
-/// corners of each were found.
+/// Compares all panels of a page. Returns where on the page the first of them lies, and the positions of the corners
+/// found.
 pub(super) fn check(
     verifier: &Verifier,
     page: &Page,
@@ -41,7 +39,7 @@ pub(super) fn check(
 ) -> (AffineMap, Seen) {
     let blurred = page.blurred();
     let detection = verifier.detector.detect(&blurred, "page");
-    // Looked at in a mirror only if need be.
+    // Detect the mirrored page only if necessary.
     let mut mirrored: Option<Detection> = None;
     let mut mirror = None;
     let mut placed = Vec::new();
@@ -94,8 +92,8 @@ pub(super) fn check(
     (mirror.or(first).unwrap_or(AffineMap::IDENTITY), seen)
 }
 
-/// Says first that the corners found are those of another board, where too few are the stated ones
-/// and their number differs. All corners count, whether or not they are on the stated board.
+/// Adds a first finding that the corners are those of another board, if too few stated corners are found and their
+/// number differs. All corners count, whether or not they are on the stated board.
 fn another_board(verifier: &Verifier, page: &Page, verdict: &mut SheetVerdict) {
     let unknown = verdict.findings.iter().any(|finding| {
         use BoardFinding::{CornerExtra, PanelMissing};
@@ -116,8 +114,8 @@ fn another_board(verifier: &Verifier, page: &Page, verdict: &mut SheetVerdict) {
     }
 }
 
-/// Compares one panel: corners, then tiles and tags where the corners say they are. Returns where
-/// the corners were found.
+/// Compares one panel: first its corners, then its tiles and tags at the positions given by the corners. Returns the
+/// positions of the corners found.
 fn check_panel(
     verifier: &Verifier,
     blurred: &Gray<u16>,
@@ -149,10 +147,10 @@ fn check_panel(
     found
 }
 
-/// Page positions of the stated corners that were found, by corner id.
+/// Returns the page positions of the stated corners that were found, by corner id.
 ///
-/// Corners of a tagged panel must be labelled by its tags. An untagged panel has nothing but its
-/// outline, which tells nothing once a corner is missing; then position decides.
+/// The corners of a tagged panel must be labelled by its tags. An untagged panel has only its outline, which is
+/// useless once a corner is missing; corners are then matched by position.
 fn found_corners(
     blurred: &Gray<u16>,
     detection: &Detection,
@@ -192,7 +190,7 @@ fn found_corners(
     found
 }
 
-/// The stated corner nearest to a page position, and its distance, mm.
+/// Returns the stated corner nearest to a page position, and its distance, mm.
 fn nearest<'a>(placed: &PlacedPanel<'a>, at: DVec2) -> Option<(&'a Corner, f64)> {
     let distance = |corner: &Corner| {
         let stated = placed.found_from_stated.apply(placed.page_from_panel(corner.panel_mm));
@@ -202,7 +200,7 @@ fn nearest<'a>(placed: &PlacedPanel<'a>, at: DVec2) -> Option<(&'a Corner, f64)>
     corners.map(|corner| (corner, distance(corner))).min_by(|a, b| a.1.total_cmp(&b.1))
 }
 
-/// Compares positions; where they differ, looks for one cause.
+/// Compares positions, and searches for a common cause if they differ.
 fn check_positions(
     placed: &mut PlacedPanel,
     found: &BTreeMap<u32, DVec2>,
@@ -240,8 +238,7 @@ fn check_positions(
     }
 }
 
-/// Scale, turn and shift of a whole panel, each where it alone moves a corner by more than the
-/// tolerance.
+/// Returns scale, rotation and shift of a whole panel, each if it alone moves a corner by more than the tolerance.
 fn causes(panel: &Panel, map: &AffineMap, pairs: &[(DVec2, DVec2)]) -> Vec<BoardFinding> {
     let id = panel.id;
     let mean =
@@ -262,14 +259,14 @@ fn causes(panel: &Panel, map: &AffineMap, pairs: &[(DVec2, DVec2)]) -> Vec<Board
     if turn.abs() * radius > TOLERANCE_MM {
         causes.push(BoardFinding::Turned { panel: id, angle_deg: turn.to_degrees() });
     }
-    // A scaled or turned page has its middle elsewhere too.
+    // Scaling or rotating a page also moves its middle.
     if causes.is_empty() && by_mm.length() > TOLERANCE_MM {
         causes.push(BoardFinding::Shifted { panel: id, by_mm });
     }
     causes
 }
 
-/// Tags that the detector reads where the panel has none, or another.
+/// Reports tags that the detector reads where the panel has none or a different one.
 fn extra_tags(detection: &Detection, panel: &Panel, verdict: &mut SheetVerdict) {
     let stated: BTreeSet<(u32, i32, i32)> =
         panel.tags.iter().map(|tag| (tag.id, tag.row, tag.col)).collect();
@@ -281,8 +278,8 @@ fn extra_tags(detection: &Detection, panel: &Panel, verdict: &mut SheetVerdict) 
     verdict.findings.extend(extra);
 }
 
-/// Corners that belong to no panel of the page. The cells of a tag meet like small tiles; what is
-/// inside a tag's tile is judged cell by cell instead.
+/// Reports corners that belong to no panel of the page. The cells of a tag meet like small tiles, so the inside of a
+/// tag's tile is checked cell by cell instead.
 fn extra_corners(detection: &Detection, placed: &[PlacedPanel], verdict: &mut SheetVerdict) {
     for corner in detection.grids.iter().flat_map(|grid| &grid.corners) {
         let Some(page) = placed.first().map(|p| p.page) else { return };

@@ -1,4 +1,4 @@
-//! The marks that a sheet should show: outlines in black, and the area that belongs to each.
+//! The expected marks of a sheet: outlines in black, and the area that belongs to each.
 
 use std::f64::consts::TAU;
 
@@ -13,13 +13,14 @@ use deltille_core::targets::Corner;
 use deltille_layout::artwork;
 use deltille_layout::{CHECK_BAR_STROKE_MM, Logo, LogoPlacement, SheetLayout};
 
-/// Long marks are compared in pieces of at most this length, mm.
+/// Maximum length of the pieces in which long marks are compared, mm.
 const PIECE_MM: f64 = 20.0;
 
-/// Greatest deviation of the line segments that replace curves, mm.
+/// Largest deviation of the line segments that replace curves, mm.
 const FLATNESS_MM: f64 = 0.002;
 
-/// Sides of the polygon that is compared with a disc: of a metre they are within 5 µm of a circle.
+/// Sides of the polygon that is compared with a disc: even for a disc of a metre they deviate from the circle by at
+/// most 5 µm.
 const DISC_SIDES: u32 = 720;
 
 /// Kind and index of a mark.
@@ -29,12 +30,12 @@ pub(super) enum What {
     CheckBar(usize),
     Line(usize),
     Logo(usize),
-    /// By row and column of its panel.
+    /// Row and column of the disc on its panel.
     Disc(i32, i32),
 }
 
 impl What {
-    /// The finding that a mark differs from the layout.
+    /// Returns the finding that a mark differs from the layout.
     pub(super) fn differs(self, layout: &SheetLayout) -> MarkFinding {
         match self {
             Self::Text(i) => {
@@ -50,7 +51,7 @@ impl What {
     }
 }
 
-/// A mark beside the panels.
+/// A mark outside the panels.
 pub(super) struct Mark {
     pub what: What,
     /// Its black outlines, in the page frame, mm.
@@ -59,15 +60,15 @@ pub(super) struct Mark {
     pub areas: Vec<Area>,
 }
 
-/// A rectangle along a mark, so that what is slanted claims no more than what is upright.
+/// A rectangle along a mark, so that a slanted mark claims no more area than an upright one.
 pub(super) struct Area {
-    /// From the page to a frame along the mark.
+    /// Map from the page to a frame along the mark.
     along: Affine,
-    /// In that frame, mm.
+    /// Extent in that frame, mm.
     bounds: Rect,
 }
 
-/// A logo where it lies.
+/// Returns the mark of a logo at its position.
 pub(super) fn of_logo(logo: &Logo, place: &LogoPlacement, index: usize) -> Mark {
     let along =
         Affine::rotate(-place.angle_rad) * Affine::translate((-place.at_mm.x, -place.at_mm.y));
@@ -76,7 +77,7 @@ pub(super) fn of_logo(logo: &Logo, place: &LogoPlacement, index: usize) -> Mark 
     Mark { what: What::Logo(index), outlines: logo.outlines_mm(place), areas }
 }
 
-/// All marks of a layout but its logos, and findings for texts that cannot be drawn.
+/// Returns all marks of a layout except its logos, and findings for texts that cannot be drawn.
 pub(super) fn marks(layout: &SheetLayout) -> (Vec<Mark>, Vec<MarkFinding>) {
     let (mut marks, mut findings) = (Vec::new(), Vec::new());
     for (index, text) in layout.texts.iter().enumerate() {
@@ -109,7 +110,7 @@ pub(super) fn marks(layout: &SheetLayout) -> (Vec<Mark>, Vec<MarkFinding>) {
     (marks, findings)
 }
 
-/// The discs of a panel, each a polygon of so many sides that it is a circle.
+/// Returns the discs of a panel, as polygons with enough sides to be circles.
 pub(super) fn discs(placed: &PlacedPanel) -> Vec<Mark> {
     let Some(diameter) = placed.panel.discs_mm else { return Vec::new() };
     let radius = diameter / 2.0;
@@ -127,7 +128,7 @@ pub(super) fn discs(placed: &PlacedPanel) -> Vec<Mark> {
     placed.panel.corners.iter().map(disc).collect()
 }
 
-/// A path as polygons.
+/// Converts a path to polygons.
 fn polygons(path: &BezPath) -> Vec<Vec<DVec2>> {
     let mut polygons: Vec<Vec<DVec2>> = Vec::new();
     kurbo::flatten(path, FLATNESS_MM, |element| match (element, polygons.last_mut()) {
@@ -138,7 +139,7 @@ fn polygons(path: &BezPath) -> Vec<Vec<DVec2>> {
     polygons
 }
 
-/// Pieces of the area of a straight mark.
+/// Returns the pieces of the area of a straight mark.
 fn pieces([from, to]: [DVec2; 2], width_mm: f64) -> Vec<Area> {
     let length = from.distance(to);
     let along = Affine::rotate(-(to - from).to_angle()) * Affine::translate((-from.x, -from.y));
@@ -151,20 +152,20 @@ fn pieces([from, to]: [DVec2; 2], width_mm: f64) -> Vec<Area> {
 }
 
 impl Area {
-    /// The rectangle of pixels around it.
+    /// Returns the pixel rectangle around the area.
     pub(super) fn pixels(&self, page: &Page) -> [usize; 4] {
         let Rect { x0, y0, x1, y1 } = self.along.inverse().transform_rect_bbox(self.bounds);
         pixels(page, [x0, y0, x1, y1], BLANK_PX)
     }
 
-    /// Whether a pixel belongs to it, with `blank` around.
+    /// Whether a pixel belongs to the area or to the margin of `blank_px` around it.
     pub(super) fn contains(&self, page: &Page, x: usize, y: usize, blank_px: f64) -> bool {
         let place = page.page_from_px(DVec2::new(x as f64, y as f64));
         let blank = blank_px / page.px_per_mm;
         self.bounds.inflate(blank, blank).contains(self.along * Point::new(place.x, place.y))
     }
 
-    /// Marks its pixels.
+    /// Marks the pixels of the area.
     pub(super) fn cover(&self, page: &Page, known: &mut [bool]) {
         let [x0, y0, x1, y1] = self.pixels(page);
         for y in y0..y1 {
@@ -175,8 +176,8 @@ impl Area {
     }
 }
 
-/// The pixels of a rectangle of the page (mm) with `blank` more on every side: first and
-/// past-the-end column and row, as left, upper, right, lower.
+/// Returns the pixels of a rectangle of the page (mm), with a margin of `blank` on every side, as left, upper, right
+/// and lower bound; right and lower are past the end.
 pub(super) fn pixels(page: &Page, [x0, y0, x1, y1]: [f64; 4], blank: f64) -> [usize; 4] {
     let [least, most] = [(x0, y1), (x1, y0)].map(|place| page.px_from_page(place.into()));
     let size = DVec2::new(page.image.width() as f64, page.image.height() as f64);

@@ -1,4 +1,4 @@
-//! A face that polygons cover with ink, as a sheet of its own.
+//! A face covered with ink by polygons, as a separate sheet.
 
 use glam::DVec2;
 
@@ -10,10 +10,10 @@ use deltille_core::raster::{Coverage, Gray};
 use deltille_core::targets::Panel;
 use deltille_layout::{Placement, SheetLayout};
 
-/// White around a face in its picture, mm.
+/// White margin around a face in its image, mm.
 const AROUND_MM: f64 = 5.0;
 
-/// A picture of a face, to be compared with what the face should show.
+/// An image of a face, for comparison with its expected appearance.
 pub(crate) struct FacePicture {
     page: Page,
     layout: SheetLayout,
@@ -24,7 +24,7 @@ pub(crate) struct FacePicture {
 }
 
 impl FacePicture {
-    /// A blank picture of a face with this outline in the frame of its panel, mm.
+    /// Creates a blank image of a face with this outline in the frame of its panel, mm.
     pub(crate) fn new(verifier: &Verifier, panel: &Panel, outline: &[DVec2]) -> Self {
         let least = outline.iter().copied().reduce(DVec2::min).unwrap_or_default();
         let most = outline.iter().copied().reduce(DVec2::max).unwrap_or_default();
@@ -56,18 +56,19 @@ impl FacePicture {
         Self { page, layout, size_px, low }
     }
 
-    /// The place of a pixel in the frame of the panel, mm.
+    /// Returns the position of a pixel in the frame of the panel, mm.
     pub(crate) fn place(&self, index: usize) -> DVec2 {
         let width = self.size_px[0];
         let pixel = DVec2::new((index % width) as f64, (index / width) as f64);
         self.page.page_from_px(pixel) + self.low
     }
 
-    /// How much of each pixel polygons in the frame of the panel cover, each times its value; clockwise ones negative.
+    /// Returns the coverage of each pixel by polygons in the frame of the panel, weighted by their values; clockwise
+    /// polygons count negative.
     pub(crate) fn covered<'p>(&self, parts: impl Iterator<Item = (&'p [DVec2], f64)>) -> Gray<f32> {
         let mut cover = Coverage::new(self.size_px[0], self.size_px[1]);
         for (corners, value) in parts {
-            // Clockwise on the screen is positive.
+            // Clockwise on the screen counts positive.
             let pixels = corners.iter().rev();
             let pixels = pixels.map(|&corner| self.page.px_from_page(corner - self.low));
             cover.add(&pixels.collect::<Vec<DVec2>>(), value);
@@ -75,7 +76,7 @@ impl FacePicture {
         cover.finish()
     }
 
-    /// The face with these polygons in black, and what it should show.
+    /// Returns the face with these polygons in black, and its expected appearance.
     pub(crate) fn inked<'p>(
         mut self,
         dark: impl Iterator<Item = (&'p [DVec2], f64)>,

@@ -1,4 +1,4 @@
-//! What lies between the marks and beside the tiles: paper, or the black field of an inverted panel.
+//! The area between the marks and outside the tiles: paper, or the black field of an inverted panel.
 
 use std::f64::consts::TAU;
 
@@ -13,7 +13,7 @@ use crate::panel::spots::named;
 use crate::panel::tile_table::TileTable;
 use deltille_core::polygon::rectangle;
 
-/// Names each connected spot of wrong pixels outside the tiles and the `known` marks.
+/// Returns a finding for each connected spot of wrong pixels outside the tiles and the `known` marks.
 pub(super) fn spots(page: &Page, known: &[bool], panels: &[PlacedPanel]) -> Vec<MarkFinding> {
     let (width, height) = (page.image.width(), page.image.height());
     let grounds: Vec<Ground> = panels.iter().map(Ground::new).collect();
@@ -22,17 +22,17 @@ pub(super) fn spots(page: &Page, known: &[bool], panels: &[PlacedPanel]) -> Vec<
     wrong.par_chunks_mut(width).enumerate().for_each(|(y, row)| {
         for (x, (wrong, &pixel)) in row.iter_mut().zip(page.image.row(y)).enumerate() {
             let ink = 1.0 - f64::from(pixel) / 255.0;
-            // White is right wherever no inverted panel is; most of the sheet is done here.
+            // White is right wherever there is no inverted panel; this handles most of the sheet.
             let plain = ink <= MAX_INK_ERROR && !is_inverted;
             if plain || known[y * width + x] {
                 continue;
             }
             let pixel = DVec2::new(x as f64, y as f64);
-            // Most of what is black is in tiles, which are compared by themselves.
+            // Most black pixels lie in tiles, which are compared separately.
             if grounds.iter().any(|ground| ground.has_tile_at(page, pixel)) {
                 continue;
             }
-            // Where this far from edges.
+            // Only at this distance from edges.
             let is_off = |most: f64, near_px: f64| {
                 let expected = |ground: &Ground| ground.expected(page, pixel, near_px);
                 let expected = grounds.iter().find_map(expected).unwrap_or(Some(0.0));
@@ -49,13 +49,13 @@ pub(super) fn spots(page: &Page, known: &[bool], panels: &[PlacedPanel]) -> Vec<
 pub(super) struct Ground<'a> {
     placed: &'a PlacedPanel<'a>,
     tiles: TileTable<()>,
-    /// Directions in which tiles are looked for beside a pixel: fine enough that no tip of a tile, also a lone
-    /// one, slips between two.
+    /// Directions in which tiles are searched for beside a pixel: close enough together that no tip of a tile, even a
+    /// single one, fits between two of them.
     probes: Vec<DVec2>,
-    /// Outline of the tiles, or of the black field of an inverted panel, counter-clockwise: from where each side begins, and
-    /// which way is inwards, mm.
+    /// Outline of the tiles, or of the black field of an inverted panel, counter-clockwise: the start of each side
+    /// and its inward direction, mm.
     field: Vec<[DVec2; 2]>,
-    /// Where on the picture that may be: left, upper, right, lower end, px.
+    /// Area of the image where that outline may be: left, upper, right and lower bound, px.
     around_px: [f64; 4],
 }
 
@@ -90,7 +90,7 @@ impl<'a> Ground<'a> {
         self.placed.panel.inverted
     }
 
-    /// Whether a pixel is on the picture where the panel may be.
+    /// Whether a pixel is in the area of the image where the panel may be.
     fn is_around(&self, pixel: DVec2) -> bool {
         let [left, upper, right, lower] = self.around_px;
         pixel.x >= left && pixel.x <= right && pixel.y >= upper && pixel.y <= lower
@@ -104,9 +104,9 @@ impl<'a> Ground<'a> {
         }
     }
 
-    /// What a pixel of the panel's area should be; `Some(None)` in and beside the tiles, which are
-    /// compared by themselves, and at the edge of the field, `near_px` to either side. Between the tiles of a panel
-    /// that is not inverted there may be another one.
+    /// Returns the expected ink of a pixel in the panel's area. Returns `Some(None)` in and beside the tiles, which
+    /// are compared separately, and within `near_px` of the edge of the field. Another panel may lie between the
+    /// tiles of a panel that is not inverted.
     pub(super) fn expected(&self, page: &Page, pixel: DVec2, near_px: f64) -> Option<Option<f64>> {
         if !self.is_around(pixel) {
             return None;

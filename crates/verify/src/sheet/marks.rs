@@ -1,9 +1,7 @@
-//! Verification outside the tiles: every text, check bar, line and logo has its ink, and there is nothing
-//! else on the sheet.
+//! Verification outside the tiles: every text, check bar, line and logo has its ink, and the sheet has nothing else.
 //!
-//! The expected outlines come from the same code as the printed ones; so this proves that the sheet
-//! has what the description states, and no more. The length of check bars is measured
-//! independently.
+//! The expected outlines come from the same code as the printed ones. This check therefore shows that the sheet has
+//! exactly what the description states. The length of check bars is measured independently.
 
 use glam::DVec2;
 use rayon::prelude::*;
@@ -23,16 +21,16 @@ use deltille_core::polygon;
 use deltille_core::raster::{Coverage, Gray};
 use deltille_layout::{Logo, SheetLayout};
 
-/// Ink of a mark and of its outline, each the mean of 3 × 3 pixels, may differ by this. An edge
-/// that lies 0.02 mm off at 300 dpi changes a mean by 0.08, a missing stroke by more than 0.5.
+/// Largest accepted difference of ink between a mark and its outline, each the mean of 3 × 3 pixels. An edge
+/// displaced by 0.02 mm at 300 dpi changes a mean by 0.08, a missing stroke by more than 0.5.
 const MAX_MARK_ERROR: f64 = 0.3;
 
-/// Blank around the window of a page that belongs to it, px: what it shows is cut off at its rim,
-/// through pixels and through the width of lines.
+/// Margin around the window of a page that belongs to the window, px: its content is cut off at the rim, through
+/// pixels and line widths.
 const WINDOW_BLANK_PX: f64 = 3.0;
 
-/// Compares the marks, and looks for ink where none should be. What is in `window`
-/// (left, lower, right, upper end, mm), the part of a larger sheet, is left to others.
+/// Compares the marks, and searches for unexpected ink. Skips the content of `window` (left, lower, right, upper
+/// bound, mm), which is part of a larger sheet.
 pub(crate) fn check(
     page: &Page,
     layout: &SheetLayout,
@@ -43,7 +41,7 @@ pub(crate) fn check(
 ) {
     let grounds: Vec<Ground> = panels.iter().map(Ground::new).collect();
     let window = window.map(|window| pixels(page, window, WINDOW_BLANK_PX));
-    // What the window or a panel shows is compared by itself.
+    // The content of the window and of the panels is compared separately.
     let is_own = |x: usize, y: usize| {
         let in_window =
             |[x0, y0, x1, y1]: [usize; 4]| (x0..x1).contains(&x) && (y0..y1).contains(&y);
@@ -61,7 +59,7 @@ pub(crate) fn check(
         let is_right = mark.areas.iter().all(|area| drawn.is_in(area, is_own));
         (!is_right).then(|| mark.what.differs(layout))
     }));
-    // A bar of another length has been reported.
+    // A bar with the wrong length has already been reported.
     let is_said = |differs: &MarkFinding| {
         let is_same = |found: &Finding| match (found, differs) {
             (
@@ -83,10 +81,10 @@ pub(crate) fn check(
     verdict.findings.extend(spots(page, &known, panels).into_iter().map(Finding::from));
 }
 
-/// An outline in the picture, by the rectangle around it, and whether it is of a letter or a logo.
+/// Bounding rectangle of an outline in the image, and whether it belongs to a letter or a logo.
 type Outline = GeomWithData<Rectangle<[f64; 2]>, (Vec<DVec2>, bool)>;
 
-/// The marks that a page should show.
+/// The expected marks of a page.
 struct Drawn<'a> {
     page: &'a Page,
     outlines: RTree<Outline>,
@@ -108,7 +106,7 @@ impl<'a> Drawn<'a> {
         Self { page, outlines: RTree::bulk_load(marks.iter().flat_map(of_mark).collect()) }
     }
 
-    /// Whether an area has the ink of the marks, and no other, where it `is_own`.
+    /// Whether an area has exactly the ink of the marks at the pixels where `is_own` is true.
     fn is_in(&self, area: &Area, is_own: impl Fn(usize, usize) -> bool) -> bool {
         let page = self.page;
         let [x0, y0, x1, y1] = area.pixels(page);
@@ -131,7 +129,7 @@ impl<'a> Drawn<'a> {
         })
     }
 
-    /// The ink of the marks in a part of the picture.
+    /// Returns the expected ink of the marks in a part of the image.
     fn stated(&self, [x0, y0]: [usize; 2], [width, height]: [usize; 2]) -> Gray<f32> {
         let origin = DVec2::new(x0 as f64, y0 as f64);
         let (first, size) = (origin - 0.5, DVec2::new(width as f64, height as f64));
@@ -140,7 +138,7 @@ impl<'a> Drawn<'a> {
         for outline in self.outlines.locate_in_envelope_intersecting(part) {
             let (polygon, has_holes) = &outline.data;
             let polygon: Vec<DVec2> = polygon.iter().map(|&p| p - origin).collect();
-            // Which way outlines of letters run is the font's business; those of strokes cross each other.
+            // The orientation of letter outlines depends on the font; outlines of strokes may cross.
             match has_holes {
                 true => letters.add(&polygon, 1.0),
                 false => strokes.add(&polygon, polygon::area(&polygon).signum()),

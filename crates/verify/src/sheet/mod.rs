@@ -1,13 +1,13 @@
 //! One sheet of paper compared with its layout.
 //!
-//! Comes in: pages of a document. Goes out: a verdict on the sheet, and the corners that were seen on it.
+//! Input: pages of a document. Output: a verdict on the sheet, and the corners detected on it.
 //!
-//! 1. `source` renders a page; `assemble` joins the pages of a larger sheet, `face_picture` draws a face as a sheet.
-//! 2. `whole` runs the following on it.
-//! 3. `boards` compares panels with what the detector sees, `undetected` those that it does not look for.
+//! 1. `source` renders a page; `assemble` joins the pages of a larger sheet; `face_picture` draws a face as a sheet.
+//! 2. `whole` runs the following steps on it.
+//! 3. `boards` compares panels with the detections, `undetected` checks panels that the detector does not search for.
 //! 4. `bars` measures the check bars.
-//! 5. `expected_marks` has the texts, lines, logos and discs of the layout; `marks` compares them.
-//! 6. `ground` is what lies beside tiles and marks, and should be blank.
+//! 5. `expected_marks` contains the texts, lines, logos and discs of the layout; `marks` compares them.
+//! 6. `ground` is the area outside tiles and marks, which should be blank.
 
 pub(super) mod assemble;
 mod bars;

@@ -1,4 +1,4 @@
-//! A page of a document, rendered as its sheet states it.
+//! A page of a document, rendered as its sheet requires.
 
 use glam::DVec2;
 
@@ -9,11 +9,11 @@ use crate::reading::error::DocumentError;
 use crate::verifier::{PRINT_PX_PER_MM, Verifier};
 use deltille_layout::SheetLayout;
 
-/// Least edge of a cell of a tag in the picture, px, so that more than a few pixels lie inside it.
+/// Minimum edge of a tag cell in the image, px, so that it contains more than a few pixels.
 const CELL_PX: f64 = 8.0;
 
-/// A page with a side this many times as long as stated is not rendered: at the resolution that is
-/// possible for it nothing of its boards could be seen.
+/// A page with a side longer than stated by this factor is not rendered: at the possible resolution, its boards could
+/// not be seen.
 const MOST_ENLARGED: f64 = 10.0;
 
 /// A page of a document.
@@ -24,7 +24,8 @@ pub(crate) struct Source<'a> {
 }
 
 impl Source<'_> {
-    /// The page as a picture, turned over where it is printed as its mirror image, and whether it has the stated size.
+    /// Renders the page, mirrored back if it is printed as a mirror image, and returns a finding if its size is
+    /// wrong.
     pub(crate) fn render(
         &self,
         layout: &SheetLayout,
@@ -43,14 +44,14 @@ impl Source<'_> {
             let page = turned(page);
             return Ok((page, vec![PageFinding::PageSize { found_mm, stated_mm }.into()]));
         }
-        // Pictures begin at the upper edge and end with a whole pixel: heights are counted from
-        // the true lower edge, not from the end of the last pixel; so are those that are turned over, from the other side.
+        // Images begin at the upper edge and end with a whole pixel. Heights are therefore measured from the true
+        // lower edge, not from the end of the last pixel; the same applies to the other side of mirrored pages.
         (page.width_mm, page.height_mm) = (layout.width_mm, layout.height_mm);
         Ok((turned(page), Vec::new()))
     }
 }
 
-/// Print resolution, or finer where the cells of tags are small.
+/// Returns the print resolution, or a finer one if tag cells are small.
 pub(crate) fn wish_px_per_mm(verifier: &Verifier, layout: &SheetLayout) -> f64 {
     let panels = verifier.target().panels.iter();
     let here = panels.filter(|panel| layout.placements.iter().any(|p| p.panel == panel.id));

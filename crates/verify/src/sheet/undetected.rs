@@ -1,4 +1,5 @@
-//! Verification of panels that the detector does not look for, at their stated places: single tags, and grids of discs.
+//! Verification of panels that the detector does not search for, at their stated positions: single tags, and grids of
+//! discs.
 //!
 //! Discs are measured by the centre of gravity and the amount of their ink, tags cell by cell.
 
@@ -14,7 +15,7 @@ use crate::verdict::SheetVerdict;
 use crate::verifier::{TOLERANCE_MM, Verifier};
 use deltille_core::targets::Corner;
 
-/// Whether all panels of a page are such, if it has any.
+/// Whether the page has panels and all of them are of this kind.
 pub(super) fn is_for(placed: &[PlacedPanel]) -> bool {
     let is_stated = |placed: &PlacedPanel| {
         let panel = placed.panel;
@@ -44,7 +45,7 @@ pub(super) fn check(verifier: &Verifier, panels: &[PlacedPanel], verdict: &mut S
     }
 }
 
-/// Compares places and diameters of discs.
+/// Compares positions and diameters of discs.
 fn check_discs(placed: &PlacedPanel, stated_mm: f64, verdict: &mut SheetVerdict) {
     for corner in &placed.panel.corners {
         let Corner { id, row, col, panel_mm, .. } = *corner;
@@ -65,8 +66,8 @@ fn check_discs(placed: &PlacedPanel, stated_mm: f64, verdict: &mut SheetVerdict)
     }
 }
 
-/// The centre of gravity of the ink in the square of one spacing around a disc, mm on the page, and the diameter of a disc
-/// with so much ink, mm; `None` where there is none.
+/// Returns the centre of gravity of the ink in a square of one spacing around a disc, mm on the page, and the
+/// diameter of a disc with the same amount of ink, mm; `None` without ink.
 fn disc(placed: &PlacedPanel, corner: &Corner) -> Option<(DVec2, f64)> {
     let page = placed.page;
     let middle = page.px_from_page(placed.page_from_panel(corner.panel_mm));

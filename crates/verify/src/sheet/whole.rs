@@ -43,7 +43,7 @@ pub(crate) fn compare(
     seen
 }
 
-/// The panels of a page where they are stated.
+/// Returns the panels of a page at their stated positions.
 fn placed<'p>(
     verifier: &'p Verifier,
     page: &'p Page,
@@ -57,7 +57,7 @@ fn placed<'p>(
     placed.collect()
 }
 
-/// Measures the check bars. Where the boards lie only tells where to look for them.
+/// Measures the check bars. The position of the boards only determines where to search for them.
 pub(crate) fn check_bars(
     page: &Page,
     layout: &SheetLayout,

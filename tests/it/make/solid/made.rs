@@ -1,4 +1,4 @@
-//! Solids from the command to the proof, and to photographs in which they are found.
+//! Solids from the command to verification, and to synthetic photographs in which they are detected.
 
 use std::path::Path;
 
@@ -18,7 +18,7 @@ fn an_icosahedron_needs_no_option() {
     assert_eq!(names(folder.path()), ["icosahedron.glb", "icosahedron.json"]);
 }
 
-/// The description of the reference programs says the same: corners, tags, places in space.
+/// The description of the reference programs agrees: corners, tags, positions in space.
 #[test]
 fn every_format_is_written_and_the_dsc_reads_back() {
     let folder = tempfile::tempdir().unwrap();
@@ -48,11 +48,11 @@ fn every_format_is_written_and_the_dsc_reads_back() {
         let turned = a.pose.rotation.iter().zip(&b.pose.rotation).map(|(a, b)| (a - b).abs());
         assert!(turned.fold(0.0, f64::max) < 1e-9);
     }
-    // Eighty bytes of header, a count, fifty bytes a triangle.
+    // A header of eighty bytes, a count, fifty bytes per triangle.
     assert_eq!(std::fs::metadata(out.join("t.stl")).unwrap().len(), 84 + 4 * 50);
 }
 
-/// The 16 equilateral triangles of a gyroelongated square bipyramid: two pyramids on an antiprism.
+/// A gyroelongated square bipyramid with 16 equilateral triangles: two pyramids on an antiprism.
 pub(super) fn bipyramid(edge: f64) -> String {
     let radius = edge / 2f64.sqrt();
     let across = 2.0 * radius * (std::f64::consts::FRAC_PI_8).sin();
@@ -73,7 +73,7 @@ pub(super) fn bipyramid(edge: f64) -> String {
     text
 }
 
-/// Every output of a solid from a mesh, inside out and in metres, from the file to the proof.
+/// All outputs of a solid from a mesh that is inside out and in metres, from the file to verification.
 #[test]
 fn any_closed_mesh_becomes_a_target() {
     let folder = tempfile::tempdir().unwrap();
@@ -91,7 +91,7 @@ fn any_closed_mesh_becomes_a_target() {
     let mut page = Page::default();
     assert!(page.run(path, &format!("deltille {args}")).status.success());
     page.is("solid-of-a-mesh");
-    // The description is enough to make the target again.
+    // The description is enough to generate the target again.
     let target = std::fs::read_to_string(path.join("new/gyro.json")).unwrap();
     let target = Printing::from_json(&target).unwrap();
     let family = deltille::family::Family::shipped("delTag25h7").unwrap();
@@ -102,7 +102,7 @@ fn any_closed_mesh_becomes_a_target() {
     assert_eq!(again.panels.len(), 16);
 }
 
-/// Faces that lie in one plane do not see each other's print, and edges between them are not folded.
+/// Faces in one plane do not see each other's print, and edges between them are not folded.
 #[test]
 fn a_tetrahedron_with_each_face_cut_in_four_is_sixteen_faces() {
     let folder = tempfile::tempdir().unwrap();
@@ -125,7 +125,7 @@ fn a_tetrahedron_with_each_face_cut_in_four_is_sixteen_faces() {
     let json = std::fs::read_to_string(path.join("flat.json")).unwrap();
     let Printing { target, sheets, .. } = Printing::from_json(&json).unwrap();
     assert_eq!(target.panels.len(), 16);
-    // The faces of a quarter lie in one plane: its three inner edges are not folded.
+    // The faces of a quarter lie in one plane, so its three inner edges are not folded.
     let lines = || sheets.iter().flat_map(|sheet| &sheet.lines);
     let count = |kind| lines().filter(|line| line.kind == kind).count();
     assert_eq!((count(LineKind::Flat), count(LineKind::Fold)), (12, 12));
@@ -134,8 +134,8 @@ fn a_tetrahedron_with_each_face_cut_in_four_is_sixteen_faces() {
 }
 
 #[test]
-/// An octahedron from the command to its proof, and to a photograph in which it is found.
-fn an_octahedron_is_made_photographed_and_found() {
+/// An octahedron from the command to verification, and to an image in which it is detected.
+fn an_octahedron_is_generated_rendered_and_detected() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path();
     let args = "octahedron --gltf --obj --stl --dxf --skeleton --face-margin 7mm";
@@ -152,7 +152,7 @@ fn an_octahedron_is_made_photographed_and_found() {
     assert_eq!(picture.decode().unwrap().color(), image::ColorType::L16);
 }
 
-/// How many corners of a target are found in its rendered view, each within 0.2 px of its true place.
+/// Counts the corners of a target detected in its rendered view, each within 0.2 px of its true position.
 fn corners_found(path: &Path, name: &str) -> usize {
     deltille(path, &format!("detect --target {name}.json {name}-view.png -o found")).success();
     let read = |file: String| -> serde_json::Value {
@@ -181,9 +181,9 @@ fn corners_found(path: &Path, name: &str) -> usize {
 const CAMERA: &str = "width: 1600\nheight: 1200\nmodel: pinhole\nfocal_px: [1800, 1800]\n\
                       centre_px: [799.5, 599.5]\n";
 
-/// A cube from the command to its proof in every format, and to a photograph in which three faces are found.
+/// A cube from the command to verification in every format, and to an image in which three faces are detected.
 #[test]
-fn a_cube_is_made_photographed_and_found() {
+fn a_cube_is_generated_rendered_and_detected() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path();
     let mut page = Page::default();
@@ -207,8 +207,8 @@ fn a_cube_is_made_photographed_and_found() {
     assert_eq!(corners_found(path, "cube"), 3 * 49);
 }
 
-/// Squares beside triangles, hexagons and rhombs, each with its board: from the mesh to the proof, and found in a
-/// photograph.
+/// Solids with squares beside triangles, hexagons and rhombs, each with its board: from the mesh to verification, and
+/// detected in an image.
 #[test]
 fn meshes_of_other_faces_become_targets() {
     let folder = tempfile::tempdir().unwrap();
@@ -216,7 +216,7 @@ fn meshes_of_other_faces_become_targets() {
     std::fs::write(path.join("camera.yaml"), CAMERA).unwrap();
     let mut page = Page::default();
     let bodies = "--pdf --gltf --stl --skeleton --dxf --panel-thickness 1mm --wall 1.5mm";
-    // How many corners at least are found.
+    // The minimum number of detected corners.
     for (name, obj, options, least) in [
         ("cubocta", cuboctahedron(70.0), "--tiles 6", 2 * 25 + 10),
         ("truncated", truncated_tetrahedron(60.0), "--tiles 6 --first-id 7", 91),
@@ -230,7 +230,7 @@ fn meshes_of_other_faces_become_targets() {
         let found = corners_found(path, name);
         assert!(found >= least, "{name}: {found}");
     }
-    // Of two families the tags of either kind have their own ids.
+    // With two families, the tags of each family have their own ids.
     let target = std::fs::read_to_string(path.join("cubocta.json")).unwrap();
     let target = Printing::from_json(&target).unwrap();
     let kinds = |kind| target.target.panels.iter().filter(move |panel| panel.kind == kind);
@@ -254,9 +254,9 @@ fn meshes_of_other_faces_become_targets() {
     deltille(path, &format!("{beside} {own_ids} --first-square-id 24")).success();
 }
 
-/// All faces of a cuboid have squares of one size, as many along its shortest side as are asked for.
+/// All faces of a cuboid have squares of one size, with the requested number along its shortest side.
 #[test]
-fn a_cuboid_is_made_photographed_and_found() {
+fn a_cuboid_is_generated_rendered_and_detected() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path();
     let mut page = Page::default();
@@ -286,9 +286,9 @@ fn a_cuboid_is_made_photographed_and_found() {
     assert_eq!(corners_found(path, "box"), 7 * 16 + 7 * 11 + 11 * 16);
 }
 
-/// Bare tilings, white tiles on black, and both: pages, meshes, bodies and drawings are proved like all others.
+/// Bare tilings, white tiles on black, and both: pages, meshes, bodies and drawings are verified like all others.
 #[test]
-fn solids_are_untagged_and_inverted() {
+fn solids_may_be_untagged_and_inverted() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path();
     let formats = "--pdf --gltf --obj --3mf --laser dxf,svg";
@@ -307,7 +307,7 @@ fn solids_are_untagged_and_inverted() {
             );
         }
     }
-    // On panels of a skeleton the black lies whole, with the margin that is usual and with the least.
+    // On the panels of a skeleton the black field is whole, with the usual margin and with the smallest.
     for margin in ["", "--face-margin 8.7mm"] {
         let skeleton = "--skeleton --per-face --pdf --laser dxf,svg --name s --force";
         deltille(path, &format!("tetrahedron --invert {margin} {skeleton}")).success();

@@ -1,4 +1,4 @@
-//! `deltille icosahedron` and its sisters: what they write, what proves it, and what they refuse.
+//! `deltille icosahedron` and similar commands: their output, its verification, and their errors.
 
 mod made;
 mod outlines;

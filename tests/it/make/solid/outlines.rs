@@ -1,10 +1,10 @@
-//! Outlines of faces and nets to cut.
+//! Outlines of faces and nets for cutting.
 
 use crate::common::command::deltille;
 use deltille::layout::{LineKind, Printing};
 use glam::DVec2;
 
-/// Outlines to cut have the size of the faces, or of what the seats take.
+/// Outlines to cut have the size of the faces, or the size that fits into the seats.
 #[test]
 fn panels_to_cut_have_their_true_size() {
     let folder = tempfile::tempdir().unwrap();
@@ -22,7 +22,7 @@ fn panels_to_cut_have_their_true_size() {
                     a.distance(b)
                 })
                 .collect();
-            // Ribs of icosahedra: 3 mm below, faces meet at 138.19°; 0.8 mm of foot, 0.15 of play.
+            // Ribs of icosahedra: 3 mm below, faces meet at 138.19°; 0.8 mm of foot, 0.15 mm of play.
             let inset = 3.0 / (138.1897f64 / 2.0).to_radians().tan() + 0.8 + 0.15;
             let stated = if edge_mm.is_nan() { 150.0 - 12f64.sqrt() * inset } else { edge_mm };
             assert!(sides.iter().all(|side| (side - stated).abs() < 1e-4), "{sides:?} {stated}");
@@ -31,7 +31,7 @@ fn panels_to_cut_have_their_true_size() {
     }
 }
 
-/// The sheets of single faces are cut to what the seats take, by default with room around the tiles.
+/// The sheets of single faces are cut to the size of the seats, by default with room around the tiles.
 #[test]
 fn single_faces_are_cut_to_the_seats_of_the_skeleton() {
     let folder = tempfile::tempdir().unwrap();
@@ -39,7 +39,7 @@ fn single_faces_are_cut_to_the_seats_of_the_skeleton() {
     deltille(path, "tetrahedron --skeleton --per-face --svg --dxf").success();
     let json = std::fs::read_to_string(path.join("tetrahedron.json")).unwrap();
     let sheet = &Printing::from_json(&json).unwrap().sheets[0];
-    // Two marks at each vertex; the lines through those along an edge make the outline.
+    // Two marks at each vertex; the lines through the marks along an edge form the outline.
     let cuts: Vec<_> = sheet.lines.iter().filter(|line| line.kind == LineKind::Cut).collect();
     let between = cuts[0].from_mm.distance(cuts[1].from_mm);
     let text = std::fs::read_to_string(path.join("tetrahedron-panels.dxf")).unwrap();
@@ -50,10 +50,10 @@ fn single_faces_are_cut_to_the_seats_of_the_skeleton() {
     assert!(sheet.texts.iter().any(|text| text.text.to_string() == "edge 0 · face 3"));
 }
 
-/// A piece of a net is one outline around its faces and tabs, with a line to fold for each edge between two
-/// faces and for each tab.
+/// A piece of a net is one outline around its faces and tabs, with a fold line for each edge between two faces and
+/// for each tab.
 #[test]
-fn the_net_to_cut_holds_all_faces_and_tabs() {
+fn the_net_to_cut_contains_all_faces_and_tabs() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path();
     let cases = [
@@ -77,7 +77,7 @@ fn the_net_to_cut_holds_all_faces_and_tabs() {
         let tabs = 10 + pieces;
         let tab_mm2 = (outlines.iter().map(area).sum::<f64>() - faces_mm2) / tabs as f64;
         assert!((60.0..900.0).contains(&tab_mm2), "{tab_mm2}");
-        // Edges that join faces, and the others, which have tabs.
+        // Edges that join faces, and the other edges, which have tabs.
         let folds = text.matches("LINE\n  8\nFOLD\n").count();
         assert_eq!(folds, 20 - pieces + tabs);
         let texts = closed_polylines(&text, "ENGRAVE").len();
@@ -88,7 +88,7 @@ fn the_net_to_cut_holds_all_faces_and_tabs() {
     assert!(!path.join("tetrahedron-net.dxf").exists());
 }
 
-/// The closed polylines of a layer of a DXF of release 12.
+/// Returns the closed polylines of a layer of a DXF of release 12.
 fn closed_polylines(text: &str, layer: &str) -> Vec<Vec<DVec2>> {
     let lines: Vec<&str> = text.lines().map(str::trim).collect();
     let (mut outlines, mut entity, mut on_layer) = (Vec::<Vec<DVec2>>::new(), "", false);

@@ -1,13 +1,13 @@
-//! Solids that cannot be made, and files that do not show them.
+//! Impossible solids, and files that do not show their solid.
 
 use super::made::bipyramid;
 use crate::common::command::deltille;
 use crate::common::page::Page;
 use deltille::layout::Printing;
 
-/// Changes of an OBJ that an eye would not notice, and what is said of them.
+/// Subtle changes to an OBJ, and the resulting findings.
 #[test]
-fn wrong_meshes_are_refused_with_the_cause() {
+fn wrong_meshes_are_rejected_with_the_cause() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path();
     deltille(path, "tetrahedron --edge 80mm --tiles 7 --face-margin 4mm --obj --name t").success();
@@ -65,13 +65,13 @@ fn wrong_meshes_are_refused_with_the_cause() {
 }
 
 #[test]
-fn meshes_that_are_no_solids_are_refused() {
+fn meshes_that_are_not_solids_are_rejected() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path();
     let good = bipyramid(120.0);
     let without_last = good.trim_end().rsplit_once('\n').unwrap().0.to_owned();
     let flattened = good.replace("f 1 2 9\n", "f 1 1 9\n");
-    // A face of four corners that is bent along a diagonal.
+    // A face with four corners that is bent along a diagonal.
     let bent = good.replace("f 1 2 9\nf 2 1 5\n", "f 1 5 2 9\n");
     let wound = good.replace("f 1 2 9\n", "f 2 1 9\n");
     let twice = good.clone() + &good.replace("v 0 0 ", "v 999 0 ");
@@ -114,12 +114,12 @@ fn meshes_that_are_no_solids_are_refused() {
     }
     page.refused(path, "deltille solid --mesh good.obj --obj");
     page.is("solid");
-    // What is skewed on purpose is made.
+    // A mesh that is skewed on purpose is accepted.
     std::fs::write(path.join("skew.obj"), skewed).unwrap();
     deltille(path, "solid --mesh skew.obj --allow-skew --tiles 7").success();
 }
 
-/// What is printed wrong on a mesh is named, also where the detector would not mind.
+/// Printing errors on a mesh are named, even if the detector tolerates them.
 #[test]
 fn wrong_marks_on_a_mesh_are_named() {
     let folder = tempfile::tempdir().unwrap();
@@ -156,7 +156,7 @@ fn wrong_marks_on_a_mesh_are_named() {
         let (row, col) = (f64::from(row) + third, f64::from(col) + third);
         [(col + row / 2.0) * e, row * 0.75f64.sqrt() * e]
     };
-    // Where the changed square is, and how wide, mm.
+    // Position and width of the changed square, mm.
     let mut page = Page::default();
     let cell = e / 9.5;
     for (name, at, side) in [
@@ -182,7 +182,7 @@ fn wrong_marks_on_a_mesh_are_named() {
     deltille(path, "verify t.json t.obj").success();
 }
 
-/// Bodies to print that are open, turned or of another size are refused.
+/// Bodies for printing that are open, rotated or of the wrong size are rejected.
 #[test]
 fn wrong_bodies_are_named() {
     let folder = tempfile::tempdir().unwrap();
@@ -208,7 +208,7 @@ fn wrong_bodies_are_named() {
     numbers(&mut turned, &|_, [x, y, z]| [-y, x, z]);
     let mut thick = read("i-skeleton.stl");
     numbers(&mut thick, &|i, v| if i == 0 { v } else { v.map(|x| x * 1.002) });
-    // A wall that is thinner deep inside, where no seat is felt.
+    // A wall that is thinner deep inside, where no ray probes a seat.
     let mut thin = read("i-skeleton.stl");
     let far = |v: [f32; 3]| v.iter().map(|x| x * x).sum::<f32>().sqrt();
     let nearest_mm = std::cell::Cell::new(f32::INFINITY);
@@ -242,7 +242,7 @@ fn wrong_bodies_are_named() {
 }
 
 #[test]
-fn what_cannot_be_made_is_refused_in_one_line_and_leaves_nothing() {
+fn impossible_targets_are_rejected_in_one_line_and_leave_no_files() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
     let mut page = Page::default();
@@ -276,7 +276,7 @@ fn what_cannot_be_made_is_refused_in_one_line_and_leaves_nothing() {
     ] {
         page.refused(at, &format!("deltille {args}"));
     }
-    page.title("A file that cannot be replaced keeps the others from being written");
+    page.title("A file that cannot be replaced prevents the others from being written");
     std::fs::create_dir(at.join("octahedron.stl")).unwrap();
     page.refused(at, "deltille octahedron --stl");
     page.is("icosahedron");

@@ -1,8 +1,8 @@
-//! Edits of files of any kind.
+//! Edits for files of all kinds.
 
 use super::Damage;
 
-/// Puts `to` where `from` stands first.
+/// Replaces the first occurrence of `from` by `to`.
 pub fn swap(from: &str, to: &str) -> Damage {
     let (from, to) = (from.as_bytes().to_vec(), to.as_bytes().to_vec());
     Box::new(move |bytes| {
@@ -11,7 +11,7 @@ pub fn swap(from: &str, to: &str) -> Damage {
     })
 }
 
-/// Puts text before the first place where `mark` stands.
+/// Inserts text before the first occurrence of `mark`.
 pub fn before(mark: &str, text: &str) -> Damage {
     swap(mark, &format!("{text}{mark}"))
 }
@@ -22,12 +22,12 @@ pub fn append(text: &str) -> Damage {
     Box::new(move |bytes| [bytes, &text].concat())
 }
 
-/// Changes a text as a whole.
+/// Edits a whole text.
 pub fn text(edit: impl Fn(&str) -> String + 'static) -> Damage {
     Box::new(move |bytes| edit(std::str::from_utf8(bytes).unwrap()).into_bytes())
 }
 
-/// Changes the first line that begins with `start`.
+/// Edits the first line that begins with `start`.
 pub fn line(start: &'static str, edit: impl Fn(&str) -> String + 'static) -> Damage {
     text(move |text| {
         let line = text.lines().find(|line| line.starts_with(start)).unwrap();
@@ -35,7 +35,7 @@ pub fn line(start: &'static str, edit: impl Fn(&str) -> String + 'static) -> Dam
     })
 }
 
-/// Where some bytes stand first.
+/// Returns the position of the first occurrence of some bytes.
 pub fn find(bytes: &[u8], part: &[u8]) -> usize {
     let found = bytes.windows(part.len()).position(|window| window == part);
     found.unwrap_or_else(|| panic!("`{}` is not in the file", String::from_utf8_lossy(part)))

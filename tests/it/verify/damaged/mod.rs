@@ -1,8 +1,8 @@
-//! A corpus of damaged artifacts: each differs from one that passes by a single cause and must fail. What is found is
-//! compared with a page for each format in `tests/snapshots`: it has to name the cause.
+//! A corpus of damaged artifacts. Each differs from a valid one by a single cause and must fail. The findings, which
+//! must name the cause, are compared with a page for each format in `tests/snapshots`.
 //!
-//! Most of the damage does not show in the picture that the verifier draws: it is what other
-//! viewers would show otherwise. A table for each format has a line for each cause.
+//! Most of the damage is not visible in the image that the verifier renders, but would change what other viewers
+//! show. Each format has a table with a line for each cause.
 
 mod edit;
 pub mod glb;
@@ -37,25 +37,25 @@ use tempfile::TempDir;
 use crate::common::page::Page;
 use crate::common::verdict::findings;
 
-/// Least number of damaged files.
+/// Minimum number of damaged files.
 const LEAST: usize = 440;
 
 /// One way of damaging a file.
 pub struct Case {
-    /// What is done to it.
+    /// Description of the damage.
     name: &'static str,
-    /// The file that is damaged.
+    /// File that is damaged.
     file: &'static str,
     damage: Damage,
 }
 
-/// Makes a damaged file of a good one.
+/// Damages a valid file.
 pub type Damage = Box<dyn Fn(&[u8]) -> Vec<u8>>;
 
-/// A line of a table: what is done, and how.
+/// A line of a table: the description of the damage, and the damage.
 type Row = (&'static str, Damage);
 
-/// The cases of a table, all for one file.
+/// Creates the cases of a table, all for one file.
 fn cases(file: &'static str, rows: Vec<Row>) -> Vec<Case> {
     let case = |(name, damage)| Case { name, file, damage };
     rows.into_iter().map(case).collect()
@@ -67,7 +67,7 @@ struct Artifacts {
     folder: TempDir,
 }
 
-/// A small board as `b.pdf`, `.svg`, `.png`, `.dsc`.
+/// Creates a small board as `b.pdf`, `.svg`, `.png` and `.dsc`.
 static BOARD: LazyLock<Artifacts> = LazyLock::new(|| {
     let spec = TargetSpec::Board(BoardSpec::new(GridKind::Deltille, 4, 5, 20.0));
     let artifacts = Artifacts::new("b", &spec);
@@ -75,7 +75,7 @@ static BOARD: LazyLock<Artifacts> = LazyLock::new(|| {
     artifacts
 });
 
-/// A small tetrahedron in all formats; its net is on one page.
+/// Creates a small tetrahedron in all formats; its net fits on one page.
 static SOLID: LazyLock<Artifacts> = LazyLock::new(|| {
     let spec = SolidSpec {
         edge_mm: 60.0,
@@ -98,7 +98,7 @@ static SOLID: LazyLock<Artifacts> = LazyLock::new(|| {
     artifacts
 });
 
-/// A small tetrahedron as meshes with two textures.
+/// Creates a small tetrahedron as meshes with two textures.
 static SPLIT: LazyLock<Artifacts> = LazyLock::new(|| {
     let spec = SolidSpec {
         edge_mm: 60.0,
@@ -143,13 +143,13 @@ impl Artifacts {
         verifier.verify_path(path).map_err(|error| error.to_string())
     }
 
-    /// What is said of a damaged file; `None` if it passes.
+    /// Returns the report on a damaged file, or `None` if it passes.
     fn damaged(&self, case: &Case) -> Option<String> {
         let good = fs::read(self.folder.path().join(case.file)).unwrap();
         let bad = (case.damage)(&good);
-        assert!(bad != good, "{}, {}: nothing is damaged", case.file, case.name);
+        assert!(bad != good, "{}, {}: the file is unchanged", case.file, case.name);
         let folder = TempDir::new().unwrap();
-        // Material libraries and textures are verified with their mesh, parts of it with the model for MuJoCo.
+        // Material libraries and textures are verified with their mesh, parts of the mesh with the MuJoCo model.
         for entry in fs::read_dir(self.folder.path()).unwrap() {
             let path = entry.unwrap().path();
             let is_part = ["obj", "mtl", "png", "xml"].map(OsStr::new);
@@ -174,7 +174,7 @@ impl Artifacts {
         }
     }
 
-    /// Verifies what is damaged, and adds what is found to a page.
+    /// Verifies damaged files and adds the findings to a page.
     fn all_fail(&self, cases: &[Case], page: &mut Page) {
         let mut passing = Vec::new();
         for case in cases {
@@ -188,7 +188,7 @@ impl Artifacts {
     }
 }
 
-/// What was found, a line each: the kind and the words of the first few, and how many more there are.
+/// Lists the kind and text of the first few findings, one per line, and the number of further findings.
 fn found(verdict: &Verdict) -> String {
     const SHOWN: usize = 4;
     let kind = |finding: &Finding| serde_json::to_value(finding).unwrap()["kind"].clone();

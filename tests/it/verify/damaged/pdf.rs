@@ -5,7 +5,7 @@ use lopdf::{Dictionary, Document, Object, ObjectId, Stream, dictionary};
 use super::edit::{append, before, find, swap};
 use super::{Case, Damage, cases};
 
-/// Changes the objects of a document.
+/// Edits the objects of a document.
 fn document(edit: impl Fn(&mut Document) + 'static) -> Damage {
     Box::new(move |bytes| {
         let mut document = Document::load_mem(bytes).unwrap();
@@ -36,14 +36,14 @@ fn page(key: &'static str, value: impl Fn(&mut Document) -> Object + 'static) ->
     })
 }
 
-/// Lists a resource of the page.
+/// Adds a resource to the page.
 fn resource(kind: &'static str) -> Damage {
     page("Resources", move |_| {
         Object::Dictionary(dictionary! { kind => dictionary! { "R" => Object::Null } })
     })
 }
 
-/// Puts operators at the beginning of the page.
+/// Inserts operators at the beginning of the page.
 fn operators(text: &'static str) -> Damage {
     content(move |content| format!("{text}\n{content}"))
 }
@@ -57,7 +57,7 @@ fn content(edit: impl Fn(&str) -> String + 'static) -> Damage {
     })
 }
 
-/// Sets words of the information.
+/// Sets a text of the information dictionary.
 fn info(key: &'static str, words: &'static str) -> Damage {
     document(move |document| {
         let id = document.trailer.get(b"Info").and_then(Object::as_reference).unwrap();
@@ -66,7 +66,7 @@ fn info(key: &'static str, words: &'static str) -> Damage {
     })
 }
 
-/// Changes the packed content of the page.
+/// Edits the compressed content of the page.
 fn packed(edit: impl Fn(&mut Vec<u8>) + 'static) -> Damage {
     document(move |document| {
         let id = document.get_page_contents(page_id(document))[0];
@@ -85,7 +85,7 @@ fn boxed(ends: [i64; 4]) -> Object {
     Object::Array(ends.map(Object::Integer).to_vec())
 }
 
-/// Of a board.
+/// Returns the cases for a board.
 pub fn board() -> Vec<Case> {
     let some = |_: &mut Document| Object::Dictionary(Dictionary::new());
     let script = |_: &mut Document| {
@@ -110,7 +110,7 @@ pub fn board() -> Vec<Case> {
             ("a form", catalog("AcroForm", some)),
             ("metadata", catalog("Metadata", some)),
             ("an outline", catalog("Outlines", some)),
-            ("another version", catalog("Version", |_| name("2.0"))),
+            ("a different version", catalog("Version", |_| name("2.0"))),
             ("output intents", catalog("OutputIntents", |_| Vec::<Object>::new().into())),
             ("full screen", catalog("PageMode", |_| name("FullScreen"))),
             (
@@ -125,7 +125,7 @@ pub fn board() -> Vec<Case> {
                     Object::Dictionary(dictionary! { "PrintScaling" => "None", "NumCopies" => 2 })
                 }),
             ),
-            ("no word on scaling", catalog("ViewerPreferences", |_| Object::Null)),
+            ("no statement on scaling", catalog("ViewerPreferences", |_| Object::Null)),
             (
                 "an annotation",
                 page("Annots", |document| {
@@ -133,10 +133,10 @@ pub fn board() -> Vec<Case> {
                     Object::Array(vec![document.add_object(note).into()])
                 }),
             ),
-            ("a page that is turned", page("Rotate", |_| 180.into())),
+            ("a rotated page", page("Rotate", |_| 180.into())),
             ("a larger unit", page("UserUnit", |_| 2.into())),
             ("transparency", page("Group", some)),
-            ("actions of the page", page("AA", some)),
+            ("page actions", page("AA", some)),
             ("a thumbnail", page("Thumb", some)),
             ("a transition", page("Trans", some)),
             ("a cropped page", page("CropBox", |_| boxed([0, 0, 400, 400]))),
@@ -145,9 +145,9 @@ pub fn board() -> Vec<Case> {
             ("a shifted page", page("MediaBox", |_| boxed([-10, 0, 842, 595]))),
             ("a graphics state", resource("ExtGState")),
             ("a font", resource("Font")),
-            ("a picture", resource("XObject")),
+            ("an image", resource("XObject")),
             ("a pattern", resource("Pattern")),
-            ("properties of layers", resource("Properties")),
+            ("layer properties", resource("Properties")),
             (
                 "content in two streams",
                 page("Contents", |document| {
@@ -156,14 +156,14 @@ pub fn board() -> Vec<Case> {
                 }),
             ),
             (
-                "another filter",
+                "a different filter",
                 page("Contents", |document| {
                     let stream = Stream::new(dictionary! { "Filter" => "LZWDecode" }, Vec::new());
                     document.add_object(stream).into()
                 }),
             ),
             (
-                "content from a file",
+                "content in an external file",
                 page("Contents", |document| {
                     let stream = Stream::new(
                         dictionary! { "F" => Object::string_literal("a.txt") },
@@ -173,7 +173,7 @@ pub fn board() -> Vec<Case> {
                 }),
             ),
             (
-                "a page that is listed twice",
+                "a page listed twice",
                 document(|document| {
                     let page = Object::Reference(page_id(document));
                     let pages =
@@ -185,7 +185,7 @@ pub fn board() -> Vec<Case> {
                 }),
             ),
             (
-                "pages within themselves",
+                "a recursive page tree",
                 document(|document| {
                     let pages =
                         document.catalog().unwrap().get(b"Pages").unwrap().as_reference().unwrap();
@@ -194,34 +194,34 @@ pub fn board() -> Vec<Case> {
                     list.set("Kids", vec![Object::Reference(pages)]);
                 }),
             ),
-            ("a state by name", operators("/G gs")),
+            ("a named graphics state", operators("/G gs")),
             ("a layer", operators("/OC /L BDC")),
-            ("a picture on the page", operators("/I Do")),
-            ("a picture in line", operators("BI ID EI")),
-            ("words", operators("BT ET")),
+            ("an image on the page", operators("/I Do")),
+            ("an inline image", operators("BI ID EI")),
+            ("text", operators("BT ET")),
             ("a clip", operators("0 0 m 9 0 l 9 9 l h W n")),
-            ("another scale", operators("1.01 0 0 1.01 0 0 cm")),
+            ("a different scale", operators("1.01 0 0 1.01 0 0 cm")),
             ("dashes", operators("[3] 0 d")),
             ("a shading", operators("/S sh")),
             ("a rectangle", operators("0 0 9 9 re f*")),
-            ("a nonzero filling", content(|text| text.replacen("f*", "f ", 1))),
+            ("nonzero filling", content(|text| text.replacen("f*", "f ", 1))),
             ("white marks", operators("0 0 0 0 k")),
             ("coloured marks", operators("1 0 0 rg")),
             ("grey marks", operators("0.5 g")),
-            ("lines of no width", operators("0 w")),
+            ("lines of zero width", operators("0 w")),
             ("a comment", operators("% 1 0 0 rg")),
-            ("operands that are missing", operators("0 m 9 9 l S")),
-            ("a line from nowhere", operators("9 9 l S")),
+            ("missing operands", operators("0 m 9 9 l S")),
+            ("a line without a starting point", operators("9 9 l S")),
             ("a colour within a path", operators("0 0 m 0 0 0 1 k 9 9 l S")),
             ("a page that ends early", content(|text| format!("{text} 0 0 m"))),
-            ("marks of the default colour", {
+            ("marks in the default colour", {
                 content(|text| text.replacen("0 0 0 1 k\n", "", 1))
             }),
-            ("a line of the default colour", {
+            ("a line in the default colour", {
                 content(|text| format!("1 w 9 9 m 99 9 l S\n{text}"))
             }),
             ("a line of the default width", operators("0 0 0 1 K 9 9 m 99 9 l S")),
-            ("a tile twice", {
+            ("a duplicate tile", {
                 content(|text| {
                     let end = text.find("f*").unwrap() + 2;
                     let begin = text[..end].rfind("K\n").unwrap() + 2;
@@ -235,56 +235,56 @@ pub fn board() -> Vec<Case> {
                 operators("0 0 0 1 k 9 9 m 19 9 l 9 19 l h 9 9 m 99 9.01 l 9 9.02 l h f*"),
             ),
             ("a faint line", operators("0 0 0 1 K 0.05 w 9 9 m 99 9 l S")),
-            ("a dot of dust", operators("0 0 0 1 k 9 9 m 9.1 9 l 9.1 9.1 l 9 9.1 l h f*")),
+            ("a speck of dust", operators("0 0 0 1 k 9 9 m 9.1 9 l 9.1 9.1 l 9 9.1 l h f*")),
             ("marks off the page", operators("0 0 0 1 k 900 9 m 910 9 l 910 19 l h f*")),
             ("a line over the edge", operators("0 0 0 1 K 20 w 9 9 m 99 9 l S")),
-            ("an object of no use", {
+            ("an unused object", {
                 document(|document| {
                     document.add_object(Object::string_literal("hidden"));
                 })
             }),
-            ("an attached file of no use", {
+            ("an unused attached file", {
                 document(|document| {
                     let file = dictionary! { "Type" => "EmbeddedFile" };
                     document.add_object(Stream::new(file, b"<html></html>".to_vec()));
                 })
             }),
-            ("another title", info("Title", "desk")),
-            ("another description", info("Subject", "a checkerboard")),
-            ("another creator", info("Creator", "a program")),
+            ("a different title", info("Title", "desk")),
+            ("a different description", info("Subject", "a checkerboard")),
+            ("a different creator", info("Creator", "a program")),
             (
-                "an identifier of a change",
+                "an identifier of a changed file",
                 document(|document| {
                     let id =
                         document.trailer.get_mut(b"ID").and_then(Object::as_array_mut).unwrap();
                     id[1] = Object::string_literal("changed");
                 }),
             ),
-            ("key words", info("Keywords", "desk")),
+            ("keywords", info("Keywords", "desk")),
             (
-                "no words",
+                "no information dictionary",
                 document(|document| {
                     document.trailer.remove(b"Info");
                 }),
             ),
             ("pages side by side", catalog("PageLayout", |_| name("TwoPageLeft"))),
             ("a language", catalog("Lang", |_| Object::string_literal("en"))),
-            ("a page of two units", page("UserUnit", |_| 1.into())),
-            ("pages of another version", swap("%PDF-1.6", "%PDF-2.0")),
+            ("a page with a user unit", page("UserUnit", |_| 1.into())),
+            ("a newer version", swap("%PDF-1.6", "%PDF-2.0")),
             ("an older version", swap("%PDF-1.6", "%PDF-1.0")),
-            ("content that is not packed", document(|document| document.decompress())),
-            ("content without its check sum", packed(|data| data.truncate(data.len() - 4))),
-            ("content of another check sum", packed(|data| *data.last_mut().unwrap() ^= 1)),
-            ("content that ends early", packed(|data| data.truncate(data.len() / 2))),
-            ("content that goes on", packed(|data| data.extend(b"more"))),
+            ("uncompressed content", document(|document| document.decompress())),
+            ("content without its checksum", packed(|data| data.truncate(data.len() - 4))),
+            ("content with a wrong checksum", packed(|data| *data.last_mut().unwrap() ^= 1)),
+            ("truncated content", packed(|data| data.truncate(data.len() / 2))),
+            ("content with trailing data", packed(|data| data.extend(b"more"))),
             ("a comment at the end", before("startxref", "% desk\n")),
             ("a table that points elsewhere", swap("0000000066", "0000000067")),
-            ("a table of another place", swap("startxref\n4", "startxref\n5")),
+            ("a table at a different offset", swap("startxref\n4", "startxref\n5")),
             ("a number on the next line", swap("/Count 1", "/Count\n1")),
-            ("a key twice", swap("/PageMode/UseNone", "/Pages 5 0 R     ")),
+            ("a duplicate key", swap("/PageMode/UseNone", "/Pages 5 0 R     ")),
             ("an object after the table", before("startxref", "6 0 obj\n<</Page 0>>\nendobj\n")),
             (
-                "content of another length",
+                "content with a wrong length",
                 Box::new(|bytes| {
                     let at = find(bytes, b"/Length ") + 8;
                     let digit = if bytes[at] == b'1' { b'2' } else { b'1' };
@@ -297,7 +297,7 @@ pub fn board() -> Vec<Case> {
             ("data after the end", append("<html></html>")),
             ("data before the head", swap("%PDF", "\n%PDF")),
             (
-                "a tile that is missing",
+                "a missing tile",
                 content(|text| {
                     let end = text.find("f*").unwrap() + 2;
                     let start = text.find(" K").unwrap() + 2;
@@ -305,7 +305,7 @@ pub fn board() -> Vec<Case> {
                 }),
             ),
             (
-                "a page that is missing",
+                "a missing page",
                 document(|document| {
                     document.delete_pages(&[1]);
                     document.prune_objects();

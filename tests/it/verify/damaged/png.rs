@@ -6,16 +6,16 @@ use super::edit::{append, find, swap};
 use super::{BOARD, Case, Damage, cases};
 use crate::common::png::chunk;
 
-/// Puts a chunk before the pixels.
+/// Inserts a chunk before the pixels.
 pub fn with_chunk(name: &'static [u8; 4], data: &'static [u8]) -> Damage {
     Box::new(move |bytes| {
-        // The length stands before the name.
+        // The length precedes the name.
         let at = find(bytes, b"IDAT") - 4;
         [&bytes[..at], &chunk(name, data), &bytes[at..]].concat()
     })
 }
 
-/// Changes a byte of the head: 8 depth, 9 colour type, 12 interlace.
+/// Sets a byte of the head: 8 depth, 9 colour type, 12 interlace.
 fn head(at: usize, value: u8) -> Damage {
     Box::new(move |bytes| {
         let mut head = bytes[16..29].to_vec();
@@ -24,7 +24,7 @@ fn head(at: usize, value: u8) -> Damage {
     })
 }
 
-/// Draws the pixels anew, resolution and title kept.
+/// Replaces the pixels and keeps resolution and title.
 pub fn pixels(draw: impl Fn(GrayImage) -> DynamicImage + 'static) -> Damage {
     Box::new(move |bytes| {
         let picture = image::load_from_memory(bytes).unwrap().into_luma8();
@@ -35,7 +35,7 @@ pub fn pixels(draw: impl Fn(GrayImage) -> DynamicImage + 'static) -> Damage {
     })
 }
 
-/// Exchanges black and white in a square; its corner in parts of the picture, its side in pixels.
+/// Swaps black and white in a square; its corner as a fraction of the image, its side in pixels.
 pub fn square([across, down]: [f64; 2], side: u32) -> Damage {
     pixels(move |mut picture| {
         let [x, y] = [across * f64::from(picture.width()), down * f64::from(picture.height())];
@@ -47,7 +47,7 @@ pub fn square([across, down]: [f64; 2], side: u32) -> Damage {
     })
 }
 
-/// Makes a square grey; its corner in parts of the picture, its side in pixels.
+/// Fills a square with grey; its corner as a fraction of the image, its side in pixels.
 pub fn level([across, down]: [f64; 2], side: u32, level: u8) -> Damage {
     pixels(move |mut picture| {
         let [x, y] = [across * f64::from(picture.width()), down * f64::from(picture.height())];
@@ -58,7 +58,7 @@ pub fn level([across, down]: [f64; 2], side: u32, level: u8) -> Damage {
     })
 }
 
-/// A rectangle so far from the first end of the first check bar, so long and so high, mm.
+/// Draws a rectangle on the first check bar: distance from its first end, length and height, mm.
 fn on_bar(from_mm: f64, length_mm: f64, height_mm: f64, level: u8) -> Damage {
     const PX_PER_MM: f64 = 300.0 / 25.4;
     let sheet = &BOARD.target.sheets[0];
@@ -80,13 +80,13 @@ fn on_bar(from_mm: f64, length_mm: f64, height_mm: f64, level: u8) -> Damage {
     })
 }
 
-/// Changes all grey values.
+/// Maps all grey values.
 pub fn grey(mut picture: GrayImage, change: impl Fn(u8) -> u8) -> DynamicImage {
     picture.pixels_mut().for_each(|Luma([grey])| *grey = change(*grey));
     picture.into()
 }
 
-/// Lets every fifth pixel of every third row be a little greyer.
+/// Makes every fifth pixel of every third row slightly darker.
 fn noise(mut picture: GrayImage) -> DynamicImage {
     for (x, y, Luma([grey])) in picture.enumerate_pixels_mut() {
         *grey ^= if x % 5 == 0 && y % 3 == 0 { 16 } else { 0 };
@@ -94,7 +94,7 @@ fn noise(mut picture: GrayImage) -> DynamicImage {
     picture.into()
 }
 
-/// The resolution, in pixels along each side.
+/// Sets the resolution, in pixels per unit along each side.
 fn resolution(along: u32, up: u32, unit: u8) -> Damage {
     Box::new(move |bytes| {
         let at = find(bytes, b"pHYs") - 4;
@@ -103,7 +103,7 @@ fn resolution(along: u32, up: u32, unit: u8) -> Damage {
     })
 }
 
-/// Changes the check sum of the packed pixels, in the last of their chunks.
+/// Changes the checksum of the compressed pixels, in the last of their chunks.
 fn packed_sum() -> Damage {
     Box::new(|bytes| {
         let end = bytes.len() - 12;
@@ -114,7 +114,7 @@ fn packed_sum() -> Damage {
     })
 }
 
-/// Adds data to the last chunk of packed pixels.
+/// Adds data to the last chunk of compressed pixels.
 fn more_packed() -> Damage {
     Box::new(|bytes| {
         let end = bytes.len() - 12;
@@ -122,7 +122,7 @@ fn more_packed() -> Damage {
     })
 }
 
-/// Packs the pixels anew in one chunk.
+/// Puts the edited compressed pixels into one chunk.
 fn packed(edit: impl Fn(&mut Vec<u8>) + 'static) -> Damage {
     Box::new(move |bytes| {
         let first = find(bytes, b"IDAT") - 4;
@@ -137,7 +137,7 @@ fn packed(edit: impl Fn(&mut Vec<u8>) + 'static) -> Damage {
     })
 }
 
-/// Changes the last byte of the check sum of a chunk with so many bytes of content.
+/// Changes the last byte of the checksum of a chunk with `length` bytes of data.
 fn sum_of(name: &'static str, length: usize) -> Damage {
     Box::new(move |bytes| {
         let mut bytes = bytes.to_vec();
@@ -147,7 +147,7 @@ fn sum_of(name: &'static str, length: usize) -> Damage {
     })
 }
 
-/// Changes the check sum of the last chunk.
+/// Changes the checksum of the last chunk.
 fn last_byte() -> Damage {
     Box::new(|bytes| {
         let (last, rest) = bytes.split_last().unwrap();
@@ -155,7 +155,7 @@ fn last_byte() -> Damage {
     })
 }
 
-/// Of a board.
+/// Returns the cases for a board.
 pub fn board() -> Vec<Case> {
     cases(
         "b.png",
@@ -167,7 +167,7 @@ pub fn board() -> Vec<Case> {
             ("transparent black", with_chunk(b"tRNS", &[0, 0])),
             ("a background", with_chunk(b"bKGD", &[0, 0])),
             ("an animation", with_chunk(b"acTL", &[0, 0, 0, 2, 0, 0, 0, 0])),
-            ("a turn", with_chunk(b"eXIf", b"MM")),
+            ("an orientation", with_chunk(b"eXIf", b"MM")),
             ("a palette", with_chunk(b"PLTE", &[0; 3])),
             ("significant bits", with_chunk(b"sBIT", &[1])),
             ("a second resolution", with_chunk(b"pHYs", &[0; 9])),
@@ -177,30 +177,33 @@ pub fn board() -> Vec<Case> {
             ("transparency", pixels(|p| DynamicImage::from(p).to_luma_alpha8().into())),
             ("sixteen bits", pixels(|p| DynamicImage::from(p).to_luma16().into())),
             ("data after the end", append("PK")),
-            ("a check sum of the packed pixels", packed_sum()),
-            ("data behind the packed pixels", more_packed()),
-            ("packed pixels without their check sum", packed(|data| data.truncate(data.len() - 4))),
-            ("packed pixels that end early", packed(|data| data.truncate(data.len() - 9))),
-            ("a check sum of the resolution", sum_of("pHYs", 9)),
-            ("a check sum of the title", sum_of("iTXt", 11)),
-            ("a check sum of the end", last_byte()),
-            ("another title", swap("Title\0\0\0\0\0b", "Title\0\0\0\0\0c")),
+            ("a wrong checksum of the compressed pixels", packed_sum()),
+            ("data after the compressed pixels", more_packed()),
+            (
+                "compressed pixels without their checksum",
+                packed(|data| data.truncate(data.len() - 4)),
+            ),
+            ("truncated compressed pixels", packed(|data| data.truncate(data.len() - 9))),
+            ("a wrong checksum of the resolution", sum_of("pHYs", 9)),
+            ("a wrong checksum of the title", sum_of("iTXt", 11)),
+            ("a wrong checksum of the end", last_byte()),
+            ("a different title", swap("Title\0\0\0\0\0b", "Title\0\0\0\0\0c")),
             ("a second title", with_chunk(b"iTXt", b"Title\0\0\0\0\0b")),
             ("no title", {
                 Box::new(|bytes| [&bytes[..54], &bytes[find(bytes, b"IDAT") - 4..]].concat())
             }),
-            ("words on the side", with_chunk(b"tEXt", b"Comment\0desk")),
+            ("an additional text", with_chunk(b"tEXt", b"Comment\0desk")),
             ("a time", with_chunk(b"tIME", &[7, 234, 1, 1, 0, 0, 0])),
             ("data at the end", {
                 Box::new(|bytes| [&bytes[..bytes.len() - 12], &chunk(b"IEND", b"a")].concat())
             }),
             ("a larger page", resolution(11_000, 11_000, 1)),
-            ("pixels that are not square", resolution(11_811, 11_000, 1)),
+            ("non-square pixels", resolution(11_811, 11_000, 1)),
             ("a resolution without a unit", resolution(11_811, 11_811, 0)),
             ("a spot", square([0.02, 0.02], 12)),
             ("a faint spot", level([0.02, 0.02], 1, 240)),
             ("a faint spot in the board", level([0.5, 0.5], 6, 128)),
-            ("grey for black", pixels(|p| grey(p, |v| v.max(100)))),
+            ("grey in place of black", pixels(|p| grey(p, |v| v.max(100)))),
             ("grey paper", pixels(|p| grey(p, |v| v.min(250)))),
             ("noise", pixels(noise)),
             ("a check bar with a second end", on_bar(5.0, 0.3, 2.0, 0)),
@@ -208,13 +211,13 @@ pub fn board() -> Vec<Case> {
             ("a check bar under a stroke", on_bar(40.0, 20.0, 1.0, 0)),
             ("a hole in the board", square([0.5, 0.5], 40)),
             (
-                "black and white exchanged",
+                "black and white swapped",
                 pixels(|mut p| {
                     image::imageops::invert(&mut p);
                     p.into()
                 }),
             ),
-            ("a mirror", pixels(|p| image::imageops::flip_horizontal(&p).into())),
+            ("a mirrored shape", pixels(|p| image::imageops::flip_horizontal(&p).into())),
         ],
     )
 }

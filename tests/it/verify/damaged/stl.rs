@@ -2,7 +2,7 @@
 
 use super::{Case, Damage, cases};
 
-/// Changes bytes in place.
+/// Edits bytes in place.
 fn bytes(edit: impl Fn(&mut Vec<u8>) + 'static) -> Damage {
     Box::new(move |good| {
         let mut bad = good.to_vec();
@@ -11,12 +11,12 @@ fn bytes(edit: impl Fn(&mut Vec<u8>) + 'static) -> Damage {
     })
 }
 
-/// Where triangle `index` begins: a normal and three vertices of three floats, two bytes.
+/// Returns the start of triangle `index`: a normal and three vertices of three floats, two bytes.
 fn triangle(index: usize) -> usize {
     84 + 50 * index
 }
 
-/// Changes all coordinates of vertices.
+/// Maps all coordinates of vertices.
 fn vertices(edit: impl Fn(usize, f32) -> f32 + 'static) -> Damage {
     bytes(move |bytes| {
         for index in 0..(bytes.len() - 84) / 50 {
@@ -29,43 +29,43 @@ fn vertices(edit: impl Fn(usize, f32) -> f32 + 'static) -> Damage {
     })
 }
 
-/// Of a solid.
+/// Returns the cases for a solid.
 pub fn all() -> Vec<Case> {
     cases(
         "t.stl",
         vec![
-            ("the word that begins a text", bytes(|b| b[..5].copy_from_slice(b"solid"))),
+            ("the word that begins a text STL", bytes(|b| b[..5].copy_from_slice(b"solid"))),
             ("a colour", bytes(|b| b[40..50].copy_from_slice(b"COLOR=\xff\0\0\xff"))),
             ("a coloured triangle", bytes(|b| b[triangle(2) + 49] = 0x80)),
             (
-                "a triangle that is missing",
+                "a missing triangle",
                 bytes(|b| {
                     b.truncate(triangle(3));
                     b[80] = 3;
                 }),
             ),
-            ("a file that is cut off", bytes(|b| b.truncate(triangle(3)))),
+            ("a truncated file", bytes(|b| b.truncate(triangle(3)))),
             ("data after the end", bytes(|b| b.extend(b"more"))),
-            ("a normal of another side", bytes(|b| b[triangle(0) + 3] ^= 0x80)),
+            ("a normal to the other side", bytes(|b| b[triangle(0) + 3] ^= 0x80)),
             (
-                "a normal that is none",
+                "a NaN normal",
                 bytes(|b| b[triangle(0)..triangle(0) + 4].copy_from_slice(&f32::NAN.to_le_bytes())),
             ),
-            ("another target's head", bytes(|b| b[9] = b'u')),
+            ("the head of a different target", bytes(|b| b[9] = b'u')),
             ("more triangles stated", bytes(|b| b[80] = 5)),
             (
-                "a triangle twice",
+                "a duplicate triangle",
                 bytes(|b| {
                     let first = b[triangle(0)..triangle(1)].to_vec();
                     b.extend(first);
                     b[80] += 1;
                 }),
             ),
-            ("a vertex that is moved", bytes(|b| b[triangle(0) + 14] ^= 0x10)),
-            ("a coordinate that is none", vertices(|_, _| f32::NAN)),
+            ("a displaced vertex", bytes(|b| b[triangle(0) + 14] ^= 0x10)),
+            ("a NaN coordinate", vertices(|_, _| f32::NAN)),
             ("inches for millimetres", vertices(|_, v| v / 25.4)),
-            ("a mirror", vertices(|axis, v| if axis == 0 { -v } else { v })),
-            ("stretched", vertices(|axis, v| if axis == 2 { 1.01 * v } else { v })),
+            ("a mirrored shape", vertices(|axis, v| if axis == 0 { -v } else { v })),
+            ("a stretched body", vertices(|axis, v| if axis == 2 { 1.01 * v } else { v })),
         ],
     )
 }

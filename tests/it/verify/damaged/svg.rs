@@ -3,7 +3,7 @@
 use super::edit::{append, before, line, swap, text};
 use super::{Case, Damage, cases};
 
-/// Of a board.
+/// Returns the cases for a board.
 pub fn board() -> Vec<Case> {
     let over = |element: &str| before("</svg>", element);
     let on = |element: &str, attribute: &str| {
@@ -32,55 +32,55 @@ pub fn board() -> Vec<Case> {
                 "an external picture",
                 over("<image href=\"http://example.org/a.png\" width=\"9\" height=\"9\"/>"),
             ),
-            ("an external part", over("<use href=\"other.svg#a\"/>")),
-            ("text in a font", over("<text x=\"9\" y=\"9\">5</text>")),
+            ("an external element", over("<use href=\"other.svg#a\"/>")),
+            ("text", over("<text x=\"9\" y=\"9\">5</text>")),
             ("a choice by language", over("<switch/>")),
             ("a link", over("<a href=\"http://example.org\"/>")),
             ("a filter", over("<filter id=\"f\"/>")),
             (
-                "a tile twice",
+                "a duplicate tile",
                 line("<path", |path| format!("{path}\n{}", path.replace("id=\"", "id=\"x"))),
             ),
             ("a hairline", swap("<path ", "<path d=\"M9 9L20 9Z\" id=\"x\"/><path ")),
             (
-                "a dot of dust",
+                "a speck of dust",
                 swap("<path ", "<path d=\"M3 3L3.03 3L3.03 3.03L3 3.03Z\" id=\"x\"/><path "),
             ),
             ("a mask", over("<mask id=\"m\"/>")),
             ("a pattern", over("<pattern id=\"p\"/>")),
-            ("a view of a part", over("<view id=\"v\" viewBox=\"0 0 9 9\"/>")),
-            ("a drawing within", over("<svg/>")),
+            ("a view element", over("<view id=\"v\" viewBox=\"0 0 9 9\"/>")),
+            ("a nested drawing", over("<svg/>")),
             (
-                "a path of another language",
+                "a path in another namespace",
                 over("<path xmlns=\"http://example.org\" d=\"M0 0Z\"/>"),
             ),
             ("no paper", swap("<rect fill=\"#fff\" height=\"100%\" width=\"100%\"/>", "")),
             ("a white page over all", over("<rect width=\"100%\" height=\"100%\" fill=\"#fff\"/>")),
-            ("style of the marks", on("g", "style=\"display: none\"")),
+            ("marks with a style", on("g", "style=\"display: none\"")),
             ("a class", on("g", "class=\"a\"")),
-            ("opacity of the marks", on("g", "opacity=\"0\"")),
+            ("marks with an opacity", on("g", "opacity=\"0\"")),
             ("a transform", on("g", "transform=\"rotate(1)\"")),
             ("a blend mode", on("g", "mix-blend-mode=\"screen\"")),
             ("a hidden tile", on("path", "display=\"none\"")),
             ("an invisible tile", on("path", "visibility=\"hidden\"")),
             ("a clipped tile", on("path", "clip-path=\"url(#c)\"")),
             ("a dashed tile", on("path", "stroke-dasharray=\"1 1\"")),
-            ("code that is run when shown", on("svg", "onload=\"alert()\"")),
-            ("another aspect", on("svg", "preserveAspectRatio=\"none\"")),
+            ("a script attribute", on("svg", "onload=\"alert()\"")),
+            ("a different aspect ratio", on("svg", "preserveAspectRatio=\"none\"")),
             ("white marks", swap("fill=\"#000\"", "fill=\"#fff\"")),
-            ("marks of the reader's colour", swap("fill=\"#000\"", "fill=\"currentColor\"")),
-            ("marks of a pattern", swap("fill=\"#000\"", "fill=\"url(#p)\"")),
-            ("another rule of filling", swap("evenodd", "nonzero")),
+            ("marks in the current colour", swap("fill=\"#000\"", "fill=\"currentColor\"")),
+            ("marks with a pattern", swap("fill=\"#000\"", "fill=\"url(#p)\"")),
+            ("a different fill rule", swap("evenodd", "nonzero")),
             ("black paper", swap("fill=\"#fff\"", "fill=\"#000\"")),
-            ("a tile that ends early", line("<path", |line| line.replacen("Z\"", "L1\"", 1))),
+            ("an incomplete tile", line("<path", |line| line.replacen("Z\"", "L1\"", 1))),
             (
                 "a tile with an arc",
                 line("<path", |line| line.replacen("Z\"", "A1 1 0 0 0 2 2Z\"", 1)),
             ),
             ("a style sheet", before("<svg", "<?xml-stylesheet href=\"a.css\"?>")),
             ("entities", before("<svg", "<!DOCTYPE svg [<!ENTITY a \"b\">]>")),
-            ("another encoding", swap("UTF-8", "UTF-16")),
-            ("words on the page", over("words")),
+            ("a different encoding", swap("UTF-8", "UTF-16")),
+            ("text on the page", over("words")),
             (
                 "an edge that bulges by 0.1 mm",
                 on_tile(|d| {
@@ -106,46 +106,46 @@ pub fn board() -> Vec<Case> {
                 }),
             ),
             (
-                "a tile that is missing",
+                "a missing tile",
                 text(|text| {
                     let tile = text.lines().find(|line| line.contains("tile-0-r1-c1\"")).unwrap();
                     text.replacen(tile, "", 1)
                 }),
             ),
-            ("another page", {
+            ("a different page size", {
                 text(|text| text.replacen("297mm", "298mm", 1).replacen("0 0 297", "0 0 298", 1))
             }),
-            ("a drawing of another shape", swap("297mm", "298mm")),
-            ("a page of another unit", swap("297mm", "29.7cm")),
-            ("a unit in capitals", swap("297mm", "297MM")),
+            ("a drawing with different proportions", swap("297mm", "298mm")),
+            ("a page size in another unit", swap("297mm", "29.7cm")),
+            ("a unit in upper case", swap("297mm", "297MM")),
             ("no width", swap(" width=\"297mm\"", "")),
-            ("no part of the drawing", swap(" viewBox=\"0 0 297 210\"", "")),
+            ("no viewBox", swap(" viewBox=\"0 0 297 210\"", "")),
             ("a byte order mark", before("<?xml", "\u{feff}")),
-            ("another version of XML", swap("1.0", "1.1")),
+            ("a different version of XML", swap("1.0", "1.1")),
             ("no declaration", swap("<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n", "")),
-            ("another alphabet", {
+            ("a different character encoding", {
                 Box::new(|bytes| bytes.iter().flat_map(|&byte| [byte, 0]).collect())
             }),
             ("a comment", over("<!-- desk -->")),
-            ("a section of characters", swap("<title>b<", "<title><![CDATA[b]]><")),
-            ("another title", swap("<title>b<", "<title>c<")),
+            ("a CDATA section", swap("<title>b<", "<title><![CDATA[b]]><")),
+            ("a different title", swap("<title>b<", "<title>c<")),
             ("no title", swap("<title>b</title>", "")),
             ("two titles", before("<title>", "<title>b</title>")),
-            ("another description", swap("20 corners", "21 corners")),
-            ("a value with references", swap("\"#000\"", "\"&#35;000\"")),
-            ("kept blanks", on("svg", "xml:space=\"preserve\"")),
-            ("marks without a rule of filling", swap(" fill-rule=\"evenodd\"", "")),
+            ("a different description", swap("20 corners", "21 corners")),
+            ("a value with character references", swap("\"#000\"", "\"&#35;000\"")),
+            ("preserved white space", on("svg", "xml:space=\"preserve\"")),
+            ("marks without a fill rule", swap(" fill-rule=\"evenodd\"", "")),
             ("marks without a colour", swap("<g fill=\"#000\"", "<g")),
-            ("a mark of no paint", swap("<path ", "<path fill=\"none\" ")),
+            ("a mark without paint", swap("<path ", "<path fill=\"none\" ")),
             ("marks off the page", before("</g>", "<path d=\"M300 9L310 9L310 19Z\" id=\"a\"/>")),
             ("numbers without blanks", line("<path", |line| line.replacen("L", " L", 1))),
-            ("another scale", swap("viewBox=\"0 0 297 210\"", "viewBox=\"0 0 300 212.1212\"")),
+            ("a different scale", swap("viewBox=\"0 0 297 210\"", "viewBox=\"0 0 300 212.1212\"")),
             ("a second document", append("<svg/>")),
         ],
     )
 }
 
-/// Draws another path for a plain tile.
+/// Replaces the path of a plain tile.
 fn on_tile(edit: impl Fn(&str) -> String + 'static) -> Damage {
     text(move |text| {
         let tiles = text.lines().filter(|line| line.contains("id=\"tile-"));
@@ -155,45 +155,45 @@ fn on_tile(edit: impl Fn(&str) -> String + 'static) -> Damage {
     })
 }
 
-/// The vertices of a triangle's path.
+/// Returns the vertices of a triangle's path.
 fn vertices(path: &str) -> [[f64; 2]; 3] {
     let numbers = path.split(['M', 'L', 'Z', ' ']).filter(|part| !part.is_empty());
     let numbers: Vec<f64> = numbers.map(|number| number.parse().unwrap()).collect();
-    let [ax, ay, bx, by, cx, cy] = numbers[..] else { panic!("{path} is no triangle") };
+    let [ax, ay, bx, by, cx, cy] = numbers[..] else { panic!("{path} is not a triangle") };
     [[ax, ay], [bx, by], [cx, cy]]
 }
 
-/// A path whose ends are 0.2 mm further right and down.
+/// Moves the ends of a path by 0.2 mm to the right and down.
 fn beside(path: &str) -> String {
     let (before, rest) = path.split_once("d=\"").unwrap();
     let (ends, after) = rest.split_once('"').unwrap();
     let numbers = ends.split(['M', 'L', ' ']).filter(|part| !part.is_empty());
     let moved: Vec<f64> = numbers.map(|number| number.parse::<f64>().unwrap() + 0.2).collect();
-    let [x0, y0, x1, y1] = moved[..] else { panic!("{ends} is no line") };
+    let [x0, y0, x1, y1] = moved[..] else { panic!("{ends} is not a line") };
     format!("{before}d=\"M{x0:.4} {y0:.4}L{x1:.4} {y1:.4}\"{after}")
 }
 
-/// Of a net, which has lines.
+/// Returns the cases for a net, which has lines.
 pub fn net() -> Vec<Case> {
     cases(
         "t.svg",
         vec![
-            ("lines of no width", swap("stroke-width=\"0.15\"", "stroke-width=\"0\"")),
+            ("lines of zero width", swap("stroke-width=\"0.15\"", "stroke-width=\"0\"")),
             ("white lines", swap("stroke=\"#000\"", "stroke=\"#fff\"")),
             (
-                "lines as wide as the screen says",
+                "lines with a screen-dependent width",
                 swap("stroke=\"#000\"", "vector-effect=\"non-scaling-stroke\" stroke=\"#000\""),
             ),
             ("wide lines", swap("stroke-width=\"0.15\"", "stroke-width=\"1\"")),
             ("narrow lines", swap("stroke-width=\"0.15\"", "stroke-width=\"0.04\"")),
-            ("a line beside its place", {
+            ("a displaced line", {
                 text(|text| {
                     let cut = text.lines().find(|line| line.contains("id=\"cut-")).unwrap();
                     text.replacen(cut, &beside(cut), 1)
                 })
             }),
             (
-                "a line that is missing",
+                "a missing line",
                 text(|text| {
                     let cut = text.lines().find(|line| line.contains("id=\"cut-")).unwrap();
                     text.replacen(cut, "", 1)

@@ -1,5 +1,5 @@
-//! The parts of a `.glb` that every viewer shows alike: one scene, a tree of nodes, triangles with
-//! opaque, unlit-white materials, and a texture inside for each.
+//! The parts of a `.glb` that every viewer shows the same way: one scene, a tree of nodes, triangles with opaque,
+//! unlit-white materials, and an embedded texture for each.
 
 use std::collections::BTreeSet;
 
@@ -19,18 +19,18 @@ use deltille_files::export::obj::material_name;
 use deltille_files::export::texture::MAX_TEXTURES;
 use deltille_files::limits::{Exceeded, Limits};
 
-/// The mode of a primitive that is a list of triangles, in glTF.
+/// The mode of a triangle list in glTF.
 const TRIANGLES: u32 = 4;
 
-/// Relative tolerance by which the transform of a node may differ from a rotation with one scale for
-/// all axes: its numbers are in single precision.
+/// Relative tolerance by which the transform of a node may differ from a rotation with one scale for all axes: its
+/// numbers are in single precision.
 const SLACK: f64 = 1e-5;
 
-/// Inspects a `.glb` for constructs that are not permitted.
+/// Inspects a `.glb` for constructs that are not allowed.
 ///
 /// # Errors
 ///
-/// It is no glTF or cut off, or exceeds the limits.
+/// Returns an error if the file is not glTF, is truncated, or exceeds the limits.
 pub(in crate::construct) fn check(
     bytes: &[u8],
     words: &Words,
@@ -56,38 +56,38 @@ pub(in crate::construct) fn check(
     let value: Value =
         serde_json::from_slice(json).map_err(|error| format!("not glTF: {}", in_words(error)))?;
     if value.is_array() || !has_objects(&value) {
-        found.add("the JSON", "a list for an object or within a list");
+        found.add("the JSON", "a list in place of an object or within a list");
         return Ok(found);
     }
-    // If a key is repeated, or spelled with escapes, readers differ in which value they take. So the
-    // JSON must be what its values are when they are written again.
-    let anew = value.to_string();
-    let filled = anew.len().next_multiple_of(4) == json.len();
-    if !filled || json.trim_ascii_end() != anew.as_bytes() {
-        let spelling = "blanks, a spelling, or a key that is there twice";
+    // If a key is repeated or spelled with escapes, readers differ in which value they take. The JSON must therefore
+    // equal its own values written again.
+    let rewritten = value.to_string();
+    let filled = rewritten.len().next_multiple_of(4) == json.len();
+    if !filled || json.trim_ascii_end() != rewritten.as_bytes() {
+        let spelling = "blanks, a different spelling, or a duplicate key";
         found.add("the JSON", spelling);
     }
-    let mut walk = Walk { root: &root, binary, words, found };
-    walk.counts();
+    let mut inspection = Inspection { root: &root, binary, words, found };
+    inspection.counts();
     // References to missing objects are not followed.
-    if walk.found.0.is_empty() {
-        walk.sizes(limits).map_err(|exceeded| exceeded.to_string())?;
-        walk.nodes(limits).map_err(|exceeded| exceeded.to_string())?;
-        walk.primitives();
-        walk.sampler(&root.samplers[0]);
+    if inspection.found.0.is_empty() {
+        inspection.sizes(limits).map_err(|exceeded| exceeded.to_string())?;
+        inspection.nodes(limits).map_err(|exceeded| exceeded.to_string())?;
+        inspection.primitives();
+        inspection.sampler(&root.samplers[0]);
         for index in 0..root.materials.len() {
-            walk.material(index);
-            walk.texture(index, limits)?;
+            inspection.material(index);
+            inspection.texture(index, limits)?;
         }
-        walk.names();
-        walk.layout();
-        walk.unused();
+        inspection.names();
+        inspection.layout();
+        inspection.unused();
     }
-    Ok(walk.found)
+    Ok(inspection.found)
 }
 
-/// Whether what is to be an object is written as one: serde also reads a struct from a list of its
-/// values, which other readers refuse.
+/// Whether all objects are written as objects. serde also reads a struct from a list of its values, which other
+/// readers refuse.
 fn has_objects(value: &Value) -> bool {
     const OBJECTS: [&str; 4] = ["asset", "attributes", "pbrMetallicRoughness", "baseColorTexture"];
     match value {
@@ -107,19 +107,19 @@ struct Chunks<'a> {
 }
 
 impl<'a> Chunks<'a> {
-    /// The chunks of a file; `None`, with a finding, where the container is of another version.
+    /// Returns the chunks of a file, or `None` with a finding if the container has another version.
     fn read(bytes: &'a [u8], found: &mut Findings) -> Result<Option<Self>, String> {
         let word = |at: usize| -> Option<u32> {
             bytes.get(at..at + 4)?.first_chunk::<4>().copied().map(u32::from_le_bytes)
         };
         if !bytes.starts_with(b"glTF") {
-            return Err("not glTF: it does not begin as a .glb does".to_owned());
+            return Err("not glTF: no glTF header".to_owned());
         }
         if word(4) != Some(2) {
             found.add("the head", "a version other than 2");
             return Ok(None);
         }
-        let cut_off = || "not glTF: it is cut off".to_owned();
+        let cut_off = || "not glTF: truncated".to_owned();
         let length = word(8).ok_or_else(cut_off)? as usize;
         found.unless(bytes.len() <= length, "the end", "data after the stated length");
         if bytes.len() < length {
@@ -134,23 +134,23 @@ impl<'a> Chunks<'a> {
             (kind == name).then_some(data)
         };
         let json = chunk(b"JSON").ok_or_else(cut_off)?;
-        let binary = chunk(b"BIN\0").ok_or("it has no binary part")?;
+        let binary = chunk(b"BIN\0").ok_or("no binary chunk")?;
         found.unless(at >= length, "the end", "a third chunk");
         Ok(Some(Self { json, binary }))
     }
 }
 
-/// The inspection of a file whose JSON has only permitted keys.
-struct Walk<'a> {
+/// The inspection of a file that has only permitted JSON keys.
+struct Inspection<'a> {
     root: &'a Root,
     binary: &'a [u8],
     words: &'a Words,
     found: Findings,
 }
 
-impl Walk<'_> {
-    /// Checks that there is one of each thing of which the reader takes the first, a material and a picture for each
-    /// texture, and that views and accessors lie within the binary chunk.
+impl Inspection<'_> {
+    /// Checks that there is only one of each thing of which the reader takes the first, one material and image for
+    /// each texture, and that views and accessors lie within the binary chunk.
     fn counts(&mut self) {
         let root = self.root;
         let version = &root.asset.version;
@@ -165,16 +165,16 @@ impl Walk<'_> {
             ("buffers", root.buffers.len(), 1),
         ] {
             let problem = match stated {
-                1 => format!("{count} entries instead of one"),
+                1 => format!("{count} entries instead of 1"),
                 _ => format!("{count} instead of {stated} entries"),
             };
             self.found.unless(count == stated, place, problem);
         }
-        self.found.unless(root.scene == 0, "scene", "a default scene that is not there");
+        self.found.unless(root.scene == 0, "scene", "a default scene that does not exist");
         for buffer in &root.buffers {
-            // The chunk is filled up to whole words.
+            // The chunk is padded to whole words.
             let whole = Some(self.binary.len()) == buffer.byte_length.checked_next_multiple_of(4);
-            self.found.unless(whole, "buffers[0]", "a length that is not that of the binary part");
+            self.found.unless(whole, "buffers[0]", "a length other than that of the binary chunk");
         }
         for (i, view) in root.buffer_views.iter().enumerate() {
             let inside = view.buffer == 0
@@ -183,20 +183,20 @@ impl Walk<'_> {
                     .checked_add(view.byte_length)
                     .is_some_and(|end| end <= self.binary.len());
             let place = format!("bufferViews[{i}]");
-            self.found.unless(inside, &place, "bytes outside the binary part");
+            self.found.unless(inside, &place, "bytes outside the binary chunk");
         }
         for (i, accessor) in root.accessors.iter().enumerate() {
             let inside = self.bytes(accessor).is_some();
             self.found.unless(
                 inside,
                 format!("accessors[{i}]"),
-                "values that its view does not hold",
+                "values beyond the end of its view",
             );
         }
     }
 
-    /// The bytes of an accessor's values; `None` where its view does not hold them, or for a type that
-    /// is not permitted.
+    /// Returns the bytes of an accessor's values. Returns `None` if they exceed the view, or for a type that is not
+    /// allowed.
     fn bytes(&self, accessor: &Accessor) -> Option<&[u8]> {
         let view = self.root.buffer_views.get(accessor.buffer_view)?;
         let components = match accessor.kind.as_str() {
@@ -223,8 +223,8 @@ impl Walk<'_> {
         limits.check_nodes(root.nodes.len() + indices.map(|list| list.count / 3).sum::<usize>())
     }
 
-    /// Checks that the scene is a tree of all nodes, without cycles and without a node that is shown
-    /// twice, that all meshes are shown, and that transforms neither mirror nor skew.
+    /// Checks that the scene is a tree of all nodes, without cycles and without a node shown twice, that all meshes
+    /// are shown, and that transforms neither mirror nor skew.
     fn nodes(&mut self, limits: &Limits) -> Result<(), Exceeded> {
         let root = self.root;
         let mut parents = vec![0usize; root.nodes.len()];
@@ -232,7 +232,7 @@ impl Walk<'_> {
             root.scenes[0].nodes.iter().map(|&node| (node, 1)).collect();
         while let Some((index, depth)) = open.pop() {
             let Some(node) = root.nodes.get(index) else {
-                self.found.add("scene", "a node that is not there");
+                self.found.add("scene", "a node that does not exist");
                 return Ok(());
             };
             limits.check_depth(depth)?;
@@ -247,7 +247,7 @@ impl Walk<'_> {
             let place = format!("nodes[{index}]");
             self.found.unless(parents > 0, &place, "a node that the scene does not reach");
             let there = node.mesh.is_none_or(|mesh| mesh < root.meshes.len());
-            self.found.unless(there, &place, "a mesh that is not there");
+            self.found.unless(there, &place, "a mesh that does not exist");
             self.found.unless(keeps_shapes(node), &place, "a transform that mirrors or skews");
         }
         let shown = |mesh: usize| root.nodes.iter().any(|node| node.mesh == Some(mesh));
@@ -280,29 +280,37 @@ impl Walk<'_> {
         let images = images.map(|(i, image)| (&image.name, image_name(title, i, count)));
         for (name, usual) in nodes.chain(meshes).chain(images) {
             if let Some(name) = name.as_ref().filter(|name| **name != usual) {
-                let problem = format!("{name:?} for the target's name");
+                let problem = format!("{name:?} instead of the target's name");
                 self.found.unseen_unless(false, "the names", problem);
             }
         }
     }
 
-    /// Checks that the views follow each other in the binary chunk, padded with zeros to words of four
-    /// bytes, that there are no other bytes, that values fill their view, and that the stated target
-    /// of a view fits its values. So nothing is hidden between what is shown.
+    /// Checks that views follow each other in the binary chunk, padded with zeros to four bytes, that there are no
+    /// other bytes, that values fill their view, and that the stated target of a view fits its values. Nothing can
+    /// then be hidden between the visible data.
     fn layout(&mut self) {
         let (root, binary) = (self.root, self.binary);
         let mut end = 0usize;
         for (i, view) in root.buffer_views.iter().enumerate() {
             let place = format!("bufferViews[{i}]");
             let follows = view.byte_offset == end.next_multiple_of(4);
-            self.found.unless(follows, &place, "bytes that do not follow those of the view before");
+            self.found.unless(
+                follows,
+                &place,
+                "bytes that do not follow those of the previous view",
+            );
             let filled = binary.get(end..view.byte_offset).unwrap_or_default();
-            self.found.unless(filled.iter().all(|&byte| byte == 0), &place, "bytes before it");
+            self.found.unless(
+                filled.iter().all(|&byte| byte == 0),
+                &place,
+                "non-zero bytes before it",
+            );
             end = view.byte_offset + view.byte_length;
         }
         let rest = binary.get(end..).unwrap_or_default();
         let ends = rest.len() < 4 && rest.iter().all(|&byte| byte == 0);
-        self.found.unless(ends, "buffers[0]", "bytes of no view");
+        self.found.unless(ends, "buffers[0]", "bytes outside all views");
         for (i, accessor) in root.accessors.iter().enumerate() {
             let place = format!("accessors[{i}]");
             let view = &root.buffer_views[accessor.buffer_view];
@@ -313,22 +321,22 @@ impl Walk<'_> {
                 _ => ARRAY_BUFFER,
             };
             let holds = view.target.is_none_or(|stated| stated == target);
-            self.found.unless(holds, &place, "a view for values of another kind");
+            self.found.unless(holds, &place, "a view with a target for other values");
         }
         for (i, image) in root.images.iter().enumerate() {
             let picture = root.buffer_views.get(image.buffer_view);
             let bare = picture.is_some_and(|view| view.target.is_none());
-            self.found.unless(bare, format!("images[{i}]"), "a view for values");
+            self.found.unless(bare, format!("images[{i}]"), "a view with a target");
         }
     }
 
-    /// Checks that every material, accessor and view is part of what is shown.
+    /// Checks that every material, accessor and view is used by what is shown.
     fn unused(&mut self) {
         let root = self.root;
         let primitives = || root.meshes.iter().flat_map(|mesh| &mesh.primitives);
         for i in 0..root.materials.len() {
             let is_used = primitives().any(|primitive| primitive.material == i);
-            self.found.unless(is_used, format!("materials[{i}]"), "a material of no use");
+            self.found.unless(is_used, format!("materials[{i}]"), "an unused material");
         }
         let accessors: BTreeSet<usize> = primitives()
             .flat_map(|Primitive { attributes: a, indices, .. }| {
@@ -339,10 +347,10 @@ impl Walk<'_> {
         let pictures = root.images.iter().map(|image| image.buffer_view);
         let views: BTreeSet<usize> = views.chain(pictures).collect();
         for i in (0..root.accessors.len()).filter(|i| !accessors.contains(i)) {
-            self.found.add(format!("accessors[{i}]"), "values of no use");
+            self.found.add(format!("accessors[{i}]"), "unused values");
         }
         for i in (0..root.buffer_views.len()).filter(|i| !views.contains(i)) {
-            self.found.add(format!("bufferViews[{i}]"), "bytes of no use");
+            self.found.add(format!("bufferViews[{i}]"), "unused bytes");
         }
     }
 
@@ -356,13 +364,13 @@ impl Walk<'_> {
         }
     }
 
-    /// Checks that a primitive is a list of triangles with a material, that its attributes are
-    /// finite floats of equal number, and that texture coordinates lie on the texture.
+    /// Checks that a primitive is a triangle list with a material, that its attributes are finite floats of equal
+    /// number, and that texture coordinates lie on the texture.
     fn primitive(&mut self, primitive: &Primitive, place: &str) {
         let mode = primitive.mode.unwrap_or(TRIANGLES);
         self.found.unless(mode == TRIANGLES, place, format!("mode {mode} instead of triangles"));
         let dressed = primitive.material < self.root.materials.len();
-        self.found.unless(dressed, place, "a material that is not there");
+        self.found.unless(dressed, place, "a material that does not exist");
         let attributes = &primitive.attributes;
         let mut count = None;
         for (name, index, kind) in [
@@ -380,7 +388,7 @@ impl Walk<'_> {
             self.found.unless(
                 same,
                 place,
-                format!("attribute {name} of another number of vertices"),
+                format!("attribute {name} with a different number of vertices"),
             );
             let (what, inside) =
                 (format!("attribute {name} beyond the texture"), |v: &f32| (0.0..=1.0).contains(v));
@@ -389,14 +397,14 @@ impl Walk<'_> {
             if name == "POSITION" {
                 self.bounds(index, &values);
             } else if min.is_some() || max.is_some() {
-                self.found.add(format!("accessors[{index}]"), "min and max of no use");
+                self.found.add(format!("accessors[{index}]"), "unused min and max");
             }
         }
         self.indices(primitive.indices, count.unwrap_or_default(), place);
     }
 
-    /// The values of an accessor of floats of this type; `None` where it is another, or a value is not
-    /// finite.
+    /// Returns the values of an accessor of floats of this type. Returns `None` if it has another type, or if a value
+    /// is not finite.
     fn floats(&self, index: usize, kind: &str) -> Option<Vec<f32>> {
         let accessor = self.root.accessors.get(index)?;
         if accessor.kind != kind || accessor.component_type != FLOAT {
@@ -407,7 +415,7 @@ impl Walk<'_> {
         values.iter().all(|value| value.is_finite()).then_some(values)
     }
 
-    /// Checks that the stated bounds of positions are theirs: viewers leave out what lies outside.
+    /// Checks that the stated bounds of positions are correct: viewers skip what lies outside.
     fn bounds(&mut self, index: usize, values: &[f32]) {
         let accessor = &self.root.accessors[index];
         let bound = |pick: fn(f32, f32) -> f32| -> Vec<f32> {
@@ -419,11 +427,11 @@ impl Walk<'_> {
         self.found.unless(
             same,
             format!("accessors[{index}]"),
-            "min and max that are not those of its values",
+            "min and max that do not match its values",
         );
     }
 
-    /// Checks that the indices are those of whole triangles and point to vertices.
+    /// Checks that the indices form whole triangles and refer to existing vertices.
     fn indices(&mut self, index: usize, vertices: usize, place: &str) {
         let accessor = self.root.accessors.get(index);
         let Some(accessor) =
@@ -432,15 +440,15 @@ impl Walk<'_> {
             return self.found.add(place, "indices other than unsigned short");
         };
         let whole = accessor.count.is_multiple_of(3);
-        self.found.unless(whole, place, "indices of a part of a triangle");
+        self.found.unless(whole, place, "indices of an incomplete triangle");
         let bytes = self.bytes(accessor).unwrap_or_default();
         let mut all = bytes.as_chunks::<2>().0.iter().map(|&bytes| u16::from_le_bytes(bytes));
         let inside = all.all(|index| usize::from(index) < vertices);
-        self.found.unless(inside, place, "an index that points nowhere");
+        self.found.unless(inside, place, "an index out of range");
     }
 
-    /// Checks that a material shows the texture of its number as it is, on opaque triangles that are seen from
-    /// outside only.
+    /// Checks that a material shows the texture of the same number unchanged, on opaque triangles that are visible
+    /// only from outside.
     fn material(&mut self, index: usize) {
         let place = format!("materials[{index}]");
         let material = &self.root.materials[index];
@@ -464,7 +472,7 @@ impl Walk<'_> {
             ),
             (
                 material.emissive_factor.is_none_or(|factor| factor == [0.0; 3]),
-                "emissiveFactor other than none",
+                "emissiveFactor other than 0",
             ),
             (material.double_sided != Some(true), "doubleSided"),
         ];
@@ -473,7 +481,7 @@ impl Walk<'_> {
         }
     }
 
-    /// Checks the sampler, which all textures have.
+    /// Checks the sampler, which all textures share.
     fn sampler(&mut self, sampler: &Sampler) {
         let Sampler { mag_filter, min_filter, wrap_s, wrap_t } = *sampler;
         let filters = [mag_filter, min_filter] == [LINEAR, LINEAR_MIPMAP_LINEAR];
@@ -482,12 +490,12 @@ impl Walk<'_> {
         self.found.unless(wraps, "samplers[0]", "a wrap mode other than clamping");
     }
 
-    /// Checks a texture, and its picture as a PNG; the error says that this exceeds the limits.
+    /// Checks a texture, and its image as a PNG. Returns an error if the image exceeds the limits.
     fn texture(&mut self, index: usize, limits: &Limits) -> Result<(), String> {
         let root = self.root;
         let (texture, image) = (&root.textures[index], &root.images[index]);
         let own = (texture.sampler, texture.source) == (0, index);
-        let problem = "a sampler or an image that is not its own";
+        let problem = "a wrong sampler or image";
         self.found.unless(own, format!("textures[{index}]"), problem);
         let (place, kind) = (format!("images[{index}]"), &image.mime_type);
         self.found.unless(kind == "image/png", &place, format!("mimeType {kind}"));
@@ -498,14 +506,14 @@ impl Walk<'_> {
         match bytes.map(|bytes| png::check(bytes, &self.words.title, limits)) {
             Some(Ok(picture)) => self.found.add_of(&place, picture),
             Some(Err(problem)) => self.found.add(place, problem),
-            None => self.found.add(place, "a view that is not there"),
+            None => self.found.add(place, "a view that does not exist"),
         }
         Ok(())
     }
 }
 
-/// Whether the transform of a node is a rotation, a translation and one scale for all axes, without
-/// a mirror: only that keeps the shapes of tiles.
+/// Whether the transform of a node consists of a rotation, a translation and one scale for all axes, without
+/// mirroring: only such a transform preserves the shapes of tiles.
 fn keeps_shapes(node: &Node) -> bool {
     let parts = node.translation.is_some() || node.rotation.is_some() || node.scale.is_some();
     let matrix = match node.matrix {

@@ -1,9 +1,8 @@
-//! The JSON of a `.glb` that every viewer shows alike, as types: a key that has no field here is
-//! refused.
+//! The JSON of a `.glb` that every viewer shows the same way, as types: a key without a field here is rejected.
 //!
-//! Names and meanings are those of glTF 2.0; a number that refers to another object is its index in
-//! the list of that kind in [`Root`]. Optional fields may be missing, as their default is what every
-//! viewer assumes. [`glb`](super::glb) checks the values.
+//! Names and meanings are those of glTF 2.0. A number that refers to another object is its index in the list of that
+//! kind in [`Root`]. Optional fields may be missing because every viewer assumes their default. [`glb`](super::glb)
+//! checks the values.
 
 use serde::Deserialize;
 use serde_json::Value;
@@ -41,8 +40,8 @@ pub(super) struct Scene {
     pub nodes: Vec<usize>,
 }
 
-/// A node with its transform to its parent: a matrix, column by column, or a translation in metres, a
-/// rotation as a quaternion x, y, z, w, and a scale.
+/// A node with its transform to its parent: either a matrix in column order, or a translation in metres, a rotation
+/// as a quaternion x, y, z, w, and a scale.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields, rename_all = "camelCase")]
 pub(super) struct Node {
@@ -73,8 +72,8 @@ pub(super) struct Primitive {
     pub mode: Option<u32>,
 }
 
-/// The accessors of the vertices' attributes. All three are required; colours, tangents or a second
-/// set of texture coordinates are not permitted.
+/// The accessors of the vertex attributes. All three are required; colours, tangents and a second set of texture
+/// coordinates are not allowed.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields, rename_all = "SCREAMING_SNAKE_CASE")]
 pub(super) struct Attributes {
@@ -135,7 +134,7 @@ pub(super) struct Image {
     pub buffer_view: usize,
 }
 
-/// Typed values in a view, from its beginning.
+/// Typed values from the beginning of a view.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields, rename_all = "camelCase")]
 pub(super) struct Accessor {

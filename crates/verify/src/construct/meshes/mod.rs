@@ -1,10 +1,10 @@
 //! Constructs of meshes and bodies.
 //!
-//! Comes in: a file, and those that it names. Goes out: what in them is not on the list of the format.
+//! Input: a file, and the files that it names. Output: their constructs that are not on the list of the format.
 //!
-//! 1. `glb` has the chunks of a binary glTF, `glb_json` its JSON.
-//! 2. `obj` has the statements of an OBJ, `mtl` those of its materials.
-//! 3. `usda` has the lines of a USD as text; `threemf` the parts of a 3MF, and `stl` the head of an STL.
+//! 1. `glb` lists the chunks of a binary glTF, `glb_json` its JSON.
+//! 2. `obj` lists the statements of an OBJ, `mtl` those of its materials.
+//! 3. `usda` lists the lines of a USD as text, `threemf` the parts of a 3MF, and `stl` the header of an STL.
 
 pub(super) mod glb;
 mod glb_json;

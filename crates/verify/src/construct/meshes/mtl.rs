@@ -1,24 +1,24 @@
-//! The lines of a material library that every viewer takes alike: materials that show their texture
-//! as it is.
+//! The lines of a material library that every viewer interprets the same way: materials that show their texture
+//! unchanged.
 
 use crate::construct::findings::Findings;
 use crate::construct::text::{is_plain_file_name, start};
 use crate::construct::words::is_creator;
 
-/// The statements about a material, word for word: no ambient light, white, no gloss. Viewers
-/// differ in what they assume for an omitted statement.
+/// The required statements of a material, word for word: no ambient light, white, no gloss. Viewers assume different
+/// values for an omitted statement.
 const STATED: [&str; 4] = ["Ka 0 0 0", "Kd 1 1 1", "Ks 0 0 0", "illum 1"];
 
 /// A material of a library.
 pub(super) struct Material {
-    /// Its name.
+    /// Name of the material.
     pub name: String,
     /// File name of its texture.
     pub texture: Option<String>,
 }
 
-/// Inspects a material library, which has a comment about its writer, and then of each material its
-/// name and each statement once; returns the materials and the findings.
+/// Inspects a material library: a comment that names its writer, then for each material its name and each statement
+/// once. Returns the materials and the findings.
 pub(super) fn check(text: &str) -> (Vec<Material>, Findings) {
     let (mut materials, mut found) = (Vec::<Material>::new(), Findings::default());
     let mut stated: Vec<&str> = Vec::new();
@@ -27,7 +27,8 @@ pub(super) fn check(text: &str) -> (Vec<Material>, Findings) {
         if index == 0 {
             let creator =
                 line.strip_prefix("# ").and_then(|words| words.strip_suffix(", material"));
-            let construct = format!("`{}` instead of what wrote it", start(line, 60));
+            let construct =
+                format!("`{}` instead of the comment that names deltille", start(line, 60));
             found.unless(creator.is_some_and(is_creator), place, construct);
             continue;
         }
@@ -67,7 +68,7 @@ pub(super) fn check(text: &str) -> (Vec<Material>, Findings) {
     (materials, found)
 }
 
-/// Looks for what a material lacks.
+/// Reports what a material lacks.
 fn end(material: Option<&Material>, stated: &[&str], found: &mut Findings) {
     let Some(material) = material else { return };
     for line in STATED {

@@ -1,5 +1,5 @@
-//! The lines of an OBJ that every viewer takes alike: triangles with their material, each corner with
-//! its position, texture coordinate and normal.
+//! The lines of an OBJ that every viewer interprets the same way: triangles with their material, each corner with its
+//! position, texture coordinate and normal.
 
 use std::collections::BTreeSet;
 use std::path::Path;
@@ -16,12 +16,12 @@ use crate::reading::reader::{Artifact, Reader};
 use deltille_files::export::obj::{material_name, part_name, texture_name};
 use deltille_files::export::texture::MAX_TEXTURES;
 
-/// Inspects an OBJ, its material library and its textures; returns the findings, and these files as
-/// far as nothing before them was refused.
+/// Inspects an OBJ, its material library and its textures. Returns the findings, and these files up to the first one
+/// that is rejected.
 ///
 /// # Errors
 ///
-/// One of the files cannot be read, is no text or no PNG, or exceeds the limits.
+/// Returns an error if a file cannot be read, is not text or not a PNG, or exceeds the limits.
 pub(in crate::construct) fn check(
     reader: &Reader,
     path: &Path,
@@ -52,7 +52,7 @@ pub(in crate::construct) fn check(
     found.unless(
         named,
         &library_name,
-        "materials of other names than are written, or in another order",
+        "materials with other names than deltille writes, or in another order",
     );
     for texture in materials.into_iter().filter_map(|material| material.texture) {
         if found.refuse() {
@@ -68,12 +68,12 @@ pub(in crate::construct) fn check(
     Ok((found, parts))
 }
 
-/// Compares what a model for MuJoCo, of `count` textures, takes from an OBJ that was inspected: textures of the usual
-/// names, and where there are several, for each a part of the mesh in an OBJ of its own.
+/// Compares what a MuJoCo model with `count` textures uses of an inspected OBJ: textures with the usual names, and if
+/// there are several, a part of the mesh for each in a separate OBJ.
 ///
 /// # Errors
 ///
-/// One of the files cannot be read, or is no text.
+/// Returns an error if a file cannot be read or is not text.
 pub(in crate::construct) fn check_parts(
     reader: &Reader,
     path: &Path,
@@ -100,7 +100,8 @@ pub(in crate::construct) fn check_parts(
     Ok(found)
 }
 
-/// The materials of an OBJ, each with the places, texture coordinates and normals of its corners as they are written.
+/// Returns the materials of an OBJ, each with the positions, texture coordinates and normals of its corners as
+/// written.
 fn groups(text: &str) -> Vec<(&str, Vec<&str>)> {
     let mut lists = [const { Vec::new() }; 3];
     let mut groups: Vec<(&str, Vec<&str>)> = Vec::new();
@@ -137,11 +138,11 @@ fn lines(text: &str, words: &Words) -> Lines {
     for (used, (what, count)) in
         lines.used.iter().zip(["v", "vt", "vn"].into_iter().zip(lines.counts))
     {
-        lines.found.unless(used.len() == count, "the file", format!("a line {what} of no use"));
+        lines.found.unless(used.len() == count, "the file", format!("an unused line {what}"));
     }
     let named = lines.object.as_deref() == Some(&*words.title);
     lines.found.unseen_unless(named, "the file", "an object other than the target's name");
-    lines.found.unless(!lines.is_bare, "the file", "a material that no face has");
+    lines.found.unless(!lines.is_bare, "the file", "a material that no face uses");
     lines
 }
 
@@ -155,33 +156,33 @@ struct Lines {
     object: Option<String>,
     /// Names of the materials.
     materials: Vec<String>,
-    /// Whether no face came after the last of them.
+    /// Whether no face has followed the last material.
     is_bare: bool,
-    /// Numbers of positions, texture coordinates and normals so far.
+    /// Number of positions, texture coordinates and normals so far.
     counts: [usize; 3],
-    /// Indices, from 1 on, of those that faces use.
+    /// Indices of those that faces use, from 1.
     used: [BTreeSet<usize>; 3],
 }
 
 impl Lines {
-    /// Inspects a comment: the first line says what wrote the file and the unit, the second describes
-    /// the target as JSON, and there are no others.
+    /// Inspects a comment. The first line names the program and the unit, the second describes the target as JSON;
+    /// there are no others.
     fn comment(&mut self, comment: &str, index: usize, words: &Words, place: &str) {
         let holds = match index {
             0 => comment.strip_suffix(", millimetres").is_some_and(is_creator),
             1 => serde_json::from_str(comment).is_ok_and(|found: Value| {
-                let anew = found.to_string();
-                words.are_extras(&found) && anew == comment
+                let rewritten = found.to_string();
+                words.are_extras(&found) && rewritten == comment
             }),
             _ => false,
         };
-        // After a backslash some readers take the next line for a part of the comment.
+        // After a backslash, some readers treat the next line as part of the comment.
         let listed = index < 2 && !comment.contains('\\');
         self.found.unless(listed, place, "a comment");
-        self.found.unseen_unless(!listed || holds, place, "words that do not describe the target");
+        self.found.unseen_unless(!listed || holds, place, "text that does not describe the target");
     }
 
-    /// Inspects a line that is no comment.
+    /// Inspects a line that is not a comment.
     fn line(&mut self, line: &str, place: &str) {
         let (word, rest) = line.split_once(' ').unwrap_or((line, ""));
         let once = |slot: &mut Option<String>| slot.replace(rest.to_owned()).is_none();
@@ -210,7 +211,7 @@ impl Lines {
         self.found.unless(holds, place, format!("`{}`", start(line, 60)));
     }
 
-    /// Whether a line of one of the three lists holds `count` numbers; the line is counted.
+    /// Whether a line of one of the three lists contains `count` numbers. Counts the line.
     fn numbers(&mut self, rest: &str, list: usize, count: usize) -> bool {
         self.counts[list] += 1;
         let numbers: Option<Vec<f64>> = rest.split(' ').map(decimal).collect();
@@ -235,13 +236,12 @@ impl Lines {
     }
 }
 
-/// An index without a sign or leading zeros; negative ones, which count from the end, are not
-/// permitted.
+/// Parses an index without a sign or leading zeros. Negative indices, which count from the end, are not allowed.
 fn index(word: &str) -> Option<usize> {
     word.parse().ok().filter(|index: &usize| index.to_string() == word)
 }
 
-/// Whether a coordinate is on the texture; beyond it some viewers repeat the texture.
+/// Whether a coordinate is on the texture; outside it, some viewers repeat the texture.
 fn on_texture(word: &str) -> bool {
     decimal(word).is_some_and(|value| (0.0..=1.0).contains(&value))
 }

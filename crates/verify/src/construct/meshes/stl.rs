@@ -1,5 +1,5 @@
-//! Inspection of binary STL for what every reader takes alike: the header that is written here, and
-//! triangles without attributes, which some readers take for colours.
+//! Inspection of binary STL for what every reader interprets the same way: the header that the program writes, and
+//! triangles without attributes, which some readers interpret as colours.
 
 use crate::construct::findings::Findings;
 use deltille_files::export::stl::header;
@@ -10,11 +10,11 @@ const HEAD: usize = 84;
 const TRIANGLE: usize = 50;
 const GEOMETRY: usize = 48;
 
-/// Inspects a binary STL of a target of this name. A truncated file is left to its reader.
+/// Inspects a binary STL of the target with this name. Its reader reports a truncated file.
 ///
 /// # Errors
 ///
-/// There are more triangles than the limits allow.
+/// Returns an error if there are more triangles than the limits allow.
 pub(in crate::construct) fn check(
     bytes: &[u8],
     name: &str,
@@ -24,7 +24,7 @@ pub(in crate::construct) fn check(
     limits.check_nodes(count).map_err(|exceeded| exceeded.to_string())?;
     let mut found = Findings::default();
     let head = bytes.get(..80).is_none_or(|head| head == header(name));
-    found.unless(head, "the head", "words other than the target's name");
+    found.unless(head, "the head", "text other than the target's name");
     let triangles = bytes.get(HEAD..).unwrap_or_default().chunks_exact(TRIANGLE);
     let coloured = triangles.enumerate().find(|(_, triangle)| triangle[GEOMETRY..] != [0, 0]);
     if let Some((index, _)) = coloured {

@@ -1,4 +1,4 @@
-//! The parts and lines of a 3MF that this program writes: bodies, their vertices and triangles.
+//! The parts and lines of a 3MF that this program writes: bodies with their vertices and triangles.
 
 use flate2::{Crc, Decompress};
 use glam::DVec3;
@@ -12,17 +12,18 @@ use deltille_files::export::inlay::Body;
 use deltille_files::export::threemf::{MODEL, TURN, fixed_parts, frame};
 use deltille_files::limits::{Kind, Limits};
 
-/// Bytes of the record that ends a ZIP, and of the headers of a part in its directory and before its content, without
-/// the name.
+/// Number of bytes, without the name, of the record that ends a ZIP, of the entry of a part in the directory, and of
+/// the header before its content.
 const END: usize = 22;
 const LISTED: usize = 46;
 const HEADER: usize = 30;
 
-/// Inspects a 3MF that should have bodies of these names; returns the findings, and the bodies unless anything was found.
+/// Inspects a 3MF that should have bodies with these names. Returns the findings, and the bodies if there are no
+/// findings.
 ///
 /// # Errors
 ///
-/// It is no ZIP, is damaged, names vertices that are not there, or exceeds the limits.
+/// Returns an error if the file is not a ZIP, is damaged, refers to missing vertices, or exceeds the limits.
 pub(in crate::construct) fn check(
     file: &[u8],
     names: &[&str],
@@ -43,21 +44,21 @@ pub(in crate::construct) fn check(
                 let stated = frame(&words.title, &words.subject, names);
                 bodies = model(text(&content)?, &stated, limits, &mut found)?;
             }
-            _ => found.add(format!("part {name}"), "a part, or its place in the file"),
+            _ => found.add(format!("part {name}"), "an unknown or misplaced part"),
         }
     }
-    found.unless(has_model, "the file", format!("without a part {MODEL}"));
+    found.unless(has_model, "the file", format!("no part {MODEL}"));
     Ok((found, bodies))
 }
 
-/// The parts of a ZIP, with their names and contents. They must lie one after the other, as the directory at the end of
-/// the file lists them: programs differ in what they read of files where that is not so.
+/// Returns the parts of a ZIP with their names and contents. They must be contiguous, in the order of the directory
+/// at the end of the file: programs read other files differently.
 fn parts(
     file: &[u8],
     limits: &Limits,
     found: &mut Findings,
 ) -> Result<Vec<(String, Vec<u8>)>, String> {
-    let damaged = || "not a ZIP in whole parts, one after the other".to_owned();
+    let damaged = || "not a ZIP of complete, contiguous parts".to_owned();
     let end = file.len().checked_sub(END).ok_or_else(damaged)?;
     let (before, last) = file.split_at(end);
     let directory = number(last, 16, 4).filter(|_| last.starts_with(b"PK\x05\x06"));
@@ -66,7 +67,7 @@ fn parts(
     let (mut parts, mut place, mut left) = (Vec::new(), 0, limits.max_bytes);
     while !listed.is_empty() {
         let part = Part::of(listed, &before[..directory], place).ok_or_else(damaged)?;
-        // Before anything is unpacked: a small file may hold a very large part.
+        // Checked before anything is unpacked: a small file may contain a very large part.
         left = left
             .checked_sub(part.size as u64)
             .ok_or_else(|| limits.exceeded(Kind::Bytes).to_string())?;
@@ -96,15 +97,15 @@ struct Part<'a> {
     /// Length of its content, and its checksum.
     size: usize,
     sum: usize,
-    /// Without flags, comment, or additional fields.
+    /// Whether it has neither flags, nor a comment, nor additional fields.
     is_plain: bool,
-    /// Where it ends in the file.
+    /// Offset of its end in the file.
     end: usize,
 }
 
 impl<'a> Part<'a> {
-    /// The part that the first entry of a directory lists, which begins at `place` of the file; `None` where the entry
-    /// and the file contradict each other.
+    /// Returns the part that the first entry of a directory lists and that begins at offset `place` of the file.
+    /// Returns `None` if the entry and the file contradict each other.
     fn of(listed: &'a [u8], file: &'a [u8], place: usize) -> Option<Self> {
         let header = file.get(place..)?;
         let is_part = listed.starts_with(b"PK\x01\x02") && header.starts_with(b"PK\x03\x04");
@@ -130,7 +131,7 @@ impl<'a> Part<'a> {
         })
     }
 
-    /// What it holds; `None` unless it has the stated size and checksum.
+    /// Returns the content, or `None` if it does not have the stated size and checksum.
     fn content(&self) -> Option<Vec<u8>> {
         let mut content = Vec::new();
         if self.is_packed {
@@ -146,13 +147,13 @@ impl<'a> Part<'a> {
     }
 }
 
-/// A number of so many bytes, the lowest first.
+/// Reads a little-endian number of `length` bytes.
 fn number(bytes: &[u8], at: usize, length: usize) -> Option<usize> {
     let bytes = bytes.get(at..at + length)?;
     Some(bytes.iter().rev().fold(0, |value, &byte| value << 8 | usize::from(byte)))
 }
 
-/// The bodies of a model; everything else must be as it is written.
+/// Returns the bodies of a model; everything else must be exactly as the program writes it.
 fn model(
     text: &str,
     stated: &str,
@@ -165,7 +166,7 @@ fn model(
     let mut place = None;
     let mut nodes = 0;
     for line in text.lines() {
-        // No other white space is XML's in all its versions.
+        // XML has no other white space in any of its versions.
         let trimmed = line.trim_start_matches(' ');
         nodes += 1;
         if nodes > limits.max_nodes {
@@ -198,7 +199,7 @@ fn model(
     found.unless(
         is_there,
         "the build item",
-        "a position other than with its least coordinates at 0",
+        "a position that does not put the smallest coordinates at 0",
     );
     if found.refuse() {
         return Ok(Vec::new());
@@ -207,11 +208,11 @@ fn model(
         |body: &Body| body.triangles.iter().flatten().all(|&v| v < body.vertices_mm.len());
     match bodies.iter().all(is_known) {
         true => Ok(bodies),
-        false => Err("a triangle names a vertex that is not there".to_owned()),
+        false => Err("a triangle refers to a missing vertex".to_owned()),
     }
 }
 
-/// A line without its numbers, and these, if it is the one that puts the object onto the printer.
+/// If a line positions the object on the printer, returns the line without its numbers, and the numbers.
 fn placed(line: &str) -> (String, Option<DVec3>) {
     let numbers = || {
         let (before, rest) = line.split_once(TURN)?;
@@ -226,14 +227,14 @@ fn placed(line: &str) -> (String, Option<DVec3>) {
     }
 }
 
-/// Whether the object is put where its least coordinate along each axis is 0.
+/// Whether the object is positioned with its smallest coordinate along each axis at 0.
 fn is_at_origin(bodies: &[Body], place: DVec3) -> bool {
     let vertices = bodies.iter().flat_map(|body| &body.vertices_mm);
     let least = vertices.copied().reduce(DVec3::min).unwrap_or_default();
     (least + place).abs().max_element() <= ROUNDED_MM
 }
 
-/// Coordinates are written with nine decimals.
+/// Rounding of coordinates, which are written with nine decimals, mm.
 const ROUNDED_MM: f64 = 1e-8;
 
 fn vertex(line: &str) -> Option<DVec3> {
@@ -250,7 +251,7 @@ fn triangle(line: &str) -> Option<[usize; 3]> {
     Some([a?, b?, c?])
 }
 
-/// The three values of a line, after these words each.
+/// Returns the three values of a line, each preceded by one of these words.
 fn values<'a>(line: &'a str, words: [&str; 3]) -> Option<[&'a str; 3]> {
     let rest = line.strip_prefix(words[0])?.strip_suffix("\"/>")?;
     let (first, rest) = rest.split_once(words[1])?;
@@ -296,7 +297,7 @@ mod tests {
         ] {
             assert!(!holds(&format!("{before}{TURN}{place}\"/>{end}")), "{place}");
         }
-        // White space that XML does not know.
+        // White space that XML does not recognise.
         for space in ['\u{c}', '\u{b}', '\u{a0}', '\u{2003}'] {
             assert!(!holds(&good.replacen("<vertex", &format!("{space}<vertex"), 1)));
         }

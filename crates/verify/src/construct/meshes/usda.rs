@@ -12,11 +12,11 @@ use deltille_files::export::obj::texture_name;
 use deltille_files::export::scene::{USD_LISTS, USD_SUBSET, usda_frame};
 use deltille_files::export::texture::MAX_TEXTURES;
 
-/// Inspects a USD and its textures; returns the findings, and the textures as far as nothing before them was refused.
+/// Inspects a USD and its textures. Returns the findings, and the textures up to the first one that is rejected.
 ///
 /// # Errors
 ///
-/// One of the files cannot be read, is no text or no PNG, or exceeds the limits.
+/// Returns an error if a file cannot be read, is not text or not a PNG, or exceeds the limits.
 pub(in crate::construct) fn check(
     reader: &Reader,
     path: &Path,
@@ -43,14 +43,15 @@ pub(in crate::construct) fn check(
     Ok((found, parts))
 }
 
-/// Number of textures of a file, by the lines that begin so: where there are several, each has one.
+/// Returns the number of textures of a file from its lines that begin with `start`: with several textures, each has
+/// such a line.
 pub(in crate::construct) fn textures_by(text: &str, start: &str) -> usize {
     let lines = text.lines().filter(|line| line.trim_start().starts_with(start));
     lines.count().clamp(1, MAX_TEXTURES as usize)
 }
 
-/// Adds the first line that is not that of `stated`, after `plain` was taken of both; the versions of the program that
-/// wrote them may differ.
+/// Adds the first line that differs from `stated`, after `plain` was applied to both. The versions of the program
+/// that wrote them may differ.
 pub(in crate::construct) fn same_lines(
     text: &str,
     stated: &str,
@@ -77,28 +78,28 @@ pub(in crate::construct) fn same_lines(
     }
 }
 
-/// A line without the numbers of a version after the name of this program.
+/// Returns a line without the version number after the name of this program.
 fn without_version(line: &str) -> String {
     let Some((before, after)) = line.split_once("deltille ") else { return line.to_owned() };
     let version = |c: char| c.is_ascii_digit() || c == '.';
     format!("{before}deltille {}", after.trim_start_matches(version))
 }
 
-/// A line without the numbers of its list, if it is one whose every number all readers take alike.
+/// Returns a line without the numbers of its list, if every reader interprets all of these numbers the same way.
 fn list_of(line: &str) -> String {
     let Some(_) = list(line) else { return line.to_owned() };
     let [from, to] = brackets(line);
     format!("{}{}", &line[..from], &line[to..])
 }
 
-/// Where the brackets of a list begin and end.
+/// Returns where the brackets of a list begin and end.
 fn brackets(line: &str) -> [usize; 2] {
     let from = line.find("= [").map_or(0, |at| at + 2);
     let to = line.rfind(']').map_or(from, |at| at + 1);
     [from, to.max(from)]
 }
 
-/// The list that a line has: its name and its numbers, each tuple of which has as many as the type of the list says.
+/// Parses the list on a line: its name and its numbers, in tuples of the size that the type of the list requires.
 pub(crate) fn list(line: &str) -> Option<(&'static str, Vec<f64>)> {
     let trimmed = line.trim_start();
     let mut names = USD_LISTS.into_iter().chain([USD_SUBSET]);
@@ -133,14 +134,14 @@ pub(crate) fn list(line: &str) -> Option<(&'static str, Vec<f64>)> {
         numbers.extend(entry(&rest[..end])?);
         rest = match &rest[end..] {
             "" => "",
-            // Something follows.
+            // Something must follow.
             next => next.strip_prefix(", ").filter(|next| !next.is_empty())?,
         };
     }
     Some((name, numbers))
 }
 
-/// Digits of an index that fits into 32 bits with its sign.
+/// Maximum number of digits of an index, so that it fits into 32 bits with its sign.
 const MOST_DIGITS_OF_INDEX: usize = 9;
 
 #[cfg(test)]
@@ -148,7 +149,7 @@ mod tests {
     use super::list;
 
     #[test]
-    fn lists_hold_tuples_of_their_type() {
+    fn lists_contain_tuples_of_their_type() {
         let values = |line: &str| list(line).map(|(_, values)| values);
         let good = "        point3f[] points = [(0.1, -2, 3), (4, 5, 6)]";
         assert_eq!(values(good), Some(vec![0.1, -2.0, 3.0, 4.0, 5.0, 6.0]));

@@ -1,40 +1,33 @@
-//! Inspection of the constructs of a file against a list of those that every viewer shows alike.
-//!
-//! Rendering a file proves what one program shows. Scripts, animations, rules for print, layers,
-//! blend modes, vertex colours or a second scene make other programs show something else. So each
-//! format has a list of the constructs that its writer here uses and the reader interprets exactly;
-//! anything else is named and refused, known as harmful or not. A refused file is not rendered.
+//! The marks on a page: each wide enough and drawn once, all together few enough to be rendered quickly.
 
 use std::collections::HashSet;
 
 use glam::DVec2;
 use kurbo::{BezPath, PathEl, Shape};
 
-/// Problem of marks outside the page: some viewers show more than the page, and then these as well.
-pub(super) const OFF_PAGE: &str = "a mark that reaches over the edge of the page";
+/// Problem of marks outside the page: some viewers show more than the page, including these marks.
+pub(super) const OFF_PAGE: &str = "a mark that extends beyond the page";
 
-/// Most length of all contours per area of the page, 1/mm: tags in all tiles, with cells of 0.1 mm,
-/// have less.
+/// Maximum length of all contours per area of the page, 1/mm: even tags in all tiles, with cells of 0.1 mm, have
+/// less.
 const MOST_PER_MM: f64 = 40.0;
 
-/// Most area of the rectangles around filled paths, and of strokes, in areas of the page: those of
-/// tiles and cells overlap each other little.
+/// Maximum total area of strokes and of the rectangles around filled paths, in page areas: those of tiles and cells
+/// overlap little.
 const MOST_PAGES: f64 = 40.0;
 
-/// Least width of an area or a line, mm: thinner ones are drawn by some viewers as wide as a pixel,
-/// and by others not at all. Cells and strokes of letters are wider.
+/// Minimum width of an area or line, mm: some viewers draw thinner ones one pixel wide, others not at all. Cells and
+/// letter strokes are wider.
 const LEAST_WIDTH_MM: f64 = 0.01;
 
-/// Problem of a mark that is thinner.
-const THIN: &str = "a mark so thin that not all viewers draw it alike";
+/// Problem of a mark below [`LEAST_WIDTH_MM`].
+const THIN: &str = "a mark that is thinner than 0.01 mm";
 
-/// Problem of a mark on top of an equal one: where both cover a part of a pixel, some viewers draw
-/// it darker.
+/// Problem of a mark on top of an identical one: some viewers draw pixels that both partly cover darker.
 const TWICE: &str = "a mark that is drawn twice";
 
-/// The key by which equal marks are recognised, in units of [`LEAST_WIDTH_MM`]: its ends on each
-/// side, the side of a square of its area, the diagonal along which its points lie, and the width
-/// of its pen.
+/// Key that identifies equal marks, in units of [`LEAST_WIDTH_MM`]: the bounds on each side, the side of a square of
+/// equal area, the diagonal along which the points lie, and the pen width.
 type Outline = [i64; 7];
 
 /// The marks on a page so far, in units of the page.
@@ -47,18 +40,18 @@ pub(super) struct Ink {
     length: f64,
     /// Area of the rectangles around filled paths, and of strokes, so far.
     area: f64,
-    /// The marks so far, to recognise equal ones.
+    /// The marks so far, to detect duplicates.
     marks: HashSet<Outline>,
 }
 
 impl Ink {
-    /// An empty page of this width and height, in units of `mm` millimetres.
+    /// Creates an empty page of this width and height, in units of `mm` millimetres.
     pub(super) fn new(size: DVec2, mm: f64) -> Self {
         Self { page: size.element_product(), mm, length: 0.0, area: 0.0, marks: HashSet::new() }
     }
 
-    /// Adds a path that is filled by the even-odd rule, or stroked where the width of a pen is given,
-    /// in units of the page; returns the problem if not all viewers draw it alike.
+    /// Adds a path, filled by the even-odd rule or stroked with a pen of the given width, in units of the page.
+    /// Returns the problem if viewers may draw it differently.
     pub(super) fn add(&mut self, path: &BezPath, pen: Option<f64>) -> Option<&'static str> {
         let (length, count) = length(path);
         let around = path.control_box();
@@ -94,8 +87,8 @@ impl Ink {
         (!is_new).then_some(TWICE)
     }
 
-    /// Whether the pen, or without one each contour of a filled path, is wide enough that all viewers
-    /// draw it alike.
+    /// Whether the pen, or without one each contour of a filled path, is wide enough to be drawn the same way by all
+    /// viewers.
     fn is_thick(&self, path: &BezPath, pen: Option<f64>) -> bool {
         let least = LEAST_WIDTH_MM / self.mm;
         if let Some(width) = pen {
@@ -106,21 +99,21 @@ impl Ink {
         let contours = elements.chunk_by(|_, next| !is_start(next));
         contours.map(|contour| BezPath::from_vec(contour.to_vec())).all(|mut contour| {
             contour.close_path();
-            // Twice the area over the perimeter is the width of a long rectangle.
+            // The width of a long rectangle is twice its area divided by its perimeter.
             let width = 2.0 * contour.area().abs() / length(&contour).0;
             width >= least
         })
     }
 
-    /// Whether the marks so far are within the bounds, so that rendering them takes little time.
+    /// Whether the marks so far are within the bounds that keep rendering fast.
     pub(super) fn is_drawable(&self) -> bool {
-        // Written so that NaN is refused too.
+        // Written so that NaN is rejected, too.
         self.length <= MOST_PER_MM * self.mm * self.page && self.area <= MOST_PAGES * self.page
     }
 }
 
-/// The length of a path, and its number of segments. For a curve it is the length of its control
-/// polygon, which is an upper bound and quick to compute.
+/// Returns the length of a path and its number of segments. The length of a curve is that of its control polygon, an
+/// upper bound that is quick to compute.
 fn length(path: &BezPath) -> (f64, f64) {
     let lengths = path.segments().map(|segment| {
         let points = segment.to_cubic();
@@ -135,7 +128,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn thin_marks_are_told_from_thick_ones() {
+    fn thin_marks_are_distinguished_from_thick_ones() {
         let ink = Ink::new(DVec2::splat(100.0), 1.0);
         let is_thick = |path: &str| ink.is_thick(&BezPath::from_svg(path).unwrap(), None);
         assert!(is_thick("M0,0 L20,20 L20.1,20 L0.1,0 z"));
@@ -160,7 +153,7 @@ mod tests {
     }
 
     #[test]
-    fn a_page_is_covered_some_times_and_not_often() {
+    fn a_page_may_be_covered_ten_times_but_not_fifty() {
         let page = kurbo::Shape::to_path(&kurbo::Rect::new(0.0, 0.0, 100.0, 100.0), 0.1);
         let mut ink = Ink::new(DVec2::splat(100.0), 1.0);
         (0..10).for_each(|_| _ = ink.add(&page, None));

@@ -1,10 +1,10 @@
 //! Constructs of printed pages.
 //!
-//! Comes in: a PDF or an SVG. Goes out: what in it is not on the list of its format.
+//! Input: a PDF or an SVG. Output: the constructs that are not on the list of its format.
 //!
-//! 1. `svg` has elements, attributes and values.
-//! 2. `pdf` has objects, `pdf_content` the operators that draw a page.
-//! 3. `ink` tells for both whether what is drawn is black, white and on the page.
+//! 1. `svg` lists elements, attributes and values.
+//! 2. `pdf` lists objects, `pdf_content` the operators that draw a page.
+//! 3. `ink` checks for both that marks are wide enough, drawn once and few enough.
 
 mod ink;
 pub(super) mod pdf;

@@ -1,5 +1,5 @@
-//! The objects of a PDF that every viewer shows alike: pages of black paths, and nothing that is
-//! hidden, laid over them, run or attached.
+//! The objects of a PDF that every viewer shows the same way: pages of black paths, with nothing hidden, overlaid,
+//! executed or attached.
 
 use std::collections::BTreeSet;
 
@@ -15,34 +15,34 @@ use deltille_files::export::pdf::{VERSION, color_spaces, graphics_states};
 use deltille_files::limits::Limits;
 use deltille_layout::Finish;
 
-/// The permitted keys of the trailer, the catalogue, the information, the page tree and a page.
+/// Permitted keys of the trailer, catalogue, information dictionary, page tree and page.
 const TRAILER: [&str; 4] = ["Root", "Info", "Size", "ID"];
 const CATALOG: [&str; 5] = ["Type", "Pages", "PageLayout", "PageMode", "ViewerPreferences"];
 const INFO: [&str; 3] = ["Title", "Subject", "Creator"];
 const PAGES: [&str; 3] = ["Type", "Count", "Kids"];
 const PAGE: [&str; 8] =
     ["Type", "Parent", "MediaBox", "TrimBox", "CropBox", "Resources", "Contents", "Annots"];
-/// Kinds of resources that a page may list with no entries.
+/// Kinds of resources that a page may list without entries.
 const RESOURCES: [&str; 4] = ["Font", "XObject", "ExtGState", "Shading"];
 /// The bytes before the content of a stream, and the permitted keys of its dictionary.
 const STREAM_BEGINS: &[u8] = b">>stream";
 const STREAM: [&str; 2] = ["Length", "Filter"];
 
-/// The second line of the file: bytes that are no text, so that programs take the file for binary.
+/// The second line of the file: bytes that are not text, so that programs treat the file as binary.
 const BINARY_MARK: &[u8] = b"\n%\xbb\xad\xc0\xde\n";
 
-/// Inspects a PDF for constructs that are not permitted.
+/// Inspects a PDF for constructs that are not allowed.
 ///
 /// # Errors
 ///
-/// It is no readable PDF, or exceeds the limits.
+/// Returns an error if the file is not a readable PDF or exceeds the limits.
 pub(in crate::construct) fn check(
     bytes: &[u8],
     words: &Words,
     limits: &Limits,
 ) -> Result<Findings, String> {
     if positions(bytes, b"%PDF-").is_empty() {
-        return Err("not a readable PDF (its head)".to_owned());
+        return Err("not a readable PDF (no %PDF header)".to_owned());
     }
     let mut found = Findings::default();
     head(bytes, &mut found);
@@ -61,16 +61,17 @@ pub(in crate::construct) fn check(
     let (between, streams) = split_streams(bytes);
     limits.check_nodes(document.objects.len()).map_err(|exceeded| exceeded.to_string())?;
     let (finish, cut_lines) = (&words.finish, 0);
-    let mut walk = Walk { document: &document, between, streams, limits, finish, cut_lines, found };
-    walk.names();
-    walk.catalog();
-    walk.info(words);
-    walk.identifier();
-    walk.pages(&words.cut_lines)?;
-    walk.unused();
-    let mut found = walk.found;
+    let mut inspection =
+        Inspection { document: &document, between, streams, limits, finish, cut_lines, found };
+    inspection.names();
+    inspection.catalog();
+    inspection.info(words);
+    inspection.identifier();
+    inspection.pages(&words.cut_lines)?;
+    inspection.unused();
+    let mut found = inspection.found;
     if !found.refuse() {
-        written_anew(&mut document, bytes, &mut found);
+        check_rewrite(&mut document, bytes, &mut found);
     }
     Ok(found)
 }
@@ -82,40 +83,40 @@ fn head(bytes: &[u8], found: &mut Findings) {
     };
     if let Some(rest) = rest.strip_prefix(VERSION.as_bytes()) {
         let marked = rest.starts_with(BINARY_MARK);
-        return found.unless(marked, "the head", "other bytes than a version and a mark");
+        return found.unless(marked, "the head", "bytes other than a version and the binary mark");
     }
     let version: Vec<u8> = rest.iter().copied().take(3).collect();
     let version = String::from_utf8_lossy(&version).into_owned();
     found.add("the head", format!("version {version} instead of {VERSION}"));
 }
 
-/// Checks that every object begins where the cross-reference table says: readers that rebuild the
-/// table would otherwise find other objects than those that follow it.
+/// Checks that every object begins at its offset in the cross-reference table. Otherwise readers that rebuild the
+/// table would find other objects than readers that follow it.
 fn table(document: &Document, bytes: &[u8], found: &mut Findings) {
     for (number, entry) in &document.reference_table.entries {
         let &XrefEntry::Normal { offset, generation } = entry else { continue };
         let there = bytes.get(offset as usize..).unwrap_or_default();
         let head = format!("{number} {generation} obj");
         let holds = there.starts_with(head.as_bytes());
-        found.unless(holds, "the table", format!("object {number} elsewhere than it says"));
+        found.unless(holds, "the table", format!("a wrong offset of object {number}"));
     }
 }
 
-/// Checks that the objects as they were read, written again, are the file byte by byte: so the reader
-/// passed over nothing, and mended nothing.
-fn written_anew(document: &mut Document, bytes: &[u8], found: &mut Findings) {
-    let mut anew = Vec::with_capacity(bytes.len());
-    let written = document.save_to(&mut anew).is_ok();
-    if written && anew == bytes {
+/// Checks that the parsed objects, written again, reproduce the file byte by byte: the reader neither skipped nor
+/// repaired anything.
+fn check_rewrite(document: &mut Document, bytes: &[u8], found: &mut Findings) {
+    let mut rewritten = Vec::with_capacity(bytes.len());
+    let written = document.save_to(&mut rewritten).is_ok();
+    if written && rewritten == bytes {
         return;
     }
-    let at = anew.iter().zip(bytes).position(|(a, b)| a != b);
-    let at = at.unwrap_or(anew.len().min(bytes.len()));
-    found.add(format!("byte {at}"), "spelling, order or a table that is not that of its objects");
+    let at = rewritten.iter().zip(bytes).position(|(a, b)| a != b);
+    let at = at.unwrap_or(rewritten.len().min(bytes.len()));
+    found.add(format!("byte {at}"), "a spelling, order or table that is not as deltille writes it");
 }
 
-/// Checks that there is one revision, which ends with the file, and that its trailer has permitted
-/// keys only: an earlier revision, encryption and a second table would each need another.
+/// Checks that there is a single revision, which ends with the file, and that the trailer has permitted keys only. An
+/// earlier revision, encryption and a second table each need another key.
 fn trailer(bytes: &[u8], found: &mut Findings) {
     let Some(&at) = positions(bytes, b"trailer").last() else { return };
     let text = String::from_utf8_lossy(&bytes[at..]);
@@ -130,13 +131,13 @@ fn trailer(bytes: &[u8], found: &mut Findings) {
     found.unless(tables < 2, "the end", "a second revision");
 }
 
-/// The offsets of a word in a file.
+/// Returns the offsets of a word in a file.
 fn positions(bytes: &[u8], word: &[u8]) -> Vec<usize> {
     let windows = bytes.windows(word.len()).enumerate();
     windows.filter(|(_, window)| *window == word).map(|(at, _)| at).collect()
 }
 
-/// Number of slashes, which begin names, in the written form of an object.
+/// Returns the number of slashes, which begin names, in the written form of an object.
 fn slashes(object: &Object) -> usize {
     let of_dictionary = |dictionary: &Dictionary| -> usize {
         dictionary.iter().map(|(_, value)| 1 + slashes(value)).sum()
@@ -153,8 +154,8 @@ fn slashes(object: &Object) -> usize {
     }
 }
 
-/// The parts of a file between its streams, and the contents of the streams without the line ends
-/// around them.
+/// Splits a file into the parts between its streams and the contents of the streams, without the line ends around
+/// them.
 fn split_streams(bytes: &[u8]) -> (Vec<&[u8]>, Vec<&[u8]>) {
     let (begins, ends) = (positions(bytes, STREAM_BEGINS), positions(bytes, b"endstream"));
     let (mut between, mut streams) = (Vec::new(), Vec::new());
@@ -185,29 +186,29 @@ fn references(document: &Document, object: &Object, used: &mut BTreeSet<ObjectId
     }
 }
 
-/// The inspection of a document that was parsed.
-struct Walk<'a> {
+/// The inspection of a parsed document.
+struct Inspection<'a> {
     document: &'a Document,
-    /// The parts of the file between streams.
+    /// The parts of the file between its streams.
     between: Vec<&'a [u8]>,
-    /// The contents of streams in the file.
+    /// The contents of the streams in the file.
     streams: Vec<&'a [u8]>,
     limits: &'a Limits,
     /// How the pages should be printed.
     finish: &'a Finish,
-    /// Number of lines to cut along on the page that is looked at.
+    /// Number of cut lines on the inspected page.
     cut_lines: usize,
     found: Findings,
 }
 
-impl<'a> Walk<'a> {
-    /// The object itself, or the one that it refers to.
+impl<'a> Inspection<'a> {
+    /// Returns the object itself, or the object that it refers to.
     fn resolve(&self, object: &'a Object) -> Option<&'a Object> {
         self.document.dereference(object).ok().map(|(_, object)| object)
     }
 
-    /// Checks that as many names are parsed as the file has: of a repeated key or object one reader
-    /// takes the first, another the last.
+    /// Checks that the parser found as many names as the file contains. Of a repeated key or object, some readers
+    /// take the first, others the last.
     fn names(&mut self) {
         let objects = self.document.objects.values().map(slashes);
         let trailer: usize =
@@ -215,20 +216,20 @@ impl<'a> Walk<'a> {
         let read = objects.sum::<usize>() + trailer;
         let slashes = |part: &&[u8]| part.iter().filter(|&&byte| byte == b'/').count();
         let written: usize = self.between.iter().map(slashes).sum();
-        self.found.unless(read == written, "the file", "a key or an object that is there twice");
+        self.found.unless(read == written, "the file", "a duplicate key or object");
     }
 
-    /// A value of a dictionary, references followed.
+    /// Returns a value of a dictionary, with references resolved.
     fn value(&self, dictionary: &'a Dictionary, key: &str) -> Option<&'a Object> {
         self.resolve(dictionary.get(key.as_bytes()).ok()?)
     }
 
-    /// A value of a dictionary that is a name.
+    /// Returns a value of a dictionary that is a name.
     fn name(&self, dictionary: &'a Dictionary, key: &str) -> Option<&'a [u8]> {
         self.value(dictionary, key)?.as_name().ok()
     }
 
-    /// Checks that a dictionary has listed keys only.
+    /// Checks that a dictionary has permitted keys only.
     fn keys(&mut self, dictionary: &Dictionary, place: &str, listed: &[&str]) {
         for (key, _) in dictionary {
             let key = String::from_utf8_lossy(key).into_owned();
@@ -237,7 +238,7 @@ impl<'a> Walk<'a> {
         }
     }
 
-    /// Checks that the catalogue opens single pages, and that printing does not scale them.
+    /// Checks that the catalogue opens single pages and that printing does not scale them.
     fn catalog(&mut self) {
         let place = "the catalogue";
         let document = self.document;
@@ -254,14 +255,14 @@ impl<'a> Walk<'a> {
         }
         let preferences = self.value(catalog, "ViewerPreferences");
         let Some(preferences) = preferences.and_then(|object| object.as_dict().ok()) else {
-            return self.found.add(place, "no viewer preferences, so that prints may be scaled");
+            return self.found.add(place, "no viewer preferences (prints may be scaled)");
         };
         self.keys(preferences, "the viewer preferences", &["PrintScaling"]);
         let unscaled = self.name(preferences, "PrintScaling") == Some(b"None");
         self.found.unless(unscaled, "the viewer preferences", "print scaling other than None");
     }
 
-    /// Checks that title, subject and creator are those of the target: viewers show them.
+    /// Checks that title, subject and creator are those of the target, because viewers show them.
     fn info(&mut self, words: &Words) {
         let document = self.document;
         let place = "the information";
@@ -281,29 +282,27 @@ impl<'a> Walk<'a> {
         self.found.unseen_unless(creator, place, "a Creator other than deltille");
     }
 
-    /// Checks that both identifiers are the same: of a file that was changed after it was written, the
-    /// second differs.
+    /// Checks that both identifiers are equal. In a file that was changed after it was written, the second differs.
     fn identifier(&mut self) {
         let id = self.document.trailer.get(b"ID").and_then(Object::as_array).ok();
         let same = id.is_some_and(|id| {
             id.len() == 2 && id[0] == id[1] && id[0].as_str().is_ok_and(|text| text.len() == 16)
         });
-        self.found.unless(same, "the trailer", "an ID that is not one digest, twice");
+        self.found.unless(same, "the trailer", "an ID that is not the same digest twice");
     }
 
-    /// Checks that every object is reached from the trailer.
+    /// Checks that the trailer refers, directly or indirectly, to every object.
     fn unused(&mut self) {
         let document = self.document;
         let mut used = BTreeSet::new();
         document.trailer.iter().for_each(|(_, value)| references(document, value, &mut used));
         let unused = document.objects.keys().find(|id| !used.contains(id));
         if let Some((number, generation)) = unused {
-            self.found.add(format!("object {number} {generation}"), "an object of no use");
+            self.found.add(format!("object {number} {generation}"), "an unused object");
         }
     }
 
-    /// Checks the page tree, which is one list, and every page; the error says that a page exceeds the
-    /// limits.
+    /// Checks the page tree, which is a flat list, and every page. Returns an error if a page exceeds the limits.
     fn pages(&mut self, cut_lines: &[usize]) -> Result<(), String> {
         let document = self.document;
         let place = "the page tree";
@@ -320,17 +319,13 @@ impl<'a> Walk<'a> {
             return Ok(());
         };
         let count = self.value(root, "Count").and_then(|count| count.as_i64().ok());
-        self.found.unless(
-            count == Some(kids.len() as i64),
-            place,
-            "a count that is not that of the pages",
-        );
+        self.found.unless(count == Some(kids.len() as i64), place, "a wrong count of pages");
         let mut seen = BTreeSet::new();
         for (index, kid) in kids.iter().enumerate() {
             let place = format!("page {}", index + 1);
             self.cut_lines = cut_lines.get(index).copied().unwrap_or_default();
             let new = kid.as_reference().is_ok_and(|kid| seen.insert(kid));
-            self.found.unless(new, &place, "a page that is listed twice, or within the list");
+            self.found.unless(new, &place, "a page that is listed twice or nested");
             match self.resolve(kid).and_then(|page| page.as_dict().ok()) {
                 Some(page) => self.page(page, id, &place)?,
                 None => self.found.add(&place, "no dictionary"),
@@ -339,15 +334,15 @@ impl<'a> Walk<'a> {
         Ok(())
     }
 
-    /// Checks a page: its boxes, that it has neither annotations nor resources, and its content.
+    /// Checks a page: its boxes, the absence of annotations and resources, and its content.
     fn page(&mut self, page: &'a Dictionary, parent: ObjectId, place: &str) -> Result<(), String> {
         if self.name(page, "Type") != Some(b"Page") {
-            self.found.add(place, "an object that is no page");
+            self.found.add(place, "an object that is not a page");
             return Ok(());
         }
         self.keys(page, place, &PAGE);
         let own = page.get(b"Parent").and_then(Object::as_reference).is_ok_and(|id| id == parent);
-        self.found.unless(own, place, "another parent than the page tree");
+        self.found.unless(own, place, "a parent other than the page tree");
         let size_pt = self.boxes(page, place);
         let annotations = page.has(b"Annots").then(|| self.value(page, "Annots")).flatten();
         let none = annotations.is_none_or(|list| list.as_array().is_ok_and(Vec::is_empty));
@@ -356,7 +351,7 @@ impl<'a> Walk<'a> {
         self.content(page, size_pt, place)
     }
 
-    /// Checks that all boxes are the page, from its origin; returns width and height in points.
+    /// Checks that all boxes equal the page and start at the origin. Returns width and height in points.
     fn boxes(&mut self, page: &'a Dictionary, place: &str) -> DVec2 {
         let ends = |key: &str| -> Option<Vec<f32>> {
             let list = self.value(page, key)?.as_array().ok()?;
@@ -373,7 +368,7 @@ impl<'a> Walk<'a> {
         }
     }
 
-    /// Checks that a page has no resources but the stated spot colours.
+    /// Checks that a page has no resources except the stated spot colours.
     fn resources(&mut self, page: &'a Dictionary, place: &str) {
         let resources = self.value(page, "Resources").and_then(|object| object.as_dict().ok());
         let (spaces, states) = (color_spaces(self.finish), graphics_states(self.finish));
@@ -404,15 +399,15 @@ impl<'a> Walk<'a> {
             return Ok(());
         };
         self.keys(&stream.dict, &format!("{place}, its content"), &STREAM);
-        // A reader that mends a wrong length takes what stands up to the end.
+        // A reader that repairs a wrong length takes everything up to the end.
         let whole = self.streams.contains(&stream.content.trim_ascii());
-        self.found.unless(whole, place, "content of another length than stated");
+        self.found.unless(whole, place, "content with a wrong stated length");
         if self.name(&stream.dict, "Filter") != Some(b"FlateDecode") {
-            self.found.add(place, "content that is not of FlateDecode");
+            self.found.add(place, "content with a filter other than FlateDecode");
             return Ok(());
         }
         let mut content = Vec::new();
-        // Some readers show as much as they can unpack, others nothing.
+        // Some readers show as much as they can decompress, others nothing.
         let most = self.limits.max_bytes;
         match unpack(&stream.content, most, |block| content.extend_from_slice(block)) {
             Some(_) => {
@@ -422,8 +417,8 @@ impl<'a> Walk<'a> {
                     .map_err(|exceeded| format!("{place}: {exceeded}"))
             }
             None => {
-                let construct = "content that is cut off, goes on behind its end, is too long, or \
-                                 whose check sum is wrong";
+                let construct = "content that is truncated, continues past its end, is too long, or \
+                                 has a wrong checksum";
                 self.found.add(place, construct);
                 Ok(())
             }

@@ -1,6 +1,6 @@
-//! The operators of a PDF page that every viewer draws alike: black paths, filled by the even-odd
-//! rule or stroked. Where spot colours are stated, the white fills the page before anything else is drawn, lines are in that
-//! of the contour, and everything overprints.
+//! The operators of a PDF page that every viewer draws the same way: black paths, filled by the even-odd rule or
+//! stroked. With spot colours, white fills the page before anything else, cut lines have the contour colour, and
+//! everything overprints.
 
 use glam::DVec2;
 use kurbo::{BezPath, Shape as _};
@@ -15,7 +15,7 @@ use deltille_layout::Finish;
 /// Millimetres per point of 1/72 inch.
 const MM_PER_PT: f64 = 25.4 / 72.0;
 
-/// Usual number of words of an operator with its operands, by which words are counted as nodes.
+/// Usual number of words of an operator with its operands, which converts words to nodes.
 const WORDS: usize = 3;
 
 /// The effect of an operator on the current path.
@@ -26,13 +26,13 @@ enum Role {
     /// Begins a contour.
     Begin,
     /// Continues a contour.
-    GoOn,
-    /// Paints the path, which is then gone.
+    Continue,
+    /// Paints and clears the path.
     Paint,
 }
 
-/// The permitted operators with the number of their operands: fill and stroke colour in CMYK, line
-/// width, move, line, curve, close, even-odd fill and stroke; graphics state, spaces of spot colours and how much of these.
+/// The permitted operators with their number of operands: fill and stroke colour in CMYK, line width, move, line,
+/// curve, close, even-odd fill and stroke; graphics state, spot colour spaces and their tints.
 const OPERATORS: [(&str, usize, Role); 14] = [
     ("k", 4, Role::State),
     ("K", 4, Role::State),
@@ -43,9 +43,9 @@ const OPERATORS: [(&str, usize, Role); 14] = [
     ("scn", 1, Role::State),
     ("SCN", 1, Role::State),
     ("m", 2, Role::Begin),
-    ("l", 2, Role::GoOn),
-    ("c", 6, Role::GoOn),
-    ("h", 0, Role::GoOn),
+    ("l", 2, Role::Continue),
+    ("c", 6, Role::Continue),
+    ("h", 0, Role::Continue),
     ("f*", 0, Role::Paint),
     ("S", 0, Role::Paint),
 ];
@@ -53,30 +53,30 @@ const OPERATORS: [(&str, usize, Role); 14] = [
 /// Black ink alone: cyan, magenta, yellow, black.
 const BLACK: [f64; 4] = [0.0, 0.0, 0.0, 1.0];
 
-/// Greatest coordinate, points: larger ones are not exact in all viewers.
+/// Largest coordinate, points: larger ones are not exact in all viewers.
 const FARTHEST_PT: f64 = 1e5;
 
-/// Distance by which a path may reach over the edge of the page, points: coordinates are rounded.
+/// Distance by which a path may extend beyond the page, points: coordinates are rounded.
 const EDGE_SLACK_PT: f64 = 0.01;
 
-/// What a page is.
+/// What the content of a page must agree with.
 pub(super) struct Content<'a> {
     /// Width and height, points.
     pub size_pt: DVec2,
-    /// How it should be printed.
+    /// How the page should be printed.
     pub finish: &'a Finish,
-    /// Number of its lines to cut along, each of which is in the colour of the contour if there is one.
+    /// Number of cut lines on the page, each in the contour colour if there is one.
     pub cut_lines: usize,
-    /// Its name in findings.
+    /// Name of the page in findings.
     pub page: &'a str,
 }
 
-/// Inspects the content of a page: there are numbers and permitted operators only, colour and width are set before they are
-/// used, all marks are on the page, and spot colours are used as they should be.
+/// Inspects the content of a page. It may have only numbers and permitted operators, colour and width must be set
+/// before use, all marks must lie on the page, and spot colours must be used as the finish requires.
 ///
 /// # Errors
 ///
-/// There are more operators than the limits allow.
+/// Returns an error if there are more operators than the limits allow.
 pub(super) fn check(
     content: &[u8],
     &Content { size_pt, finish, cut_lines, page }: &Content,
@@ -94,7 +94,7 @@ pub(super) fn check(
         spots: [false; 2],
         marks: 0,
         contours_drawn: 0,
-        said: Vec::new(),
+        set: Vec::new(),
         width_pt: 0.0,
         path: None,
         contours: BezPath::new(),
@@ -131,10 +131,10 @@ pub(super) fn check(
     }
     let ended = operands.is_empty() && painter.path.is_none() && painter.resource.is_none();
     found.unless(ended, page, "content that ends within a path");
-    let has_white = finish.white.is_none() || painter.said.contains(&WHITE);
-    found.unless(has_white, page, "no white beneath it");
+    let has_white = finish.white.is_none() || painter.set.contains(&WHITE);
+    found.unless(has_white, page, "no white layer below the marks");
     let has_contour = finish.contour.is_none() || painter.contours_drawn == cut_lines;
-    found.unless(has_contour, page, "lines to cut along that are not in the colour of the contour");
+    found.unless(has_contour, page, "cut lines that are not in the contour colour");
     Ok(())
 }
 
@@ -144,32 +144,32 @@ struct Painter<'a> {
     size_pt: DVec2,
     /// How the page should be printed.
     finish: &'a Finish,
-    /// The name before an operator.
+    /// The name given before an operator.
     resource: Option<String>,
     /// Whether areas are filled, and lines drawn, in a spot colour.
     spots: [bool; 2],
     /// Number of marks so far.
     marks: usize,
-    /// Number of these that are lines in the colour of the contour.
+    /// Number of marks that are lines in the contour colour.
     contours_drawn: usize,
-    /// Operators so far that set colour or line width, and the white once it is there.
-    said: Vec<&'static str>,
+    /// Operators so far that set colour or line width, and the white layer once it is drawn.
+    set: Vec<&'static str>,
     /// Line width, points.
     width_pt: f64,
-    /// Left, lower, right and upper end of the path that is being built, points; `None` between paths.
+    /// Left, lower, right and upper bound of the path under construction, points; `None` between paths.
     path: Option<[f64; 4]>,
-    /// The same path.
+    /// The path under construction.
     contours: BezPath,
-    /// All marks that were painted.
+    /// All painted marks.
     ink: Ink,
 }
 
 impl Painter<'_> {
-    /// Executes an operator; returns whether what it paints, if anything, is on the page.
+    /// Executes an operator. Returns whether what it paints, if anything, is on the page.
     ///
     /// # Errors
     ///
-    /// The construct, where the operator, its operands or its place are not permitted.
+    /// Returns the construct if the operator, its operands or its position is not allowed.
     fn operator(&mut self, word: &str, operands: &[f64]) -> Result<bool, String> {
         let listed = OPERATORS.iter().find(|(name, ..)| *name == word);
         let Some(&(name, count, role)) = listed.filter(|(name, ..)| self.is_of_finish(name)) else {
@@ -178,13 +178,13 @@ impl Painter<'_> {
         let fits = match role {
             Role::State => self.path.is_none(),
             Role::Begin => true,
-            Role::GoOn | Role::Paint => self.path.is_some(),
+            Role::Continue | Role::Paint => self.path.is_some(),
         };
         let path = self.path;
         match role {
-            Role::Begin | Role::GoOn => self.path = Some(reach(path, operands)),
+            Role::Begin | Role::Continue => self.path = Some(reach(path, operands)),
             Role::Paint => self.path = None,
-            Role::State => self.said.push(name),
+            Role::State => self.set.push(name),
         }
         if operands.len() != count {
             return Err(format!("operator {word} with {} operands", operands.len()));
@@ -198,7 +198,7 @@ impl Painter<'_> {
             return Err(format!("operator {word} with name `{}`", start(&resource, 20)));
         }
         if !fits {
-            return Err(format!("operator {word} in this place"));
+            return Err(format!("misplaced operator {word}"));
         }
         let has_begun = !self.contours.elements().is_empty();
         match (name, operands) {
@@ -209,8 +209,8 @@ impl Painter<'_> {
             }
             ("h", []) if has_begun => self.contours.close_path(),
             ("w", &[width]) => self.width_pt = width,
-            ("scn", _) if !self.spots[0] => return Err("operator scn in this place".to_owned()),
-            ("SCN", _) if !self.spots[1] => return Err("operator SCN in this place".to_owned()),
+            ("scn", _) if !self.spots[0] => return Err("misplaced operator scn".to_owned()),
+            ("SCN", _) if !self.spots[1] => return Err("misplaced operator SCN".to_owned()),
             ("cs", _) => self.spots[0] = true,
             ("CS", _) => self.spots[1] = true,
             ("k", _) => self.spots[0] = false,
@@ -225,7 +225,7 @@ impl Painter<'_> {
                 return self.paint(&["CS", "SCN", "w"], path, Some(self.width_pt));
             }
             ("S", _) if self.finish.contour.is_some() => {
-                return Err("a line that is not in the colour of the contour".to_owned());
+                return Err("a line that is not in the contour colour".to_owned());
             }
             ("S", _) => return self.paint(&["K", "w"], path, Some(self.width_pt)),
             _ => {}
@@ -233,7 +233,7 @@ impl Painter<'_> {
         Ok(true)
     }
 
-    /// Whether an operator has anything to do on a page that is printed so.
+    /// Whether pages with this finish use an operator.
     fn is_of_finish(&self, operator: &str) -> bool {
         match operator {
             "gs" => self.finish.spots().next().is_some(),
@@ -243,7 +243,7 @@ impl Painter<'_> {
         }
     }
 
-    /// The name that an operator must have before it.
+    /// Returns the name that must precede an operator.
     fn needed(&self, operator: &str) -> Option<&'static str> {
         match operator {
             "gs" => Some(OVERPRINT),
@@ -253,27 +253,27 @@ impl Painter<'_> {
         }
     }
 
-    /// Checks that the white is the first mark, and as large as the page.
+    /// Checks that the white layer is the first mark and covers the page.
     fn white(&mut self, path: Option<[f64; 4]>) -> Result<(), String> {
         let DVec2 { x: width, y: height } = self.size_pt;
         let page = [0.0, 0.0, width, height];
         let ends = path.unwrap_or_default();
         let is_page = ends.iter().zip(page).all(|(end, page)| (end - page).abs() < EDGE_SLACK_PT);
         let area = self.contours.area().abs();
-        // A rectangle of four corners has no other outline of its area.
+        // A rectangle of four corners has no other outline with this area.
         let is_full = self.contours.elements().len() == 5
             && (area - width * height).abs() < EDGE_SLACK_PT * (width + height);
         match self.marks == 0 && is_page && is_full {
             true => {
-                self.said.push(WHITE);
+                self.set.push(WHITE);
                 Ok(())
             }
-            false => Err("white that is not all of the page, beneath all marks".to_owned()),
+            false => Err("a white layer that does not cover the page below all marks".to_owned()),
         }
     }
 
-    /// Fills the path, or strokes it with a pen of this width, points; `needed` are the operators that
-    /// must have set the colour and width. Returns whether the mark is on the page.
+    /// Fills the path, or strokes it with a pen of this width, points. `needed` are the operators that must have set
+    /// colour and width. Returns whether the mark is on the page.
     fn paint(
         &mut self,
         needed: &[&str],
@@ -282,12 +282,12 @@ impl Painter<'_> {
     ) -> Result<bool, String> {
         let contours = std::mem::take(&mut self.contours);
         self.marks += 1;
-        if self.finish.spots().next().is_some() && !self.said.contains(&"gs") {
+        if self.finish.spots().next().is_some() && !self.set.contains(&"gs") {
             return Err("a mark that does not overprint".to_owned());
         }
         let problem = self.ink.add(&contours, pen);
-        if let Some(unsaid) = needed.iter().find(|needed| !self.said.contains(needed)) {
-            return Err(format!("a mark before any operator {unsaid}"));
+        if let Some(unset) = needed.iter().find(|needed| !self.set.contains(needed)) {
+            return Err(format!("a mark before any operator {unset}"));
         }
         if let Some(problem) = problem {
             return Err(problem.to_owned());
@@ -302,7 +302,7 @@ impl Painter<'_> {
     }
 }
 
-/// Left, lower, right and upper end of a path after further points, given as x, y, x, y, …
+/// Extends the left, lower, right and upper bound of a path by further points, given as x, y, x, y, …
 fn reach(path: Option<[f64; 4]>, points: &[f64]) -> [f64; 4] {
     let none = [f64::INFINITY, f64::INFINITY, f64::NEG_INFINITY, f64::NEG_INFINITY];
     points.as_chunks::<2>().0.iter().fold(path.unwrap_or(none), |ends, &[x, y]| {
@@ -310,12 +310,12 @@ fn reach(path: Option<[f64; 4]>, points: &[f64]) -> [f64; 4] {
     })
 }
 
-/// Whether the operands of a listed operator are ones that all viewers draw alike.
+/// Whether the operands of a permitted operator are ones that all viewers draw the same way.
 fn is_listed(operator: &str, operands: &[f64]) -> bool {
     match operator {
         "k" | "K" => operands == BLACK,
         "scn" | "SCN" => operands == [1.0],
-        // A width of zero is the thinnest line of a device, which differs from one to another.
+        // A width of zero means the thinnest line of a device, which differs between devices.
         "w" => operands.iter().all(|&width| width > 0.0),
         _ => operands.iter().all(|value| value.abs() < FARTHEST_PT),
     }

@@ -1,5 +1,5 @@
-//! The SVG elements, attributes and values that every viewer draws alike: a white page, and black
-//! paths with absolute coordinates.
+//! The SVG elements, attributes and values that every viewer draws the same way: a white page, and black paths with
+//! absolute coordinates.
 
 use glam::DVec2;
 use kurbo::BezPath;
@@ -14,11 +14,11 @@ use deltille_files::limits::{Kind, Limits};
 /// The XML namespace of SVG.
 const NAMESPACE: &str = "http://www.w3.org/2000/svg";
 
-/// The declaration before the drawing.
+/// The XML declaration before the drawing.
 const DECLARATION: &str = "<?xml version=\"1.0\" encoding=\"UTF-8\"?>";
 
-/// Permitted elements with their parents and attributes. An `id` is harmless, as nothing permitted can
-/// refer to it.
+/// Permitted elements with their parents and attributes. An `id` is harmless because nothing permitted can refer to
+/// it.
 const ELEMENTS: [(&str, &str, &[&str]); 6] = [
     ("svg", "", &["width", "height", "viewBox"]),
     ("title", "svg", &[]),
@@ -28,22 +28,22 @@ const ELEMENTS: [(&str, &str, &[&str]); 6] = [
     ("path", "g", &["d", "id", "fill", "stroke", "stroke-width"]),
 ];
 
-/// Greatest coordinate, units of the drawing: beyond it, viewers that calculate in single precision
-/// draw something else.
+/// Largest coordinate, units of the drawing: beyond it, viewers that calculate in single precision draw something
+/// else.
 const FARTHEST: f64 = 1e5;
 
-/// Distance by which a path may reach over the edge of the page, and by which the proportions of the
-/// drawing may differ from those of the page: coordinates are rounded.
+/// Distance by which a path may extend beyond the page, and by which the proportions of the drawing may differ from
+/// those of the page: coordinates are rounded.
 const EDGE_SLACK_MM: f64 = 1e-3;
 
-/// Most attributes of an element: readers compare each with all others.
+/// Maximum number of attributes of an element: readers compare each with all others.
 const MOST_ATTRIBUTES: usize = 1000;
 
-/// Inspects an SVG for constructs that are not permitted.
+/// Inspects an SVG for constructs that are not allowed.
 ///
 /// # Errors
 ///
-/// It is no readable SVG, or exceeds the limits.
+/// Returns an error if the file is not a readable SVG or exceeds the limits.
 pub(in crate::construct) fn check(
     bytes: &[u8],
     words: &Words,
@@ -73,7 +73,11 @@ pub(in crate::construct) fn check(
         Err(error) => return Err(format!("not a readable SVG ({error})")),
     };
     let view = View::of(&document.root_element());
-    found.unless(view.is_some(), "the page", "width, height and viewBox of no page in mm");
+    found.unless(
+        view.is_some(),
+        "the page",
+        "width, height and viewBox that do not describe a page in mm",
+    );
     let view = view.unwrap_or_default();
     let mut ink = Ink::new(view.size(), view.unit_mm);
     for node in document.root().descendants() {
@@ -93,14 +97,14 @@ pub(in crate::construct) fn check(
         }
         let on_page = !node.is_element() || is_on_page(&node, &view);
         let is_listed = constructs.is_empty() && on_page;
-        // Lines are counted from the first on, so only where they are asked for.
+        // Counting lines starts at the first one, so count only for findings.
         if !is_listed && !found.is_full() {
             let place = format!("line {}", document.text_pos_at(node.range().start).row);
             constructs.into_iter().for_each(|construct| found.add(&place, construct));
             found.unseen_unless(on_page, place, OFF_PAGE);
         }
     }
-    // A page of no size is told already.
+    // A page without a size has already been reported.
     let drawable = !found.0.is_empty() || ink.is_drawable();
     found.unless(drawable, "the page", "more lines and areas than any target has");
     let packed = text.contains("<![CDATA[");
@@ -128,7 +132,7 @@ fn is_writer(comment: &Node) -> bool {
     first && words.is_some_and(is_creator)
 }
 
-/// Adds the mark of a path; returns the problem if not all viewers draw it alike.
+/// Adds the mark of a path. Returns the problem if viewers may draw it differently.
 fn add(node: &Node, ink: &mut Ink) -> Option<&'static str> {
     let path = BezPath::from_svg(node.attribute("d").unwrap_or_default()).ok()?;
     let pen = node.attribute("stroke").map(|_| {
@@ -138,7 +142,7 @@ fn add(node: &Node, ink: &mut Ink) -> Option<&'static str> {
     ink.add(&path, pen)
 }
 
-/// Checks that title and description are those of the target: viewers show them, and read them aloud.
+/// Checks that title and description are those of the target: viewers show them and read them aloud.
 fn title(document: &Document, words: &Words, found: &mut Findings) {
     for (name, stated, problem) in [
         ("title", &*words.title, "a title other than the target's name"),
@@ -150,17 +154,17 @@ fn title(document: &Document, words: &Words, found: &mut Findings) {
     }
 }
 
-/// The part of the drawing that is the page.
+/// The area of the drawing that is the page.
 #[derive(Default)]
 struct View {
-    /// Left, upper, right and lower end, units of the drawing; y down.
+    /// Left, upper, right and lower bound, units of the drawing; y down.
     ends: [f64; 4],
     /// Millimetres per unit of the drawing.
     unit_mm: f64,
 }
 
 impl View {
-    /// The view of an SVG; `None` where its size is not in mm, or the `viewBox` has other proportions
+    /// Returns the view of an SVG. Returns `None` if its size is not in mm, or if the `viewBox` has other proportions
     /// than the page, so that viewers would have to choose a scale.
     fn of(svg: &Node) -> Option<Self> {
         let [width, height] = ["width", "height"].map(|key| length(svg.attribute(key)?));
@@ -171,14 +175,14 @@ impl View {
         (across > 0.0 && down > 0.0 && same).then_some(Self { ends, unit_mm: width? / across })
     }
 
-    /// Width and height, units of the drawing.
+    /// Returns width and height, units of the drawing.
     fn size(&self) -> DVec2 {
         let [x0, y0, x1, y1] = self.ends;
         DVec2::new(x1 - x0, y1 - y0)
     }
 
-    /// Whether a mark with these ends, left, upper, right and lower, is on the page.
-    fn holds(&self, [left, upper, right, lower]: [f64; 4]) -> bool {
+    /// Whether a mark with these left, upper, right and lower bounds is on the page.
+    fn contains(&self, [left, upper, right, lower]: [f64; 4]) -> bool {
         let [x0, y0, x1, y1] = self.ends;
         left >= x0 - EDGE_SLACK_MM
             && upper >= y0 - EDGE_SLACK_MM
@@ -187,13 +191,13 @@ impl View {
     }
 }
 
-/// A positive length in millimetres, such as `210mm`.
+/// Parses a positive length in millimetres, such as `210mm`.
 fn length(value: &str) -> Option<f64> {
     decimal(value.strip_suffix("mm")?).filter(|&length| length > 0.0)
 }
 
-/// Checks that a white rectangle lies below all marks: without it, black marks are not seen in a viewer
-/// with a dark background.
+/// Checks that a white rectangle lies below all marks: without it, black marks are invisible in a viewer with a dark
+/// background.
 fn paper(document: &Document, found: &mut Findings) {
     let children = document.root_element().children().filter(Node::is_element);
     let drawn: Vec<&str> = children.map(|node| node.tag_name().name()).collect();
@@ -202,7 +206,7 @@ fn paper(document: &Document, found: &mut Findings) {
     found.unless(!drawn.any(|name| name == "rect"), "the page", "paper above the marks");
 }
 
-/// The constructs of an element that are not permitted.
+/// Returns the constructs of an element that are not allowed.
 fn element(node: &Node) -> Vec<String> {
     let name = node.tag_name().name();
     let parent = node.parent_element().map_or("", |parent| parent.tag_name().name());
@@ -217,7 +221,7 @@ fn element(node: &Node) -> Vec<String> {
         constructs.push(format!("element <{name}> within <{parent}>"));
     }
     let has = |key: &str| node.has_attribute(key);
-    // A stroked path states fill, stroke and width; a filled one takes them from its group.
+    // A stroked path states fill, stroke and width; a filled one inherits them from its group.
     let needed = |key: &&&str| match (name, **key) {
         ("path", "stroke" | "stroke-width") => has("stroke") || has("stroke-width"),
         ("path", "fill") => has("stroke") || has("stroke-width"),
@@ -233,27 +237,27 @@ fn element(node: &Node) -> Vec<String> {
         let (key, value) = (attribute.name(), attribute.value());
         if attribute.namespace().is_some() || !attributes.contains(&key) {
             constructs.push(format!("attribute {key} of <{name}>"));
-        } else if !holds(name, key, value) {
+        } else if !is_permitted_value(name, key, value) {
             constructs.push(format!("{key}=\"{}\" of <{name}>", start(value, 40)));
         } else if node.document().input_text()[attribute.range_value()] != *value {
-            constructs.push(format!("{key} of <{name}> that is spelled otherwise"));
+            constructs.push(format!("{key} of <{name}> that is not as deltille writes it"));
         }
     }
     constructs
 }
 
-/// Whether a path, with the width of its pen, is on the page. Other elements, and paths whose data are
-/// not permitted, pass.
+/// Whether a path, including the width of its pen, is on the page. Other elements pass, and so do paths with data
+/// that are not allowed.
 fn is_on_page(node: &Node, view: &View) -> bool {
     let width = node.attribute("stroke-width").and_then(decimal).unwrap_or_default();
     let ends = node.attribute("d").and_then(path_ends);
     ends.is_none_or(|[left, upper, right, lower]| {
         let half = width / 2.0;
-        view.holds([left - half, upper - half, right + half, lower + half])
+        view.contains([left - half, upper - half, right + half, lower + half])
     })
 }
 
-/// The construct of a text that is in neither a title nor a description.
+/// Returns the construct of a text outside title and description.
 fn loose_text(node: &Node) -> Vec<String> {
     let parent = node.parent_element().map_or("", |parent| parent.tag_name().name());
     let blank = node.text().unwrap_or_default().trim().is_empty();
@@ -263,8 +267,8 @@ fn loose_text(node: &Node) -> Vec<String> {
     vec!["text between elements".to_owned()]
 }
 
-/// Whether the value of a permitted attribute is one that all viewers understand alike.
-fn holds(element: &str, key: &str, value: &str) -> bool {
+/// Whether all viewers interpret the value of a permitted attribute the same way.
+fn is_permitted_value(element: &str, key: &str, value: &str) -> bool {
     match (element, key) {
         ("svg", "width" | "height") => length(value).is_some(),
         ("rect", "width" | "height") => value == "100%",
@@ -284,8 +288,8 @@ fn holds(element: &str, key: &str, value: &str) -> bool {
     }
 }
 
-/// Left, upper, right and lower end of the control points of path data, units of the drawing; `None`
-/// unless they consist of absolute moves, lines, curves and closings, with plain decimals.
+/// Returns the left, upper, right and lower bound of the control points of path data, units of the drawing. Returns
+/// `None` unless the data consist of absolute moves, lines, curves and closings, with plain decimals.
 fn path_ends(data: &str) -> Option<[f64; 4]> {
     let mut ends = [f64::INFINITY, f64::INFINITY, f64::NEG_INFINITY, f64::NEG_INFINITY];
     let mut rest = data;
