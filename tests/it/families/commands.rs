@@ -1,4 +1,4 @@
-//! The `deltag` program: families made, checked and refused.
+//! The `deltag` program: generating and checking families, and its errors.
 
 use std::path::Path;
 
@@ -11,7 +11,7 @@ fn deltag() -> Command {
 }
 
 #[test]
-fn a_search_ends_after_the_round_in_which_its_time_is_over() {
+fn a_search_ends_after_the_round_in_which_its_time_runs_out() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("f.json");
     deltag()
@@ -23,10 +23,10 @@ fn a_search_ends_after_the_round_in_which_its_time_is_over() {
     assert_eq!(family["construction"]["rounds"], 1, "{}", family["construction"]);
 }
 
-/// What ships is where a search starts, and is said, with the true distance, before the search begins: codes that are
-/// farther apart than asked for, and fewer of them under stricter rules.
+/// A search starts from a shipped family and says so, with the true distance, before it begins: from codes that are
+/// farther apart than requested, and from fewer codes under stricter rules.
 #[test]
-fn a_search_starts_from_what_ships() {
+fn a_search_starts_from_a_shipped_family() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
     let mut page = Page::default();
@@ -39,7 +39,7 @@ fn a_search_starts_from_what_ships() {
     assert!(std::fs::read(at.join("d25h7.json")).unwrap() == std::fs::read(shipped).unwrap());
 }
 
-/// Work is counted alike on every machine, whatever its number of threads.
+/// Work is counted the same way on every machine, with any number of threads.
 #[test]
 fn a_search_by_work_depends_on_its_seed_alone() {
     let folder = tempfile::tempdir().unwrap();
@@ -80,7 +80,7 @@ fn the_published_lexicode_is_written_as_shipped() {
 
 /// Each command that reads families says what is wrong with a file.
 #[test]
-fn what_is_wrong_with_a_family_is_told() {
+fn commands_say_what_is_wrong_with_a_family() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
     let shipped = Path::new(crate::common::REPOSITORY).join("families/delTag16h5.json");
@@ -103,12 +103,12 @@ fn what_is_wrong_with_a_family_is_told() {
         ("family/1", "family/9", [2, 2]),
         ("\"bits\": 16", "\"bits\": 17", [2, 2]),
         ("\"rules\"", "\"rulez\"", [2, 2]),
-        // Altered codes do not hold, and no command takes them.
+        // Altered codes violate the claims, and every command rejects them.
         ("\"name\": \"delTag16h5\"", "\"name\": \"d9h3\"", [1, 2]),
         ("0.001556396484375", "0.000556396484375", [1, 2]),
         ("0x24d6", "0x24d7", [1, 2]),
         ("0x2a9b", "0x24d6", [1, 2]),
-        // Fewer white cells than the rule now asks for; the fingerprint covers only the codes.
+        // Fewer white cells than the rule now requires; the fingerprint covers only the codes.
         ("\"black_distance\": 5", "\"black_distance\": 9", [1, 0]),
         ("\"step\": 982451653", "\"step\": 982451655", [1, 0]),
     ] {
@@ -123,7 +123,7 @@ fn what_is_wrong_with_a_family_is_told() {
 }
 
 #[test]
-fn bad_arguments_are_one_line_and_exit_code_2() {
+fn bad_arguments_give_one_line_and_exit_code_2() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
     std::fs::write(at.join("file"), "").unwrap();
@@ -227,7 +227,7 @@ fn bad_arguments_are_one_line_and_exit_code_2() {
     }
 }
 
-/// A file with more codes, or of other tags, is not lost; neither is what was found.
+/// A file with more codes, or with other tags, is kept, and so are the new codes.
 #[test]
 fn a_larger_family_is_not_replaced() {
     let folder = tempfile::tempdir().unwrap();
@@ -246,10 +246,10 @@ fn a_larger_family_is_not_replaced() {
     page.is("deltag-gen-family-replaces");
 }
 
-/// What a family covers: the tags of one board and of one icosahedron, as `deltille` makes them; and the smallest that
-/// suffices.
+/// The coverage of a family: the tags of one board and of one icosahedron, as `deltille` generates them; and the
+/// smallest family that suffices.
 #[test]
-fn families_are_told_by_what_they_cover() {
+fn families_are_described_by_what_they_cover() {
     let folder = tempfile::tempdir().unwrap();
     let mut page = Page::default();
     for args in [
@@ -266,8 +266,8 @@ fn families_are_told_by_what_they_cover() {
     page.is("deltag-info");
 }
 
-/// The rule that is chosen is the one with the most codes of those whose natural false positives are few enough, and the
-/// family that is made with it keeps them so.
+/// The chosen rule has the most codes among those with few enough natural false positives, and the family generated
+/// with it stays below that limit.
 #[test]
 fn a_rule_is_chosen_by_the_false_positives_it_leaves() {
     let folder = tempfile::tempdir().unwrap();
@@ -287,9 +287,9 @@ fn a_rule_is_chosen_by_the_false_positives_it_leaves() {
     }
 }
 
-/// `deltag info d16h5 | head -1` is no error.
+/// `deltag info d16h5 | head -1` is not an error.
 #[test]
-fn a_reader_that_goes_away_ends_the_work_quietly() {
+fn a_reader_that_closes_the_pipe_ends_the_program_quietly() {
     let mut child = std::process::Command::new(env!("CARGO_BIN_EXE_deltag"))
         .args(["verify-family", "d36h11", "d16h5"])
         .stdout(std::process::Stdio::piped())
@@ -310,7 +310,7 @@ fn exports_list_every_code() {
     }
 }
 
-/// A folder with exports of 64-bit codes, which fill a machine word, under a name that is no identifier.
+/// Creates a folder with exports of 64-bit codes, which fill a machine word, under a name that is not an identifier.
 fn exports() -> tempfile::TempDir {
     let folder = tempfile::tempdir().unwrap();
     let shipped = Path::new(crate::common::REPOSITORY).join("families/d64h12.json");
@@ -398,7 +398,7 @@ fn tables_of_other_programs_become_families() {
     std::fs::write(at.join("mine.py"), format!("BITS = 16\ncodes = [\n{}]\n", list(""))).unwrap();
     std::fs::write(at.join("words.txt"), "231b\n2ea5\n346a\n").unwrap();
     std::fs::write(at.join("prose.txt"), "no table\n").unwrap();
-    // White and black alone look alike in all turns.
+    // White and black alone look the same in all rotations.
     std::fs::write(at.join("blank.txt"), "231b\n0000\n").unwrap();
     let mut page = Page::default();
     for args in [
@@ -432,9 +432,9 @@ fn tables_of_other_programs_become_families() {
     page.is("deltag-import");
 }
 
-/// Whoever reads tags by a family believes in its distance.
+/// Detection relies on the distance that a family claims.
 #[test]
-fn a_family_that_is_not_what_it_claims_is_not_detected_with() {
+fn a_family_with_false_claims_is_rejected_for_detection() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
     let known = Family::shipped("delTag16h5").unwrap();

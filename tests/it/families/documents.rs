@@ -1,4 +1,4 @@
-//! Figures in the guides are those of the family files.
+//! The numbers in the guides are those of the family files.
 
 use std::collections::HashSet;
 use std::path::Path;
@@ -14,7 +14,7 @@ fn found(name: &str) -> Family {
     Family::from_json(&read(&format!("families/found/{name}.json"))).unwrap()
 }
 
-/// A number as the guides write it: 1208, and 20,140.
+/// Formats a number as in the guides: 1208, and 20,140.
 fn written(number: usize) -> String {
     match number {
         10_000.. => format!("{},{:03}", number / 1000, number % 1000),
@@ -22,7 +22,7 @@ fn written(number: usize) -> String {
     }
 }
 
-/// The cells of the row of a table that begins with a word.
+/// Returns the cells of the table row that begins with a word.
 fn row<'a>(text: &'a str, first: &str) -> Vec<&'a str> {
     let lines = text.lines().filter(|line| line.starts_with('|'));
     let mut rows = lines.map(|line| line.trim_matches('|').split('|').map(str::trim).collect());
@@ -47,7 +47,7 @@ fn the_guide_has_the_sizes_of_the_shipped_families() {
     }
 }
 
-/// A rate as the guide writes it: 4.5·10⁻⁴, or 1.3 %.
+/// Parses a rate as in the guides: 4.5·10⁻⁴, or 1.3 %.
 fn stated(cell: &str) -> f64 {
     if let Some(percent) = cell.strip_suffix(" %") {
         return percent.parse::<f64>().unwrap() / 100.0;
@@ -59,7 +59,7 @@ fn stated(cell: &str) -> f64 {
 }
 
 #[test]
-fn the_guide_has_what_was_found_and_does_not_ship() {
+fn the_guide_lists_families_that_do_not_ship() {
     let guide = read("docs/families.md");
     for name in ["d25h7", "d36h10"] {
         let family = found(name);
@@ -72,9 +72,9 @@ fn the_guide_has_what_was_found_and_does_not_ship() {
     }
 }
 
-/// Ids are places in the list: the shipped family stays until a larger one begins with it.
+/// Ids are positions in the list: the shipped family stays until a larger one begins with it.
 #[test]
-fn the_larger_d25h7_is_no_extension_of_the_shipped_one() {
+fn the_larger_d25h7_does_not_extend_the_shipped_one() {
     let words = TagWords::new(Dimension::from_bits(25).unwrap());
     let least = |&code: &u64| words.canonical(code);
     let (shipped, larger) = (Family::shipped("d25h7").unwrap(), found("d25h7"));

@@ -1,4 +1,4 @@
-//! Every shipped family: what it claims holds, and it decodes what was misread.
+//! All shipped families: their claims are true, and they decode misread words.
 
 use deltille::clock;
 use deltille::family::algebra::AlgebraicConstruction;
@@ -63,7 +63,7 @@ fn published_families_have_the_published_codes() {
     }
 }
 
-/// What the searches reached must not be lost again.
+/// Families must never become smaller than the searches made them.
 #[test]
 fn own_families_are_as_large_as_documented() {
     for (name, size) in [
@@ -84,9 +84,9 @@ fn own_families_are_as_large_as_documented() {
     }
 }
 
-/// d36h9 has grown: boards of its first codes keep their ids, and are read by it.
+/// d36h9 has grown: boards with its first codes keep their ids and are still read.
 #[test]
-fn d36h9_begins_with_what_it_was() {
+fn d36h9_begins_with_its_earlier_codes() {
     let family = Family::shipped("d36h9").unwrap();
     assert_eq!(family.codes_under("5eb19ef119f5821f"), Some(12_964));
     let words = TagWords::new(family.dimension());
@@ -96,7 +96,7 @@ fn d36h9_begins_with_what_it_was() {
 
 /// Minutes of work: `cargo test --release -- --ignored`.
 #[test]
-#[ignore = "looks for the codes among all 2^36 words, minutes of work"]
+#[ignore = "searches for the codes among all 2^36 words, minutes of work"]
 fn lexicodes_of_36_bits_are_the_published_ones() {
     for name in ["delTag36h11", "delTag36h9"] {
         let published = Family::shipped(name).unwrap();
@@ -105,7 +105,7 @@ fn lexicodes_of_36_bits_are_the_published_ones() {
     }
 }
 
-/// Beyond 100,000 codes the distance is proved by structure, and a wrong code is still found.
+/// Above 100,000 codes the distance is proved by the structure of the code, and a wrong code is still found.
 #[test]
 fn very_large_families_are_proved_by_their_structure() {
     let shipped = Family::shipped("d49h12").unwrap();
@@ -135,7 +135,8 @@ fn very_large_families_are_proved_by_their_structure() {
     );
 }
 
-/// Of a code with more words than anybody lists, too: the dual code is weighed, and the codes are those that its numbers give.
+/// Also for a code with more words than can be listed: the weights of the dual code are computed, and the codes are
+/// those given by its parameters.
 #[test]
 fn families_of_64_bits_are_proved_by_the_dual_code() {
     let shipped = Family::shipped("d64h12").unwrap();
@@ -145,7 +146,7 @@ fn families_of_64_bits_are_proved_by_the_dual_code() {
     let dimension = shipped.dimension();
     let words = TagWords::new(dimension);
     let screen = Screen::new(words.clone(), shipped.distance(), shipped.rules());
-    // The listed codes are the first of those that the rules admit.
+    // The listed codes are the first ones that the rules admit.
     let (_, count) = construction.by_rank(dimension, 0).unwrap();
     assert_eq!(count, 22_906_490_880);
     let stride = construction.stride.unwrap();
@@ -166,7 +167,7 @@ fn families_of_64_bits_are_proved_by_the_dual_code() {
     let certificate = certify(&family(codes.clone(), &large));
     assert_eq!(certificate.failures, [""; 0]);
     assert!(!certificate.all_compared && certificate.min_distance >= 12);
-    // One cell more in the basis is a code with light words.
+    // One more cell in the basis gives a code with light words.
     let mut basis = large.basis.clone();
     basis[0] = "0x8000000000000001".to_owned();
     let wrong = AlgebraicConstruction { basis, ..large.clone() };
@@ -176,14 +177,14 @@ fn families_of_64_bits_are_proved_by_the_dual_code() {
     let failures = certify(&family(wrong, &large)).failures;
     assert!(failures.iter().any(|f| f.starts_with("distance: code 77777")), "{failures:?}");
 
-    // What a stride cannot be.
+    // Invalid strides.
     for (stride, limit) in [(2, Some(9)), (0, Some(9)), (stride, None), (stride, Some(1 << 40))] {
         let wrong = AlgebraicConstruction { stride: Some(stride), limit, ..construction.clone() };
         assert!(wrong.codes(&screen).is_err(), "{stride}, {limit:?}");
     }
 }
 
-/// Searches of 64 bits, from what ships and from nothing, with free and with hidden cells.
+/// Searches of 64 bits, from a shipped family and from nothing, with free and with hidden cells.
 #[test]
 fn best_families_of_64_bits_hold() {
     let dimension = Dimension::from_bits(64).unwrap();
@@ -213,7 +214,7 @@ fn best_families_of_64_bits_hold() {
 }
 
 #[test]
-fn best_families_hold_whatever_the_rules() {
+fn best_families_hold_under_all_rules() {
     for (bits, distance, rules) in [
         (9, 3, Rules { black_distance: 3, ..Rules::NONE }),
         (16, 6, Rules { min_complexity: 0.6, black_distance: 6, white_distance: 6, ..Rules::NONE }),
@@ -249,7 +250,7 @@ fn the_first_candidates_of_the_36_bit_lexicodes_give_the_published_prefix() {
     }
 }
 
-/// The number of threads may change the time a search takes, and nothing else.
+/// The number of threads may change only the time that a search takes.
 #[test]
 fn lexicodes_do_not_depend_on_threads() {
     let published = Family::shipped("delTag36h11").unwrap();
@@ -270,7 +271,7 @@ proptest! {
         pick: prop::sample::Index, id: prop::sample::Index, turns in 0..3u8,
         flips in prop::collection::btree_set(0..64u32, 0..6),
     ) {
-        // Decoders are built once; all shipped families take their turn.
+        // Decoders are built once; all shipped families are used in turn.
         static DECODERS: std::sync::OnceLock<Vec<(Family, Decoder)>> = std::sync::OnceLock::new();
         let decoders = DECODERS.get_or_init(|| {
             shipped().into_iter().map(|f| { let d = Decoder::new(&f); (f, d) }).collect()
@@ -291,7 +292,7 @@ proptest! {
         if errors > 0 {
             prop_assert_eq!(decoder.decode(read, errors - 1), None);
         }
-        // The slower search beyond ⌊(h−1)/2⌋ sees the same.
+        // The slower search beyond ⌊(h−1)/2⌋ gives the same result.
         let beyond = decoder.decode(read, family.correctable() + 1).unwrap();
         prop_assert_eq!((beyond.id, beyond.turns, beyond.errors), (decoded.id, turns, errors));
     }
@@ -322,7 +323,7 @@ proptest! {
     }
 
     #[test]
-    fn a_word_read_at_random_decodes_to_its_nearest_code_or_not_at_all(word: u64) {
+    fn a_random_word_decodes_to_its_nearest_code_or_not_at_all(word: u64) {
         let family = Family::shipped("delTag25h7").unwrap();
         let word = word & family.dimension().mask();
         let words = TagWords::new(family.dimension());
