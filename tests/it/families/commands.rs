@@ -97,7 +97,7 @@ fn commands_say_what_is_wrong_with_a_family() {
         }
     };
     check("Half of it", good[..good.len() / 2].to_owned(), [2, 2]);
-    check("No JSON", "34 codes".to_owned(), [2, 2]);
+    check("Not JSON", "34 codes".to_owned(), [2, 2]);
     for (from, to, codes) in [
         ("\"distance\": 5", "\"distance\": \"5\"", [2, 2]),
         ("family/1", "family/9", [2, 2]),
@@ -117,7 +117,7 @@ fn commands_say_what_is_wrong_with_a_family() {
     page.title("One bad file does not hide the others");
     let output = page.run(at, "deltag verify-family no-such.json f.json d16h5");
     assert_eq!(output.status.code(), Some(2));
-    page.title("What is not repeated is named");
+    page.title("Checks that are not repeated are named");
     assert!(page.run(at, "deltag verify-family delTag36h11").status.success());
     page.is("deltag-verify-family");
 }
@@ -415,7 +415,7 @@ fn tables_of_other_programs_become_families() {
     assert!(page.run(at, board).status.success());
     assert!(page.run(at, "deltille detect own.png --target own.json -o found").status.success());
 
-    page.title("What is no table");
+    page.title("Not a table");
     for args in [
         "prose.txt",
         "mine.h --shape square",

@@ -27,7 +27,7 @@ fn boards_are_made_for_glass_print_shops_and_lasers() {
     }
     page.run(at, "deltille verify pane.json");
     page.run(at, "deltille verify squares.json squares-laser.svg");
-    page.title("What is refused");
+    page.title("Rejected");
     let board = "deltille board --rows 5 --cols 6 --edge 20mm --name no";
     for arguments in [
         "--laser dxf --kerf 0.6mm",

@@ -85,7 +85,7 @@ fn verify_reports_match_the_snapshot() {
     edit(&at.join("b.dsc"), "\n0,", "\n7,");
     verify(&mut page, at, "b.json", 1);
 
-    page.title("What cannot be verified");
+    page.title("Files that cannot be verified");
     let folder = board();
     let at = folder.path();
     let pdf = fs::read(at.join("b.pdf")).unwrap();

@@ -60,7 +60,7 @@ pub enum TileFinding {
         col: i32,
         /// The id that is read.
         reads: u32,
-        /// Counter-clockwise rotation, in thirds of a turn.
+        /// Counter-clockwise rotation, in steps of 120°.
         turns: u8,
     },
     /// A tag has too many wrong cells for correction.

@@ -58,7 +58,7 @@ fn compare(verifier: &Verifier, path: &Path, model: Model, format: Format) -> Ve
         findings.push(BoardFinding::Scale { panel: verifier.target().panels[0].id, scale }.into());
     }
     let stated = match &verifier.target().spec {
-        // If all triangles lie on compared faces, there is nothing else to check.
+        // The faces have this many triangles, and all of them are compared: there must be no others.
         TargetSpec::Solid(spec) => Some(spec.polyhedron().triangles_mm().len()),
         spec if spec.is_on_plate() => {
             findings.extend(beside_boards(&model, sides(verifier.target())));

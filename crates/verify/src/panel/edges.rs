@@ -110,7 +110,7 @@ impl PlacedPanel<'_> {
     /// `None` without an edge.
     fn displaced(&self, low: [usize; 2], is_black: &impl Fn(DVec2) -> bool) -> Option<f64> {
         const SIDE: usize = SQUARE + 2 * NEAR;
-        // Corner of a pixel relative to the corner of the nearest pixel that counts.
+        // Whether the corner of a pixel is black; pixels are counted from the first one in the margin of the square.
         let corner = |x: usize, y: usize| {
             is_black(DVec2::new((low[0] + x) as f64, (low[1] + y) as f64) - NEAR as f64 - 0.5)
         };

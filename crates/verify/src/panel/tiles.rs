@@ -103,7 +103,7 @@ impl<'a> PlacedPanel<'a> {
             GridKind::Deltille => u >= 0.0 && v >= 0.0 && u + v <= 1.0,
             GridKind::Checker => u >= 0.0 && v >= 0.0 && u <= 1.0 && v <= 1.0,
         };
-        // Fractions of the tile's heights that a circle covers.
+        // Extent of a circle along the tile's heights, as fractions of them.
         let reach = further.iter().fold(DVec2::ZERO, |most, off| most.max(off.abs()));
         let slanting = further.iter().map(|off| off.element_sum().abs()).fold(0.0, f64::max);
         let clear_of_edges = |p: DVec2| {

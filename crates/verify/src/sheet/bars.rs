@@ -151,7 +151,7 @@ mod tests {
                         });
                         let found = measure(&page, ends);
                         let off = found.map(|mm| (mm - 60.0).abs());
-                        // Beyond the stated end the search range is limited, so only longer bars are within it.
+                        // Ends far beyond the stated ones are out of the search range.
                         if length == 50.0 {
                             assert_eq!(found, None);
                         } else {

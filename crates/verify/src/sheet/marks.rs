@@ -21,8 +21,8 @@ use deltille_core::polygon;
 use deltille_core::raster::{Coverage, Gray};
 use deltille_layout::{Logo, SheetLayout};
 
-/// Largest accepted difference of ink between a mark and its outline, each the mean of 3 × 3 pixels. An edge
-/// displaced by 0.02 mm at 300 dpi changes a mean by 0.08, a missing stroke by more than 0.5.
+/// Largest accepted difference between the ink of a printed mark and that of its expected outline, each the mean of
+/// 3 × 3 pixels. An edge displaced by 0.02 mm at 300 dpi changes a mean by 0.08, a missing stroke by more than 0.5.
 const MAX_MARK_ERROR: f64 = 0.3;
 
 /// Margin around the window of a page that belongs to the window, px: its content is cut off at the rim, through
