@@ -1,4 +1,4 @@
-//! A print with its finish: lines to cut along are added, and what does not go together is refused.
+//! Applies a finish to a print: adds cutting lines and rejects settings that conflict.
 
 use glam::DVec2;
 
@@ -7,16 +7,17 @@ use deltille_core::polygon::rectangle;
 use deltille_core::setting::Setting::{BoardTwoSidedMm, PaperGuidePage, PaperPoster};
 use deltille_core::targets::TargetError;
 
-/// Width of the line to cut along, mm: the quarter of a point that print shops ask for.
+/// Width of a cutting line, mm: the quarter point that print shops ask for.
 const CONTOUR_MM: f64 = 0.1;
 
 impl Printing {
-    /// The same target printed otherwise. A contour is a line to cut along in the middle of what the paper's margin leaves
-    /// blank; where boards are to be cut apart, it is the lines for that, of a board with two sides the outline of its plate. `margin_mm` is that margin.
+    /// Returns the same target with another finish. `margin_mm` is the margin of the paper. A contour becomes a cutting
+    /// line in the middle of that margin. Packed boards keep the lines that separate them. A two-sided board gets the
+    /// outline of its plate instead.
     ///
     /// # Errors
-    /// When a name is none of a spot colour, a board is to be joined of several pages, there is a guide, or two sides are to be
-    /// mirrored.
+    /// Returns an error if a spot colour name is invalid, if the finish is not plain and a board spans several pages or
+    /// the print has a guide page, or if a two-sided board is to be mirrored.
     ///
     /// ```
     /// use deltille_layout::{Finish, Printing};
@@ -30,15 +31,15 @@ impl Printing {
     pub fn finished(mut self, finish: Finish, margin_mm: f64) -> Result<Self, TargetError> {
         finish.check().map_err(|(setting, problem)| TargetError::invalid(setting, problem))?;
         if !finish.is_plain() && self.sheets.iter().any(|sheet| !sheet.pages.is_empty()) {
-            let problem = "pages to be joined are neither mirrored nor printed in spot colours: take paper as large as the board";
+            let problem = "a board on several pages cannot be mirrored or printed in spot colours: use paper as large as the board";
             return Err(TargetError::invalid(PaperPoster, problem));
         }
         if !finish.is_plain() && self.sheets.iter().any(|sheet| sheet.placements.is_empty()) {
-            let problem = "the guide is for paper, to be read as it is: make it with a plain print";
+            let problem = "the guide page cannot be mirrored or printed in spot colours: make it with a plain print";
             return Err(TargetError::invalid(PaperGuidePage, problem));
         }
         if finish.mirrored && self.target.spec.two_sided_mm().is_some() {
-            let problem = "each side is seen from its own front: leave the mirror image out";
+            let problem = "a two-sided board cannot be mirrored, because each side is seen from its own front";
             return Err(TargetError::invalid(BoardTwoSidedMm, problem));
         }
         if finish.contour.is_some() {
@@ -51,7 +52,7 @@ impl Printing {
                 });
                 match side {
                     Some((field_mm, placed)) => {
-                        // Instead of the marks at the plate's corners.
+                        // Replaces the marks at the corners of the plate.
                         sheet.lines.clear();
                         let corners = rectangle(field_mm);
                         add_outline(sheet, corners.map(|corner| placed.page_from_panel(corner)));
@@ -64,7 +65,7 @@ impl Printing {
     }
 }
 
-/// Adds lines to cut along in the middle of the margin, unless the sheet has such.
+/// Adds cutting lines in the middle of the margin, unless the sheet already has cutting lines.
 fn add_contour(sheet: &mut SheetLayout, margin_mm: f64) {
     if sheet.lines.iter().any(|line| line.kind == LineKind::Cut) {
         return;
@@ -74,7 +75,7 @@ fn add_contour(sheet: &mut SheetLayout, margin_mm: f64) {
     add_outline(sheet, rectangle([inset, inset, right, upper]));
 }
 
-/// Adds the sides of a rectangle as lines to cut along.
+/// Adds the sides of a rectangle as cutting lines.
 fn add_outline(sheet: &mut SheetLayout, corners: [DVec2; 4]) {
     let sides = corners.into_iter().zip(corners.into_iter().cycle().skip(1));
     sheet.lines.extend(sides.map(|(from_mm, to_mm)| SheetLine {
@@ -91,15 +92,19 @@ mod tests {
     use deltille_core::targets::BoardSpec;
 
     #[test]
-    fn names_of_inks_are_told_from_other_words() {
+    fn invalid_ink_names_are_refused() {
         let refused = |white: &str, contour: &str| {
             let [white, contour] = [white, contour].map(|name| Some(name.to_owned()));
             let board = Printing::new("board", BoardSpec::deltille(4, 5, 20.0)).unwrap();
             board.finished(Finish { mirrored: false, white, contour }, 5.0).unwrap_err().to_string()
         };
-        assert!(refused("black", "CutContour").starts_with("`Finish::white`: `black` stands for"));
-        assert!(refused("", "CutContour").starts_with("`Finish::white`: `` is no name"));
-        assert!(refused("White", "a/b").starts_with("`Finish::contour`: `a/b` is no name"));
-        assert!(refused("White", "White").starts_with("`Finish::contour`: it is the name of"));
+        assert!(
+            refused("black", "CutContour").starts_with("`Finish::white`: `black` is reserved for")
+        );
+        assert!(refused("", "CutContour").starts_with("`Finish::white`: `` is not a valid"));
+        assert!(refused("White", "a/b").starts_with("`Finish::contour`: `a/b` is not a valid"));
+        assert!(
+            refused("White", "White").starts_with("`Finish::contour`: this name is already used")
+        );
     }
 }

@@ -1,4 +1,4 @@
-//! The target file (`docs/formats.md`, “Target”) with its sheets: reading with every field checked, and writing.
+//! Reading and writing of the target file with its sheets (`docs/formats.md`, “Target”). Reading checks every field.
 
 use std::collections::BTreeSet;
 
@@ -11,14 +11,14 @@ use deltille_core::targets::json;
 use deltille_core::targets::json::Printed;
 use deltille_core::targets::{Problem, problem};
 
-/// Longest side of a sheet, mm: more than any paper, and than the net of any solid that is made.
+/// Longest side of a sheet, mm: larger than any paper and than the net of any supported solid.
 const LONGEST_SHEET_MM: f64 = 20_000.0;
 
 impl Printing {
-    /// Reads the text of a target file.
+    /// Parses the text of a target file.
     ///
     /// # Errors
-    /// Where it is no target file, of another version, or a field is wrong.
+    /// Returns an error if the text is not a target file, has another version, or contains an invalid field.
     pub fn from_json(text: &str) -> Result<Self, TargetFileError> {
         let (target, Printed { sheets, finish, logo }) = json::read(text)?;
         let finish = finish.unwrap_or_default();
@@ -27,7 +27,7 @@ impl Printing {
         Ok(printing)
     }
 
-    /// The text of the target file, a corner a line.
+    /// Returns the text of the target file, with one corner per line.
     ///
     /// ```
     /// use deltille_layout::Printing;
@@ -47,7 +47,7 @@ impl Printing {
     }
 }
 
-/// Checks what the types do not say; returns the field at fault and what is wrong with it.
+/// Checks the constraints that the types do not express. Returns the invalid field and the reason.
 fn check(printing: &Printing) -> Result<(), Problem> {
     let panels: BTreeSet<u32> = printing.target.panels.iter().map(|panel| panel.id).collect();
     let named = |setting: Setting| {
@@ -62,42 +62,45 @@ fn check(printing: &Printing) -> Result<(), Problem> {
             let field = format!("sheets[{s}].pages[{p}]");
             check_sheet(&page.marks, printing, &format!("{field}.marks"))?;
             if !page.marks.placements.is_empty() || !page.marks.pages.is_empty() {
-                let what = "a page has no panels and no pages of its own, its sheet has them";
+                let what =
+                    "a page must not have panels or pages of its own: they belong to its sheet";
                 return problem(format!("{field}.marks"), what);
             }
             let [left, lower, right, upper] = page.window_mm;
             let [width, height] = [page.marks.width_mm, page.marks.height_mm];
             let on_page = 0.0 <= left && left < right && right <= width;
             if !(on_page && 0.0 <= lower && lower < upper && upper <= height) {
-                return problem(format!("{field}.window_mm"), "it does not lie on the page");
+                return problem(format!("{field}.window_mm"), "the window extends beyond the page");
             }
         }
         if let Some(placed) = sheet.placements.iter().find(|p| !panels.contains(&p.panel)) {
-            let what = format!("there is no panel {}", placed.panel);
+            let what = format!("no panel has id {}", placed.panel);
             return problem(format!("sheets[{s}].placements"), what);
         }
     }
     Ok(())
 }
 
-/// Checks the size of a sheet, that its lines lie on it, and that there is a logo where it has one.
+/// Checks the size of a sheet, that its lines lie within it, and that the file contains a logo if the sheet places one.
 fn check_sheet(sheet: &SheetLayout, printing: &Printing, field: &str) -> Result<(), Problem> {
     let sides = [("width_mm", sheet.width_mm), ("height_mm", sheet.height_mm)];
     if let Some((side, _)) = sides.iter().find(|(_, mm)| *mm <= 0.0) {
         return problem(format!("{field}.{side}"), "it must be positive");
     }
     if let Some((side, _)) = sides.iter().find(|(_, mm)| *mm > LONGEST_SHEET_MM) {
-        let what = format!("it is more than {LONGEST_SHEET_MM} mm");
+        let what = format!("it must not exceed {LONGEST_SHEET_MM} mm");
         return problem(format!("{field}.{side}"), what);
     }
     if !sheet.logos.is_empty() && printing.logo.is_none() {
-        return problem("logo", format!("`{field}.logos` places one, so there must be one"));
+        return problem("logo", format!("missing, but `{field}.logos` places a logo"));
     }
     let on_sheet = |DVec2 { x, y }: DVec2| {
         (0.0..=sheet.width_mm).contains(&x) && (0.0..=sheet.height_mm).contains(&y)
     };
     match sheet.lines.iter().position(|l| !on_sheet(l.from_mm) || !on_sheet(l.to_mm)) {
-        Some(line) => problem(format!("{field}.lines[{line}]"), "it does not lie on the sheet"),
+        Some(line) => {
+            problem(format!("{field}.lines[{line}]"), "the line extends beyond the sheet")
+        }
         None => Ok(()),
     }
 }
@@ -124,7 +127,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn writing_and_reading_changes_nothing(
+        fn targets_survive_writing_and_reading(
             rows in 3u32..12, cols in 3u32..12, edge_mm in 5.0f64..30.0,
             tagged: bool, boards in 1u32..3,
         ) {
@@ -144,7 +147,7 @@ mod tests {
         }
     }
 
-    /// What is said about a file in which `from` is replaced by `to`.
+    /// Error message for a file in which `from` is replaced by `to`.
     fn complaint(from: &str, to: &str) -> String {
         let json = board(4, 4, 20.0, true, 1).to_json();
         assert!(json.contains(from), "{from} is not in {json}");

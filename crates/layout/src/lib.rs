@@ -1,18 +1,17 @@
-//! Targets on paper: where panels, labels, check bars and cutting lines lie on the sheets of a print.
+//! Layout of targets on paper: the positions of panels, labels, check bars and cutting lines on the sheets of a print.
 //!
-//! In comes a [`Target`](deltille_core::targets::Target) and a [`PaperSpec`]; out goes a [`Printing`]: the target with its
-//! [sheets](SheetLayout), its [finish](Finish) and its [logo](Logo). In the order in
-//! which a target meets them:
+//! The input is a [`Target`](deltille_core::targets::Target) and a [`PaperSpec`]. The output is a [`Printing`]: the
+//! target with its [sheets](SheetLayout), its [finish](Finish) and its [logo](Logo). The modules, in processing order:
 //!
-//! 1. `paper`: what is printed on; `printing`: how a kind of target is laid out on it;
-//! 2. `placing`: where panels and check bars lie on one page, several pages, or the sheets of a solid;
-//! 3. `marks`: what is printed beside a target: labels, ids of tags, a logo;
-//! 4. `finish`, and `finished` prints: how all of it is printed: mirrored, in spot colours, with lines to cut along;
-//! 5. `sheet`: the values that these fill; `json`: the target file that holds them;
-//! 6. [`artwork`]: what is drawn of a sheet, in mm;
-//! 7. [`synth`]: a sheet or a target seen by a camera, as an image with exact ground truth.
+//! 1. `paper` describes the paper; `printing` lays out each kind of target on it;
+//! 2. `placing` positions panels and check bars on one page, several pages, or the sheets of a solid;
+//! 3. `marks` adds what is printed beside a target: labels, tag ids, a logo;
+//! 4. `finish` and `finished` control the print: mirroring, spot colours, cutting lines;
+//! 5. `sheet` defines the resulting values; `json` reads and writes the target file that contains them;
+//! 6. [`artwork`] draws a sheet, in mm;
+//! 7. [`synth`] renders a sheet or a target as seen by a camera, with exact ground truth.
 //!
-//! `planning` proposes the board that suits a camera and its distances, on some paper.
+//! `planning` proposes a board for a given camera, distance range and paper.
 
 pub mod artwork;
 mod finish;

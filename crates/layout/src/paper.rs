@@ -1,4 +1,4 @@
-//! Paper: sizes, orientation, margins, and what is asked for of a print.
+//! Paper: sizes, orientation, margins, and the options of a print.
 
 use std::fmt;
 use std::str::FromStr;
@@ -8,7 +8,7 @@ use glam::DVec2;
 use crate::Logo;
 use deltille_core::targets::{format_mm, parse_length_mm};
 
-/// Sizes with a name: short and long side, mm (ISO 216; ANSI A and B, US legal).
+/// Named sizes: short and long side, mm (ISO 216; ANSI A and B, US legal).
 const SIZES: [(&str, [f64; 2]); 9] = [
     ("A0", [841.0, 1189.0]),
     ("A1", [594.0, 841.0]),
@@ -21,39 +21,39 @@ const SIZES: [(&str, [f64; 2]); 9] = [
     ("tabloid", [279.4, 431.8]),
 ];
 
-/// The longest side of a sheet, mm: PDF page boxes end at 14,400 pt (ISO 32000-1, annex C).
+/// Longest side of a sheet, mm: PDF page boxes end at 14,400 pt (ISO 32000-1, annex C).
 const LONGEST_MM: f64 = 5080.0;
 
-/// The shortest side, mm: on less than this there is no room for check bars.
+/// Shortest side of a sheet, mm: smaller paper has no room for check bars.
 const SHORTEST_MM: f64 = 50.0;
 
-/// Margin unless another is asked for, mm. Office printers leave 3 to 5 mm blank.
+/// Default margin, mm. Office printers leave 3 to 5 mm blank.
 pub const DEFAULT_MARGIN_MM: f64 = 5.0;
 
-/// The paper that a target is laid out on.
+/// Paper on which a target is laid out.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PaperSpec {
-    /// The paper; `None` for the smallest of A4, A3, A2, A1 and A0 that takes the board.
+    /// Paper size; `None` selects the smallest of A4, A3, A2, A1 and A0 that fits the board.
     pub size: Option<PaperSize>,
-    /// Whether the sheet stands upright or lies.
+    /// Orientation of the sheet.
     pub orientation: Orientation,
-    /// Width of the strip along the paper's edges that stays blank, mm.
+    /// Width of the blank strip along the edges of the paper, mm.
     pub margin_mm: f64,
     /// How the faces of a solid are printed.
     pub solids: SolidSheets,
-    /// Whether a board that is larger than the paper is printed over several pages.
+    /// Whether a board that is larger than the paper is split over several pages.
     pub poster: bool,
-    /// Whether as many boards as fit are printed on a sheet, to be cut apart, instead of one on each.
+    /// Whether a sheet contains as many boards as fit, to be cut apart, instead of one.
     pub packed: bool,
-    /// What is printed on the label of every sheet beside the name, such as whose it is.
+    /// Note printed on the label of every sheet after the name, for example the owner.
     pub note: Option<String>,
-    /// A logo that is printed on every sheet, at the other end of the strip in which the label begins.
+    /// Logo printed on every sheet, at the opposite end of the strip in which the label begins.
     pub logo: Option<Logo>,
-    /// Its height, mm; where none is asked for, that of the strip, or less where it would be too wide.
+    /// Height of the logo, mm; `None` uses the height of the strip, or less if the logo would be too wide.
     pub logo_height_mm: Option<f64>,
-    /// Whether the ids of tags are printed beside them, in small type.
+    /// Whether each tag has its id printed beside it in small type.
     pub tag_ids: bool,
-    /// Whether a page with a picture of the target, what to do and a ruler goes with the sheets.
+    /// Whether to add a guide page with a figure of the target, instructions and a ruler.
     pub guide_page: bool,
 }
 
@@ -61,18 +61,17 @@ pub struct PaperSpec {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum SolidSheets {
-    /// As a net, to be folded; where it is larger than the paper, in pieces of whole faces.
+    /// As a net to fold. A net larger than the paper is split into pieces of whole faces.
     #[default]
     Net,
-    /// As a net, to be folded; where it is larger than the paper, over pages that are joined along seams
-    /// through its tiles.
+    /// As a net to fold. A net larger than the paper is split over pages that are joined along seams through its tiles.
     SeamedNet,
-    /// Each on a sheet of its own, to be glued on a rigid skeleton.
+    /// Each face on its own sheet, to be glued on a rigid skeleton.
     PerFace,
 }
 
 impl PaperSpec {
-    /// The pages of a size of paper that may be taken, upright before lying, mm.
+    /// Returns the allowed page sizes for a paper size, portrait before landscape, mm.
     pub(super) fn pages_mm(&self, size: &PaperSize) -> Vec<DVec2> {
         match self.orientation {
             Orientation::Portrait => vec![size.portrait_mm()],
@@ -81,7 +80,7 @@ impl PaperSpec {
         }
     }
 
-    /// The sizes that may be taken, smallest first: the one that is asked for, or those of [`PaperSize::automatic`].
+    /// Returns the allowed sizes, smallest first: the requested one, or those of [`PaperSize::automatic`].
     pub(super) fn sizes(&self) -> Vec<PaperSize> {
         match &self.size {
             Some(size) => vec![size.clone()],
@@ -108,15 +107,15 @@ impl Default for PaperSpec {
     }
 }
 
-/// Whether a sheet stands upright or lies.
+/// Orientation of a sheet.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Orientation {
-    /// The one that takes the board.
+    /// The orientation that fits the board.
     #[default]
     Auto,
-    /// Upright: higher than wide.
+    /// Higher than wide.
     Portrait,
-    /// Lying: wider than high.
+    /// Wider than high.
     Landscape,
 }
 
@@ -133,7 +132,7 @@ impl FromStr for Orientation {
     }
 }
 
-/// A paper size: its name, such as `A4` or `297 × 420 mm`, and its sides.
+/// Paper size: its name, such as `A4` or `297 × 420 mm`, and its sides.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PaperSize {
     name: String,
@@ -141,29 +140,31 @@ pub struct PaperSize {
     long_mm: f64,
 }
 
-/// A text that names no paper, or no orientation.
+/// Error for a text that is not a paper size or an orientation.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum PaperError {
-    /// Neither a name nor two lengths.
-    #[error("`{0}` is no paper: give {size}", size = PaperSize::choice())]
+    /// The text is neither a known name nor two lengths.
+    #[error("unknown paper size `{0}` (known: {size})", size = PaperSize::choice())]
     Unknown(String),
-    /// A side that is too short or too long.
-    #[error("`{0}` is no paper: its sides must be {SHORTEST_MM} to {LONGEST_MM} mm long")]
+    /// A side is too short or too long.
+    #[error(
+        "paper size `{0}` is out of range: both sides must be {SHORTEST_MM} to {LONGEST_MM} mm long"
+    )]
     Side(String),
-    /// None of auto, portrait and landscape.
-    #[error("`{0}` is none of auto, portrait, landscape")]
+    /// The orientation is not auto, portrait or landscape.
+    #[error("unknown orientation `{0}` (known: auto, portrait, landscape)")]
     Orientation(String),
 }
 
 impl PaperSize {
-    /// The sizes tried, smallest first, when none is asked for: A4 to A0.
+    /// Iterates over the sizes tried by default, smallest first: A4 to A0.
     pub fn automatic() -> impl Iterator<Item = PaperSize> {
         let from_a4 = SIZES.iter().rev().skip_while(|(name, _)| *name != "A4");
         from_a4.map(|&(name, sides)| Self::named(name, sides))
     }
 
-    /// What may be given, in words: the sizes with a name, and an example of another.
+    /// Describes the accepted values: the named sizes, and an example of a custom size.
     pub fn choice() -> String {
         let (series, other): (Vec<&str>, Vec<&str>) =
             SIZES.iter().map(|&(name, _)| name).partition(|name| name.starts_with('A'));
@@ -175,17 +176,17 @@ impl PaperSize {
         Self { name: name.to_owned(), short_mm, long_mm }
     }
 
-    /// The name.
+    /// Returns the name.
     pub fn name(&self) -> &str {
         &self.name
     }
 
-    /// Width and height of the upright sheet, mm.
+    /// Returns width and height in portrait orientation, mm.
     pub fn portrait_mm(&self) -> DVec2 {
         DVec2::new(self.short_mm, self.long_mm)
     }
 
-    /// Width and height of the lying sheet, mm.
+    /// Returns width and height in landscape orientation, mm.
     pub fn landscape_mm(&self) -> DVec2 {
         DVec2::new(self.long_mm, self.short_mm)
     }
@@ -200,7 +201,7 @@ impl fmt::Display for PaperSize {
 impl FromStr for PaperSize {
     type Err = PaperError;
 
-    /// A name in any case, or two lengths such as `297x420mm`, `11 × 17 in` or `30cmx40cm`.
+    /// Parses a name in any case, or two lengths such as `297x420mm`, `11 × 17 in` or `30cmx40cm`.
     fn from_str(text: &str) -> Result<Self, PaperError> {
         let unknown = || PaperError::Unknown(text.to_owned());
         let trimmed = text.trim();
@@ -209,7 +210,7 @@ impl FromStr for PaperSize {
         }
         let (first, second) = trimmed.split_once(['x', 'X', '×']).ok_or_else(unknown)?;
         let (first, second) = (first.trim(), second.trim());
-        // One unit at the end serves both sides.
+        // A unit after the second length applies to both.
         let unit = second.trim_start_matches(|c: char| !c.is_ascii_alphabetic());
         let shared = first.ends_with(|c: char| c.is_ascii_digit() || c == '.');
         let first = if shared { format!("{first}{unit}") } else { first.to_owned() };
@@ -228,7 +229,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn names_and_sizes() {
+    fn names_and_sizes_are_parsed() {
         let sides = |text: &str| text.parse::<PaperSize>().unwrap().portrait_mm();
         assert_eq!(sides("a4"), DVec2::new(210.0, 297.0));
         assert_eq!(sides("Letter"), DVec2::new(215.9, 279.4));

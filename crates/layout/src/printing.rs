@@ -1,4 +1,4 @@
-//! A target with the sheets that it is printed on.
+//! A target together with the sheets on which it is printed.
 
 use std::borrow::Cow;
 
@@ -18,32 +18,32 @@ use deltille_core::targets::{
     BoardSpec, FamilyRef, Panel, Target, TargetError, TargetSpec, fingerprint,
 };
 
-/// A target, and the sheets that it is printed on.
+/// A target, and the sheets on which it is printed.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Printing {
-    /// What is printed.
+    /// The printed target.
     pub target: Target,
-    /// Where its panels lie on paper; empty where it was made, or read from a file, without sheets.
+    /// Positions of its panels on paper; empty if the target was made, or read from a file, without sheets.
     pub sheets: Vec<SheetLayout>,
-    /// How they are printed.
+    /// How the sheets are printed.
     pub finish: Finish,
-    /// The logo on them.
+    /// The logo on the sheets.
     pub logo: Option<Logo>,
 }
 
 impl From<Target> for Printing {
-    /// Without sheets.
+    /// Creates a printing without sheets.
     fn from(target: Target) -> Self {
         Self { target, sheets: Vec::new(), finish: Finish::default(), logo: None }
     }
 }
 
 impl Printing {
-    /// Makes what `spec` asks for with a family that is shipped, laid out on the smallest paper that takes it.
+    /// Builds the target described by `spec` with a shipped family, on the smallest paper that fits it.
     ///
     /// # Errors
-    /// Where the name is no file name, a number is out of its range, the family is not shipped or has too
-    /// few codes, or nothing up to A0 takes the target.
+    /// Returns an error if the name is not a file name, a number is out of range, the family is not shipped or has too
+    /// few codes, or the target does not fit on A0.
     ///
     /// ```
     /// use deltille_layout::Printing;
@@ -59,12 +59,12 @@ impl Printing {
         Self::build(name, &spec, shipped_family(&spec)?.as_ref(), Some(&PaperSpec::default()))
     }
 
-    /// Makes what `spec` asks for, laid out on `paper`; without paper there are no sheets. `family` holds the codes of the
-    /// tags; an untagged target needs none.
+    /// Builds the target described by `spec` and lays it out on `paper`; without paper, the printing has no sheets.
+    /// `family` contains the codes of the tags; an untagged target does not need one.
     ///
     /// # Errors
-    /// Where a number is out of its range, the family is another one or has too few codes, or the paper has no room for
-    /// the target.
+    /// Returns an error if a number is out of range, the family is the wrong one or has too few codes, or the target
+    /// does not fit on the paper.
     pub fn build(
         name: &str,
         spec: &TargetSpec,
@@ -78,7 +78,7 @@ impl Printing {
         }
     }
 
-    /// Lays a target out on paper.
+    /// Lays out a target on paper.
     fn on_paper(target: Target, paper: &PaperSpec) -> Result<Self, TargetError> {
         logo_room::check(paper)?;
         let title = match &paper.note {
@@ -118,7 +118,8 @@ impl Printing {
         Ok(printing)
     }
 
-    /// The same under the name that is on the sheets: that of the plan, where the target was measured or refined.
+    /// Returns the printing under the name that is on the sheets. For a measured or refined target, that is the name of
+    /// its plan.
     pub fn under_printed_name(&self) -> Cow<'_, Self> {
         let Some(plan) = &self.target.plan else { return Cow::Borrowed(self) };
         let mut printing = self.clone();
@@ -126,16 +127,16 @@ impl Printing {
         Cow::Owned(printing)
     }
 
-    /// On how many pages all its sheets are printed.
+    /// Returns the total number of pages of all sheets.
     pub fn page_count(&self) -> usize {
         self.sheets.iter().map(SheetLayout::page_count).sum()
     }
 }
 
-/// Most characters of a note: with more the label that it stands in could not be read any more.
+/// Maximum number of characters in a note: a longer one would make the label illegible.
 const LONGEST_NOTE: usize = 80;
 
-/// A note that can be printed.
+/// Checks that a note can be printed, and trims it.
 fn checked_note(note: &str) -> Result<&str, TargetError> {
     let refused = |problem: String| Err(TargetError::invalid(PaperNote, problem));
     let is_printed = |c: char| (' '..='~').contains(&c) || "°±·×–−".contains(c);
@@ -144,17 +145,17 @@ fn checked_note(note: &str) -> Result<&str, TargetError> {
         Some(other) => {
             refused(format!("the built-in font has no {other:?}: use ASCII and ° ± · × – −"))
         }
-        None if count > LONGEST_NOTE => {
-            refused(format!("{count} characters are more than {LONGEST_NOTE}: take fewer"))
-        }
+        None if count > LONGEST_NOTE => refused(format!(
+            "the note has {count} characters, more than the maximum of {LONGEST_NOTE}: shorten it"
+        )),
         None if note.trim().is_empty() => {
-            refused("there is nothing in it: leave it out".to_owned())
+            refused("the note is empty: omit the option or enter text".to_owned())
         }
         None => Ok(note.trim()),
     }
 }
 
-/// The sheets of boards.
+/// Lays out the sheets of boards.
 fn board_sheets(
     name: &str,
     board: &BoardSpec,
@@ -164,7 +165,8 @@ fn board_sheets(
 ) -> Result<Vec<SheetLayout>, TargetError> {
     if paper.packed {
         if board.two_sided_mm.is_some() {
-            let problem = "each side of a board has a sheet of its own: leave it out";
+            let problem =
+                "a two-sided board cannot be packed, because each side needs its own sheet";
             return Err(TargetError::invalid(PaperPacked, problem));
         }
         return packed::sheets(name, board, panels, family, paper);
@@ -192,7 +194,7 @@ fn board_sheets(
     }
 }
 
-/// A board that is larger than the paper, over several pages.
+/// Lays out a board that is larger than the paper on several pages.
 fn poster(
     board: &BoardSpec,
     panel: &Panel,
@@ -209,7 +211,7 @@ fn poster(
         angle_rad: turn_of(motion.turn),
         origin_mm: motion.shift,
     });
-    // Crosses keep out of the board and its quiet zone.
+    // Crosses stay clear of the board and its quiet zone.
     let field = corners.map(|corner| motion.apply(corner));
     let outline = field.iter().zip(field.iter().cycle().skip(1));
     let outline: Vec<SheetLine> = outline
@@ -229,16 +231,17 @@ fn poster(
     Ok(sheet)
 }
 
-/// The edge of a board's tiles where none is asked for, mm: that of the published board, which fits A4 with 10 × 11 corners;
-/// on a certain paper the largest in whole millimetres that fits. Where nothing fits, making the board says so.
+/// Returns the default edge length of a board's tiles, mm. Without a fixed paper size, that is the edge of the
+/// published board, which fits A4 with 10 × 11 corners. With a fixed size, it is the largest whole number of
+/// millimetres that fits. If nothing fits, building the board reports the error.
 pub fn usual_edge_mm(spec: &BoardSpec, paper: &PaperSpec) -> f64 {
     let fitting = paper.size.as_ref().and_then(|_| largest_edge_mm(spec, paper));
     fitting.unwrap_or(BoardSpec::USUAL_EDGE_MM)
 }
 
-/// The largest edge in whole millimetres with which a board fits on paper, if one of 5 mm does.
+/// Returns the largest edge in whole millimetres with which a board fits on paper, or `None` if 5 mm does not fit.
 pub fn largest_edge_mm(spec: &BoardSpec, paper: &PaperSpec) -> Option<f64> {
-    // A metre fits next to nothing, and the refusal proposes an edge that does.
+    // Almost no paper fits an edge of 1 m, and the resulting error proposes an edge that fits.
     let probe = BoardSpec { edge_mm: 1000.0, ..spec.clone() };
     if paper.packed {
         let of_edge = |mm: u32| BoardSpec { edge_mm: f64::from(mm), ..spec.clone() };

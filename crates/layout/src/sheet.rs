@@ -1,4 +1,4 @@
-//! Sheets: what lies where on a page of a print, in millimetres from its lower-left corner, y up.
+//! Sheets: the positions of all marks on a printed page, in millimetres from its lower-left corner, y up.
 
 use glam::DVec2;
 use serde::{Deserialize, Serialize};
@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 use crate::{Label, LogoPlacement};
 use deltille_core::{angles, quantity};
 
-/// One printed page: its size, where panels lie on it, and its check bars.
+/// One printed page: its size, the positions of its panels, and its check bars.
 ///
 /// The page frame has its origin at the lower-left corner of the page, x right, y up, mm.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -20,62 +20,61 @@ pub struct SheetLayout {
     pub height_mm: f64,
     /// Panels on the page.
     pub placements: Vec<Placement>,
-    /// Lines of stated length, to be measured with a ruler.
+    /// Lines of known length, to be measured with a ruler.
     pub check_bars: Vec<CheckBar>,
-    /// Marks to cut and fold along.
+    /// Lines to cut and fold along, and alignment marks.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub lines: Vec<SheetLine>,
-    /// The label and the words on the check bars.
+    /// The label, and the texts of check bars and lines.
     pub texts: Vec<SheetText>,
-    /// Where the logo of the target lies.
+    /// Positions of the logo of the target.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub logos: Vec<LogoPlacement>,
-    /// The pages that show this sheet in parts, where it is larger than the paper; it is then
-    /// printed on none of its own.
+    /// Pages that show parts of this sheet if it is larger than the paper. The sheet itself is then not printed.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub pages: Vec<SheetPage>,
 }
 
 impl SheetLayout {
-    /// On how many pages it is printed.
+    /// Returns the number of pages on which the sheet is printed.
     pub fn page_count(&self) -> usize {
         self.pages.len().max(1)
     }
 }
 
-/// A page that shows a window onto a sheet that is larger than the paper.
+/// A page that shows a window onto a sheet larger than the paper.
 ///
 /// ```text
 ///    ┌──────────────┐
-///    │┌────────────┐│   in the window the sheet, cut off at its rim: the same
-///    ││            ││   paper position, `sheet_at_mm` less, is that on the sheet;
-///    ││            ││   around it the marks of the page
-///    │└────────────┘│
+///    │┌────────────┐│   The window shows the sheet, clipped at its border.
+///    ││            ││   Subtract `sheet_at_mm` from a page position to get
+///    ││            ││   the position on the sheet. The marks of the page
+///    │└────────────┘│   surround the window.
 ///    │ ├──────────┤ │
 ///    └──────────────┘
 /// ```
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct SheetPage {
-    /// Its place among the pages: rows are letters from the top, columns numbers from the left.
+    /// Page number, counted from 1, row by row from the upper left.
     pub label: String,
-    /// Left, lower, right and upper end of the window on the page, mm.
+    /// Left, lower, right and upper edge of the window on the page, mm.
     #[serde(deserialize_with = "quantity::place_mm::de")]
     pub window_mm: [f64; 4],
-    /// Position of the sheet's lower-left corner on the page, mm.
+    /// Page position of the lower-left corner of the sheet, mm.
     #[serde(deserialize_with = "quantity::place_mm::de")]
     pub sheet_at_mm: DVec2,
-    /// Size of the page, and what is printed around the window.
+    /// Size of the page, and the marks around the window.
     pub marks: SheetLayout,
 }
 
-/// `page = turn(angle) · panel + origin`.
+/// Pose of a panel on its page: `page = rotation(angle) · panel + origin`.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Placement {
-    /// Id of the panel.
+    /// Panel id.
     pub panel: u32,
-    /// Counter-clockwise turn of the panel on the page, radians.
+    /// Counter-clockwise rotation of the panel on the page, radians.
     #[serde(deserialize_with = "quantity::angle_rad::de")]
     pub angle_rad: f64,
     /// Page position of the panel's origin, mm.
@@ -84,13 +83,13 @@ pub struct Placement {
 }
 
 impl Placement {
-    /// Page position of a point of the panel, mm.
+    /// Returns the page position of a point of the panel, mm.
     pub fn page_from_panel(&self, point: DVec2) -> DVec2 {
         let right = angles::direction(self.angle_rad);
         self.origin_mm + right * point.x + right.perp() * point.y
     }
 
-    /// A point of the page in the frame of the panel, mm.
+    /// Returns the panel coordinates of a point of the page, mm.
     pub fn panel_from_page(&self, point: DVec2) -> DVec2 {
         let right = angles::direction(self.angle_rad);
         let from_origin = point - self.origin_mm;
@@ -98,11 +97,11 @@ impl Placement {
     }
 }
 
-/// A straight line of a page.
+/// A straight line on a page.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct SheetLine {
-    /// What it is for.
+    /// Its purpose.
     pub kind: LineKind,
     /// One end on the page, mm.
     #[serde(deserialize_with = "quantity::place_mm::de")]
@@ -110,35 +109,35 @@ pub struct SheetLine {
     /// The other end on the page, mm.
     #[serde(deserialize_with = "quantity::place_mm::de")]
     pub to_mm: DVec2,
-    /// Its width, mm.
+    /// Line width, mm.
     #[serde(deserialize_with = "quantity::length_mm::de")]
     pub width_mm: f64,
 }
 
-/// What a line of a page is for.
+/// Purpose of a line on a page.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum LineKind {
-    /// To cut along; drawn through.
+    /// Cutting line; drawn solid.
     Cut,
-    /// To fold along, away from the print; dashed.
+    /// Line to fold away from the print (mountain fold); dashed.
     Fold,
-    /// To fold along, towards the print; dash-dotted.
+    /// Line to fold towards the print (valley fold); dash-dotted.
     Valley,
-    /// Between two faces in one plane, not to be folded; dotted.
+    /// Line between two coplanar faces, not to be folded; dotted.
     Flat,
-    /// A stroke of a registration cross: pages that share it are laid on one another, single faces
-    /// on their seats; a mark at a corner of a plate; or of the overview of such pages, or another picture. Drawn through.
+    /// Alignment mark; drawn solid. It is a stroke of a registration cross, on which shared pages or single faces are
+    /// aligned, a mark at the corner of a plate, or a line of the page overview or another figure.
     Align,
 }
 
 impl LineKind {
-    /// Whether paper goes on beyond it, to another face or to a tab.
+    /// Returns whether the paper continues beyond the line, to another face or to a tab.
     pub fn joins_faces(self) -> bool {
         matches!(self, Self::Fold | Self::Valley | Self::Flat)
     }
 
-    /// Its name in files.
+    /// Returns its name in files.
     pub fn name(self) -> &'static str {
         match self {
             Self::Cut => "cut",
@@ -150,7 +149,7 @@ impl LineKind {
     }
 }
 
-/// A check bar: the distance between the outer edges of its two end strokes is its length.
+/// A check bar. Its length is the distance between the outer edges of its two end strokes.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct CheckBar {
@@ -163,7 +162,7 @@ pub struct CheckBar {
 }
 
 impl CheckBar {
-    /// The length that it states and has, mm.
+    /// Returns its nominal length, mm.
     pub fn length_mm(&self) -> f64 {
         let way = self.to_mm - self.from_mm;
         way.x.hypot(way.y)
@@ -174,18 +173,18 @@ impl CheckBar {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct SheetText {
-    /// What it says.
+    /// Content of the text.
     pub text: Label,
-    /// Left end of the base line on the page, mm.
+    /// Page position of the left end of the baseline, mm.
     #[serde(deserialize_with = "quantity::place_mm::de")]
     pub at_mm: DVec2,
-    /// Counter-clockwise turn of the base line, radians.
+    /// Counter-clockwise rotation of the baseline, radians.
     #[serde(deserialize_with = "quantity::angle_rad::de")]
     pub angle_rad: f64,
     /// Height of a capital letter, mm.
     #[serde(deserialize_with = "quantity::length_mm::de")]
     pub cap_height_mm: f64,
-    /// The line is set smaller where it would be longer than this, mm.
+    /// Maximum width of the line, mm; longer text is scaled down.
     #[serde(deserialize_with = "quantity::length_mm::de")]
     pub max_width_mm: f64,
 }

@@ -166,7 +166,7 @@ fn a_note_goes_with_every_board_that_is_cut_out() {
     let refused = format!("board --rows 3 --cols 4 --edge 8mm --boards 6 --pack --note {long}");
     let said = deltille(folder.path()).args(refused.split(' ')).assert().code(2);
     let said = String::from_utf8(said.get_output().stderr.clone()).unwrap();
-    assert!(said.starts_with("error: --note: 80 characters are more than the "), "{said}");
+    assert!(said.starts_with("error: --note: the note has 80 characters, but only "), "{said}");
 }
 
 #[test]

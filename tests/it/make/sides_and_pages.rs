@@ -166,13 +166,13 @@ fn a_template_keeps_the_logo_and_unprintable_logos_are_rejected_in_one_line() {
             "--logo text.svg",
             "--logo: text.svg: `text` with the id `name` cannot be printed: convert it to paths",
         ),
-        ("--logo nothing.svg", "--logo: nothing of it is black"),
+        ("--logo nothing.svg", "--logo: the logo has no black area"),
         ("--logo missing.svg", "--logo: cannot read missing.svg"),
         (
             "--logo logo.svg --logo-height 90mm",
-            "--logo-height: beside what else is printed there is no room",
+            "--logo-height: a logo 90 mm high does not fit beside the other marks",
         ),
-        ("--logo-height 9mm", "--logo-height: there is no logo: give --logo"),
+        ("--logo-height 9mm", "--logo-height: needs a logo: add --logo"),
         ("--logo logo.svg --gltf", "--logo: it says nothing without --pdf, --svg or --png"),
     ] {
         let said = deltille(folder.path(), &format!("{board} {args} -o refused")).code(2);

@@ -79,10 +79,10 @@ fn what_cannot_be_printed_is_named() {
             ),
             "what has the id `h` has a filter",
         ),
-        (String::new(), "nothing of it is black"),
-        (format!(r#"{frame}fill="white"/>"#), "nothing of it is black"),
+        (String::new(), "the logo has no black area"),
+        (format!(r#"{frame}fill="white"/>"#), "the logo has no black area"),
         ("<path".to_owned(), "not a readable SVG"),
-        (r#"<rect width="100" height="1"/>"#.to_owned(), "its width is to its height as 100 to 1"),
+        (r#"<rect width="100" height="1"/>"#.to_owned(), "the aspect ratio is 100 to 1"),
     ];
     for (body, expected) in cases {
         let said = read(&body).unwrap_err().to_string();

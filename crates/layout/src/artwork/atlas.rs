@@ -1,4 +1,4 @@
-//! Texture atlas of a solid, all faces packed in rows on one sheet, and that of a plate with boards.
+//! Texture atlases: all faces of a solid packed in rows on one sheet, and the sides of a plate with boards.
 
 use std::f64::consts::PI;
 
@@ -9,14 +9,14 @@ use super::{ArtworkError, Sheet};
 use crate::Placement;
 use deltille_core::targets::{Face, Panel, Target};
 
-/// White between two faces, px: more than the filters of the first mipmap levels reach.
+/// White gap between two faces, px: wider than the filters of the first mipmap levels reach.
 const PADDING_PX: f64 = 16.0;
 
-/// Faces of a solid, or sides of a plate that carry boards, on one picture, which is a texture of its mesh.
+/// Faces of a solid, or sides of a plate with boards, in one image that serves as the texture of the mesh.
 ///
 /// ```text
-///    ╱╲‾‾╱╲‾‾╱      Faces stand alternately upright and upside down in rows. Their own margins and
-///   ╱__╲╱__╲╱       the padding are white, so that no filter takes anything from another face.
+///    ╱╲‾‾╱╲‾‾╱      Faces stand alternately upright and upside down in rows. Their margins and the
+///   ╱__╲╱__╲╱       padding are white, so that no filter mixes in pixels of another face.
 /// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct Atlas {
@@ -24,9 +24,9 @@ pub struct Atlas {
     pub px_per_m: u32,
     /// Width and height of the texture, px.
     pub size_px: [u32; 2],
-    /// Vertices of each face on the picture, mm, in the order of the faces, or of the sides of a plate.
+    /// Vertices of each face in the image, mm, in the order of the faces, or of the sides of a plate.
     pub outlines_mm: Vec<Vec<DVec2>>,
-    /// Where the panel of each face lies, likewise.
+    /// Placement of the panel of each face, in the same order.
     placements: Vec<Placement>,
 }
 
@@ -45,7 +45,7 @@ impl Atlas {
         Self { px_per_m, size_px, outlines_mm, placements }
     }
 
-    /// Lays out sides of a plate, one above the other: boards with their quiet zones, all as large as the first.
+    /// Lays out the sides of a plate one above the other: boards with their quiet zones, all the size of the first.
     pub fn of_plate(sides: &[Panel], px_per_m: u32) -> Self {
         let mm_per_px = 1e3 / f64::from(px_per_m);
         let padding = DVec2::splat(PADDING_PX * mm_per_px);
@@ -65,15 +65,15 @@ impl Atlas {
         Self { px_per_m, size_px, outlines_mm, placements }
     }
 
-    /// Width and height of the picture, mm: whole numbers of pixels.
+    /// Returns width and height of the image, mm: whole numbers of pixels.
     pub fn size_mm(&self) -> DVec2 {
         DVec2::from(self.size_px.map(f64::from)) * (1e3 / f64::from(self.px_per_m))
     }
 
-    /// Draws what is on the faces, whose `panels` are in their order.
+    /// Draws the faces. `panels` are in the order of the faces.
     ///
     /// # Errors
-    /// When the family of its tags is unknown or lacks a code.
+    /// Returns an error if the family of the tags is unknown or lacks a code.
     pub fn drawn(&self, target: &Target, panels: &[Panel]) -> Result<Sheet, ArtworkError> {
         let mut shapes = Vec::new();
         for (panel, placement) in panels.iter().zip(&self.placements) {
@@ -84,8 +84,8 @@ impl Atlas {
     }
 }
 
-/// Faces packed in rows of equal number, alternately upright and upside down; those of four and more corners as the
-/// rectangles around them.
+/// Faces packed in rows of equal count, alternately upright and upside down. Faces with four or more corners are packed
+/// as their bounding rectangles.
 pub(super) struct Packing {
     pub size_mm: DVec2,
     /// Rotation of each panel, rad, and position of its origin, mm.
@@ -93,8 +93,7 @@ pub(super) struct Packing {
 }
 
 impl Packing {
-    /// The packing whose longer side is the shortest, over all numbers of faces in a row; `padding`
-    /// in mm.
+    /// Returns the packing with the shortest longer side over all numbers of faces per row; `padding` in mm.
     pub(super) fn tightest(faces: &[Face], padding: f64) -> Self {
         let packings = (1..=faces.len()).map(|columns| Self::new(faces, columns, padding));
         let side = |packing: &Self| packing.size_mm.max_element();
@@ -102,15 +101,14 @@ impl Packing {
         tightest.unwrap_or(Self { size_mm: DVec2::ZERO, places: Vec::new() })
     }
 
-    /// The placement of each face on the sheet, numbered from 0.
+    /// Iterates over the placement of each face on the sheet, numbered from 0.
     pub(super) fn placements(&self) -> impl Iterator<Item = Placement> {
         let places = self.places.iter().zip(0..);
         places.map(|(&(angle_rad, origin_mm), panel)| Placement { panel, angle_rad, origin_mm })
     }
 
     fn new(faces: &[Face], columns: usize, padding: f64) -> Self {
-        // Slanted edges keep the padding, measured across them, along a row; so does the flattest
-        // one.
+        // The padding is measured perpendicular to slanted edges; the flattest edge determines the gap along a row.
         let shapes: Vec<Vec<DVec2>> = faces.iter().map(packed_shape).collect();
         let triangles = shapes.iter().filter(|shape| shape.len() == 3);
         let slants = triangles.flat_map(|shape| {
@@ -131,8 +129,7 @@ impl Packing {
             }
             let upright = (index % columns).is_multiple_of(2);
             let turn = if upright { 1.0 } else { -1.0 };
-            // The lower edge of an upright face, or the apex of an inverted one, lies at the bottom
-            // of the row.
+            // The lower edge of an upright face, or the apex of an inverted one, lies at the bottom of the row.
             let lowest = if upright { shape[0].y } else { -shape[2].y };
             let y = packing.size_mm.y - lowest;
             let shape: Vec<DVec2> = shape.iter().map(|&p| turn * p + DVec2::Y * y).collect();
@@ -152,7 +149,8 @@ impl Packing {
     }
 }
 
-/// The outline of a triangle, or the rectangle around another face, from its lower left end: mm in the panel frame.
+/// Returns the outline of a triangle, or the bounding rectangle of another face, starting at its lower-left corner, mm
+/// in the panel frame.
 fn packed_shape(face: &Face) -> Vec<DVec2> {
     let outline = &face.outline_mm;
     if outline.len() == 3 {
@@ -163,10 +161,10 @@ fn packed_shape(face: &Face) -> Vec<DVec2> {
     vec![low, DVec2::new(high.x, low.y), high, DVec2::new(low.x, high.y)]
 }
 
-/// The shift along x, mm, with which `shape` touches `before` from the right.
+/// Returns the shift along x, mm, at which `shape` touches `before` from the right.
 ///
-/// The right outline of one shape and the left outline of the other are straight between the
-/// vertices of both, so that they touch at the height of a vertex.
+/// The facing outlines of both shapes are straight between their vertices, so the shapes touch at the height of a
+/// vertex.
 fn shift_beside(before: &[DVec2], shape: &[DVec2]) -> f64 {
     let heights = before.iter().chain(shape).map(|p| p.y);
     let needed = heights.filter_map(|y| {
@@ -177,7 +175,7 @@ fn shift_beside(before: &[DVec2], shape: &[DVec2]) -> f64 {
     needed.fold(f64::NEG_INFINITY, f64::max)
 }
 
-/// Left and right end of a convex shape at height y; `None` where it does not reach that height.
+/// Returns the left and right end of a convex shape at height y; `None` if it does not reach that height.
 fn extent_at(shape: &[DVec2], y: f64) -> Option<[f64; 2]> {
     let mut extent: Option<[f64; 2]> = None;
     for i in 0..shape.len() {

@@ -11,7 +11,7 @@ use deltille_core::family::Family;
 use deltille_core::lattice::{TagCells, Tile};
 use deltille_core::targets::{Panel, TagPlacement, TagsIn, Target};
 
-/// How far the curves of a disc may be from a circle, mm.
+/// Maximum distance between the curves of a disc and a circle, mm.
 const DISC_TOLERANCE_MM: f64 = 1e-4;
 
 /// Draws sheet `index` of a target, in the frame of the whole sheet, mm.
@@ -28,7 +28,7 @@ pub(super) fn sheet(printing: &Printing, index: usize) -> Result<Sheet, ArtworkE
     Ok(Sheet { width_mm: layout.width_mm, height_mm: layout.height_mm, shapes })
 }
 
-/// Draws a page that shows a part of a sheet, in the frame of the page, mm.
+/// Draws a page that shows part of a sheet, in the frame of the page, mm.
 pub(super) fn page(
     sheet: &Sheet,
     printing: &Printing,
@@ -42,7 +42,7 @@ pub(super) fn page(
         window::clip(Shape { path, ..shape.clone() }, Rect::new(x0, y0, x1, y1))
     });
     let mut shapes: Vec<Shape> = in_window.collect();
-    // Lines, texts and logos of the page itself are numbered on from those of the sheet.
+    // Indices of the page's own lines, texts and logos continue after those of the sheet.
     let (lines, texts) = (layout.lines.len(), layout.texts.len());
     let logos = layout.logos.len();
     shapes.extend(marks(&page.marks, printing.logo.as_ref())?.into_iter().map(|shape| {
@@ -89,21 +89,20 @@ fn marks(layout: &SheetLayout, logo: Option<&Logo>) -> Result<Vec<Shape>, Artwor
     Ok(shapes)
 }
 
-/// The lines of a layout that are drawn, with their indices. Faces that touch without hanging
-/// together have one line to cut each, in opposite directions; only the first is drawn.
+/// Iterates over the lines of a layout that are drawn, with their indices. Faces that touch without being connected
+/// have one cutting line each, in opposite directions; only the first is drawn.
 pub fn drawn_lines(layout: &SheetLayout) -> impl Iterator<Item = (usize, &SheetLine)> {
     let lines = layout.lines.iter().enumerate();
     lines.filter(|(index, line)| !layout.lines[..*index].iter().any(|drawn| is_back(drawn, line)))
 }
 
-/// Whether a line runs along another in the opposite direction, to within half a line width.
+/// Returns whether a line coincides with another in the opposite direction, to within half a line width.
 fn is_back(line: &SheetLine, other: &SheetLine) -> bool {
     let near = |p: DVec2, q: DVec2| p.distance(q) < line.width_mm.min(other.width_mm) / 2.0;
     line.kind == other.kind && near(line.from_mm, other.to_mm) && near(line.to_mm, other.from_mm)
 }
 
-/// Draws the tiles of a panel on its page, mm: one shape for each tile, or one field for an
-/// inverted panel.
+/// Draws the tiles of a panel on its page, mm: one shape per tile, or one field for an inverted panel.
 pub(super) fn draw_panel(
     target: &Target,
     panel: &Panel,
@@ -150,7 +149,7 @@ pub(super) fn draw_panel(
     Ok(shapes.collect())
 }
 
-/// The cells and the code word of a tag.
+/// Returns the cells and the code word of a tag.
 pub(super) fn tag_word(
     target: &Target,
     panel: &Panel,
@@ -167,7 +166,7 @@ pub(super) fn tag_word(
     })
 }
 
-/// A polygon in the frame of its panel, mm, from points in the coordinates of a tile.
+/// Converts points from tile coordinates to a polygon in the frame of the panel, mm.
 fn in_tile(panel: &Panel, tile: Tile, outline: impl IntoIterator<Item = DVec2>) -> BezPath {
     polygon(outline.into_iter().map(|at| {
         let place = panel.place_in_tile(tile, at) * panel.edge_mm;
@@ -175,18 +174,17 @@ fn in_tile(panel: &Panel, tile: Tile, outline: impl IntoIterator<Item = DVec2>) 
     }))
 }
 
-/// The outline of a disc, mm.
+/// Returns the outline of a disc, mm.
 pub(super) fn disc(middle: DVec2, diameter: f64) -> BezPath {
     Circle::new((middle.x, middle.y), diameter / 2.0).to_path(DISC_TOLERANCE_MM)
 }
 
-/// The outline of a tile in the frame of its panel, mm, moved inwards by the fraction `inside` of
-/// its edge.
+/// Returns the outline of a tile in the frame of its panel, mm, moved inwards by the fraction `inside` of its edge.
 fn tile_outline(panel: &Panel, tile: Tile, inside: f64) -> BezPath {
     in_tile(panel, tile, tile_corners(panel, tile, inside))
 }
 
-/// The corners of a tile in its own coordinates, moved inwards by the fraction `inside` of its edge.
+/// Iterates over the corners of a tile in tile coordinates, moved inwards by the fraction `inside` of its edge.
 pub(super) fn tile_corners(
     panel: &Panel,
     tile: Tile,
@@ -199,8 +197,8 @@ pub(super) fn tile_corners(
     corners.map(move |corner| middle + left * (corner - middle))
 }
 
-/// The outlines of the white areas of a tag in tile coordinates (u along the lower edge, v along
-/// the left edge, 0..1).
+/// Iterates over the outlines of the white areas of a tag in tile coordinates (u along the lower edge, v along the left
+/// edge, 0..1).
 pub(super) fn tag_outlines(
     cells: &TagCells,
     word: u64,
@@ -213,7 +211,7 @@ pub(super) fn tag_outlines(
         .map(move |outline| outline.into_iter().map(|v| DVec2::new(at(v.col), at(v.row))).collect())
 }
 
-/// The outline of a text on its page, mm, scaled down where it would exceed its maximum width.
+/// Returns the outline of a text on its page, mm, scaled down if it exceeds its maximum width.
 pub(super) fn draw_text(label: &SheetText) -> Result<BezPath, text::MissingGlyph> {
     let size = label.cap_height_mm / text::CAP_HEIGHT;
     let (path, width) = text::outline(&label.text.to_string(), size)?;
@@ -222,7 +220,7 @@ pub(super) fn draw_text(label: &SheetText) -> Result<BezPath, text::MissingGlyph
     Ok(place * Affine::scale(fit) * path)
 }
 
-/// A closed polygon through the points.
+/// Returns a closed polygon through the points.
 pub(super) fn polygon(points: impl IntoIterator<Item = Point>) -> BezPath {
     let mut path = BezPath::new();
     for (i, point) in points.into_iter().enumerate() {

@@ -4,19 +4,17 @@ use std::collections::BTreeMap;
 
 use deltille_core::lattice::{GridKind, TagCells, Tile, Vertex};
 
-/// The outlines of the white areas of a tag, as vertices of the lattice of its cells (triangles or
-/// squares).
+/// Returns the outlines of the white areas of a tag, as vertices of the lattice of its cells (triangles or squares).
 ///
 /// ```text
 ///      ·───·───·            White cells that share an edge form one area. Its outline runs with
 ///     ╱ ╲w╱w╲ ╱             white on the left; an area with a black island has two loops. Areas
-///    ·───·═══·───·          that touch in a vertex only keep separate loops, so that every loop
-///   ╱ ╲ ╱ ╲w╱ ╲ ╱ ╲         is simple, and filling all of them by the even-odd rule is exact.
+///    ·───·═══·───·          that touch only in a vertex keep separate loops. So every loop is
+///   ╱ ╲ ╱ ╲w╱ ╲ ╱ ╲         simple, and filling all of them by the even-odd rule is exact.
 /// ```
 ///
-/// A vertex (row, col) lies at tile coordinates u = (inset + col) / width, v = (inset + row) /
-/// width, with `width` as [`TagCells::width`] gives it. Vertices on a straight run are left out.
-/// The order of the loops is the same in every run.
+/// A vertex (row, col) lies at tile coordinates u = (inset + col) / width, v = (inset + row) / width, where `width` is
+/// [`TagCells::width`]. Vertices inside a straight run are omitted. The order of the loops is deterministic.
 pub fn white_outlines(cells: &TagCells, word: u64) -> Vec<Vec<Vertex>> {
     let mut edges = boundary_edges(cells.kind(), white_cells(cells, word));
     let mut loops = Vec::new();
@@ -27,7 +25,7 @@ pub fn white_outlines(cells: &TagCells, word: u64) -> Vec<Vec<Vertex>> {
     loops
 }
 
-/// The white cells of a tag as tiles of the lattice of its cells.
+/// Iterates over the white cells of a tag, as tiles of the lattice of its cells.
 pub(super) fn white_cells(cells: &TagCells, word: u64) -> impl Iterator<Item = Tile> {
     let kind = cells.kind();
     let white = cells.cells().iter().enumerate().filter(move |&(bit, _)| word >> bit & 1 == 1);
@@ -37,11 +35,12 @@ pub(super) fn white_cells(cells: &TagCells, word: u64) -> impl Iterator<Item = T
     })
 }
 
-/// A walk along an outline: the vertices, and the direction in which each is left.
+/// A closed path along an outline: the vertices, and the direction in which each is left.
 pub(super) type Walk = Vec<(Vertex, usize)>;
 
-/// Walks around tiles with these on the left, or on the right unless they are `inside`. What lies on the left is kept apart
-/// where it meets in a vertex only: there a walk turns left as sharply as possible, so that it may pass a vertex twice.
+/// Traces closed paths around tiles, with the tiles on the left, or on the right if not `inside`. Areas on the left
+/// that meet only in a vertex stay separate: the path turns left as sharply as possible there, so it may pass a vertex
+/// twice.
 pub(super) fn walks(kind: GridKind, tiles: impl Iterator<Item = Tile>, inside: bool) -> Vec<Walk> {
     let mut edges = boundary_edges(kind, tiles);
     if !inside {
@@ -61,7 +60,7 @@ pub(super) fn walks(kind: GridKind, tiles: impl Iterator<Item = Tile>, inside: b
     walks
 }
 
-/// The walk that begins with a step, which is taken out of the edges.
+/// Traces the path that begins with a step, and removes its edges.
 fn walk(kind: GridKind, edges: &mut BTreeMap<Vertex, Vec<usize>>, first: (Vertex, usize)) -> Walk {
     remove(edges, first.0, first.1);
     let mut steps = vec![first];
@@ -80,7 +79,7 @@ fn walk(kind: GridKind, edges: &mut BTreeMap<Vertex, Vec<usize>>, first: (Vertex
     }
 }
 
-/// The parts of a walk that pass every vertex once.
+/// Splits a path into parts that pass every vertex once.
 pub(super) fn simple(walk: Walk) -> Vec<Walk> {
     let mut parts = Vec::new();
     let mut steps = Walk::new();
@@ -94,8 +93,8 @@ pub(super) fn simple(walk: Walk) -> Vec<Walk> {
     parts
 }
 
-/// Edges between tiles and what is around them, tiles on the left: for each vertex the directions of the
-/// edges that start there, as indices into [`GridKind::steps`], ascending.
+/// Returns the edges between tiles and their surroundings, tiles on the left: for each vertex the directions of the
+/// edges that start there, as ascending indices into [`GridKind::steps`].
 fn boundary_edges(
     kind: GridKind,
     tiles: impl Iterator<Item = Tile>,
@@ -133,9 +132,9 @@ fn remove(edges: &mut BTreeMap<Vertex, Vec<usize>>, from: Vertex, direction: usi
     true
 }
 
-/// Follows an outline from where it starts with a heading, turning left as sharply as possible at every vertex,
-/// which keeps to the same white area where several meet. When the walk reaches a vertex for the
-/// second time, the part in between is cut off as a loop of its own.
+/// Traces an outline from a start vertex and heading, turning left as sharply as possible at every vertex. This keeps
+/// to the same white area where several meet. When the path reaches a vertex for the second time, the part in between
+/// becomes a separate loop.
 fn trace(
     kind: GridKind,
     edges: &mut BTreeMap<Vertex, Vec<usize>>,
@@ -158,13 +157,13 @@ fn trace(
     }
 }
 
-/// All directions except straight back, from the sharpest left turn on.
+/// Iterates over all directions except straight back, starting with the sharpest left turn.
 fn left_first(kind: GridKind, heading: usize) -> impl Iterator<Item = usize> {
     let full = kind.steps().len();
     (1..full).map(move |right| (heading + full / 2 + full - right) % full)
 }
 
-/// The vertices of a loop where its direction changes.
+/// Returns the vertices of a loop at which its direction changes.
 fn bends(steps: &[(Vertex, usize)]) -> Vec<Vertex> {
     let before = |i: usize| steps[(i + steps.len() - 1) % steps.len()].1;
     let bends = steps.iter().enumerate().filter(|&(i, &(_, heading))| heading != before(i));
@@ -178,7 +177,7 @@ mod tests {
     use super::*;
     use deltille_core::lattice::Dimension;
 
-    /// The signed area of which a triangular cell has 1, a square one 2.
+    /// Signed area, in units in which a triangular cell has 1 and a square one 2.
     fn area(outline: &[Vertex]) -> i32 {
         let next = outline.iter().cycle().skip(1);
         outline.iter().zip(next).map(|(a, b)| a.col * b.row - a.row * b.col).sum()
@@ -202,7 +201,7 @@ mod tests {
     }
 
     proptest! {
-        /// The loops enclose exactly the white cells, each runs through a vertex once.
+        /// The loops enclose exactly the white cells, and each passes a vertex once.
         #[test]
         fn loops_are_simple_and_enclose_the_white_cells(
             bits in 3u32..9, seed: u64, square: bool,

@@ -1,17 +1,17 @@
-//! The outline of a check bar, which is measured with a ruler to find the print scale.
+//! Outline of a check bar, which is measured with a ruler to determine the print scale.
 
 use kurbo::{Affine, BezPath};
 
 use crate::{CHECK_BAR_STROKE_MM, CheckBar};
 
-/// Width of an end stroke, along the bar, mm: slightly more than the line of a ruler.
+/// Width of an end stroke along the bar, mm: slightly more than a ruler line.
 pub const STROKE_WIDTH_MM: f64 = 0.3;
 
 /// Thickness of the line that joins the end strokes, mm.
 const LINE_MM: f64 = 0.2;
 
-/// The outline of a check bar in the frame of its page, mm: two end strokes, whose outer edges are
-/// `from` and `to`, joined by a thin line.
+/// Returns the outline of a check bar in the frame of its page, mm: two end strokes, whose outer edges are at `from`
+/// and `to`, joined by a thin line.
 ///
 /// ```text
 ///   from ┃━━━━━━━━━━━━━━━━━━━━━━━━━━━━┃ to

@@ -11,26 +11,26 @@ use crate::{
 };
 use deltille_core::targets::{Target, TargetError, TargetSpec};
 
-/// Blank between panels, mm: more than the width of any cut.
+/// Gap between panels, mm: wider than any kerf.
 pub(super) const GAP_MM: f64 = 4.0;
 
-/// Height of the number of a face, as a fraction of the inradius, and its maximum, mm.
+/// Height of the number of a face as a fraction of the inradius, and its maximum, mm.
 const FACE_CAP: (f64, f64) = (0.25, 8.0);
 
-/// Advance width of a digit, in heights of a capital.
+/// Advance width of a digit, in capital heights.
 const ADVANCE_CAPS: f64 = 0.84;
 
-/// Distance of the number of an edge from it, mm.
+/// Distance of an edge number from its edge, mm.
 const EDGE_GAP_MM: f64 = 1.5;
 
-/// Greatest deviation of the line segments that replace the curves of letters, mm.
+/// Maximum deviation of the line segments that replace the curves of letters, mm.
 const FLATTENING_MM: f64 = 0.02;
 
-/// Lines of an outline whose ends are nearer than this are joined, mm: pieces between a face and
-/// its tab that are shorter than a line is wide are left out of a net.
+/// Outline ends closer than this are joined, mm: nets omit pieces between a face and its tab that are shorter than a
+/// line width.
 const JOIN_MM: f64 = 0.2;
 
-/// The operation along a path, one layer of the drawing each.
+/// Operation along a path; each is one layer of the drawing.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub enum CutLayer {
     /// Cut through.
@@ -46,9 +46,9 @@ pub enum CutLayer {
 /// A polyline.
 #[derive(Clone, Debug, PartialEq)]
 pub struct CutPath {
-    /// The operation along it.
+    /// Operation along the path.
     pub layer: CutLayer,
-    /// Whether the last point is joined to the first one.
+    /// Whether the last point is joined to the first.
     pub closed: bool,
     /// Points in the frame of the drawing, mm, x right, y up.
     pub points_mm: Vec<DVec2>,
@@ -61,34 +61,34 @@ pub struct CutDrawing {
     pub paths: Vec<CutPath>,
 }
 
-/// Why a target has no drawing for a cutter.
+/// Reason why a target has no drawing for a cutter.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum CuttingError {
     /// The target is not a solid.
-    #[error("{0} is no solid made by `deltille`: it has no panels to cut")]
+    #[error("{0} is not a solid made by `deltille`, so it has no panels to cut")]
     NotSolid(String),
-    /// The sheets of the solid are not those of its net, or there are none.
-    #[error("{0} is not laid out as a net: there is no net to cut")]
+    /// The sheets of the solid are not those of its net, or it has no sheets.
+    #[error("{0} is not laid out as a net, so there is no net to cut")]
     NotNet(String),
     /// The target has no plates.
-    #[error("{0} is a sheet of tags: only boards and solids are engraved by a laser")]
+    #[error("{0} is a sheet of tags: only boards and solids can be engraved by a laser")]
     NotBoard(String),
-    /// A beam that is too wide, or no width.
+    /// The kerf is too wide, or not a valid width.
     #[error(
-        "a kerf of {kerf_mm} mm is not between 0 mm and {:.3} mm, a quarter of the finest thing on the board",
+        "a kerf of {kerf_mm} mm is not between 0 mm and {:.3} mm, a quarter of the finest detail on the board",
         most_mm
     )]
     Kerf {
-        /// The width asked for, mm.
+        /// Requested kerf, mm.
         kerf_mm: f64,
-        /// The largest that leaves something of everything, mm.
+        /// Largest kerf that preserves every detail, mm.
         most_mm: f64,
     },
     /// The board cannot be drawn.
     #[error(transparent)]
     Draw(#[from] super::ArtworkError),
-    /// The solid cannot be made.
+    /// The solid cannot be built.
     #[error(transparent)]
     Target(#[from] TargetError),
     /// The font lacks a character of a number.
@@ -96,14 +96,13 @@ pub enum CuttingError {
     Text(#[from] MissingGlyph),
 }
 
-/// The panels of a solid side by side, seen from outside: outlines to cut in true size, and the
-/// numbers of each face and of its edges to engrave. Edges of the same number meet on the solid.
+/// Returns the panels of a solid side by side, seen from outside: outlines to cut in true size, and the numbers of each
+/// face and its edges to engrave. Edges with the same number meet on the solid.
 ///
-/// Panels are whole faces, or the plates that fit the seats of the skeleton where the specification
-/// has one.
+/// Panels are whole faces, or, if the specification has a skeleton, plates that fit its seats.
 ///
 /// # Errors
-/// When the target is not a solid, or its skeleton has no seats for the faces.
+/// Returns an error if the target is not a solid, or if its skeleton has no seats for the faces.
 pub fn panels_to_cut(target: &Target) -> Result<CutDrawing, CuttingError> {
     let TargetSpec::Solid(spec) = &target.spec else {
         return Err(CuttingError::NotSolid(target.name.to_string()));
@@ -135,17 +134,16 @@ pub fn panels_to_cut(target: &Target) -> Result<CutDrawing, CuttingError> {
     Ok(drawing)
 }
 
-/// The net of a solid to cut, score and fold, in true size and independent of the pages on which it
-/// is printed: the outline of each piece with its tabs, the lines to fold, and the numbers of faces
-/// and edges to engrave. Pieces lie side by side.
+/// Returns the net of a solid to cut, score and fold, in true size and independent of the printed pages: the outline of
+/// each piece with its tabs, the folding lines, and the numbers of faces and edges to engrave. Pieces lie side by side.
 ///
 /// # Errors
-/// When the target was not laid out as a net of closed outlines.
+/// Returns an error if the target was not laid out as a net of closed outlines.
 pub fn net_to_cut(printing: &Printing) -> Result<CutDrawing, CuttingError> {
     let no_net = || CuttingError::NotNet(printing.target.name.to_string());
     let mut drawing = CutDrawing::default();
     let mut right_mm = 0.0;
-    // The guide has no piece of it.
+    // The guide page does not contain a piece of the net.
     for sheet in printing.sheets.iter().filter(|sheet| !sheet.placements.is_empty()) {
         let mut piece = CutDrawing::default();
         for points_mm in outlines(sheet).ok_or_else(no_net)? {
@@ -173,12 +171,10 @@ pub fn net_to_cut(printing: &Printing) -> Result<CutDrawing, CuttingError> {
     if drawing.paths.is_empty() { Err(no_net()) } else { Ok(drawing) }
 }
 
-/// The closed outlines that the cut lines of a sheet form, mm; `None` when a line does not
-/// continue.
+/// Returns the closed outlines formed by the cutting lines of a sheet, mm; `None` if a line has no continuation.
 ///
-/// Every line runs with the paper on its left. Where an outline touches itself, more than one line
-/// begins; the outline continues with the line that encloses the least angle of paper, which no
-/// other line can divide.
+/// Every line has the paper on its left. Where an outline touches itself, several lines begin. The outline continues
+/// with the line that encloses the smallest angle of paper, which no other line can divide.
 fn outlines(sheet: &SheetLayout) -> Option<Vec<Vec<DVec2>>> {
     let cuts = sheet.lines.iter().filter(|line| line.kind == LineKind::Cut);
     let mut left: Vec<[DVec2; 2]> = cuts.map(|line| [line.from_mm, line.to_mm]).collect();
@@ -190,7 +186,7 @@ fn outlines(sheet: &SheetLayout) -> Option<Vec<Vec<DVec2>>> {
             let paper_rad = |[from, to]: [DVec2; 2]| {
                 let back = (last[0] - last[1]).to_angle();
                 let on = (to - from).to_angle();
-                // Coincident lines enclose a whole turn of paper, not none.
+                // Coincident lines enclose 360° of paper, not 0°.
                 TAU - (on - back).rem_euclid(TAU)
             };
             let near = |a: DVec2, b: DVec2| a.distance(b) < JOIN_MM;
@@ -214,7 +210,7 @@ fn outlines(sheet: &SheetLayout) -> Option<Vec<Vec<DVec2>>> {
     Some(outlines)
 }
 
-/// The number of a face, centred on its incircle.
+/// Lays out the number of a face, centred on its incircle.
 fn face_number(placement: &Placement, outline: &[DVec2], index: usize) -> crate::SheetText {
     let corners: Vec<_> = outline.iter().map(|corner| corner.extend(0.0)).collect();
     let circle = deltille_core::targets::Incircle::of(&corners);
@@ -232,7 +228,7 @@ fn face_number(placement: &Placement, outline: &[DVec2], index: usize) -> crate:
 }
 
 impl CutDrawing {
-    /// Bounding box, mm: left, lower, right and upper end; `None` for an empty drawing.
+    /// Returns the bounding box, mm: left, lower, right and upper end; `None` for an empty drawing.
     pub fn bounds_mm(&self) -> Option<[f64; 4]> {
         let points = || self.paths.iter().flat_map(|path| &path.points_mm).copied();
         let (least, most) = (points().reduce(DVec2::min)?, points().reduce(DVec2::max)?);

@@ -30,14 +30,13 @@ const TEXT: f64 = 0.13;
 /// Space between two tags, and around all of them, in edge lengths.
 const GAP: f64 = 0.25;
 
-/// Draws the tags `ids` of a family, each with its id below, on a sheet of just the size needed,
-/// mm.
+/// Draws the tags `ids` of a family, each with its id below, on a sheet of exactly the required size, mm.
 ///
-/// Ids that the family does not have are left out; the caller should check them first. Tags are
-/// drawn as triangles, whatever the dimension of the family.
+/// Ids that the family does not contain are skipped; the caller should check them first. Tags are always drawn as
+/// triangles.
 ///
 /// # Errors
-/// When the font lacks a character of an id; it has all digits.
+/// Returns an error if the font lacks a character of an id. The built-in font has all digits.
 pub fn tag_gallery(
     family: &Family,
     ids: &[u32],

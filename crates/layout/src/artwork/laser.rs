@@ -1,16 +1,15 @@
-//! Drawings of boards, and faces of solids, for a laser or a plotter: what is black as closed outlines to engrave, and the outline of the plate to
-//! cut, with an allowance for the width of the beam.
+//! Drawings of boards and faces of solids for a laser or a plotter: black areas as closed outlines to engrave, and the
+//! outline of the plate to cut, with kerf compensation.
 //!
 //! ```text
-//!    ╲──────────╱      ╲───────╱       A beam takes away half of its width on either side of its
-//!     ╲ engrave╱        ╲─────╱        path. So what is engraved is drawn that much smaller, and the
-//!      ╲      ╱   →      ╲   ╱         plate that much larger; tiles that meet in a corner come
-//!       ╲    ╱            ╲ ╱          apart. Corners stay sharp: each edge is moved along its
-//!        ╳──╳                          normal, and meets its neighbours where they then are.
+//!    ╲──────────╱      ╲───────╱       A beam removes half its width on either side of its path. So
+//!     ╲ engrave╱        ╲─────╱        engraved areas are drawn smaller by that amount, and the plate
+//!      ╲      ╱   →      ╲   ╱         larger. Tiles that meet in a corner therefore separate. Corners
+//!       ╲    ╱            ╲ ╱          stay sharp: each edge is moved along its normal, and meets its
+//!        ╳──╳                          neighbours at their new position.
 //! ```
 //!
-//! Every outline has what is black on its left: outer ones run counter-clockwise, holes clockwise (on a mirrored board
-//! too).
+//! Every outline has black on its left: outer outlines run counter-clockwise, holes clockwise, on a mirrored board too.
 
 use std::collections::BTreeMap;
 use std::f64::consts::TAU;
@@ -26,13 +25,14 @@ use deltille_core::lattice::{GridKind, Tile, Vertex};
 use deltille_core::polygon::rectangle;
 use deltille_core::targets::{Face, Panel, TagPlacement, TagsIn, Target, TargetSpec};
 
-/// Widest kerf, mm: less than the gap between two plates.
+/// Largest kerf, mm: smaller than the gap between two plates.
 const WIDEST_KERF_MM: f64 = 3.0;
 
-/// Greatest part of the finest thing on a board that a kerf may take.
+/// Largest fraction of the finest detail on a board that a kerf may take.
 const KERF_PART: f64 = 0.25;
 
-/// Sides of the polygon that stands for a disc: of a diameter of 50 mm they are within a micrometre of it.
+/// Number of sides of the polygon that approximates a disc: for a diameter of 50 mm it stays within a micrometre of the
+/// circle.
 const DISC_SIDES: u32 = 360;
 
 /// A board, or a face of a solid, in a drawing.
@@ -40,27 +40,27 @@ const DISC_SIDES: u32 = 360;
 pub struct LaserBoard<'a> {
     /// The board.
     pub panel: &'a Panel,
-    /// Outline of the finished plate, counter-clockwise in the frame of the board, mm: tiles with their quiet zone, or the
-    /// panel of a solid.
+    /// Outline of the finished plate, counter-clockwise in the frame of the board, mm: tiles with their quiet zone, or
+    /// the panel of a solid.
     pub plate_mm: Vec<DVec2>,
-    /// Where it lies, as it is seen.
+    /// Placement in the unmirrored drawing.
     placement: Placement,
-    /// Right end of all plates, by which a mirrored drawing is mirrored, mm; `None` for one as it is seen.
+    /// Right end of all plates, about which a mirrored drawing is reflected, mm; `None` if not mirrored.
     mirror_mm: Option<f64>,
 }
 
 impl LaserBoard<'_> {
-    /// A point of a drawing as it is seen in one that may be mirrored, or back, mm.
+    /// Maps a point between the mirrored and the unmirrored drawing, mm.
     fn mirrored(&self, point: DVec2) -> DVec2 {
         self.mirror_mm.map_or(point, |right| DVec2::new(right - point.x, point.y))
     }
 
-    /// A point of the drawing in the frame of the board, mm.
+    /// Returns the board coordinates of a point of the drawing, mm.
     pub fn board_from_drawing(&self, point: DVec2) -> DVec2 {
         self.placement.panel_from_page(self.mirrored(point))
     }
 
-    /// Whether a point of the drawing is on the plate.
+    /// Returns whether a point of the drawing lies on the plate.
     pub fn holds(&self, point: DVec2) -> bool {
         let point = self.board_from_drawing(point);
         let next = self.plate_mm.iter().cycle().skip(1);
@@ -68,7 +68,7 @@ impl LaserBoard<'_> {
         sides.all(|(&from, &to)| (to - from).perp_dot(point - from) >= 0.0)
     }
 
-    /// An outline in the frame of the board as a path of the drawing, in the same sense.
+    /// Converts an outline in the frame of the board to a path of the drawing with the same orientation.
     fn path(&self, layer: CutLayer, outline: &[DVec2]) -> CutPath {
         let seen = outline.iter().map(|&point| self.placement.page_from_panel(point));
         let mut points_mm: Vec<DVec2> = seen.map(|point| self.mirrored(point)).collect();
@@ -79,10 +79,10 @@ impl LaserBoard<'_> {
     }
 }
 
-/// The boards or faces of a target side by side, in true size and as they are mirrored.
+/// Returns the boards or faces of a target side by side, in true size, mirrored if the print is.
 ///
 /// # Errors
-/// When the target is neither made of boards nor a solid.
+/// Returns an error if the target is neither made of boards nor a solid.
 pub fn laser_boards(printing: &Printing) -> Result<Vec<LaserBoard<'_>>, CuttingError> {
     let target = &printing.target;
     let mut boards = match &target.spec {
@@ -100,7 +100,7 @@ pub fn laser_boards(printing: &Printing) -> Result<Vec<LaserBoard<'_>>, CuttingE
     Ok(boards)
 }
 
-/// The plates of boards in rows from below, about as many in each as there are rows.
+/// Arranges the plates of boards in rows from below, with about as many columns as rows.
 fn plates_in_rows(target: &Target) -> Vec<LaserBoard<'_>> {
     let columns = (target.panels.len() as f64).sqrt().ceil() as usize;
     let mut boards = Vec::new();
@@ -121,7 +121,7 @@ fn plates_in_rows(target: &Target) -> Vec<LaserBoard<'_>> {
     boards
 }
 
-/// The panels of a solid as they are cut without engraving.
+/// Arranges the panels of a solid as in a drawing without engraving.
 fn faces_in_rows<'a>(target: &'a Target, faces: &[Face]) -> Vec<LaserBoard<'a>> {
     let placements: Vec<Placement> = Packing::tightest(faces, GAP_MM).placements().collect();
     let plates = faces.iter().map(|face| face.outline_mm.clone()).zip(placements);
@@ -131,11 +131,12 @@ fn faces_in_rows<'a>(target: &'a Target, faces: &[Face]) -> Vec<LaserBoard<'a>> 
     boards.collect()
 }
 
-/// The drawing of all boards or faces of a target for a beam of this width, mm. Finished plates lie right of the origin and
-/// above it.
+/// Draws all boards or faces of a target for a beam of the given width, mm. Finished plates lie to the right of and
+/// above the origin.
 ///
 /// # Errors
-/// When the target is neither made of boards nor a solid, the family of its tags is unknown or lacks a code, or the beam is too wide.
+/// Returns an error if the target is neither made of boards nor a solid, the family of its tags is unknown or lacks a
+/// code, or the beam is too wide.
 pub fn to_laser(printing: &Printing, kerf_mm: f64) -> Result<CutDrawing, CuttingError> {
     let boards = laser_boards(printing)?;
     let target = &printing.target;
@@ -151,15 +152,15 @@ pub fn to_laser(printing: &Printing, kerf_mm: f64) -> Result<CutDrawing, Cutting
         let dark = dark_outlines(target, board.panel, kerf_mm == 0.0)?;
         let dark = dark.iter().map(|outline| moved_inwards(outline, half));
         paths.extend(dark.map(|outline| board.path(CutLayer::Engrave, &outline)));
-        // Holes first: what is cut out may move.
+        // Holes come first, because a plate may move once it is cut out.
         let cut = holes(board.panel).chain([board.plate_mm.clone()]);
         paths.extend(cut.map(|outline| board.path(CutLayer::Cut, &moved_inwards(&outline, -half))));
     }
     Ok(CutDrawing { paths })
 }
 
-/// The smallest length on a board, mm: the edge of a cell of its tags, of a tile, the diameter of a disc or hole, or twice the
-/// black around a hole where that is narrowest.
+/// Returns the smallest length on a board, mm: the edge of a tag cell or a tile, the diameter of a disc or hole, or
+/// twice the narrowest black ring around a hole.
 fn finest_mm(panel: &Panel, family: Option<&Family>) -> f64 {
     let family = family.filter(|_| panel.border_bits.is_some());
     let family = family.and_then(|family| family.of_tiling(panel.kind));
@@ -173,8 +174,8 @@ fn finest_mm(panel: &Panel, family: Option<&Family>) -> f64 {
     lengths.into_iter().flatten().fold(panel.edge_mm, f64::min)
 }
 
-/// The outlines of what is black on a board, in its frame, mm. Where black meets black in a corner only, they keep apart;
-/// `simple` ones pass no corner twice.
+/// Returns the outlines of the black areas of a board, in its frame, mm. Areas that meet only in a corner stay
+/// separate. `simple` outlines pass no corner twice.
 fn dark_outlines(
     target: &Target,
     panel: &Panel,
@@ -183,7 +184,7 @@ fn dark_outlines(
     if let Some(diameter) = panel.discs_mm {
         return Ok(panel.corners.iter().map(|corner| disc(corner.panel_mm, diameter)).collect());
     }
-    // Dark tiles of an inverted board are white on print.
+    // Dark tiles of an inverted board are printed white.
     let inside = !panel.inverted;
     let around = outlines(panel.kind, panel.dark_tiles().into_iter(), inside, simple);
     let mut dark: Vec<Vec<DVec2>> = around
@@ -205,7 +206,7 @@ fn dark_outlines(
     Ok(dark)
 }
 
-/// The holes of the tags of a panel, clockwise in its frame, mm.
+/// Iterates over the holes of the tags of a panel, clockwise in its frame, mm.
 fn holes(panel: &Panel) -> impl Iterator<Item = Vec<DVec2>> {
     let of_tag = move |(tag, diameter): (&TagPlacement, f64)| {
         let mut outline = disc(panel.tag_middle_mm(tag), diameter);
@@ -215,13 +216,13 @@ fn holes(panel: &Panel) -> impl Iterator<Item = Vec<DVec2>> {
     panel.tags.iter().filter_map(|tag| Some((tag, panel.hole_mm?))).map(of_tag)
 }
 
-/// The outline of a disc, counter-clockwise, mm.
+/// Returns the outline of a disc, counter-clockwise, mm.
 fn disc(middle: DVec2, diameter: f64) -> Vec<DVec2> {
     let angles = (0..DISC_SIDES).map(|n| TAU * f64::from(n) / f64::from(DISC_SIDES));
     angles.map(|angle| middle + diameter / 2.0 * DVec2::from_angle(angle)).collect()
 }
 
-/// The outlines of the black of a tag, in the frame of its board, mm.
+/// Returns the outlines of the black areas of a tag, in the frame of its board, mm.
 fn tag_outlines(
     target: &Target,
     panel: &Panel,
@@ -250,8 +251,9 @@ fn tag_outlines(
     Ok(dark.iter().map(|outline| outline.iter().map(place).collect()).collect())
 }
 
-/// The outlines of tiles as vertices where they bend, with the tiles on the left, or on the right unless `inside`. `simple` ones
-/// have vertices where they meet others, too, so that they still meet there when coordinates are rounded.
+/// Returns the outlines of tiles as vertices where they bend, with the tiles on the left, or on the right if not
+/// `inside`. `simple` outlines also keep the vertices where they meet others, so that they still meet after coordinates
+/// are rounded.
 fn outlines(
     kind: GridKind,
     tiles: impl Iterator<Item = Tile>,
@@ -276,8 +278,8 @@ fn outlines(
     walks.iter().map(vertices).collect()
 }
 
-/// A closed outline with each edge moved to its left by a length, mm, or to its right by a negative one; edges stay as long
-/// as their neighbours leave them.
+/// Returns a closed outline with each edge moved to its left by a length, mm, or to its right if negative. Edges end
+/// where they meet their moved neighbours.
 pub fn moved_inwards(outline: &[DVec2], by_mm: f64) -> Vec<DVec2> {
     let count = outline.len();
     let normal =
@@ -303,14 +305,14 @@ mod tests {
         of_layer.map(|path| polygon::area(&path.points_mm)).sum()
     }
 
-    /// The area of what is drawn in the frame of a board, mm².
+    /// Area of the black shapes of a board in its frame, mm².
     fn drawn(target: &Target) -> f64 {
         let shapes = super::super::panel_shapes(target, &target.panels[0]).unwrap();
-        // Loops of white run the other way than those of black, inside a field as inside a tile.
+        // White loops run in the opposite direction to black ones, inside a field as inside a tile.
         shapes.iter().map(|shape| even_odd(&shape.path)).sum()
     }
 
-    /// The area of a path whose loops lie in each other, by the even-odd rule.
+    /// Area of a path with nested loops, by the even-odd rule.
     fn even_odd(path: &kurbo::BezPath) -> f64 {
         use kurbo::Shape;
         let elements = path.elements();
@@ -318,7 +320,7 @@ mod tests {
         let loops: Vec<kurbo::BezPath> =
             loops.map(|l| kurbo::BezPath::from_vec(l.to_vec())).collect();
         let depth = |of: &kurbo::BezPath| {
-            // A point just inside of the first edge.
+            // A point just inside the first edge.
             let Some(kurbo::PathSeg::Line(edge)) = of.segments().next() else { return 0 };
             let along = edge.p1 - edge.p0;
             let side = of.area().signum();
@@ -331,10 +333,10 @@ mod tests {
 
     proptest! {
         #![proptest_config(ProptestConfig::with_cases(24))]
-        /// The black of a drawing is that of the print; with a kerf, each edge takes half of that off along its length, and
-        /// moved back by as much it is the same again.
+        /// The black of a drawing matches the print. A kerf removes half its width along each edge, and moving the
+        /// edges back restores the original area.
         #[test]
-        fn black_is_that_of_the_print(
+        fn black_matches_the_print(
             rows in 3u32..7, cols in 3u32..7, kind in 0..4, inverted: bool, first_id in 0u32..40,
         ) {
             let mut spec = match kind {

@@ -1,27 +1,26 @@
-//! Dash patterns of the lines to cut and to fold along.
+//! Dash patterns of cutting and folding lines.
 
 use glam::DVec2;
 
 use crate::{LineKind, SheetLine};
 
-/// Dash and gap of a mountain fold, mm; both ends of the line are dashes, so that a ruler can be
-/// laid against them.
+/// Dash and gap of a mountain fold, mm. Both ends of the line are dashes, so that a ruler can be aligned with them.
 const DASH_MM: [f64; 2] = [3.0, 2.0];
 
 /// Dash, gap, dot and gap of a valley fold, mm.
 const DASH_DOT_MM: [f64; 4] = [3.0, 1.2, 0.6, 1.2];
 
-/// Dot and gap of a line between faces in one plane, mm.
+/// Dot and gap of a line between coplanar faces, mm.
 const DOT_MM: [f64; 2] = [0.6, 3.0];
 
-/// The strokes of which a line is drawn: start and end of each, in the frame of its page, mm.
+/// Returns the strokes of a line: start and end of each, in the frame of its page, mm.
 ///
 /// ```text
 ///   cut, align  ────────────────    fold  ──── ──── ────    valley  ──── · ──── · ────
 ///   flat  ·   ·   ·   ·
 /// ```
 ///
-/// A dash pattern is stretched so that a whole number of periods and a last dash fill the line.
+/// The pattern is stretched so that a whole number of periods and a final dash fill the line.
 pub fn strokes_mm(line: &SheetLine) -> Vec<[DVec2; 2]> {
     let pattern = match line.kind {
         LineKind::Cut | LineKind::Align => return vec![[line.from_mm, line.to_mm]],

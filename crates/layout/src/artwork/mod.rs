@@ -1,16 +1,15 @@
 //! The drawing of a target in millimetres, independent of the file type.
 //!
-//! [`Printing::draw`] turns a target and its layout into sheets of shapes. Every exporter writes
-//! the same shapes, and text is included as glyph outlines, so that PDF, SVG and PNG show the same
-//! marks whatever fonts the reader has.
+//! [`Printing::draw`] turns a target and its layout into sheets of shapes. Every exporter writes the same shapes. Text
+//! is included as glyph outlines, so PDF, SVG and PNG show the same marks regardless of the reader's fonts.
 //!
-//! No two shapes overlap: a black tile is one path whose holes are the merged white cells of its
-//! tag, and white is bare paper. Two tiles share only a vertex, so that no renderer shows a seam.
+//! No two shapes overlap: a black tile is one path whose holes are the merged white cells of its tag, and white is bare
+//! paper. Two tiles share only a vertex, so that no renderer shows a seam.
 //!
-//! 1. `board` draws panels, marks and texts; `cells` the white of a tag, `check_bar`, `line` and `text` what is beside it;
+//! 1. `board` draws panels, marks and texts, using `cells` (white of a tag), `check_bar`, `line` and `text`;
 //! 2. `window` clips a sheet to pages; `gallery` shows single tags;
 //! 3. `atlas` packs the faces of a solid on a texture;
-//! 4. `cutting` and `laser` are drawings for machines.
+//! 4. `cutting` and `laser` produce drawings for machines.
 //!
 //! Frame: the page frame of [`SheetLayout`](crate::SheetLayout), origin at the lower-left
 //! corner of the page, x right, y up.
@@ -52,7 +51,7 @@ pub struct Artwork {
     pub subject: String,
     /// The pages, in the order of the target's sheets and of the pages of each.
     pub sheets: Vec<Sheet>,
-    /// How they are printed. Shapes are mirrored already where that is so; formats with spot colours have those.
+    /// Print finish. If the finish is mirrored, shapes are already mirrored. Formats with spot colours use its colours.
     pub finish: Finish,
 }
 
@@ -68,7 +67,7 @@ pub struct Sheet {
 }
 
 impl Sheet {
-    /// Exchanges left and right.
+    /// Mirrors the page left to right.
     fn mirror(&mut self) {
         let mirrored = Affine::new([-1.0, 0.0, 0.0, 1.0, self.width_mm, 0.0]);
         self.shapes.iter_mut().for_each(|shape| shape.path = mirrored * &shape.path);
@@ -98,7 +97,7 @@ pub enum Paint {
     },
 }
 
-/// Which mark of a target a shape is.
+/// Identifies the mark that a shape belongs to.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Part {
     /// A black tile of a panel with the holes of its tag, or a tag in a white square; named by
@@ -141,15 +140,15 @@ pub enum Part {
     },
 }
 
-/// Why a target cannot be drawn.
+/// Reason why a target cannot be drawn.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum ArtworkError {
-    /// The codes of its tags are not known.
+    /// The codes of its tags are unknown.
     #[error(transparent)]
     Family(#[from] UnknownCodes),
     /// A tag id is not in the family.
-    #[error("tag {id} at row {row}, column {col} is beyond the {len} codes of family {family}")]
+    #[error("tag {id} at row {row}, column {col} is not in family {family}, which has {len} codes")]
     NoSuchTag {
         /// The id asked for.
         id: u32,
@@ -170,17 +169,17 @@ pub enum ArtworkError {
         /// Panel id.
         panel: u32,
     },
-    /// A text holds a character that the built-in font lacks.
+    /// A text contains a character that the built-in font lacks.
     #[error(transparent)]
     Text(#[from] text::MissingGlyph),
 }
 
 impl Printing {
-    /// Draws every page of a target, in the page frame, mm.
+    /// Draws every page of the target, in the page frame, mm.
     ///
     /// # Errors
-    /// When the family of its tags is unknown or lacks a code, a sheet shows an unknown panel, or the font
-    /// lacks a character of a text.
+    /// Returns an error if the family of the tags is unknown or lacks a code, a sheet shows an unknown panel, or the
+    /// font lacks a character of a text.
     ///
     /// ```
     /// use deltille_layout::Printing;
@@ -213,21 +212,21 @@ impl Printing {
 /// Draws the tiles of one panel in the frame of the panel, mm.
 ///
 /// # Errors
-/// When the family of its tags is unknown or lacks a code.
+/// Returns an error if the family of its tags is unknown or lacks a code.
 pub fn panel_shapes(target: &Target, panel: &Panel) -> Result<Vec<Shape>, ArtworkError> {
     let placement = Placement { panel: panel.id, angle_rad: 0.0, origin_mm: DVec2::ZERO };
     board::draw_panel(target, panel, &placement)
 }
 
-/// The outline of a text in the frame of its page, mm; to be filled by the even-odd rule.
+/// Returns the outline of a text in the frame of its page, mm; to be filled by the even-odd rule.
 ///
 /// # Errors
-/// When the font lacks a character of the text.
+/// Returns an error if the font lacks a character of the text.
 pub fn text_outline(text: &SheetText) -> Result<BezPath, text::MissingGlyph> {
     board::draw_text(text)
 }
 
-/// One line that describes a target: kind, number of corners and tags, family with fingerprint.
+/// Describes a target in one line: kind, number of corners and tags, family with fingerprint.
 pub fn subject(target: &Target) -> String {
     let corners: usize = target.panels.iter().map(|panel| panel.corners.len()).sum();
     let tags: usize = target.panels.iter().map(|panel| panel.tags.len()).sum();

@@ -4,15 +4,15 @@ use kurbo::{BezPath, PathEl, Point, Rect, Shape as _};
 
 use super::{Paint, Shape};
 
-/// Greatest deviation of the line segments that replace curves across the border of a window, mm.
+/// Maximum deviation of the line segments that replace curves across the border of a window, mm.
 const FLATNESS_MM: f64 = 0.001;
 
-/// Width below which what a window leaves of an area is left out, mm: some viewers draw so thin a mark as wide as a pixel,
-/// others not at all, and the page beside shows it whole.
+/// Minimum width of a clipped area, mm; narrower remnants are omitted. Some viewers draw a mark this thin one pixel
+/// wide, others not at all, and the adjacent page shows the whole area.
 const SLIVER_MM: f64 = 0.02;
 
-/// The part of a shape inside a window, mm; `None` when there is none. Shapes that lie entirely
-/// inside keep their curves.
+/// Returns the part of a shape inside a window, mm; `None` if the shape is outside. Shapes entirely inside keep their
+/// curves.
 pub(super) fn clip(shape: Shape, window: Rect) -> Option<Shape> {
     let bounds = shape.path.bounding_box();
     if window.union(bounds) == window {
@@ -42,7 +42,7 @@ pub(super) fn clip(shape: Shape, window: Rect) -> Option<Shape> {
     (!path.is_empty()).then_some(Shape { path, ..shape })
 }
 
-/// Twice the area of a polygon over its perimeter: the width of a long one.
+/// Returns twice the area of a polygon divided by its perimeter: the width of a long shape.
 fn width(polygon: &[Point]) -> f64 {
     let sides = || polygon.iter().zip(polygon.iter().cycle().skip(1));
     let area: f64 = sides().map(|(a, b)| 0.5 * a.to_vec2().cross(b.to_vec2())).sum();
@@ -59,7 +59,7 @@ fn append(path: &mut BezPath, points: &[Point], close: bool) {
     }
 }
 
-/// The contours of a path as polylines.
+/// Converts the contours of a path to polylines.
 fn polylines(path: &BezPath) -> Vec<Vec<Point>> {
     let mut lines = Vec::<Vec<Point>>::new();
     kurbo::flatten(path, FLATNESS_MM, |element| match element {
@@ -70,13 +70,13 @@ fn polylines(path: &BezPath) -> Vec<Vec<Point>> {
     lines
 }
 
-/// Distances of a point from the four sides of a rectangle, positive inside.
+/// Returns the distances of a point from the four sides of a rectangle, positive inside.
 fn depths(p: Point, window: Rect) -> [f64; 4] {
     [p.x - window.x0, window.x1 - p.x, p.y - window.y0, window.y1 - p.y]
 }
 
-/// The part of a polygon inside a rectangle, clipped side by side (Sutherland and Hodgman 1974).
-/// Where that is several parts, coincident lines along the border join them; they enclose no area.
+/// Clips a polygon to a rectangle, one side after the other (Sutherland and Hodgman 1974). If several parts result,
+/// coincident lines along the border join them; they enclose no area.
 fn clip_polygon(mut polygon: Vec<Point>, window: Rect) -> Vec<Point> {
     for side in 0..4 {
         let depth = |p: Point| depths(p, window)[side];
@@ -100,7 +100,7 @@ fn clip_polygon(mut polygon: Vec<Point>, window: Rect) -> Vec<Point> {
     polygon
 }
 
-/// The part of a line segment inside a rectangle; `None` when there is none.
+/// Returns the part of a line segment inside a rectangle; `None` if it is outside.
 fn clip_segment([from, to]: [Point; 2], window: Rect) -> Option<[Point; 2]> {
     let (mut start, mut end) = (0.0f64, 1.0f64);
     for (a, b) in depths(from, window).into_iter().zip(depths(to, window)) {
@@ -125,7 +125,7 @@ mod tests {
     use crate::artwork::Part;
 
     proptest! {
-        /// The area in the window is that of the polygon's points in it, counted on a grid.
+        /// Clipping preserves the winding number of every point inside the window.
         #[test]
         fn clipping_keeps_the_winding_of_every_point(
             points in prop::collection::vec((-3e4f64..3e4, -3e4f64..3e4), 3..9),
@@ -147,7 +147,7 @@ mod tests {
     }
 
     #[test]
-    fn strokes_end_at_the_rim() {
+    fn strokes_end_at_the_border() {
         let mut path = BezPath::new();
         append(&mut path, &[Point::new(-2.0, 0.5), Point::new(2.0, 0.5)], false);
         let paint = Paint::Stroke { width_mm: 0.1 };

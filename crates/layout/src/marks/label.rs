@@ -1,11 +1,11 @@
-//! What the texts on a sheet say.
+//! Texts on a sheet.
 
 use std::fmt;
 
 use serde::{Deserialize, Serialize};
 
-/// What a text on a sheet says: a text in files, data for programs. Numbers of faces and edges are
-/// those of the solid, from 0.
+/// Text on a sheet: a string in files, structured data in programs. Faces and edges are numbered as in the solid, from
+/// 0.
 ///
 /// ```
 /// use deltille_layout::Label;
@@ -19,38 +19,38 @@ use serde::{Deserialize, Serialize};
 pub enum Label {
     /// The number of a face.
     Face(usize),
-    /// The number of an edge: sides of the same number meet.
+    /// Number of an edge. Sides with the same number meet.
     Edge(usize),
-    /// The number of an edge, and the face that its tab goes under.
+    /// Number of an edge, and the face under which its tab is glued.
     Tab {
         /// The edge.
         edge: usize,
         /// The face.
         under: usize,
     },
-    /// The number of an edge, and the face beyond it.
+    /// Number of an edge, and the face beyond it.
     Beyond {
         /// The edge.
         edge: usize,
         /// The face.
         face: usize,
     },
-    /// Anything else, for people: ASCII and `° ± · × – −`.
+    /// Any other text: ASCII and `° ± · × – −`.
     Words(String),
 }
 
 impl Label {
-    /// How many characters it has.
+    /// Returns the number of characters.
     pub fn characters(&self) -> usize {
         self.to_string().chars().count()
     }
 
-    /// Whether it says which face or edge of a solid something is.
+    /// Returns whether the label identifies a face or an edge of a solid.
     pub fn is_number(&self) -> bool {
         !matches!(self, Self::Words(_))
     }
 
-    /// A number of a face or an edge.
+    /// Parses the number of a face or an edge.
     fn read_number(text: &str) -> Option<Self> {
         if let Some(face) = text.strip_prefix("face ") {
             return Some(Self::Face(face.parse().ok()?));
@@ -78,10 +78,10 @@ impl fmt::Display for Label {
     }
 }
 
-/// The label that is written so.
+/// Parses the text that [`Display`](fmt::Display) writes for a label.
 impl From<String> for Label {
     fn from(text: String) -> Self {
-        // Such as "edge 07" is no number that is written here.
+        // A text such as "edge 07" does not match the written form, so it stays words.
         let number = Self::read_number(&text).filter(|label| label.to_string() == text);
         number.unwrap_or(Self::Words(text))
     }
@@ -101,7 +101,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_is_written_is_read_and_other_words_stay_as_they_are() {
+    fn written_labels_are_read_back_and_other_words_are_kept() {
         let tab = Label::Tab { edge: 7, under: 3 };
         for label in [Label::Face(0), Label::Edge(29), tab, Label::Beyond { edge: 0, face: 12 }] {
             assert_eq!(Label::from(label.to_string()), label);

@@ -1,8 +1,8 @@
-//! A logo: a black outline in the margin of sheets, so that a target is told apart and known to be somebody's.
+//! A logo: a black outline in the margin of each sheet that identifies a target and its owner.
 //!
 //! ```text
-//!   ├──────────── 230 mm ───────────┤   ▲▲    It lies at the end of the strip in which the label begins; the check bar
-//!   name · 10 × 11 corners · …         ▲▲▲▲   of that strip is shorter by it, and the board stays where it is.
+//!   ├──────────── 230 mm ───────────┤   ▲▲    The logo lies at the end of the strip in which the label begins. It shortens
+//!   name · 10 × 11 corners · …         ▲▲▲▲   the check bar of that strip; the board does not move.
 //! ```
 
 use std::fmt;
@@ -15,23 +15,24 @@ use deltille_core::setting::Setting::PaperLogo;
 use deltille_core::targets::TargetError;
 use deltille_core::{polygon, quantity};
 
-/// Height of a logo in the units of its outline: of one that is 12 mm high a unit is 1.2 µm.
+/// Height of a logo in outline units: for a logo 12 mm high, one unit is 1.2 µm.
 const UNITS: i32 = 10_000;
 
-/// Most characters of the data of an outline: some 6,000 corners, more than a printer shows on a few square centimetres;
-/// every target file has them.
+/// Maximum length of the outline data, bytes: some 6,000 corners, more than a printer resolves on a few square
+/// centimetres. Every target file contains the outline.
 pub const MOST_LOGO_BYTES: usize = 65_536;
 
-/// Most width of a logo, in heights, and most height in widths.
+/// Maximum ratio of width to height, and of height to width.
 const MOST_RATIO: f64 = 30.0;
 
-/// Width below which an outline is left out, mm: some viewers draw so thin a mark as wide as a pixel, others not at all.
+/// Minimum width of an outline, mm; narrower ones are omitted. Some viewers draw a mark this thin one pixel wide,
+/// others not at all.
 pub(super) const SLIVER_MM: f64 = 0.02;
 
-/// The black outline of a logo, in whole units of a ten-thousandth of its height.
+/// Black outline of a logo, in whole units of a ten-thousandth of its height.
 ///
-/// In files it is the data of an SVG path of straight lines, x right, y down, whose ink begins at 0 0; to be filled by
-/// the even-odd rule.
+/// In files, it is SVG path data of straight lines, x right, y down, whose ink begins at 0 0. Fill it by the even-odd
+/// rule.
 ///
 /// ```
 /// use deltille_layout::Logo;
@@ -50,23 +51,23 @@ pub struct Logo {
 }
 
 impl Logo {
-    /// A logo of closed outlines in any unit, x right, y down. They do not cross; outer ones run one way, holes the
-    /// other.
+    /// Builds a logo from closed outlines in any unit, x right, y down. Outlines must not cross. Holes run in the
+    /// opposite direction to outer outlines.
     ///
     /// # Errors
-    /// When nothing is left of it, it is far wider than high or far higher than wide, or has too many corners.
+    /// Returns an error if no area remains, if the aspect ratio is too extreme, or if the outline has too many corners.
     pub fn from_outlines(outlines: &[Vec<DVec2>]) -> Result<Self, TargetError> {
         let points = || outlines.iter().flatten().copied();
         let end = |of: fn(DVec2, DVec2) -> DVec2| points().reduce(of).unwrap_or_default();
         let (least, size) = (end(DVec2::min), end(DVec2::max) - end(DVec2::min));
         if !(size.x > 0.0 && size.y > 0.0 && size.is_finite()) {
-            return refused("nothing of it is black");
+            return refused("the logo has no black area");
         }
         if size.x > MOST_RATIO * size.y || size.y > MOST_RATIO * size.x {
             let [x, y] = [size.x, size.y].map(|side| side / size.min_element());
             return refused(format!(
-                "its width is to its height as {x:.0} to {y:.0}: take one that is at most {MOST_RATIO} times as long \
-                 as broad"
+                "the aspect ratio is {x:.0} to {y:.0}: use a logo whose longer side is at most {MOST_RATIO} times \
+                 the shorter"
             ));
         }
         let scale = f64::from(UNITS) / size.y;
@@ -86,7 +87,7 @@ impl Logo {
         let logo = Self::new(rings).or_else(refused)?;
         if logo.to_string().len() > MOST_LOGO_BYTES {
             return refused(format!(
-                "its outline has {} corners, of which some 6,000 find room in a target file: simplify its paths",
+                "the outline has {} corners, but a target file holds about 6,000: simplify its paths",
                 logo.rings.iter().map(Vec::len).sum::<usize>()
             ));
         }
@@ -100,25 +101,25 @@ impl Logo {
         };
         let ([left, right], [upper, lower]) = (end(0), end(1));
         if rings.iter().any(|ring| ring.len() < 3) {
-            return Err("an outline has less than three corners".to_owned());
+            return Err("an outline has fewer than three corners".to_owned());
         }
         if [left, upper, lower] != [0, 0, UNITS] {
-            return Err(format!("its ink does not reach from 0 0 to a height of {UNITS}"));
+            return Err(format!("the ink must start at 0 0 and have a height of {UNITS}"));
         }
         let ratio = f64::from(right) / f64::from(UNITS);
-        // Rounded.
+        // Coordinates are rounded, so the ratio may exceed the limit slightly.
         if !(0.99 / MOST_RATIO..=1.01 * MOST_RATIO).contains(&ratio) {
-            return Err(format!("it is more than {MOST_RATIO} times as long as broad"));
+            return Err(format!("its longer side is more than {MOST_RATIO} times the shorter"));
         }
         Ok(Self { rings, width: right })
     }
 
-    /// Its width, in heights.
+    /// Returns the width, in heights.
     pub fn width(&self) -> f64 {
         f64::from(self.width) / f64::from(UNITS)
     }
 
-    /// Its closed outlines where it lies, in the frame of the page, mm; without those that would be less than 0.02 mm wide.
+    /// Returns the closed outlines at their position on the page, mm, without those narrower than 0.02 mm.
     pub fn outlines_mm(&self, place: &LogoPlacement) -> Vec<Vec<DVec2>> {
         let turn = DVec2::from_angle(place.angle_rad);
         let unit = place.height_mm / f64::from(UNITS);
@@ -131,7 +132,7 @@ impl Logo {
     }
 }
 
-/// Twice the area of a closed outline over its length: the width of a long one.
+/// Returns twice the area of a closed outline divided by its perimeter: the width of a long shape.
 fn width(outline: &[DVec2]) -> f64 {
     let next = outline.iter().cycle().skip(1);
     let length: f64 = outline.iter().zip(next).map(|(a, b)| a.distance(*b)).sum();
@@ -165,14 +166,16 @@ impl TryFrom<String> for Logo {
 
     fn try_from(text: String) -> Result<Self, String> {
         if text.len() > MOST_LOGO_BYTES {
-            return Err(format!("it has more than {MOST_LOGO_BYTES} characters"));
+            return Err(format!("it is longer than {MOST_LOGO_BYTES} characters"));
         }
-        let path = BezPath::from_svg(&text).map_err(|_| "it is no data of an SVG path")?;
+        let path = BezPath::from_svg(&text).map_err(|_| "it is not valid SVG path data")?;
         let whole = |Point { x, y }: Point| {
             let is_whole = [x, y]
                 .iter()
                 .all(|value| (0.0..=f64::from(i32::MAX)).contains(value) && value.fract() == 0.0);
-            is_whole.then_some([x as i32, y as i32]).ok_or("its coordinates are not whole")
+            is_whole
+                .then_some([x as i32, y as i32])
+                .ok_or("its coordinates must be non-negative whole numbers")
         };
         let mut rings: Vec<Vec<[i32; 2]>> = Vec::new();
         for element in path.elements() {
@@ -180,24 +183,24 @@ impl TryFrom<String> for Logo {
                 (PathEl::MoveTo(to), _) => rings.push(vec![whole(to)?]),
                 (PathEl::LineTo(to), Some(ring)) => ring.push(whole(to)?),
                 (PathEl::ClosePath, _) => {}
-                _ => return Err("it has curves".to_owned()),
+                _ => return Err("it must consist of straight lines only".to_owned()),
             }
         }
         Self::new(rings)
     }
 }
 
-/// Where a logo lies on a page.
+/// Position of a logo on a page.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct LogoPlacement {
-    /// Its lower left corner on the page, mm.
+    /// Lower-left corner on the page, mm.
     #[serde(deserialize_with = "quantity::place_mm::de")]
     pub at_mm: DVec2,
-    /// Counter-clockwise turn about it, radians.
+    /// Counter-clockwise rotation about that corner, radians.
     #[serde(deserialize_with = "quantity::angle_rad::de")]
     pub angle_rad: f64,
-    /// Its height, mm.
+    /// Height, mm.
     #[serde(deserialize_with = "quantity::length_mm::de")]
     pub height_mm: f64,
 }

@@ -1,4 +1,4 @@
-//! How large a logo becomes in the margin of a sheet, and whether it finds room.
+//! Size of a logo in the margin of a sheet, and the check that it fits.
 
 use glam::DVec2;
 
@@ -7,44 +7,46 @@ use crate::{PaperSpec, SheetLayout};
 use deltille_core::setting::Setting::{PaperLogo, PaperLogoHeightMm, PaperSize};
 use deltille_core::targets::{TargetError, format_mm};
 
-/// Most of the length of a strip that a logo may take: the check bar beside it must stay long enough to be measured.
+/// Largest fraction of the length of a strip that a logo may take: the check bar beside it must stay long enough to
+/// measure.
 const MOST_PART: f64 = 0.3;
 
-/// What it may take in any case of a strip that its label needs.
+/// Fraction of the strip that a logo may take even if the label needs the space.
 const LEAST_PART: f64 = 0.15;
 
-/// Blank between a logo and what is beside it, mm.
+/// Gap between a logo and its neighbours, mm.
 const BESIDE_MM: f64 = 2.0;
 
-/// Heights that may be asked for, mm: with less nothing can be told apart.
+/// Allowed heights, mm: details of a smaller logo cannot be distinguished.
 const HEIGHT_MM: std::ops::RangeInclusive<f64> = 3.0..=200.0;
 
-/// Room that is missing by no more than this is what rounding leaves, mm.
+/// Tolerance for missing space, mm: covers rounding.
 const SLACK_MM: f64 = 1e-6;
 
-/// How large a logo is to be.
+/// Requested size of a logo.
 #[derive(Clone, Copy)]
 pub(crate) struct LogoSize {
     /// Width, in heights.
     width: f64,
-    /// The height that is asked for, mm.
+    /// Requested height, mm.
     height_mm: Option<f64>,
 }
 
 impl LogoSize {
-    /// That of the logo of a paper.
+    /// Returns the size of the logo of a paper.
     pub(crate) fn of(paper: &PaperSpec) -> Option<Self> {
         let width = paper.logo.as_ref()?.width();
         Some(Self { width, height_mm: paper.logo_height_mm })
     }
 
-    /// Its width, in heights.
+    /// Returns the width, in heights.
     pub(crate) fn width(self) -> f64 {
         self.width
     }
 
-    /// Width and height in a strip of some length, with words that want to be so long: as high as asked for, where there
-    /// is room for the `most`; else as the strip is `deep`, or less for the sake of the words.
+    /// Returns width and height of the logo in a strip of the given `length`, beside `words` of the given length. A
+    /// requested height is used up to `most`. Otherwise the logo is as high as the strip is `deep`, or smaller to leave
+    /// room for the words.
     pub(crate) fn in_strip(self, [length, words]: [f64; 2], deep: f64, most: f64) -> DVec2 {
         let widest = MOST_PART * length;
         let height = match self.height_mm {
@@ -57,18 +59,18 @@ impl LogoSize {
         DVec2::new(self.width * height, height)
     }
 
-    /// How much of the length of a strip a logo of that width takes, mm.
+    /// Returns the length of a strip that a logo of that width takes, mm.
     pub(crate) fn taken(width_mm: f64) -> f64 {
         width_mm + BESIDE_MM
     }
 }
 
-/// Refuses a height without a logo, or one that no logo has.
+/// Rejects a height without a logo, and a height out of range.
 pub(crate) fn check(paper: &PaperSpec) -> Result<(), TargetError> {
     let refused = |problem| Err(TargetError::invalid(PaperLogoHeightMm, problem));
     match paper.logo_height_mm {
         Some(_) if paper.logo.is_none() => {
-            refused(format!("there is no logo: give {PaperLogo}, or leave it out"))
+            refused(format!("needs a logo: add {PaperLogo}, or omit the height"))
         }
         Some(height) if !HEIGHT_MM.contains(&height) => {
             let [least, most] = [*HEIGHT_MM.start(), *HEIGHT_MM.end()].map(format_mm);
@@ -78,7 +80,7 @@ pub(crate) fn check(paper: &PaperSpec) -> Result<(), TargetError> {
     }
 }
 
-/// Refuses sheets on which the logo found too little room.
+/// Rejects sheets on which the logo has too little space.
 pub(crate) fn check_sheets(sheets: &[SheetLayout], paper: &PaperSpec) -> Result<(), TargetError> {
     let pages = sheets.iter().flat_map(|sheet| {
         let pages = sheet.pages.iter().map(|page| &page.marks);
@@ -90,25 +92,27 @@ pub(crate) fn check_sheets(sheets: &[SheetLayout], paper: &PaperSpec) -> Result<
     let least = place.height_mm;
     if logo.outlines_mm(place).is_empty() {
         let width = format_mm(SLIVER_MM);
-        return refused(format!("nothing of it is {width} wide: take thicker lines"));
+        return refused(format!(
+            "all lines of the logo are thinner than {width}: use thicker lines"
+        ));
     }
     let fitting = format_mm((10.0 * least).floor() / 10.0);
     match paper.logo_height_mm {
         Some(asked) if least < asked - SLACK_MM => {
             let remedy = if least < *HEIGHT_MM.start() {
-                format!("take larger {PaperSize}")
+                format!("use a larger {PaperSize}")
             } else {
-                format!("take at most {fitting}, or larger {PaperSize}")
+                format!("use at most {fitting}, or a larger {PaperSize}")
             };
             let problem = format!(
-                "beside what else is printed there is no room for a logo {} high: {remedy}",
+                "a logo {} high does not fit beside the other marks: {remedy}",
                 format_mm(asked)
             );
             Err(TargetError::invalid(PaperLogoHeightMm, problem))
         }
         None if least < *HEIGHT_MM.start() => refused(format!(
-            "{:.1} times as wide as high it would find room only {fitting} high, less than {}: take larger \
-             {PaperSize}, or a logo that is less wide",
+            "the logo is {:.1} times as wide as high and would fit only {fitting} high, less than {}: use a larger \
+             {PaperSize}, or a narrower logo",
             logo.width(),
             format_mm(*HEIGHT_MM.start()),
         )),
@@ -154,7 +158,7 @@ mod tests {
         (b + blank).cmple(c + SLACK_MM).any() || (d + blank).cmple(a + SLACK_MM).any()
     }
 
-    /// Checks that logos keep off everything, and that nothing else moved.
+    /// Checks that logos overlap nothing, and that nothing else moved.
     fn check_place(spec: &TargetSpec, paper: &PaperSpec) -> Result<(), TestCaseError> {
         let plain = PaperSpec { logo: None, logo_height_mm: None, ..paper.clone() };
         let (Ok(plain), Ok(target)) = (build(spec, &plain), build(spec, paper)) else {
@@ -207,7 +211,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn a_logo_moves_nothing_and_keeps_off_everything(
+        fn a_logo_moves_nothing_and_overlaps_nothing(
             rows in 3u32..12, cols in 3u32..12, edge in 10.0f64..40.0, width in 0.1f64..12.0,
             height in 3.0f64..30.0, free: bool, checker: bool, inverted: bool, kind in 0usize..4,
             size in 0usize..4,
@@ -229,7 +233,7 @@ mod tests {
     }
 
     #[test]
-    fn solids_and_other_targets_have_a_place_for_it() {
+    fn solids_and_other_targets_have_room_for_a_logo() {
         let solid = TargetSpec::from(SolidSpec::new(SolidShape::Icosahedron));
         let circles = CirclesSpec {
             circles: [7, 5],
@@ -258,7 +262,7 @@ mod tests {
     }
 
     #[test]
-    fn sizes_that_find_no_room_are_refused() {
+    fn sizes_that_do_not_fit_are_refused() {
         let said = |logo: Option<Logo>, logo_height_mm: Option<f64>, size: &str| {
             let size = Some(size.parse().unwrap());
             let paper = PaperSpec { size, logo, logo_height_mm, ..PaperSpec::default() };
@@ -274,7 +278,7 @@ mod tests {
         let most: f64 = most.parse().unwrap();
         assert_eq!(said(logo(), Some(most), "A4"), Ok(()));
         assert!(said(logo(), Some(most + 0.11), "A4").is_err());
-        assert!(refused(said(None, Some(9.0), "A4")).contains("there is no logo"));
+        assert!(refused(said(None, Some(9.0), "A4")).contains("needs a logo"));
         assert!(refused(said(logo(), Some(2.0), "A4")).contains("between 3 mm and 200 mm"));
         let narrow = BoardSpec::deltille(4, 4, 5.0);
         let paper = PaperSpec {
@@ -287,7 +291,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_too_thin_for_some_viewers_is_left_out() {
+    fn outlines_too_thin_for_some_viewers_are_omitted() {
         let rectangle = |x0: f64, x1: f64| {
             [(x0, 0.0), (x1, 0.0), (x1, 1.0), (x0, 1.0)].map(DVec2::from).to_vec()
         };
@@ -300,11 +304,11 @@ mod tests {
         let logo = Logo::from_outlines(&[rectangle(0.0, 0.001), rectangle(0.9, 0.901)]).unwrap();
         let paper = PaperSpec { logo: Some(logo), ..PaperSpec::default() };
         let error = build(&BoardSpec::deltille(5, 6, 20.0).into(), &paper).unwrap_err().to_string();
-        assert!(error.contains("nothing of it is 0.02 mm wide"), "{error}");
+        assert!(error.contains("thinner than 0.02 mm"), "{error}");
     }
 
     #[test]
-    fn files_hold_outlines_and_nothing_else() {
+    fn files_accept_outlines_and_nothing_else() {
         let read = |text: &str| Logo::try_from(text.to_owned());
         let logo = read("M0 0L20000 0L20000 10000L0 10000Z").unwrap();
         assert_eq!((logo.width(), read(&logo.to_string())), (2.0, Ok(logo)));

@@ -1,7 +1,7 @@
-//! What is printed beside a target.
+//! Marks that are printed beside a target.
 //!
-//! In come sheets with their panels, out go the same with more on them: `label` (what the texts say), `logo` (an outline) and
-//! `logo_room` (how large it becomes in the margin), `tag_ids` (the id of each tag in small type).
+//! The functions take sheets with panels and add marks to them: `label` (the texts), `logo` (an outline), `logo_room`
+//! (its size in the margin), `tag_ids` (the id of each tag in small type).
 
 pub(crate) mod label;
 pub(crate) mod logo;

@@ -1,4 +1,4 @@
-//! The ids of tags in small type, for people: each in a white tile beside its tag.
+//! Tag ids in small, human-readable type: each in a white tile beside its tag.
 
 use std::collections::BTreeSet;
 
@@ -11,33 +11,38 @@ use deltille_core::setting::Setting::PaperTagIds;
 use deltille_core::targets::format_mm;
 use deltille_core::targets::{Panel, TagPlacement, TagsIn, Target, TargetError};
 
-/// Capital height, in edges of a tile, and the most of it, mm: small beside what a corner is measured from.
+/// Capital height in tile edges, and its maximum, mm: small compared with the region from which a corner is measured.
 const CAP: (f64, f64) = (0.09, 1.8);
 
 /// Mean advance of a digit, in capital heights.
 const DIGIT_CAPS: f64 = 0.85;
 
-/// The least that can be read on paper, mm.
+/// Smallest capital height that is legible on paper, mm.
 const LEAST_CAP_MM: f64 = 0.7;
 
 /// Adds the ids to all sheets of a target.
 pub(crate) fn add(target: &Target, sheets: &mut [SheetLayout]) -> Result<(), TargetError> {
     let refused = |problem: String| Err(TargetError::invalid(PaperTagIds, problem));
     if target.panels.iter().all(|panel| panel.tags.is_empty()) {
-        return refused("there are no tags: leave it out".to_owned());
+        return refused(
+            "the target has no tags whose ids could be printed: omit this option".to_owned(),
+        );
     }
     if target.family.as_ref().is_some_and(|family| family.name == places::NAME) {
-        return refused("place codes have no ids to read: leave it out".to_owned());
+        return refused("place codes have no ids to print: omit this option".to_owned());
     }
     for panel in &target.panels {
         if panel.inverted || panel.tags_in == TagsIn::White {
-            return refused("the tiles beside tags are black: leave it out".to_owned());
+            return refused(
+                "the tiles beside the tags are black, so ids cannot be printed: omit this option"
+                    .to_owned(),
+            );
         }
         if CAP.0 * panel.edge_mm < LEAST_CAP_MM {
             let least = (10.0 * LEAST_CAP_MM / CAP.0).ceil() / 10.0;
             let edge = format_mm(panel.edge_mm);
             return refused(format!(
-                "beside tiles of {edge} nobody could read them: take tiles of at least {least} mm"
+                "ids would be illegible on tiles of {edge}: use tiles of at least {least} mm"
             ));
         }
     }
@@ -50,7 +55,7 @@ pub(crate) fn add(target: &Target, sheets: &mut [SheetLayout]) -> Result<(), Tar
     Ok(())
 }
 
-/// The ids of a panel's tags where it lies on its sheet.
+/// Lays out the ids of a panel's tags on its sheet.
 fn of_panel(panel: &Panel, placement: &Placement) -> Vec<SheetText> {
     let cap_height_mm = (CAP.0 * panel.edge_mm).min(CAP.1);
     let mut free: BTreeSet<Tile> =
@@ -72,7 +77,7 @@ fn of_panel(panel: &Panel, placement: &Placement) -> Vec<SheetText> {
     panel.tags.iter().filter_map(text).collect()
 }
 
-/// The tiles that share an edge with that of a tag, to its right first.
+/// Returns the tiles that share an edge with the tile of a tag, the one to its right first.
 fn beside(kind: GridKind, tag: &TagPlacement) -> Vec<Tile> {
     let own = Vertex::new(tag.row, tag.col);
     let at = |row: i32, col: i32| own + Vertex::new(row, col);
@@ -99,7 +104,7 @@ mod tests {
     }
 
     proptest! {
-        /// Every tag has its id in a white tile that shares an edge with its own, and no tile has two.
+        /// Every tag has its id in a white tile that shares an edge with its own, and no tile has two ids.
         #[test]
         fn every_tag_has_its_id_beside_it(
             rows in 3u32..9, cols in 3u32..9, spacing in 1u32..4, squares: bool,
@@ -127,7 +132,7 @@ mod tests {
     }
 
     #[test]
-    fn ids_that_nobody_could_read_are_refused() {
+    fn illegible_ids_are_refused() {
         let board = |edge_mm| BoardSpec::deltille(5, 6, edge_mm);
         let said = |spec: BoardSpec| target(&spec.into()).unwrap_err().to_string();
         assert!(said(board(5.0)).contains("tiles of at least 7.8 mm"));

@@ -1,13 +1,13 @@
-//! Where a board, its label and its check bars lie on paper.
+//! Arrangement of a board, its label and its check bars on a page.
 //!
 //! ```text
 //!   ┌────────────────────────────────┐
-//!   │  ▲▲▲▲▲▲▲▲▲▲▲▲▲▲▲▲▲▲▲▲▲      ┬  │   the board lies in the middle of the page unless that
-//!   │  ▲▲▲▲▲▲▲▲▲▲▲▲▲▲▲▲▲▲▲▲▲      │  │   would bring a mark into its quiet zone;
-//!   │  ▲▲▲▲▲▲▲▲▲▲▲▲▲▲▲▲▲▲▲▲▲      │  │   the bars lie along the lower and the right margin, the
-//!   │0 ▲▲▲▲▲▲▲▲▲▲▲▲▲▲▲▲▲▲▲▲▲      │  │   words between their ends; the label below the lower
-//!   │  ├────── 180 mm ──────┤     ┴  │   bar, or beside the right one where that saves the board
-//!   │  name · 10 × 11 corners · …    │   where there is room the board's id in large type
+//!   │  ▲▲▲▲▲▲▲▲▲▲▲▲▲▲▲▲▲▲▲▲▲      ┬  │   The board is centred on the page, unless a mark would then
+//!   │  ▲▲▲▲▲▲▲▲▲▲▲▲▲▲▲▲▲▲▲▲▲      │  │   enter its quiet zone. Check bars run along the lower and the
+//!   │  ▲▲▲▲▲▲▲▲▲▲▲▲▲▲▲▲▲▲▲▲▲      │  │   right margin, with their texts between the ends. The label
+//!   │0 ▲▲▲▲▲▲▲▲▲▲▲▲▲▲▲▲▲▲▲▲▲      │  │   lies below the lower bar, or beside the right one if the board
+//!   │  ├────── 180 mm ──────┤     ┴  │   fits only then. The id of the board is printed in large type if
+//!   │  name · 10 × 11 corners · …    │   there is room.
 //!   └────────────────────────────────┘
 //! ```
 
@@ -28,33 +28,34 @@ use deltille_core::targets::format_mm;
 use deltille_core::targets::size_mm;
 use deltille_core::targets::{BoardSpec, Panel, TargetError};
 
-/// Capital height of a board's id, mm: legible from three metres; and the least that is worth printing.
+/// Capital height of a board's id, mm: legible from three metres. The second value is the smallest height that is
+/// printed.
 const LARGE_CAP_MM: f64 = 8.0;
 const LEAST_LARGE_CAP_MM: f64 = 4.0;
-/// Blanks between a bar, its words and the label, mm: the first that leaves room for the board. The
-/// last is what 10 × 11 corners with 20 mm edges leave on A4.
+/// Gaps between a bar, its text and the label, mm. The first value that leaves room for the board is used. The second
+/// is what 10 × 11 corners with 20 mm edges leave on A4.
 const GAPS_MM: [f64; 2] = [1.5, 0.8];
-/// Blank between the black field of an inverted board and the marks, mm.
+/// Gap between the black field of an inverted board and the marks, mm.
 const FIELD_GAP_MM: f64 = 1.0;
-/// Marks to cut a plate's sheet out begin and end so far from its corners, mm.
+/// Distances from the corner of a plate at which its crop marks begin and end, mm.
 const CROP_MM: [f64; 2] = [1.0, 5.0];
-/// Width of these marks, mm.
+/// Width of crop marks, mm.
 const CROP_WIDTH_MM: f64 = 0.15;
-/// Blank that is left along the edges of the paper whatever the margin, mm: a pixel at 200 dpi has
-/// 0.13 mm, and the stroke of a bar that touches the edge can neither be measured nor trimmed.
+/// Smallest blank strip along the edges of the paper, mm, even with a smaller margin. A pixel at 200 dpi is 0.13 mm,
+/// and the stroke of a bar that touches the edge can be neither measured nor trimmed.
 pub(crate) const LEAST_MARGIN_MM: f64 = 0.5;
-/// Finest edge proposed to make a board fit, mm: what office printers resolve in a tag.
+/// Smallest edge length proposed to make a board fit, mm: the limit that office printers resolve in a tag.
 const LEAST_PROPOSED_MM: u32 = 5;
 
-/// The rectangle that a panel's ink takes, and the blanks it needs, mm.
+/// Bounding rectangle of a panel's ink, and the blank space it needs, mm.
 pub(crate) struct Footprint {
     pub width: f64,
     pub height: f64,
-    /// Distance to the edges of the paper.
+    /// Minimum distance to the edges of the paper.
     pub edge_blank: f64,
-    /// Distance to the marks.
+    /// Minimum distance to the marks.
     pub mark_blank: f64,
-    /// Whether it stands upright in the middle between left and right, so that two sides of a sheet fit each other.
+    /// Whether the panel must stand upright, centred horizontally, so that the two sides of a sheet match.
     pub is_centred: bool,
 }
 
@@ -74,32 +75,32 @@ impl Footprint {
     }
 }
 
-/// A sheet before its panel is named: which paper, and where things are.
+/// Arrangement of a sheet before its panel is known: page size and positions.
 #[derive(Clone, Copy)]
 pub(crate) struct Arrangement {
     page: DVec2,
     margin: f64,
-    /// Whether the board is turned by 90° counter-clockwise.
+    /// Whether the board is rotated by 90° counter-clockwise.
     turned: bool,
     /// Lower-left corner of the footprint.
     board_at: DVec2,
-    /// What lies along the lower and the right margin.
+    /// Marks along the lower and the right margin.
     marks: [Marks; 2],
-    /// From these margins to what stays blank around the footprint.
+    /// Space between these margins and the blank around the footprint.
     rooms: [f64; 2],
-    /// How large the logo is to be, where there is one.
+    /// Requested size of the logo, if any.
     logo: Option<LogoSize>,
 }
 
-/// Fits a board on paper, in this order of preference: the smallest paper (where it is free), the
-/// orientation of the board's longer side, the board not turned, the label below.
+/// Fits a board on paper. Preferences, in order: the smallest paper (if the size is free), the orientation of the
+/// board's longer side, the unrotated board, the label below.
 pub(crate) fn arrange(spec: &BoardSpec, paper: &PaperSpec) -> Result<Arrangement, TargetError> {
     let fitting = |spec: &BoardSpec| fit(&Footprint::new(spec, paper.margin_mm), paper);
     let fits = |smaller: &BoardSpec| fitting(smaller).is_ok_and(|found| found.is_some());
     fitting(spec)?.ok_or_else(|| does_not_fit(spec, paper, fits))
 }
 
-/// What is said of a board that finds no room on paper, with the largest edge that `fits`.
+/// Returns the error for a board that does not fit on the paper. It proposes the largest edge length that `fits`.
 pub(crate) fn does_not_fit(
     spec: &BoardSpec,
     paper: &PaperSpec,
@@ -122,7 +123,7 @@ pub(crate) fn does_not_fit(
     }
 }
 
-/// Fits a footprint on paper; `None` where it does not fit.
+/// Fits a footprint on paper; `None` if it does not fit.
 pub(crate) fn fit(
     footprint: &Footprint,
     paper: &PaperSpec,
@@ -131,7 +132,7 @@ pub(crate) fn fit(
     fit_turned(footprint, paper, turns)
 }
 
-/// Fits a footprint on paper as it stands; `None` where it does not fit.
+/// Fits a footprint on paper without rotation; `None` if it does not fit.
 pub(crate) fn fit_upright(
     footprint: &Footprint,
     paper: &PaperSpec,
@@ -151,7 +152,7 @@ fn fit_turned(
     Ok(found.map(|arrangement| arrangement.with_logo(paper)))
 }
 
-/// The margin asked for, mm, and never less than what must stay blank.
+/// Returns the requested margin, mm, but at least the minimum.
 pub(crate) fn check_margin(paper: &PaperSpec) -> Result<f64, TargetError> {
     let margin = paper.margin_mm;
     if !(0.0..=100.0).contains(&margin) {
@@ -213,13 +214,13 @@ pub(crate) fn on_page(
 }
 
 impl Arrangement {
-    /// The same with the logo of a paper.
+    /// Returns the arrangement with the logo of the paper.
     pub(crate) fn with_logo(self, paper: &PaperSpec) -> Self {
         Self { logo: LogoSize::of(paper), ..self }
     }
 
-    /// The sheet of one panel, whose `ink` is a rectangle of its frame; one of no area where the sheet is filled otherwise,
-    /// up to its strips.
+    /// Returns the sheet of one panel, whose `ink` is a rectangle in the panel frame. An empty rectangle means that
+    /// other content fills the sheet up to its margin strips.
     pub(crate) fn sheet(&self, panel: u32, ink: [f64; 4], label: String) -> SheetLayout {
         let DVec2 { x: width_mm, y: height_mm } = self.page;
         let [lower_marks, right_marks] = self.marks;
@@ -280,8 +281,9 @@ impl Arrangement {
         }
     }
 
-    /// The id of a board in large type beside its lower left corner, standing as the board does, so that boards are told
-    /// apart, and up from down, from some metres away; none where there is no room. `ink` is a rectangle of the board's frame.
+    /// Lays out the id of a board in large type beside its lower-left corner, upright relative to the board. It
+    /// identifies the board and its orientation from several metres away. Returns `None` if it does not fit. `ink` is a
+    /// rectangle in the board frame.
     pub(crate) fn large_id(&self, spec: &BoardSpec, id: u32, ink: [f64; 4]) -> Option<SheetText> {
         let placement = self.placement(id, ink);
         let [left, lower, right, upper] = self.clear_mm();
@@ -310,7 +312,7 @@ impl Arrangement {
         })
     }
 
-    /// Whether a text meets the logo of its sheet.
+    /// Returns whether a text overlaps the logo of its sheet.
     pub(crate) fn logo_meets(&self, sheet: &SheetLayout, text: &SheetText) -> bool {
         let box_of = |at: DVec2, angle_rad: f64, size: DVec2| {
             let turn = DVec2::from_angle(angle_rad);
@@ -327,7 +329,8 @@ impl Arrangement {
         })
     }
 
-    /// Marks at the corners of a plate, a rectangle of the board's frame, to cut its sheet out, or to lay one side on the other.
+    /// Returns crop marks at the corners of a plate, a rectangle in the board frame. They serve for cutting out the
+    /// sheet and for aligning the two sides.
     pub(crate) fn crop_marks(&self, panel: u32, ink: [f64; 4], plate: [f64; 4]) -> Vec<SheetLine> {
         let placement = self.placement(panel, ink);
         let corners = rectangle(plate);
@@ -346,17 +349,17 @@ impl Arrangement {
         marks.map(line).collect()
     }
 
-    /// Width and height of the page, mm.
+    /// Returns width and height of the page, mm.
     pub(crate) fn page_mm(&self) -> DVec2 {
         self.page
     }
 
-    /// Lower-left corner of the footprint on the page, mm.
+    /// Returns the lower-left corner of the footprint on the page, mm.
     pub(crate) fn footprint_at_mm(&self) -> DVec2 {
         self.board_at
     }
 
-    /// What the margins and the marks leave free: left, lower, right, upper end, mm.
+    /// Returns the area that the margins and the marks leave free: left, lower, right and upper end, mm.
     pub(crate) fn clear_mm(&self) -> [f64; 4] {
         let [lower, right] = self.marks.map(Marks::depth);
         let margin = self.margin;
@@ -365,7 +368,7 @@ impl Arrangement {
 
     fn placement(&self, panel: u32, [left, lower, _, upper]: [f64; 4]) -> Placement {
         if self.turned {
-            // (u, v) of the panel goes to (−v, u): its upper end lies left.
+            // (u, v) of the panel maps to (−v, u), so its upper end lies on the left.
             let origin_mm = self.board_at + DVec2::new(upper, -left);
             return Placement { panel, angle_rad: FRAC_PI_2, origin_mm };
         }
@@ -408,7 +411,7 @@ mod tests {
     }
 
     #[test]
-    fn the_board_of_the_paper_fits_a4_and_letter_at_20_mm() {
+    fn the_published_board_fits_a4_and_letter_at_20_mm() {
         for size in ["A4", "letter"] {
             let target = build(&spec(10, 11, 20.0), &on(size, Orientation::Auto)).unwrap();
             let sheet = &target.sheets[0];
@@ -421,14 +424,14 @@ mod tests {
     }
 
     #[test]
-    fn orientation_is_obeyed_by_turning_the_board() {
+    fn boards_are_rotated_to_match_the_orientation() {
         let target = build(&spec(10, 11, 20.0), &on("A4", Orientation::Portrait)).unwrap();
         assert_eq!((target.sheets[0].width_mm, target.sheets[0].height_mm), (210.0, 297.0));
         assert_eq!(target.sheets[0].placements[0].angle_rad, FRAC_PI_2);
     }
 
     #[test]
-    fn what_does_not_fit_is_refused_with_an_edge_that_does() {
+    fn boards_that_do_not_fit_are_refused_with_an_edge_that_fits() {
         let paper = on("A4", Orientation::Auto);
         let error = build(&spec(10, 11, 30.0), &paper).unwrap_err();
         assert!(error.to_string().contains("`BoardSpec::edge_mm` of at most 20 mm"), "{error}");
@@ -438,7 +441,7 @@ mod tests {
     }
 
     proptest! {
-        /// Ink stays off the margin, marks off the quiet zone and off each other.
+        /// Ink stays clear of the margin, and marks stay clear of the quiet zone and of each other.
         #[test]
         fn nothing_overlaps(
             rows in 2u32..20, cols in 2u32..20, edge in 5.0f64..40.0, margin in 0.0f64..20.0,
@@ -446,7 +449,7 @@ mod tests {
         ) {
             use Orientation::{Auto, Landscape, Portrait};
             let grid = if checker { GridKind::Checker } else { GridKind::Deltille };
-            // Smaller boards need tags to be told from texture.
+            // Smaller boards need tags to be distinguished from texture.
             prop_assume!(rows * cols >= least_untagged_corners(grid));
             let spec = BoardSpec { grid, inverted, ..spec(rows, cols, edge) };
             let orientation = [Auto, Landscape, Portrait][orientation];
@@ -454,7 +457,7 @@ mod tests {
             let target = match build(&spec, &paper) {
                 Ok(target) => target,
                 Err(TargetError::DoesNotFit { fitting_edge_mm, .. }) => {
-                    // Ink wider than A0 less its margins does not fit, and much less does.
+                    // Only ink wider than A0 minus its margins does not fit; a much smaller edge does.
                     let across = [edge * f64::from(cols), 0.86 * edge * f64::from(rows)];
                     prop_assert!(across.iter().any(|&mm| mm > 600.0), "{across:?} do not fit A0");
                     prop_assert!(fitting_edge_mm.is_none_or(|mm| f64::from(mm) < edge));

@@ -1,20 +1,20 @@
-//! Sheets of single faces, to be glued on a rigid skeleton: the panel with the marks to cut it out
-//! and to put it in its place. With a skeleton in the spec the panel is as large as its seat takes.
+//! Sheets of single faces to be glued on a rigid skeleton: the panel with marks for cutting it out and positioning it.
+//! If the specification has a skeleton, the panel is as large as its seat.
 //!
 //! ```text
 //!            +
 //!          \   /           Cutting marks extend the edges of the panel beyond its vertices, so that
-//!     7     ╲ ╱            a ruler laid on them leaves no line on it. Outside each edge its number
-//!           ╱ ╲            and the face beyond it are printed: edges of the same number meet. The
-//!        4 ╱   ╲ 9         number of the face is printed beside it and, small, in its lower left end.
+//!     7     ╲ ╱            no mark lies on the panel itself. Outside each edge, its number and the face
+//!           ╱ ╲            beyond it are printed. Edges with the same number meet. The number of the face
+//!        4 ╱   ╲ 9         is printed beside it and, in small type, in its lower-left corner.
 //!         ╱7    ╲
-//!    ── ─╱───────╲─ ──     Registration crosses lie on the bisectors beyond the vertices, each as
-//!  +         3         +   far from its vertex: a plotter, a jig or a second print is laid on them.
+//!    ── ─╱───────╲─ ──     Registration crosses lie on the bisectors beyond the vertices, all at the same
+//!  +         3         +   distance, for aligning a plotter, a jig or a second print.
 //! ```
 //!
-//! The margin of a face is white, and so is its bleed: for [`BLEED_MM`] beyond the cut nothing is
-//! printed, so that a cut which is off by less leaves neither a line nor a letter on the panel, and
-//! a panel cut with its bleed can be trimmed after it was glued.
+//! The margin of a face is white, and so is its bleed: nothing is printed within [`BLEED_MM`] beyond the cut. A cut
+//! that deviates by less leaves neither a line nor a letter on the panel. A panel cut with its bleed can also be
+//! trimmed after gluing.
 
 use glam::DVec2;
 
@@ -32,34 +32,34 @@ use deltille_core::targets::{
     Face, FamilyRef, Fingerprint, Panel, Polyhedron, SolidSpec, TargetError, fingerprint,
 };
 
-/// White beyond the edges of a face, mm: what cutting and gluing by hand are off, and some more.
+/// White space beyond the edges of a face, mm: the error of cutting and gluing by hand, plus a reserve.
 pub(crate) const BLEED_MM: f64 = 3.0;
-/// Cutting marks start this far from a vertex and end that far, mm.
+/// Distances from a vertex at which a cutting mark begins and ends, mm.
 const MARK_MM: [f64; 2] = [BLEED_MM, 9.0];
-/// Distance of a registration cross from its vertex, and length of its arms, mm: it stays clear of
-/// the cutting marks of a face with angles of 60°.
+/// Distance of a registration cross from its vertex, and length of its arms, mm: clear of the cutting marks of a face
+/// with angles of 60°.
 const CROSS_MM: [f64; 2] = [13.0, 2.5];
-/// Width of a cutting mark, mm: a hairline that every printer holds.
+/// Width of a cutting mark, mm: a hairline that every printer can print.
 const MARK_WIDTH_MM: f64 = 0.15;
-/// Capital height of the number of a face beside it, mm.
+/// Capital height of the number beside a face, mm.
 const FACE_CAP_MM: f64 = 5.0;
-/// Capital height of the numbers of edges, mm.
+/// Capital height of edge numbers, mm.
 const EDGE_CAP_MM: f64 = 2.2;
 /// Capital height and line spacing of the instructions, mm.
 const WORDS_MM: [f64; 2] = [2.0, 3.4];
-/// How to use a sheet, below the number of its face.
+/// Instructions below the number of the face.
 const WORDS: [&str; 3] = ["Cut from mark to mark.", "Edges of the same", "number meet."];
 /// Height of the number of a face and the instructions below it, mm.
 const WORDS_HEIGHT_MM: f64 = FACE_CAP_MM + WORDS_MM[0] / 2.0 + WORDS.len() as f64 * WORDS_MM[1];
-/// Blank between what a face prints and the marks along the margins of the page, mm.
+/// Gap between the marks of a face and the marks along the page margins, mm.
 const MARK_BLANK_MM: f64 = 1.5;
-/// Capital height of the number on a face, in widths of its margin, and the most of it, mm.
+/// Capital height of the number on a face as a fraction of the margin width, and its maximum, mm.
 const INNER_CAP: (f64, f64) = (0.35, 2.0);
-/// Place of the number on a triangle, along the bisector of its lower left end, in margins; on other faces it is half
-/// as far as the end of the margin.
+/// Position of the number on a triangle, along the bisector of its lower-left corner, in margin widths. On other faces
+/// it is half as far as the inner corner of the margin.
 const INNER_PLACE: f64 = 0.9;
 
-/// The sheets of a solid's faces, one each.
+/// Lays out the faces of a solid, one sheet each.
 pub(crate) fn sheets(
     name: &str,
     spec: &SolidSpec,
@@ -90,7 +90,7 @@ pub(crate) fn sheets(
         .collect()
 }
 
-/// Numbers of the edges of a face, in the order of its outline.
+/// Returns the edge numbers of a face, in the order of its outline.
 pub fn edge_numbers(solid: &Polyhedron, edges: &[[usize; 2]], face: usize) -> Vec<usize> {
     let number = |(from, to): (usize, usize)| {
         edges.iter().position(|&edge| edge == [from.min(to), from.max(to)]).unwrap_or_default()
@@ -98,12 +98,12 @@ pub fn edge_numbers(solid: &Polyhedron, edges: &[[usize; 2]], face: usize) -> Ve
     sides(&solid.faces[face]).map(number).collect()
 }
 
-/// Bounding box of what is printed of a face, with its marks, in the panel frame, mm.
+/// Returns the bounding box of a face with its marks, in the panel frame, mm.
 fn bounds(face: &Face) -> [f64; 4] {
     let reach = CROSS_MM[0] + CROSS_MM[1];
     let least = face.outline_mm.iter().copied().reduce(DVec2::min).unwrap_or_default() - reach;
     let most = face.outline_mm.iter().copied().reduce(DVec2::max).unwrap_or_default() + reach;
-    // Beside the apex of a triangle there is room for words.
+    // Beside the apex of a triangle there is room for the instructions.
     let words = if face.outline_mm.len() > 3 { WORDS_HEIGHT_MM } else { 0.0 };
     [least.x, least.y, most.x, most.y + words]
 }
@@ -139,7 +139,7 @@ fn arrange(
     });
     let edge = format_mm(spec.edge_mm);
     let problem =
-        format!("a face with {edge} edges and its marks do not fit {paper}: take {instead}");
+        format!("a face with {edge} edges and its marks do not fit {paper}: use {instead}");
     Err(TargetError::invalid(PaperSize, problem))
 }
 
@@ -189,7 +189,7 @@ fn mark(
     }
 }
 
-/// The number of a face in its lower left end; none where the margin leaves no room for it.
+/// Lays out the number of a face in its lower-left corner; `None` if the margin is too narrow.
 fn inner_number(
     placement: &Placement,
     margin_mm: f64,
@@ -204,7 +204,7 @@ fn inner_number(
     let [a, b, .., c] = face.outline_mm[..] else { return None };
     let inwards = unit(b - a) + unit(c - a);
     let width = text.len() as f64 * ADVANCE_CAPS * cap;
-    // The length of the sum of two unit vectors that enclose α is 2 cos α/2.
+    // The sum of two unit vectors that enclose α has length 2 cos α/2.
     let length = inwards.x.hypot(inwards.y);
     let place = match face.outline_mm.len() {
         3 => INNER_PLACE,
@@ -221,14 +221,14 @@ fn inner_number(
     })
 }
 
-/// A number that stands alone: with a point after it where it reads as another upside down.
+/// Returns a number for standalone use, with a trailing point if it reads as another number upside down.
 pub fn upright_number(number: usize) -> String {
     let text = number.to_string();
     let turns = text.chars().all(|c| "01689".contains(c)) && text.contains(['6', '9']);
     if turns { text + "." } else { text }
 }
 
-/// A text along the middle of an edge, its base line `inwards` from it.
+/// Lays out a text along the middle of an edge, with its baseline `inwards` from the edge.
 pub fn edge_text(
     placement: &Placement,
     [a, b]: [DVec2; 2],
@@ -248,12 +248,12 @@ pub fn edge_text(
     }
 }
 
-/// The direction of a vector; the written digits of marks depend on how its length is rounded.
+/// Returns the direction of a vector. The last digits of the marks in files depend on how the length is rounded here.
 fn unit(v: DVec2) -> DVec2 {
     v / v.x.hypot(v.y)
 }
 
-/// The label of a face: all that is needed to make it again.
+/// Returns the label of a face, with everything needed to reproduce it.
 fn label(
     name: &str,
     spec: &SolidSpec,

@@ -1,27 +1,27 @@
-//! What lies along the lower and the right margin of a sheet: check bars with their words, and the label.
+//! Marks along the lower and the right margin of a sheet: check bars with their texts, and the label.
 
 use std::f64::consts::FRAC_PI_2;
 
 use glam::DVec2;
 
-/// Capital height of the words on a check bar, mm: 7 pt, small print that is still easy to read.
+/// Capital height of the text on a check bar, mm: 7 pt, small but easily legible.
 pub(super) const BAR_CAP_MM: f64 = 1.8;
 /// Capital height of the label, mm.
 pub(super) const LABEL_CAP_MM: f64 = 2.2;
-/// Length of a bar's end strokes, across the bar, mm: enough to lay a ruler on, short enough to
-/// leave room for the words.
+/// Length of a bar's end strokes, across the bar, mm: long enough to align a ruler, short enough to leave room for the
+/// text.
 pub const CHECK_BAR_STROKE_MM: f64 = 2.0;
-/// What letters such as g reach below the base line, in capital heights.
+/// Depth of descenders such as in g below the baseline, in capital heights.
 const DESCENT_CAPS: f64 = 0.33;
-/// Blank between the ends of a bar and its words, mm.
+/// Gap between the ends of a bar and its text, mm.
 pub(super) const BAR_INDENT_MM: f64 = 3.0;
-/// Check bars are a multiple of this long, mm: a round number is read off a ruler without error.
+/// Step of the lengths of check bars, mm: a round number is easy to read off a ruler.
 pub(super) const BAR_STEP_MM: f64 = 10.0;
-/// Average advance of a character in the built-in font, in capital heights; a long text is set
-/// only where it fits by this estimate.
+/// Average advance of a character in the built-in font, in capital heights. Long texts are used only if they fit by
+/// this estimate.
 pub(crate) const ADVANCE_CAPS: f64 = 0.76;
 
-/// A check bar and perhaps the label, along a margin: distances from the margin inwards, mm.
+/// A check bar, with or without the label, along a margin: distances inwards from the margin, mm.
 #[derive(Clone, Copy)]
 pub(super) struct Marks {
     pub(super) label: bool,
@@ -29,42 +29,42 @@ pub(super) struct Marks {
 }
 
 impl Marks {
-    /// Base line of the label.
+    /// Baseline of the label.
     pub(super) const LABEL: f64 = LABEL_CAP_MM * DESCENT_CAPS;
 
-    /// Base line of the words on the bar.
+    /// Returns the baseline of the text on the bar.
     pub(super) fn words(self) -> f64 {
         let label = if self.label { Self::LABEL + LABEL_CAP_MM + self.gap } else { 0.0 };
         label + BAR_CAP_MM * DESCENT_CAPS
     }
 
-    /// The line of the bar.
+    /// Returns the position of the line of the bar.
     pub(super) fn line(self) -> f64 {
         self.words() + BAR_CAP_MM + self.gap
     }
 
-    /// All of it.
+    /// Returns the depth of all marks together.
     pub(super) fn depth(self) -> f64 {
         self.line() + CHECK_BAR_STROKE_MM / 2.0
     }
 }
 
-/// A strip along the lower or, turned counter-clockwise, the right margin.
+/// A strip along the lower margin or, rotated counter-clockwise, along the right margin.
 pub(super) struct Strip {
-    /// Its outer corner: lower left, or lower right.
+    /// Outer corner of the strip: lower left, or lower right.
     pub(super) start: DVec2,
     pub(super) turned: bool,
     pub(super) length: f64,
 }
 
 impl Strip {
-    /// The page position `along` the strip and `inwards` from the margin.
+    /// Returns the page position `along` the strip and `inwards` from the margin.
     pub(super) fn at(&self, along: f64, inwards: f64) -> DVec2 {
         let way = DVec2::new(along, inwards);
         self.start + if self.turned { way.perp() } else { way }
     }
 
-    /// Length of the bar along it, mm.
+    /// Returns the length of the check bar along the strip, mm.
     pub(super) fn bar_mm(&self) -> f64 {
         (self.length / BAR_STEP_MM).floor() * BAR_STEP_MM
     }
@@ -74,7 +74,7 @@ impl Strip {
     }
 }
 
-/// How to measure a check bar and what to do when it is off, as fully as its length allows.
+/// Returns how to measure a check bar and what to do if its length is wrong, in as much detail as fits.
 pub(super) fn bar_words(length_mm: f64) -> String {
     let texts = [
         format!(
@@ -98,7 +98,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn bars_on_a4_say_how_to_measure_and_what_to_do() {
+    fn texts_of_bars_on_a4_explain_measuring_and_scaling() {
         for length in [150.0, 190.0, 270.0] {
             let words = bar_words(length);
             assert!(words.contains("outer ends") && words.contains("measured / "), "{words}");

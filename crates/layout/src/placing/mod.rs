@@ -1,14 +1,14 @@
-//! Where panels lie on pages.
+//! Positions of panels on pages.
 //!
-//! In come the panels of a target and the paper, out go sheets with placements, check bars, lines and texts. In the order of
-//! what a sheet takes:
+//! The functions take the panels of a target and the paper, and return sheets with placements, check bars, lines and
+//! texts. The modules:
 //!
-//! 1. `arrangement`: one board with its label and check bars on the smallest page that takes it, which the others use;
-//!    `margin_marks` are these bars, `sheet_label` is the label;
-//! 2. `single_panel`: boards of other detectors; `tag_sheet`: single tags in rows;
+//! 1. `arrangement`: one board with its label and check bars on the smallest page that fits; the other modules build on
+//!    it; `margin_marks`: the check bars; `sheet_label`: the label;
+//! 2. `single_panel`: ChArUco boards, AprilGrids and circles; `tag_sheet`: single tags in rows;
 //! 3. `packed`: several boards on a sheet; `poster`: one board or net over several pages;
-//! 4. `face_sheet`: a sheet for each face of a solid; `net`: the faces of a solid in one piece, to be folded;
-//! 5. `guide`: a page of its own that says what to do with the others.
+//! 4. `face_sheet`: one sheet per face of a solid; `net`: the faces of a solid in one piece, to be folded;
+//! 5. `guide`: a separate page with instructions.
 
 pub(crate) mod arrangement;
 pub(crate) mod face_sheet;

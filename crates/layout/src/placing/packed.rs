@@ -1,9 +1,9 @@
 //! Several boards on one sheet, to be cut apart.
 //!
 //! ```text
-//!   ┌──────────────┬──────────────┐   in rows from the upper left, as many as fit; around each its quiet zone, below it
-//!   │ ▲▲▲▲▲▲▲▲▲▲▲  │ ▲▲▲▲▲▲▲▲▲▲▲  │   a label of its own, which stays with it; along the lower and the right margin
-//!   │ ▲▲▲▲▲▲▲▲▲▲▲  │ ▲▲▲▲▲▲▲▲▲▲▲  │   of the sheet the check bars and the label of all
+//!   ┌──────────────┬──────────────┐   As many boards as fit, in rows from the upper left. Each has its quiet zone and its
+//!   │ ▲▲▲▲▲▲▲▲▲▲▲  │ ▲▲▲▲▲▲▲▲▲▲▲  │   own label below, which stays with it. The check bars and the label of the whole
+//!   │ ▲▲▲▲▲▲▲▲▲▲▲  │ ▲▲▲▲▲▲▲▲▲▲▲  │   sheet run along its lower and right margins.
 //!   │ board 0 · …  │ board 1 · …  │
 //!   │ note         │ note         │
 //!   └──────────────┴──────────────┘
@@ -26,32 +26,32 @@ use deltille_core::targets::{BoardSpec, FamilyRef, Panel, TargetError, fingerpri
 
 /// Capital height of a board's label, mm.
 const LABEL_CAP_MM: f64 = 2.0;
-/// Blank around that label, mm.
+/// Gap around that label, mm.
 const LABEL_GAP_MM: f64 = 1.5;
-/// Blank above and below a logo beside that label, mm.
+/// Gap above and below a logo beside that label, mm.
 const LOGO_GAP_MM: f64 = 0.75;
-/// The least capital height of a note that can be read, mm.
+/// Smallest legible capital height of a note, mm.
 const LEAST_CAP_MM: f64 = 0.9;
-/// Blank between a quiet zone and the line to cut along, mm.
+/// Gap between a quiet zone and the cutting line, mm.
 const CUT_GAP_MM: f64 = 0.5;
-/// Width of these lines, mm.
+/// Width of cutting lines, mm.
 const LINE_MM: f64 = 0.15;
 
-/// Part of the distance between rows or columns of tiles by which boards side by side are out of step: the golden
-/// section, by which neighbours of neighbours are, too.
+/// Phase offset between adjacent boards, as a fraction of the distance between rows or columns of tiles. The golden
+/// section keeps boards farther apart out of phase, too.
 const OUT_OF_STEP: f64 = 0.382;
 
-/// Where a board lies in its part of a sheet.
+/// Layout of a board in its part of a sheet.
 struct Cell {
-    /// Lower left and upper right end of its ink, in the frame of its panel, mm.
+    /// Lower-left and upper-right corner of its ink, in the panel frame, mm.
     ink: [DVec2; 2],
-    /// Blank around that, mm.
+    /// Blank space around the ink, mm.
     blank: f64,
     /// Its size, mm.
     size: DVec2,
-    /// Lower ends of the lines of its label above its own, from above, mm.
+    /// Lower ends of the lines of its label, measured from the lower end of the cell, from above, mm.
     lines: Vec<f64>,
-    /// Size of the logo beside them, mm.
+    /// Size of the logo beside the label, mm.
     logo: Option<DVec2>,
 }
 
@@ -66,8 +66,8 @@ impl Cell {
         let lines = (0..count).rev().map(|line| LABEL_GAP_MM + line as f64 * step).collect();
         let below = blank + count as f64 * step + LABEL_GAP_MM;
         let least = ink[1] - ink[0] + DVec2::new(2.0 * blank, blank + below);
-        // Tiles of one board are no continuation of those of the next, for whoever looks at the whole sheet. Every second
-        // row of triangles lies half an edge further.
+        // The tiles of one board must not continue those of the next when the whole sheet is viewed. Every second row
+        // of triangles is shifted by half an edge.
         let step = spec.edge_mm
             * match spec.grid {
                 GridKind::Deltille => DVec2::new(0.5, ROW_HEIGHT),
@@ -77,7 +77,7 @@ impl Cell {
         Self { ink, blank, size, lines, logo: None }
     }
 
-    /// The same with a logo beside the label, which is to have room for these words.
+    /// Returns the cell with a logo beside the label, which must have room for these words.
     fn with_logo(self, logo: Option<LogoSize>, words: &str) -> Self {
         let lines = self.lines.len() as f64 * (LABEL_CAP_MM + LABEL_GAP_MM) + LABEL_GAP_MM;
         let [deep, most] =
@@ -87,13 +87,13 @@ impl Cell {
         Self { logo, ..self }
     }
 
-    /// Room for a line of the label, mm.
+    /// Returns the space for a line of the label, mm.
     fn line_mm(&self) -> f64 {
         let logo_mm = self.logo.map_or(0.0, |size| LogoSize::taken(size.x));
         self.size.x - 2.0 * self.blank - logo_mm
     }
 
-    /// Refuses a note that nobody could read.
+    /// Rejects a note that would be illegible.
     fn check_note(&self, note: Option<&str>) -> Result<(), TargetError> {
         let Some(note) = note else { return Ok(()) };
         let most = (self.line_mm() / (LEAST_CAP_MM * ADVANCE_CAPS)).floor() as usize;
@@ -102,18 +102,18 @@ impl Cell {
             return Ok(());
         }
         let problem = format!(
-            "{count} characters are more than the {most} that can be read below such a board: take fewer, or larger boards"
+            "the note has {count} characters, but only {most} are legible below this board: shorten it, or use larger boards"
         );
         Err(TargetError::invalid(PaperNote, problem))
     }
 
-    /// Blank below the board, with its label.
+    /// Returns the space below the board, including its label.
     fn below(&self) -> f64 {
         self.size.y - self.blank - (self.ink[1].y - self.ink[0].y)
     }
 }
 
-/// Sheets with as many boards on each as fit.
+/// Lays out sheets with as many boards on each as fit.
 pub(crate) fn sheets(
     name: &str,
     spec: &BoardSpec,
@@ -142,22 +142,22 @@ pub(crate) fn sheets(
     Ok(sheets.collect())
 }
 
-/// Whether a board of this kind finds room.
+/// Returns whether a board of this kind fits on the paper.
 pub(crate) fn fits(spec: &BoardSpec, paper: &PaperSpec) -> bool {
     let panels = deltille_core::targets::untied_panels(&BoardSpec { boards: 1, ..spec.clone() });
     let cell = panels.first().map(|panel| Cell::new(spec, panel, paper));
     cell.is_some_and(|cell| arrange(&cell, 1, paper).is_ok_and(|found| found.is_some()))
 }
 
-/// The columns and rows that a page takes, at most as many as there are boards, and where they lie: on the smallest
-/// paper that takes one, the way that takes most.
+/// Chooses the columns and rows of a page, at most as many as there are boards, and their position. Uses the smallest
+/// paper that fits one board, in the orientation that fits most.
 fn arrange(
     cell: &Cell,
     boards: usize,
     paper: &PaperSpec,
 ) -> Result<Option<([usize; 2], Arrangement)>, TargetError> {
     let margin = check_margin(paper)?;
-    // The most boards, in no more room than they need.
+    // Prefers the most boards, then the smallest grid.
     let worth = |[c, r]: [usize; 2]| ((c * r).min(boards), Reverse(c * r), c);
     let on_sheet = |page: DVec2| {
         let size = cell.size;
@@ -189,11 +189,11 @@ struct Boards<'a> {
     panels: &'a [Panel],
     spec: &'a BoardSpec,
     family: Option<&'a FamilyRef>,
-    /// What stands below each.
+    /// Note below each board.
     note: Option<&'a str>,
 }
 
-/// One sheet: boards from the upper left, row by row, each with its logo, and the lines between them.
+/// Lays out one sheet: boards from the upper left, row by row, each with its logo, and the lines between them.
 fn sheet(
     cell: &Cell,
     [columns, rows]: [usize; 2],

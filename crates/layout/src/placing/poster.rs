@@ -1,12 +1,12 @@
-//! A net or a board that is larger than the paper, over several pages.
+//! A net or a board larger than the paper, printed over several pages.
 //!
 //! ```text
 //!   1─────┬┬────┐2      The sheet is as large as the windows of all pages together. Neighbouring
 //!   │     ││    │       windows overlap; crosses in the overlap are printed on both pages. Pages
-//!   ├─────┼┼────┤ ×     are numbered row by row from the upper left. Windows that show nothing of
-//!   ├─────┼┼────┤       it are not printed.
-//!   3─────┴┴────┘4      A page with another on its left or above has a line there to be trimmed along; ticks on the
-//!                       other end where that edge comes to lie.
+//!   ├─────┼┼────┤ ×     are numbered row by row from the upper left. Windows that would show
+//!   ├─────┼┼────┤       nothing are not printed. A page with a left or upper neighbour has a trim
+//!   3─────┴┴────┘4      line on that side. Ticks on the neighbour mark the position of the
+//!                       trimmed edge.
 //! ```
 
 use glam::DVec2;
@@ -21,51 +21,51 @@ use deltille_core::polygon::rectangle;
 use deltille_core::setting::Setting;
 use deltille_core::targets::TargetError;
 
-/// Width of what neighbouring windows share, mm.
+/// Width of the overlap of neighbouring windows, mm.
 const OVERLAP_MM: f64 = 10.0;
 
-/// Blank around what is printed, on its sheet, mm.
+/// Blank border around the print on its sheet, mm.
 const BORDER_MM: f64 = 3.0;
 
-/// Blank between the window and the marks of the page, mm.
+/// Gap between the window and the marks of the page, mm.
 const BLANK_MM: f64 = 1.5;
 
-/// Height of the words between window and check bar, mm; the overview beside them is as high.
+/// Height of the text between window and check bar, mm; the overview beside it has the same height.
 const WORDS_MM: f64 = 13.0;
 
-/// Smallest window, mm: on less there is more overlap than anything else.
+/// Smallest window, mm: a smaller one would consist mostly of overlap.
 const LEAST_WINDOW_MM: f64 = 40.0;
 
-/// Most pages of a sheet or a net: an afternoon's work.
+/// Maximum number of pages of a sheet or a net: an afternoon's work.
 pub(crate) const MOST_PAGES: usize = 120;
 
-/// Largest sheet, mm²: pictures of it that still resolve its hairlines can be verified.
+/// Largest sheet, mm²: images of it that still resolve its hairlines can be verified.
 const MOST_AREA_MM2: f64 = 4e6;
 
-/// Length of an arm of a cross, and its blank, mm: it has room in a slanted margin of 5 mm.
+/// Length of an arm of a cross, and the gap around it, mm: a cross fits in a slanted margin of 5 mm.
 const CROSS_MM: (f64, f64) = (1.3, 0.35);
 
-/// Places for crosses are tried in steps of this, mm: less than the room to spare in such a margin.
+/// Step between candidate positions of crosses, mm: less than the spare space in such a margin.
 const CROSS_STEP_MM: f64 = 0.5;
 
-/// Width of the lines of crosses, and of the overview's, mm.
+/// Width of the lines of crosses and of the overview, mm.
 const LINE_MM: f64 = 0.15;
 
-/// Distance of the line to be trimmed along from the window, mm: the paper that it leaves hides nothing.
+/// Distance of the trim line from the window, mm: the remaining paper hides nothing.
 const TRIM_MM: f64 = 0.3;
 
 /// Length of a tick, mm.
 pub(crate) const TICK_MM: f64 = 2.0;
 
-/// Width of the frame around the page's own window on the overview, mm.
+/// Width of the frame around the page's own window in the overview, mm.
 const FRAME_MM: f64 = 0.5;
 
-/// Capital height of the page's name, mm.
+/// Capital height of the name of the page, mm.
 const NAME_CAP_MM: f64 = 6.0;
 
-/// How a net or a board lies over pages.
+/// Layout of a net or a board over several pages.
 pub(crate) struct Poster {
-    /// A page as it would be without a window.
+    /// A page without its window.
     page: Arrangement,
     /// The window on the page: left, lower, right, upper end, mm.
     window_mm: [f64; 4],
@@ -75,7 +75,7 @@ pub(crate) struct Poster {
 }
 
 impl Poster {
-    /// That with the fewest windows that shows all points, on A0 unless the paper is said.
+    /// Returns the layout with the fewest windows that shows all points, on A0 unless a paper size is given.
     pub(crate) fn new(points: &[DVec2], paper: &PaperSpec) -> Result<Self, TargetError> {
         let size = Self::paper_size(paper);
         let orientations = match paper.orientation {
@@ -102,14 +102,14 @@ impl Poster {
         }
         best.ok_or_else(|| {
             let problem =
-                format!("{size} is too small for the pages of a larger sheet: take larger paper");
+                format!("{size} is too small for the pages of a larger sheet: use larger paper");
             TargetError::invalid(Setting::PaperSize, problem)
         })
     }
 
-    /// The paper of its pages: the largest that may be taken.
+    /// Returns the paper of its pages: the largest allowed size.
     fn paper_size(paper: &PaperSpec) -> PaperSize {
-        paper.sizes().pop().expect("there are sizes")
+        paper.sizes().pop().expect("at least one size is allowed")
     }
 
     fn on(page: &Arrangement, turn: Motion, points: &[DVec2]) -> Self {
@@ -131,13 +131,13 @@ impl Poster {
         poster
     }
 
-    /// The windows, whether they show anything or not.
+    /// Returns the number of windows, including empty ones.
     fn windows(&self) -> usize {
         self.counts[0] * self.counts[1]
     }
 
-    /// Refuses more pages, or a larger sheet, than can be assembled and verified. `what` has edges of so many mm by a
-    /// setting; the refusal says which edge would do, or what `instead`.
+    /// Rejects more pages, or a larger sheet, than can be assembled and verified. `what` has edges of `edge_mm`, given
+    /// by `setting`. The error proposes an edge that would fit, or the setting `instead`.
     pub(crate) fn check(
         &self,
         what: &str,
@@ -154,8 +154,8 @@ impl Poster {
         let edge = (edge_mm / excess.sqrt() * 0.95).floor();
         let instead = instead.map_or(String::new(), |instead| format!("{instead}, "));
         let problem = format!(
-            "{what} takes {} pages of {}, more than can be assembled and verified: take {instead}{setting} of at most \
-             {edge} mm, or larger {}",
+            "{what} takes {} pages of {}, more than can be assembled and verified: use {instead}{setting} of at most \
+             {edge} mm, or a larger {}",
             self.windows(),
             Self::paper_size(paper),
             Setting::PaperSize
@@ -163,12 +163,12 @@ impl Poster {
         Err(TargetError::invalid(setting, problem))
     }
 
-    /// Where the points lie on the sheet.
+    /// Returns the transform from the points to the sheet.
     pub(crate) fn sheet_from_points(&self) -> Motion {
         self.sheet_from_points
     }
 
-    /// The sheet, still empty.
+    /// Returns the empty sheet.
     pub(crate) fn sheet(&self) -> SheetLayout {
         let DVec2 { x: width_mm, y: height_mm } = self.size_mm();
         SheetLayout {
@@ -188,13 +188,13 @@ impl Poster {
         DVec2::new(right - left, upper - lower)
     }
 
-    /// Width and height of the sheet, mm.
+    /// Returns width and height of the sheet, mm.
     fn size_mm(&self) -> DVec2 {
         let [columns, rows] = self.counts.map(|count| count as f64);
         (self.window_size() - OVERLAP_MM) * DVec2::new(columns, rows) + OVERLAP_MM
     }
 
-    /// The window in a column and a row (from the top) on the sheet: left, lower, right, upper.
+    /// Returns the window in a column and a row (from the top) on the sheet: left, lower, right, upper.
     fn window_on_sheet(&self, column: usize, row: usize) -> [f64; 4] {
         let window = self.window_size();
         let left = (window.x - OVERLAP_MM) * column as f64;
@@ -202,10 +202,11 @@ impl Poster {
         [left, upper - window.y, left + window.x, upper]
     }
 
-    /// Adds crosses to a sheet that holds everything else, and its pages.
+    /// Adds crosses and pages to a sheet that is otherwise complete.
     ///
-    /// `areas` are convex polygons of the sheet that no cross may meet, beside its lines and texts; the `overview` is drawn
-    /// small on every page, which has this `label` in small type, and its number in large type after what it is `of`; the `words` are set from a place on, in a room of some width.
+    /// `areas` are convex polygons of the sheet that no cross may overlap, in addition to its lines and texts. Every
+    /// page shows a small `overview`, the `label` in small type, and its number in large type, prefixed with `of`.
+    /// `words` lays out the instructions from a position, within a given width.
     pub(crate) fn add_pages(
         &self,
         sheet: &mut SheetLayout,
@@ -268,7 +269,7 @@ impl Poster {
         sheet.pages = pages.collect();
     }
 
-    /// The lines of a page to be trimmed along, where another lies on its left or above.
+    /// Returns the trim lines of a page, on the sides where it has a left or upper neighbour.
     fn trims(&self, left: bool, above: bool) -> impl Iterator<Item = SheetLine> {
         let [x0, y0, x1, y1] = self.window_mm;
         let (x, y) = (x0 - TRIM_MM, y1 + TRIM_MM);
@@ -282,7 +283,7 @@ impl Poster {
         })
     }
 
-    /// Size of the overview, mm, and its scale.
+    /// Returns the size of the overview, mm, and its scale.
     fn overview(&self) -> (DVec2, f64) {
         let size = self.size_mm();
         let high = WORDS_MM - 2.0 * BLANK_MM;
@@ -290,7 +291,7 @@ impl Poster {
         (size * scale, scale)
     }
 
-    /// The name of the page, and what to do with it.
+    /// Adds the name of the page and its instructions.
     fn explain(
         &self,
         marks: &mut SheetLayout,
@@ -319,7 +320,7 @@ impl Poster {
         marks.texts.push(text(joining, (start, above), 2.2, room));
     }
 
-    /// A small picture of the sheet with the window of the page framed.
+    /// Draws a small overview of the sheet, with the window of the page framed.
     fn draw_overview(&self, marks: &mut SheetLayout, lines: &[SheetLine], window: [f64; 4]) {
         let [_, lower, right, _] = self.page.clear_mm();
         let (size, scale) = self.overview();
@@ -345,7 +346,7 @@ impl Poster {
     }
 }
 
-/// What to do with a page that has pages of these numbers on its left and above.
+/// Returns the instructions for a page that has pages with these numbers on its left and above.
 fn joining(left: Option<usize>, above: Option<usize>) -> String {
     let (line, pages) = match (left, above) {
         (None, None) => return "Lay this page down; the next ones are glued on it.".to_owned(),
@@ -358,7 +359,7 @@ fn joining(left: Option<usize>, above: Option<usize>) -> String {
     format!("Trim along {line}; glue it on {pages}, its edge on the ticks, cross on cross.")
 }
 
-/// Everything printed on a sheet, as convex polygons.
+/// Converts all printed marks of a sheet to convex polygons.
 fn obstacles(sheet: &SheetLayout, areas: Vec<Vec<DVec2>>) -> Vec<Vec<DVec2>> {
     let lines = sheet.lines.iter().map(|l| vec![l.from_mm, l.to_mm]);
     let texts = sheet.texts.iter().map(|text| {
@@ -372,8 +373,8 @@ fn obstacles(sheet: &SheetLayout, areas: Vec<Vec<DVec2>>) -> Vec<Vec<DVec2>> {
     areas.into_iter().chain(lines).chain(texts).collect()
 }
 
-/// Up to two ticks that end where the trimmed edge of a page comes to lie on its neighbour, on the left of what both
-/// show, or above it: on the page below, beside that edge.
+/// Returns up to two ticks that mark the trimmed edge of a page on its left or upper neighbour. They lie beside that
+/// edge, outside the shared area.
 fn ticks(
     [left, lower, right, upper]: [f64; 4],
     is_left: bool,
@@ -408,7 +409,7 @@ fn ticks(
         .collect()
 }
 
-/// Up to two crosses in an area, as far apart as what is printed there allows.
+/// Returns up to two crosses in an area, as far apart as the printed marks allow.
 fn crosses(shared: [f64; 4], obstacles: &[Vec<DVec2>]) -> Vec<SheetLine> {
     let (arm, blank) = CROSS_MM;
     let near: Vec<&Vec<DVec2>> =

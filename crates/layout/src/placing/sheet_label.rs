@@ -1,16 +1,16 @@
-//! The label of a sheet: all that is needed to make it again.
+//! The label of a sheet, with everything needed to reproduce it.
 
 use deltille_core::family::places;
 use deltille_core::lattice::GridKind;
 use deltille_core::targets::format_mm;
 use deltille_core::targets::{BoardSpec, FamilyRef, Fingerprint, Panel, TagsIn};
 
-/// How the label of a sheet ends: which target it is part of, and what made it.
+/// Returns the end of a label: the target that the sheet belongs to, and the program that made it.
 pub(crate) fn imprint(target: Fingerprint) -> String {
     format!("target {} · deltille {}", target.short(), env!("CARGO_PKG_VERSION"))
 }
 
-/// The label of a sheet of boards: all that is needed to make them again.
+/// Returns the label of a sheet of boards, with everything needed to reproduce them.
 pub(crate) fn label(
     name: &str,
     spec: &BoardSpec,
@@ -40,7 +40,7 @@ pub(crate) fn label(
     parts.join(" · ")
 }
 
-/// The label of a board among others on a sheet: what tells it from them.
+/// Returns the label that distinguishes a board from the others on its sheet.
 pub(crate) fn label_of_one(spec: &BoardSpec, panel: &Panel, family: Option<&FamilyRef>) -> String {
     let mut parts = size_in_words(&format!("board {}", panel.id), spec);
     if let (Some(family), [first, .., last] | [first @ last]) = (family, panel.tags.as_slice()) {
@@ -49,7 +49,7 @@ pub(crate) fn label_of_one(spec: &BoardSpec, panel: &Panel, family: Option<&Fami
     parts.join(" · ")
 }
 
-/// What is called so, its corners and its edge.
+/// Returns the name, the number of corners and the edge length.
 fn size_in_words(name: &str, spec: &BoardSpec) -> Vec<String> {
     let corners = format!("{} × {} corners", spec.rows, spec.cols);
     vec![
@@ -62,7 +62,8 @@ fn size_in_words(name: &str, spec: &BoardSpec) -> Vec<String> {
     ]
 }
 
-/// Tags in words: `d25h7 id 3`, `d25h7 ids 3–7`; place codes, whose ids are those of places, by their family alone.
+/// Describes tags in words: `d25h7 id 3`, `d25h7 ids 3–7`. Place codes, whose ids are positions, are described by their
+/// family alone.
 pub fn tag_range(family: &str, first: u32, last: u32) -> String {
     match (family, first == last) {
         (places::NAME, _) => family.to_owned(),

@@ -1,4 +1,4 @@
-//! Sheets of ChArUco boards, AprilGrids and circles: their panel in the middle of the smallest paper that takes it.
+//! Sheets of ChArUco boards, AprilGrids and circles: the panel in the middle of the smallest paper that fits it.
 
 use super::arrangement::{Footprint, fit};
 use super::sheet_label::{imprint, tag_range};
@@ -13,18 +13,18 @@ use deltille_core::targets::{
     AprilGridSpec, CharucoSpec, CirclesSpec, Panel, Target, TargetError, TargetSpec, fingerprint,
 };
 
-/// Finest size that is proposed to make a target fit, mm: what office printers resolve.
+/// Smallest size proposed to make a target fit, mm: the limit that office printers resolve.
 const LEAST_PROPOSED_MM: u32 = 5;
 
-/// A panel whose size is given by one length.
+/// A panel whose size is determined by one length.
 struct SinglePanel<'a> {
-    /// The panel for any such length, mm.
+    /// Builds the panel for a given length, mm.
     of_size: &'a dyn Fn(f64) -> Panel,
-    /// The length asked for, mm.
+    /// Requested length, mm.
     size_mm: f64,
-    /// The field that sets it.
+    /// Setting of that length.
     setting: Setting,
-    /// The field of which less would make it fit, too, such as the number of squares.
+    /// Setting whose reduction would also make the panel fit, such as the number of squares.
     fewer: Setting,
 }
 
@@ -42,7 +42,7 @@ impl SinglePanel<'_> {
         }
     }
 
-    /// Why it cannot be printed, and what would do.
+    /// Returns the error for a panel that does not fit, with a proposal.
     fn too_large(&self, paper: &PaperSpec) -> TargetError {
         let size = format_mm(self.size_mm);
         let on = paper.size.as_ref().map_or("even A0".to_owned(), ToString::to_string);
@@ -54,14 +54,14 @@ impl SinglePanel<'_> {
             None => format!("a smaller {PaperMarginMm}"),
         };
         let problem = format!(
-            "with {size} the target and what is printed around it do not fit {on}: take larger paper, fewer {}, or {smaller}",
+            "with {size}, the target and its marks do not fit {on}: use larger paper, fewer {}, or {smaller}",
             self.fewer
         );
         TargetError::invalid(PaperSize, problem)
     }
 }
 
-/// The sheet of a target of one of these kinds; of another there is none.
+/// Lays out the sheet of a ChArUco board, an AprilGrid or circles; returns no sheet for other targets.
 pub(crate) fn sheets(
     title: &str,
     target: &Target,
@@ -102,7 +102,7 @@ pub(crate) fn sheets(
     Ok(vec![sheet])
 }
 
-/// Lays a panel out with its label and check bars.
+/// Lays out a panel with its label and check bars.
 fn sheet(
     single: &SinglePanel,
     paper: &PaperSpec,
@@ -114,7 +114,7 @@ fn sheet(
     Ok(arrangement.sheet(panel.id, panel.bounds_mm(), label))
 }
 
-/// All that is needed to make the same again.
+/// Returns the label, with everything needed to reproduce the target.
 fn charuco_label(title: &str, spec: &CharucoSpec, family: &str, imprint: String) -> String {
     let [columns, rows] = spec.squares;
     let last = spec.first_id + spec.markers() - 1;
@@ -133,7 +133,7 @@ fn charuco_label(title: &str, spec: &CharucoSpec, family: &str, imprint: String)
     parts.join(" · ")
 }
 
-/// All that is needed to make the same again.
+/// Returns the label, with everything needed to reproduce the target.
 fn aprilgrid_label(title: &str, spec: &AprilGridSpec, family: &str, imprint: String) -> String {
     let [columns, rows] = spec.tags;
     let last = spec.first_id + spec.count() - 1;
@@ -150,7 +150,7 @@ fn aprilgrid_label(title: &str, spec: &AprilGridSpec, family: &str, imprint: Str
     parts.join(" · ")
 }
 
-/// All that is needed to make the same again.
+/// Returns the label, with everything needed to reproduce the target.
 fn circles_label(title: &str, spec: &CirclesSpec, imprint: String) -> String {
     let [columns, rows] = spec.circles;
     let kind = if spec.asymmetric { "asymmetric circles" } else { "circles" };

@@ -1,10 +1,10 @@
-//! Sheets of single tags: a panel of one tile for each, in rows, as many pages as they take.
+//! Sheets of single tags: a panel of one tile for each, in rows, on as many pages as needed.
 //!
 //! ```text
-//!     ▲      ▲      ▲     Tags stand upright. Around each is a quiet zone, beneath that its id, and
-//!     0      1      2     below an id more blank than above it, so that it belongs to its tag.
-//!     ▲      ▲
-//!     3      4            The rest of the page is that of a board: label and check bars.
+//!     ▲      ▲      ▲     Tags stand upright. Each has a quiet zone around it, and its id beneath. The
+//!     0      1      2     gap below an id is larger than the one above, so that it clearly belongs to
+//!     ▲      ▲            its tag.
+//!     3      4            The label and the check bars are those of a board sheet.
 //! ```
 
 use glam::DVec2;
@@ -19,16 +19,16 @@ use deltille_core::setting::Setting::{self, PaperMarginMm, TagSheetEdgeMm};
 use deltille_core::targets::format_mm;
 use deltille_core::targets::{TagSheetSpec, TargetError};
 
-/// Blank around a tag: so many edges, at least so many mm, and at least a cell's edge.
+/// Quiet zone around a tag: fraction of its edge, and minimum, mm; also at least the edge of a cell.
 const QUIET: (f64, f64) = (0.15, 3.0);
-/// Blank between an id and the row below, in quiet zones.
+/// Gap between an id and the row below, in quiet zones.
 const BELOW_ID: f64 = 1.5;
-/// Capital height of an id, in edges, and its range, mm.
+/// Capital height of an id as a fraction of the edge, and its range, mm.
 const ID_CAP: (f64, [f64; 2]) = (0.07, [1.5, 5.0]);
-/// Ids are listed on a page's label up to this many characters, else only counted.
+/// Maximum length of the list of ids on a label, characters; longer lists are replaced by a count.
 const LISTED: usize = 48;
 
-/// The blanks of a sheet, mm.
+/// Blank spaces of a sheet, mm.
 struct Blanks {
     edge: f64,
     quiet: f64,
@@ -43,13 +43,13 @@ impl Blanks {
         Self { edge, quiet, id_cap: (share * edge).clamp(least, most) }
     }
 
-    /// From the base of one tag to that of its neighbour, right and below.
+    /// Returns the distance from the base of one tag to that of its neighbour, to the right and below.
     fn pitch(&self) -> DVec2 {
         let below = self.quiet + self.id_cap + BELOW_ID * self.quiet;
         DVec2::new(self.edge + 2.0 * self.quiet, self.edge * ROW_HEIGHT + below)
     }
 
-    /// What a block of tags with their ids takes.
+    /// Returns the footprint of a block of tags with their ids.
     fn footprint(&self, [columns, rows]: [usize; 2], margin_mm: f64) -> Footprint {
         let pitch = self.pitch();
         Footprint {
@@ -62,7 +62,7 @@ impl Blanks {
     }
 }
 
-/// The sheets of some tags.
+/// Lays out the sheets of a list of tags.
 pub(crate) fn sheets(
     name: &str,
     spec: &TagSheetSpec,
@@ -80,8 +80,8 @@ pub(crate) fn sheets(
     Ok(sheets.collect())
 }
 
-/// The columns and rows that a page takes, at most as many as there are tags, and where they lie;
-/// the way of the paper that takes the most tags.
+/// Chooses the columns and rows of a page, at most as many as there are tags, and their position. Uses the orientation
+/// that fits most tags.
 fn arrange(
     spec: &TagSheetSpec,
     blanks: &Blanks,
@@ -91,7 +91,7 @@ fn arrange(
     let margin = check_margin(paper)?;
     let size = paper.size.clone().or_else(|| PaperSize::automatic().next());
     let Some(size) = size else {
-        return Err(TargetError::invalid(Setting::PaperSize, "none is named"));
+        return Err(TargetError::invalid(Setting::PaperSize, "no paper size is given"));
     };
     let pages = paper.pages_mm(&size);
     let pitch = blanks.pitch();
@@ -102,7 +102,7 @@ fn arrange(
             for rows in 1..=(((page.y / pitch.y) as usize + 1).min(tags.div_ceil(columns))) {
                 let footprint = blanks.footprint([columns, rows], paper.margin_mm);
                 let most = best.as_ref().map_or(0, |([c, r], _)| c * r);
-                // Of two equal blocks the later, wider one.
+                // Of two equal blocks, the later, wider one is used.
                 let more = columns * rows > most || (columns * rows == most && columns > rows);
                 if more && let Some(found) = on_page(&footprint, page, margin, false) {
                     best = Some(([columns, rows], found.with_logo(paper)));
@@ -124,13 +124,13 @@ fn arrange(
             None => format!("larger paper, or a smaller {PaperMarginMm}"),
         };
         let problem = format!(
-            "a tag with {edge} edges, its id and the check bars do not fit {size}: take {instead}"
+            "a tag with {edge} edges, its id and the check bars do not fit {size}: use {instead}"
         );
         TargetError::invalid(Setting::PaperSize, problem)
     })
 }
 
-/// One page: tags from the upper left, row by row.
+/// Lays out one page: tags from the upper left, row by row.
 fn page(
     blanks: &Blanks,
     grid @ [columns, rows]: [usize; 2],
@@ -161,7 +161,7 @@ fn page(
     sheet
 }
 
-/// What is on a page: all that is needed to print it again.
+/// Returns the label of a page, with everything needed to print it again.
 fn label(
     name: &str,
     spec: &TagSheetSpec,
@@ -183,7 +183,7 @@ fn label(
     parts.join(" · ")
 }
 
-/// Ids in words: `ids 0–29`, `ids 3, 7, 20–25`; many pieces are counted only.
+/// Describes ids in words: `ids 0–29`, `ids 3, 7, 20–25`; long lists are replaced by a count.
 fn listed(ids: &[u32]) -> String {
     let runs = ids.chunk_by(|a, b| a.checked_add(1) == Some(*b)).filter_map(|run| {
         let (first, last) = (run.first()?, run.last()?);
@@ -212,7 +212,7 @@ mod tests {
     }
 
     #[test]
-    fn every_tag_is_on_one_page_with_blank_around_it() {
+    fn every_tag_is_on_one_page_with_a_quiet_zone() {
         for (edge, paper) in [(5.0, "A4"), (30.0, "A4"), (30.0, "letter"), (140.0, "A4")] {
             let ids: Vec<u32> = (100..300).collect();
             let target = build(ids.clone(), edge, paper).unwrap();
@@ -239,7 +239,7 @@ mod tests {
     }
 
     #[test]
-    fn what_does_not_fit_is_refused() {
+    fn tags_that_do_not_fit_are_refused() {
         let error = build(vec![0], 250.0, "A4").unwrap_err().to_string();
         assert!(error.starts_with("`PaperSpec::size`: a tag"), "{error}");
         let largest = error.split("at most ").nth(1).and_then(|e| e.split(' ').next()).unwrap();
@@ -262,7 +262,7 @@ mod tests {
     }
 
     #[test]
-    fn ids_are_told_in_few_words() {
+    fn lists_of_ids_are_shortened() {
         assert_eq!(listed(&[4]), "id 4");
         assert_eq!(listed(&[3, 7, 20, 21, 22]), "ids 3, 7, 20–22");
         let odd: Vec<u32> = (0..100).map(|i| 2 * i + 1).collect();

@@ -1,5 +1,5 @@
-//! Which target suits a camera: `reach` is the distance from which a target can be used, and `proposal` the board that suits a
-//! camera, its distances and the paper.
+//! Planning of a target for a camera: `reach` computes the distances at which a target can be used, and `proposal` the
+//! board for a given camera, distance range and paper.
 
 mod proposal;
 mod reach;

@@ -1,4 +1,4 @@
-//! Which board suits a camera, and the distances from which it is to be seen.
+//! Proposes a board for a camera and the distances from which it must be visible.
 
 use super::reach::{COMFORTABLE_BIT_PX, COMFORTABLE_EDGE_PX, Reach, shortening};
 use crate::{PaperSpec, largest_edge_mm};
@@ -6,47 +6,49 @@ use deltille_core::family::Family;
 use deltille_core::lattice::{GridKind, ROW_HEIGHT};
 use deltille_core::targets::{BoardSpec, TagSpec, Target, TargetError, TargetSpec};
 
-/// The part of a picture that a board may fill: beyond, a hand moves it out.
+/// Fraction of the image that a board may fill: a larger board held by hand easily leaves the image.
 const FILLED: f64 = 0.9;
 
-/// Rows and columns of corners of the smallest and the largest board that is proposed: fewer tell little of a camera, and
-/// more are not held by hand.
+/// Rows and columns of corners of the smallest and the largest board that is proposed. Fewer corners constrain a camera
+/// poorly, and larger boards cannot be held by hand.
 const LEAST: [u32; 2] = [4, 5];
 const MOST: u32 = 40;
 
-/// Smallest cell of a place code at which patches of three by four tiles are labelled in sharp images, px, measured on
-/// photographs of printed pages (docs/benchmarks.md, Dense boards). Tilted cells need the same height.
+/// Cell size of a place code from which patches of three by four tiles are labelled in sharp images, px. Measured on
+/// photographs of printed pages (docs/benchmarks.md). Tilted cells need the same height, because a patch has no
+/// redundant cells.
 const PATCH_BIT_PX: f64 = 1.4;
 
-/// A camera, and from where it is to see a board.
+/// A camera, and the distances from which it must see a board.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Situation {
     /// Focal length, px.
     pub focal_px: f64,
-    /// Width and height of its pictures, px.
+    /// Width and height of its images, px.
     pub size_px: [u32; 2],
-    /// The nearest and the farthest distance, mm.
+    /// Nearest and farthest distance, mm.
     pub distances_mm: [f64; 2],
-    /// The tilt up to which all of it is to be read at the farthest distance, rad.
+    /// Tilt up to which the whole board must be readable at the farthest distance, rad.
     pub tilt_rad: f64,
 }
 
-/// A board that suits, and what it is good for.
+/// A proposed board and its properties.
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct Proposal {
     /// The board.
     pub spec: BoardSpec,
-    /// What it offers.
+    /// Its size, tags and distances.
     pub reach: Reach,
-    /// From where on a board that faces the camera is whole in the picture, mm. Nearer, parts of a board with tags are
-    /// labelled too.
+    /// Distance from which a board facing the camera is entirely visible, mm. At shorter distances, parts of a tagged
+    /// board are still labelled.
     pub whole_from_mm: f64,
 }
 
 impl Proposal {
-    /// Of a board of place codes the distance up to which a patch of three by four tiles is labelled in sharp pictures of a
-    /// camera of a focal length in px, tilted by an angle, mm; no other board has such.
+    /// Returns the distance up to which a patch of three by four tiles of a place-code board is labelled in sharp
+    /// images, mm. `focal_px` is the focal length and `tilt_rad` the tilt of the board. Returns `None` for other
+    /// boards.
     pub fn patches_to_mm(&self, focal_px: f64, tilt_rad: f64) -> Option<f64> {
         let is_dense = self.spec.tags.as_ref().is_some_and(TagSpec::is_dense);
         let to_mm = focal_px * self.reach.detail_mm * tilt_rad.cos() / PATCH_BIT_PX;
@@ -54,14 +56,14 @@ impl Proposal {
     }
 }
 
-/// Why no board suits.
+/// Reason why no board fits.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum Unsuited {
-    /// Tiles that are large enough at the farthest distance leave no room for a board in the picture there.
+    /// Tiles large enough for the farthest distance leave no room for a board in the image.
     #[error(
-        "tiles must be {edge_mm:.0} mm long to be read from {far_mm:.0} mm, and the picture there takes less than 4 × 5 \
-         corners of them: take a camera of more pixels, a lens of a wider view, less tilt or a shorter distance"
+        "tiles must be {edge_mm:.0} mm long to be read from {far_mm:.0} mm, but the image there shows fewer than 4 × 5 \
+         corners of them: use a camera with more pixels, a wider lens, less tilt or a shorter distance"
     )]
     Picture {
         /// Edge of a tile, mm.
@@ -69,10 +71,10 @@ pub enum Unsuited {
         /// The farthest distance, mm.
         far_mm: f64,
     },
-    /// They do not fit the paper.
+    /// The tiles do not fit on the paper.
     #[error(
-        "tiles must be {edge_mm:.0} mm long to be read from {far_mm:.0} mm, and the paper takes less than 4 × 5 corners of \
-         them: take larger paper, or print a poster"
+        "tiles must be {edge_mm:.0} mm long to be read from {far_mm:.0} mm, but the paper fits fewer than 4 × 5 corners \
+         of them: use larger paper, or print a poster"
     )]
     Paper {
         /// Edge of a tile, mm.
@@ -80,14 +82,15 @@ pub enum Unsuited {
         /// The farthest distance, mm.
         far_mm: f64,
     },
-    /// There is no such board.
+    /// The board cannot be built.
     #[error(transparent)]
     Target(#[from] TargetError),
 }
 
 impl Situation {
-    /// The board with the most corners whose tags, or tiles where there are none, are large enough at the farthest
-    /// distance, which is whole in the picture at the nearest if that takes 4 × 5 corners, and fits the paper.
+    /// Returns the board with the most corners that fits on the paper and is readable at the farthest distance. Its
+    /// tags, or its tiles if it has none, are large enough there. At the nearest distance the whole board is visible,
+    /// provided the image shows 4 × 5 corners.
     ///
     /// ```
     /// use deltille_layout::Situation;
@@ -110,7 +113,7 @@ impl Situation {
     /// ```
     ///
     /// # Errors
-    /// When there is none.
+    /// Returns an error if no board fits.
     pub fn board(
         &self,
         kind: GridKind,
@@ -121,7 +124,7 @@ impl Situation {
         let mut spec = BoardSpec::new(kind, LEAST[0], LEAST[1], 1.0);
         spec.tags = tags.as_ref().map(|(tags, _)| tags.clone());
         let family = tags.map(|(_, family)| family);
-        // A board of tiles of one millimetre tells what of a tile must be seen.
+        // A board with tiles of one millimetre gives the size of the smallest detail in tile edges.
         let unit = Target::build("plan", &TargetSpec::Board(spec.clone()), family)?;
         let unit = Reach::of(&unit).map_err(TargetError::from)?;
         let comfortable = if family.is_some() { COMFORTABLE_BIT_PX } else { COMFORTABLE_EDGE_PX };
@@ -138,7 +141,8 @@ impl Situation {
             [rows, cols].map(|n| n.clamp(0.0, f64::from(MOST)) as u32)
         };
         let takes = |[rows, cols]: [u32; 2]| rows >= LEAST[0] && cols >= LEAST[1];
-        // Where the nearest picture takes too little, the board is whole from a little farther on.
+        // If the image at the nearest distance shows too few corners, the board is entirely visible only from farther
+        // away.
         let steps =
             (0..=STEPS).map(|k| near_mm * (far_mm / near_mm).powf(f64::from(k) / f64::from(STEPS)));
         let whole =
@@ -160,5 +164,5 @@ impl Situation {
     }
 }
 
-/// Distances between the nearest and the farthest that are tried.
+/// Number of distances tried between the nearest and the farthest.
 const STEPS: u32 = 60;

@@ -1,48 +1,50 @@
-//! From where a camera can use a target.
+//! Distances at which a camera can use a target.
 
 use serde::Serialize;
 
 use deltille_core::detection::MIN_UNTAGGED_EDGE_PX;
 use deltille_core::targets::{Target, TargetSpec, UnknownCodes};
 
-/// A cell of a tag that is so long leaves room for tilt, blur and noise, px; without these half of it is read.
+/// Size of a tag cell that leaves a reserve for tilt, blur and noise, px. Under ideal conditions half of this is
+/// sufficient.
 pub(super) const COMFORTABLE_BIT_PX: f64 = 2.0;
 
-/// Likewise the edge of a tile of a board without tags.
+/// The same for the tile edge of a board without tags, px.
 pub(super) const COMFORTABLE_EDGE_PX: f64 = 1.25 * MIN_UNTAGGED_EDGE_PX;
 
-/// A cell of a tag from which on boards are labelled where pictures are sharp, px: half of the views are at 1.25, nearly all
-/// from a twentieth more on. Tilted cells need as large an area.
+/// Size of a tag cell from which boards are labelled in sharp images, px: half of the views are labelled at 1.25,
+/// nearly all at 5 % more. Tilted cells need the same area.
 const LEAST_BIT_PX: f64 = 1.3;
 
-/// Boards of two tags, of 32 and 50 bits, need two fifths and a tenth more px for each to be labelled.
+/// Number of bits that sets the penalty for boards with few tags. Boards with two tags, of 32 and 50 bits in total,
+/// need 40 % and 10 % more pixels.
 const FEW_BITS: f64 = 24.0;
 
-/// What a target offers, and from where a camera can use it.
+/// Size and tags of a target, and the distances at which a camera can use it.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 #[non_exhaustive]
 pub struct Reach {
-    /// Corners of all panels.
+    /// Number of corners of all panels.
     pub corners: usize,
-    /// Tags of all panels.
+    /// Number of tags of all panels.
     pub tags: usize,
-    /// Bits of all tags.
+    /// Number of bits of all tags.
     pub bits: u32,
-    /// Ids of the family that are left for other targets after the last one of this.
+    /// Number of unused ids of the family after the highest id of this target.
     pub ids_left: usize,
-    /// The smallest thing that must be seen, mm: a cell of a tag, or the edge of a tile where there are no tags.
+    /// Smallest detail that must be resolved, mm: a tag cell, or the tile edge if the target has no tags.
     pub detail_mm: f64,
-    /// How long that must be in a picture, px.
+    /// Required length of that detail in an image, px.
     pub needed_px: f64,
-    /// The longest side of the box around all corners, mm.
+    /// Longest side of the bounding box of all corners, mm.
     pub size_mm: f64,
 }
 
 impl Reach {
-    /// What a target offers.
+    /// Computes the reach of a target.
     ///
     /// # Errors
-    /// Where the family of its tags is unknown.
+    /// Returns an error if the family of its tags is unknown.
     ///
     /// ```
     /// use deltille_layout::Reach;
@@ -67,7 +69,7 @@ impl Reach {
             let bits = family_of(panel.kind).map_or(0, |family| family.dimension().bits());
             bits * panel.tags.len() as u32
         });
-        // Of two families the one that has fewer left.
+        // If the target uses two families, the smaller number counts.
         let left = target.tilings().filter_map(|kind| {
             let (_, ids) = target.tags_of_tiling(kind)?;
             let after = ids.into_iter().max().map_or(0, |id| id as usize + 1);
@@ -81,7 +83,7 @@ impl Reach {
             Some([least.min(at), most.max(at)])
         });
         let size_mm = match (&target.spec, box_mm) {
-            // Single tags are seen one by one.
+            // Single tags are viewed one at a time.
             (TargetSpec::Tags(spec), _) => spec.edge_mm,
             (_, Some([least, most])) => (most - least).max_element(),
             (_, None) => 0.0,
@@ -97,27 +99,29 @@ impl Reach {
         })
     }
 
-    /// The distances at which it fills the width of the picture and at which its details are just large enough, mm, for a
-    /// camera of a focal length and a width in px; `None` where there is no distance at which both are so.
+    /// Returns the distance at which the target fills the width of the image, and the one at which its details are just
+    /// large enough, mm. The focal length and the image width are in px. Returns `None` if the second distance is not
+    /// larger than the first.
     pub fn distances_mm(&self, focal_px: f64, width_px: f64) -> Option<[f64; 2]> {
         let near = focal_px * self.size_mm / width_px;
         let far = focal_px * self.detail_mm / self.needed_px;
         (near < far).then_some([near, far])
     }
 
-    /// The distance up to which boards are labelled in sharp pictures of a camera of a focal length in px, tilted by an
-    /// angle, mm. Tagged boards are hardly labelled a tenth farther away; those without tags often are.
+    /// Returns the distance up to which boards are labelled in sharp images, mm. `focal_px` is the focal length and
+    /// `tilt_rad` the tilt of the board. Tagged boards are rarely labelled 10 % farther away; untagged boards often
+    /// are.
     pub fn labelled_to_mm(&self, focal_px: f64, tilt_rad: f64) -> f64 {
         let needed_px = match self.bits {
             0 => COMFORTABLE_EDGE_PX,
-            // Few bits must be the surer.
+            // With few bits, each must be read more reliably.
             bits => LEAST_BIT_PX * (1.0 + (FEW_BITS / f64::from(bits)).powi(3)),
         };
         focal_px * self.detail_mm * shortening(self.tags > 0, tilt_rad) / needed_px
     }
 }
 
-/// What is left, at a tilt, of how far a board is labelled: cells of tags must keep their area, tiles without their height.
+/// Factor by which tilt shortens the labelling distance: tag cells must keep their area, untagged tiles their height.
 pub(super) fn shortening(has_tags: bool, tilt_rad: f64) -> f64 {
     if has_tags { tilt_rad.cos().sqrt() } else { tilt_rad.cos() }
 }
@@ -129,7 +133,7 @@ mod tests {
     use deltille_core::targets::BoardSpec;
 
     #[test]
-    fn without_tags_tiles_must_be_seen() {
+    fn untagged_boards_are_limited_by_their_tiles() {
         let board = BoardSpec { tags: None, ..BoardSpec::new(GridKind::Checker, 7, 9, 30.0) };
         let reach = Reach::of(&Target::new("board", board).unwrap()).unwrap();
         assert_eq!((reach.corners, reach.tags, reach.ids_left), (63, 0, 0));
@@ -140,7 +144,7 @@ mod tests {
     }
 
     #[test]
-    fn ids_before_the_first_one_are_not_left() {
+    fn ids_before_the_first_one_do_not_count_as_left() {
         let mut board = BoardSpec::deltille(10, 11, 20.0);
         board.tags.as_mut().unwrap().first_id = 300;
         let target = Target::new("board", board).unwrap();

@@ -1,10 +1,9 @@
-//! One ideal corner, as the paper's Fig. 6 simulates it.
+//! One ideal corner, as simulated for Fig. 6 of the paper.
 //!
-//! K lines through a point of a plane, seen by a camera that is tilted by φ about an axis at α:
-//! image angles atan2(sin(a − α), −cos φ · cos(a − α)) for a = 0°, 60°, 120° or 0°, 90°. Levels are
-//! multiplied by a linear illumination, then the image is blurred, then each pixel takes the mean
-//! over its square, by Gauss–Legendre quadrature of the blurred image's closed form: exact to 10⁻⁵
-//! of full scale for blurs from 0.4 px (tests).
+//! The corner consists of K lines through a point of a plane, seen by a camera that is tilted by φ about an axis at α.
+//! The image angles are atan2(sin(a − α), −cos φ · cos(a − α)) for a = 0°, 60°, 120° or 0°, 90°. Levels are multiplied
+//! by a linear illumination, then the image is blurred. Each pixel is the mean over its square, by Gauss–Legendre
+//! quadrature of the closed form of the blurred image: exact to 10⁻⁵ of full scale for blurs from 0.4 px (tests).
 //!
 //! ```
 //! use deltille_layout::synth::SimulatedCorner;
@@ -21,18 +20,18 @@ use glam::DVec2;
 
 use deltille_core::raster::Gray;
 
-/// Nodes of the rule along each side of a pixel, on −1 … 1, and weights; sharper blurs than 1 px
-/// ask for the second.
+/// Number of quadrature nodes along each side of a pixel, on −1 … 1. The second rule is used for blurs sharper than
+/// [`SMOOTH_BLUR_PX`].
 const SMOOTH_RULE: usize = 3;
 const SHARP_RULE: usize = 6;
 
-/// Blur from which the smaller rule is exact enough, px.
+/// Blur from which the smaller rule is accurate enough, px.
 const SMOOTH_BLUR_PX: f64 = 0.9;
 
-/// Lines of a deltille corner.
+/// Number of lines of a deltille corner.
 const MAX_LINES: usize = 3;
 
-/// Nodes of the orthant integral; 10⁻¹² up to edges 20° apart.
+/// Number of nodes of the orthant integral: accurate to 10⁻¹² for edges at least 20° apart.
 const ORTHANT_RULE: usize = 16;
 
 /// A corner of two (checker) or three (deltille) lines.
@@ -40,13 +39,13 @@ const ORTHANT_RULE: usize = 16;
 pub struct SimulatedCorner {
     /// Position, px.
     pub position: DVec2,
-    /// Image angles of the lines, rising within a half-turn, radians.
+    /// Image angles of the lines, ascending within 180°, radians.
     pub angles: Vec<f64>,
-    /// Standard deviation of the optical blur, px; the pixel's square comes on top.
+    /// Standard deviation of the optical blur, px, without the averaging over the pixel.
     pub blur_px: f64,
-    /// Half the contrast, of full scale.
+    /// Half the contrast, as a fraction of full scale.
     pub amplitude: f64,
-    /// Grey value half-way between dark and bright, of full scale.
+    /// Grey value midway between dark and bright, as a fraction of full scale.
     pub level: f64,
     /// Relative change of illumination per pixel, 0 in `light_centre`.
     pub slope: DVec2,
@@ -55,8 +54,8 @@ pub struct SimulatedCorner {
 }
 
 impl SimulatedCorner {
-    /// A corner of `lines` lines seen at tilt φ about an axis at α (radians), levels 0.1 and 0.9,
-    /// evenly lit.
+    /// Returns an evenly lit corner of `lines` lines seen at tilt φ about an axis at α (radians), with levels 0.1 and
+    /// 0.9.
     pub fn seen_from(
         lines: usize,
         axis_rad: f64,
@@ -82,13 +81,13 @@ impl SimulatedCorner {
         }
     }
 
-    /// The image before noise, of full scale 1.
+    /// Renders the image before noise; full scale is 1.
     pub fn render(&self, width: usize, height: usize) -> Gray<f32> {
         let rules = self.rules();
         Gray::from_fn(width, height, |x, y| self.pixel(&rules, x as f64, y as f64) as f32)
     }
 
-    /// Brightness of the pixels of a square around (x, y), row by row.
+    /// Returns the brightness of the pixels of a square around (x, y), row by row.
     pub fn window(&self, [x, y]: [usize; 2], radius: usize) -> Vec<f64> {
         let rules = self.rules();
         let side = 2 * radius as isize + 1;
@@ -120,7 +119,7 @@ impl SimulatedCorner {
         Rules { normals, pixel: gauss_legendre(nodes), orthant }
     }
 
-    /// The mean over the square of a pixel.
+    /// Returns the mean over the square of a pixel.
     fn pixel(&self, rules: &Rules, x: f64, y: f64) -> f64 {
         let mut sum = 0.0;
         for &(v, weight_v) in &rules.pixel {
@@ -132,7 +131,7 @@ impl SimulatedCorner {
         sum
     }
 
-    /// The blurred image at a point. A linear factor g·p under a Gaussian of s leaves
+    /// Returns the blurred image at a point. A linear factor g·p under a Gaussian of standard deviation s yields
     /// (g·p)(f∗G) + s² g·∇(f∗G).
     fn point(&self, rules: &Rules, p: DVec2) -> f64 {
         let off = p - self.position;
@@ -185,12 +184,12 @@ fn erf_sqrt_half(h: f64) -> f64 {
     libm::erf(h * FRAC_1_SQRT_2)
 }
 
-/// The Gauss–Legendre rule of n points on −1 … 1: the roots of Pₙ by Newton's method.
+/// Returns the Gauss–Legendre rule of n points on −1 … 1. Newton's method finds the roots of Pₙ.
 fn gauss_legendre(n: usize) -> Vec<(f64, f64)> {
     let root = |i: usize| {
         let mut x = (PI * (i as f64 + 0.75) / (n as f64 + 0.5)).cos();
         let mut derivative = 1.0;
-        // Quadratic convergence from an error of a per mille.
+        // Convergence is quadratic, starting from an error of 0.1 %.
         for _ in 0..5 {
             let (mut p, mut before) = (1.0, 0.0);
             for k in 1..=n {
@@ -221,7 +220,7 @@ mod tests {
         }
     }
 
-    /// The definition itself: sharp image times light, under a kernel that is sampled finely.
+    /// Compares with the definition: the sharp image times illumination, convolved with a finely sampled kernel.
     #[test]
     fn pixels_are_the_blurred_and_integrated_image() {
         for lines in [2, 3] {

@@ -1,12 +1,13 @@
-//! A target seen by a camera, as an image with exact ground truth.
+//! Synthetic images of a target, with exact ground truth.
 //!
-//! 1. `surface`: paper with black areas; `sheet` and `solid` make such of a printed sheet and of a target;
-//! 2. `scene`: surfaces before a camera, rendered with light, blur and noise; `occlusion`: what they hide of each other;
-//! 3. `corner`: one ideal corner by itself.
+//! 1. `surface`: paper with black areas; `sheet` and `solid` build surfaces from a printed sheet and a target;
+//! 2. `scene`: surfaces in front of a camera, rendered with illumination, blur and noise; `occlusion`: the parts they
+//!    hide of each other;
+//! 3. `corner`: one ideal corner on its own.
 //!
-//! Outlines are projected edge by edge and their area in every pixel is computed, not sampled
-//! ([`deltille_core::raster::Coverage`]), so the image before blur and noise is exact, and so are the
-//! positions of the corners.
+//! Outlines are projected edge by edge, and their area in every pixel is computed, not sampled
+//! ([`deltille_core::raster::Coverage`]). So the image before blur and noise is exact, and so are the positions of the
+//! corners.
 
 mod corner;
 mod occlusion;

@@ -1,19 +1,18 @@
-//! What surfaces hide of each other.
+//! Occlusion between surfaces.
 //!
-//! Seen from an eye, a plane convex piece hides what is inside the pyramid of sight over its
-//! outline and beyond its plane. On another plane each side of that shadow is a straight line, so
-//! that the visible part of a polygon comes of cutting along lines, exactly, whatever the lens.
+//! Seen from an eye, a plane convex surface hides everything inside the view pyramid over its outline and beyond its
+//! plane. On another plane, each side of that shadow is a straight line. So the visible part of a polygon results from
+//! clipping along lines, which is exact for every lens.
 
 use glam::{DVec2, DVec3};
 
 use super::Surface;
 use deltille_core::polygon::clip;
 
-/// A piece hides nothing of a plane above which it rises by less than this, mm: faces that meet in
-/// an edge.
+/// A surface must rise above a plane by more than this to hide part of it, mm: faces that meet in an edge do not.
 const ABOVE_MM: f64 = 1e-6;
 
-/// The side of a line on which n·p + c ≥ 0.
+/// The half-plane on which n·p + c ≥ 0.
 #[derive(Clone, Copy, Debug)]
 struct Half {
     n: DVec2,
@@ -26,15 +25,15 @@ impl Half {
     }
 }
 
-/// The shadow of one surface on the plane of another: where all halves hold.
+/// The shadow of one surface on the plane of another: the intersection of all half-planes.
 #[derive(Clone, Debug)]
 pub(super) struct Shadow {
     halves: Vec<Half>,
 }
 
 impl Shadow {
-    /// The shadow of `before` on the plane of `behind`, both with their fronts to the eye (in the
-    /// target frame); `None` where `before` does not rise above that plane.
+    /// Returns the shadow of `before` on the plane of `behind`, both facing the eye (in the target frame); `None` if
+    /// `before` does not rise above that plane.
     pub(super) fn of(before: &Surface, behind: &Surface, eye: DVec3) -> Option<Self> {
         let surface_from_target = behind.target_from_surface.inverse();
         let outline: Vec<DVec3> = before
@@ -49,7 +48,7 @@ impl Shadow {
         let eye = surface_from_target.apply(eye);
         let half =
             |normal: DVec3, through: DVec3| Half { n: normal.truncate(), c: -normal.dot(through) };
-        // The outline is counter-clockwise as the eye sees it.
+        // The outline is counter-clockwise as seen from the eye.
         let n = outline.len();
         let sides = (0..n).map(|i| half((outline[(i + 1) % n] - eye).cross(outline[i] - eye), eye));
         let front = surface_from_target.rotation * before.target_from_surface.rotation * DVec3::Z;
@@ -57,13 +56,13 @@ impl Shadow {
         Some(Self { halves: sides.chain([beyond]).collect() })
     }
 
-    /// Whether a point of the plane is hidden.
+    /// Returns whether a point of the plane is hidden.
     pub(super) fn hides(&self, p: DVec2) -> bool {
         self.halves.iter().all(|half| half.at(p) > 0.0)
     }
 
-    /// The parts of a polygon outside the shadow. An outline and its holes may be cut one by one:
-    /// what the cuts add to one they add to the other.
+    /// Returns the parts of a polygon outside the shadow. An outline and its holes may be cut separately: extra area
+    /// that a cut adds to one is also added to the other.
     pub(super) fn cut(&self, polygon: Vec<DVec2>) -> Vec<Vec<DVec2>> {
         let mut visible = Vec::new();
         let mut rest = polygon;

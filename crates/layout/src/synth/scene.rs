@@ -9,13 +9,13 @@ use super::occlusion::Shadow;
 use deltille_core::camera::{Camera, Pose};
 use deltille_core::raster::{Coverage, Gray, gaussian};
 
-/// An edge is divided until its image leaves the straight line by less than this, px.
+/// Maximum distance between the image of an edge and its chords, px.
 const MAX_CHORD_ERROR_PX: f64 = 1e-4;
 
-/// Divisions of an edge stop here: 2¹⁰ pieces follow any lens.
+/// Maximum depth of the subdivision of an edge: 2¹⁰ pieces follow any lens.
 const MAX_DIVISIONS: u32 = 10;
 
-/// Brightness and imperfections of a photograph.
+/// Illumination and imperfections of an image.
 ///
 /// ```
 /// use deltille_layout::synth::Light;
@@ -30,7 +30,7 @@ pub struct Light {
     pub white: f64,
     /// Grey value of black print; full scale is 1.
     pub black: f64,
-    /// Grey value of what is not the target; full scale is 1.
+    /// Grey value outside the target; full scale is 1.
     pub background: f64,
     /// Relative change of illumination across the width and down the height of the image.
     pub gradient: DVec2,
@@ -43,7 +43,7 @@ pub struct Light {
 }
 
 impl Default for Light {
-    /// A good photograph: levels 0.1 and 0.9, 0.8 px of blur, 1 % of noise.
+    /// Typical values of a good photograph: levels 0.1 and 0.9, 0.8 px of blur, 1 % of noise.
     fn default() -> Self {
         Self {
             white: 0.9,
@@ -58,58 +58,57 @@ impl Default for Light {
 }
 
 impl Light {
-    /// With white paper of this level, of full scale 1.
+    /// Sets the level of white paper; full scale is 1.
     #[must_use]
     pub fn white(self, white: f64) -> Self {
         Self { white, ..self }
     }
 
-    /// With black print of this level, of full scale 1.
+    /// Sets the level of black print; full scale is 1.
     #[must_use]
     pub fn black(self, black: f64) -> Self {
         Self { black, ..self }
     }
 
-    /// With this level around the target, of full scale 1.
+    /// Sets the level around the target; full scale is 1.
     #[must_use]
     pub fn background(self, background: f64) -> Self {
         Self { background, ..self }
     }
 
-    /// With an illumination that changes by these parts of itself across the width and down the height.
+    /// Sets the relative change of illumination across the width and down the height of the image.
     #[must_use]
     pub fn gradient(self, gradient: DVec2) -> Self {
         Self { gradient, ..self }
     }
 
-    /// With a Gaussian blur of this standard deviation, px.
+    /// Sets the standard deviation of the Gaussian blur, px.
     #[must_use]
     pub fn blur_px(self, blur_px: f64) -> Self {
         Self { blur_px, ..self }
     }
 
-    /// With Gaussian noise of this standard deviation, of full scale 1.
+    /// Sets the standard deviation of the Gaussian noise; full scale is 1.
     #[must_use]
     pub fn noise(self, noise: f64) -> Self {
         Self { noise, ..self }
     }
 
-    /// With other noise of the same strength.
+    /// Sets the seed of the noise.
     #[must_use]
     pub fn seed(self, seed: u64) -> Self {
         Self { seed, ..self }
     }
 }
 
-/// Surfaces of solids, seen from their front sides only. They may hide each other, but not cut
-/// through each other.
+/// Surfaces of solids, visible from the front only. They may hide each other, but must not intersect.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Scene {
-    /// The surfaces; their papers are convex.
+    /// The surfaces; their paper outlines are convex.
     pub surfaces: Vec<Surface>,
 }
 
-/// Where the corners of a synthetic image are.
+/// True positions of the corners in a synthetic image.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[non_exhaustive]
 pub struct Truth {
@@ -138,7 +137,7 @@ pub struct TruthCorner {
 }
 
 impl Scene {
-    /// The image that `camera` takes, on a scale of 0 to 1, before rounding to a pixel depth.
+    /// Renders the image that `camera` takes, on a scale of 0 to 1, before rounding to a pixel depth.
     pub fn render(&self, camera: &Camera, camera_from_target: &Pose, light: &Light) -> Gray<f32> {
         let (width, height) = (camera.width as usize, camera.height as usize);
         let mut coverage = Coverage::new(width, height);
@@ -177,12 +176,12 @@ impl Scene {
         image
     }
 
-    /// The corners that the camera sees, at least `margin_px` inside the image.
+    /// Returns the corners that are visible in the image, at least `margin_px` from its border.
     pub fn truth(&self, camera: &Camera, camera_from_target: &Pose, margin_px: f64) -> Truth {
         let mut truth = Truth::default();
         for (surface, shadows) in self.seen_from(camera_from_target) {
             let camera_from_surface = surface.camera_from(camera_from_target);
-            // What cannot be projected whole is not drawn either.
+            // A surface that cannot be projected completely is not drawn either.
             if (View { camera, camera_from_surface }).outline(&surface.paper_mm).is_none() {
                 continue;
             }
@@ -203,7 +202,7 @@ impl Scene {
         truth
     }
 
-    /// The surfaces that turn their front to the camera, with the shadows of the others on them.
+    /// Returns the surfaces that face the camera, with the shadows of the others on them.
     fn seen_from(&self, camera_from_target: &Pose) -> Vec<(&Surface, Vec<Shadow>)> {
         let eye = camera_from_target.inverse().translation;
         let facing = self.surfaces.iter().filter(|surface| {
@@ -220,7 +219,7 @@ impl Scene {
     }
 }
 
-/// A surface's plane in a camera.
+/// The plane of a surface, seen by a camera.
 struct View<'a> {
     camera: &'a Camera,
     camera_from_surface: Pose,
@@ -231,7 +230,7 @@ impl View<'_> {
         self.camera.project(self.camera_from_surface.apply(point.extend(0.0)))
     }
 
-    /// The image of an outline as a fine polygon; `None` when a part of it cannot be projected.
+    /// Returns the image of an outline as a fine polygon; `None` if a part of it cannot be projected.
     fn outline(&self, outline: &[DVec2]) -> Option<Vec<DVec2>> {
         let mut image = Vec::with_capacity(4 * outline.len());
         for (i, &from) in outline.iter().enumerate() {
@@ -243,7 +242,7 @@ impl View<'_> {
         Some(image)
     }
 
-    /// Pushes the points between the ends of an edge that its curvature asks for.
+    /// Adds points between the ends of an edge until the polygon follows its curvature.
     fn divide(
         &self,
         [from, to]: [DVec2; 2],
@@ -264,31 +263,31 @@ impl View<'_> {
     }
 }
 
-/// The parts of an outline outside all shadows.
+/// Returns the parts of an outline outside all shadows.
 fn lit(outline: &[DVec2], shadows: &[Shadow]) -> Vec<Vec<DVec2>> {
     shadows.iter().fold(vec![outline.to_vec()], |parts, shadow| {
         parts.into_iter().flat_map(|part| shadow.cut(part)).collect()
     })
 }
 
-/// How many of the other outlines of an area enclose outline `i`.
+/// Returns the number of other outlines of an area that enclose outline `i`.
 fn depth(area: &[Vec<DVec2>], i: usize) -> usize {
     let Some(&point) = area[i].first() else {
         return 0;
     };
-    // Outlines may touch in vertices, so a point just inside the outline is asked about.
+    // Outlines may touch in vertices, so the test uses a point just inside the outline.
     let inner = just_inside(&area[i]).unwrap_or(point);
     (0..area.len()).filter(|&j| j != i && encloses(&area[j], inner)).count()
 }
 
-/// A point inside a polygon, close to the middle of its first edge.
+/// Returns a point inside a polygon, close to the middle of its first edge.
 fn just_inside(polygon: &[DVec2]) -> Option<DVec2> {
     let (a, b) = (*polygon.first()?, *polygon.get(1)?);
     let (middle, normal) = (a.midpoint(b), (b - a).perp() * 1e-3);
     [middle + normal, middle - normal].into_iter().find(|&p| encloses(polygon, p))
 }
 
-/// Even-odd rule.
+/// Returns whether a polygon encloses a point, by the even-odd rule.
 fn encloses(polygon: &[DVec2], p: DVec2) -> bool {
     let n = polygon.len();
     (0..n).fold(false, |inside, i| {
@@ -299,7 +298,7 @@ fn encloses(polygon: &[DVec2], p: DVec2) -> bool {
     })
 }
 
-/// The polygon clockwise on the screen if `solid`, else counter-clockwise.
+/// Orients a polygon clockwise on the screen if `solid`, else counter-clockwise.
 fn clockwise(mut polygon: Vec<DVec2>, solid: bool) -> Vec<DVec2> {
     let n = polygon.len();
     let doubled: f64 = (0..n).map(|i| polygon[i].perp_dot(polygon[(i + 1) % n])).sum();

@@ -6,13 +6,13 @@ use crate::artwork::{Paint, Shape, Sheet};
 use crate::{Placement, Printing};
 use deltille_core::camera::Pose;
 
-/// Curves of letters are replaced by chords that leave them by less than this, mm.
+/// Maximum deviation of the chords that replace curves of letters, mm.
 const FLATTENING_MM: f64 = 0.005;
 
-/// A printed page lying in the world where its first panel says.
+/// Returns the scene of a printed page, positioned by its first panel.
 ///
-/// All panels of the page must lie in one plane of the target, as those of boards do; the page is
-/// one surface, labelled with the id of its first panel, that holds the corners of all.
+/// All panels of the page must lie in one plane of the target, as those of boards do. The page is one surface with the
+/// id of its first panel and the corners of all panels.
 pub fn scene_of_sheet(printing: &Printing, sheet: &Sheet, index: usize) -> Scene {
     let placements = printing.sheets.get(index).map_or(&[][..], |layout| &layout.placements);
     let panels = placements.iter().filter_map(|placement| {
@@ -47,7 +47,7 @@ fn target_from_page(placement: &Placement, panel: &deltille_core::targets::Panel
     panel.pose.to_pose().after(&page_from_panel.inverse())
 }
 
-/// The filled ones of some shapes as polygons.
+/// Converts the filled shapes to polygons.
 pub(super) fn black_areas(shapes: &[Shape]) -> Vec<Vec<Vec<DVec2>>> {
     shapes
         .iter()

@@ -5,13 +5,13 @@ use crate::artwork::ArtworkError;
 use deltille_core::polygon::rectangle;
 use deltille_core::targets::{Panel, Target, TargetSpec};
 
-/// The panels of a target where they are in space: the faces of a solid, or boards cut out along
-/// their quiet zone.
+/// Returns the scene of a target: the faces of a solid at their poses, or boards cut out along their quiet zone.
 ///
-/// Boards of one target are loose sheets that all lie in its origin; only a single one makes sense.
+/// The boards of one target are loose sheets that all lie in its origin, so only a target with a single board is
+/// meaningful.
 ///
 /// # Errors
-/// Where the family of the tags is unknown or lacks a code.
+/// Returns an error if the family of the tags is unknown or lacks a code.
 pub fn scene_of_target(target: &Target) -> Result<Scene, ArtworkError> {
     let faces = match &target.spec {
         TargetSpec::Solid(spec) => spec.faces().ok(),

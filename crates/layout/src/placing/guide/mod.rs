@@ -1,18 +1,18 @@
-//! The page that goes with a target: a picture of it, what to do with its sheets, and a ruler.
+//! The guide page of a target: a figure, assembly instructions, and a ruler.
 //!
 //! ```text
 //!   ┌──────────────────────┐
-//!   │ name                 │   The picture shows what is to be built from outside, or the board on its
-//!   │     ╱╲               │   plate: faces have their numbers, and an arrow towards their upper end.
+//!   │ name                 │   The figure shows the finished solid from outside, or the board on its
+//!   │     ╱╲               │   plate. Faces have their numbers, and an arrow towards their upper end.
 //!   │    ╱ 3╲   z│         │   The axes are those of the target's description.
 //!   │   ╱____╲   └─ x      │
-//!   │ 1. Print …           │   All of it is lines and texts as on other sheets, so that it is proved
-//!   │ 2. Cut …             │   like these.
+//!   │ 1. Print …           │   The page consists of lines and texts like other sheets, so that it is
+//!   │ 2. Cut …             │   verified in the same way.
 //!   │ ├──┴──┴──┴──┤        │
 //!   └──────────────────────┘
 //! ```
 //!
-//! 1. `model`: what the picture shows, as lines; 2. `steps`: what to do. The page puts both where there is room.
+//! 1. `model`: the lines of the figure; 2. `steps`: the instructions. This file lays out both on the page.
 
 mod model;
 mod steps;
@@ -30,32 +30,32 @@ use deltille_core::targets::format_mm;
 use deltille_core::targets::{Incircle, Target, TargetError, TargetSpec};
 use deltille_core::words::counted;
 
-/// Sides of the paper that is taken as it is, mm: what is printed at a desk. Else the page is an A4.
+/// Range of paper sides used for the guide page, mm: what a desktop printer prints. Otherwise, the page is A4.
 const AT_A_DESK_MM: [f64; 2] = [140.0, 360.0];
-/// Capital heights of the name, of the steps and of small words, mm.
+/// Capital heights of the name, of the steps and of small texts, mm.
 const NAME_CAP_MM: f64 = 6.0;
 const STEP_CAP_MM: f64 = 2.3;
 const SMALL_CAP_MM: f64 = 1.8;
-/// Distance of the base lines of a step, and what a new step adds, mm.
+/// Line spacing within a step, and additional spacing between steps, mm.
 const LINE_SPACING_MM: f64 = 4.6;
 const STEP_SPACING_MM: f64 = 1.8;
-/// Where the words of a step begin, after its number, mm.
+/// Indentation of the text of a step, after its number, mm.
 const INDENT_MM: f64 = 6.0;
-/// Height of the ruler with its numbers, mm, and the length of its longest marks.
+/// Height of the ruler with its numbers, and length of its longest marks, mm.
 const RULER_MM: f64 = 9.0;
 const MARK_MM: f64 = 4.0;
-/// Blank between name, picture, steps and ruler, mm.
+/// Gap between name, figure, steps and ruler, mm.
 const BLANK_MM: f64 = 5.0;
-/// Least share of the room between name and ruler that the picture takes, and the most.
+/// Smallest and largest fraction of the space between name and ruler that the figure takes.
 const PICTURE_SHARE: (f64, f64) = (0.35, 0.62);
-/// Length of the axes in the picture, mm.
+/// Length of the axes in the figure, mm.
 const AXIS_MM: f64 = 12.0;
-/// Faces seen at a lower angle than this sine have no number.
+/// Sine of the smallest viewing angle at which a face is numbered.
 const LEAST_SINE: f64 = 0.2;
-/// Capital heights of the numbers of faces, mm.
+/// Capital heights of face numbers, mm.
 const NUMBER_CAP_MM: std::ops::RangeInclusive<f64> = 1.5..=6.0;
 
-/// The page for a target that was laid out on `paper`.
+/// Returns the guide page for a target that was laid out on `paper`.
 pub(crate) fn sheet(
     title: &str,
     target: &Target,
@@ -67,7 +67,7 @@ pub(crate) fn sheet(
         orientation: Orientation::Portrait,
         ..paper.clone()
     };
-    // Whatever room the bars along the margins leave; a board as small as this fits in any case.
+    // The guide uses the space that the bars along the margins leave. A small board stands in for its content here.
     let small = Footprint {
         width: 50.0,
         height: 100.0,
@@ -76,8 +76,10 @@ pub(crate) fn sheet(
         is_centred: false,
     };
     let arrangement = fit_upright(&small, &paper)?.ok_or_else(|| {
-        let problem =
-            format!("{} leaves no room for the guide: take less", format_mm(paper.margin_mm));
+        let problem = format!(
+            "a margin of {} leaves no room for the guide page: use a smaller one",
+            format_mm(paper.margin_mm)
+        );
         TargetError::invalid(PaperMarginMm, problem)
     })?;
     let mut sheet = arrangement.sheet(0, [0.0; 4], description(title, target));
@@ -87,17 +89,17 @@ pub(crate) fn sheet(
     Ok(Page { sheet, least, most }.filled(target, sheets, &paper))
 }
 
-/// The paper itself where it is printed at a desk, else an A4.
+/// Returns the paper itself if a desktop printer can print it, else A4.
 fn at_a_desk(paper: &PaperSpec) -> PaperSize {
     let fits = |size: &&PaperSize| {
         let DVec2 { x, y } = size.portrait_mm();
         (AT_A_DESK_MM[0]..=AT_A_DESK_MM[1]).contains(&x) && y <= AT_A_DESK_MM[1]
     };
     let own = paper.size.as_ref().filter(fits).cloned();
-    own.unwrap_or_else(|| PaperSize::automatic().next().expect("A4 is one of them"))
+    own.unwrap_or_else(|| PaperSize::automatic().next().expect("A4 is an automatic size"))
 }
 
-/// What the target is, in a line.
+/// Describes the target in one line.
 fn description(title: &str, target: &Target) -> String {
     let what = if matches!(target.spec, TargetSpec::Circles(_)) { "circle" } else { "corner" };
     let corners: usize = target.panels.iter().map(|panel| panel.corners.len()).sum();
@@ -112,7 +114,7 @@ fn description(title: &str, target: &Target) -> String {
     parts.join(" · ")
 }
 
-/// The page, and what of it is still free, mm.
+/// The page, and its remaining free area, mm.
 struct Page {
     sheet: SheetLayout,
     least: DVec2,
@@ -142,7 +144,7 @@ impl Page {
         self.sheet.texts.push(SheetText { text, at_mm, angle_rad, cap_height_mm, max_width_mm });
     }
 
-    /// A text whose middle is at a place.
+    /// Adds a text centred at a position.
     fn centred(&mut self, text: String, middle: DVec2, cap_mm: f64) {
         let width = text.chars().count() as f64 * ADVANCE_CAPS * cap_mm;
         self.text(text, middle - DVec2::new(width, cap_mm) / 2.0, cap_mm);
@@ -152,7 +154,7 @@ impl Page {
         self.sheet.lines.push(SheetLine { kind: LineKind::Align, from_mm, to_mm, width_mm });
     }
 
-    /// A ruler in centimetres and half centimetres, as long as finds room.
+    /// Adds a ruler in centimetres and half centimetres, as long as the page allows.
     fn ruler(&mut self) {
         let (base, start) = (self.least.y + SMALL_CAP_MM + 1.5, self.least.x + THIN_MM);
         let halves = ((self.most.x - start - SMALL_CAP_MM) / 5.0).floor() as u32;
@@ -171,7 +173,7 @@ impl Page {
         self.least.y += RULER_MM + BLANK_MM;
     }
 
-    /// The lines of each step, broken where the page ends.
+    /// Wraps the lines of each step at the page width.
     fn wrapped(&self, steps: &[String]) -> Vec<Vec<String>> {
         let room = self.most.x - self.least.x - INDENT_MM;
         let characters = (room / (ADVANCE_CAPS * STEP_CAP_MM)) as usize;
@@ -180,7 +182,7 @@ impl Page {
         steps.iter().map(lines).collect()
     }
 
-    /// The steps, numbered; smaller where the page would not take them.
+    /// Adds the numbered steps, scaled down if the page is too small.
     fn steps(&mut self, steps: Vec<Vec<String>>) {
         let scale = ((self.most.y - self.least.y) / height(&steps)).min(1.0);
         let mut y = self.most.y;
@@ -195,7 +197,8 @@ impl Page {
         }
     }
 
-    /// The target: a solid from two sides, of which one shows what the other hides.
+    /// Adds the figures of the target. A solid is drawn from two opposite sides, so that every face is visible in one
+    /// of them.
     fn pictures(&mut self, target: &Target, [lower, upper]: [DVec2; 2]) {
         let front = Model::of(target);
         if front.numbers.is_empty() {
@@ -208,13 +211,13 @@ impl Page {
         self.picture(&back, [DVec2::new(middle, lower.y), upper]);
     }
 
-    /// What is to be built, as large as a rectangle takes it, and its axes.
+    /// Draws the model with its axes, as large as the rectangle allows.
     fn picture(&mut self, model: &Model, [lower, upper]: [DVec2; 2]) {
         let seen = model.faces.iter().flatten().map(|&point| model.view.projected(point));
         let seen: Vec<DVec2> = seen.collect();
         let bounds = [DVec2::min, DVec2::max]
             .map(|most| seen.iter().copied().reduce(most).unwrap_or_default());
-        // The axes lie below a solid, which is seen twice, or at the left.
+        // The axes lie below a solid, which is drawn twice, or to the left of a board.
         let axes = match model.numbers.is_empty() {
             true => DVec2::new(2.0 * AXIS_MM, 0.0),
             false => DVec2::new(0.0, 2.0 * AXIS_MM),
@@ -241,7 +244,7 @@ impl Page {
         }
     }
 
-    /// The number of a face, and an arrow towards its upper end, where it is seen well.
+    /// Draws the number of a face, and an arrow towards its upper end, if the face is clearly visible.
     fn number(
         &mut self,
         model: &Model,
@@ -274,14 +277,13 @@ impl Page {
     }
 }
 
-/// How much the lines of the steps take, mm.
+/// Returns the height of the steps, mm.
 fn height(steps: &[Vec<String>]) -> f64 {
     let lines: usize = steps.iter().map(Vec::len).sum();
     lines as f64 * LINE_SPACING_MM + steps.len() as f64 * STEP_SPACING_MM
 }
 
-/// From where a model is seen, by parallel light.
-/// A text in lines of at most so many characters, broken at blanks.
+/// Wraps a text at spaces into lines of at most `most` characters.
 fn wrapped(text: &str, most: usize) -> Vec<String> {
     let mut lines: Vec<String> = Vec::new();
     for word in text.split(' ') {
@@ -307,10 +309,8 @@ mod tests {
         sheet("target", &target.target, &target.sheets, &PaperSpec::default()).unwrap()
     }
 
-    /// Of an icosahedron that hides nothing but its own back, every edge of a face towards the eye is seen, whole, and
-
     #[test]
-    fn everything_lies_on_the_page_and_says_what_to_do() {
+    fn guides_fit_on_the_page_and_contain_the_steps() {
         let board = guide(BoardSpec::deltille(10, 11, 20.0));
         let solid = guide(SolidSpec::new(SolidShape::Cube));
         let bare = guide(SolidSpec { tags: None, ..SolidSpec::new(SolidShape::Cube) });
@@ -323,7 +323,7 @@ mod tests {
             assert!(sheet.lines.iter().all(|line| on_page(line.from_mm) && on_page(line.to_mm)));
             let says = |words| sheet.texts.iter().any(|t| t.text.to_string().contains(words));
             assert!(says(words));
-            // What cannot label bare faces is not proposed for them.
+            // Bare faces cannot be labelled, so the guide must not propose that.
             let is_bare = std::ptr::eq(sheet, &bare);
             assert_eq!(says("deltille calibrate"), !is_bare);
             assert!(!(is_bare && says("deltille rig")));

@@ -1,4 +1,4 @@
-//! The picture of a target: its faces, its tiles and its edges as lines, seen by parallel light.
+//! The figure of a target: its faces, tiles and edges as lines in parallel projection.
 
 use std::f64::consts::TAU;
 
@@ -8,20 +8,20 @@ use deltille_core::lattice::{GridKind, Tile};
 use deltille_core::polygon::rectangle;
 use deltille_core::targets::{Corner, Panel, Polyhedron, Target, TargetSpec};
 
-/// Widths of the lines of the picture and of the marks of the ruler, mm.
+/// Widths of the lines of the figure and of the marks of the ruler, mm.
 pub(super) const THICK_MM: f64 = 0.3;
 pub(super) const THIN_MM: f64 = 0.15;
-/// Pieces of a line of which each is hidden as a whole, or not at all.
+/// Number of pieces into which a line is divided; each is either hidden or drawn.
 const PIECES: usize = 60;
-/// Most tiles of a board that are drawn in the picture: beyond this they run together.
+/// Maximum number of tiles of a board that are drawn: more would run together.
 const MOST_TILES: usize = 250;
-/// Thickness of the plate in the picture, in its diagonals.
+/// Thickness of the plate in the figure, as a fraction of its diagonal.
 const PLATE_PART: f64 = 0.02;
-/// Sides of the polygon that stands for a circle.
+/// Number of sides of the polygon that approximates a circle.
 const DISC_SIDES: usize = 24;
-/// Heights of the lines by which a black tile is hatched, in its own.
+/// Heights of the hatching lines of a black tile, as fractions of its height.
 const HATCHING: [f64; 6] = [0.0, 0.16, 0.32, 0.48, 0.64, 0.8];
-/// From where solids are seen, and in the frame of its panel a board.
+/// Viewing directions: of solids, and of boards in the panel frame.
 const SOLID_FROM: DVec3 = DVec3::new(0.55, -0.75, 0.42);
 const BOARD_FROM: DVec3 = DVec3::new(-0.3, 0.4, 0.85);
 
@@ -33,7 +33,7 @@ pub(super) struct View {
 }
 
 impl View {
-    /// Seen from a direction, the axis `upwards` upright in the picture.
+    /// Returns the view from a direction, with the axis `upwards` vertical in the figure.
     pub(super) fn from(direction: DVec3, upwards: DVec3) -> Self {
         let towards = direction.normalize();
         let right = upwards.cross(towards).normalize();
@@ -45,15 +45,15 @@ impl View {
     }
 }
 
-/// What the picture shows, in the target frame, mm.
+/// The content of the figure, in the target frame, mm.
 pub(super) struct Model {
     pub(super) view: View,
-    /// The faces that hide what is behind them; of a solid those with numbers.
+    /// Faces that hide what is behind them; the faces of a solid have numbers.
     pub(super) faces: Vec<Vec<DVec3>>,
-    /// Where the upper end of each of these is.
+    /// Direction of the upper end of each face.
     pub(super) up: Vec<DVec3>,
     pub(super) numbers: Vec<String>,
-    /// Lines with their widths on the page.
+    /// Lines, with their widths on the page.
     pub(super) lines: Vec<([DVec3; 2], f64)>,
 }
 
@@ -86,7 +86,7 @@ impl Model {
         }
     }
 
-    /// A board on its plate, with its black tiles.
+    /// Builds the model of a board on its plate, with its black tiles.
     fn of_board(panel: &Panel) -> Self {
         let at = |point: DVec2| panel.pose.target_from_panel(point);
         let plate = rectangle(panel.field_mm()).map(at);
@@ -106,7 +106,7 @@ impl Model {
         }
     }
 
-    /// The pieces of a line that no face hides, in the picture.
+    /// Returns the visible pieces of a line, projected into the figure.
     pub(super) fn seen_of(&self, [from, to]: [DVec3; 2]) -> Vec<[DVec2; 2]> {
         let at = |share: f64| from.lerp(to, share / PIECES as f64);
         let mut pieces: Vec<[usize; 2]> = Vec::new();
@@ -120,13 +120,14 @@ impl Model {
         pieces.into_iter().map(ends).collect()
     }
 
-    /// Whether a face other than `own` is between a point and the eye.
+    /// Returns whether a face other than `own` lies between a point and the eye.
     pub(super) fn is_hidden(&self, point: DVec3, own: Option<usize>) -> bool {
         let others = self.faces.iter().enumerate().filter(|(index, _)| Some(*index) != own);
         others.into_iter().any(|(_, face)| self.hides(face, point))
     }
 
-    /// Whether a flat, convex face hides a point: whether the ray from there to the eye passes through its inside.
+    /// Returns whether a flat convex face hides a point, that is, whether the ray from the point to the eye passes
+    /// through its interior.
     fn hides(&self, face: &[DVec3], point: DVec3) -> bool {
         let normal = (1..face.len() - 1)
             .map(|i| (face[i] - face[0]).cross(face[i + 1] - face[0]))
@@ -135,7 +136,7 @@ impl Model {
         let slope = normal.dot(self.view.towards);
         let reach = face[0].distance(face[1]);
         let distance = normal.dot(face[0] - point) / slope;
-        // Not what lies in the face itself, or in one seen edge-on.
+        // A face does not hide points in its own plane, and a face seen edge-on hides nothing.
         if slope.abs() < 1e-9 || distance < 1e-6 * reach {
             return false;
         }
@@ -147,7 +148,8 @@ impl Model {
     }
 }
 
-/// Outlines and hatching of the black tiles of a panel, in its frame, mm; none where they are too many to be seen.
+/// Returns outlines and hatching of the black tiles of a panel, in its frame, mm; empty if there are too many to be
+/// visible.
 fn tile_lines(panel: &Panel) -> Vec<[DVec2; 2]> {
     let tiles = panel.dark_tiles();
     if tiles.len().max(panel.corners.len()) > MOST_TILES || panel.corners.is_empty() {
@@ -168,7 +170,7 @@ fn tile_lines(panel: &Panel) -> Vec<[DVec2; 2]> {
             GridKind::Checker => b + c - a,
         };
         let sides = [[a, c], [b, last]];
-        // Of a triangle it is a point.
+        // For a triangle, the upper side is a point.
         let top = (panel.kind == GridKind::Checker).then_some([c, last]);
         let hatched = HATCHING.map(|part| sides.map(|[foot, top]| foot.lerp(top, part)));
         sides.into_iter().chain(top).chain(hatched)
@@ -182,9 +184,9 @@ mod tests {
     use crate::Printing;
     use deltille_core::targets::{SolidShape, SolidSpec};
 
-    /// no other.
+    /// Every edge of a front-facing face of a convex solid is visible in full; the other edges are hidden.
     #[test]
-    fn a_convex_solid_shows_the_faces_towards_the_eye() {
+    fn a_convex_solid_shows_its_front_faces() {
         let solid = SolidSpec::new(SolidShape::Icosahedron);
         let target = Printing::new("target", solid.clone()).unwrap();
         let model = Model::of(&target.target);

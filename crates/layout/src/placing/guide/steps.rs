@@ -1,11 +1,11 @@
-//! What to do with the sheets of a target, step by step.
+//! Step-by-step instructions for the sheets of a target.
 
 use crate::SheetLayout;
 use crate::paper::{PaperSpec, SolidSheets};
 use deltille_core::targets::format_mm;
 use deltille_core::targets::{BoardSpec, SolidSpec, Target, TargetSpec};
 
-/// What to do with the sheets of a target.
+/// Returns the instructions for the sheets of a target.
 pub(super) fn steps(target: &Target, sheets: &[SheetLayout], paper: &PaperSpec) -> Vec<String> {
     let name = &target.name;
     let mut steps = vec![

@@ -1,4 +1,4 @@
-//! Which unfolding of a solid is printed: in one piece, or in those pieces that take the fewest pages.
+//! Selects the unfolding of a solid to print: one piece, or the pieces that need the fewest pages.
 
 use glam::DVec2;
 
@@ -7,11 +7,11 @@ use super::tabs::{self, Tab};
 use super::unfold::{self, Piece, Sides};
 use deltille_core::targets::{Face, Polyhedron, SolidSpec};
 
-/// Largest pieces that are tried, in parts of the room of a page: large ones are less work to glue, small ones leave less
-/// of the paper unused.
+/// Largest piece sizes to try, as fractions of the usable page: large pieces are less work to glue, small ones waste
+/// less paper.
 const PARTS_OF_ROOM: [f64; 6] = [1.0, 0.7, 0.5, 0.35, 0.25, 0.18];
 
-/// Orders of growth that are tried for each of them.
+/// Number of growth orders tried for each size.
 const ORDERS: u64 = 4;
 
 /// A net in its own frame: faces, and the tabs of each piece.
@@ -20,22 +20,22 @@ pub(super) struct Net {
     pub(super) tabs: Vec<Vec<Tab>>,
 }
 
-/// A net whose pieces lie on pages.
+/// A net whose pieces are placed on pages.
 pub(super) struct Nested {
     pub(super) net: Net,
-    /// Of each piece.
+    /// Place of each piece.
     pub(super) places: Vec<Place>,
     pub(super) pages: usize,
 }
 
 impl Nested {
-    /// Pages to print, then pieces to glue.
+    /// Returns the number of pages to print, then the number of pieces to glue.
     fn work(&self) -> [usize; 2] {
         [self.pages, self.net.pieces.len()]
     }
 }
 
-/// The net whose pieces take the fewest pages with a room of this size, then that with the fewest pieces.
+/// Returns the net that needs the fewest pages of this usable size; among equals, the one with the fewest pieces.
 pub(super) fn nest_on(flat: &[Vec<DVec2>], sides: &Sides, room: DVec2) -> Option<Nested> {
     let mut best: Option<Nested> = None;
     for part in PARTS_OF_ROOM {
@@ -58,7 +58,7 @@ pub(super) fn nest_on(flat: &[Vec<DVec2>], sides: &Sides, room: DVec2) -> Option
                 best = Some(nested);
             }
         }
-        // There are no smaller pieces than single faces.
+        // Single faces are the smallest possible pieces.
         if fewest == flat.len() {
             break;
         }
@@ -66,7 +66,7 @@ pub(super) fn nest_on(flat: &[Vec<DVec2>], sides: &Sides, room: DVec2) -> Option
     best
 }
 
-/// The unfoldings that have room for tabs, best liked first.
+/// Returns the unfoldings that have room for tabs, best first.
 pub(super) fn nets(
     solid: &Polyhedron,
     spec: &SolidSpec,

@@ -1,4 +1,4 @@
-//! What is drawn of a net: panels, lines to cut and to fold along, numbers of edges, and how to make it.
+//! Drawing of a net: panels, cutting and folding lines, edge numbers, and instructions.
 
 use std::f64::consts::PI;
 
@@ -16,40 +16,39 @@ use deltille_core::lattice::GridKind;
 use deltille_core::targets::format_mm;
 use deltille_core::targets::{Face, FamilyRef, Panel, Polyhedron, SolidSpec, fingerprint};
 
-/// Faces that rise or fall from one plane by less than this are not folded, radians (a tenth of a
-/// degree): no hand makes so slight a fold, and the neighbours hold the paper in its place.
+/// Faces whose planes differ by less than this angle are not folded, radians (0.1°): nobody can fold so slightly by
+/// hand, and the neighbouring faces fix the paper in position.
 const FLAT_RAD: f64 = 0.1 / 180.0 * PI;
 
-/// Width of lines to cut and to fold along, mm: a hairline that every printer holds.
+/// Width of cutting and folding lines, mm: a hairline that every printer can print.
 const LINE_WIDTH_MM: f64 = 0.15;
 
-/// Capital height of the numbers in the margin of a face, in widths of the margin, and the most of
-/// it, mm.
+/// Capital height of the numbers in the margin of a face as a fraction of the margin width, and its maximum, mm.
 const NUMBER_CAP: (f64, f64) = (0.35, 2.0);
 
-/// Capital height of the words on a tab, in depths of the tab, and the most of it, mm.
+/// Capital height of the text on a tab as a fraction of the tab depth, and its maximum, mm.
 const TAB_CAP: (f64, f64) = (0.35, 2.2);
 
-/// Blank on either side of the words on a tab, mm.
+/// Gap on either side of the text on a tab, mm.
 const TAB_INDENT_MM: f64 = 1.0;
 
-/// Smallest capital height of words on a tab before they are cut short, mm.
+/// Capital height below which the text on a tab is shortened, mm.
 const LEGIBLE_CAP_MM: f64 = 1.2;
 
 /// Capital height and line spacing of the instructions, mm.
 const WORDS_CAP_MM: f64 = 2.2;
 const WORDS_STEP_MM: f64 = 3.6;
 
-/// Capital height of the number of a page, mm.
+/// Capital height of the page number, mm.
 const PAGE_CAP_MM: f64 = 5.0;
 
-/// Blank between the net, the instructions and the marks along the margins, mm.
+/// Gap between the net, the instructions and the marks along the margins, mm.
 pub(super) const BLANK_MM: f64 = 2.5;
 
-/// Height of the instructions with the blank above them, mm.
+/// Height of the instructions with the gap above them, mm.
 pub(super) const WORDS_MM: f64 = 2.0 * WORDS_STEP_MM + BLANK_MM;
 
-/// What it takes to draw any piece of a solid's net.
+/// Data needed to draw any piece of a solid's net.
 pub(super) struct Drawing<'a> {
     name: &'a str,
     spec: &'a SolidSpec,
@@ -57,9 +56,9 @@ pub(super) struct Drawing<'a> {
     pub(super) panels: &'a [Panel],
     family: Option<&'a FamilyRef>,
     pub(super) sides: &'a Sides,
-    /// Numbers of the edges of each face.
+    /// Edge numbers of each face.
     numbers: Vec<Vec<usize>>,
-    /// Which way each side of each face is folded.
+    /// Fold of each side of each face.
     folds: Vec<Vec<LineKind>>,
 }
 
@@ -79,7 +78,7 @@ impl<'a> Drawing<'a> {
         let angles_rad = solid.dihedral_angles_rad();
         let fold = |edge: usize| match angles_rad[edge] - PI {
             angle if angle.abs() < FLAT_RAD => LineKind::Flat,
-            // The next face rises out of this one's plane.
+            // The next face rises out of the plane of this one.
             angle if angle > 0.0 => LineKind::Valley,
             _ => LineKind::Fold,
         };
@@ -88,7 +87,7 @@ impl<'a> Drawing<'a> {
         Self { name, spec, faces, panels, family, sides, numbers, folds }
     }
 
-    /// Adds the instructions from `at` to the right end, and before them which page of how many it is.
+    /// Adds the instructions from `at` to the right end, preceded by the page number if the net has several pages.
     pub(super) fn explain(
         &self,
         sheet: &mut SheetLayout,
@@ -142,7 +141,7 @@ impl<'a> Drawing<'a> {
                 let tab = tabs.iter().find(|tab| tab.side == at);
                 let number = self.numbers[index][side];
                 match (hinge, tab) {
-                    // A fold is drawn once, with the face that hangs on the other.
+                    // A fold is drawn once, with the face that is attached to the other.
                     (Some((_, own)), _) => {
                         if *own == at {
                             sheet.lines.push(line(self.folds[index][side], ends));
@@ -157,7 +156,7 @@ impl<'a> Drawing<'a> {
                         sheet.texts.push(self.margin_words(ends, Label::Edge(number), 0.5));
                     }
                 }
-                // The name of the face stands where no number of an edge does.
+                // The name of the face is printed along a side that has no edge number.
                 if !named && (hinge.is_some() || tab.is_some()) {
                     named = true;
                     sheet.texts.push(self.margin_words(ends, Label::Face(index), 0.5));
@@ -180,7 +179,7 @@ impl<'a> Drawing<'a> {
         lines
     }
 
-    /// The words on a tab: its edge, and the face it goes under where there is room for that.
+    /// Lays out the text on a tab: its edge and, if it fits, the face under which it is glued.
     fn tab_words(&self, tab: &Tab, number: usize, motion: &Motion) -> Option<SheetText> {
         let [_, _, far_a, far_b] = tab.corners.map(|corner| motion.apply(corner));
         let under = self.sides.partner(tab.side)?.face;
@@ -193,18 +192,18 @@ impl<'a> Drawing<'a> {
         Some(words([far_a, far_b], text, cap, 0.5, (tab.depth_mm - cap) / 2.0, room))
     }
 
-    /// Words in the margin of a face along one of its sides, centred at a part of its length.
+    /// Lays out a text in the margin of a face along one of its sides, centred at the fraction `part` of its length.
     fn margin_words(&self, ends: [DVec2; 2], text: Label, part: f64) -> SheetText {
         let margin = self.spec.white_margin_mm();
         let cap = (NUMBER_CAP.0 * margin).min(NUMBER_CAP.1);
         let room = (ends[0].distance(ends[1]) - 4.0 * margin).max(cap);
         let cap = cap.min(cap * room / width(&text, cap));
-        // Wide margins keep the words near the edge that they name.
+        // In a wide margin, the text stays close to its edge.
         let inwards = ((margin - cap) / 2.0).min(2.0 * cap);
         words(ends, text, cap, part, inwards, room)
     }
 
-    /// All that is needed to make the net again.
+    /// Returns the label, with everything needed to reproduce the net.
     pub(super) fn label(&self, of: &str) -> String {
         let (spec, name) = (self.spec, self.name);
         let mut parts = vec![name.to_owned(), spec.size()];
@@ -227,8 +226,7 @@ impl<'a> Drawing<'a> {
     }
 }
 
-/// How to make the solid from a print of these lines, two lines of text; the lower one stands at
-/// `at`.
+/// Lays out how to make the solid from a print of these lines, in two lines of text; the lower one starts at `at`.
 pub(super) fn instructions(lines: &[SheetLine], at: DVec2, room: f64) -> [SheetText; 2] {
     let has = |kind| lines.iter().any(|line| line.kind == kind);
     let mut folds = if has(LineKind::Valley) {
@@ -261,13 +259,13 @@ fn line(kind: LineKind, [from_mm, to_mm]: [DVec2; 2]) -> SheetLine {
     SheetLine { kind, from_mm, to_mm, width_mm: LINE_WIDTH_MM }
 }
 
-/// Estimated width of a text, mm.
+/// Estimates the width of a text, mm.
 pub(super) fn width(text: &Label, cap: f64) -> f64 {
     text.characters() as f64 * ADVANCE_CAPS * cap
 }
 
-/// Words along the line between two points, centred at a part of it, their base line `inwards`
-/// (to the left) of it.
+/// Lays out a text along the line between two points, centred at the fraction `part` of its length, with the baseline
+/// `inwards` (to the left) of it.
 fn words(
     [from, to]: [DVec2; 2],
     text: Label,

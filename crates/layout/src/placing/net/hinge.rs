@@ -1,4 +1,4 @@
-//! How the faces of a solid hang together on its sheets, to be unfolded in space.
+//! Connections between the faces of a solid on its sheets, for unfolding it in space.
 
 use glam::DVec3;
 use serde::Serialize;
@@ -8,26 +8,27 @@ use crate::Printing;
 use deltille_core::angles::angle;
 use deltille_core::targets::{SolidSpec, TargetSpec};
 
-/// Sides that lie on each other on a sheet differ by less, mm.
+/// Maximum distance between sides that coincide on a sheet, mm.
 const TOUCHING_MM: f64 = 0.01;
 
-/// A face of a solid, and the one that it hangs on.
+/// A face of a solid, and the face to which it is attached.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 #[non_exhaustive]
 pub struct Hinge {
     /// Index of the face.
     pub face: usize,
-    /// Index of the face that it hangs on; `None` for the first of a sheet.
+    /// Index of the face to which it is attached; `None` for the first face of a sheet.
     pub on: Option<usize>,
-    /// The ends of the edge that both have, in the target frame, mm.
+    /// Ends of the shared edge in the target frame, mm.
     pub ends_mm: [DVec3; 2],
-    /// The turn about the line from the first end to the second that brings it into the plane of the other, radians.
+    /// Rotation about the line from the first end to the second that moves the face into the plane of the other,
+    /// radians.
     pub angle_rad: f64,
 }
 
 impl Printing {
-    /// How the faces of a solid hang together on its sheets: each after the one that it hangs on. Empty where the sheets
-    /// are no nets.
+    /// Returns how the faces of a solid are connected on its sheets. Each face follows the one to which it is attached.
+    /// The list is empty if the sheets are not nets.
     ///
     /// ```
     /// use deltille_layout::Printing;
@@ -48,13 +49,13 @@ impl Printing {
     }
 }
 
-/// The hinges of the sheets of a solid; `None` where its faces have no boards.
+/// Returns the hinges of the sheets of a solid; `None` if its faces have no boards.
 fn of_sheets(printing: &Printing, spec: &SolidSpec) -> Option<Vec<Hinge>> {
     let (solid, faces) = (spec.polyhedron(), spec.faces().ok()?);
     let sides = Sides::new(&solid);
     let mut hinges = Vec::with_capacity(faces.len());
     for sheet in &printing.sheets {
-        // Of each face the ends of its sides on the sheet.
+        // Corners of each face on the sheet.
         let mut on_sheet = vec![None; faces.len()];
         for placement in &sheet.placements {
             let face =
@@ -107,7 +108,7 @@ mod tests {
     use super::*;
     use deltille_core::targets::SolidShape;
 
-    /// Turned about their hinges, all faces lie in one plane, as they do on the sheet.
+    /// Rotated about their hinges, all faces lie in one plane, as on the sheet.
     #[test]
     fn unfolded_faces_lie_as_on_the_sheet() {
         use SolidShape::{Cube, Icosahedron, Octahedron, Tetrahedron};
@@ -152,7 +153,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_net_has_no_hinges() {
+    fn targets_without_a_net_have_no_hinges() {
         let board = deltille_core::targets::BoardSpec::deltille(10, 11, 20.0);
         assert!(Printing::new("board", board).unwrap().hinges().is_empty());
     }

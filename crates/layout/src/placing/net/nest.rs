@@ -1,10 +1,10 @@
-//! Pieces nested on pages: as few pages as a greedy search finds.
+//! Nesting of pieces on pages, by a greedy search for few pages.
 //!
 //! ```text
-//!   ┌─────────────┐   The page and each piece, in twelve directions, are fields of cells. Pieces come in the
-//!   │    ╱╲╱╲     │   order of their size; each goes to the first page that has room for it, where its upper
-//!   │ ╱╲╱╲╱╲╱╲ ╱╲ │   end is lowest, then as far left as it can. A cell belongs to a piece where any part of
-//!   │ ╲╱╲╱╲╱  ╱╲╱ │   it is nearer than half the blank between pieces, so that what fits never overlaps.
+//!   ┌─────────────┐   The page, and each piece in twelve rotations, are grids of cells. Pieces are placed
+//!   │    ╱╲╱╲     │   in order of decreasing size. Each goes on the first page that has room, where its
+//!   │ ╱╲╱╲╱╲╱╲ ╱╲ │   upper end is lowest, then as far left as possible. A cell belongs to a piece if any
+//!   │ ╲╱╲╱╲╱  ╱╲╱ │   part of it is closer than half the gap between pieces, so that pieces never overlap.
 //!   └─────────────┘
 //! ```
 
@@ -15,31 +15,31 @@ use glam::DVec2;
 use super::plane::{Motion, bounds};
 use deltille_core::polygon::area;
 
-/// Blank between pieces, mm: scissors pass.
+/// Gap between pieces, mm: wide enough for scissors.
 const BLANK_MM: f64 = 2.0;
 
-/// Cells along the longer side of a page: on A0 a cell is 4 mm, half a glue tab.
+/// Number of cells along the longer side of a page: on A0 a cell is 4 mm, half a glue tab.
 const CELLS: f64 = 300.0;
 
 /// Smallest cell, mm.
 const LEAST_CELL_MM: f64 = 1.0;
 
-/// Directions in which a piece is tried.
+/// Number of rotations tried for a piece.
 const TURNS: usize = 12;
 
-/// A piece to be nested: convex polygons in a frame of its own, mm.
+/// A piece to be nested: convex polygons in its own frame, mm.
 pub(super) type Outline = Vec<Vec<DVec2>>;
 
-/// Where a piece lies.
+/// Position of a piece.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Place {
     /// Index of the page.
     pub page: usize,
-    /// From the frame of the piece to that of the room on a page, whose lower left corner is the origin.
+    /// Transform from the frame of the piece to that of the usable page area, whose origin is its lower-left corner.
     pub room_from_piece: Motion,
 }
 
-/// Nests pieces in rooms of this width and height, mm; `None` where a piece fits none.
+/// Nests pieces in areas of this width and height, mm; `None` if a piece does not fit.
 pub(super) fn nest(pieces: &[Outline], room: DVec2) -> Option<Vec<Place>> {
     let cell = (room.max_element() / CELLS).max(LEAST_CELL_MM);
     let mut order: Vec<usize> = (0..pieces.len()).collect();
@@ -69,7 +69,7 @@ pub(super) fn nest(pieces: &[Outline], room: DVec2) -> Option<Vec<Place>> {
     places.into_iter().collect()
 }
 
-/// Whether a piece with these points, and a rim of this width around it, can lie in a room.
+/// Returns whether a piece with these points, and a rim of this width around it, fits in an area.
 pub(super) fn fits(points: &[DVec2], rim: f64, room: DVec2) -> bool {
     directions(points).into_iter().any(|turn| {
         let turned: Vec<DVec2> = points.iter().map(|&p| turn.apply(p)).collect();
@@ -79,9 +79,9 @@ pub(super) fn fits(points: &[DVec2], rim: f64, room: DVec2) -> bool {
     })
 }
 
-/// The turns in which a piece is tried: from the one in which its bounding box is smallest, all round.
+/// Returns the rotations tried for a piece, starting with the one that minimizes its bounding box, all around.
 fn directions(points: &[DVec2]) -> [Motion; TURNS] {
-    // A box that touches an edge of the convex hull is the smallest; to a degree is near enough.
+    // The smallest box touches an edge of the convex hull; one degree is accurate enough.
     let size = |degrees: u32| {
         let turn = Motion::turning(f64::from(degrees).to_radians());
         let turned: Vec<DVec2> = points.iter().map(|&p| turn.apply(p)).collect();
@@ -91,21 +91,21 @@ fn directions(points: &[DVec2]) -> [Motion; TURNS] {
     let smallest = (0..90).min_by(|&a, &b| size(a).total_cmp(&size(b))).unwrap_or(0);
     let first = f64::from(smallest).to_radians();
     std::array::from_fn(|n| {
-        // Right angles first, which the edges of the page have.
+        // Right angles come first, because the page has right angles.
         let (quarter, rest) = (n % 4, n / 4);
         let rest = rest as f64 * TAU / TURNS as f64;
         Motion::turning(first + quarter as f64 * FRAC_PI_2 + rest)
     })
 }
 
-/// A piece in one of its directions.
+/// A piece in one of its rotations.
 struct Stamp {
     turn: Motion,
-    /// The place of its first cell, in the frame of the turned piece, mm.
+    /// Position of its first cell, in the frame of the rotated piece, mm.
     lower_left: DVec2,
-    /// How many cells it is wide.
+    /// Width in cells.
     width: usize,
-    /// Cells that it takes, by rows from below: first and last of those that lie beside each other.
+    /// Occupied cells by rows from below: first and last cell of each contiguous run.
     rows: Vec<Vec<[usize; 2]>>,
 }
 
@@ -137,7 +137,7 @@ fn stamps(piece: &Outline, room: DVec2, cell: f64) -> Vec<Stamp> {
     directions(&points).into_iter().filter_map(stamp).collect()
 }
 
-/// Runs of cells, those that meet or overlap as one.
+/// Merges runs of cells that touch or overlap.
 fn joined(mut runs: Vec<[usize; 2]>) -> Vec<[usize; 2]> {
     runs.sort_unstable();
     let mut joined: Vec<[usize; 2]> = Vec::with_capacity(runs.len());
@@ -150,7 +150,7 @@ fn joined(mut runs: Vec<[usize; 2]>) -> Vec<[usize; 2]> {
     joined
 }
 
-/// Ends of the part of a convex polygon within a strip from below to above.
+/// Returns the ends of the part of a convex polygon within a horizontal strip.
 fn extent(polygon: &[DVec2], [below, above]: [f64; 2]) -> Option<[f64; 2]> {
     let mut ends = [f64::INFINITY, f64::NEG_INFINITY];
     let mut take = |x: f64| ends = [ends[0].min(x), ends[1].max(x)];
@@ -167,10 +167,10 @@ fn extent(polygon: &[DVec2], [below, above]: [f64; 2]) -> Option<[f64; 2]> {
     (ends[0] <= ends[1]).then_some(ends)
 }
 
-/// The cells of a page that are taken.
+/// The occupied cells of a page.
 struct Page {
     width: usize,
-    /// By rows from below, 64 cells to a word.
+    /// Rows from below, 64 cells per word.
     rows: Vec<Vec<u64>>,
 }
 
@@ -180,7 +180,7 @@ impl Page {
         Self { width, rows: vec![vec![0; width.div_ceil(64)]; height] }
     }
 
-    /// The stamp and its place with the lowest upper end, then the leftmost one.
+    /// Returns the stamp and its position with the lowest upper end, then the leftmost one.
     fn best(&self, stamps: &[Stamp]) -> Option<(usize, [usize; 2])> {
         let mut best: Option<([usize; 2], usize, [usize; 2])> = None;
         for (index, stamp) in stamps.iter().enumerate() {
@@ -205,14 +205,14 @@ impl Page {
         best.map(|(_, stamp, at)| (stamp, at))
     }
 
-    /// The leftmost column up to `most` where a stamp is free in a row.
+    /// Returns the leftmost column up to `most` at which a stamp fits in a row.
     fn leftmost(&self, stamp: &Stamp, y: usize, most: usize) -> Option<usize> {
         let mut x = 0;
         while x <= most {
             let mut rows = self.rows[y..].iter().zip(&stamp.rows);
             let beyond = rows.find_map(|(taken, runs)| {
                 runs.iter().find_map(|&[first, last]| {
-                    // The run that meets a cell does so until it has passed it.
+                    // A run that meets an occupied cell does so until it has passed it.
                     Some(last_taken(taken, [x + first, x + last])? + 1 - first)
                 })
             });
@@ -233,7 +233,7 @@ impl Page {
     }
 }
 
-/// The last cell of a row that is taken, from a first to a last one.
+/// Returns the last occupied cell of a row within a range.
 fn last_taken(row: &[u64], [first, last]: [usize; 2]) -> Option<usize> {
     (first / 64..=last / 64).rev().find_map(|word| {
         let mut cells = row[word];
@@ -260,11 +260,11 @@ mod tests {
         vec![corners.map(|at: f64| DVec2::from_angle(at.to_radians()) * radius).to_vec()]
     }
 
-    /// Two triangles of the same kind fill a parallelogram, and what does not fit any more gets a page of its own.
+    /// Two equal triangles fill a parallelogram, and pieces that no longer fit go on another page.
     #[test]
-    fn pages_are_filled_before_another_is_taken() {
+    fn pages_are_filled_before_another_is_started() {
         let pieces = vec![triangle(100.0); 9];
-        // Four times two in rows of 87 mm.
+        // Two rows of 87 mm with four triangles each.
         let places = nest(&pieces, DVec2::new(275.0, 190.0)).unwrap();
         let on = |page| places.iter().filter(|place| place.page == page).count();
         assert!(on(0) >= 8 && on(0) + on(1) == 9, "{places:?}");
@@ -274,14 +274,14 @@ mod tests {
     proptest! {
         #![proptest_config(ProptestConfig::with_cases(24))]
 
-        /// Pieces of triangles keep the blank between them, and stay in the room.
+        /// Pieces of triangles keep the gap between them, and stay within the area.
         #[test]
         fn nested_pieces_are_apart(
             edges in prop::collection::vec(20.0f64..120.0, 2..14),
             room in (150.0f64..400.0, 150.0f64..400.0),
         ) {
             let room = DVec2::from(room);
-            // Each with a tab of a third of its edge.
+            // Each has a tab of a third of its edge.
             let pieces: Vec<Outline> = edges.iter().map(|&edge| {
                 let mut piece = triangle(edge);
                 let [a, b] = [piece[0][0], piece[0][1]];

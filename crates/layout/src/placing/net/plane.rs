@@ -1,18 +1,18 @@
-//! Convex polygons of the plane: how far they lie apart, and motions that carry them.
+//! Convex polygons in the plane: their distance, and rigid motions.
 
 use glam::DVec2;
 
 use deltille_core::angles::direction;
 
-/// Depth of an overlap that rounding makes of two polygons that share an edge, mm; coordinates of
-/// metres carry errors a million times smaller.
+/// Overlap that rounding causes between two polygons that share an edge, mm. Coordinates in metres have errors a
+/// million times smaller.
 pub(crate) const TOUCHING_MM: f64 = 1e-6;
 
-/// How far two convex polygons, both counter-clockwise, lie apart: a lower bound of their distance
-/// where it is positive, minus the depth of their overlap where it is negative, mm.
+/// Returns the signed distance of two convex polygons, both counter-clockwise, mm. A positive value is a lower bound of
+/// their distance, a negative one the depth of their overlap.
 ///
-/// Two convex polygons are disjoint if, and only if, a line along an edge of one of them separates
-/// them; so the sign is exact but for [`TOUCHING_MM`] of rounding.
+/// Two convex polygons are disjoint if and only if a line along an edge of one of them separates them. So the sign is
+/// exact up to rounding errors of [`TOUCHING_MM`].
 pub(crate) fn gap_mm(a: &[DVec2], b: &[DVec2]) -> f64 {
     let beyond_edges_of = |a: &[DVec2], b: &[DVec2]| {
         let edges = a.iter().zip(a.iter().cycle().skip(1));
@@ -25,36 +25,35 @@ pub(crate) fn gap_mm(a: &[DVec2], b: &[DVec2]) -> f64 {
     beyond_edges_of(a, b).max(beyond_edges_of(b, a))
 }
 
-/// A turn about the origin and a shift: `p ↦ turn · p + shift`.
+/// A rotation about the origin, followed by a shift: `p ↦ turn · p + shift`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Motion {
-    /// Unit vector: where the x axis goes.
+    /// Unit vector: image of the x axis.
     pub turn: DVec2,
-    /// Where the origin goes, mm.
+    /// Image of the origin, mm.
     pub shift: DVec2,
 }
 
 impl Motion {
-    /// The motion that takes a to the place of p, and the direction from a to b to that from p
-    /// to q.
+    /// Returns the motion that moves a to p, and rotates the direction from a to b into that from p to q.
     pub(crate) fn carrying([a, b]: [DVec2; 2], [p, q]: [DVec2; 2]) -> Self {
         let (from, to) = ((b - a).normalize_or_zero(), (q - p).normalize_or_zero());
         let turn = DVec2::new(from.dot(to), from.perp_dot(to));
         Self { turn, shift: p - turn.rotate(a) }
     }
 
-    /// Turn by an angle, counter-clockwise.
+    /// Returns the counter-clockwise rotation by an angle.
     pub(crate) fn turning(angle_rad: f64) -> Self {
         Self { turn: direction(angle_rad), shift: DVec2::ZERO }
     }
 
-    /// Image of a point.
+    /// Returns the image of a point.
     pub(crate) fn apply(&self, p: DVec2) -> DVec2 {
         self.turn.rotate(p) + self.shift
     }
 }
 
-/// Left, lower, right and upper end of some points.
+/// Returns the left, lower, right and upper end of a set of points.
 pub(crate) fn bounds<'a>(points: impl IntoIterator<Item = &'a DVec2>) -> [f64; 4] {
     let start = (DVec2::INFINITY, DVec2::NEG_INFINITY);
     let (least, most) =
@@ -80,10 +79,10 @@ mod tests {
     }
 
     proptest! {
-        /// Where the gap is positive no point is in both, and a shift by the depth of an overlap
-        /// along the line of centres does not separate any earlier.
+        /// If the gap is positive, no point lies in both triangles. The overlap vanishes only once the centres are far
+        /// enough apart.
         #[test]
-        fn the_sign_tells_whether_a_common_point_exists(
+        fn the_sign_matches_whether_a_common_point_exists(
             x in -3.0f64..3.0, y in -3.0f64..3.0, angle in 0.0f64..6.3, u in 0.0f64..1.0, v in 0.0f64..1.0,
         ) {
             let (a, b) = (triangle(DVec2::ZERO, 0.0), triangle(DVec2::new(x, y), angle));

@@ -1,4 +1,4 @@
-//! A net on paper: on one sheet, over several pages, or in pieces, and how it lies there.
+//! Sheets of a net: on one sheet, over several pages, or in pieces.
 
 use glam::DVec2;
 
@@ -20,13 +20,13 @@ use deltille_core::setting::Setting::{
 use deltille_core::targets::format_mm;
 use deltille_core::targets::{FamilyRef, Panel, SolidSpec, TargetError};
 
-/// Least margin of a face that takes its numbers, mm.
+/// Smallest face margin with room for numbers, mm.
 const LEAST_MARGIN_MM: f64 = 2.5;
 
-/// Smallest room for pieces of a net, mm.
+/// Smallest usable area for pieces of a net, mm.
 const LEAST_ROOM_MM: f64 = 40.0;
 
-/// A piece of a net on a sheet.
+/// A piece of a net placed on a sheet.
 struct Laid<'a> {
     piece: &'a Piece,
     tabs: &'a [Tab],
@@ -34,7 +34,7 @@ struct Laid<'a> {
     page_from_net: Motion,
 }
 
-/// The sheets of a solid's net.
+/// Lays out the sheets of a solid's net.
 pub(crate) fn sheets(
     name: &str,
     spec: &SolidSpec,
@@ -44,8 +44,8 @@ pub(crate) fn sheets(
 ) -> Result<Vec<SheetLayout>, TargetError> {
     if spec.margin_mm < LEAST_MARGIN_MM {
         let problem = format!(
-            "a net has its numbers in the margins of the faces: take at least {} instead of {}, \
-             or {SolidSheetsPerFace}",
+            "the numbers of a net are printed in the face margins: use at least {} instead of {}, or \
+             {SolidSheetsPerFace}",
             format_mm(LEAST_MARGIN_MM),
             format_mm(spec.margin_mm)
         );
@@ -72,7 +72,7 @@ pub(crate) fn sheets(
     }
 }
 
-/// The sheet of a net in one piece that fits its paper.
+/// Lays out a net in one piece that fits the paper.
 fn sheet_of_one(drawing: &Drawing, laid: &Laid) -> SheetLayout {
     let mut sheet = laid.arrangement.sheet(0, [0.0; 4], drawing.label("net"));
     sheet.placements.clear();
@@ -82,7 +82,7 @@ fn sheet_of_one(drawing: &Drawing, laid: &Laid) -> SheetLayout {
     sheet
 }
 
-/// A net that is larger than the paper, over pages that are joined along seams.
+/// Lays out a net larger than the paper over pages that are joined along seams.
 fn seamed(
     nets: &[Net],
     spec: &SolidSpec,
@@ -90,7 +90,7 @@ fn seamed(
     paper: &PaperSpec,
 ) -> Result<Vec<SheetLayout>, TargetError> {
     let [net, ..] = nets else {
-        let problem = format!("the faces leave no room for glue tabs: take {SolidSheetsPerFace}");
+        let problem = format!("the faces leave no room for glue tabs: use {SolidSheetsPerFace}");
         return Err(TargetError::invalid(SolidEdgeMm, problem));
     };
     let what = format!("the net of a solid with {} edges", format_mm(spec.edge_mm));
@@ -118,8 +118,8 @@ fn seamed(
         .collect()
 }
 
-/// Pieces of whole faces, nested on pages: on the smallest paper that takes them all, or on as few pages as will do of the
-/// size that is asked for, or of the largest.
+/// Nests pieces of whole faces on pages. They go on the smallest paper that fits all of them on one page. Otherwise
+/// they go on as few pages as possible of the requested size, or of the largest.
 fn nested(
     spec: &SolidSpec,
     drawing: &Drawing,
@@ -152,8 +152,8 @@ fn nested(
         }
         if count > MOST_PAGES {
             let problem = format!(
-                "the net of a solid with {} edges takes {count} pages of {size}, more than can be assembled: take \
-                 {SolidSheetsPerFace}, a shorter {SolidEdgeMm}, or larger {PaperSize}",
+                "the net of a solid with {} edges takes {count} pages of {size}, more than can be assembled: use \
+                 {SolidSheetsPerFace}, a shorter {SolidEdgeMm}, or a larger {PaperSize}",
                 format_mm(spec.edge_mm),
             );
             return Err(TargetError::invalid(SolidEdgeMm, problem));
@@ -184,16 +184,17 @@ fn nested(
         return Ok((0..count).map(sheet).collect());
     }
     let size = sizes.last().map(ToString::to_string).unwrap_or_default();
-    let seams = if paper.size.is_some() { format!(", larger {PaperSize}") } else { String::new() };
+    let seams =
+        if paper.size.is_some() { format!(", a larger {PaperSize}") } else { String::new() };
     let problem = format!(
-        "a face with {} edges and its tabs is larger than {size}: take {SolidSheetsSeamedNet}{seams}, or a shorter \
+        "a face with {} edges and its tabs is larger than {size}: use {SolidSheetsSeamedNet}{seams}, or a shorter \
          {SolidEdgeMm}",
         format_mm(spec.edge_mm),
     );
     Err(TargetError::invalid(SolidEdgeMm, problem))
 }
 
-/// The convex shape that the tiles of a face fill, in the panel frame, mm.
+/// Returns the convex outline of the tiles of a face, in the panel frame, mm.
 fn tiles_outline(panel: &Panel) -> Vec<DVec2> {
     if panel.outline != deltille_core::targets::Outline::Triangle {
         let tiles = panel.dark_tiles();
@@ -205,18 +206,18 @@ fn tiles_outline(panel: &Panel) -> Vec<DVec2> {
     ends.map(|(row, col)| panel.lattice_mm(Vertex::new(row, col))).to_vec()
 }
 
-/// Points of a panel on a page, mm.
+/// Converts points of a panel to page positions, mm.
 fn on_page(placement: &Placement, points: &[DVec2]) -> Vec<DVec2> {
     points.iter().map(|&p| placement.page_from_panel(p)).collect()
 }
 
-/// All corners of a piece and its tabs.
+/// Returns all corners of a piece and its tabs.
 fn points(piece: &Piece, tabs: &[Tab]) -> Vec<DVec2> {
     let faces = piece.iter().flat_map(|face| face.corners.iter().copied());
     faces.chain(tabs.iter().flat_map(|tab| tab.corners)).collect()
 }
 
-/// Lays a piece on the smallest paper that takes it, turned no more than that needs.
+/// Lays a piece on the smallest paper that fits it, rotated as little as possible.
 fn lay<'a>(
     piece: &'a Piece,
     tabs: &'a [Tab],
@@ -224,7 +225,7 @@ fn lay<'a>(
 ) -> Result<Option<Laid<'a>>, TargetError> {
     let sizes = paper.sizes();
     let points = points(piece, tabs);
-    // As the net stands, upright, then slanted as little as will do.
+    // Upright first, then with increasing slant.
     let slanted = (1..18).flat_map(|n| [5 * n, -5 * n]).filter(|n| n % 90 != 0);
     let turns: Vec<f64> =
         [0, 90].into_iter().chain(slanted).map(|n| f64::from(n).to_radians()).collect();
@@ -265,7 +266,7 @@ mod tests {
     use deltille_core::family::Family;
     use deltille_core::targets::{SolidShape, TargetSpec};
 
-    /// The rectangle that a text takes, by estimate.
+    /// Estimated bounding rectangle of a text.
     fn text_box(text: &SheetText) -> [DVec2; 4] {
         let width = width(&text.text, text.cap_height_mm).min(text.max_width_mm);
         let (at, along) = (text.at_mm, DVec2::from_angle(text.angle_rad));
@@ -284,17 +285,17 @@ mod tests {
     proptest! {
         #![proptest_config(ProptestConfig::with_cases(48))]
 
-        /// Every face once, none on another, all on its sheet; no words on lines, tiles or words;
-        /// on several pages of one sheet every line is shown, and every cross on two.
+        /// Every face appears once, does not overlap another, and lies on its sheet. No text overlaps lines, tiles or
+        /// other texts. On a sheet of several pages, every line is shown, and every cross appears on two pages.
         #[test]
-        fn nothing_on_a_net_meets_anything_else(
+        fn marks_of_a_net_do_not_overlap(
             shape in 0usize..5, edge_mm in 60.0f64..200.0, tiles in 6u32..12, margin_mm in 2.5f64..7.0,
             paper in 0usize..3, seams in any::<bool>(),
         ) {
             use SolidShape::{Cube, Cuboid, Icosahedron, Octahedron, Tetrahedron};
             let box_of = Cuboid(DVec3::new(2.0, 1.6, 1.2));
             let has_squares = shape > 2;
-            // The largest whose faces fit A4.
+            // The largest edge whose faces fit A4.
             let edge_mm = if has_squares { 0.8 * edge_mm } else { edge_mm };
             let shape = [Tetrahedron, Octahedron, Icosahedron, Cube, box_of][shape].clone();
             let mut spec = SolidSpec { edge_mm, tiles, margin_mm, ..SolidSpec::new(shape) };
@@ -346,7 +347,7 @@ mod tests {
                 };
                 sheet.pages.iter().filter(on).count()
             };
-            // Ticks are beside the edge of the other page.
+            // Ticks lie beside the edge of the other page.
             let is_tick = (line.from_mm.distance(line.to_mm) - TICK_MM).abs() < 1e-9;
             let least = if line.kind == LineKind::Align && !is_tick { 2 } else { 1 };
             for part in 0..=10 {
@@ -358,7 +359,7 @@ mod tests {
         Ok(())
     }
 
-    /// Sheets of a target, and the part of their area that faces take.
+    /// Number of sheets of a target, and the fraction of their area that its faces cover.
     fn used(target: &Printing) -> (usize, f64) {
         let area = |placement: &Placement| polygon::area(&outline(target, placement));
         let faces: f64 = target.sheets.iter().flat_map(|s| &s.placements).map(area).sum();
@@ -367,7 +368,7 @@ mod tests {
     }
 
     #[test]
-    fn a_net_that_is_larger_than_the_paper_has_whole_faces_on_every_page() {
+    fn a_net_larger_than_the_paper_has_whole_faces_on_every_page() {
         let spec = TargetSpec::Solid(SolidSpec::new(SolidShape::Icosahedron));
         let family = Family::shipped("delTag25h7").unwrap();
         let paper = PaperSpec { size: Some("A4".parse().unwrap()), ..PaperSpec::default() };
@@ -409,14 +410,14 @@ mod tests {
         let target =
             Printing::build("ball", &TargetSpec::Solid(spec), Some(&family), Some(&paper)).unwrap();
         let (sheets, part) = used(&target);
-        assert!(sheets <= 4 && part >= 0.55, "{sheets} sheets, {part:.2} of them used");
+        assert!(sheets <= 4 && part >= 0.55, "{sheets} sheets, {part:.2} of their area used");
         for sheet in &target.sheets {
             check_sheet(&target, sheet).unwrap();
         }
     }
 
     #[test]
-    fn the_paper_is_the_smallest_that_takes_the_net() {
+    fn the_smallest_paper_that_fits_the_net_is_used() {
         let family = Family::shipped("delTag25h7").unwrap();
         let size = |shape| {
             let spec = TargetSpec::Solid(SolidSpec::new(shape));

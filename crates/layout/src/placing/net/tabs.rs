@@ -1,9 +1,9 @@
-//! Glue tabs: a trapezoid on one side of every edge that is cut.
+//! Glue tabs: a trapezoid on one side of every cut edge.
 //!
 //! ```text
 //!        b'──────a'            outside
 //!       ╱          ╲
-//!   ───b────────────a───       the edge; counter-clockwise the face's side runs from a to b
+//!   ───b────────────a───       the edge; the face's side runs counter-clockwise from a to b
 //!            face
 //! ```
 
@@ -15,34 +15,34 @@ use super::plane::{TOUCHING_MM, bounds, gap_mm};
 use super::unfold::{Piece, Side, Sides};
 use deltille_core::angles::tangent;
 
-/// Depth of a tab in lengths of its edge, and its least and most, mm: the least takes its words,
-/// the most is what glue needs.
+/// Depth of a tab as a fraction of its edge, and its minimum and maximum, mm: the minimum fits the text, the maximum is
+/// sufficient for gluing.
 const DEPTH: (f64, f64, f64) = (0.15, 4.0, MOST_DEPTH_MM);
 
-/// Depth of the deepest tabs, mm.
+/// Maximum depth of a tab, mm.
 pub(super) const MOST_DEPTH_MM: f64 = 9.0;
 
-/// Angles between a tab's edge and its legs, degrees: the usual one, flatter ones for narrow gaps,
-/// a steep one for short edges; tried in this order.
+/// Angles between the edge of a tab and its legs, degrees, in the order tried: the usual one, flatter ones for narrow
+/// gaps, and a steep one for short edges.
 const LEGS_DEG: [f64; 4] = [45.0, 30.0, 20.0, 60.0];
 
-/// By so much the legs of a tab could be steeper without meeting anything, degrees: scissors pass
-/// between a tab and what lies beside it.
+/// Angle by which the legs of a tab could be steeper without touching anything, degrees: room for scissors between a
+/// tab and its neighbours.
 const SPARE_DEG: f64 = 4.0;
 
-/// Parts of the edge left free at each end, tried in this order.
+/// Fractions of the edge left free at each end, in the order tried.
 const INSETS: [f64; 4] = [0.0, 0.06, 0.15, 0.27];
 
-/// Parts of the full depth, tried in this order.
+/// Fractions of the full depth, in the order tried.
 const DEPTHS: [f64; 4] = [1.0, 0.8, 0.6, 0.45];
 
-/// Least distance of a tab from faces and tabs that share no vertex with it, mm.
+/// Minimum distance of a tab from faces and tabs that share no vertex with it, mm.
 const CLEARANCE_MM: f64 = 0.5;
 
-/// A tab beside a side of a face.
+/// A tab on a side of a face.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Tab {
-    /// The side that it hangs on.
+    /// The side to which it is attached.
     pub side: Side,
     /// Its corners, counter-clockwise: b, a, a', b' of the figure; mm.
     pub corners: [DVec2; 4],
@@ -50,11 +50,11 @@ pub(super) struct Tab {
     pub depth_mm: f64,
 }
 
-/// Gives each cut edge of some pieces a tab on one of its sides; `None` where an edge has room on
-/// neither. Each piece is a plane of its own.
+/// Gives each cut edge a tab on one of its sides; `None` if an edge has room on neither side. Each piece lies in its
+/// own plane.
 ///
-/// The side with the deeper tab gets it; where both take the same, the one with the lower number
-/// in its face, so that the tabs of a regular net all point the same way round.
+/// The tab goes on the side where it is larger. If both are equal, it goes on the side with the lower number in its
+/// face, so that the tabs of a regular net all point the same way round.
 pub(super) fn place(pieces: &[Piece], sides: &Sides) -> Option<Vec<Vec<Tab>>> {
     let mut tabs: Vec<Vec<Tab>> = vec![Vec::new(); pieces.len()];
     let mut places = BTreeMap::new();
@@ -77,7 +77,7 @@ pub(super) fn place(pieces: &[Piece], sides: &Sides) -> Option<Vec<Vec<Tab>>> {
     Some(tabs)
 }
 
-/// The edges of the solid along which the net is cut, as pairs of sides in the order of faces.
+/// Returns the edges of the solid along which the net is cut, as pairs of sides in the order of faces.
 pub(super) fn cut_edges(pieces: &[Piece], sides: &Sides) -> Vec<(Side, Side)> {
     let faces = || pieces.iter().flatten();
     let folded: Vec<(Side, Side)> = faces().filter_map(|face| face.hinge).collect();
@@ -92,7 +92,7 @@ pub(super) fn cut_edges(pieces: &[Piece], sides: &Sides) -> Vec<(Side, Side)> {
 }
 
 impl Tab {
-    /// Depth times length, rounded so that sizes of equal tabs are equal.
+    /// Returns depth times length, rounded so that equal tabs compare equal.
     fn size(&self) -> f64 {
         let [b, a, ..] = self.corners;
         (self.depth_mm * a.distance(b) * 1e6).round() / 1e6
@@ -108,14 +108,14 @@ impl Tab {
         Self { side, corners, depth_mm: depth }
     }
 
-    /// Whether its far edge is at least half as long as its near one.
+    /// Returns whether the outer edge is at least half as long as the inner one.
     fn is_wide(&self) -> bool {
         let [b, a, far_a, far_b] = self.corners;
         (far_b - far_a).dot(b - a) >= 0.5 * (b - a).length_squared()
     }
 }
 
-/// The largest tab that a side of face `at` of a piece takes.
+/// Returns the largest tab that fits on a side of face `at` of a piece.
 fn largest(piece: &Piece, at: usize, side: Side, tabs: &[Tab]) -> Option<Tab> {
     let ends = piece[at].ends(side.side);
     let (part, least, most) = DEPTH;
@@ -128,7 +128,7 @@ fn largest(piece: &Piece, at: usize, side: Side, tabs: &[Tab]) -> Option<Tab> {
         let faces = piece.iter().enumerate().filter(|&(f, _)| f != at);
         faces.map(|(_, face)| &face.corners[..]).chain(tabs.iter().map(|tab| &tab.corners[..]))
     };
-    // Only what is near can be met.
+    // Only nearby polygons can be touched.
     let [x0, y0, x1, y1] = bounds(&ends);
     let reach = full + CLEARANCE_MM;
     let near: Vec<&[DVec2]> = obstacles()
@@ -144,7 +144,7 @@ fn largest(piece: &Piece, at: usize, side: Side, tabs: &[Tab]) -> Option<Tab> {
     })
 }
 
-/// Whether a tab keeps clear of a polygon, which may touch an end of its edge.
+/// Returns whether a tab stays clear of a polygon, which may touch an end of its edge.
 fn is_clear(tab: &Tab, other: &[DVec2]) -> bool {
     let [b, a, ..] = tab.corners;
     let meet = other.iter().any(|v| v.distance(a).min(v.distance(b)) < TOUCHING_MM);

@@ -11,54 +11,53 @@ use super::plane::{Motion, TOUCHING_MM, bounds, gap_mm};
 use deltille_core::targets::sides;
 use deltille_core::targets::{Polyhedron, SolidShape};
 
-/// Seed of the search for nets of meshes: any will do, a fixed one makes results repeatable.
+/// Seed of the search for nets of meshes, fixed for repeatable results; its value is arbitrary.
 const SEED: u64 = 20;
 
-/// Grown nets that are looked at further.
+/// Number of grown nets that are considered further.
 const MOST_GROWN: usize = 8;
 
-/// Least angle between two sides that are cut and meet in a vertex, radians: room for a tab with the flattest legs,
-/// and for scissors.
+/// Smallest angle between two cut sides that meet in a vertex, radians: room for a tab with the flattest legs, and for
+/// scissors.
 const LEAST_GAP_RAD: f64 = 25.0 / 180.0 * PI;
 
-/// Orders of growth tried for a mesh: fewer for many faces, since each takes a time that grows
-/// with their square.
+/// Returns the number of growth orders tried for a mesh. It decreases with the number of faces, because the time per
+/// order grows with its square.
 fn tries(faces: usize) -> u64 {
     (400_000 / (faces * faces).max(1)).clamp(4, 64) as u64
 }
 
-/// A side of a face: from its vertex of that index to the next.
+/// A side of a face: from the vertex with that index to the next.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) struct Side {
     /// Index of the face.
     pub face: usize,
-    /// 0 is the lower edge, 1 and 2 follow counter-clockwise.
+    /// Index of the side: 0 is the lower edge, the others follow counter-clockwise.
     pub side: usize,
 }
 
-/// A face laid into the plane.
+/// A face laid in the plane.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct FlatFace {
     /// Index of the face.
     pub face: usize,
     /// Its vertices, counter-clockwise, mm.
     pub corners: Vec<DVec2>,
-    /// The side of an earlier face that it hangs on, and its own there; `None` for the first.
+    /// The side of an earlier face to which it is attached, and its own matching side; `None` for the first face.
     pub hinge: Option<(Side, Side)>,
 }
 
 impl FlatFace {
-    /// Ends of a side, mm.
+    /// Returns the ends of a side, mm.
     pub(super) fn ends(&self, side: usize) -> [DVec2; 2] {
         [self.corners[side], self.corners[(side + 1) % self.corners.len()]]
     }
 }
 
-/// Faces joined in one piece, none of which overlaps another; the first hangs on nothing, every
-/// other on one before it.
+/// Faces joined in one piece without overlap. The first is the root; every other is attached to an earlier one.
 pub(super) type Piece = Vec<FlatFace>;
 
-/// The sides of a solid's faces, matched.
+/// The sides of a solid's faces, matched in pairs.
 pub(crate) struct Sides {
     partner: Vec<Vec<Option<Side>>>,
 }
@@ -78,21 +77,21 @@ impl Sides {
         Self { partner: solid.faces.iter().map(partners).collect() }
     }
 
-    /// The sides of a face.
+    /// Iterates over the sides of a face.
     pub(crate) fn of(&self, face: usize) -> impl Iterator<Item = Side> + use<> {
         (0..self.partner[face].len()).map(move |side| Side { face, side })
     }
 
-    /// The other side of the same edge; `None` on the rim of an open mesh.
+    /// Returns the other side of the same edge; `None` on the boundary of an open mesh.
     pub(crate) fn partner(&self, side: Side) -> Option<Side> {
         self.partner[side.face][side.side]
     }
 }
 
-/// Ways to unfold a solid, best liked first: each a list of pieces that together hold every face
-/// once. `flat` holds the outlines of the faces, each in a frame of its own, mm.
+/// Returns ways to unfold a solid, best first. Each is a list of pieces that together contain every face once. `flat`
+/// contains the outlines of the faces, each in its own frame, mm.
 ///
-/// A named solid has its usual nets, any other solid those that are [`grown`].
+/// A named solid has its usual nets, any other solid [`grown`] ones.
 pub(super) fn unfoldings(
     solid: &Polyhedron,
     shape: &SolidShape,
@@ -102,7 +101,7 @@ pub(super) fn unfoldings(
     if usual.is_empty() { grown(solid, flat) } else { usual }
 }
 
-/// The usual nets of a named solid.
+/// Returns the usual nets of a named solid.
 fn usual(solid: &Polyhedron, shape: &SolidShape, flat: &[Vec<DVec2>]) -> Vec<Vec<Piece>> {
     let sides = Sides::new(solid);
     let nets = usual_hinges(shape).into_iter().filter_map(|(root, hinges)| {
@@ -112,9 +111,9 @@ fn usual(solid: &Polyhedron, shape: &SolidShape, flat: &[Vec<DVec2>]) -> Vec<Vec
     nets.collect()
 }
 
-/// Nets grown from many beginnings in many orders: a face is laid on the first free side where it
-/// overlaps nothing, and what finds no place begins another piece, so that every result is a valid
-/// one. Fewer pieces are better, then a smaller bounding box.
+/// Grows nets from many starting faces in many orders. A face is attached to the first free side where it overlaps
+/// nothing. A face that fits nowhere starts another piece, so every result is valid. Results with fewer pieces come
+/// first, then those with a smaller bounding box.
 fn grown(solid: &Polyhedron, flat: &[Vec<DVec2>]) -> Vec<Vec<Piece>> {
     let sides = Sides::new(solid);
     let mut grown: Vec<Vec<Piece>> =
@@ -124,7 +123,7 @@ fn grown(solid: &Polyhedron, flat: &[Vec<DVec2>]) -> Vec<Vec<Piece>> {
     grown
 }
 
-/// A last resort: nets of pieces of at most `most` faces.
+/// Grows nets with pieces of at most `most` faces, as a last resort.
 pub(super) fn in_small_pieces(
     solid: &Polyhedron,
     flat: &[Vec<DVec2>],
@@ -135,7 +134,7 @@ pub(super) fn in_small_pieces(
     (0..tries(flat.len())).map(move |seed| grow_all(flat, &sides, seed, few))
 }
 
-/// Nets of pieces whose corners `fit`, with room for a tab along every side that is cut.
+/// Grows nets with pieces whose corners `fit`, with room for a tab along every cut side.
 pub(super) fn in_pieces_that_fit(
     flat: &[Vec<DVec2>],
     sides: &Sides,
@@ -148,10 +147,11 @@ pub(super) fn in_pieces_that_fit(
     })
 }
 
-/// Whether a face that is laid beside a piece leaves wide gaps, or none along its hinge, to the others that meet it in
-/// a vertex.
+/// Returns whether a face attached to a piece leaves gaps wide enough to the other faces that meet it in a vertex.
+/// Along its hinge, the gap must be zero.
 fn leaves_gaps(piece: &[FlatFace], face: &FlatFace) -> bool {
-    // Directions at a corner: to the next corner, and to the one before; the face lies to the left of the first.
+    // Directions from a corner to the next corner and to the previous one; the face lies to the left of the first
+    // direction.
     let sector = |corners: &[DVec2], n: usize| {
         let count = corners.len();
         [1, count - 1].map(|way| (corners[(n + way) % count] - corners[n]).to_angle())
@@ -160,7 +160,7 @@ fn leaves_gaps(piece: &[FlatFace], face: &FlatFace) -> bool {
     let count = face.corners.len();
     (0..count).all(|n| {
         let [first, last] = sector(&face.corners, n);
-        // The sides that lie along these directions.
+        // The sides along these directions.
         let [on_first, on_last] = [n, (n + count - 1) % count].map(|side| own_side == Some(side));
         piece.iter().all(|other| {
             let meets = |corner: &DVec2| corner.distance(face.corners[n]) < TOUCHING_MM;
@@ -185,7 +185,7 @@ fn area(pieces: &[Piece]) -> f64 {
     pieces.iter().map(area).sum()
 }
 
-/// Root and (parent, child) pairs of the nets that a named solid usually has.
+/// Returns root and (parent, child) pairs of the usual nets of a named solid.
 fn usual_hinges(shape: &SolidShape) -> Vec<(usize, Vec<(usize, usize)>)> {
     match shape {
         // A large triangle around the base, or a strip.
@@ -206,16 +206,16 @@ fn usual_hinges(shape: &SolidShape) -> Vec<(usize, Vec<(usize, usize)>)> {
             let teeth = (0..5).flat_map(|k| [(5 + k, k), (10 + k, 15 + k)]);
             vec![(10, belt.chain(teeth).collect())]
         }
-        // A cross: a belt of four, and the ends above and below the second of it.
+        // A cross: a belt of four, and the ends above and below its second face.
         SolidShape::Cube | SolidShape::Cuboid(_) => {
             vec![(1, vec![(1, 0), (1, 2), (2, 3), (1, 4), (1, 5)])]
         }
-        // Found from its shape.
+        // Derived from the shape.
         _ => Vec::new(),
     }
 }
 
-/// Lays the faces out as the pairs of parent and child say; `None` where two overlap.
+/// Lays out the faces according to the pairs of parent and child; `None` if two overlap.
 fn hang(
     flat: &[Vec<DVec2>],
     sides: &Sides,
@@ -247,20 +247,20 @@ fn hang(
     Some(piece)
 }
 
-/// A face laid beside another, across a side of it.
+/// Lays a face beside another, across one of its sides.
 fn beside(flat: &[Vec<DVec2>], on: &FlatFace, side: Side, own: Side) -> FlatFace {
     let outline = &flat[own.face];
     let next = (own.side + 1) % outline.len();
     let [p, q] = on.ends(side.side);
     let motion = Motion::carrying([outline[own.side], outline[next]], [q, p]);
     let mut corners: Vec<DVec2> = outline.iter().map(|&corner| motion.apply(corner)).collect();
-    // The shared ends are the same numbers, not only the same to rounding.
+    // The shared ends are exactly equal, not only up to rounding.
     corners[own.side] = q;
     corners[next] = p;
     FlatFace { face: own.face, corners, hinge: Some((side, own)) }
 }
 
-/// Whether a face overlaps none of a piece.
+/// Returns whether a face does not overlap any face of a piece.
 fn is_free(piece: &[FlatFace], corners: &[DVec2]) -> bool {
     let [x0, y0, x1, y1] = bounds(corners);
     piece.iter().all(|face| {
@@ -273,7 +273,7 @@ fn is_free(piece: &[FlatFace], corners: &[DVec2]) -> bool {
     })
 }
 
-/// Grows pieces until every face is in one; a piece takes a face that it `may`.
+/// Grows pieces until every face belongs to one. `may` decides whether a piece accepts a face.
 fn grow_all(
     flat: &[Vec<DVec2>],
     sides: &Sides,
@@ -286,14 +286,14 @@ fn grow_all(
     while let Some(first) = (0..flat.len()).find(|&face| !placed[face]) {
         let free: Vec<usize> = (first..flat.len()).filter(|&face| !placed[face]).collect();
         let root = if seed == 0 { first } else { free[random.random_range(0..free.len())] };
-        // Half of the orders keep the piece round, the others are free.
+        // Half of the orders keep the piece compact, the others grow at random.
         let round = seed.is_multiple_of(2);
         pieces.push(grow(flat, sides, root, round, &may, &mut placed, &mut random));
     }
     pieces
 }
 
-/// Grows one piece from its `root`, which stays `round` or not; `placed` tells the faces that are taken.
+/// Grows one piece from its `root`, compact if `round`. `placed` marks the faces already used.
 fn grow(
     flat: &[Vec<DVec2>],
     sides: &Sides,
@@ -341,7 +341,7 @@ mod tests {
     use super::*;
     use crate::placing::net::tabs;
 
-    /// A named solid with its vertices moved; a face keeps its lengths, not its angles.
+    /// A named solid with moved vertices. Unfolding must preserve the lengths of its edges.
     fn dented(shape: &SolidShape, moves: &[DVec3]) -> Polyhedron {
         let mut solid = match shape {
             SolidShape::Tetrahedron => Polyhedron::tetrahedron(100.0),
@@ -361,8 +361,8 @@ mod tests {
         (0..solid.faces.len()).map(outline).collect()
     }
 
-    /// What makes an unfolding foldable: every face once and with its own lengths, the right side
-    /// up, hinges joined; and printable: nothing overlaps, every cut edge has a tab.
+    /// Checks that an unfolding can be folded: every face appears once with its own lengths, the right way up, and
+    /// hinges are joined. Also checks that it can be printed: nothing overlaps, and every cut edge has a tab.
     fn check(solid: &Polyhedron, pieces: &[Piece]) -> Result<(), TestCaseError> {
         let mut faces: Vec<usize> = pieces.iter().flatten().map(|face| face.face).collect();
         faces.sort_unstable();
@@ -422,7 +422,7 @@ mod tests {
         }
     }
 
-    /// A ball of 80 triangles: each face of an icosahedron in four, moved out to the sphere.
+    /// A ball of 80 triangles: each face of an icosahedron divided into four and projected onto the sphere.
     fn ball() -> Polyhedron {
         let core = Polyhedron::icosahedron(100.0);
         let radius = core.vertices_mm[0].length();
