@@ -47,7 +47,7 @@ const MARK_MM: f64 = 4.0;
 /// Gap between name, figure, steps and ruler, mm.
 const BLANK_MM: f64 = 5.0;
 /// Smallest and largest fraction of the space between name and ruler that the figure takes.
-const PICTURE_SHARE: (f64, f64) = (0.35, 0.62);
+const FIGURE_SHARE: (f64, f64) = (0.35, 0.62);
 /// Length of the axes in the figure, mm.
 const AXIS_MM: f64 = 12.0;
 /// Sine of the smallest viewing angle at which a face is numbered.
@@ -129,10 +129,10 @@ impl Page {
         self.ruler();
         let steps = self.wrapped(&steps(target, sheets, paper));
         let room = self.most.y - self.least.y;
-        let height = (room - height(&steps) - BLANK_MM)
-            .clamp(PICTURE_SHARE.0 * room, PICTURE_SHARE.1 * room);
+        let height =
+            (room - height(&steps) - BLANK_MM).clamp(FIGURE_SHARE.0 * room, FIGURE_SHARE.1 * room);
         let lower = DVec2::new(self.least.x, self.most.y - height);
-        self.pictures(target, [lower, self.most]);
+        self.figures(target, [lower, self.most]);
         self.most.y -= height + BLANK_MM;
         self.steps(steps);
         self.sheet
@@ -199,20 +199,20 @@ impl Page {
 
     /// Adds the figures of the target. A solid is drawn from two opposite sides, so that every face is visible in one
     /// of them.
-    fn pictures(&mut self, target: &Target, [lower, upper]: [DVec2; 2]) {
+    fn figures(&mut self, target: &Target, [lower, upper]: [DVec2; 2]) {
         let front = Model::of(target);
         if front.numbers.is_empty() {
-            self.picture(&front, [lower, upper]);
+            self.figure(&front, [lower, upper]);
             return;
         }
         let middle = lower.midpoint(upper).x;
-        self.picture(&front, [lower, DVec2::new(middle, upper.y)]);
+        self.figure(&front, [lower, DVec2::new(middle, upper.y)]);
         let back = Model { view: View::from(-front.view.towards, DVec3::Z), ..front };
-        self.picture(&back, [DVec2::new(middle, lower.y), upper]);
+        self.figure(&back, [DVec2::new(middle, lower.y), upper]);
     }
 
     /// Draws the model with its axes, as large as the rectangle allows.
-    fn picture(&mut self, model: &Model, [lower, upper]: [DVec2; 2]) {
+    fn figure(&mut self, model: &Model, [lower, upper]: [DVec2; 2]) {
         let seen = model.faces.iter().flatten().map(|&point| model.view.projected(point));
         let seen: Vec<DVec2> = seen.collect();
         let bounds = [DVec2::min, DVec2::max]
