@@ -1,22 +1,22 @@
 //! The Cramér–Rao bound of a simulated corner.
 //!
-//! Fisher's information of white noise σ is JᵀJ/σ², J the derivatives of the exact pixels by all
-//! that the fit does not know: position, angles, blur, contrast, level, and the light's slopes with
-//! the prior that the fit puts on them. Derivatives are difference quotients of the exact renderer.
+//! The Fisher information under white noise σ is JᵀJ/σ². J contains the derivatives of the exact pixels with respect to
+//! all unknowns of the fit: position, angles, blur, contrast, level, and illumination slopes. The slopes have the same
+//! prior as in the fit. Derivatives are difference quotients of the exact renderer.
 
 use nalgebra::{DMatrix, Matrix2};
 
 use deltille::detect::{SLOPE_PRIOR, Tone};
 use deltille::synth::SimulatedCorner;
 
-/// Step of the difference quotients, in the parameters' units; errors are of its square.
+/// Step of the difference quotients, in units of the parameters; the errors are of second order in it.
 const STEP: f64 = 1e-3;
 
-/// Directions over which the length of an error is averaged.
+/// Number of directions over which the length of an error is averaged.
 const DIRECTIONS: usize = 64;
 
-/// The least covariance of a position estimated from the (2 · radius + 1)² pixels around it, of a camera whose
-/// tone curve is known.
+/// Returns the smallest covariance of a position estimated from the (2 · radius + 1)² pixels around it, for a camera
+/// with a known tone curve.
 pub(crate) fn covariance(
     corner: &SimulatedCorner,
     radius: usize,
@@ -24,7 +24,7 @@ pub(crate) fn covariance(
     tone: Tone,
 ) -> Option<Matrix2<f64>> {
     let centre = corner.position.to_array().map(|c| c.round() as usize);
-    // Slopes act about the corner; whence they are counted changes level and contrast alone.
+    // Slopes act about the corner: another origin would only change level and contrast.
     let local = SimulatedCorner { light_centre: corner.position, ..corner.clone() };
     type Move<'a> = Box<dyn Fn(&mut SimulatedCorner, f64) + 'a>;
     let mut moves: Vec<Move> = vec![
@@ -61,8 +61,8 @@ pub(crate) fn covariance(
     Some(Matrix2::new(inverse[(0, 0)], inverse[(0, 1)], inverse[(1, 0)], inverse[(1, 1)]))
 }
 
-/// The mean length of a Gaussian error with this covariance: √(π/2) times the mean over directions
-/// of |L e|, L Lᵀ = C.
+/// Returns the mean length of a Gaussian error with this covariance: √(π/2) times the mean over directions of |L e|, L
+/// Lᵀ = C.
 pub(crate) fn mean_length(covariance: &Matrix2<f64>) -> Option<f64> {
     let root = covariance.cholesky()?.l();
     let lengths = (0..DIRECTIONS).map(|i| {
@@ -77,7 +77,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn mean_lengths_of_round_and_flat_gaussians() {
+    fn mean_lengths_of_isotropic_and_flat_gaussians_are_exact() {
         let round = mean_length(&Matrix2::identity()).unwrap();
         assert!((round - std::f64::consts::FRAC_PI_2.sqrt()).abs() < 1e-9);
         let flat = mean_length(&Matrix2::new(1.0, 0.0, 0.0, 1e-12)).unwrap();

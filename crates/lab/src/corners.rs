@@ -1,9 +1,8 @@
-//! The paper's Fig. 6: how precisely corners are refined, against blur, noise and tilt.
+//! The experiment of the paper's Fig. 6: precision of corner refinement against blur, noise and tilt.
 //!
-//! Each image shows one corner ([`SimulatedCorner`]), its place uniform in the central pixel, with
-//! light that changes by up to 10 % across 200 px and white noise. Every method starts from the
-//! four pixel centres around the truth. Beside the errors stands the Cramér–Rao bound of the same
-//! images and the same 21×21 pixels.
+//! Each image shows one corner ([`SimulatedCorner`]). Its position is uniform in the central pixel, its illumination
+//! changes by up to 10 % across 200 px, and its noise is white. Every method starts from the four pixel centres around
+//! the true position. The errors are compared with the Cramér–Rao bound for the same images and the same 21×21 pixels.
 
 use std::f64::consts::TAU;
 use std::fmt::Write as _;
@@ -22,41 +21,41 @@ use deltille::raster::Gray;
 use deltille::synth::SimulatedCorner;
 use deltille_core::statistics::quantile;
 
-/// Side of the window that all methods read, px: the reference's 11×11 fit on smoothed pixels.
+/// Side of the window that all methods use, px: an 11×11 fit on smoothed pixels, as in the reference implementation.
 pub const WINDOW_PX: usize = 21;
 
-/// Side of an image, px: the window around starts a pixel off the centre.
+/// Side of an image, px: large enough for windows around starts that lie a pixel off the centre.
 const SIDE: usize = 41;
 
-/// Steepest light, relative change per pixel: 10 % across 200 px.
+/// Maximum illumination gradient, relative change per pixel: 10 % across 200 px.
 const MAX_SLOPE: f64 = 0.1 / 200.0;
 
-/// A fit this far off has found something else, px.
+/// Error above which a fit counts as having found something else, px.
 pub const FAR_PX: f64 = 0.5;
 
-/// Blur, noise and tilt where they are not swept.
+/// Blur, noise and maximum tilt in sweeps that do not vary them.
 const BLUR_PX: f64 = 1.0;
 const NOISE: f64 = 0.01;
 const MAX_TILT_DEG: f64 = 60.0;
 
-/// What is varied.
+/// The varied quantity.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Sweep {
     /// Gaussian blur, px.
     Blur,
     /// Noise, % of full scale.
     Noise,
-    /// Tilt, degrees; in the other sweeps uniform up to 60°.
+    /// Tilt, degrees; uniform up to 60° in the other sweeps.
     Tilt,
-    /// Gamma of the camera: grey = light^(1/γ), before the noise.
+    /// Gamma of the camera: grey = light^(1/γ), applied before the noise.
     Tone,
 }
 
 impl Sweep {
-    /// All, the paper's in its order.
+    /// All sweeps; those of the paper come first, in its order.
     pub const ALL: [Self; 4] = [Self::Blur, Self::Noise, Self::Tilt, Self::Tone];
 
-    /// The values.
+    /// Returns the values of the sweep.
     pub fn values(self) -> &'static [f64] {
         match self {
             Self::Blur => &[0.5, 1.0, 1.5, 2.0, 3.0, 4.0, 5.0],
@@ -66,7 +65,7 @@ impl Sweep {
         }
     }
 
-    /// Name in tables.
+    /// Returns the name in tables.
     pub fn name(self) -> &'static str {
         match self {
             Self::Blur => "blur_px",
@@ -77,7 +76,7 @@ impl Sweep {
     }
 }
 
-/// What is measured.
+/// The methods compared.
 pub const METHODS: [Method; 5] = [
     Method::Polynomial(1),
     Method::Polynomial(2),
@@ -86,19 +85,19 @@ pub const METHODS: [Method; 5] = [
     Method::ModelWithTone,
 ];
 
-/// A way to refine.
+/// A refinement method.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Method {
-    /// The paper's, after so many iterations.
+    /// The paper's polynomial fit, with this number of iterations.
     Polynomial(usize),
-    /// The model of a linear camera, from the polynomial's result.
+    /// The model fit for a linear camera, starting from the result of the polynomial.
     Model,
-    /// The model, with the tone curve estimated from this one corner.
+    /// The model fit, with the tone curve estimated from this one corner.
     ModelWithTone,
 }
 
 impl Method {
-    /// Name in tables.
+    /// Returns the name in tables.
     pub fn name(self) -> String {
         match self {
             Self::Polynomial(t) => format!("polynomial t = {t}"),
@@ -120,40 +119,40 @@ impl Method {
     }
 }
 
-/// A line of the result: one method at one point of a sweep.
+/// One row of the result: one method at one point of a sweep.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Row {
     /// Deltille or checker.
     pub kind: GridKind,
-    /// What was varied.
+    /// The varied quantity.
     pub sweep: Sweep,
     /// Its value.
     pub value: f64,
-    /// How corners were refined.
+    /// Refinement method.
     pub method: Method,
-    /// Fits: images times four.
+    /// Number of fits: four per image.
     pub fits: usize,
     /// Mean, median and 95th percentile of the error of all fits that found a corner, px.
     pub error_px: [f64; 3],
-    /// Mean error that no unbiased method can beat, px.
+    /// Smallest mean error of an unbiased method, px.
     pub bound_px: f64,
-    /// Fits that found no corner.
+    /// Number of fits that found no corner.
     pub failed: usize,
-    /// Fits further than [`FAR_PX`] off.
+    /// Number of fits with an error above [`FAR_PX`].
     pub far: usize,
-    /// Mean of eᵀC⁻¹e with the reported covariances: 2 when they are honest.
+    /// Mean of eᵀC⁻¹e with the reported covariances: 2 if they are correct.
     pub nees: Option<f64>,
 }
 
-/// Number of rows, which is also how often progress is reported.
+/// Returns the number of rows, which is also the number of progress reports.
 pub fn rows_count() -> usize {
     2 * METHODS.len() * Sweep::ALL.iter().map(|sweep| sweep.values().len()).sum::<usize>()
 }
 
-/// Runs the experiment with `images` images a point, of a camera with this tone curve where it is not
-/// varied; `None` when cancelled.
+/// Runs the experiment with `images` images per point. `tone` is the tone curve of the camera in sweeps that do not
+/// vary it. Returns `None` if cancelled.
 ///
-/// The result depends on `images` and `seed` alone. `progress` is called once a row.
+/// The result depends only on `images` and `seed`. `progress` is called once per row.
 pub fn run(
     images: usize,
     seed: u64,
@@ -175,7 +174,7 @@ pub fn run(
     Some(rows)
 }
 
-/// All methods at one point of a sweep.
+/// Runs all methods at one point of a sweep.
 pub fn point(
     kind: GridKind,
     sweep: Sweep,
@@ -220,14 +219,14 @@ pub fn point(
     Some(rows.collect())
 }
 
-/// What came of a fit that found a corner.
+/// Result of a fit that found a corner.
 #[derive(Clone, Copy)]
 struct Outcome {
     error_px: f64,
     nees: Option<f64>,
 }
 
-/// What came of one image: its bound, and each method from each start.
+/// Result of one image: its bound, and the outcome of each method from each start.
 struct Sample {
     bound_px: Option<f64>,
     outcomes: [[Option<Outcome>; 4]; METHODS.len()],
@@ -295,7 +294,7 @@ fn mean(values: &[f64]) -> f64 {
     values.iter().sum::<f64>() / values.len() as f64
 }
 
-/// The result as CSV.
+/// Formats the result as CSV.
 pub fn csv(rows: &[Row]) -> String {
     let mut text =
         "kind,sweep,value,method,fits,mean_px,median_px,p95_px,bound_px,failed,far,nees\n"
@@ -316,7 +315,7 @@ pub fn csv(rows: &[Row]) -> String {
     text
 }
 
-/// Name of a kind of corner.
+/// Returns the name of a kind of corner.
 pub fn name(kind: GridKind) -> &'static str {
     match kind {
         GridKind::Deltille => "deltille",
@@ -328,9 +327,9 @@ pub fn name(kind: GridKind) -> &'static str {
 mod tests {
     use super::*;
 
-    /// A small version of the experiment at its default point, with the floors of the full one.
+    /// A small version of the experiment at its default point, with the error limits of the full one.
     #[test]
-    fn the_model_is_near_the_bound_and_knows_its_errors() {
+    fn the_model_is_near_the_bound_and_its_covariances_are_correct() {
         let never = AtomicBool::new(false);
         for (kind, model_px, polynomial_px) in
             [(GridKind::Deltille, 0.0070_f64, 0.0117), (GridKind::Checker, 0.0085, 0.0171)]
@@ -342,15 +341,15 @@ mod tests {
             assert!(model.error_px[0] < model_px.min(1.25 * model.bound_px), "{model:?}");
             assert!(model.error_px[0] > 0.85 * model.bound_px, "better than possible: {model:?}");
             assert!(model.failed + model.far == 0, "{model:?}");
-            // 200 independent images of two degrees of freedom: 0.14 standard deviation.
+            // The mean of 200 images with two degrees of freedom each has a standard deviation of 0.14.
             assert!((model.nees.unwrap() - 2.0).abs() < 0.45, "{model:?}");
         }
     }
 
-    /// A curve of gamma 2.2 moves the corner of a linear model by more than the noise does; a curve that is
-    /// estimated brings it back.
+    /// A gamma of 2.2 shifts the corner of a linear model by more than the noise does; estimating the curve corrects
+    /// this.
     #[test]
-    fn tone_curves_are_found_from_the_corner() {
+    fn tone_curves_are_estimated_from_the_corner() {
         let never = AtomicBool::new(false);
         for (kind, model_px) in [(GridKind::Deltille, 0.0095), (GridKind::Checker, 0.0115)] {
             let gamma = Sweep::Tone;
@@ -363,7 +362,7 @@ mod tests {
     }
 
     #[test]
-    fn results_depend_on_the_seed_alone_and_stop_when_told() {
+    fn results_depend_only_on_the_seed_and_runs_can_be_cancelled() {
         let run = |seed| {
             let never = AtomicBool::new(false);
             csv(&point(GridKind::Checker, Sweep::Tilt, 45.0, Tone::Linear, [seed, 0], 8, &never)

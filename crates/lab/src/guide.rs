@@ -1,16 +1,16 @@
-//! Views that are chosen one after the other against views taken at random, by simulation.
+//! Simulation that compares views proposed one after the other with random views.
 //!
 //! ```text
-//!   guided:  Guide::after(views) ─→ where the board is to be ─→ a hand that is off by cm and degrees ─→ view ─┐
-//!              ↑ 15 times                                                                                     │
-//!              └──────────────────────────────────────────────────────────────────────────────────────────────┘
-//!   random:  60 poses of a board that is whole in the picture ─→ views ─→ Calibration
-//!   cut off: the same of a board of which half is enough
+//!   guided:  Guide::after(views) ─→ proposed pose ─→ hand-held pose, off by cm and degrees ─→ view ─┐
+//!              ↑ 15 times                                                                          │
+//!              └───────────────────────────────────────────────────────────────────────────────────┘
+//!   random:  60 poses with the whole board in the image ─→ views ─→ Calibration
+//!   cut off: the same with at least half of the board in the image
 //! ```
 //!
-//! Corners are projected by a camera that is known and moved by noise; or every picture is rendered and its corners
-//! are detected. How far a calibration is off is what `deltille compare` shows of it and the true camera over the whole image at infinity: the root mean square
-//! of a coordinate after the rotation that explains most.
+//! Corners are either projected by a known camera and shifted by noise, or every image is rendered and its corners are
+//! detected. The error of a calibration is measured as by `deltille compare`: against the true camera, over the whole
+//! image, at infinity. It is the RMS per axis after the rotation that explains most of the difference.
 
 use std::f64::consts::{PI, TAU};
 use std::fmt::Write as _;
@@ -36,53 +36,54 @@ use deltille_core::statistics::median;
 /// The board: 9 rows of 12 corners, 20 mm, about A4.
 const BOARD: (u32, u32, f64) = (9, 12, 20.0);
 
-/// What the detector finds, beside what is in the picture: tilts up to 70°, and edges from 12 px on, and corners this
-/// far from the border, px.
+/// Limits of the detector within the image: tilts up to 70°, edges of at least 12 px, and this distance of corners from
+/// the border, px.
 const FOUND_TILT_COS: f64 = 0.342;
 const FOUND_EDGE_PX: f64 = 12.0;
 const FOUND_MARGIN_PX: f64 = 5.0;
 
-/// Corners without which a hand tries again.
+/// Number of corners below which the view is taken again.
 const LEAST_CORNERS: usize = 20;
 
-/// Part of a board that a random picture shows at least, where it may be cut off.
+/// Smallest visible fraction of a board that may be cut off in a random image.
 const LEAST_PART: f64 = 0.5;
 
-/// Light of rendered pictures: blur and noise of a good webcam, deviations in px and of full scale.
+/// Blur and noise of rendered images, those of a good webcam: standard deviations in px and as a fraction of full
+/// scale.
 const BLUR_PX: f64 = 0.8;
 const NOISE: f64 = 0.01;
 
-/// A hand is off by so much, standard deviations: turns about each axis, rad (4°), sideways in parts of the distance
-/// (2 cm at 0.5 m), and in depth.
+/// Standard deviations of a hand-held pose: rotation about each axis, rad (4°), sideways shift as a fraction of the
+/// distance (2 cm at 0.5 m), and shift in depth.
 const HAND_RAD: f64 = 0.07;
 const HAND_ASIDE: f64 = 0.04;
 const HAND_DEEP: f64 = 0.06;
 
-/// Random poses: parts of the image's width that the board's width fills, tilts, rad (45°), and turns in the
-/// plane, rad, deviation (15°).
+/// Random poses: range of the board width as a fraction of the image width, maximum tilt, rad (45°), and standard
+/// deviation of the in-plane rotation, rad (15°).
 const RANDOM_FILL: [f64; 2] = [0.25, 0.8];
 const RANDOM_TILT: f64 = 0.785;
 const RANDOM_ROLL: f64 = 0.26;
 
-/// What is simulated.
+/// Parameters of the simulation.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Setup {
-    /// Guided views.
+    /// Number of guided views.
     pub guided: usize,
-    /// Random views.
+    /// Number of random views.
     pub random: usize,
-    /// Runs with each camera, of different noise, hands and random poses.
+    /// Number of runs with each camera, each with its own noise, hand-held errors and random poses.
     pub runs: usize,
-    /// Deviation of a coordinate of a corner, px; `None` where pictures are rendered and corners detected.
+    /// Standard deviation of a corner coordinate, px; `None` to render images and detect corners.
     pub noise_px: Option<f64>,
     /// Seed of all random choices.
     pub seed: u64,
 }
 
-/// A camera that is calibrated, and the model by which.
+/// A camera to be calibrated, and its model.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Subject {
-    /// What it is called.
+    /// Its name.
     pub name: &'static str,
     /// The true camera.
     pub camera: Camera,
@@ -90,62 +91,62 @@ pub struct Subject {
     pub model: Model,
 }
 
-/// What came of a number of views.
+/// Quality of the calibration from a number of views.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Worth {
-    /// How many views.
+    /// Number of views.
     pub views: usize,
-    /// Difference from the true camera at infinity over the image, px, root mean square.
+    /// Difference from the true camera over the image at infinity, px, RMS per axis.
     pub off_px: f64,
-    /// The same of points at the median distance of the corners, where a move is allowed for too.
+    /// The same for points at the median distance of the corners, where a shift of the camera is compensated, too.
     pub off_near_px: f64,
-    /// What the estimate itself says at infinity over the image, px: the same mean of its uncertainty from noise.
+    /// Uncertainty from noise that the estimate reports over the image at infinity, px, as the same mean.
     pub said_px: f64,
-    /// What the guide expected of the last view, px.
+    /// Uncertainty that the guide predicted for the last view, px.
     pub expected_px: Option<f64>,
 }
 
 /// One run with a camera.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Run {
-    /// What the camera is called.
+    /// Name of the camera.
     pub subject: &'static str,
-    /// After each guided view from which on there is a calibration.
+    /// Quality after each guided view, from the first one that permits a calibration.
     pub guided: Vec<Worth>,
-    /// After as many random views as are guided, and after all.
+    /// Quality after as many random views as guided ones, and after all.
     pub random: Vec<Worth>,
-    /// The same of boards that may be cut off by the picture.
+    /// The same for boards that may be cut off by the image border.
     pub cut_off: Vec<Worth>,
 }
 
-/// Why a run was not finished.
+/// Reason why a run failed.
 #[derive(Debug, thiserror::Error)]
 pub enum GuideExperimentError {
-    /// A board that cannot be made.
+    /// The board cannot be built.
     #[error(transparent)]
     Target(#[from] TargetError),
-    /// A calibration that fails.
+    /// A calibration failed.
     #[error("{subject}, {views} views: {error}")]
     Calibration {
-        /// Of which camera.
+        /// Name of the camera.
         subject: &'static str,
-        /// From how many views.
+        /// Number of views.
         views: usize,
-        /// Why.
+        /// Reason.
         error: CalibrationError,
     },
-    /// No guide to a camera.
-    #[error("{0}: there is no guide to views of it")]
+    /// The guide does not support the camera model.
+    #[error("{0}: the guide does not support this camera model")]
     NoGuide(&'static str),
-    /// A board that cannot be drawn.
+    /// The board cannot be drawn.
     #[error(transparent)]
     Artwork(#[from] ArtworkError),
-    /// A board that cannot be detected.
+    /// The board cannot be detected.
     #[error(transparent)]
     Detector(#[from] UnknownCodes),
 }
 
-/// The cameras: a webcam, a wide fisheye of 150° across, and a long lens of 12°.
+/// Returns the simulated cameras: a webcam, a fisheye 150° wide, and a long lens of 12°.
 pub fn subjects() -> Vec<Subject> {
     let perspective = |width: u32, height: u32, angle: f64, radial: [f64; 3], tangential| {
         let lens = BrownConrady { radial, tangential, ..BrownConrady::default() };
@@ -167,11 +168,11 @@ pub fn subjects() -> Vec<Subject> {
     ]
 }
 
-/// Makes all runs; `None` when it was interrupted. `tick` is called after each, of which there are
-/// [`Setup::runs`] with each camera.
+/// Performs all runs; returns `None` if interrupted. `tick` is called after each of the [`Setup::runs`] runs of each
+/// camera.
 ///
 /// # Errors
-/// Where a calibration of all views fails.
+/// Returns an error if a calibration from all views fails.
 pub fn run(
     setup: Setup,
     subjects: &[Subject],
@@ -180,7 +181,7 @@ pub fn run(
 ) -> Result<Option<Vec<Run>>, GuideExperimentError> {
     let (rows, columns, edge_mm) = BOARD;
     let board = Target::new("board", BoardSpec::deltille(rows, columns, edge_mm))?;
-    let pictures = match setup.noise_px {
+    let renderer = match setup.noise_px {
         Some(_) => None,
         None => {
             let scene = scene_of_target(&board)?;
@@ -197,8 +198,8 @@ pub fn run(
         }
         let random = ChaCha8Rng::seed_from_u64(setup.seed.wrapping_mul(1000).wrapping_add(index));
         let run = {
-            let (board, pictures) = (&board, pictures.as_ref());
-            World { subject, board, noise_px: setup.noise_px, pictures, random }.run(setup)
+            let (board, renderer) = (&board, renderer.as_ref());
+            World { subject, board, noise_px: setup.noise_px, renderer, random }.run(setup)
         };
         tick();
         run.map(Some)
@@ -206,12 +207,12 @@ pub fn run(
     runs.collect()
 }
 
-/// A camera, a board, and chance.
+/// A camera, a board, and a random generator.
 struct World<'a> {
     subject: &'a Subject,
     board: &'a Target,
     noise_px: Option<f64>,
-    pictures: Option<&'a (Scene, Detector)>,
+    renderer: Option<&'a (Scene, Detector)>,
     random: ChaCha8Rng,
 }
 
@@ -226,7 +227,7 @@ impl World<'_> {
         let guide = guide.ok_or(GuideExperimentError::NoGuide(name))?;
         let (mut views, mut guided, mut next) = (Vec::new(), Vec::new(), guide.next(0, None));
         for count in 1..=setup.guided {
-            views.push(self.held(&next, count));
+            views.push(self.hand_held(&next, count));
             let Guided { estimate, next: after, .. } = guide.after(&reference, &views);
             let expected_px = next.expected_px;
             match estimate {
@@ -237,7 +238,7 @@ impl World<'_> {
             next = after;
         }
         let [random, cut_off] = [true, false].map(|whole| {
-            let views: Vec<View> = (0..setup.random).map(|i| self.chance(i, whole)).collect();
+            let views: Vec<View> = (0..setup.random).map(|i| self.unguided(i, whole)).collect();
             let mut worths = Vec::new();
             for count in [setup.guided.min(setup.random), setup.random] {
                 let calibration = Calibration::new(reference.panels());
@@ -258,8 +259,8 @@ impl World<'_> {
         sd * DVec3::new(x, y, z)
     }
 
-    /// A view that somebody takes who holds the board over an outline, as well as hands do.
-    fn held(&mut self, next: &NextView, index: usize) -> View {
+    /// Returns a view of a user who holds the board over an outline by hand.
+    fn hand_held(&mut self, next: &NextView, index: usize) -> View {
         let pose = self.over(next);
         loop {
             let turn = DQuat::from_scaled_axis(self.normal(HAND_RAD));
@@ -273,7 +274,7 @@ impl World<'_> {
         }
     }
 
-    /// The pose at which the board covers a proposed outline in the true camera's picture.
+    /// Returns the pose at which the board covers a proposed outline in the image of the true camera.
     fn over(&self, next: &NextView) -> Pose {
         let panel = &self.board.panels[0];
         let corners = next.corners.iter().filter_map(|corner| {
@@ -290,8 +291,8 @@ impl World<'_> {
         found.map_or(next.camera_from_target, |found| found.frames[0].rig_from_target)
     }
 
-    /// A view that somebody takes without a guide; the board is whole in it, or half of it at least.
-    fn chance(&mut self, index: usize, whole: bool) -> View {
+    /// Returns a view taken without a guide that shows the whole board, or at least half of it.
+    fn unguided(&mut self, index: usize, whole: bool) -> View {
         let part = if whole { 1.0 } else { LEAST_PART };
         let least = (part * self.board.panels[0].corners.len() as f64).ceil() as usize;
         let camera = self.subject.camera.clone();
@@ -313,7 +314,7 @@ impl World<'_> {
                 facing * DQuat::from_axis_angle(axis, tilt) * DQuat::from_rotation_z(roll);
             let translation = distance * sight - rotation * panel.middle_mm();
             let pose = Pose { rotation, translation };
-            // Nobody takes a picture that does not show the board.
+            // Users do not take images without the board.
             if self.projected(&pose, index).corner_count() < least {
                 continue;
             }
@@ -324,9 +325,9 @@ impl World<'_> {
         }
     }
 
-    /// What is found of the board at a pose: in a picture that is rendered, where pictures are.
+    /// Returns what is detected of the board at a pose, in a rendered image if images are rendered.
     fn view(&mut self, pose: &Pose, index: usize) -> View {
-        let Some((scene, detector)) = self.pictures else { return self.projected(pose, index) };
+        let Some((scene, detector)) = self.renderer else { return self.projected(pose, index) };
         let camera = &self.subject.camera;
         let light = Light::default().blur_px(BLUR_PX).noise(NOISE).seed(self.random.random());
         let image = scene.render(camera, pose, &light).map(|v| (v * 255.0 + 0.5) as u8);
@@ -337,7 +338,7 @@ impl World<'_> {
         view.unwrap_or_else(|| self.of_corners(Vec::new(), index))
     }
 
-    /// The corners that a detector would find at a pose, moved by noise.
+    /// Returns the corners that a detector would find at a pose, shifted by noise.
     fn projected(&mut self, pose: &Pose, index: usize) -> View {
         let camera = self.subject.camera.clone();
         let noise_px = self.noise_px.unwrap_or_default();
@@ -377,7 +378,7 @@ impl World<'_> {
         View { name, image, size_px: [width, height], sightings }
     }
 
-    /// What an estimate is worth.
+    /// Measures the quality of an estimate.
     fn worth(&self, estimate: &Estimate, views: usize, expected_px: Option<f64>) -> Worth {
         let found = &estimate.cameras[0];
         let truth = CameraEstimate::given("true", self.subject.camera.clone());
@@ -396,7 +397,7 @@ impl World<'_> {
     }
 }
 
-/// How sure an estimate says that it is, over the image at infinity: root mean square of a coordinate, px.
+/// Returns the uncertainty that an estimate reports over the image at infinity: RMS per axis, px.
 fn over_image(found: &CameraEstimate) -> Option<f64> {
     let Camera { width, height, .. } = found.camera;
     let places = (0..48).map(|i| DVec2::new(f64::from(i % 8) + 0.5, f64::from(i / 8) + 0.5));
@@ -415,12 +416,12 @@ fn middle<'a>(runs: &[&'a Run], of: impl Fn(&'a Run) -> Option<f64>) -> f64 {
     median(runs.iter().filter_map(|run| of(run)).collect()).unwrap_or(f64::NAN)
 }
 
-/// Medians over the runs of each camera as tables to read.
+/// Formats medians over the runs of each camera as tables.
 pub fn text(setup: Setup, runs: &[Run]) -> String {
     let mut text = String::new();
     let mut names: Vec<&str> = runs.iter().map(|run| run.subject).collect();
     names.dedup();
-    let line = "camera    views            off, px  off near, px  says, px\n";
+    let line = "camera    views            error, px  error near, px  reported, px\n";
     text += line;
     for name in &names {
         let of: Vec<&Run> = runs.iter().filter(|run| run.subject == *name).collect();
@@ -431,7 +432,11 @@ pub fn text(setup: Setup, runs: &[Run]) -> String {
                 let both = last(run).zip(random(run).last().copied());
                 both.is_some_and(|(guided, random)| guided.off_px <= random.off_px)
             };
-            format!("guided is as good in {} of {}", of.iter().filter(is_as_good).count(), of.len())
+            format!(
+                "guided is at least as good in {} of {} runs",
+                of.iter().filter(is_as_good).count(),
+                of.len()
+            )
         };
         type Which<'a> = (&'a str, usize, &'a dyn Fn(&Run) -> Option<Worth>, String);
         let rows: [Which; 5] = [
@@ -445,14 +450,14 @@ pub fn text(setup: Setup, runs: &[Run]) -> String {
             // Writing to a String cannot fail.
             let _ = writeln!(
                 text,
-                "{name:9} {views:3} {kind:10}  {:9.4}  {:12.4}  {:8.4}  {note}",
+                "{name:9} {views:3} {kind:10}   {:9.4}  {:14.4}  {:12.4}  {note}",
                 middle(&of, |run| which(run).map(|worth| worth.off_px)),
                 middle(&of, |run| which(run).map(|worth| worth.off_near_px)),
                 middle(&of, |run| which(run).map(|worth| worth.said_px)),
             );
         }
     }
-    text += "\ncamera    view  expected, px  says, px   off, px  says / expected\n";
+    text += "\ncamera    view  expected, px  reported, px  error, px  reported / expected\n";
     for name in &names {
         let of: Vec<&Run> = runs.iter().filter(|run| run.subject == *name).collect();
         for view in 1..=setup.guided {
@@ -471,7 +476,7 @@ pub fn text(setup: Setup, runs: &[Run]) -> String {
             let ratio = shown(ratio, 2);
             let _ = writeln!(
                 text,
-                "{name:9} {view:4}  {expected:>12}  {:8.4}  {:7.4}  {ratio:>15}",
+                "{name:9} {view:4}  {expected:>12}  {:12.4}  {:9.4}  {ratio:>19}",
                 middle(&of, |run| Some(at(run)?.said_px)),
                 middle(&of, |run| Some(at(run)?.off_px)),
             );
@@ -480,7 +485,7 @@ pub fn text(setup: Setup, runs: &[Run]) -> String {
     text
 }
 
-/// Every run and number of views, for plots.
+/// Formats every run and number of views as CSV, for plots.
 pub fn csv(runs: &[Run]) -> String {
     let mut text = "camera,run,kind,views,off_px,off_near_px,says_px,expected_px\n".to_owned();
     let mut run_of: (&str, usize) = ("", 0);

@@ -1,9 +1,9 @@
-//! Simulations and protocols that measure the library itself, for `deltille experiment`.
+//! Simulations and protocols that measure the library, for `deltille experiment`.
 //!
-//! 1. `corners`: precision of single corners (Fig. 6 of the paper), against their `bound`, drawn by `plot`;
-//! 2. `photographs`: whole pictures of printed pages, on a path that shares nothing with [`deltille::synth`];
+//! 1. `corners`: precision of single corners (Fig. 6 of the paper), compared with their `bound` and plotted by `plot`;
+//! 2. `photographs`: complete images of printed pages, rendered independently of [`deltille::synth`];
 //! 3. `table2`, `rig`: Table 2 and §4.4 of the paper;
-//! 4. `states`, `guide`: whether a camera in one state is called so, and what chosen views are worth.
+//! 4. `states`, `guide`: reliability of the checks for changed cameras, and benefit of guided views.
 
 mod bound;
 pub mod corners;

@@ -1,5 +1,5 @@
-//! The plot of the corner experiment: a row of panels per kind, a column per sweep, errors on a
-//! logarithmic scale. Text is outlines, so the picture looks the same everywhere.
+//! The plot of the corner experiment: a row of panels per kind, a column per sweep, errors on a logarithmic scale. Text
+//! is drawn as outlines, so the plot looks the same everywhere.
 
 use std::fmt::Write as _;
 
@@ -12,7 +12,7 @@ use deltille::export::GENERATOR;
 use deltille::export::kind::signed_png;
 use deltille::lattice::GridKind;
 
-/// Size of a panel's axes and the room around it, in user units.
+/// Size of a panel's axes and the space around it, in user units.
 const PANEL: DVec2 = DVec2::new(300.0, 230.0);
 const MARGIN: DVec2 = DVec2::new(70.0, 78.0);
 const HEAD: f64 = 56.0;
@@ -20,7 +20,7 @@ const HEAD: f64 = 56.0;
 /// Range of the vertical axis, px.
 const ERRORS_PX: [f64; 2] = [0.002, 0.1];
 
-/// Where lines lie across the panels, px.
+/// Errors at which guide lines are drawn, px.
 const GUIDES_PX: [f64; 6] = [0.002, 0.005, 0.01, 0.02, 0.05, 0.1];
 
 const BOUND_COLOUR: &str = "#000000";
@@ -35,7 +35,7 @@ fn colour(method: Method) -> &'static str {
     }
 }
 
-/// The plot as SVG.
+/// Draws the plot as SVG.
 pub fn svg(rows: &[Row]) -> String {
     let pitch = PANEL + MARGIN;
     let size = DVec2::new(Sweep::ALL.len() as f64 * pitch.x + 20.0, HEAD + 2.0 * pitch.y + 4.0);
@@ -52,7 +52,7 @@ pub fn svg(rows: &[Row]) -> String {
     page(size, &body)
 }
 
-/// Shapes on a white page.
+/// Places shapes on a white page.
 pub(super) fn page(DVec2 { x: width, y: height }: DVec2, body: &str) -> String {
     format!(
         "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{width}\" height=\"{height}\" \
@@ -62,7 +62,7 @@ pub(super) fn page(DVec2 { x: width, y: height }: DVec2, body: &str) -> String {
     )
 }
 
-/// A plot made by [`svg()`] as PNG, twice its size; `None` only if it is no such plot.
+/// Converts a plot made by [`svg()`] to PNG at twice its size; `None` if the text is not such a plot.
 pub fn png(svg: &str) -> Option<Vec<u8>> {
     const SCALE: f32 = 2.0;
     let tree = resvg::usvg::Tree::from_str(svg, &resvg::usvg::Options::default()).ok()?;
@@ -130,7 +130,7 @@ fn panel(body: &mut String, origin: DVec2, kind: GridKind, sweep: Sweep, rows: &
     line(body, &bound, BOUND_COLOUR, 1.6, "6 4");
 }
 
-/// A line through points, in user units.
+/// Draws a line through points, in user units.
 pub(super) fn line(body: &mut String, points: &[DVec2], colour: &str, width: f64, dash: &str) {
     let places: Vec<String> = points
         .iter()
@@ -146,7 +146,8 @@ pub(super) fn line(body: &mut String, points: &[DVec2], colour: &str, width: f64
     );
 }
 
-/// Writes text whose given part (0 start, 1 end) lies at a place; returns its width.
+/// Writes text at a position; `anchor` selects the part of the text that lies there (0 start, 1 end). Returns its
+/// width.
 pub(super) fn write(body: &mut String, label: &str, DVec2 { x, y }: DVec2, anchor: f64) -> f64 {
     const SIZE: f64 = 14.0;
     let Ok((path, width)) = text::outline(label, SIZE) else { return 0.0 };

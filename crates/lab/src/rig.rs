@@ -1,14 +1,14 @@
-//! The paper's §4.4 by simulation: a rig of four cameras, calibrated with an icosahedron of deltille
-//! boards and with a cube of checkerboards, whose panels were both glued on imprecisely.
+//! Simulation of §4.4 of the paper: a rig of four cameras, calibrated with an icosahedron of deltille boards and with a
+//! cube of checkerboards. The panels of both were glued on imprecisely.
 //!
 //! ```text
-//!        c2 ──── c3       four cameras at the corners of a square of 0.5 m, 0.8 m from the target
-//!         │      │        that all look at; 20° wide, all taking their pictures at the same moment
+//!        c2 ──── c3       Four cameras at the corners of a square of 0.5 m, all facing the target
+//!         │      │        at 0.8 m. They are 20° wide and take their images simultaneously.
 //!        c0 ──── c1
 //! ```
 //!
-//! Every picture is rendered and detected. Then the rig is calibrated twice: with the panels where
-//! they are stated to be, and with their poses among the unknowns.
+//! Every image is rendered, and its corners are detected. The rig is then calibrated twice: with the panels at their
+//! nominal poses, and with their poses as unknowns.
 
 use std::fmt::Write as _;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -30,38 +30,38 @@ use deltille::targets::{
     TargetSpec, UnknownCodes,
 };
 
-/// Cameras of the rig.
+/// Number of cameras of the rig.
 pub const CAMERAS: usize = 4;
 
 /// Horizontal field of view, rad (20°).
 const FIELD_RAD: f64 = 0.349_065_850_398_865_9;
-/// Distance of the target from the cameras, and half the distance between these, mm.
+/// Distance of the target from the cameras, and half the distance between the cameras, mm.
 const DISTANCE_MM: f64 = 800.0;
 const BASE_MM: f64 = 250.0;
-/// How far the target is moved about, sideways and in depth, mm: it stays in the field of 280 mm.
+/// Range of motion of the target, sideways and in depth, mm: it stays in the field of 280 mm.
 const MOVED_MM: [f64; 2] = [12.0, 40.0];
-/// Standard deviations of the placement of a panel, mm and rad (0.1°).
+/// Standard deviations of the position and the orientation of a panel, mm and rad (0.1°).
 const PLACED_MM: f64 = 0.1;
 const PLACED_RAD: f64 = 0.001_745_329_251_994_33;
-/// Edge of the icosahedron and of the cube, mm: spheres of the same size hold both.
+/// Edge of the icosahedron and of the cube, mm: both have circumscribed spheres of the same size.
 const ICOSAHEDRON_MM: f64 = 100.0;
 const CUBE_MM: f64 = 110.0;
-/// Squares along the edge of the cube, and the quiet zone around them, mm.
+/// Number of squares along the edge of the cube, and the quiet zone around them, mm.
 const SQUARES: u32 = 10;
 const QUIET_MM: f64 = 5.0;
 
-/// What is simulated.
+/// Parameters of the simulation.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Setup {
-    /// Width of the pictures, px; the height is three quarters of it.
+    /// Width of the images, px; the height is three quarters of it.
     pub width: u32,
-    /// Moments at which pictures are taken.
+    /// Number of frames, at each of which every camera takes an image.
     pub frames: usize,
     /// Seed of all random choices.
     pub seed: u64,
 }
 
-/// What a rig is calibrated with.
+/// The calibration object.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Object {
     /// Twenty faces with DelTags.
@@ -71,10 +71,10 @@ pub enum Object {
 }
 
 impl Object {
-    /// Both.
+    /// Both objects.
     pub const ALL: [Object; 2] = [Self::Icosahedron, Self::Cube];
 
-    /// Its name.
+    /// Returns the name.
     pub fn name(self) -> &'static str {
         match self {
             Self::Icosahedron => "icosahedron",
@@ -83,55 +83,54 @@ impl Object {
     }
 }
 
-/// What came of a calibration.
+/// Result of a calibration.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Outcome {
-    /// What it was done with.
+    /// The calibration object.
     pub object: Object,
-    /// Whether the panels' poses were found too.
+    /// Whether the poses of the panels were refined.
     pub refined: bool,
-    /// Root mean square error of a coordinate, px.
+    /// RMS reprojection error per axis, px.
     pub rms_px: f64,
-    /// The same of each frame.
+    /// RMS reprojection error per axis of each frame, px.
     pub frames_px: Vec<f64>,
-    /// Frames that took no part.
+    /// Number of excluded frames.
     pub left_out: usize,
-    /// Corners that were seen.
+    /// Number of detected corners.
     pub corners: usize,
-    /// Root mean square errors over the cameras: focal length, relative; principal point, px.
+    /// RMS errors over the cameras: focal length, relative; principal point, px.
     pub focal: f64,
     /// See `focal`.
     pub centre_px: f64,
-    /// Root mean square errors of the cameras' places and directions relative to the first one, mm
-    /// and rad.
+    /// RMS errors of the cameras' positions and orientations relative to the first camera, mm and rad.
     pub place_mm: f64,
     /// See `place_mm`.
     pub turn_rad: f64,
 }
 
-/// Why an experiment was not made.
+/// Reason why an experiment failed.
 #[derive(Debug, thiserror::Error)]
 pub enum RigExperimentError {
-    /// A target that cannot be made.
+    /// The target cannot be built.
     #[error(transparent)]
     Target(#[from] TargetError),
-    /// The codes of its tags are not known.
+    /// The codes of its tags are unknown.
     #[error(transparent)]
     Family(#[from] UnknownCodes),
-    /// A target that cannot be drawn.
+    /// The target cannot be drawn.
     #[error(transparent)]
     Artwork(#[from] ArtworkError),
-    /// A rig that cannot be found, such as from too few frames.
+    /// The calibration failed, for example because of too few frames.
     #[error("{}: {error}", object.name())]
     Calibration {
-        /// With what.
+        /// Calibration object.
         object: Object,
-        /// Why.
+        /// Reason.
         error: CalibrationError,
     },
 }
 
-/// The rig and its target, as they are.
+/// The true rig and target.
 struct World {
     camera: Camera,
     camera_from_world: Vec<Pose>,
@@ -170,11 +169,11 @@ impl World {
     }
 }
 
-/// Renders, detects and calibrates; `None` when it was interrupted. `tick` is called after every
-/// picture, of which there are two for each camera and frame.
+/// Renders, detects and calibrates; returns `None` if interrupted. `tick` is called after every image, of which there
+/// are two for each camera and frame.
 ///
 /// # Errors
-/// Where a target cannot be made, or a rig not be found.
+/// Returns an error if a target cannot be built, or a calibration fails.
 pub fn run(
     setup: Setup,
     interrupted: &AtomicBool,
@@ -186,16 +185,17 @@ pub fn run(
         let stated = target(object)?;
         let scene = scene_of_target(&misplaced(&stated, setup.seed))?;
         let detector = Detector::for_target(&stated, DetectorConfig::default())?;
-        let pictures: Vec<(usize, usize)> = (0..CAMERAS)
+        let images: Vec<(usize, usize)> = (0..CAMERAS)
             .flat_map(|camera| (0..setup.frames).map(move |frame| (camera, frame)))
             .collect();
-        let found: Option<Vec<(usize, String, Detection)>> = pictures
+        let found: Option<Vec<(usize, String, Detection)>> = images
             .into_par_iter()
             .map(|(camera, frame)| {
                 if interrupted.load(Ordering::Relaxed) {
                     return None;
                 }
-                let detection = picture(&world, &scene, &detector, camera, frame, setup.seed);
+                let detection =
+                    render_and_detect(&world, &scene, &detector, camera, frame, setup.seed);
                 tick();
                 Some((camera, format!("{frame:04}"), detection))
             })
@@ -219,7 +219,7 @@ pub fn run(
     Ok(Some(outcomes))
 }
 
-fn picture(
+fn render_and_detect(
     world: &World,
     scene: &Scene,
     detector: &Detector,
@@ -234,7 +234,7 @@ fn picture(
     detector.detect(&image.map(|v| (v * 255.0 + 0.5) as u8), "")
 }
 
-/// The target as it is stated.
+/// Returns the nominal target.
 fn target(object: Object) -> Result<Target, RigExperimentError> {
     let spec = match object {
         Object::Icosahedron => TargetSpec::Solid(SolidSpec {
@@ -253,14 +253,14 @@ fn target(object: Object) -> Result<Target, RigExperimentError> {
     }
     let faces: Vec<PanelPose> =
         (0..6).map(|face| cube_face(face, target.panels[face].field_mm())).collect();
-    // Its boards are loose no more.
+    // Its boards are no longer loose.
     let spec = TargetSpec::Listed(ListedSpec { format: ListFormat::DscFork });
     let mut cube = target.with_poses(&faces);
     cube.spec = spec;
     Ok(cube)
 }
 
-/// The pose of a board of `field_mm` on a face of the cube: ±x, ±y, ±z.
+/// Returns the pose of a board of `field_mm` on a face of the cube: ±x, ±y, ±z.
 fn cube_face(face: usize, [left, lower, right, upper]: [f64; 4]) -> PanelPose {
     let sign = if face.is_multiple_of(2) { 1.0 } else { -1.0 };
     let normal = sign * DVec3::AXES[face / 2];
@@ -270,7 +270,7 @@ fn cube_face(face: usize, [left, lower, right, upper]: [f64; 4]) -> PanelPose {
     PanelPose::new(DMat3::from_cols(along, up, normal), normal * CUBE_MM / 2.0 - middle)
 }
 
-/// The target with its panels as they were glued on.
+/// Returns the target with its panels as they were glued on.
 fn misplaced(target: &Target, seed: u64) -> Target {
     let mut random = ChaCha8Rng::seed_from_u64(!seed);
     let mut normal = |sd: f64| {
@@ -279,7 +279,7 @@ fn misplaced(target: &Target, seed: u64) -> Target {
     };
     let poses = target.panels.iter().map(|panel| {
         let turn = DMat3::from_quat(DQuat::from_scaled_axis(normal(PLACED_RAD)));
-        // A panel is turned about its own middle.
+        // A panel is rotated about its own centre.
         let middle = panel.middle_mm();
         let arm = panel.pose.translation_mm - middle;
         PanelPose::new(turn * panel.pose.matrix(), middle + turn * arm + normal(PLACED_MM))
@@ -317,16 +317,16 @@ impl Outcome {
     }
 }
 
-/// The outcomes as a table to read.
+/// Formats the outcomes as a table.
 pub fn text(outcomes: &[Outcome]) -> String {
-    let mut text = "target       panels   corners  rms px  worst frame  focal %  centre px  place mm  turn °\n"
+    let mut text = "target       panels   corners  rms px  worst frame  focal %  centre px  position mm  rotation °\n"
         .to_owned();
     for outcome in outcomes {
         let worst = outcome.frames_px.iter().copied().fold(0.0, f64::max);
         // Writing to a String cannot fail.
         let _ = writeln!(
             text,
-            "{:12} {:8} {:7}  {:.4}  {worst:11.4}  {:7.4}  {:9.3}  {:8.4}  {:.5}{}",
+            "{:12} {:8} {:7}  {:.4}  {worst:11.4}  {:7.4}  {:9.3}  {:11.4}  {:10.5}{}",
             outcome.object.name(),
             if outcome.refined { "refined" } else { "stated" },
             outcome.corners,
@@ -337,14 +337,14 @@ pub fn text(outcomes: &[Outcome]) -> String {
             outcome.turn_rad.to_degrees(),
             match outcome.left_out {
                 0 => String::new(),
-                n => format!("  ({n} left out)"),
+                n => format!("  ({n} excluded)"),
             }
         );
     }
     text
 }
 
-/// The error of every frame, as the paper's Fig. 8 shows it.
+/// Formats the error of every frame as CSV, as in Fig. 8 of the paper.
 pub fn csv(outcomes: &[Outcome]) -> String {
     let mut text = "target,panels,frame,rms_px\n".to_owned();
     for outcome in outcomes {

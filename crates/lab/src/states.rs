@@ -1,16 +1,16 @@
-//! Whether views of a camera in one state are called so, and others are not, by simulation.
+//! Simulation of the checks for a changed camera: detection and false-alarm rates.
 //!
 //! ```text
 //!   clean     any camera, board, number of views, noise, tilts and order of the poses
 //!   zoom      the focal length is 10 % longer from the middle of the views on
 //!   focus     0.5 % longer, noise 0.1 px, 25 views
-//!   centre    the principal point moves by 3 px instead, in a random direction
-//!   shutter   rows are read one after the other in 30 ms while the board moves at 200 mm/s
-//!   stretch   a board of 21 × 20 mm that is taken for 20 mm
-//!   curved    a board that is bent by 1 mm, poses in slow order: no change of the camera
+//!   centre    the principal point shifts by 3 px instead, in a random direction
+//!   shutter   rows are read out one after the other in 30 ms while the board moves at 200 mm/s
+//!   stretch   a board of 21 × 20 mm is assumed to have 20 mm in both directions
+//!   curved    the board is bent by 1 mm, poses change slowly: the camera does not change
 //! ```
 //!
-//! Corners are projected by a camera that is known and moved by noise.
+//! Corners are projected by a known camera and shifted by noise.
 
 use std::f64::consts::{PI, TAU};
 use std::fmt::Write as _;
@@ -28,27 +28,27 @@ use deltille::calibrate::{
 };
 use deltille::camera::{BrownConrady, Camera, DoubleSphere, KannalaBrandt, Lens, Pose};
 
-/// Size of the pictures, px.
+/// Size of the images, px.
 const SIZE_PX: [u32; 2] = [1280, 960];
 
-/// Corners this near to the border are not found, px.
+/// Distance from the border below which corners are not found, px.
 const MARGIN_PX: f64 = 4.0;
 
-/// How much longer a focal length is after a change of zoom, and of focus.
+/// Factor of the focal length after a change of zoom, and of focus.
 const ZOOM: f64 = 1.10;
 const FOCUS: f64 = 1.005;
 
-/// How far a principal point moves, px.
+/// Shift of the principal point, px.
 const CENTRE_PX: f64 = 3.0;
 
-/// A rolling shutter, s, and the speed of the board, mm/s.
+/// Readout time of the rolling shutter, s, and speed of the board, mm/s.
 const READOUT_S: f64 = 0.03;
 const SPEED_MM_S: f64 = 200.0;
 
-/// Steps by which the moment of a row is found.
+/// Number of iterations that determine the readout time of a row.
 const ROW_STEPS: usize = 8;
 
-/// What is wrong with the views.
+/// The fault in the views.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Scene {
     /// Nothing.
@@ -57,11 +57,11 @@ pub enum Scene {
     Zoom,
     /// The focal length changes by 0.5 %.
     Focus,
-    /// The principal point moves.
+    /// The principal point shifts.
     Centre,
-    /// Rows are read one after the other while the board moves.
+    /// Rows are read out one after the other while the board moves.
     Shutter,
-    /// The board is longer in one direction.
+    /// The board is longer in one direction than assumed.
     Stretch,
     /// The board is bent.
     Curved,
@@ -79,7 +79,7 @@ impl Scene {
         Self::Curved,
     ];
 
-    /// Its name.
+    /// Returns the name.
     pub fn name(self) -> &'static str {
         match self {
             Self::Clean => "clean",
@@ -93,31 +93,31 @@ impl Scene {
     }
 }
 
-/// What came of a run.
+/// Result of a run.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Run {
-    /// What was wrong.
+    /// The simulated fault.
     pub scene: Scene,
-    /// Its number.
+    /// Number of the run.
     pub index: usize,
-    /// The model.
+    /// The camera model.
     pub model: Model,
-    /// How many views.
+    /// Number of views.
     pub views: usize,
     /// Noise, px.
     pub noise_px: f64,
     /// Whether poses change slowly.
     pub is_slow: bool,
-    /// What was said of the state of the camera and the board: the kind, and the ratio of focal lengths or the motion of the
-    /// principal point in px, the shear in px, or the ratio of the board's lengths.
+    /// Diagnoses of the camera and the board. Each has a kind and a figure: the ratio of focal lengths, the shift of
+    /// the principal point in px, the shear in px, or the ratio of the board's lengths.
     pub said: Vec<(&'static str, f64)>,
-    /// Whether there was a calibration at all.
+    /// Whether the calibration succeeded.
     pub is_calibrated: bool,
-    /// Focal length in x, its deviation from noise and the observed one, px.
+    /// Focal length in x, its standard deviation from noise, and the observed standard deviation, px.
     pub focal: [f64; 3],
 }
 
-/// A camera, a board and how it is held.
+/// A camera, a board and its motion.
 struct World {
     random: ChaCha8Rng,
     scene: Scene,
@@ -193,7 +193,7 @@ impl World {
         StandardNormal.sample(&mut self.random)
     }
 
-    /// Poses of the board, in rings of growing tilt or in any order.
+    /// Returns poses of the board, in rings of increasing tilt or in random order.
     fn poses(&mut self) -> Vec<Pose> {
         let extent = self.edge_mm * f64::from(self.columns.max(self.rows));
         let size = DVec2::from(SIZE_PX.map(f64::from));
@@ -227,7 +227,7 @@ impl World {
         (0..self.views).map(|index| pose(self, index)).collect()
     }
 
-    /// What is seen of the board that moves by so many mm/s, with a rolling shutter of so many seconds.
+    /// Returns the view of a board that moves at `speed` mm/s, with a rolling shutter of `readout_s` seconds.
     fn seen(
         &mut self,
         pose: &Pose,
@@ -314,7 +314,8 @@ impl World {
     }
 }
 
-/// What was said of the state of the camera, of the shutter and of the board; a board that is bent may be called so.
+/// Returns the diagnoses of the camera, the shutter and the board. For a bent board, a diagnosis of its shape is
+/// legitimate.
 fn said(calibration: &Calibration, found: &Estimate) -> Vec<(&'static str, f64)> {
     let kind = |said: &Diagnosis| match said {
         Diagnosis::ChangedCamera { change, .. } => {
@@ -329,7 +330,7 @@ fn said(calibration: &Calibration, found: &Estimate) -> Vec<(&'static str, f64)>
     calibration.explain(found).iter().filter_map(kind).collect()
 }
 
-/// Makes runs of each scene; `None` when it was interrupted. `tick` is called after each.
+/// Performs runs of each scene; returns `None` if interrupted. `tick` is called after each run.
 pub fn run(
     scenes: &[(Scene, usize)],
     seed: u64,
@@ -349,7 +350,7 @@ pub fn run(
     all.into_par_iter().map(run).collect()
 }
 
-/// How often each diagnosis was made, as a table to read.
+/// Formats the number of runs with each diagnosis as a table.
 pub fn text(runs: &[Run]) -> String {
     let mut text =
         "scene     runs  calibrated  changed camera  rolling shutter  stretched board\n".to_owned();
@@ -376,7 +377,7 @@ pub fn text(runs: &[Run]) -> String {
     text
 }
 
-/// Every run, a line each.
+/// Formats every run as CSV, one per line.
 pub fn csv(runs: &[Run]) -> String {
     let mut text = "scene,run,model,views,noise_px,slow,calibrated,fx_px,fx_sd_px,fx_observed_px,said,figures\n".to_owned();
     for run in runs {

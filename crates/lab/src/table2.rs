@@ -1,5 +1,5 @@
-//! Table 2 of the paper on photographs: a camera is calibrated on the first half of a sequence; on
-//! the second half only the poses are found.
+//! Table 2 of the paper on photographs: a camera is calibrated on the first half of a sequence; on the second half,
+//! only the poses are estimated.
 
 use std::path::Path;
 
@@ -13,55 +13,55 @@ use deltille::detect::{Detector, DetectorConfig, Refinement};
 use deltille::lattice::GridKind;
 use deltille::photograph::{self, ImageError};
 
-/// Rows and columns of the board of the paper's sequence, and its edges.
+/// Rows and columns of the board in the paper's sequence, and its edge length.
 const SIZE: [u32; 2] = [10, 11];
 const EDGE_MM: f64 = 20.0;
 
-/// Images of the board that are needed: three for each half, of which a camera is made.
+/// Minimum number of images of the board: three for each half, enough for a calibration.
 const LEAST_VIEWS: usize = 6;
 
-/// A line of the table: root mean square errors of a coordinate, px.
+/// A row of the table: RMS reprojection errors per axis, px.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Row {
-    /// How corners were refined.
+    /// Refinement method.
     pub refinement: Refinement,
-    /// What was calibrated.
+    /// Camera model.
     pub model: Model,
-    /// Whether the first half measured the board too, instead of taking it as planned.
+    /// Whether the first half also measured the board, instead of using the nominal one.
     pub measured: bool,
-    /// Views of the first half, and their error.
+    /// Number of views of the first half, and their error.
     pub training: (usize, f64),
-    /// Views of the second half, and their error with the first half's camera.
+    /// Number of views of the second half, and their error with the camera of the first half.
     pub test: (usize, f64),
 }
 
-/// Why the table was not made.
+/// Reason why the table was not made.
 #[derive(Debug, thiserror::Error)]
 pub enum Table2Error {
     /// Too few images of the board.
     #[error(
-        "{found} of {all} images show the board whole, untagged, of {} × {} corners, and {LEAST_VIEWS} \
-         are needed: name the folder of the paper's photographs", SIZE[0], SIZE[1]
+        "{found} of {all} images show the whole untagged board of {} × {} corners, but {LEAST_VIEWS} are needed: \
+         give the folder of the paper's photographs", SIZE[0], SIZE[1]
     )]
     TooFew {
-        /// How many show it.
+        /// Number of images that show the board.
         found: usize,
-        /// How many there are.
+        /// Total number of images.
         all: usize,
     },
-    /// An image that cannot be read.
+    /// An image cannot be read.
     #[error(transparent)]
     Image(#[from] ImageError),
-    /// Views that do not make a camera.
+    /// The calibration failed.
     #[error(transparent)]
     Calibration(#[from] CalibrationError),
 }
 
-/// Detects in all images, which are in the order of the sequence, and makes the table. Errors are
-/// plain: all corners count alike and in full.
+/// Detects the board in all images, in the order of the sequence, and computes the table. All corners have equal
+/// weight, without a robust loss.
 ///
 /// # Errors
-/// Where a picture cannot be read, too few show the board whole, or the views make no camera.
+/// Returns an error if an image cannot be read, too few images show the whole board, or the calibration fails.
 pub fn run(images: &[impl AsRef<Path> + Sync]) -> Result<Vec<Row>, Table2Error> {
     let mut rows = Vec::new();
     for refinement in [Refinement::Polynomial, Refinement::Model] {
@@ -117,12 +117,12 @@ fn detect(
     });
     let found = found.collect::<Result<Vec<_>, ImageError>>()?;
     let mut views = views(&found, &reference())?.views;
-    // Of a part of the board it is not known which corner is which.
+    // If only a part of the board is visible, the identity of its corners is ambiguous.
     views.retain(|view| reference().is_sure_of(view));
     Ok(views)
 }
 
-/// The table as text; beside it what the paper's corners give on the whole sequence.
+/// Formats the table as text, followed by the results for the paper's corners on the whole sequence.
 pub fn text(rows: &[Row]) -> String {
     let mut text = "refinement  model     board     views       calibrated  pose only\n".to_owned();
     for row in rows {

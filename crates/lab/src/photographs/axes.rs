@@ -1,13 +1,13 @@
-//! What is varied, one thing at a time.
+//! The varied quantities, one at a time.
 
 use super::scene::{Background, Mosaic, Scene, Tone};
 
-/// What is varied.
+/// The varied quantity.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Axis {
     /// Standard deviation of the blur, px.
     Blur,
-    /// Straight move during the exposure, px.
+    /// Length of a straight motion during the exposure, px.
     Motion,
     /// Noise, % of full scale.
     Noise,
@@ -17,27 +17,27 @@ pub enum Axis {
     Tone,
     /// Gain of the exposure.
     Exposure,
-    /// Light of paper to light of ink.
+    /// Ratio of the light from paper to that from ink.
     Contrast,
     /// Angle between sheet and sensor, degrees.
     Tilt,
     /// Size of a tag's bit, px.
     Distance,
-    /// Part of the corners that is covered, %.
+    /// Fraction of the corners that is covered, %.
     Covers,
     /// Number of glare spots.
     Glare,
     /// Sag of the bent sheet, % of the board's width.
     Curl,
-    /// Width to which the picture is enlarged or reduced, px.
+    /// Width to which the image is resized, px.
     Scale,
-    /// Interpolation of colours.
+    /// Demosaicing method.
     Mosaic,
-    /// Sharpening, times what a blur takes away.
+    /// Sharpening, as a multiple of the detail that a blur removes.
     Sharpening,
-    /// Light from one side of the picture to the other.
+    /// Change of illumination from one side of the image to the other.
     Light,
-    /// What lies around the page.
+    /// Surroundings of the page.
     Background,
 }
 
@@ -46,12 +46,12 @@ pub enum Axis {
 pub struct Level {
     /// Its value or name, in tables and file names.
     pub name: String,
-    /// The default scene with that one thing changed.
+    /// The default scene with this one change.
     pub scene: Scene,
 }
 
 impl Axis {
-    /// All, in the order of the report.
+    /// All axes, in the order of the report.
     pub const ALL: [Self; 17] = [
         Self::Blur,
         Self::Motion,
@@ -72,7 +72,7 @@ impl Axis {
         Self::Background,
     ];
 
-    /// Its name on the command line and in tables.
+    /// Returns the name on the command line and in tables.
     pub fn name(self) -> &'static str {
         match self {
             Self::Blur => "blur",
@@ -95,7 +95,7 @@ impl Axis {
         }
     }
 
-    /// What its levels are, for plots.
+    /// Returns the label of its levels in plots.
     pub fn label(self) -> &'static str {
         match self {
             Self::Blur => "blur, px",
@@ -103,22 +103,22 @@ impl Axis {
             Self::Noise => "noise, % of full scale",
             Self::Jpeg => "JPEG quality",
             Self::Tone => "tone curve",
-            Self::Exposure => "exposure, times",
-            Self::Contrast => "contrast, to 1",
+            Self::Exposure => "exposure gain",
+            Self::Contrast => "contrast ratio",
             Self::Tilt => "tilt, °",
             Self::Distance => "size of a bit, px",
             Self::Covers => "covered, %",
             Self::Glare => "glare spots",
-            Self::Curl => "sag of the sheet, % of the board",
-            Self::Scale => "enlarged or reduced to px wide",
+            Self::Curl => "sag of the sheet, % of the board width",
+            Self::Scale => "image width after resizing, px",
             Self::Mosaic => "mosaic",
-            Self::Sharpening => "sharpening, times",
-            Self::Light => "light across the picture, ± %",
+            Self::Sharpening => "sharpening factor",
+            Self::Light => "illumination change across the image, ± %",
             Self::Background => "background",
         }
     }
 
-    /// Its levels.
+    /// Returns the levels.
     pub fn levels(self) -> Vec<Level> {
         let numbers = |values: &[f64], set: fn(&mut Scene, f64)| {
             values
@@ -200,7 +200,7 @@ impl std::str::FromStr for Axis {
         let found = Self::ALL.into_iter().find(|axis| axis.name() == text);
         found.ok_or_else(|| {
             let names: Vec<&str> = Self::ALL.iter().map(|axis| axis.name()).collect();
-            format!("`{text}` is none of {}", names.join(", "))
+            format!("unknown axis `{text}` (known: {})", names.join(", "))
         })
     }
 }

@@ -1,22 +1,22 @@
-//! Detection on photographs of a printed page, of which everything is known.
+//! Detection on rendered photographs of a printed page with complete ground truth.
 //!
 //! ```text
 //! page ─▶ view ─▶ optics ─▶ sensor ─▶ file ─▶ detector
 //!   └───────┴── truth ───────────────────────▶ score
 //! ```
 //!
-//! Comes in: a target, and what is to be varied. Goes out: how well the detector found it, level by level.
+//! The input is a target and the quantities to vary. The output is the detection quality at each level.
 //!
-//! 1. `axes` are what is varied, one thing at a time, from a [`scene`] that is always the same, with the same poses at
-//!    every level.
-//! 2. `world` has what there is to see: the target's PDF, written and drawn by hayro, what lies around it and on it. Where
-//!    its corners are, its own paths say; nothing of [`deltille::synth`] takes part.
-//! 3. `camera` has a pinhole with a bending lens, blur and light, and a sensor; nothing of [`deltille::camera`] takes part.
-//! 4. `photograph` takes a photograph with its truth.
-//! 5. `result` compares what the detector found with that, and makes tables and the plot.
+//! 1. `axes` are the varied quantities, changed one at a time from a fixed [`scene`], with the same poses at every
+//!    level.
+//! 2. `world` is the scene: the target's PDF, written and then rendered by hayro, its surroundings and its covers. The
+//!    positions of corners come from the paths of the PDF, without use of [`deltille::synth`].
+//! 3. `camera` is a pinhole with lens distortion, blur and illumination, and a sensor, without use of
+//!    [`deltille::camera`].
+//! 4. `photograph` renders a photograph with its ground truth.
+//! 5. `result` compares detections with the ground truth, and produces tables and the plot.
 //!
-//! What it does not show: print that is not black and white, depth of field, lateral colour, rolling
-//! shutters, noise reduction.
+//! Not simulated: print that is not black and white, depth of field, lateral colour, rolling shutter, noise reduction.
 
 pub mod axes;
 pub mod camera;
@@ -47,55 +47,56 @@ use deltille::layout::{PaperSpec, Printing};
 use deltille::targets::{BoardSpec, TargetSpec};
 use deltille::verify::DocumentError;
 
-/// Why a page cannot be photographed.
+/// Reason why a page cannot be photographed.
 #[derive(Debug, thiserror::Error)]
 pub enum PhotographError {
-    /// The target says nothing about paper.
-    #[error("the target has no sheet to print: give the .json that was written with its files")]
+    /// The target has no sheets.
+    #[error(
+        "the target has no sheet to print: give the .json file that was written with its print files"
+    )]
     NoSheet,
-    /// Its first sheet is larger than the paper.
-    #[error("the target's sheet is printed on several pages: choose paper that holds it")]
+    /// The first sheet is larger than the paper.
+    #[error("the target's sheet is printed on several pages: choose paper that fits it")]
     SeveralPages,
-    /// No paths meet where a corner should be.
+    /// No paths meet at the nominal position of a corner.
     #[error("the paths of the PDF do not meet at {at_mm} mm, where corner {id} should be")]
     NoCorner {
-        /// Which corner.
+        /// Corner id.
         id: u32,
-        /// Where it is stated, mm.
+        /// Nominal position, mm.
         at_mm: DVec2,
     },
-    /// The PDF's content cannot be followed.
+    /// The content of the PDF cannot be interpreted.
     #[error("the PDF's paths cannot be read: {0}")]
     Paths(String),
-    /// It cannot be drawn.
+    /// The target cannot be drawn.
     #[error(transparent)]
     Artwork(#[from] ArtworkError),
-    /// It cannot be written.
+    /// The PDF cannot be written.
     #[error(transparent)]
     Export(#[from] ExportError),
-    /// It cannot be read back.
+    /// The PDF cannot be read back.
     #[error(transparent)]
     Document(#[from] DocumentError),
-    /// There is no place for a temporary file, or for a picture.
+    /// A temporary file or an image cannot be created.
     #[error(transparent)]
     Io(#[from] std::io::Error),
-    /// A picture cannot be written.
+    /// An image cannot be written.
     #[error(transparent)]
     Write(#[from] atomic::WriteError),
 }
 
-/// Boards that are made for the experiment where no target is given: 10 × 11 corners, or 9 × 12 on
-/// checkerboards, 20 mm apart.
+/// Default boards of the experiment: 10 × 11 corners, or 9 × 12 on checkerboards, 20 mm apart.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Kind {
     /// Deltille or checkerboard.
     pub grid: GridKind,
-    /// With the default tags.
+    /// Whether the board has the default tags.
     pub tagged: bool,
 }
 
 impl Kind {
-    /// All four.
+    /// All four kinds.
     pub const ALL: [Self; 4] = [
         Self { grid: GridKind::Deltille, tagged: true },
         Self { grid: GridKind::Deltille, tagged: false },
@@ -103,7 +104,7 @@ impl Kind {
         Self { grid: GridKind::Checker, tagged: false },
     ];
 
-    /// Its name on the command line.
+    /// Returns the name on the command line.
     pub fn name(self) -> &'static str {
         match (self.grid, self.tagged) {
             (GridKind::Deltille, true) => "deltille",
@@ -113,7 +114,7 @@ impl Kind {
         }
     }
 
-    /// The board.
+    /// Returns the specification of the board.
     pub fn spec(self) -> BoardSpec {
         let [rows, cols] = match self.grid {
             GridKind::Deltille => [10, 11],
@@ -124,7 +125,7 @@ impl Kind {
     }
 }
 
-/// What is photographed, and by what it is looked for.
+/// A photographed target, and its detector.
 pub struct Subject {
     /// Its name in tables and file names.
     pub name: String,
@@ -133,10 +134,10 @@ pub struct Subject {
 }
 
 impl Subject {
-    /// A target that is there already.
+    /// Creates a subject from an existing target.
     ///
     /// # Errors
-    /// Where the target has no sheet, or the family of its tags is unknown.
+    /// Returns an error if the target has no sheet, or the family of its tags is unknown.
     pub fn new(name: &str, printing: &Printing) -> Result<Self, PhotographError> {
         let page = PrintedPage::new(printing)?;
         let detector = Detector::for_target(&printing.target, DetectorConfig::default())
@@ -145,43 +146,43 @@ impl Subject {
         Ok(Self { name: name.to_owned(), page, detector })
     }
 
-    /// One of the boards of the experiment; `family` is that of its spec.
+    /// Creates one of the default boards; `family` is that of its specification.
     ///
     /// # Errors
-    /// Where the board cannot be made.
+    /// Returns an error if the board cannot be made.
     pub fn of_kind(kind: Kind, family: Option<&Family>) -> Result<Self, PhotographError> {
         let (spec, paper) = (TargetSpec::Board(kind.spec()), PaperSpec::default());
         let printing = Printing::build(kind.name(), &spec, family, Some(&paper))
-            .expect("the boards of the experiment can be made");
+            .expect("the default boards can be built");
         Self::new(kind.name(), &printing)
     }
 }
 
-/// How often, and where pictures go.
+/// Number of photographs, and output folder.
 pub struct Setup<'a> {
-    /// Photographs at each level.
+    /// Number of photographs at each level.
     pub views: u64,
     /// Seed of all random choices.
     pub seed: u64,
-    /// What is varied.
+    /// The varied quantities.
     pub axes: &'a [Axis],
-    /// Folder for the pictures with their truth.
+    /// Folder for the images with their ground truth.
     pub images: Option<&'a Path>,
 }
 
 impl Setup<'_> {
-    /// How many photographs will be taken of one subject, which is how often progress is reported.
+    /// Returns the number of photographs of one subject, which is also the number of progress reports.
     pub fn photographs(&self) -> usize {
         self.axes.iter().map(|axis| axis.levels().len()).sum::<usize>() * self.views as usize
     }
 }
 
-/// Photographs a subject at every level of the axes; `None` when cancelled.
+/// Photographs a subject at every level of the axes; returns `None` if cancelled.
 ///
-/// But for times, the result depends on the subject and the setup alone.
+/// Except for times, the result depends only on the subject and the setup.
 ///
 /// # Errors
-/// Where a picture cannot be made.
+/// Returns an error if an image cannot be created or written.
 pub fn run(
     subject: &Subject,
     setup: &Setup,
@@ -213,7 +214,7 @@ pub fn run(
     Ok(Some(rows))
 }
 
-/// Writes a photograph where that is wished, and scores what is detected in it.
+/// Writes a photograph if requested, and scores its detection.
 fn judge(
     subject: &Subject,
     setup: &Setup,
@@ -231,7 +232,7 @@ fn judge(
     Ok(score(&found, photograph, level.scene.scale(), subject.page.half_turn))
 }
 
-/// Writes a picture, and its truth beside it.
+/// Writes an image, and its ground truth beside it.
 fn save(
     photograph: &Photograph,
     subject: &Subject,
@@ -240,15 +241,15 @@ fn save(
 ) -> Result<(), PhotographError> {
     let Photograph { image, corners, .. } = photograph;
     let name = |extension: &str| {
-        // A level's name may hold a point.
+        // The name of a level may contain a point.
         let mut name = path.as_os_str().to_owned();
         name.push(extension);
         std::path::PathBuf::from(name)
     };
-    let picture = table::png(image);
+    let png = table::png(image);
     let file_name = name(".png").file_name().unwrap_or_default().to_string_lossy().into_owned();
     let truth = table::truth(&file_name, &subject.name, &level.scene, corners);
-    atomic::write(&name(".png"), |out| out.write_all(&picture))?;
+    atomic::write(&name(".png"), |out| out.write_all(&png))?;
     atomic::write(&name(".json"), |out| out.write_all(truth.as_bytes()))?;
     Ok(())
 }
@@ -263,10 +264,10 @@ mod tests {
         Subject::of_kind(kind, family.as_ref()).unwrap()
     }
 
-    /// Without noise and curve a corner is where the page's paths say, within what the model of a
-    /// blurred corner leaves: neither the renderer nor the truth is shifted.
+    /// Without noise and tone curve, a corner lies where the paths of the page say, up to the residual of the corner
+    /// model. So neither the renderer nor the ground truth is shifted.
     #[test]
-    fn truth_is_where_an_unspoiled_picture_shows_it() {
+    fn corners_of_a_clean_image_match_the_ground_truth() {
         let scene = scene::Scene {
             noise: 0.0,
             tone: Tone::Linear,
@@ -293,9 +294,10 @@ mod tests {
         assert!(mean.abs().max_element() < 0.001 && rms < 0.01, "{mean} {rms}");
     }
 
-    /// A box along the way is no Gaussian; taken for one, it leaves covariances four times too large.
+    /// Motion blur is a box, not a Gaussian. Modelled as a Gaussian, it would make the covariances four times too
+    /// large.
     #[test]
-    fn corners_of_a_picture_that_moved_are_as_true_as_their_covariances_say() {
+    fn covariances_are_correct_under_motion_blur() {
         for kind in [Kind::ALL[0], Kind::ALL[2]] {
             let subject = subject(kind);
             let scene = scene::Scene { motion_px: 7.0, ..scene::Scene::default() };
@@ -311,14 +313,14 @@ mod tests {
             let squares = errors().map(|error| error.length_squared()).sum::<f64>();
             let rms = (squares / (2 * errors().count()) as f64).sqrt();
             let normalised: Vec<f64> = scores.iter().flat_map(|s| s.normalised.clone()).collect();
-            // A corner has two coordinates.
+            // Each corner contributes two coordinates.
             let mean = normalised.iter().sum::<f64>() / (2 * normalised.len()) as f64;
             assert!(rms < 0.01 && (0.6..1.6).contains(&mean), "{}: {rms} {mean}", subject.name);
         }
     }
 
     #[test]
-    fn boards_are_found_from_75_degrees() {
+    fn boards_are_found_at_75_degrees() {
         for kind in [Kind::ALL[0], Kind::ALL[2]] {
             let subject = subject(kind);
             let scene = scene::Scene { tilt_deg: Some(75.0), ..scene::Scene::default() };

@@ -1,7 +1,7 @@
-//! One photograph with its truth: a scene, and what chance adds to it.
+//! One photograph with its ground truth: a scene plus its random parameters.
 //!
-//! Poses, lights, covers and noise come from streams of their own, so that a level of an axis shows
-//! the same poses as any other, and only what it changes is changed.
+//! Poses, illumination, covers and noise use separate random streams. So all levels of an axis show the same poses, and
+//! only the varied quantity changes.
 
 use std::f64::consts::TAU;
 
@@ -19,68 +19,68 @@ use super::world::covers::Covers;
 use super::world::page::{PageCorner, PrintedPage};
 use deltille::raster::Gray;
 
-/// A corner nearer to a cover's outline or to the border than this counts neither as seen nor as
+/// Minimum distance from the outline of a cover and from the image border at which a corner counts as visible or
 /// hidden, px of the sensor.
 const CLEAR_PX: f64 = 3.0;
 
-/// Glare takes a corner when less than this part of its contrast is left.
+/// Fraction of its contrast below which glare makes a corner invisible.
 const LEAST_CONTRAST: f64 = 0.5;
 
-/// Focal length in widths of the picture: 53° across.
+/// Focal length in image widths: 53° wide.
 const FOCAL_WIDTHS: f64 = 1.0;
 
-/// Range of the lens's coefficient.
+/// Range of the distortion coefficient.
 const LENS: std::ops::Range<f64> = -0.02..0.12;
 
-/// How far the middle of the board may be off the middle of the picture, of its height.
+/// Maximum offset of the board centre from the image centre, as a fraction of the image height.
 const OFF_CENTRE: f64 = 0.06;
 
-/// Whether a corner can be seen.
+/// Visibility of a corner.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Sight {
-    /// It can.
+    /// The corner is visible.
     Visible,
-    /// It is next to a cover's outline or the border of the picture.
+    /// The corner is close to the outline of a cover or to the image border.
     Beside,
-    /// Glare has left too little of it.
+    /// Glare leaves too little contrast.
     Glared,
-    /// It is under a cover.
+    /// The corner is under a cover.
     Covered,
 }
 
-/// A corner where it truly is.
+/// A corner at its true position.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct TrueCorner {
-    /// Its id in the target.
+    /// Corner id in the target.
     pub id: u32,
-    /// Its panel.
+    /// Panel id.
     pub panel: u32,
     /// Lattice row.
     pub row: i32,
     /// Lattice column.
     pub col: i32,
-    /// Position, px; pixel centres at integers.
+    /// Horizontal position, px; pixel centres at integers.
     pub x: f64,
-    /// Position, px, downwards.
+    /// Vertical position, px, downwards.
     pub y: f64,
-    /// Whether it can be seen.
+    /// Visibility.
     pub sight: Sight,
 }
 
-/// A photograph and what is true of it.
+/// A photograph and its ground truth.
 pub struct Photograph {
-    /// What the file holds.
+    /// The image in the file.
     pub image: Gray<u8>,
-    /// All corners within the picture.
+    /// All corners inside the image.
     pub corners: Vec<TrueCorner>,
-    /// Length of a tile's edge in the middle of the board before it is tilted, px.
+    /// Length of a tile edge in the middle of the board before tilting, px.
     pub edge_px: f64,
 }
 
-/// Streams of chance.
+/// Independent random streams.
 #[derive(Clone, Copy)]
-enum Chance {
+enum Stream {
     Pose,
     Light,
     Covers,
@@ -88,26 +88,26 @@ enum Chance {
     Noise,
 }
 
-fn chance(seed: u64, view: u64, of: Chance) -> ChaCha8Rng {
+fn random(seed: u64, view: u64, of: Stream) -> ChaCha8Rng {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     rng.set_stream(view << 8 | of as u64);
     rng
 }
 
-/// Takes a photograph. The same page, scene, seed and view give the same bytes.
+/// Takes a photograph. The same page, scene, seed and view produce the same bytes.
 pub fn take(page: &PrintedPage, studio: &Studio, scene: &Scene, view: u64) -> Photograph {
     let seed = studio.seed;
-    let rng = |of| chance(seed, view, of);
-    let camera = pose(page, scene, &mut rng(Chance::Pose));
+    let rng = |of| random(seed, view, of);
+    let camera = pose(page, scene, &mut rng(Stream::Pose));
     let seen: Vec<(&PageCorner, DVec2)> = page
         .corners
         .iter()
         .filter_map(|corner| Some((corner, camera.px_from_page(corner.page_mm)?)))
         .collect();
     let places: Vec<DVec2> = seen.iter().map(|(_, place)| *place).collect();
-    let covers = Covers::over(&places, scene.covered, view % 2 == 1, &mut rng(Chance::Covers));
-    let light = light(scene, &places, &mut rng(Chance::Light));
-    let mut around = rng(Chance::Background);
+    let covers = Covers::over(&places, scene.covered, view % 2 == 1, &mut rng(Stream::Covers));
+    let light = light(scene, &places, &mut rng(Stream::Light));
+    let mut around = rng(Stream::Background);
     let shift = DVec2::new(around.random_range(0.0..1e3), around.random_range(0.0..1e3));
     let setting = Setting {
         page,
@@ -118,7 +118,7 @@ pub fn take(page: &PrintedPage, studio: &Studio, scene: &Scene, view: u64) -> Ph
         skin: studio.skin(),
         light: &light,
     };
-    let image = record(&expose(&setting, scene), scene, &mut rng(Chance::Noise));
+    let image = record(&expose(&setting, scene), scene, &mut rng(Stream::Noise));
 
     let size_px = camera.size_px;
     let scale = scene.scale();
@@ -141,7 +141,7 @@ fn pose(page: &PrintedPage, scene: &Scene, rng: &mut ChaCha8Rng) -> View {
     let [width, height] = scene.size_px.map(|size| size as f64);
     let focal_px = FOCAL_WIDTHS * width;
     let (middle_mm, board_mm) = page.board_mm();
-    // Chance is asked for the same numbers in every scene.
+    // Every scene draws the same random numbers.
     let (roll, towards) = (rng.random_range(0.0..TAU), rng.random_range(0.0..TAU));
     let any_tilt = rng.random_range(0.0..MOST_TILT_DEG);
     let offset = DVec2::new(rng.random_range(-1.0..1.0), rng.random_range(-1.0..1.0));
@@ -195,7 +195,7 @@ fn light(scene: &Scene, places: &[DVec2], rng: &mut ChaCha8Rng) -> Light {
     }
 }
 
-/// Whether a corner can be seen.
+/// Returns the visibility of a corner.
 fn sight(
     place: DVec2,
     scene: &Scene,

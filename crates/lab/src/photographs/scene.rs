@@ -1,63 +1,63 @@
-//! All that decides how a page is seen and recorded.
+//! Parameters that determine how a page is seen and recorded.
 
 use serde::Serialize;
 
-/// A scene, but for what chance decides.
+/// A scene without its random parameters.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Scene {
     /// Width and height of the sensor, px.
     pub size_px: [usize; 2],
-    /// Size of a tag's bit in the middle of the board, px, before the tilt shortens it.
+    /// Size of a tag's bit in the middle of the board, px, before foreshortening by tilt.
     pub bit_px: f64,
-    /// Angle between the sheet and the sensor, degrees; `None` for any up to [`MOST_TILT_DEG`].
+    /// Angle between the sheet and the sensor, degrees; `None` for a random one up to [`MOST_TILT_DEG`].
     pub tilt_deg: Option<f64>,
-    /// Sag of the bent sheet over the width of the board, as a part of it.
+    /// Sag of the bent sheet over the width of the board, as a fraction of that width.
     pub curl: f64,
-    /// What lies around the page.
+    /// Surroundings of the page.
     pub background: Background,
-    /// Part of the corners that lies under hands and other things.
+    /// Fraction of the corners that lies under hands and other objects.
     pub covered: f64,
 
-    /// Light that bare paper sends, of what the sensor takes, at an exposure of 1.
+    /// Light from bare paper as a fraction of full scale, at an exposure of 1.
     pub white: f64,
-    /// Light of paper to light of ink.
+    /// Ratio of the light from paper to that from ink.
     pub contrast: f64,
-    /// Relative change of the light from one side of the picture to the other.
+    /// Relative change of illumination from one side of the image to the other.
     pub gradient: f64,
-    /// Light that is lost in the corners of the picture.
+    /// Light lost in the image corners.
     pub vignetting: f64,
     /// Number of glare spots.
     pub glare: u32,
-    /// Standard deviation of the blur, px, beside that of the pixels themselves.
+    /// Standard deviation of the blur, px, in addition to that of the pixels.
     pub blur_px: f64,
-    /// Length of a straight move during the exposure, px.
+    /// Length of a straight motion during the exposure, px.
     pub motion_px: f64,
 
-    /// Gain of everything before it is clipped.
+    /// Gain applied before clipping.
     pub exposure: f64,
-    /// Standard deviation of the noise at full scale, in linear light; half of the variance is the
-    /// light's and grows with it.
+    /// Standard deviation of the noise at full scale, in linear light. Half of the variance is proportional to the
+    /// light.
     pub noise: f64,
-    /// How colours are recorded.
+    /// Recording of colours.
     pub mosaic: Mosaic,
-    /// From light to grey values.
+    /// Tone curve from light to grey values.
     pub tone: Tone,
-    /// How much of what a blur of [`SHARPENING_PX`] takes away is added.
+    /// Sharpening: multiple of the detail removed by a blur of [`SHARPENING_PX`] that is added.
     pub sharpening: f64,
     /// Quality of JPEG compression; `None` for none.
     pub jpeg: Option<u8>,
-    /// Width to which the picture is enlarged or reduced, px.
+    /// Width to which the image is resized, px.
     pub width_px: Option<u32>,
 }
 
-/// Largest tilt where none is given, degrees.
+/// Largest tilt if none is given, degrees.
 pub const MOST_TILT_DEG: f64 = 50.0;
 
 /// Standard deviation of the blur that sharpening undoes, px.
 pub const SHARPENING_PX: f64 = 1.2;
 
 impl Default for Scene {
-    /// A good photograph: all of it at four pixels a bit, and the tone curve that files have.
+    /// A good photograph: evenly sharp, four pixels per bit, with the tone curve of common files.
     fn default() -> Self {
         Self {
             size_px: [960, 720],
@@ -85,54 +85,54 @@ impl Default for Scene {
 }
 
 impl Scene {
-    /// Size of a pixel of the file in pixels of the sensor, inverted.
+    /// Returns the number of file pixels per sensor pixel.
     pub fn scale(&self) -> f64 {
         self.width_px.map_or(1.0, |width| f64::from(width) / self.size_px[0] as f64)
     }
 }
 
-/// What lies around the page.
+/// Surroundings of the page.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Background {
     /// A grey table.
     Plain,
-    /// Grain of all sizes.
+    /// Texture at all scales.
     Texture,
-    /// Many things with sharp edges.
+    /// Many objects with sharp edges.
     Clutter,
 }
 
-/// How colours are recorded.
+/// Recording of colours.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Mosaic {
     /// A grey sensor.
     None,
-    /// Bayer's filters, colours interpolated bilinearly.
+    /// Bayer filters, colours interpolated bilinearly.
     Bilinear,
-    /// The same, green interpolated along edges and the others as differences to it.
+    /// Bayer filters, green interpolated along edges and the other colours as differences to green.
     Edges,
 }
 
-/// From linear light, 0 to 1, to grey values, 0 to 1.
+/// Tone curve from linear light, 0 to 1, to grey values, 0 to 1.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Tone {
-    /// As it is.
+    /// Linear.
     Linear,
     /// x^(1/γ).
     Gamma(f64),
     /// IEC 61966-2-1.
     Srgb,
-    /// sRGB, then more contrast in the middle: 3g² − 2g³ mixed half and half with g.
+    /// sRGB with more contrast in the mid-tones: 3g² − 2g³ averaged with g.
     SoftS,
-    /// A logistic curve over sRGB, as picture styles have it.
+    /// A logistic curve applied to sRGB, as in picture styles of cameras.
     SteepS,
 }
 
 impl Tone {
-    /// The grey value of an amount of light.
+    /// Returns the grey value for an amount of light.
     pub fn grey(self, light: f32) -> f32 {
         let light = light.clamp(0.0, 1.0);
         match self {

@@ -1,11 +1,11 @@
-//! The camera: from a page that is seen to the grey values of a file.
+//! The camera: from a page in view to the grey values of a file.
 //!
-//! Comes in: what there is to see, and where the camera stands. Goes out: a picture of eight bits.
+//! The input is the scene and the pose of the camera. The output is an 8-bit image.
 //!
-//! 1. `view` says which place of the page a pixel sees, and where a place of the page is seen.
-//! 2. `optics` gathers the light of each pixel, blurred and partly covered.
-//! 3. `sensor` makes grey values of it, with noise, and what programs in cameras do to them.
-//! 4. `mosaic` has the colour filters of a sensor.
+//! 1. `view` maps pixels to positions on the page and back.
+//! 2. `optics` gathers the light of each pixel, with blur and covers.
+//! 3. `sensor` converts it to grey values, with noise and in-camera processing.
+//! 4. `mosaic` contains the colour filters of a sensor.
 
 mod mosaic;
 pub mod optics;

@@ -1,13 +1,13 @@
-//! Bayer's colour filters, and colours interpolated from what they leave.
+//! The Bayer colour filters, and demosaicing.
 
 use crate::photographs::scene::Mosaic;
 use deltille::raster::Gray;
 
-/// What the filters let pass of a grey scene, relative to green; the gains that follow undo it, and
-/// raise the noise with it.
+/// Transmission of the filters for a grey scene, relative to green. Gains compensate it afterwards, and amplify the
+/// noise accordingly.
 pub(crate) const RESPONSE: [f32; 3] = [0.55, 1.0, 0.65];
 
-/// Red, green or blue: the colour of a pixel, rows RGRG… and GBGB….
+/// Returns the colour of a pixel (red, green, blue as 0, 1, 2), in rows RGRG… and GBGB….
 pub(crate) fn colour(x: usize, y: usize) -> usize {
     match (x % 2, y % 2) {
         (0, 0) => 0,
@@ -16,12 +16,12 @@ pub(crate) fn colour(x: usize, y: usize) -> usize {
     }
 }
 
-/// Three colours at every pixel from one; `raw` has its gains already.
+/// Interpolates three colours at every pixel from one; gains are already applied to `raw`.
 pub(crate) fn interpolated(raw: &Gray<f32>, how: Mosaic) -> [Gray<f32>; 3] {
     let green = green(raw, how);
     let (width, height) = (raw.width(), raw.height());
     let other = |wanted: usize| {
-        // Edge-aware: the difference to green is what is interpolated.
+        // Edge-aware: interpolates the difference to green.
         let value = |x: usize, y: usize| match how {
             Mosaic::Edges => raw.at(x, y) - green.at(x, y),
             _ => raw.at(x, y),
@@ -42,7 +42,7 @@ pub(crate) fn interpolated(raw: &Gray<f32>, how: Mosaic) -> [Gray<f32>; 3] {
     [red, green, blue]
 }
 
-/// The 3 × 3 pixels around one, with the weights of bilinear interpolation on every second pixel.
+/// Iterates over the 3 × 3 neighbourhood of a pixel, with the weights of bilinear interpolation on every second pixel.
 fn around(
     x: usize,
     y: usize,
@@ -64,7 +64,7 @@ fn green(raw: &Gray<f32>, how: Mosaic) -> Gray<f32> {
         if colour(x, y) == 1 {
             return raw.at(x, y);
         }
-        // Pixels beyond the border are mirrored, which keeps their colour.
+        // Pixels beyond the border are mirrored, which preserves their colour.
         let at = |dx: i64, dy: i64| {
             let mirrored = |i: usize, d: i64, size: usize| {
                 let last = size as i64 - 1;
@@ -77,8 +77,7 @@ fn green(raw: &Gray<f32>, how: Mosaic) -> Gray<f32> {
         if how != Mosaic::Edges {
             return 0.25 * (left + right + up + down);
         }
-        // Hamilton and Adams: along the direction that changes less, corrected by the pixel's own
-        // colour.
+        // Hamilton and Adams: interpolates along the direction of smaller change, corrected by the pixel's own colour.
         let here = raw.at(x, y);
         let (bend_x, bend_y) =
             (2.0 * here - at(-2, 0) - at(2, 0), 2.0 * here - at(0, -2) - at(0, 2));
@@ -98,7 +97,7 @@ fn green(raw: &Gray<f32>, how: Mosaic) -> Gray<f32> {
 mod tests {
     use super::*;
 
-    /// Grey that changes evenly comes through unchanged.
+    /// A linear grey ramp is reproduced unchanged.
     #[test]
     fn a_ramp_stays_a_ramp() {
         let ramp = Gray::from_fn(16, 12, |x, y| 0.02 * x as f32 + 0.01 * y as f32);

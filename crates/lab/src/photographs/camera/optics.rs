@@ -1,8 +1,8 @@
-//! The light that falls on each pixel of the sensor.
+//! The light that reaches each pixel of the sensor.
 //!
-//! The scene is sampled four to eight times along both axes of a pixel, each sample an area of the page
-//! itself (`mips`), and blurred and gathered in one step: a pixel is the integral of the
-//! picture over its square, convolved with a Gaussian,
+//! The scene is sampled four to eight times along both axes of a pixel. Each sample is an area of the page (`mips`).
+//! Blurring and gathering are one step: a pixel is the integral of the image over its square, convolved with a
+//! Gaussian,
 //!
 //! ```text
 //! w(δ) = ½ erf((δ + ½)/√2σ) − ½ erf((δ − ½)/√2σ)
@@ -21,54 +21,54 @@ use crate::photographs::world::mips::{Footprint, Mips};
 use crate::photographs::world::page::PrintedPage;
 use deltille::raster::Gray;
 
-/// Samples along a pixel: so many along a standard deviation of the blur, within these. Four along pixels of the usual
-/// blur displaced edges by 0.002 px.
+/// Returns the number of samples along a pixel, proportional to the inverse of the blur and limited to 4 … 8. Only four
+/// samples per pixel at the usual blur displaced edges by 0.002 px.
 fn subpixels(blur_px: f64) -> usize {
     ((5.6 / blur_px.max(f64::EPSILON)).round() as usize).clamp(4, 8)
 }
 
-/// A Gaussian reaches so many standard deviations.
+/// Radius of the Gaussian kernel, in standard deviations.
 const REACH_SIGMAS: f64 = 4.0;
 
-/// Samples that share a footprint on the page.
+/// Number of samples that share a footprint on the page.
 const BLOCK: usize = 16;
 
-/// What stands before the camera.
+/// The scene in front of the camera.
 pub(crate) struct Setting<'a> {
     pub page: &'a PrintedPage,
     pub view: &'a View,
     pub covers: &'a Covers,
     pub background: &'a Mips,
-    /// Where on the background's texture the page lies, texels.
+    /// Position of the page on the texture of the background, texels.
     pub shift: DVec2,
-    /// Skin of the covers.
+    /// Texture of the covers.
     pub skin: &'a Mips,
     pub light: &'a Light,
 }
 
-/// Light that is not even.
+/// Uneven illumination.
 #[derive(Clone, Debug)]
 pub struct Light {
-    /// Relative change of the light a pixel.
+    /// Relative change of the light per pixel.
     pub slope: DVec2,
-    /// Light lost in the corners.
+    /// Light lost in the image corners.
     pub vignetting: f64,
-    /// Spots that the paper mirrors.
+    /// Glare spots reflected by the paper.
     pub spots: Vec<Spot>,
-    /// Direction of the camera's move during the exposure.
+    /// Direction of the camera motion during the exposure.
     pub motion: DVec2,
 }
 
-/// A spot of glare, a Gaussian with elliptic contours.
+/// A glare spot: a Gaussian with elliptic contours.
 #[derive(Clone, Copy, Debug)]
 pub struct Spot {
-    /// Its middle, px.
+    /// Its centre, px.
     pub at: DVec2,
-    /// Its standard deviations, px, and the direction of the first.
+    /// Standard deviations along its two axes, px.
     pub sigma_px: [f64; 2],
-    /// Direction of the first.
+    /// Direction of the first axis.
     pub along: DVec2,
-    /// Light in its middle, of what the sensor takes.
+    /// Peak brightness, as a fraction of the sensor's full scale.
     pub peak: f64,
 }
 
@@ -82,7 +82,7 @@ impl Spot {
 }
 
 impl Light {
-    /// Light that falls on a place of the picture, relative to its middle.
+    /// Returns the light at an image position, relative to the centre.
     pub fn even_part(&self, place: DVec2, size_px: [usize; 2]) -> f64 {
         let half = DVec2::new(size_px[0] as f64, size_px[1] as f64) / 2.0;
         let off = place - half;
@@ -90,15 +90,15 @@ impl Light {
         (1.0 + off.dot(self.slope)).max(0.0) * (1.0 - self.vignetting * r2)
     }
 
-    /// Light that glare adds at a place.
+    /// Returns the light that glare adds at a position.
     pub fn glare(&self, place: DVec2) -> f64 {
         self.spots.iter().map(|spot| spot.light(place)).sum()
     }
 }
 
-/// The light on every pixel, 1 being what the sensor takes.
+/// Returns the light on every pixel; 1 is the full scale of the sensor.
 pub(crate) fn expose(setting: &Setting, scene: &Scene) -> Gray<f32> {
-    // What a move brings in from outside the picture.
+    // Motion brings in light from outside the image.
     let margin =
         (0.5 * scene.motion_px).ceil() as usize + if scene.motion_px > 0.0 { 2 } else { 0 };
     let still = gathered(setting, scene, margin);
@@ -112,7 +112,7 @@ pub(crate) fn expose(setting: &Setting, scene: &Scene) -> Gray<f32> {
     })
 }
 
-/// Weights of the samples for a pixel, from the sample `reach` pixels before its first one.
+/// Returns the weights of the samples for a pixel, starting `reach` pixels before its first sample.
 fn kernel(sigma_px: f64, reach: usize) -> Vec<f32> {
     let subpixels = subpixels(sigma_px);
     let count = (2 * reach + 1) * subpixels;
@@ -128,13 +128,13 @@ fn kernel(sigma_px: f64, reach: usize) -> Vec<f32> {
     (0..count).map(|k| (weight(k) / total) as f32).collect()
 }
 
-/// The blurred picture with a margin.
+/// Returns the blurred image with a margin.
 fn gathered(setting: &Setting, scene: &Scene, margin: usize) -> Gray<f32> {
     let reach = (REACH_SIGMAS * scene.blur_px).ceil() as usize;
     let (subpixels, kernel) = (subpixels(scene.blur_px), kernel(scene.blur_px, reach));
     let [width, height] = setting.view.size_px.map(|size| size + 2 * margin);
     let rows = (height + 2 * reach) * subpixels;
-    // Each row of samples, gathered along the row at once.
+    // Each row of samples is gathered along the row at once.
     let mut across: Gray<f32> = Gray::new(width, rows);
     across.pixels_mut().par_chunks_mut(width).enumerate().for_each(|(row, pixels)| {
         let place = |k: usize| (k as f64 + 0.5) / subpixels as f64 - 0.5 - (reach + margin) as f64;
@@ -156,7 +156,7 @@ fn gathered(setting: &Setting, scene: &Scene, margin: usize) -> Gray<f32> {
     out
 }
 
-/// A row of samples, `place` telling the pixel coordinate of each.
+/// Returns a row of samples; `place` maps a sample to its pixel coordinate.
 fn sample_row(
     setting: &Setting,
     scene: &Scene,
@@ -182,7 +182,7 @@ fn sample_row(
         if !covers.is_empty()
             && let Some(tone) = covers.tone(at)
         {
-            // The skin has its grain in the picture, not on the page.
+            // The skin texture is fixed to the image, not to the page.
             let grain = skin.area(at * 2.0, &skin.footprint(DVec2::X * 0.5, DVec2::Y * 0.5));
             samples.push((tone as f32) * white * grain / 128.0);
             continue;
@@ -205,24 +205,24 @@ fn sample_row(
     samples
 }
 
-/// What a step to the right and a step down are on the page, mm.
+/// Returns a step to the right and a step down, as vectors on the page, mm.
 fn sides(view: &View, px: DVec2, step: f64) -> Option<[DVec2; 2]> {
-    let look = |at| view.page_from_px(at).or_else(|| view.table_from_px(at));
+    let locate = |at| view.page_from_px(at).or_else(|| view.table_from_px(at));
     let (here, right, below) =
-        (look(px)?, look(px + DVec2::X * step)?, look(px + DVec2::Y * step)?);
+        (locate(px)?, locate(px + DVec2::X * step)?, locate(px + DVec2::Y * step)?);
     Some([right - here, below - here])
 }
 
-/// The mean of a picture along a straight move, with its margin cut off.
+/// Averages an image along a straight motion, and cuts off its margin.
 ///
-/// The picture is band-limited by now, so that Catmull–Rom's cubic interpolates it; the mean of all
-/// shifts is then one kernel with few entries.
+/// The image is already band-limited, so the cubic of Catmull–Rom interpolates it. The mean of all shifts is then a
+/// single kernel with few entries.
 fn moved(image: &Gray<f32>, along: DVec2, margin: usize, [width, height]: [usize; 2]) -> Gray<f32> {
     let length = along.length();
     if length == 0.0 {
         return Gray::from_fn(width, height, |x, y| image.at(x + margin, y + margin));
     }
-    /// Shifts a pixel of the move.
+    /// Number of shifts per pixel of motion.
     const SHIFTS: f64 = 8.0;
     let shifts = (length * SHIFTS).ceil() as usize;
     let side = 2 * margin + 1;
@@ -266,14 +266,14 @@ mod tests {
     use super::*;
 
     #[test]
-    fn kernels_have_the_width_that_they_say() {
+    fn kernels_have_the_requested_width() {
         for sigma_px in [0.0, 0.5, 2.0] {
             let reach = (REACH_SIGMAS * sigma_px).ceil() as usize;
             let (subpixels, kernel) = (subpixels(sigma_px), kernel(sigma_px, reach));
             let place = |k: usize| (k as f64 + 0.5) / subpixels as f64 - 0.5 - reach as f64;
             let variance: f64 =
                 kernel.iter().enumerate().map(|(k, &w)| f64::from(w) * place(k).powi(2)).sum();
-            // The pixel's box has 1/12, in whole samples a little less.
+            // The box of the pixel has a variance of 1/12; sampling reduces it slightly.
             let box_variance = (1.0 - 1.0 / (subpixels * subpixels) as f64) / 12.0;
             let expected = sigma_px * sigma_px + box_variance;
             assert!(
@@ -284,7 +284,7 @@ mod tests {
     }
 
     #[test]
-    fn a_move_spreads_a_point_along_its_line() {
+    fn motion_spreads_a_point_along_its_line() {
         let mut point: Gray<f32> = Gray::new(41, 41);
         point.row_mut(20)[20] = 1.0;
         let along = DVec2::new(6.0, 8.0);
@@ -299,7 +299,7 @@ mod tests {
         };
         assert!((moment(&|_, _| 1.0) - 1.0).abs() < 1e-3);
         assert!(moment(&|x, _| x).abs() < 1e-3 && moment(&|_, y| y).abs() < 1e-3);
-        // A uniform density over ±5 px: 100/12 along the line, next to nothing across it.
+        // A uniform density over ±5 px: 100/12 along the line, almost zero across it.
         assert!((moment(&|x, y| (0.6 * x + 0.8 * y).powi(2)) - 100.0 / 12.0).abs() < 0.2);
         assert!(moment(&|x, y| (0.8 * x - 0.6 * y).powi(2)).abs() < 0.2);
     }

@@ -1,5 +1,5 @@
-//! From light to the grey values of a file: exposure, noise, mosaic, tone, sharpening, eight bits,
-//! compression, another size.
+//! From light to the grey values of a file: exposure, noise, mosaic, tone, sharpening, quantization to eight bits,
+//! compression, resizing.
 
 use image::codecs::jpeg::JpegEncoder;
 use image::imageops::FilterType;
@@ -11,10 +11,10 @@ use super::mosaic::{RESPONSE, colour, interpolated};
 use crate::photographs::scene::{Mosaic, SHARPENING_PX, Scene};
 use deltille::raster::{Gray, gaussian};
 
-/// Rec. 601 weights, those of JPEG.
+/// Rec. 601 luma weights, as in JPEG.
 const LUMA: [f32; 3] = [0.299, 0.587, 0.114];
 
-/// What the file holds.
+/// Returns the content of the file.
 pub(crate) fn record(light: &Gray<f32>, scene: &Scene, rng: &mut ChaCha8Rng) -> Gray<u8> {
     let grey = developed(light, scene, rng);
     let sharp = sharpened(grey, scene.sharpening);
@@ -29,17 +29,17 @@ pub(crate) fn record(light: &Gray<f32>, scene: &Scene, rng: &mut ChaCha8Rng) -> 
     }
 }
 
-/// Grey values after the tone curve.
+/// Returns the grey values after the tone curve.
 fn developed(light: &Gray<f32>, scene: &Scene, rng: &mut ChaCha8Rng) -> Gray<f32> {
     let exposed = light.map(|v| v * scene.exposure as f32);
     let noise = scene.noise as f32;
     let mut noisy = |value: f32, x: usize, y: usize| {
         let filter = if scene.mosaic == Mosaic::None { 1.0 } else { RESPONSE[colour(x, y)] };
         let passed = value * filter;
-        let chance: f32 = StandardNormal.sample(rng);
-        let deviation = noise * (0.5 + 0.5 * passed.clamp(0.0, 1.0)).sqrt();
-        // The gains of the colours; full scale is where each is clipped.
-        ((passed + deviation * chance) / filter).clamp(0.0, 1.0)
+        let normal: f32 = StandardNormal.sample(rng);
+        let sd = noise * (0.5 + 0.5 * passed.clamp(0.0, 1.0)).sqrt();
+        // Gains of the colour channels; each channel is clipped at full scale.
+        ((passed + sd * normal) / filter).clamp(0.0, 1.0)
     };
     let raw = Gray::from_fn(light.width(), light.height(), |x, y| noisy(exposed.at(x, y), x, y));
     if scene.mosaic == Mosaic::None {
@@ -51,7 +51,7 @@ fn developed(light: &Gray<f32>, scene: &Scene, rng: &mut ChaCha8Rng) -> Gray<f32
     })
 }
 
-/// What a blur would take away is added.
+/// Adds the detail that a blur removes.
 fn sharpened(grey: Gray<f32>, amount: f64) -> Gray<f32> {
     if amount == 0.0 {
         return grey;
@@ -63,28 +63,29 @@ fn sharpened(grey: Gray<f32>, amount: f64) -> Gray<f32> {
     })
 }
 
-fn compressed(picture: &Gray<u8>, quality: u8) -> Gray<u8> {
-    let (width, height) = (picture.width(), picture.height());
+fn compressed(image: &Gray<u8>, quality: u8) -> Gray<u8> {
+    let (width, height) = (image.width(), image.height());
     let mut bytes = Vec::new();
     JpegEncoder::new_with_quality(&mut bytes, quality)
-        .encode(picture.pixels(), width as u32, height as u32, ExtendedColorType::L8)
-        .expect("a grey picture is compressed to memory");
+        .encode(image.pixels(), width as u32, height as u32, ExtendedColorType::L8)
+        .expect("a grey image is compressed in memory");
     let read = image::load_from_memory_with_format(&bytes, ImageFormat::Jpeg);
-    let pixels = read.expect("what was just compressed is read").into_luma8().into_raw();
-    Gray::from_vec(width, height, pixels).expect("the size is kept")
+    let pixels = read.expect("the compressed image is readable").into_luma8().into_raw();
+    Gray::from_vec(width, height, pixels).expect("compression preserves the size")
 }
 
-/// The picture so wide, by Catmull–Rom's cubic; made smaller, each pixel is a weighted mean.
-fn resized(picture: Gray<u8>, width: u32) -> Gray<u8> {
-    if width as usize == picture.width() {
-        return picture;
+/// Resizes an image to the given width, with the cubic of Catmull–Rom; when shrinking, each pixel is a weighted mean.
+fn resized(image: Gray<u8>, width: u32) -> Gray<u8> {
+    if width as usize == image.width() {
+        return image;
     }
-    let height = (u64::from(width) * picture.height() as u64 / picture.width() as u64) as u32;
-    let pixels = picture.pixels().to_vec();
-    let image = GrayImage::from_raw(picture.width() as u32, picture.height() as u32, pixels);
-    let image = image.expect("a picture has its pixels");
+    let height = (u64::from(width) * image.height() as u64 / image.width() as u64) as u32;
+    let pixels = image.pixels().to_vec();
+    let image = GrayImage::from_raw(image.width() as u32, image.height() as u32, pixels);
+    let image = image.expect("the buffer has the size of the image");
     let image = image::imageops::resize(&image, width, height, FilterType::CatmullRom);
-    Gray::from_vec(width as usize, height as usize, image.into_raw()).expect("the size asked for")
+    Gray::from_vec(width as usize, height as usize, image.into_raw())
+        .expect("the resized image has the requested size")
 }
 
 #[cfg(test)]
@@ -110,7 +111,7 @@ mod tests {
     }
 
     #[test]
-    fn noise_has_its_deviation() {
+    fn noise_has_the_requested_standard_deviation() {
         let light: Gray<f32> = Gray::from_fn(200, 200, |_, _| 0.5);
         for (mosaic, least, most) in [(Mosaic::None, 0.016, 0.019), (Mosaic::Bilinear, 0.008, 0.02)]
         {
@@ -119,13 +120,13 @@ mod tests {
             let mean = values.iter().sum::<f64>() / values.len() as f64;
             let variance =
                 values.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / values.len() as f64;
-            let deviation = variance.sqrt();
-            assert!(deviation > least && deviation < most, "{mosaic:?}: {deviation}");
+            let sd = variance.sqrt();
+            assert!(sd > least && sd < most, "{mosaic:?}: {sd}");
         }
     }
 
     #[test]
-    fn sharpening_leaves_a_halo_and_compression_little() {
+    fn sharpening_leaves_a_halo_and_compression_changes_little() {
         let edge = Gray::from_fn(32, 32, |x, _| if x < 16 { 0.2 } else { 0.6f32 });
         let sharp = recorded(&edge, &Scene { sharpening: 1.0, ..plain() });
         assert!(sharp.at(16, 16) > 160 && sharp.at(15, 16) < 45 && sharp.at(2, 16) == 51);
@@ -140,7 +141,7 @@ mod tests {
     }
 
     #[test]
-    fn a_picture_has_the_width_asked_for() {
+    fn images_have_the_requested_width() {
         let light = Gray::from_fn(40, 30, |x, _| x as f32 / 40.0);
         let large = recorded(&light, &Scene { width_px: Some(120), ..plain() });
         assert_eq!((large.width(), large.height()), (120, 90));

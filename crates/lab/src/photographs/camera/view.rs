@@ -1,7 +1,7 @@
-//! Where the camera stands, how its lens bends and how the sheet lies: pixels to the page and back.
+//! Camera pose, lens distortion and shape of the sheet: maps pixels to the page and back.
 //!
-//! Written for this experiment alone, so that it shares no mistake with [`deltille::camera`]. With the
-//! page's frame in the middle of the board, x right, y up, z towards the viewer,
+//! Written independently for this experiment, so that it shares no errors with [`deltille::camera`]. The page frame has
+//! its origin in the middle of the board, x right, y up, z towards the viewer:
 //!
 //! ```text
 //! sheet    X(u, v) = b · ρ sin(u/ρ) + b⊥ · v + z · ρ (1 − cos(u/ρ))      bent along b, flat for ρ = ∞
@@ -9,47 +9,47 @@
 //! lens     n = m (1 + k |m|²),  pixel = centre + f m
 //! ```
 //!
-//! so that rendering, which goes from pixels to the page, is closed in form.
+//! Rendering goes from pixels to the page, for which this model has a closed form.
 
 use glam::{DMat3, DVec2, DVec3};
 
-/// Iterations of Newton's method for the lens; it converges quadratically.
+/// Number of Newton iterations for the lens; convergence is quadratic.
 const LENS_ITERATIONS: u32 = 20;
 
-/// A view is its own inverse within this, px; where it is not, the sheet hides the place.
+/// Round-trip error up to which a projected point counts as visible, px; if it is larger, the sheet hides the point.
 const SAME_PX: f64 = 1e-3;
 
 /// A view of a sheet.
 #[derive(Clone, Debug)]
 pub struct View {
-    /// Width and height of the picture, px.
+    /// Width and height of the image, px.
     pub size_px: [usize; 2],
     /// Focal length, px.
     pub focal_px: f64,
-    /// k of the lens.
+    /// Distortion coefficient k of the lens.
     pub lens: f64,
     /// Middle of the board on the page, mm.
     pub middle_mm: DVec2,
-    /// How the sheet is bent; `None` for a flat one.
+    /// Curvature of the sheet; `None` if flat.
     pub curl: Option<Curl>,
-    /// How the camera stands to it.
+    /// Pose of the camera relative to the sheet.
     pub place: Place,
 }
 
-/// How the camera stands to the sheet.
+/// Pose of the camera relative to the sheet.
 #[derive(Clone, Copy, Debug)]
 pub struct Place {
     /// R.
     rotation: DMat3,
     /// t, mm.
     translation_mm: DVec3,
-    /// Rᵀ, and the camera in the frame of the sheet, −Rᵀ t.
+    /// Rᵀ, and the camera position in the frame of the sheet, −Rᵀ t.
     turn_back: DMat3,
     eye_mm: DVec3,
 }
 
 impl Place {
-    /// From R and t.
+    /// Creates the pose from R and t.
     pub fn new(rotation: DMat3, translation_mm: DVec3) -> Self {
         let turn_back = rotation.transpose();
         Self { rotation, translation_mm, turn_back, eye_mm: -(turn_back * translation_mm) }
@@ -59,36 +59,36 @@ impl Place {
 /// A sheet bent to a cylinder.
 #[derive(Clone, Copy, Debug)]
 pub struct Curl {
-    /// Radius ρ, mm; its sign says to which side.
+    /// Radius ρ, mm; its sign gives the side to which the sheet bends.
     pub radius_mm: f64,
     /// Direction b on the page.
     pub along: DVec2,
 }
 
 impl View {
-    /// Where a pixel looks on the page, mm; `None` where it looks past the bent sheet.
+    /// Returns the position on the page that a pixel sees, mm; `None` if it looks past the bent sheet.
     pub fn page_from_px(&self, px: DVec2) -> Option<DVec2> {
         let Some(curl) = self.curl else { return self.table_from_px(px) };
         let place = curl.hit(self.place.eye_mm, self.ray(px))?;
         Some(place + self.middle_mm)
     }
 
-    /// Where a pixel looks on the plane in which the page would lie were it flat, mm; `None` at and
-    /// above its horizon.
+    /// Returns the position that a pixel sees on the plane of the flat page, mm; `None` at and above its horizon.
     pub fn table_from_px(&self, px: DVec2) -> Option<DVec2> {
         let (eye, ray) = (self.place.eye_mm, self.ray(px));
         let s = -eye.z / ray.z;
         (s > 0.0).then(|| (eye + s * ray).truncate() + self.middle_mm)
     }
 
-    /// Direction into which a pixel looks, in the frame of the sheet.
+    /// Returns the viewing direction of a pixel, in the frame of the sheet.
     fn ray(&self, px: DVec2) -> DVec3 {
         let m = (px - self.centre_px()) / self.focal_px;
         let n = m * (1.0 + self.lens * m.length_squared());
         self.place.turn_back * n.extend(1.0)
     }
 
-    /// Where a place of the page is seen, px; `None` behind the camera and where the sheet hides it.
+    /// Returns the pixel at which a position of the page is seen; `None` behind the camera and where the sheet hides
+    /// it.
     pub fn px_from_page(&self, page_mm: DVec2) -> Option<DVec2> {
         let place = page_mm - self.middle_mm;
         let on_sheet = self.curl.map_or(place.extend(0.0), |curl| curl.bent(place));
@@ -115,7 +115,7 @@ impl View {
 }
 
 impl Curl {
-    /// Place in space of a place on the flat sheet.
+    /// Maps a position on the flat sheet to its position in space.
     fn bent(&self, place: DVec2) -> DVec3 {
         let (rho, across) = (self.radius_mm, self.along.perp());
         let (u, v) = (place.dot(self.along), place.dot(across));
@@ -123,7 +123,7 @@ impl Curl {
         (self.along * (rho * sin) + across * v).extend(rho * (1.0 - cos))
     }
 
-    /// Place on the flat sheet that a ray meets first.
+    /// Returns the position on the flat sheet that a ray meets first.
     fn hit(&self, eye: DVec3, ray: DVec3) -> Option<DVec2> {
         let (rho, across) = (self.radius_mm, self.along.perp());
         let flat = |p: DVec3| [p.truncate().dot(self.along), p.truncate().dot(across)];
@@ -169,7 +169,7 @@ mod tests {
     }
 
     #[test]
-    fn the_page_is_where_it_is_seen() {
+    fn projecting_and_unprojecting_are_inverse() {
         let along = DVec2::new(0.8, 0.6);
         for curl in
             [None, Some(Curl { radius_mm: 300.0, along }), Some(Curl { radius_mm: -300.0, along })]

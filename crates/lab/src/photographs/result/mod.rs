@@ -1,10 +1,10 @@
-//! What came of the experiment.
+//! Results of the experiment.
 //!
-//! Comes in: photographs with their truth, and what the detector found. Goes out: tables and a plot.
+//! The input is photographs with ground truth and detections. The output is tables and a plot.
 //!
-//! 1. `score` compares what was found in a photograph with its truth.
-//! 2. `table` makes rows of the scores of each level, as text, CSV and JSON.
-//! 3. `plot` draws these rows.
+//! 1. `score` compares the detections of a photograph with its ground truth.
+//! 2. `table` summarizes the scores of each level as text, CSV and JSON.
+//! 3. `plot` plots these rows.
 
 pub mod plot;
 pub mod score;

@@ -1,4 +1,4 @@
-//! The plot of the experiment: a row for each axis, columns for recall, error, honesty and time.
+//! The plot of the experiment: a row per axis, and columns for recall, error, normalized error and time.
 
 use glam::DVec2;
 
@@ -6,23 +6,23 @@ use super::table::Row;
 use crate::photographs::axes::Axis;
 use crate::plot::{line, page, write};
 
-/// Size of a panel's axes and the room around it, in user units.
+/// Size of a panel's axes and the space around it, in user units.
 const PANEL: DVec2 = DVec2::new(250.0, 130.0);
 const MARGIN: DVec2 = DVec2::new(72.0, 88.0);
 const HEAD: f64 = 50.0;
 
-/// One colour a subject, in their order.
+/// Colours of the subjects, in order.
 const COLOURS: [&str; 6] = ["#d94801", "#fdae6b", "#08519c", "#6baed6", "#238b45", "#756bb1"];
 
-/// What a column shows.
+/// The quantity of a column.
 struct Column {
     label: &'static str,
-    /// Lowest and highest value; logarithmic where the lowest is not 0.
+    /// Lowest and highest value; the scale is logarithmic unless the lowest is 0.
     range: [f64; 2],
-    /// Where lines lie across.
+    /// Values of the horizontal guide lines.
     guides: &'static [f64],
     value: fn(&Row) -> Option<f64>,
-    /// A second value, dashed.
+    /// A second value, drawn dashed.
     other: Option<fn(&Row) -> Option<f64>>,
 }
 
@@ -57,7 +57,7 @@ const COLUMNS: [Column; 4] = [
     },
 ];
 
-/// The plot as SVG.
+/// Draws the plot as SVG.
 pub fn svg(rows: &[Row]) -> String {
     let mut subjects: Vec<&str> = Vec::new();
     for row in rows {
@@ -115,7 +115,7 @@ fn panel(
         line(body, &ends, "#cccccc", 0.8, "");
         write(body, &format!("{guide}"), ends[0] + DVec2::new(-8.0, 5.0), 1.0);
     }
-    // Levels lie evenly: some have no number, and numbers are seldom evenly spaced.
+    // Levels are evenly spaced, because some are not numbers and the numbers are rarely equidistant.
     let levels = axis.levels();
     let step = PANEL.x / levels.len() as f64;
     let x = |index: usize| left + (index as f64 + 0.5) * step;

@@ -1,4 +1,4 @@
-//! What a detector made of a photograph, against its truth.
+//! Detections of a photograph, compared with its ground truth.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -7,41 +7,41 @@ use glam::DVec2;
 use crate::photographs::photograph::{Photograph, Sight, TrueCorner};
 use deltille::detect::Detection;
 
-/// A report within this of a true corner is of that corner, px of the sensor at most.
+/// Maximum distance of a report from its true corner, px of the sensor.
 const NEAR_PX: f64 = 4.0;
 
-/// And within this part of a tile's edge.
+/// The same limit as a fraction of a tile edge.
 const NEAR_EDGE: f64 = 0.25;
 
 /// Counts and errors of one photograph.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Score {
-    /// Corners that can be seen.
+    /// Number of visible corners.
     pub visible: usize,
-    /// Those of them that were reported at their place.
+    /// Number of visible corners reported at their position.
     pub found: usize,
-    /// Those of them that were reported with their label too.
+    /// Number of visible corners also reported with the correct label.
     pub labelled: usize,
-    /// Labels that belong elsewhere.
+    /// Number of wrong labels.
     pub wrong: usize,
-    /// Reports where there is no corner.
+    /// Number of reports where there is no corner.
     pub nowhere: usize,
-    /// Reports of corners that a cover hides.
+    /// Number of reports of corners hidden by a cover.
     pub hidden: usize,
-    /// Second reports of a corner.
+    /// Number of repeated reports of a corner.
     pub doubled: usize,
-    /// Errors of both coordinates of the visible corners that were reported, px.
+    /// Errors of both coordinates of the reported visible corners, px.
     pub errors_px: Vec<DVec2>,
-    /// Their squares over the reported covariances: eᵀC⁻¹e.
+    /// Squared errors normalized by the reported covariances: eᵀC⁻¹e.
     pub normalised: Vec<f64>,
-    /// Time of detection, ms.
+    /// Detection time, ms.
     pub time_ms: f64,
 }
 
-/// Compares a detection with the truth.
+/// Compares a detection with the ground truth.
 ///
-/// `scale` is the size of the sensor's pixels in the picture. With `half_turn` the labels may also be
-/// those of the board turned by half: nothing on it says which end is up.
+/// `scale` is the size of the sensor's pixels in the image. With `half_turn`, the labels may also be those of the board
+/// rotated by 180°, because nothing on it shows which end is up.
 pub fn score(found: &Detection, photograph: &Photograph, scale: f64, half_turn: bool) -> Score {
     let truth = &photograph.corners;
     let near_px = (NEAR_PX * scale).min(NEAR_EDGE * photograph.edge_px);
@@ -50,7 +50,7 @@ pub fn score(found: &Detection, photograph: &Photograph, scale: f64, half_turn: 
         time_ms: found.timing_ms.values().sum(),
         ..Score::default()
     };
-    // Every report with the true corner at its place.
+    // Each report with the true corner at its position.
     let mut reports: Vec<_> = found
         .grids
         .iter()
@@ -69,7 +69,7 @@ pub fn score(found: &Detection, photograph: &Photograph, scale: f64, half_turn: 
 
     let turned = half_turn.then(|| half_turned(truth));
     let mut taken = BTreeSet::new();
-    // Labels that are right and wrong, as printed and turned.
+    // Number of correct and wrong labels, as printed and rotated.
     let mut labels = [[0usize; 2]; 2];
     for (corner, nearest) in reports {
         let first = nearest.is_some_and(|(t, _)| taken.insert(t.id));
@@ -106,7 +106,7 @@ pub fn score(found: &Detection, photograph: &Photograph, scale: f64, half_turn: 
     score
 }
 
-/// The id that each corner has on the board turned by half, by row and column.
+/// Returns the id of each corner on the board rotated by 180°, by row and column.
 fn half_turned(truth: &[TrueCorner]) -> BTreeMap<u32, u32> {
     let places: BTreeMap<(i32, i32), u32> = truth.iter().map(|t| ((t.row, t.col), t.id)).collect();
     let last = truth.iter().fold((0, 0), |(r, c), t| (r.max(t.row), c.max(t.col)));
@@ -155,8 +155,8 @@ mod tests {
     }
 
     #[test]
-    fn every_kind_of_mistake_is_counted_as_what_it_is() {
-        // Right, a wrong label, under a cover, nowhere, and once more beside the first.
+    fn every_kind_of_error_is_counted_separately() {
+        // A correct report, a wrong label, a corner under a cover, a report without a corner, and a repeated report.
         let score = scored(
             &[(0.1, Some(0)), (40.0, Some(3)), (80.0, Some(2)), (100.0, None), (1.0, Some(0))],
             false,
@@ -168,7 +168,7 @@ mod tests {
     }
 
     #[test]
-    fn a_board_without_an_upper_end_may_be_turned() {
+    fn rotation_by_180_degrees_is_accepted_for_symmetric_boards() {
         let turned = [(0.0, Some(3)), (40.0, Some(2)), (120.0, Some(0))];
         assert_eq!(scored(&turned, false).wrong, 3);
         let score = scored(&turned, true);

@@ -1,4 +1,4 @@
-//! The result of the experiment, level by level, as text, CSV and JSON, and the truth of a picture.
+//! The result of the experiment, level by level, as text, CSV and JSON, and the ground truth of an image.
 
 use std::fmt::Write as _;
 
@@ -16,51 +16,51 @@ use deltille::raster::Gray;
 use deltille_core::json;
 use deltille_core::statistics::quantile;
 
-/// Schema of the result's JSON.
+/// Schema of the JSON result.
 const SCHEMA: &str = "deltille/photographs/1";
 
-/// Schema of a picture's truth.
+/// Schema of the ground truth of an image.
 const TRUTH_SCHEMA: &str = "deltille/photograph/1";
 
 /// All photographs of a subject at one level.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Row {
-    /// What was photographed.
+    /// Name of the photographed target.
     pub subject: String,
-    /// What was varied.
+    /// The varied quantity.
     pub axis: &'static str,
     /// Its level.
     pub level: String,
-    /// Photographs.
+    /// Number of photographs.
     pub views: usize,
-    /// Those in which a corner has its label and none a wrong one.
+    /// Number of photographs with at least one correct label and no wrong one.
     pub labelled_views: usize,
-    /// Corners that can be seen, in all.
+    /// Total number of visible corners.
     pub visible: usize,
-    /// Part of them that was reported with its label.
+    /// Fraction of the visible corners reported with the correct label.
     pub recall: f64,
-    /// Part of them that was reported at all.
+    /// Fraction of the visible corners reported at all.
     pub found: f64,
-    /// Wrong labels.
+    /// Number of wrong labels.
     pub wrong: usize,
-    /// Reports where there is no corner.
+    /// Number of reports where there is no corner.
     pub nowhere: usize,
-    /// Reports of corners under a cover.
+    /// Number of reports of corners under a cover.
     pub hidden: usize,
-    /// Second reports of a corner.
+    /// Number of repeated reports of a corner.
     pub doubled: usize,
-    /// Root of the mean squared error of a coordinate, px; none where nothing was found.
+    /// RMS error per axis, px; `None` if nothing was found.
     pub rms_px: Option<f64>,
-    /// Distance from the truth that 95 % stay below, px.
+    /// 95th percentile of the distance from the true position, px.
     pub p95_px: Option<f64>,
-    /// Mean of the squared error over the reported variance, per coordinate: 1 when it is honest.
+    /// Mean of the squared error over the reported variance, per coordinate: 1 if the covariances are correct.
     pub normalised: Option<f64>,
-    /// Median time of a detection, ms.
+    /// Median detection time, ms.
     pub time_ms: f64,
 }
 
 impl Row {
-    /// Sums up the photographs of one level.
+    /// Summarizes the photographs of one level.
     pub(crate) fn new(subject: &str, axis: Axis, level: &Level, scores: &[Score]) -> Self {
         let sum = |of: fn(&Score) -> usize| scores.iter().map(of).sum::<usize>();
         let visible = sum(|s| s.visible);
@@ -92,7 +92,7 @@ impl Row {
         }
     }
 
-    /// Corners that should not have been reported.
+    /// Returns the number of reported corners that should not have been reported.
     pub fn false_corners(&self) -> usize {
         self.nowhere + self.hidden + self.doubled
     }
@@ -102,7 +102,7 @@ fn mean(values: &[f64]) -> Option<f64> {
     (!values.is_empty()).then(|| values.iter().sum::<f64>() / values.len() as f64)
 }
 
-/// The result as a table for people.
+/// Formats the result as a table.
 pub fn text(rows: &[Row]) -> String {
     let mut text = String::new();
     let mut last = None;
@@ -145,7 +145,7 @@ pub fn text(rows: &[Row]) -> String {
     text
 }
 
-/// The result as CSV.
+/// Formats the result as CSV.
 pub fn csv(rows: &[Row]) -> String {
     let mut text =
         "subject,axis,level,views,labelled_views,visible,recall,found,wrong,nowhere,hidden,\
@@ -165,7 +165,7 @@ pub fn csv(rows: &[Row]) -> String {
     text
 }
 
-/// The result as JSON, schema `deltille/photographs/1`.
+/// Formats the result as JSON, schema `deltille/photographs/1`.
 pub fn json(rows: &[Row], seed: u64) -> String {
     #[derive(Serialize)]
     struct File<'a> {
@@ -177,7 +177,7 @@ pub fn json(rows: &[Row], seed: u64) -> String {
     json::to_text(&File { schema: SCHEMA, seed, scene: Scene::default(), rows }, 2)
 }
 
-/// The truth about a picture with this file name, schema `deltille/photograph/1`.
+/// Formats the ground truth of an image with this file name, schema `deltille/photograph/1`.
 pub(crate) fn truth(image: &str, target: &str, scene: &Scene, corners: &[TrueCorner]) -> String {
     #[derive(Serialize)]
     struct File<'a> {
@@ -190,12 +190,12 @@ pub(crate) fn truth(image: &str, target: &str, scene: &Scene, corners: &[TrueCor
     json::to_text(&File { schema: TRUTH_SCHEMA, image, target, scene, corners }, 2)
 }
 
-/// A grey picture as PNG.
-pub(crate) fn png(picture: &Gray<u8>) -> Vec<u8> {
-    let (width, height) = (picture.width() as u32, picture.height() as u32);
+/// Encodes a grey image as PNG.
+pub(crate) fn png(image: &Gray<u8>) -> Vec<u8> {
+    let (width, height) = (image.width() as u32, image.height() as u32);
     let mut bytes = Vec::new();
     PngEncoder::new(&mut bytes)
-        .write_image(picture.pixels(), width, height, ExtendedColorType::L8)
-        .expect("a grey picture is written to memory");
+        .write_image(image.pixels(), width, height, ExtendedColorType::L8)
+        .expect("a grey image is written to memory");
     signed_png(bytes)
 }

@@ -1,4 +1,4 @@
-//! What lies around the page, and the skin of what covers it: seeded textures without end.
+//! Surroundings of the page and texture of the covers: seeded, periodic textures.
 
 use std::sync::OnceLock;
 
@@ -12,16 +12,16 @@ use deltille::raster::Gray;
 /// Side of a texture, texels; a power of two.
 const SIDE: usize = 1024;
 
-/// Texels of a texture to a millimetre.
+/// Number of texels per millimetre.
 pub(crate) const TEXELS_PER_MM: f64 = 3.0;
 
-/// Things in a cluttered texture.
+/// Number of objects in a cluttered texture.
 const THINGS: usize = 400;
 
-/// Stream of chance for textures; photographs take theirs from lower ones.
+/// First random stream for textures; photographs use lower ones.
 const STREAM: u64 = 1 << 63;
 
-/// All textures of a run, made when they are first seen.
+/// All textures of a run, created on first use.
 pub struct Studio {
     pub(crate) seed: u64,
     backgrounds: [OnceLock<Mips>; 3],
@@ -29,26 +29,26 @@ pub struct Studio {
 }
 
 impl Studio {
-    /// The studio of a seed.
+    /// Creates the studio for a seed.
     pub fn new(seed: u64) -> Self {
         Self { seed, backgrounds: Default::default(), skin: OnceLock::new() }
     }
 
-    /// What lies around the page: how much light it sends back, 0 to 255.
+    /// Returns the surroundings of the page: reflected light, 0 to 255.
     pub(crate) fn background(&self, kind: Background) -> &Mips {
         self.backgrounds[kind as usize].get_or_init(|| {
             let mut rng = self.rng(1 + kind as u64);
             let tone: f64 = rng.random_range(0.3..0.5);
-            let picture = match kind {
+            let image = match kind {
                 Background::Plain => Gray::from_fn(SIDE, SIDE, |_, _| (tone * 255.0) as u8),
                 Background::Texture => grain(tone, 0.12, &mut rng),
                 Background::Clutter => clutter(grain(tone, 0.05, &mut rng), &mut rng),
             };
-            Mips::new(picture, Beyond::Again)
+            Mips::new(image, Beyond::Again)
         })
     }
 
-    /// Grain about 128.
+    /// Returns a grain texture with mean 128.
     pub(crate) fn skin(&self) -> &Mips {
         self.skin.get_or_init(|| Mips::new(grain(0.5, 0.06, &mut self.rng(0)), Beyond::Again))
     }
@@ -60,7 +60,7 @@ impl Studio {
     }
 }
 
-/// Noise of all sizes from 256 texels down, each weaker than the larger ones.
+/// Returns noise at all scales from 256 texels down, with decreasing amplitude.
 fn grain(mean: f64, contrast: f64, rng: &mut ChaCha8Rng) -> Gray<u8> {
     const LARGEST: usize = 256;
     const WEAKER: f64 = 0.72;
@@ -88,8 +88,8 @@ fn grain(mean: f64, contrast: f64, rng: &mut ChaCha8Rng) -> Gray<u8> {
     })
 }
 
-/// Rectangles of all sizes, turned at random, on a picture.
-fn clutter(mut picture: Gray<u8>, rng: &mut ChaCha8Rng) -> Gray<u8> {
+/// Adds randomly rotated rectangles of all sizes to an image.
+fn clutter(mut image: Gray<u8>, rng: &mut ChaCha8Rng) -> Gray<u8> {
     for _ in 0..THINGS {
         let [x, y] = [0; 2].map(|_: i32| rng.random_range(0.0..SIDE as f64));
         let half = [0; 2].map(|_: i32| 4.0 * 25f64.powf(rng.random_range(0.0..1.0)));
@@ -101,10 +101,10 @@ fn clutter(mut picture: Gray<u8>, rng: &mut ChaCha8Rng) -> Gray<u8> {
                 let (u, v) = (dx as f64, dy as f64);
                 if (cos * u + sin * v).abs() < half[0] && (cos * v - sin * u).abs() < half[1] {
                     let at = |i: f64, d: i64| (i as i64 + d).rem_euclid(SIDE as i64) as usize;
-                    picture.row_mut(at(y, dy))[at(x, dx)] = grey;
+                    image.row_mut(at(y, dy))[at(x, dx)] = grey;
                 }
             }
         }
     }
-    picture
+    image
 }

@@ -1,4 +1,4 @@
-//! What lies on the board or is held before it: hands, cables, cups, as rounded strokes in the picture.
+//! Objects on or in front of the board: hands, cables, cups, drawn as rounded strokes in the image.
 
 use glam::DVec2;
 use rand::Rng;
@@ -10,26 +10,26 @@ struct Stroke {
     from: DVec2,
     to: DVec2,
     radius: f64,
-    /// How much light it sends back.
+    /// Fraction of the light that it reflects.
     tone: f64,
 }
 
-/// All that covers a board, in pixels of the picture.
+/// All objects that cover a board, in image pixels.
 #[derive(Clone, Debug, Default)]
 pub struct Covers(Vec<Stroke>);
 
-/// Steps by which a hand is moved in.
+/// Number of steps by which a hand is moved in.
 const STEPS: u32 = 200;
 
-/// Most hands that are held over a board; two cover half of it.
+/// Maximum number of hands over a board; two cover half of it.
 const MOST_HANDS: u32 = 6;
 
-/// Most things that are laid on a board until enough of it is covered.
+/// Maximum number of objects placed on a board until enough of it is covered.
 const MOST_THINGS: usize = 500;
 
 impl Covers {
-    /// Covers that lie over so large a part of some places: hands that come in from the sides, or,
-    /// with `scattered`, things lying about.
+    /// Creates covers over a given fraction of the positions: hands that reach in from the sides, or, if `scattered`,
+    /// objects distributed over the board.
     pub fn over(places: &[DVec2], part: f64, scattered: bool, rng: &mut ChaCha8Rng) -> Self {
         if part <= 0.0 || places.is_empty() {
             return Self::default();
@@ -53,7 +53,7 @@ impl Covers {
             }
             return covers;
         }
-        // A hand for each third of the board, from all around.
+        // One hand for each third of the board, from all directions.
         let first = rng.random_range(0.0..std::f64::consts::TAU);
         for hand in 1..=MOST_HANDS {
             let turn = first + f64::from(hand) * rng.random_range(2.0..2.8);
@@ -82,7 +82,7 @@ impl Covers {
         covers
     }
 
-    /// Distance from the nearest cover's outline, px, negative inside.
+    /// Returns the distance from the nearest cover outline, px, negative inside.
     pub fn distance(&self, place: DVec2) -> f64 {
         self.nearest(place).map_or(f64::INFINITY, |(distance, _)| distance)
     }
@@ -92,15 +92,15 @@ impl Covers {
         distances.min_by(|(a, _), (b, _)| a.total_cmp(b))
     }
 
-    /// How much light a cover sends back at a place, darker towards its outline as round things are;
-    /// `None` beside all covers.
+    /// Returns the fraction of light that a cover reflects at a position, darker towards the outline as on round
+    /// objects; `None` outside all covers.
     pub fn tone(&self, place: DVec2) -> Option<f64> {
         let (distance, stroke) = self.nearest(place).filter(|(distance, _)| *distance < 0.0)?;
         let rim = 1.0 + distance / stroke.radius;
         Some(stroke.tone * (1.0 - 0.45 * rim.powi(4)))
     }
 
-    /// Covers that reach into a row of the picture.
+    /// Returns the covers that reach into an image row.
     pub fn in_row(&self, y: f64) -> Self {
         let reaches = |stroke: &&Stroke| {
             (y >= stroke.from.y.min(stroke.to.y) - stroke.radius)
@@ -109,7 +109,7 @@ impl Covers {
         Self(self.0.iter().filter(reaches).copied().collect())
     }
 
-    /// Whether there are none.
+    /// Returns whether there are no covers.
     pub fn is_empty(&self) -> bool {
         self.0.is_empty()
     }
@@ -123,7 +123,7 @@ impl Stroke {
     }
 }
 
-/// Four fingers and a palm, pointing along x with the tips about the origin.
+/// Returns four fingers and a palm, pointing along x, with the fingertips near the origin.
 fn hand_shape(size: f64, rng: &mut ChaCha8Rng) -> Vec<Stroke> {
     let tone = rng.random_range(0.25..0.55);
     let radius = size * rng.random_range(0.075..0.1);
@@ -147,7 +147,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn so_much_is_covered_as_was_asked_for() {
+    fn the_requested_fraction_is_covered() {
         let places: Vec<DVec2> =
             (0..400).map(|i| 10.0 * DVec2::new(f64::from(i % 20), f64::from(i / 20))).collect();
         for seed in 0..10 {

@@ -1,28 +1,28 @@
-//! A picture at all its sizes, each half of the one before, to be looked at from any distance.
+//! A mipmap: an image at successively halved sizes, for viewing from any distance.
 
 use glam::DVec2;
 
 use deltille::raster::Gray;
 
-/// What lies beyond the borders of a picture.
+/// Continuation of an image beyond its borders.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Beyond {
-    /// Its outermost pixels.
+    /// The outermost pixels are repeated.
     Border,
-    /// The same picture again.
+    /// The image is repeated periodically.
     Again,
 }
 
-/// A picture and its halvings, by exact means of 2 × 2 pixels.
+/// An image and its halvings, by exact means of 2 × 2 pixels.
 pub(crate) struct Mips {
     levels: Vec<Gray<u8>>,
     beyond: Beyond,
 }
 
 impl Mips {
-    pub(crate) fn new(picture: Gray<u8>, beyond: Beyond) -> Self {
+    pub(crate) fn new(image: Gray<u8>, beyond: Beyond) -> Self {
         const LEAST_SIDE: usize = 8;
-        let mut levels = vec![picture];
+        let mut levels = vec![image];
         while let Some(last) = levels.last()
             && last.width().min(last.height()) >= 2 * LEAST_SIDE
         {
@@ -32,18 +32,18 @@ impl Mips {
         Self { levels, beyond }
     }
 
-    /// The mean over a parallelogram around a place, in pixels of the first level.
+    /// Returns the mean over a parallelogram around a position, in pixels of the first level.
     ///
-    /// The level is the first whose pixels are no smaller than the parallelogram's narrow side: samples that lie
-    /// farther apart than pixels would displace edges along the rows by a sixteenth of that side. Along
-    /// the other as many are taken as it is longer.
+    /// The level is the first whose pixels are at least as large as the narrow side of the parallelogram. Samples
+    /// farther apart than the pixels would displace edges along the rows by a sixteenth of that side. The number of
+    /// samples along the long side is proportional to its length.
     pub(crate) fn area(&self, middle: DVec2, footprint: &Footprint) -> f32 {
         let scale = footprint.scale;
         let level = &self.levels[footprint.level.min(self.levels.len() - 1)];
         let mut sum = 0.0;
         for k in 0..footprint.samples {
             let t = (f64::from(k) + 0.5) / f64::from(footprint.samples) - 0.5;
-            // Pixel centres at integers on every level.
+            // Pixel centres lie at integers on every level.
             let at = (middle + t * footprint.long + 0.5) * scale - 0.5;
             sum += match self.beyond {
                 Beyond::Border => clamped(level, at),
@@ -53,13 +53,13 @@ impl Mips {
         sum / footprint.samples as f32
     }
 
-    /// How an area of the first level is to be sampled, whose sides are `across` and `down`, px.
+    /// Determines the sampling of an area of the first level with the sides `across` and `down`, px.
     pub(crate) fn footprint(&self, across: DVec2, down: DVec2) -> Footprint {
         Footprint::new(across, down, self.levels.len())
     }
 }
 
-/// How a small parallelogram of a picture is sampled.
+/// Sampling of a small parallelogram of an image.
 pub(crate) struct Footprint {
     level: usize,
     scale: f64,
@@ -68,7 +68,7 @@ pub(crate) struct Footprint {
     long: DVec2,
 }
 
-/// Most samples along the long axis: a tilt of more than 85°.
+/// Maximum number of samples along the long axis: sufficient for a tilt of more than 85°.
 const MOST_SAMPLES: u32 = 12;
 
 impl Footprint {
@@ -87,34 +87,34 @@ impl Footprint {
     }
 }
 
-fn half(picture: &Gray<u8>) -> Gray<u8> {
-    Gray::from_fn(picture.width() / 2, picture.height() / 2, |x, y| {
-        let at = |dx, dy| u32::from(picture.at(2 * x + dx, 2 * y + dy));
+fn half(image: &Gray<u8>) -> Gray<u8> {
+    Gray::from_fn(image.width() / 2, image.height() / 2, |x, y| {
+        let at = |dx, dy| u32::from(image.at(2 * x + dx, 2 * y + dy));
         ((at(0, 0) + at(1, 0) + at(0, 1) + at(1, 1) + 2) / 4) as u8
     })
 }
 
-fn clamped(picture: &Gray<u8>, at: DVec2) -> f32 {
-    let (width, height) = (picture.width(), picture.height());
+fn clamped(image: &Gray<u8>, at: DVec2) -> f32 {
+    let (width, height) = (image.width(), image.height());
     let at = at.clamp(DVec2::ZERO, DVec2::new((width - 1) as f64, (height - 1) as f64));
     let (left, top) = ((at.x as usize).min(width - 2), (at.y as usize).min(height - 2));
     let part = at - DVec2::new(left as f64, top as f64);
-    blend(picture, [left, left + 1], [top, top + 1], part)
+    blend(image, [left, left + 1], [top, top + 1], part)
 }
 
-fn wrapped(picture: &Gray<u8>, at: DVec2) -> f32 {
-    let (width, height) = (picture.width(), picture.height());
+fn wrapped(image: &Gray<u8>, at: DVec2) -> f32 {
+    let (width, height) = (image.width(), image.height());
     let floor = at.floor();
     let left = (floor.x as i64).rem_euclid(width as i64) as usize;
     let top = (floor.y as i64).rem_euclid(height as i64) as usize;
     let columns = [left, if left + 1 == width { 0 } else { left + 1 }];
     let rows = [top, if top + 1 == height { 0 } else { top + 1 }];
-    blend(picture, columns, rows, at - floor)
+    blend(image, columns, rows, at - floor)
 }
 
-fn blend(picture: &Gray<u8>, [x0, x1]: [usize; 2], [y0, y1]: [usize; 2], part: DVec2) -> f32 {
+fn blend(image: &Gray<u8>, [x0, x1]: [usize; 2], [y0, y1]: [usize; 2], part: DVec2) -> f32 {
     let (fx, fy) = (part.x as f32, part.y as f32);
-    let (upper, lower) = (picture.row(y0), picture.row(y1));
+    let (upper, lower) = (image.row(y0), image.row(y1));
     let mix = |row: &[u8]| f32::from(row[x0]) * (1.0 - fx) + f32::from(row[x1]) * fx;
     mix(upper) * (1.0 - fy) + mix(lower) * fy
 }
@@ -123,7 +123,7 @@ fn blend(picture: &Gray<u8>, [x0, x1]: [usize; 2], [y0, y1]: [usize; 2], part: D
 mod tests {
     use super::*;
 
-    /// A ramp is the same from everywhere, whatever the level and the footprint.
+    /// The mean of a ramp is exact for every level and footprint.
     #[test]
     fn the_mean_of_a_ramp_is_its_middle() {
         let ramp = Mips::new(Gray::from_fn(256, 256, |x, _| x as u8), Beyond::Border);

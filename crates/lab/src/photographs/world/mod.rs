@@ -1,12 +1,13 @@
-//! What there is to see: a printed page, what lies around it, and what covers it.
+//! The scene: a printed page, its surroundings, and its covers.
 //!
-//! Comes in: a target with its sheets. Goes out: pictures to be looked at from any distance, and the places of corners.
+//! The input is a target with its sheets. The output is images that can be sampled from any distance, and the positions
+//! of corners.
 //!
-//! 1. `page` is the target's PDF, drawn, with the places of its corners.
-//! 2. `paths` finds these places in the operators of the PDF.
-//! 3. `background` is the table that the page lies on, and the skin of what covers it.
-//! 4. `covers` are hands, cables and cups on it.
-//! 5. `mips` holds each of these pictures at all its sizes.
+//! 1. `page` is the rendered PDF of the target, with the positions of its corners.
+//! 2. `paths` extracts these positions from the operators of the PDF.
+//! 3. `background` is the table on which the page lies, and the texture of the covers.
+//! 4. `covers` are hands, cables and cups on the page.
+//! 5. `mips` contains each of these images at all sizes.
 
 pub mod background;
 pub mod covers;

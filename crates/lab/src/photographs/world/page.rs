@@ -1,7 +1,7 @@
-//! A target's printed page as a picture, with the places of its corners.
+//! The printed page of a target as an image, with the positions of its corners.
 //!
-//! The PDF is written, drawn by hayro, and its corners are the vertices of its own paths: the
-//! description of the target only says which of them are corners, and what they are called.
+//! The PDF is written and then rendered by hayro. Corner positions are vertices of its own paths; the description of
+//! the target only identifies which vertices are corners, and their ids.
 
 use glam::DVec2;
 
@@ -14,28 +14,28 @@ use deltille::lattice::GridKind;
 use deltille::layout::Printing;
 use deltille::verify::Document;
 
-/// Resolution asked for, px/mm: 1200 dpi. Large pages come coarser.
+/// Requested resolution, px/mm: 1200 dpi. Large pages have a lower one.
 const PX_PER_MM: f64 = 1200.0 / 25.4;
 
-/// A vertex of the paths this near to where a corner is stated is that corner, mm. Points are written
-/// in single precision.
+/// Maximum distance of a path vertex from the nominal position of its corner, mm. The PDF contains points in single
+/// precision.
 const SAME_MM: f64 = 0.01;
 
-/// Length of a tile's edge in bit-widths where no tag says it: those of the default tags.
+/// Length of a tile edge in bit widths for untagged targets: that of the default tags.
 const UNTAGGED_BITS: f64 = 10.0;
 
 /// A corner on the page.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PageCorner {
-    /// Its id in the target.
+    /// Corner id in the target.
     pub id: u32,
-    /// Its panel.
+    /// Panel id.
     pub panel: u32,
     /// Lattice row.
     pub row: i32,
     /// Lattice column.
     pub col: i32,
-    /// Where it is, mm from the lower left corner of the page, y up.
+    /// Position, mm from the lower-left corner of the page, y up.
     pub page_mm: DVec2,
 }
 
@@ -45,11 +45,11 @@ pub struct PrintedPage {
     pub size_mm: DVec2,
     /// All corners on it.
     pub corners: Vec<PageCorner>,
-    /// Length of a tile's edge, mm.
+    /// Length of a tile edge, mm.
     pub edge_mm: f64,
     /// Width of a tag's bit along the edge, mm.
     pub bit_mm: f64,
-    /// Whether labels of an untagged board can only be right up to half a turn.
+    /// Whether the labels of an untagged board are ambiguous under rotation by 180°.
     pub half_turn: bool,
     brightness: Mips,
     px_per_mm: f64,
@@ -59,7 +59,7 @@ impl PrintedPage {
     /// Prints the first page of a target.
     ///
     /// # Errors
-    /// Where the target has no sheet, or the family of its tags is unknown.
+    /// Returns an error if the target has no sheet, or the family of its tags is unknown.
     pub fn new(printing: &Printing) -> Result<Self, PhotographError> {
         let (Some(panel), Some(sheet)) = (printing.target.panels.first(), printing.sheets.first())
         else {
@@ -114,7 +114,7 @@ impl PrintedPage {
         })
     }
 
-    /// The middle of the box around all corners, mm, and the box's size.
+    /// Returns the centre of the bounding box of all corners, mm, and its size.
     pub fn board_mm(&self) -> (DVec2, DVec2) {
         let places = || self.corners.iter().map(|corner| corner.page_mm);
         let least = places().fold(DVec2::INFINITY, DVec2::min);
@@ -122,8 +122,8 @@ impl PrintedPage {
         (least.midpoint(most), most - least)
     }
 
-    /// How white a small parallelogram of the page is on the average, 0 on ink to 1 on bare paper;
-    /// `None` beside the page. Its sides are in mm.
+    /// Returns the mean whiteness of a small parallelogram of the page, 0 for ink to 1 for bare paper; `None` outside
+    /// the page. Its sides are in mm.
     pub(crate) fn whiteness(&self, place: DVec2, footprint: &Footprint) -> Option<f32> {
         let on_page = place.cmpge(DVec2::ZERO).all() && place.cmple(self.size_mm).all();
         on_page.then(|| {
@@ -132,7 +132,7 @@ impl PrintedPage {
         })
     }
 
-    /// How a parallelogram with these sides, mm, is sampled.
+    /// Determines the sampling of a parallelogram with these sides, mm.
     pub(crate) fn footprint(&self, across: DVec2, down: DVec2) -> Footprint {
         let px = |side: DVec2| side * DVec2::new(1.0, -1.0) * self.px_per_mm;
         self.brightness.footprint(px(across), px(down))

@@ -1,7 +1,7 @@
-//! Where the paths of a PDF page have their vertices, from the operators of its content stream.
+//! Vertices of the paths of a PDF page, from the operators of its content stream.
 //!
-//! Only what filled paths need is understood: the graphics state's matrix, moves, lines, curves,
-//! rectangles and the closing of contours. Text, images and nested forms are passed over.
+//! The parser supports only what filled paths need: the matrix of the graphics state, moves, lines, curves, rectangles
+//! and closing of contours. It ignores text, images and nested forms.
 
 use glam::DVec2;
 use lopdf::content::Content;
@@ -27,7 +27,8 @@ impl Vertices {
         let unreadable = |error: lopdf::Error| PhotographError::Paths(error.to_string());
         let document = Document::load_mem(pdf).map_err(unreadable)?;
         let page = document.page_iter().next();
-        let page = page.ok_or_else(|| PhotographError::Paths("it has no page".to_owned()))?;
+        let page =
+            page.ok_or_else(|| PhotographError::Paths("the document has no page".to_owned()))?;
         let stream = document.get_page_content(page);
         let content = Content::decode(&stream).map_err(unreadable)?;
         Ok(Self::of(&content))
@@ -43,7 +44,8 @@ impl Vertices {
         Self(RTree::bulk_load(contours.found))
     }
 
-    /// The mean of the vertices within `radius_mm` of a place, and of how many contours they are.
+    /// Returns the mean of the vertices within `radius_mm` of a position, and the number of contours to which they
+    /// belong.
     pub(super) fn meeting(&self, place: DVec2, radius_mm: f64) -> Option<(DVec2, usize)> {
         let [least, most] = [place - radius_mm, place + radius_mm];
         let around = AABB::from_corners(least.to_array(), most.to_array());
@@ -101,7 +103,7 @@ impl Contours {
     }
 }
 
-/// First `first`, then `then`.
+/// Returns the composition: `first`, followed by `then`.
 fn product(first: Matrix, then: Matrix) -> Matrix {
     let [a, b, c, d, e, f] = first;
     let [p, q, r, s, t, u] = then;
