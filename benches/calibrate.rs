@@ -1,4 +1,4 @@
-//! Time from corners to a calibrated camera, and to a calibrated rig with its target refined.
+//! Time to calibrate a camera from corners, and to calibrate a rig while refining its target.
 
 use std::f64::consts::PI;
 use std::hint::black_box;
@@ -12,10 +12,10 @@ use glam::{DQuat, DVec3};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-/// Corners are off by up to this, px.
+/// Maximum error of a corner coordinate, px.
 const NOISE_PX: f64 = 0.1;
 
-/// A panel as a camera sees it.
+/// Returns the observations of a panel by a camera.
 fn sighting(
     camera: &Camera,
     camera_from_panel: &Pose,
@@ -43,7 +43,7 @@ fn lens() -> Lens {
     Lens::BrownConrady(BrownConrady { radial, ..BrownConrady::default() })
 }
 
-/// 109 views of a board of 10 × 11 corners, as in the paper's Table 2.
+/// Returns 109 views of a board of 10 × 11 corners, as in Table 2 of the paper.
 fn board() -> (Vec<View>, Vec<Pose>) {
     let mut random = ChaCha8Rng::seed_from_u64(1);
     let camera = Camera::centred(1600, 1200, 625.0, lens());
@@ -67,8 +67,8 @@ fn board() -> (Vec<View>, Vec<Pose>) {
     (views.collect(), vec![Pose::IDENTITY])
 }
 
-/// Four cameras, 150 frames, and a body of twenty triangular faces of 36 corners, eight of which
-/// each camera sees.
+/// Returns the views of four cameras in 150 frames, and a solid of twenty triangular faces with 36 corners each. Each
+/// camera sees eight faces.
 fn rig() -> (Vec<CameraViews>, Vec<PanelPlace>) {
     let mut random = ChaCha8Rng::seed_from_u64(1);
     let corners = (0..8).flat_map(|row| (0..8 - row).map(move |col| (row, col)));
@@ -77,7 +77,7 @@ fn rig() -> (Vec<CameraViews>, Vec<PanelPlace>) {
         (row, col, 10.0 * (DVec3::new(x, y, 0.0) - DVec3::new(3.5, 2.0, 0.0)))
     });
     let corners: Vec<_> = corners.collect();
-    // Twenty directions, evenly over the sphere along a spiral.
+    // Twenty directions, distributed evenly over the sphere along a spiral.
     let panels = (0..20).map(|i| {
         let z = 1.0 - (2.0 * f64::from(i) + 1.0) / 20.0;
         let turn = f64::from(i) * PI * (3.0 - 5f64.sqrt());

@@ -1,7 +1,7 @@
-//! Nearest-code lookup against brute force, on a family of many codes.
+//! Nearest-code lookup compared with brute force, on families with many codes.
 //!
-//! `cargo bench --bench decode`; each figure is the time for one word. Words with as many
-//! misread cells as are corrected are what a camera sees at worst, random words what clutter gives.
+//! `cargo bench --bench decode`; each figure is the time for one word. Words with the maximum correctable number of
+//! misread cells are the worst valid tags; random words represent clutter.
 
 use std::hint::black_box;
 

@@ -1,7 +1,7 @@
-//! Every stage of detection, on a synthetic photograph of a tagged board.
+//! Time of every stage of detection, on a synthetic image of a tagged board.
 //!
-//! `cargo bench --bench detect`; each figure is the time for one image of 1600 × 1200 pixels on one
-//! thread, with either refinement. On photographs: `deltille bench detect IMAGES…`.
+//! `cargo bench --bench detect`; each figure is the time for one image of 1600 × 1200 pixels on one thread, with either
+//! refinement. For photographs, use `deltille bench detect IMAGES…`.
 
 use std::time::Duration;
 
@@ -15,7 +15,7 @@ use deltille::synth::{Light, scene_of_sheet};
 use deltille::targets::{BoardSpec, Target};
 use glam::DVec3;
 
-/// A board of 10 × 11 corners with tags, seen at 35°.
+/// Returns a board of 10 × 11 corners with tags, and its image at 35°.
 fn photograph() -> (Target, Gray<u8>) {
     let spec = BoardSpec::deltille(10, 11, 20.0);
     let target = Printing::new("board", spec).expect("a board that fits A4");

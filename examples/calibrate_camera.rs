@@ -1,5 +1,4 @@
-//! Calibrates a camera from photographs of a target, says what is wrong with them, and writes the camera and a
-//! page about it.
+//! Calibrates a camera from images of a target, reports problems, and writes the camera and a report.
 //!
 //! ```text
 //! cargo run --release --example calibrate_camera -- desk.json photos/*.png
@@ -15,7 +14,7 @@ use deltille::targets::Target;
 
 fn main() -> Result<(), Box<dyn Error>> {
     let mut args = std::env::args().skip(1);
-    let target = args.next().ok_or("give a target and photographs")?;
+    let target = args.next().ok_or("usage: calibrate_camera TARGET.json PHOTOGRAPHS…")?;
     let target = Target::from_json(&std::fs::read_to_string(target)?)?;
     let detector = Detector::new(&target)?;
     let mut found = Vec::new();
@@ -24,7 +23,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     }
     let target = Reference::Target(&target);
     let shown = views(&found, &target)?;
-    // Every fifth view takes no part, and tells how well the others predict it.
+    // Every fifth view is held out to measure how well the calibration predicts it.
     let calibration = Calibration::new(target.panels())
         .camera("camera", shown.views, Model::Radtan)
         .hold_out(Some(5));

@@ -1,4 +1,4 @@
-//! Searches a code family of one's own, proves the distance between its codes, and makes a board with it.
+//! Searches for a new code family, proves the distance between its codes, and makes a board with it.
 //!
 //! ```text
 //! cargo run --release --example own_family -- folder
@@ -17,9 +17,9 @@ use deltille::targets::{BoardSpec, TagSpec, TargetSpec};
 fn main() -> Result<(), Box<dyn Error>> {
     let folder = PathBuf::from(std::env::args().nth(1).unwrap_or_else(|| ".".to_owned()));
     std::fs::create_dir_all(&folder)?;
-    // 16 bits, any two codes in any turn at least 7 cells apart: three misread cells are mended.
+    // 16 bits, any two codes in any rotation at least 7 cells apart: up to three misread cells are corrected.
     let (dimension, distance) = (Dimension::from_bits(16)?, 7);
-    // So many steps give the same codes on every machine.
+    // A fixed number of steps gives the same codes on every machine.
     let search = Best::new(dimension, distance, Budget::Work(1)).seed(7);
     let family = search.family("own16h7", None, Control::default())?;
     let certificate = certify(&family);

@@ -1,5 +1,5 @@
-//! Follows a target in the frames of a known camera: a loop over frames that somebody else holds, without a
-//! copy. The frames are rendered here.
+//! Tracks a target with a calibrated camera: a loop over frames in existing buffers, without copying. The frames are
+//! rendered here.
 //!
 //! ```text
 //! cargo run --release --example pose_loop
@@ -29,7 +29,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         let image = scene.render(&camera, &truth, &Light::default());
         let bytes: Vec<u8> = image.pixels().iter().map(|grey| (255.0 * grey + 0.5) as u8).collect();
 
-        // Rows of 1280 bytes, as a camera's driver would hold them.
+        // Rows of 1280 bytes, as in the buffer of a camera driver.
         let start = Instant::now();
         let frame_view = View::new(1280, 960, 1280, &bytes).ok_or("too few bytes")?;
         let name = format!("frame {frame}");
@@ -46,7 +46,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         };
         let off = (seen.rig_from_target.translation - truth.translation).length();
         println!(
-            "{name}: {:.1} mm away, {off:.3} mm off the truth, rms {:.4} px, {milliseconds:.0} ms",
+            "{name}: {:.1} mm away, error {off:.3} mm, RMS {:.4} px, {milliseconds:.0} ms",
             seen.rig_from_target.translation.length(),
             seen.rms_px
         );

@@ -1,33 +1,32 @@
 //! Deltille calibration targets: code families, verified print files, detection and calibration.
 //!
-//! A *deltille grid* is the triangular tiling coloured black and white; a *DelTag* is a triangular
-//! 2D code inside one of its black tiles (Ha et al., "Deltille Grids for Geometric Camera
-//! Calibration", ICCV 2017). This crate makes such targets, finds them in photographs and proves
-//! every file it writes by reading it back.
+//! A *deltille grid* is the triangular tiling coloured black and white; a *DelTag* is a triangular 2D code inside one
+//! of its black tiles (Ha et al., "Deltille Grids for Geometric Camera Calibration", ICCV 2017). This crate makes these
+//! targets, detects them in images, and verifies every file it writes by reading it back.
 //!
-//! The modules form floors; each imports only from floors below it:
+//! The modules form layers; each imports only from layers below it:
 //!
-//! | floor | module | its one job | crate |
+//! | layer | module | purpose | crate |
 //! |---|---|---|---|
 //! | 1 | [`lattice`] | the triangular lattice: vertices, tiles, symmetries, the cells of a tag | `deltille-core` |
 //! | 1 | [`raster`] | grey images: storage, sampling, blur | |
 //! | 1 | [`camera`] | camera models and poses | |
-//! | 1 | [`setting`] | the settings that messages name, and what they are called | |
+//! | 1 | [`setting`] | the settings that messages refer to, and their names | |
 //! | 2 | [`family`] | DelTag code families: certificates and decoding; [`family::search`] is `deltille-search` | |
-//! | 3 | [`targets`] | what exists in the world: panels, corners and tags in millimetres | |
+//! | 3 | [`targets`] | physical targets: panels, corners and tags in millimetres | |
 //! | 4 | [`layout`] | targets on paper: sheets with labels, check bars and cutting lines | `deltille-layout` |
-//! | 4 | [`artwork`] | what is drawn, in millimetres, independent of file type | |
-//! | 5 | [`synth`] | a target seen by a camera, as an image | |
+//! | 4 | [`artwork`] | drawings in millimetres, independent of file type | |
+//! | 5 | [`synth`] | synthetic images of a target | |
 //! | 4 | [`detect`] | from pixels to labelled corners | `deltille-detect` |
 //! | 5 | [`calibrate`] | from detections to calibrated cameras | `deltille-calibrate` |
-//! | 6 | [`limits`] | how much of a file is read, and panics of other code | `deltille-files` |
-//! | 6 | [`photograph`] | photographs of any common format | |
-//! | 6 | [`export`] | artwork, targets and results to files and back | |
-//! | 6 | [`report`] | a calibration as a page to look at | |
-//! | 7 | [`verify`] | an artifact read back and compared with its target | `deltille-verify` |
+//! | 6 | [`limits`] | limits on the resources that a file may use, and handling of panics in other code | `deltille-files` |
+//! | 6 | [`photograph`] | images in any common format | |
+//! | 6 | [`export`] | writing and reading of artwork, targets and results | |
+//! | 6 | [`report`] | calibration reports as HTML | |
+//! | 7 | [`verify`] | comparison of artifacts with their target | `deltille-verify` |
 //!
-//! These crates may change with any version; what this one re-exports is what programs can rely on. The programs `deltag` and
-//! `deltille` are the crate `deltille-cli`.
+//! The underlying crates may change with any version; programs can rely on what this crate re-exports. The programs
+//! `deltag` and `deltille` are in the crate `deltille-cli`.
 //!
 //! Conventions: lengths in millimetres, angles in radians, pixel centres at integer coordinates,
 //! images row-major with y down, the board frame right-handed with x right and y up on the print.
@@ -55,7 +54,7 @@ pub mod family {
     pub use deltille_search as search;
 }
 
-/// The program in the README.
+/// The example program in the README.
 #[cfg(doctest)]
 #[doc = include_str!("../README.md")]
 pub struct Readme;
