@@ -1,10 +1,10 @@
-//! Fuzz targets for every reader of files; `fuzz/run` runs them all.
+//! Fuzz targets for every file reader; `fuzz/run` runs them all.
 
 pub mod files;
 
 use files::{Dice, READERS, Reader};
 
-/// A fuzz target of a name.
+/// Defines the fuzz target with the given name.
 #[macro_export]
 macro_rules! target {
     ($name:literal) => {
@@ -18,13 +18,13 @@ macro_rules! target {
     };
 }
 
-/// The reader of a name.
+/// Returns the reader with the given name.
 pub fn reader(name: &str) -> &'static Reader {
     READERS.iter().find(|reader| reader.name == name).expect("a reader of this name")
 }
 
-/// A changed file in the place of one, and its size; by libFuzzer's own means now and then, and
-/// where it becomes too large.
+/// Replaces a file by a mutated one, and returns its size. Occasionally, and if the result would be too large, it uses
+/// libFuzzer's own mutator instead.
 pub fn changed_or(
     name: &str,
     data: &mut [u8],

@@ -1,30 +1,30 @@
-//! Chance, and changes of bytes wherever they are.
+//! Random numbers, and mutations of arbitrary bytes.
 
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-/// Numbers without an end from a seed.
+/// A seeded random number generator.
 #[derive(Clone, Debug)]
 pub struct Dice(ChaCha8Rng);
 
 impl Dice {
-    /// Those of a seed.
+    /// Creates the generator for a seed.
     pub fn new(seed: u64) -> Self {
         Self(ChaCha8Rng::seed_from_u64(seed))
     }
 
-    /// A number less than another; 0 where that is 0.
+    /// Returns a number less than `end`; 0 if `end` is 0.
     pub fn below(&mut self, end: usize) -> usize {
         self.0.random_range(0..end.max(1))
     }
 
-    /// One of some things.
+    /// Returns a random element.
     pub fn one_of<T: Clone>(&mut self, things: &[T]) -> T {
         things[self.below(things.len())].clone()
     }
 }
 
-/// Changes bytes wherever they are.
+/// Mutates arbitrary bytes.
 pub fn noise(bytes: &[u8], dice: &mut Dice) -> Vec<u8> {
     let mut bytes = bytes.to_vec();
     if bytes.is_empty() {

@@ -1,4 +1,4 @@
-//! Files that are read without complaint, small ones.
+//! Small valid files.
 
 use std::io::Cursor;
 use std::sync::LazyLock;
@@ -23,7 +23,7 @@ use tempfile::TempDir;
 /// The family of the tags.
 pub static FAMILY: LazyLock<Family> = LazyLock::new(|| Family::shipped("delTag16h5").unwrap());
 
-/// A board of which there are pages.
+/// A board that is printed on pages.
 pub static BOARD: LazyLock<Printing> = LazyLock::new(|| {
     let mut spec = BoardSpec::new(GridKind::Deltille, 3, 4, 9.0);
     if let Some(tags) = &mut spec.tags {
@@ -33,7 +33,7 @@ pub static BOARD: LazyLock<Printing> = LazyLock::new(|| {
     Printing::build("b", &TargetSpec::Board(spec), Some(&FAMILY), Some(&paper)).unwrap()
 });
 
-/// A solid of which there are meshes.
+/// A solid that has meshes.
 pub static SOLID: LazyLock<Printing> = LazyLock::new(|| {
     let mut spec = SolidSpec {
         edge_mm: 60.0,
@@ -43,7 +43,7 @@ pub static SOLID: LazyLock<Printing> = LazyLock::new(|| {
     };
     if let Some(tags) = &mut spec.tags {
         tags.family = "delTag16h5".to_owned();
-        // The wider the bits, the smaller is the texture.
+        // Wider bits make the texture smaller.
         tags.border_bits = 0.6;
     }
     Printing::build("t", &TargetSpec::Solid(spec), Some(&FAMILY), Some(&PaperSpec::default()))
@@ -53,7 +53,7 @@ pub static SOLID: LazyLock<Printing> = LazyLock::new(|| {
 static MESH: LazyLock<TexturedMesh> =
     LazyLock::new(|| TexturedMesh::new(&SOLID.target, Meshing::default()).unwrap());
 
-/// Stem of the files of an extension, which tells what is in them.
+/// Returns the stem of file names with an extension. It determines which kind of artifact the verifier expects.
 pub fn stem(extension: &str) -> &'static str {
     match extension {
         "dxf" => "t-panels",
@@ -62,7 +62,7 @@ pub fn stem(extension: &str) -> &'static str {
     }
 }
 
-/// Files that a mesh names.
+/// Returns the files that a mesh refers to.
 pub fn beside_mesh() -> [(&'static str, Vec<u8>); 2] {
     [
         ("t.mtl", obj_writer::material(&MESH).into_bytes()),
@@ -174,7 +174,7 @@ fn written(name: &str, write: impl Fn(&artwork::Artwork, &std::path::Path)) -> V
     std::fs::read(path).unwrap()
 }
 
-/// The page of the board as a picture.
+/// Returns the page of the board as an image.
 fn photograph() -> Gray<u8> {
     let folder = TempDir::new().unwrap();
     let path = folder.path().join("b.png");
@@ -185,7 +185,7 @@ fn photograph() -> Gray<u8> {
     }
 }
 
-/// A part of the page in a format for photographs.
+/// Returns a part of the page in an image format.
 fn part_as(format: ImageFormat) -> Vec<u8> {
     let page = photograph();
     let (width, height) = (page.width() as u32, page.height() as u32);

@@ -1,18 +1,18 @@
-//! Changes of JSON: a value, a key, an element.
+//! Mutations of JSON: a value, a key, an element.
 
 use serde_json::{Map, Value, json};
 
 use super::dice::Dice;
 use super::text::{NUMBERS, WORDS};
 
-/// Changes one thing; `None` for what is no JSON.
+/// Mutates one thing; `None` if the bytes are not JSON.
 pub fn change(bytes: &[u8], dice: &mut Dice) -> Option<Vec<u8>> {
     let mut root: Value = serde_json::from_slice(bytes).ok()?;
     let count = count(&root);
     let other = at(&mut root, &mut dice.below(count)).cloned();
     let spot = at(&mut root, &mut dice.below(count))?;
     match dice.below(8) {
-        // What stands elsewhere in the file.
+        // A value from elsewhere in the file.
         0 => *spot = other?,
         1 => *spot = dice.one_of(&[json!(null), json!(true), json!([]), json!(""), json!({})]),
         _ => inside(spot, dice),
@@ -33,7 +33,7 @@ fn inside(spot: &mut Value, dice: &mut Dice) {
             }
         }
         Value::String(_) => *spot = json!(dice.one_of(&WORDS)),
-        // What is no number of JSON becomes a word.
+        // Text that is not a valid JSON number becomes a string.
         _ => {
             let number = dice.one_of(&NUMBERS);
             *spot = serde_json::from_str(number).unwrap_or_else(|_| json!(number));
@@ -64,7 +64,7 @@ fn count(value: &Value) -> usize {
     }
 }
 
-/// The value of a number, counted from the root down.
+/// Returns the value with a number, counted from the root down.
 fn at<'a>(value: &'a mut Value, number: &mut usize) -> Option<&'a mut Value> {
     if *number == 0 {
         return Some(value);

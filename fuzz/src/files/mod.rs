@@ -1,11 +1,12 @@
-//! The readers of files, one by one, used by the fuzz targets and by the test `tests/it/files/readers.rs`.
+//! The file readers, used by the fuzz targets and by the test `tests/it/files/readers.rs`.
 //!
-//! Comes in: chance. Goes out: a file that was changed, and whether its reader keeps what must hold.
+//! A random mutation of a file is read, and the reader's guarantees are checked.
 //!
-//! 1. `reader` names the readers.
-//! 2. `good` makes a file that each reads without complaint.
-//! 3. `mutate` changes it, keeping its form: `text`, `json`, `png` and `pdf` each know one, `dice` is the chance.
-//! 4. `read` reads it, and panics where something holds that must not.
+//! 1. `reader` lists the readers.
+//! 2. `good` makes a valid file for each.
+//! 3. `mutate` changes it, preserving its format: `text`, `json`, `png` and `pdf` each handle one, `dice` generates
+//!    random numbers.
+//! 4. `read` reads it, and panics if a guarantee is violated.
 
 mod dice;
 mod good;

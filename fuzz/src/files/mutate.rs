@@ -1,26 +1,26 @@
-//! Changes of files that keep their form, so that they get past the door of a reader.
+//! Mutations that preserve the format of a file, so that it gets past the first checks of a reader.
 
 use super::dice::{Dice, noise};
 use super::{json, pdf, png, text};
 
-/// How files are built.
+/// File formats.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Form {
-    /// Anything.
+    /// Arbitrary bytes.
     Bytes,
     /// Lines, words and numbers.
     Text,
     /// JSON.
     Json,
-    /// PNG: chunks with check sums, packed pixels.
+    /// PNG: chunks with checksums, compressed pixels.
     Png,
-    /// PDF: objects, packed drawing instructions.
+    /// PDF: objects, compressed drawing instructions.
     Pdf,
-    /// glTF in one file: JSON and numbers.
+    /// glTF in one file: JSON and binary numbers.
     Glb,
 }
 
-/// Changes one thing; `None` for a file that has not the form.
+/// Mutates one thing; `None` if the file does not have the format.
 pub fn change(form: Form, bytes: &[u8], dice: &mut Dice) -> Option<Vec<u8>> {
     match form {
         Form::Bytes => Some(noise(bytes, dice)),
@@ -33,7 +33,7 @@ pub fn change(form: Form, bytes: &[u8], dice: &mut Dice) -> Option<Vec<u8>> {
     }
 }
 
-/// Changes the JSON, or the numbers behind it.
+/// Mutates the JSON, or the numbers after it.
 fn glb(bytes: &[u8], dice: &mut Dice) -> Option<Vec<u8>> {
     let word =
         |at: usize| Some(u32::from_le_bytes(bytes.get(at..at + 4)?.try_into().ok()?) as usize);

@@ -1,11 +1,11 @@
-//! Changes of a PDF: a value of an object, a drawing instruction.
+//! Mutations of a PDF: a value of an object, a drawing instruction.
 
 use lopdf::{Dictionary, Document, Object, StringFormat};
 
 use super::dice::Dice;
 use super::text::{self, WORDS};
 
-/// Changes one thing; `None` for what is no PDF.
+/// Mutates one thing; `None` if the bytes are not a PDF.
 pub fn change(bytes: &[u8], dice: &mut Dice) -> Option<Vec<u8>> {
     let mut document = Document::load_mem(bytes).ok()?;
     let ids: Vec<_> = document.objects.keys().copied().collect();
@@ -60,7 +60,7 @@ fn of_object(object: &mut Object, other: Object, dice: &mut Dice) {
     }
 }
 
-/// Keys that make a page more than what is drawn on it.
+/// Keys that change a page beyond its drawn content.
 const KEYS: [&str; 12] = [
     "Annots",
     "AA",

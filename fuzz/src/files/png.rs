@@ -1,4 +1,4 @@
-//! Changes of a PNG: its chunks, its pixels.
+//! Mutations of a PNG: its chunks, its pixels.
 
 use std::io::{Read, Write};
 
@@ -10,10 +10,10 @@ use super::dice::{Dice, noise};
 
 const SIGNATURE: &[u8] = b"\x89PNG\r\n\x1a\n";
 
-/// Most bytes of pixels that are unpacked to be changed.
+/// Maximum number of pixel bytes that are decompressed for mutation.
 const MOST_BYTES: u64 = 4 << 20;
 
-/// Changes one thing; `None` for what is no PNG.
+/// Mutates one thing; `None` if the bytes are not a PNG.
 pub fn change(bytes: &[u8], dice: &mut Dice) -> Option<Vec<u8>> {
     let mut chunks = chunks(bytes.strip_prefix(SIGNATURE)?)?;
     if chunks.is_empty() {

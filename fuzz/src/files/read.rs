@@ -1,4 +1,4 @@
-//! What each reader does with a file, and what must hold of what it has read. Tells whether it was let in.
+//! Runs each reader on a file, checks its guarantees, and returns whether it accepted the file.
 
 use std::path::Path;
 
@@ -16,7 +16,7 @@ use glam::{DVec2, DVec3};
 
 use super::good::{BOARD, SOLID};
 
-/// A file, and what is in it.
+/// A file and its content.
 pub struct File<'a> {
     pub path: &'a Path,
     pub bytes: &'a [u8],
@@ -28,7 +28,8 @@ impl File<'_> {
     }
 }
 
-/// About a hundredth of the default, so that what gets by shows soon: as much as the texture of a good mesh has.
+/// Returns limits of about a hundredth of the default, so that excessive use shows soon: just enough for the texture of
+/// a valid mesh.
 fn limits() -> Limits {
     let mut limits = Limits::default();
     (limits.max_bytes, limits.max_pixels) = (2_000_000, 2_500_000);
@@ -37,7 +38,7 @@ fn limits() -> Limits {
 }
 
 fn assert_finite(numbers: impl IntoIterator<Item = f64>) {
-    numbers.into_iter().for_each(|number| assert!(number.is_finite(), "{number} was let in"));
+    numbers.into_iter().for_each(|number| assert!(number.is_finite(), "{number} was accepted"));
 }
 
 pub fn target(file: File) -> bool {
@@ -46,7 +47,7 @@ pub fn target(file: File) -> bool {
         let corners = panel.corners.iter();
         assert!(corners.into_iter().all(|c| c.panel_mm.is_finite() && c.target_mm.is_finite()));
     }
-    let again = Printing::from_json(&target.to_json()).expect("what is written is read");
+    let again = Printing::from_json(&target.to_json()).expect("written files are readable");
     assert_eq!(again, target);
     true
 }
@@ -54,7 +55,7 @@ pub fn target(file: File) -> bool {
 pub fn detection(file: File) -> bool {
     let Some(Ok(found)) = file.text().map(detections::read) else { return false };
     assert_finite(found.grids.iter().flat_map(|grid| &grid.corners).flat_map(|c| [c.x, c.y]));
-    let again = detections::read(&detections::write(&found)).expect("what is written is read");
+    let again = detections::read(&detections::write(&found)).expect("written files are readable");
     assert_eq!(again, found);
     for list in
         [csv::write(&found), orpc::write(&found, None), orpc::write(&found, Some(&BOARD.target))]
@@ -74,13 +75,13 @@ pub fn sheet(file: File) -> bool {
 
 pub fn family(file: File) -> bool {
     let Some(Ok(family)) = file.text().map(Family::from_json) else { return false };
-    assert_eq!(Family::from_json(&family.to_json()).expect("what is written is read"), family);
+    assert_eq!(Family::from_json(&family.to_json()).expect("written files are readable"), family);
     true
 }
 
 pub fn camera(file: File) -> bool {
     let Some(Ok(camera)) = file.text().map(Camera::from_yaml) else { return false };
-    assert_eq!(Camera::from_yaml(&camera.to_yaml()).expect("what is written is read"), camera);
+    assert_eq!(Camera::from_yaml(&camera.to_yaml()).expect("written files are readable"), camera);
     for point in [DVec3::Z, DVec3::new(0.3, -0.2, 1.0), DVec3::new(1.0, 1.0, 1e-9), DVec3::NEG_Z] {
         assert!(camera.project(point).is_none_or(|pixel| pixel.is_finite()));
     }
@@ -108,7 +109,7 @@ pub fn dsc(file: File) -> bool {
     assert!(corners.into_iter().all(|c| c.panel_mm.is_finite() && c.target_mm.is_finite()));
     for dialect in [Dialect::Fork, Dialect::Original] {
         let Ok(text) = dsc::write(&list, dialect) else { continue };
-        dsc::read(&text, "b").expect("what is written is read");
+        dsc::read(&text, "b").expect("written files are readable");
     }
     true
 }

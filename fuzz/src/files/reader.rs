@@ -1,4 +1,4 @@
-//! The readers by name, and what a good and a changed file of each are.
+//! The readers by name, with a valid file and mutations for each.
 
 use std::fs;
 
@@ -8,13 +8,13 @@ use super::dice::Dice;
 use super::mutate::{self, Form};
 use super::{good, read};
 
-/// A reader of files.
+/// A file reader.
 pub struct Reader {
     /// Name of the fuzz target.
     pub name: &'static str,
-    /// How its files are built, that is what can be changed in one.
+    /// File format, which determines the mutations.
     pub form: Form,
-    /// Extension of a file's name.
+    /// Extension of its file names.
     extension: &'static str,
     good: fn() -> Vec<u8>,
     read: fn(read::File) -> bool,
@@ -62,12 +62,12 @@ const fn of(
 }
 
 impl Reader {
-    /// A file that is read without complaint.
+    /// Returns a valid file.
     pub fn good(&self) -> Vec<u8> {
         (self.good)()
     }
 
-    /// Reads a file, and tells whether it was let in. Panics where something holds that must not.
+    /// Reads a file, and returns whether the reader accepted it. Panics if a guarantee is violated.
     pub fn read(&self, bytes: &[u8]) -> bool {
         thread_local!(static FOLDER: TempDir = {
             let memory = std::path::Path::new("/dev/shm");
@@ -83,7 +83,7 @@ impl Reader {
             if self.name == "verify_obj" {
                 for (name, bytes) in good::beside_mesh() {
                     fs::write(folder.path().join(name), bytes)
-                        .expect("what a mesh names is written");
+                        .expect("the files of a mesh are written");
                 }
             }
             fs::write(&path, bytes).expect("the file is written");
@@ -91,12 +91,12 @@ impl Reader {
         })
     }
 
-    /// A file with some of it changed; now and then a good one, from which changes begin anew.
+    /// Returns a mutated file. Occasionally, it starts again from a valid one.
     pub fn changed(&self, bytes: &[u8], dice: &mut Dice) -> Vec<u8> {
         let again = bytes.is_empty() || dice.below(50) == 0;
         let mut changed = if again { self.good() } else { bytes.to_vec() };
         for _ in 0..=dice.below(3) {
-            // A file that has lost its form is begun anew.
+            // A file that has lost its format is replaced by a valid one.
             changed = match mutate::change(self.form, &changed, dice) {
                 Some(changed) => changed,
                 None => self.good(),

@@ -1,10 +1,10 @@
-//! Changes of text: its lines, its words, its numbers.
+//! Mutations of text: its lines, words and numbers.
 
 use std::ops::Range;
 
 use super::dice::Dice;
 
-/// Numbers on which readers stumble.
+/// Numbers that often break readers.
 pub const NUMBERS: [&str; 24] = [
     "0",
     "1",
@@ -32,7 +32,7 @@ pub const NUMBERS: [&str; 24] = [
     "123456789012345678901234567890",
 ];
 
-/// Words on which readers stumble.
+/// Words that often break readers.
 pub const WORDS: [&str; 12] = [
     "",
     "../../x",
@@ -48,7 +48,7 @@ pub const WORDS: [&str; 12] = [
     "\"",
 ];
 
-/// Changes one thing; `None` for what is no text.
+/// Mutates one thing; `None` if the bytes are not text.
 pub fn change(bytes: &[u8], dice: &mut Dice) -> Option<Vec<u8>> {
     let text = std::str::from_utf8(bytes).ok()?;
     let changed = match dice.below(10) {
@@ -59,7 +59,7 @@ pub fn change(bytes: &[u8], dice: &mut Dice) -> Option<Vec<u8>> {
     Some(changed.into_bytes())
 }
 
-/// Pieces of the text whose characters are all such.
+/// Returns the ranges of the text in which all characters satisfy `is_part`.
 fn pieces(text: &str, is_part: impl Fn(char) -> bool) -> Vec<Range<usize>> {
     let (mut pieces, mut start) = (Vec::new(), None);
     for (at, character) in text.char_indices().chain([(text.len(), '\0')]) {
@@ -102,7 +102,7 @@ fn word(text: &str, dice: &mut Dice) -> String {
     replaced(text, at, new)
 }
 
-/// Files without lines have elements or clauses.
+/// Mutates a line. Files without lines are split into elements or clauses.
 fn line(text: &str, dice: &mut Dice) -> String {
     let end = dice.one_of(&['\n', '\n', '>', ' ', ',']);
     let mut lines: Vec<&str> = text.split_inclusive(end).collect();
@@ -115,7 +115,7 @@ fn line(text: &str, dice: &mut Dice) -> String {
         1 => lines.insert(at, lines[other]),
         2 => lines.swap(at, other),
         3 => lines.truncate(at),
-        // Many times the same, up to a few kilobytes.
+        // Many repetitions, up to a few kilobytes.
         _ => {
             let times = 1 + dice.below(4096 / lines[at].len().max(1)).min(200);
             lines.splice(at..at, vec![lines[at]; times]);
