@@ -149,7 +149,7 @@ fn checked_note(note: &str) -> Result<&str, TargetError> {
             "the note has {count} characters, more than the maximum of {LONGEST_NOTE}: shorten it"
         )),
         None if note.trim().is_empty() => {
-            refused("the note is empty: omit the option or enter text".to_owned())
+            refused("the note is empty: omit it, or enter text".to_owned())
         }
         None => Ok(note.trim()),
     }

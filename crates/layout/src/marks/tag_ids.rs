@@ -25,16 +25,16 @@ pub(crate) fn add(target: &Target, sheets: &mut [SheetLayout]) -> Result<(), Tar
     let refused = |problem: String| Err(TargetError::invalid(PaperTagIds, problem));
     if target.panels.iter().all(|panel| panel.tags.is_empty()) {
         return refused(
-            "the target has no tags whose ids could be printed: omit this option".to_owned(),
+            "the target has no tags whose ids could be printed: omit this setting".to_owned(),
         );
     }
     if target.family.as_ref().is_some_and(|family| family.name == places::NAME) {
-        return refused("place codes have no ids to print: omit this option".to_owned());
+        return refused("place codes have no ids to print: omit this setting".to_owned());
     }
     for panel in &target.panels {
         if panel.inverted || panel.tags_in == TagsIn::White {
             return refused(
-                "the tiles beside the tags are black, so ids cannot be printed: omit this option"
+                "the tiles beside the tags are black, so ids cannot be printed: omit this setting"
                     .to_owned(),
             );
         }
