@@ -1,4 +1,4 @@
-// How long the detector takes in pictures of 1280 × 960 that the program rendered (`npm test` makes them), in this engine.
+// Times the detector in Node on images of 1280 × 960 px rendered by the program (`npm test` makes them).
 import { readFileSync } from "node:fs";
 import { dirname, join } from "node:path";
 import { fileURLToPath, pathToFileURL } from "node:url";
@@ -23,5 +23,5 @@ for (let i = 0; i < 5; i++) {
     found.free();
   }
   times.sort((a, b) => a - b);
-  console.log(`${i}.png, ${width} × ${height}, ${corners} corners: ${times[7].toFixed(1)} ms (least ${times[0].toFixed(1)})`);
+  console.log(`${i}.png, ${width} × ${height}, ${corners} corners: ${times[7].toFixed(1)} ms (minimum ${times[0].toFixed(1)})`);
 }

@@ -1,4 +1,4 @@
-// Makes the package `deltille` for npm, in npm-package, of the modules in pkg. Its version is that of the library.
+// Makes the npm package `deltille`, in npm-package, from the modules in pkg. It has the version of the library.
 import { cpSync, mkdirSync, readFileSync, readdirSync, rmSync, writeFileSync } from "node:fs";
 import { dirname, join } from "node:path";
 import { fileURLToPath } from "node:url";

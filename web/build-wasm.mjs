@@ -1,5 +1,5 @@
-// Builds the library as five modules, which the page loads when it needs them: `make` draws targets, `prove` reads their files
-// back, `photo` decodes photographs, `see` finds corners, `solve` calibrates. Needs the Rust target wasm32-unknown-unknown.
+// Builds the library as five modules, which the page loads on demand: `make` draws targets, `prove` verifies their files, `photo`
+// decodes photographs, `see` detects corners, `solve` calibrates. Needs the Rust target wasm32-unknown-unknown.
 //
 //     node build-wasm.mjs [MODULE…]
 import { execFileSync } from "node:child_process";
@@ -17,7 +17,7 @@ const all = ["make", "prove", "photo", "see", "solve"];
 const parts = process.argv.slice(2);
 const unknown = parts.find((part) => !all.includes(part));
 if (unknown !== undefined) {
-  console.error(`${unknown}: there is no such module, only ${all.join(", ")}`);
+  console.error(`unknown module ${unknown} (known: ${all.join(", ")})`);
   process.exit(1);
 }
 

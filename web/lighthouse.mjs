@@ -1,5 +1,5 @@
-// Measures the built page (dist) by Lighthouse in Debian's Chromium (/usr/bin/chromium, or CHROMIUM), as a phone and as a desk, and fails
-// where accessibility or best practices are below 95.
+// Measures the built page (dist) with Lighthouse in Debian's Chromium (/usr/bin/chromium, or CHROMIUM), as a phone and as a
+// desktop. Fails if accessibility or best practices score below 95.
 import { preview } from "vite";
 import { launch } from "chrome-launcher";
 import lighthouse, { desktopConfig } from "lighthouse";
@@ -12,7 +12,7 @@ const browser = await launch({ chromePath: process.env.CHROMIUM ?? "/usr/bin/chr
 let isGood = true;
 try {
   for (const part of ["make", "see", "calibrate", "families"]) {
-    for (const [name, config] of [["phone", undefined], ["desk", desktopConfig]]) {
+    for (const [name, config] of [["phone", undefined], ["desktop", desktopConfig]]) {
       const { lhr } = await lighthouse(`http://127.0.0.1:4174/#${part}`, { port: browser.port, onlyCategories: asked, logLevel: "error" }, config);
       const scores = asked.map((category) => [category, Math.round(100 * lhr.categories[category].score)]);
       console.log(`${part}, ${name}: ${scores.map(([category, score]) => `${category} ${score}`).join(", ")}`);

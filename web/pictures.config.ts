@@ -1,4 +1,4 @@
 import config from "./playwright.config";
 
-// Makes the pictures of README.md.
+// Takes the screenshots of README.md.
 export default { ...config, projects: [{ testMatch: "readme.ts" }] };

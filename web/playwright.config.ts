@@ -3,15 +3,15 @@ import { fileURLToPath } from "node:url";
 
 const video = fileURLToPath(new URL("./test-results/webcam.y4m", import.meta.url));
 
-// Debian's Chromium, with a webcam that shows a board.
+// Debian's Chromium, with a fake webcam that shows a board.
 export default defineConfig({
   testDir: "tests",
   timeout: 120_000,
-  // Beside other work a page may be slow to answer.
+  // The page may respond slowly on a busy machine.
   expect: { timeout: 20_000 },
   workers: 2,
   fullyParallel: true,
-  // What is measured has the machine for itself.
+  // Timing tests run alone.
   projects: [
     { name: "journeys", testMatch: "journeys.spec.ts" },
     { name: "times", testMatch: "times.spec.ts", dependencies: ["journeys"], fullyParallel: false },

@@ -1,5 +1,5 @@
-// Makes samples/board.png, the rendered picture of a board that comes along with the page, by the program
-// (target/release/deltille, or DELTILLE_PROGRAM): a board with tags on a desk, in light that falls off.
+// Renders samples/board.png, a sample image of the page, with the program (target/release/deltille, or DELTILLE_PROGRAM):
+// a board with tags on a desk, in uneven light.
 import { execFileSync } from "node:child_process";
 import { copyFileSync, mkdtempSync, rmSync } from "node:fs";
 import { tmpdir } from "node:os";

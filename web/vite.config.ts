@@ -3,7 +3,7 @@ import { readFileSync, readdirSync, writeFileSync } from "node:fs";
 import { join } from "node:path";
 import { type Plugin, defineConfig } from "vite";
 
-/** What is kept from the beginning, so that the page works without a network once it was loaded: all but the pictures. */
+/** Files cached at installation, so that the page works offline once loaded: all except images. */
 const KEPT = /\.(html|js|css|svg|wasm|json)$/;
 
 /** Writes the service worker with the names of all files, and a version that changes with any of them. */
@@ -29,7 +29,7 @@ function offline(): Plugin {
   };
 }
 
-// Relative addresses: the folder is served from anywhere.
+// Relative addresses, so that the folder can be served from any path.
 export default defineConfig({
   base: "./",
   build: { target: "es2022", outDir: "dist", assetsInlineLimit: 0, chunkSizeWarningLimit: 800 },

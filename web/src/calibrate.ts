@@ -1,4 +1,4 @@
-// Calibrate: from the photographs that were looked at, or from a webcam.
+// Calibrate: from processed photographs, or from a webcam.
 import { el, field, save, select } from "./dom";
 import { looking } from "./library";
 import { type Shot, made, seen, stem } from "./shared";
@@ -10,17 +10,17 @@ export function calibrate(): HTMLElement {
   let model = "radtan";
   let taken: Shot[] = [];
   let stream: MediaStream | null = null;
-  /** Whether pictures are taken where they are proposed, or wherever they are new. */
+  /** Whether images are captured at proposed poses, or at any new pose. */
   let guided = true;
   let next: Next | null = null;
-  /** What the pictures so far cover, and which these are. */
+  /** Image coverage so far, and the inputs it was computed from. */
   let survey: Survey | null = null;
   let surveyOf: string[] = [];
-  /** What the camera that is shown was calibrated from. */
+  /** Inputs of the calibration shown. */
   let solvedOf: string[] = [];
-  /** In what the webcam is watched; nothing where that begins anew. */
+  /** Mode and model of the running webcam session; null to restart it. */
   let watched: string | null = null;
-  /** Frames that were looked at since the page was opened. */
+  /** Frames processed since the page was opened. */
   let frames = 0;
 
   const count = el("p", { class: "facts", "aria-live": "polite" });
@@ -40,9 +40,9 @@ export function calibrate(): HTMLElement {
   const forget = el("button", { type: "button", hidden: true, click: () => forgetAll() }, words.calibrate.forget);
   const webcam = el("button", { type: "button", click: () => void (stream ? stop() : start()) }, words.calibrate.webcam);
 
-  /** The pictures of the webcam, else the photographs: these are of different cameras. */
+  /** The webcam's images if there are any, otherwise the photographs: they come from different cameras. */
   const shots = () => (stream || taken.length > 0 ? taken : seen.shots.filter((shot) => shot.labelled));
-  /** What a camera is calibrated from. */
+  /** Inputs of a calibration. */
   const given = () => [target(), model, ...shots().map(({ json }) => json)];
   const isSame = (one: string[], other: string[]) => one.length === other.length && one.every((part, i) => part === other[i]);
   const target = () => (seen.sought && "target" in seen.sought ? seen.sought.target : made.json);
@@ -54,19 +54,19 @@ export function calibrate(): HTMLElement {
     if (location.hash.startsWith("#calibrate")) void look();
   }
 
-  /** Shows what the pictures cover, where these are others than before. */
+  /** Shows the image coverage if the inputs changed. */
   async function look(): Promise<void> {
     const all = shots();
     const of = given();
     if (isSame(of, surveyOf)) return;
     surveyOf = of;
-    // What was wrong with others.
+    // An earlier problem concerned other inputs.
     problem.hidden = true;
     let found: Survey | null = null;
     try {
       found = all.length > 0 ? await looking.call("survey", target(), all.map(({ json }) => json), all.map(({ name }) => stem(name)), model) : null;
     } catch {
-      // What is wrong with the pictures is said where a camera is asked for.
+      // Calibrating reports problems with the images.
     }
     if (of !== surveyOf) return;
     survey = found;
@@ -81,7 +81,7 @@ export function calibrate(): HTMLElement {
     tally();
   }
 
-  function tell(error: unknown): void {
+  function showError(error: unknown): void {
     problem.textContent = error instanceof Error && error.message ? error.message : words.failed;
     problem.hidden = false;
   }
@@ -90,7 +90,7 @@ export function calibrate(): HTMLElement {
     problem.hidden = true;
     tally();
     if (shots().length === 0) {
-      tell(new Error(words.calibrate.noShots));
+      showError(new Error(words.calibrate.noShots));
       return;
     }
     result.replaceChildren(el("p", { class: "busy" }, words.calibrate.solving));
@@ -103,7 +103,7 @@ export function calibrate(): HTMLElement {
       solvedOf = [];
       tally();
       result.replaceChildren();
-      tell(error);
+      showError(error);
     }
   }
 
@@ -112,7 +112,7 @@ export function calibrate(): HTMLElement {
     const digits = (value: number, sd: number | null) => (sd && sd > 0 ? value.toFixed(Math.max(0, 2 - Math.floor(Math.log10(sd)))) : value.toPrecision(7));
     const rows = figures.names.flatMap((name, i) => {
       const [value = 0, sd = null] = [figures.values[i], figures.sd[i]];
-      // What the model does not have.
+      // The model does not have this parameter.
       if (sd === null && value === 0) return [];
       return el("tr", {}, el("th", { scope: "row" }, name), el("td", {}, digits(value, sd)), el("td", {}, sd ? sd.toPrecision(2) : ""));
     });
@@ -126,14 +126,14 @@ export function calibrate(): HTMLElement {
     );
   }
 
-  /** Shows what is proposed, or that it is not asked for. */
+  /** Shows a proposed pose, or hides it. */
   function propose(proposed: Next | null): void {
     next = proposed;
     for (const part of [wish, state, elsewhere]) part.hidden = next === null;
     if (!next) return;
-    const { words: told, uncertainty_px: px, expected_px: then, enough } = next;
+    const { words: proposal, uncertainty_px: px, expected_px: then, enough } = next;
     const sure = px === null ? "" : words.calibrate.guided(px, then);
-    wish.textContent = enough ? `${words.calibrate.enough} ${sure}` : `${told.charAt(0).toUpperCase()}${told.slice(1)}. ${sure}`;
+    wish.textContent = enough ? `${words.calibrate.enough} ${sure}` : `${proposal.charAt(0).toUpperCase()}${proposal.slice(1)}. ${sure}`;
   }
 
   async function refuse(): Promise<void> {
@@ -142,13 +142,13 @@ export function calibrate(): HTMLElement {
 
   async function start(): Promise<void> {
     if (!target()) {
-      tell(new Error(words.calibrate.noTarget));
+      showError(new Error(words.calibrate.noTarget));
       return;
     }
     try {
       stream = await navigator.mediaDevices.getUserMedia({ video: { width: { ideal: 1280 }, facingMode: "environment" } });
     } catch {
-      tell(new Error(words.calibrate.denied));
+      showError(new Error(words.calibrate.denied));
       return;
     }
     problem.hidden = true;
@@ -174,7 +174,7 @@ export function calibrate(): HTMLElement {
 
   async function watch(): Promise<void> {
     const context = over.getContext("2d");
-    // A frame is shown with what was found in it, not before.
+    // A frame is drawn together with its detection, not before.
     const hidden = el("canvas", {});
     const frame = hidden.getContext("2d", { willReadFrequently: true });
     let rate = 0;
@@ -188,7 +188,7 @@ export function calibrate(): HTMLElement {
       }
       if (over.width !== width || over.height !== height) [over.width, over.height, hidden.width, hidden.height] = [width, height, width, height];
       try {
-        // The first frame, another model and another way to take pictures begin anew, with what was taken.
+        // The first frame, another model or another capture mode starts a new session, with the images captured so far.
         const asking = guided ? `${model} ${width} ${height}` : "";
         if (asking !== watched) {
           watched = asking;
@@ -198,7 +198,7 @@ export function calibrate(): HTMLElement {
           propose(begun);
         }
       } catch (error) {
-        tell(error);
+        showError(error);
         guided = false;
         way.value = "free";
         continue;
@@ -207,16 +207,16 @@ export function calibrate(): HTMLElement {
       const { data } = frame.getImageData(0, 0, width, height);
       const name = `webcam-${String(taken.length).padStart(3, "0")}`;
       try {
-        // The pixels are handed over, and come back with what was found.
+        // The pixel buffer is transferred, and comes back with the detection.
         const found = await looking.handing([data.buffer], "frame", { target: target() }, name, width, height, data, begin / 1000);
         if (!stream) break;
         context.putImageData(new ImageData(found.pixels as Uint8ClampedArray<ArrayBuffer>, width, height), 0, 0);
-        // Without a proposal it is of use to see where no corners were yet.
+        // Without a proposal, show where corners are still missing.
         if (!guided && survey) tint(context, survey);
         const corners = mark(context, found.json);
         if (takeNow && corners === 0) {
           takeNow = false;
-          tell(new Error(words.calibrate.held.unseen));
+          showError(new Error(words.calibrate.held.unseen));
         }
         if (next) outline(context, next, found.held);
         state.textContent = found.held ? (words.calibrate.held[found.held.held] ?? "") : "";
@@ -229,7 +229,7 @@ export function calibrate(): HTMLElement {
         }
       } catch (error) {
         stop();
-        tell(error);
+        showError(error);
         return;
       }
       frames += 1;
@@ -241,7 +241,7 @@ export function calibrate(): HTMLElement {
     if (stream) stop();
   }
 
-  /** The outline in which the board is to be held, with an arrow to its upper side; it fills while the board is held there. */
+  /** Draws the proposed outline of the board, with an arrow to its upper side; it fills while the board is held there. */
   function outline(context: CanvasRenderingContext2D, { outlines_px, upwards_px }: Next, held: Holding | null): void {
     const there = held?.held === "steady" || held?.held === "taken";
     context.save();
@@ -271,7 +271,7 @@ export function calibrate(): HTMLElement {
     context.restore();
   }
 
-  /** Tints what is covered already of the picture. */
+  /** Tints the covered part of the image. */
   function tint(context: CanvasRenderingContext2D, survey: Survey): void {
     const { width, height } = context.canvas;
     if (survey.size_px[0] !== width || survey.size_px[1] !== height) return;
@@ -282,7 +282,7 @@ export function calibrate(): HTMLElement {
     });
   }
 
-  /** Marks the labelled corners of a frame, and counts them. */
+  /** Marks and counts the labelled corners of a frame. */
   function mark(context: CanvasRenderingContext2D, json: string): number {
     const { grids } = JSON.parse(json) as { grids: { panel: number | null; corners: { x: number; y: number }[] }[] };
     const corners = grids.filter((grid) => grid.panel !== null).flatMap((grid) => grid.corners);

@@ -1,4 +1,4 @@
-// Elements made in one expression.
+// Elements created in one expression.
 type Attributes = Record<string, string | number | boolean | ((event: Event) => void) | undefined>;
 type Child = Node | string | null | undefined;
 
@@ -16,7 +16,7 @@ export function el<K extends keyof HTMLElementTagNameMap>(tag: K, attributes: At
 
 const SVG = "http://www.w3.org/2000/svg";
 
-/** The same of a drawing. */
+/** Creates an SVG element. */
 export function shape(tag: string, attributes: Record<string, string | number>, ...children: (Node | string)[]): SVGElement {
   const made = document.createElementNS(SVG, tag);
   for (const [name, value] of Object.entries(attributes)) made.setAttribute(name, String(value));
@@ -40,7 +40,7 @@ export function select(options: [string, string][], value: string, changed: (val
   return made;
 }
 
-/** A place for files to be dropped; they may miss it, as nothing else on the page takes files. */
+/** A drop area for files. A drop anywhere on the page counts, as nothing else takes files. */
 export function dropZone(take: (files: File[]) => void, ...children: Child[]): HTMLElement {
   const zone = el("div", { class: "drop" }, ...children);
   const over = (isOver: boolean) => () => zone.classList.toggle("over", isOver);
@@ -53,27 +53,27 @@ export function dropZone(take: (files: File[]) => void, ...children: Child[]): H
   return zone;
 }
 
-/** What was dropped, with what is in folders in their place. */
+/** The dropped files, with folders replaced by the files in them. */
 async function filesOf({ items }: DataTransfer): Promise<File[]> {
-  // Asked for at once, as nothing is left of it a moment later.
+  // Read at once: the browser clears the items after the event.
   const all = [...items].map((item) => ({ file: item.getAsFile(), entry: item.webkitGetAsEntry() }));
   const files = await Promise.all(all.map(({ file, entry }) => (entry?.isDirectory ? within(entry).catch(() => (file ? [file] : [])) : file ? [file] : [])));
   return files.flat();
 }
 
 async function within(entry: FileSystemEntry): Promise<File[]> {
-  // What systems leave in folders for themselves.
+  // Skip hidden files of the operating system.
   if (entry.name.startsWith(".")) return [];
   if (entry.isFile) return [await new Promise<File>((resolve, reject) => (entry as FileSystemFileEntry).file(resolve, reject))];
   const reader = (entry as FileSystemDirectoryEntry).createReader();
   const all: FileSystemEntry[] = [];
-  // A part at a time, until there is none.
+  // `readEntries` returns a batch at a time, and an empty one at the end.
   for (let part; (part = await new Promise<FileSystemEntry[]>((resolve, reject) => reader.readEntries(resolve, reject))).length > 0; ) all.push(...part);
   all.sort((one, other) => (one.name < other.name ? -1 : 1));
   return (await Promise.all(all.map(within))).flat();
 }
 
-/** Offers a file to be saved. */
+/** Offers a file for download. */
 export function save(name: string, content: BlobPart, type = "application/octet-stream"): void {
   const url = URL.createObjectURL(new Blob([content], { type }));
   const link = el("a", { href: url, download: name });
@@ -81,7 +81,7 @@ export function save(name: string, content: BlobPart, type = "application/octet-
   setTimeout(() => URL.revokeObjectURL(url), 10_000);
 }
 
-/** Does a work that takes time: while it is done, the last of those that are asked for waits. */
+/** Runs slow work one call at a time. Calls made meanwhile are merged into one run at the end. */
 export function latest(work: (isStale: () => boolean) => Promise<void>): () => Promise<void> {
   let isBusy = false;
   let isAsked = false;
@@ -97,7 +97,7 @@ export function latest(work: (isStale: () => boolean) => Promise<void>): () => P
   };
 }
 
-/** Runs what comes last, a moment after the last call. */
+/** Debounces: runs the last call after `ms` without another one. */
 export function settled<A extends unknown[]>(work: (...given: A) => void, ms: number): (...given: A) => void {
   let timer = 0;
   return (...given) => {

@@ -1,4 +1,4 @@
-// Families: codes of tags, damaged and decoded.
+// Families: codes of tags, damaged and decoded interactively.
 import { el, field, select, shape } from "./dom";
 import { RATES, bar, falsePositives, reading, sizes } from "./family-figures";
 import { drawing as looking } from "./library";
@@ -8,7 +8,7 @@ import type { FamilyFigures } from "./worker";
 
 type Family = { figures: FamilyFigures; cells: [number, number][][]; codes: bigint[] };
 
-/** Cells that a turn exchanges in a circle, from one on: the content of each goes to the next. */
+/** The cycle of cells that a rotation permutes, starting from one: the content of each moves to the next. */
 function cycleOf(bit: number, rotation: number[]): number[] {
   const cycle = [bit];
   for (let at = rotation.indexOf(bit); at !== bit; at = rotation.indexOf(at)) cycle.push(at);
@@ -17,11 +17,11 @@ function cycleOf(bit: number, rotation: number[]): number[] {
 
 export function families(): HTMLElement {
   let family: Family | null = null;
-  /** The family that was asked for last. */
+  /** The family requested last. */
   let asked = "";
   let id = 0;
   let word = 0n;
-  /** The code of the tag and how it is turned. */
+  /** The code of the tag, and its number of rotation steps. */
   let code = 0n;
   let turns = 0;
   const chooser = el("div", {});
@@ -47,12 +47,12 @@ export function families(): HTMLElement {
     const shares = await looking.call("reading", name, RATES);
     if (name !== asked) return;
     figures.replaceChildren(sizes(family.figures), reading(shares, family.figures.correctable));
-    // Of large families this takes a second or two.
+    // Takes a second or two for large families.
     const rates = await looking.call("falsePositives", name);
     if (name === asked) figures.append(falsePositives(rates, family.figures.kind));
   }
 
-  /** By how much a tag is turned, degrees. */
+  /** One rotation step, degrees. */
   const angle = () => 360 / (family?.figures.turns ?? 3);
 
   function pick(wanted: number): void {
@@ -111,7 +111,7 @@ export function families(): HTMLElement {
       return cell;
     });
     const ring = shape("polygon", { class: "cycle" });
-    /** Shows where a turn takes the content of a cell; of none how many circles there are. */
+    /** Shows where a rotation moves the content of a cell; without a cell, the number of cycles. */
     const show = (bit: number | null) => {
       if (!family) return;
       const { rotation, turns: all } = family.figures;
@@ -122,7 +122,7 @@ export function families(): HTMLElement {
       cycles.textContent = bit === null ? words.families.cycles(angle(), (rotation.length - stay) / all, all, stay) : words.families.cycle(angle(), cycle.map((bit) => bit + 1));
     };
     const top = isSquare ? 1 : height;
-    // The frame of tags has y up; of triangles its axes are 60° apart.
+    // The tag frame has y up; for triangles its axes are 60° apart.
     const axes = isSquare ? "matrix(1 0 0 -1 0 1)" : `matrix(1 0 0.5 ${-height} 0 ${height})`;
     const all = shape("g", { transform: axes }, shape("polygon", { points: outline, class: "border" }), ...cells, ring);
     tag.replaceChildren(shape("svg", { viewBox: `-0.02 -0.02 1.04 ${top + 0.04}` }, all));

@@ -1,12 +1,12 @@
-// The library, in workers, so that the page never waits. Modules are loaded when they are first asked for.
+// The library, in workers, so that the page never blocks. Modules are loaded on first use.
 import type { Calls, Name } from "./worker";
 
 type Waiting = { resolve: (value: unknown) => void; reject: (error: Error) => void };
 
-/** A message of the library, which is one sentence to show. */
+/** An error of the library, whose message is one sentence for the user. */
 export class LibraryError extends Error {}
 
-class Door {
+class Client {
   private worker: Worker | null = null;
   private waiting = new Map<number, Waiting>();
   private next = 0;
@@ -15,7 +15,7 @@ class Door {
     return this.handing([], name, ...given);
   }
 
-  /** The same, with buffers that are handed over instead of copied. */
+  /** Like `call`, but transfers buffers instead of copying them. */
   handing<N extends Name>(buffers: Transferable[], name: N, ...given: Parameters<Calls[N]>): Promise<Awaited<ReturnType<Calls[N]>>> {
     const id = ++this.next;
     return new Promise((resolve, reject) => {
@@ -39,7 +39,7 @@ class Door {
     return worker;
   }
 
-  /** After a failure within, the module is in no state to go on: the next call starts it anew. */
+  /** Ends a worker after a crash, which leaves the module unusable; the next call starts a new one. */
   private end(worker: Worker): void {
     worker.terminate();
     if (this.worker === worker) this.worker = null;
@@ -48,11 +48,11 @@ class Door {
   }
 }
 
-/** Draws targets, at once. */
-export const drawing = new Door();
-/** Makes solids in space, which takes seconds. */
-export const folding = new Door();
-/** Proves files, which takes seconds. */
-export const proving = new Door();
-/** Looks at pictures, and calibrates. */
-export const looking = new Door();
+/** Draws targets, immediately. */
+export const drawing = new Client();
+/** Builds 3D solids, which takes seconds. */
+export const folding = new Client();
+/** Verifies files, which takes seconds. */
+export const proving = new Client();
+/** Detects targets in images, and calibrates. */
+export const looking = new Client();

@@ -1,4 +1,4 @@
-// The page: four parts, of which one is shown; the address says which, and with what settings.
+// The page: four parts, one shown at a time. The address selects the part and its settings.
 import { families } from "./families";
 import { calibrate } from "./calibrate";
 import { el } from "./dom";
@@ -32,7 +32,7 @@ function show(): void {
   }
 }
 
-// The address says which part is shown: going to the content must not change it.
+// The address selects the part shown, so skipping to the content must not change it.
 const skip = document.querySelector(".skip") as HTMLElement;
 skip.textContent = words.skip;
 skip.addEventListener("click", (event) => {
@@ -47,11 +47,11 @@ for (const part of Object.keys(parts) as Part[]) {
 const footer = document.getElementById("footer") as HTMLElement;
 const version = el("span");
 footer.append(el("p", {}, words.privacy), el("p", {}, version));
-// A file that is dropped beside its place must not take the place of the page.
+// A file dropped outside the drop area must not replace the page.
 for (const name of ["dragover", "drop"]) window.addEventListener(name, (event) => event.preventDefault());
 window.addEventListener("hashchange", show);
 show();
 drawing.call("version").then((of) => version.replaceChildren(words.version(of)), () => undefined);
 
-// Once loaded, the page works without a network.
+// Once loaded, the page works offline.
 if ("serviceWorker" in navigator && import.meta.env.PROD) void navigator.serviceWorker.register("./sw.js").catch(() => undefined);

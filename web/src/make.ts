@@ -1,4 +1,4 @@
-// Make: settings, the sheet as it will be printed, files, and their proof.
+// Make: settings, a preview of the printed sheet, files, and their verification.
 import { dropZone, el, field, latest, save, select, settled } from "./dom";
 import { LibraryError, drawing, folding, proving } from "./library";
 import { type Settings, asked, isKind, isSolid, nameOf, ofTemplate, query, read, settled as settingsOf, template, PLACES, USUAL_FAMILY } from "./settings";
@@ -8,7 +8,7 @@ import { templates } from "./templates";
 import { words } from "./words";
 import type { FamilyFacts, Pages } from "./worker";
 
-/** Formats that the library writes, and how they are proved by name. */
+/** Formats that the library writes, and their labels. */
 const formats: [string, string][] = [
   ["pdf", "PDF"],
   ["svg", "SVG"],
@@ -23,22 +23,22 @@ const solidFormats: [string, string][] = [
   ["net", "DXF (net)"],
   ["panels", "DXF (panels)"],
 ];
-/** A description proves nothing: the others are compared with it. */
+/** The description is not verified: the other files are compared with it. */
 const PROVED_BY_ALL = "json";
 const types: Record<string, string> = { pdf: "application/pdf", svg: "image/svg+xml", png: "image/png", json: "application/json" };
-/** Ids are numbers of 32 bits. */
+/** Ids are 32-bit numbers. */
 const MOST_IDS = 2 ** 32 - 1;
 const papers = ["A5", "A4", "A3", "A2", "A1", "A0", "letter", "legal", "tabloid"];
 
 export function make(): HTMLElement {
   let settings: Settings = read(location.hash.split("?")[1] ?? "");
-  /** The address as it was last read or written. */
+  /** The address as last read or written. */
   let addressed = location.hash;
   let pages: Pages | null = null;
   let at = 0;
   let isTurning = false;
   let folded: Folding | null = null;
-  /** The settings of the solid that is shown. */
+  /** The settings of the solid shown. */
   let foldedOf = "";
   let families: FamilyFacts[] = [];
   let familyChoice: HTMLSelectElement;
@@ -99,7 +99,7 @@ export function make(): HTMLElement {
     if (!isSquare) options.push([PLACES, text.places]);
     options.push(["", text.noTags]);
     const usualFamily = isSquare ? "" : USUAL_FAMILY;
-    // What a link or a template gave stays to be seen.
+    // Keep a family from a link or template visible, even if it is unknown.
     if (settings.family && !options.some(([name]) => name === settings.family)) options.push([settings.family, settings.family]);
     const sizes = settings.paper === null || papers.includes(settings.paper) ? papers : [...papers, settings.paper];
     familyChoice = select(options, settings.family ?? usualFamily, (family) => changed(family === PLACES ? { family, tag_spacing: null, first_id: 0 } : { family }, true));
@@ -173,20 +173,20 @@ export function make(): HTMLElement {
       fold.hidden = hinges.length === 0;
       folded.unfold(Number(slider.value) / 100);
     } catch (error) {
-      // What is wrong with settings is said where the sheet is drawn.
-      if (pages && of === asked(settings)) tell(error);
+      // Drawing the sheet reports wrong settings.
+      if (pages && of === asked(settings)) showError(error);
     } finally {
       making.hidden = true;
     }
   });
 
-  function tell(error: unknown): void {
+  function showError(error: unknown): void {
     const text = error instanceof Error ? error.message : String(error);
     problem.textContent = text || words.failed;
     problem.hidden = false;
   }
 
-  /** What is wrong with a number, which the library would tell in its own words. */
+  /** The message about an invalid number; the library's own message would not name the form field. */
   function mistaken(numbers: Iterable<HTMLInputElement>): string | undefined {
     const wrong = [...numbers].find((control) => !control.validity.valid);
     const details = wrong?.closest("details");
@@ -205,7 +205,7 @@ export function make(): HTMLElement {
     } catch (error) {
       if (isStale()) return;
       show(null);
-      tell(error);
+      showError(error);
     }
   });
 
@@ -214,7 +214,7 @@ export function make(): HTMLElement {
     void redraw();
   }
 
-  /** The sheet that was drawn; nothing where there is none. */
+  /** Shows the sheet that was drawn, or null after an error. */
   function show(drawn: Pages | null): void {
     pages = drawn;
     picture.classList.toggle("past", !drawn);
@@ -227,13 +227,13 @@ export function make(): HTMLElement {
     made.name = settings.name;
     problem.hidden = true;
     turnTo(Math.min(at, drawn.pages.length - 1));
-    tellFacts(drawn);
-    // The form stays as it is, as somebody may be typing in it.
+    showFacts(drawn);
+    // Do not rebuild the form: the user may be typing in it.
     if (settings.family === null) familyChoice.value = drawn.family ?? "";
   }
 
   const address = settled(() => {
-    // A link that was just followed is yet to be read.
+    // A link that was just followed has not been read yet.
     if (!form.isConnected || location.hash !== addressed) return;
     const of = query(settings);
     history.replaceState(null, "", `#make${of ? `?${of}` : ""}`);
@@ -260,13 +260,13 @@ export function make(): HTMLElement {
     );
   }
 
-  function tellFacts({ pages, reach, family }: Pages): void {
+  function showFacts({ pages, reach, family }: Pages): void {
     facts.textContent = words.make.facts(reach.corners, reach.tags, pages.length);
     if (reach.tags > 0 && family !== PLACES) facts.textContent += ` ${words.make.idsLeft(reach.ids_left, family ?? "")}`;
     void showRange();
   }
 
-  /** From where a camera can use it, as the library has it. */
+  /** Shows the working range of a camera, as computed by the library. */
   async function showRange(): Promise<void> {
     const mistake = mistaken([view, pixels]);
     if (mistake || !pages) {
@@ -276,8 +276,8 @@ export function make(): HTMLElement {
     const { reach } = pages;
     const found = await drawing.call("distances", asked(settings), Number(view.value), Number(pixels.value)).catch(() => undefined);
     if (found === undefined || reach !== pages?.reach) return;
-    const told = (mm: number) => (mm >= 1000 ? `${(mm / 1000).toFixed(1)} m` : `${(mm / 10).toFixed(0)} cm`);
-    range.textContent = found ? words.make.range(told(found[0]), told(found[1]), reach.tags > 0) : words.make.never;
+    const length = (mm: number) => (mm >= 1000 ? `${(mm / 1000).toFixed(1)} m` : `${(mm / 10).toFixed(0)} cm`);
+    range.textContent = found ? words.make.range(length(found[0]), length(found[1]), reach.tags > 0) : words.make.never;
   }
 
   async function download(format: string): Promise<void> {
@@ -285,11 +285,11 @@ export function make(): HTMLElement {
       const files = await drawing.call("files", asked(settings), format);
       for (const { name, bytes } of files) save(name, bytes as Uint8Array<ArrayBuffer>, types[format]);
     } catch (error) {
-      tell(error);
+      showError(error);
     }
   }
 
-  /** Proves all files, each with a line as the program prints it. */
+  /** Verifies all files, each with the line that `deltille verify` prints. */
   async function prove(): Promise<void> {
     const of = asked(settings);
     const lines = el("ul", { class: "lines" });
@@ -309,10 +309,10 @@ export function make(): HTMLElement {
         lines.append(el("li", { class: proof.passed ? "passed" : "refused" }, proof.line, findings.length > 0 ? el("ul", {}, ...findings) : ""));
       } catch (error) {
         if (of !== asked(settings)) return;
-        // What the library says is why there is no such file; else it stopped, and nothing is proved.
-        const told = error instanceof LibraryError ? error.message : "";
-        if (!told) failed = true;
-        lines.append(el("li", { class: told ? "plain" : "refused" }, `${name}: ${told || words.failed}`));
+        // A message of the library says why this file does not exist. Without one it crashed, and nothing is verified.
+        const reason = error instanceof LibraryError ? error.message : "";
+        if (!reason) failed = true;
+        lines.append(el("li", { class: reason ? "plain" : "refused" }, `${name}: ${reason || words.failed}`));
       }
       sum.textContent = words.make.proving(index + 1, all.length);
     }
@@ -339,7 +339,7 @@ export function make(): HTMLElement {
       fill();
       draw();
     } catch (error) {
-      tell(new LibraryError(`${file.name}: ${error instanceof SyntaxError || !(error instanceof Error) ? words.make.noSettings : error.message}`));
+      showError(new LibraryError(`${file.name}: ${error instanceof SyntaxError || !(error instanceof Error) ? words.make.noSettings : error.message}`));
     }
   }
 
@@ -385,7 +385,7 @@ export function make(): HTMLElement {
     addressed = location.hash;
     const [part, of = ""] = addressed.slice(1).split("?");
     if (part !== "make" || of === query(settings)) return;
-    // A link to this part carries no settings: the address does again.
+    // A plain link to this part has no settings: write the current ones into the address.
     if (!location.hash.includes("?")) {
       address();
       return;
@@ -399,7 +399,7 @@ export function make(): HTMLElement {
   drawing.call("families").then((all) => {
     families = all;
     fill();
-  }, tell);
+  }, showError);
 
   return el(
     "section",

@@ -1,13 +1,13 @@
-// Meshes of other formats as OBJ, which the library reads.
+// Converts meshes of other formats to OBJ, which the library reads.
 import { Mesh, type BufferGeometry } from "three";
 import { STLLoader } from "three/examples/jsm/loaders/STLLoader.js";
 import { mergeVertices } from "three/examples/jsm/utils/BufferGeometryUtils.js";
 import { read } from "./solid";
 
-/** Vertices nearer to each other than this part of the largest coordinate are one. */
+/** Vertices closer than this fraction of the largest coordinate are merged. */
 const SAME = 1e-6;
 
-/** The text of an OBJ file, in millimetres, of a mesh that was dropped. */
+/** Returns the text of an OBJ file, in millimetres, for a dropped mesh. */
 export async function inObj(name: string, bytes: Uint8Array): Promise<string> {
   if (/\.obj$/i.test(name)) return new TextDecoder().decode(bytes);
   if (/\.stl$/i.test(name)) return written([new STLLoader().parse(bytes.slice().buffer)], 1);
@@ -17,7 +17,7 @@ export async function inObj(name: string, bytes: Uint8Array): Promise<string> {
   object.traverse((part) => {
     if (part instanceof Mesh) parts.push((part.geometry as BufferGeometry).clone().applyMatrix4(part.matrixWorld));
   });
-  // glTF has metres.
+  // glTF uses metres.
   return written(parts, 1000);
 }
 

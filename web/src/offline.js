@@ -1,5 +1,5 @@
-// The service worker: once the page was loaded, it works without a network. The build fills in the names of the files and a
-// version that changes with any of them.
+// The service worker: once loaded, the page works offline. The build fills in the names of the files and a version that changes
+// with any of them.
 const version = "deltille-" + "VERSION";
 const files = ["FILES"];
 
@@ -22,7 +22,7 @@ self.addEventListener("activate", (event) => {
   );
 });
 
-// What is kept is taken from there; the page itself is asked for first, so that a newer one is seen.
+// Cached files are served from the cache; the page itself is fetched first, so that updates appear.
 self.addEventListener("fetch", (event) => {
   const { request } = event;
   const url = new URL(request.url);

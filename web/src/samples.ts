@@ -1,4 +1,4 @@
-// Pictures that come along, to see what is found in them.
+// Bundled sample images for detection.
 import photograph from "../../tests/photographs/robot-hand-0108.png?url";
 import rendered from "../samples/board.png?url";
 import { words } from "./words";

@@ -1,4 +1,4 @@
-// See: photographs that are dropped, and what is found in them.
+// Detect: dropped photographs, and the targets found in them.
 import { dropZone, el, field, save, select } from "./dom";
 import { LibraryError, drawing, looking } from "./library";
 import { type Sample, samples } from "./samples";
@@ -11,10 +11,10 @@ type Corner = { row: number; col: number; id: number | null; x: number; y: numbe
 type Detection = { ink?: unknown; grids: { kind: string; panel: number | null; corners: Corner[]; tags: { id: number }[] }[] };
 type Photo = {
   name: string;
-  /** What tells it from others. */
+  /** Identifies the file, to skip duplicates. */
   key: string;
   bytes: () => Promise<Uint8Array>;
-  /** What was looked for in it, and what it alone says of the ink of the print. */
+  /** The target searched for, and the ink estimate from this photograph alone. */
   of: Sought | null;
   ink: unknown;
   result: Shown | null;
@@ -31,11 +31,11 @@ type BoardSpec = {
   tags: { family: string; first_id: number; spacing: number; border_bits: number; tags_in?: string };
 };
 
-/** Pixels of the picture that the magnifier shows. */
+/** Width of the magnified area, px of the image. */
 const MAGNIFIED = 24;
-/** By how much ellipses are larger than one standard deviation. */
+/** Size of the ellipses, in standard deviations. */
 const ELLIPSE = 100;
-/** The file formats of results. */
+/** File formats of the results. */
 const RESULTS = ["json", "csv", "orpc"] as const;
 const COLOURS = ["#0a84ff", "#ff9f0a", "#30d158", "#ff453a", "#bf5af2", "#64d2ff"];
 
@@ -51,15 +51,15 @@ const photoOf = (name: string, key: string, bytes: () => Promise<ArrayBuffer>): 
 });
 
 export function see(): HTMLElement {
-  /** What is looked for; nothing while no photograph has told what is in it. */
+  /** The target searched for; null until it is chosen or identified. */
   let sought: Sought | null = null;
   let choice = "auto";
   let recognised: Recognised | null = null;
   let photos: Photo[] = [];
   let at = -1;
-  /** Counts what was asked for, so that what was asked for before is dropped. */
+  /** Counts requests, so that results of earlier ones are discarded. */
   let asking = 0;
-  /** Where the magnifier is, px of the picture. */
+  /** Position of the magnifier, px of the image. */
   let pointed: [number, number] = [0, 0];
 
   const canvas = el("canvas", {
@@ -69,14 +69,14 @@ export function see(): HTMLElement {
     height: 0,
     pointermove: (event) => point(event as PointerEvent),
     pointerdown: (event) => point(event as PointerEvent),
-    // A finger is lifted to see what was under it.
+    // Touch users lift the finger to see the magnified area.
     pointerleave: (event) => (lens.hidden ||= (event as PointerEvent).pointerType === "mouse"),
     blur: () => (lens.hidden = true),
     keydown: (event) => step(event as KeyboardEvent),
   });
   const lens = el("canvas", { class: "lens", width: 240, height: 240, hidden: true, "aria-hidden": "true" });
   const problem = el("p", { class: "problem", role: "alert", hidden: true });
-  const told = el("p", { class: "facts", "aria-live": "polite" });
+  const status = el("p", { class: "facts", "aria-live": "polite" });
   const credit = el("p", { class: "credit", hidden: true });
   const hint = el("p", { class: "facts", hidden: true }, words.see.magnifier);
   const list = el("ul", { class: "photos" });
@@ -105,7 +105,7 @@ export function see(): HTMLElement {
     again();
   }
 
-  /** Looks at all photographs anew. */
+  /** Repeats detection in all photographs. */
   function again(): void {
     for (const photo of photos) {
       photo.result = photo.found = null;
@@ -114,7 +114,7 @@ export function see(): HTMLElement {
     void look();
   }
 
-  /** The choices there are, with the one that is taken. */
+  /** Shows the available targets and the current choice. */
   function offer(): void {
     const all: [string, string][] = [["auto", words.see.auto], ...Object.entries(words.see.grid)];
     if (described) all.unshift(["described", words.see.loaded(described.name)]);
@@ -135,7 +135,7 @@ export function see(): HTMLElement {
     offer();
   }
 
-  /** Takes what a file describes as what is looked for; what describes no target changes nothing. */
+  /** Uses the target that a file describes; a file without a valid description changes nothing. */
   async function describe(file: File): Promise<boolean> {
     try {
       const json = await file.text();
@@ -150,7 +150,7 @@ export function see(): HTMLElement {
     }
   }
 
-  /** Takes a photograph along, but none twice: a camera would be thought to be known better than it is. */
+  /** Adds a photograph unless it is there already: duplicates would make the calibration look more certain than it is. */
   function add(photo: Photo): void {
     if (!photos.some(({ key }) => key === photo.key)) photos.push(photo);
   }
@@ -162,12 +162,12 @@ export function see(): HTMLElement {
     await look();
   }
 
-  /** What a photograph shows, where that is not said. */
+  /** Identifies the target in a photograph. */
   async function guess(photo: Photo): Promise<Sought> {
     const bytes = await photo.bytes();
     recognised = await looking.call("recognise", photo.name, bytes);
     if (recognised) return { target: recognised.target };
-    // Without tags, the tiling of which there is more.
+    // Without tags, choose the tiling with more corners.
     const counts = await Promise.all(
       Object.keys(words.see.grid).map(async (grid): Promise<[number, string]> => {
         const { json } = await looking.call("photograph", { grid }, null, photo.name, bytes);
@@ -186,12 +186,12 @@ export function see(): HTMLElement {
     for (const [index, photo] of photos.entries()) {
       if (photo.result || photo.error) continue;
       try {
-        // What a photograph without tags shows is no target: the next may tell more.
+        // An untagged photograph does not identify the target for the others: a later one may.
         const of = sought ?? (await guess(photo));
         if (turn !== asking) return;
         if (!sought && recognised) {
           sought = of;
-          tellTarget(recognised);
+          showTarget(recognised);
         }
         const result = await looking.call("photograph", of, null, photo.name, await photo.bytes());
         if (turn !== asking) return;
@@ -212,14 +212,14 @@ export function see(): HTMLElement {
     try {
       await lookTogether(turn);
     } catch (error) {
-      if (turn === asking) tell(error);
+      if (turn === asking) showError(error);
     }
     if (turn !== asking) return;
     share();
     list.removeAttribute("aria-busy");
   }
 
-  /** Looks once more at photographs of one print, with what they say together of its ink, as the program does. */
+  /** Repeats detection in photographs of one print with their combined ink estimate, as `deltille detect` does. */
   async function lookTogether(turn: number): Promise<void> {
     const { sought: of } = seen;
     const alike = photos.filter((photo) => photo.result && JSON.stringify(photo.of) === JSON.stringify(of));
@@ -237,8 +237,8 @@ export function see(): HTMLElement {
     fill();
   }
 
-  /** What was recognised, with the edge that no photograph tells. */
-  function tellTarget(found: Recognised): void {
+  /** Shows the identified target, and asks for its tile edge, which a photograph cannot show. */
+  function showTarget(found: Recognised): void {
     const spec = found.spec as BoardSpec;
     if (spec.kind !== "board") {
       known.replaceChildren(el("p", { class: "good" }, words.see.recognisedSolid(String((found.spec as { shape?: unknown }).shape ?? ""), found.tags)));
@@ -261,7 +261,7 @@ export function see(): HTMLElement {
       sought = { target: (await drawing.call("draw", asked(settings))).json };
       again();
     } catch (error) {
-      tell(error);
+      showError(error);
     }
   }
 
@@ -277,7 +277,7 @@ export function see(): HTMLElement {
   }
 
   function figures(photo: Photo): string {
-    // The name stands before it.
+    // The list shows the name already.
     if (photo.error) return photo.error.startsWith(`${photo.name}: `) ? photo.error.slice(photo.name.length + 2) : photo.error;
     if (!photo.found || !photo.result) return words.see.looking;
     const corners = photo.found.grids.reduce((sum, grid) => sum + grid.corners.length, 0);
@@ -339,13 +339,13 @@ export function see(): HTMLElement {
 
   function blank(): void {
     canvas.width = canvas.height = 0;
-    told.textContent = "";
+    status.textContent = "";
     hint.hidden = credit.hidden = lens.hidden = true;
     downloads.replaceChildren();
   }
 
-  function tell(error: unknown): void {
-    told.textContent = error instanceof Error && error.message ? error.message : words.failed;
+  function showError(error: unknown): void {
+    status.textContent = error instanceof Error && error.message ? error.message : words.failed;
   }
 
   function draw(): void {
@@ -359,7 +359,7 @@ export function see(): HTMLElement {
     if (!photo.result || !photo.found) {
       canvas.width = canvas.height = 0;
       hint.hidden = true;
-      told.textContent = photo.error || figures(photo);
+      status.textContent = photo.error || figures(photo);
       return;
     }
     const { width, height, grey, ms, reasons } = photo.result;
@@ -370,7 +370,7 @@ export function see(): HTMLElement {
     const context = canvas.getContext("2d");
     if (!context) return;
     const shades = new ImageData(width, height);
-    // Red, green and blue are the grey value, and nothing is transparent.
+    // Red, green and blue are the grey value; every pixel is opaque.
     const pixels = new Uint32Array(shades.data.buffer);
     for (let i = 0; i < pixels.length; i++) pixels[i] = 0xff000000 | (0x010101 * (grey[i] ?? 0));
     context.putImageData(shades, 0, 0);
@@ -399,7 +399,7 @@ export function see(): HTMLElement {
       }
     });
     canvas.setAttribute("aria-label", `${photo.name}: ${figures(photo)}. ${words.see.keys}`);
-    told.textContent = [`${figures(photo)}, ${words.see.time(ms)}.`, ...reasons.map((reason) => `${reason.charAt(0).toUpperCase()}${reason.slice(1)}${reason.endsWith("?") ? "" : "."}`)].join(" ");
+    status.textContent = [`${figures(photo)}, ${words.see.time(ms)}.`, ...reasons.map((reason) => `${reason.charAt(0).toUpperCase()}${reason.slice(1)}${reason.endsWith("?") ? "" : "."}`)].join(" ");
     hint.hidden = photo.found.grids.length === 0;
     hint.textContent = words.see.magnifier;
     downloads.replaceChildren(
@@ -413,7 +413,7 @@ export function see(): HTMLElement {
       const png = await looking.call("overlay", photo.name, await photo.bytes(), photo.result?.json ?? "");
       save(`${stem(photo.name)}.overlay.png`, png as Uint8Array<ArrayBuffer>, "image/png");
     } catch (error) {
-      tell(error);
+      showError(error);
     }
   }
 
@@ -423,14 +423,14 @@ export function see(): HTMLElement {
     magnify();
   }
 
-  /** Arrow keys go from corner to corner. */
+  /** Moves from corner to corner by the arrow keys. */
   function step(event: KeyboardEvent): void {
     const way = ({ ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, -1], ArrowDown: [0, 1] } as Record<string, [number, number]>)[event.key];
     const corners = photos[at]?.found?.grids.flatMap((grid) => grid.corners) ?? [];
     if (event.key === "Escape") lens.hidden = true;
     if (!way) return;
     event.preventDefault();
-    // The nearest that lies more that way than across it.
+    // The nearest corner that lies more along the direction than across it.
     const ahead = corners.flatMap(({ x, y }) => {
       const [along, across] = [(x - pointed[0]) * way[0] + (y - pointed[1]) * way[1], Math.abs((x - pointed[0]) * way[1] - (y - pointed[1]) * way[0])];
       return along > 0.5 && along > across ? [{ x, y, far: along + across }] : [];
@@ -440,7 +440,7 @@ export function see(): HTMLElement {
     magnify();
   }
 
-  /** Shows the pixels about a place, with the corners there and their uncertainty. */
+  /** Shows the pixels around a position, with the corners there and their uncertainty. */
   function magnify(): void {
     const photo = photos[at];
     const context = lens.getContext("2d");
@@ -484,7 +484,7 @@ export function see(): HTMLElement {
         context.stroke();
       }
     });
-    // It lies where it covers nothing that is looked at.
+    // Keep the magnifier away from the pointer.
     lens.classList.toggle("left", x > width / 2);
     lens.hidden = false;
     const found = nearest as Corner | null;
@@ -494,7 +494,7 @@ export function see(): HTMLElement {
   const frame = el("div", { class: "frame" }, canvas, lens);
   const heading = el("h2", {}, words.see.list);
   const invitation = el("p", { class: "empty" }, words.see.empty);
-  /** The target of “Make” may have become known, or another one, while this part was not shown. */
+  /** Updates the choices, as the target of “Make” may have changed while this part was hidden. */
   function shown(): void {
     if (!location.hash.startsWith("#see")) return;
     const isOther = choice === "made" && !(sought && "target" in sought && sought.target === made.json);
@@ -510,6 +510,6 @@ export function see(): HTMLElement {
     "section",
     { class: "see", "aria-label": words.tabs.see },
     el("p", { class: "lead" }, words.see.lead),
-    el("div", { class: "columns" }, el("div", { class: "settings" }, zone, options, known, heading, list, inked), el("div", { class: "stage" }, problem, invitation, frame, told, hint, downloads, credit)),
+    el("div", { class: "columns" }, el("div", { class: "settings" }, zone, options, known, heading, list, inked), el("div", { class: "stage" }, problem, invitation, frame, status, hint, downloads, credit)),
   );
 }

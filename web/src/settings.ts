@@ -1,4 +1,4 @@
-// What a target is made from: the address that carries it, and the templates of the programs.
+// Settings of a target, as an address and as templates of the command-line programs.
 export type Settings = {
   kind: string;
   rows: number;
@@ -56,7 +56,7 @@ export const usual: Settings = {
 
 const OF_BOARDS = ["rows", "cols", "tags_in", "boards", "poster", "packed"] as const;
 const OF_SOLIDS = ["tiles", "face_margin_mm", "skeleton", "per_face", "allow_seams"] as const;
-/** What some settings can be. */
+/** Allowed values of some settings. */
 const CHOICES: Record<string, string[]> = {
   kind: ["deltille", "checker", "icosahedron", "octahedron", "tetrahedron", "mesh"],
   tags_in: ["black", "white"],
@@ -64,18 +64,18 @@ const CHOICES: Record<string, string[]> = {
 };
 const NUMBERS = ["rows", "cols", "edge_mm", "tag_spacing", "tag_border", "first_id", "board_id", "boards", "tiles", "face_margin_mm", "margin_mm"];
 
-/** The family of tags where none is given and there are tags. */
+/** The default tag family. */
 export const USUAL_FAMILY = "delTag25h7";
 
-/** The family of place codes, of which every upright tile has one. */
+/** The family of position codes, one in every upright tile. */
 export const PLACES = "dense9";
 
 export const isSolid = (settings: Settings): boolean => settings.kind !== "deltille" && settings.kind !== "checker";
 
-/** What goes without saying of a kind of target. */
+/** The default name of a kind of target. */
 export const nameOf = (kind: string): string => ({ deltille: "board", checker: "checkerboard", mesh: "solid" })[kind] ?? kind;
 
-/** Settings with other values than usual, as a query; nothing of a mesh, which is too long for an address. */
+/** Settings that differ from the defaults, as a query; empty for a mesh, which is too long for an address. */
 export function query(settings: Settings): string {
   if (settings.kind === "mesh") return "";
   const without: Settings = { ...usual, name: nameOf(settings.kind), mesh: settings.mesh };
@@ -83,7 +83,7 @@ export function query(settings: Settings): string {
   return new URLSearchParams(pairs.map(([key, value]) => [key, String(value)])).toString();
 }
 
-/** Settings from values by their names; what they do not say, or say wrongly, is as usual. */
+/** Settings from named values; missing and invalid ones keep their defaults. */
 export function settled(values: Iterable<[string, string]>): Settings {
   const found: Record<string, unknown> = { ...usual };
   const all = new Map(values);
@@ -98,7 +98,7 @@ export function settled(values: Iterable<[string, string]>): Settings {
   return all.has("name") ? settings : { ...settings, name: nameOf(settings.kind) };
 }
 
-/** The settings of an address, which has no mesh. */
+/** The settings of an address, which cannot contain a mesh. */
 export function read(text: string): Settings {
   const found = settled(new URLSearchParams(text));
   return found.kind === "mesh" ? usual : found;
@@ -106,7 +106,7 @@ export function read(text: string): Settings {
 
 export const isKind = (kind: unknown): boolean => CHOICES.kind?.includes(String(kind)) ?? false;
 
-/** What the library takes: nothing that says nothing of this kind of target. */
+/** The settings for the library, without those that do not apply to this kind of target. */
 export function asked(settings: Settings): string {
   const own: Partial<Settings> = { ...settings };
   for (const key of isSolid(settings) ? OF_BOARDS : OF_SOLIDS) delete own[key];
@@ -114,7 +114,7 @@ export function asked(settings: Settings): string {
   return JSON.stringify(own);
 }
 
-// Templates of the programs: TOML of one level, a setting a line.
+// Templates of the command-line programs: flat TOML, one setting per line.
 
 const KEYS: [string, keyof Settings][] = [
   ["name", "name"],
@@ -147,26 +147,26 @@ export function ofTemplate(text: string): Settings {
     const bare = line.replace(/^\s*#.*$/, "").trim();
     if (bare === "") continue;
     table = /^\[(\w+)\]/.exec(bare)?.[1] ?? table;
-    // Meshes and drawings for lasers are further files of the same target.
+    // Meshes and laser drawings are additional files of the same target.
     if (table === "meshes" || table === "laser") continue;
-    if (table !== "") throw new Error(`[${table}]: this page makes none of it: give the template to the program`);
+    if (table !== "") throw new Error(`[${table}]: the page does not support this table; use the template with the command-line program`);
     const [, key = "", string, plain] = /^([\w-]+)\s*=\s*(?:"([^"]*)"|([\w.+-]+))\s*(?:#.*)?$/.exec(bare) ?? [];
     const known = KEYS.find(([name]) => name === key)?.[1];
-    if (!known && !OTHERS.includes(key)) throw new Error(key === "" ? `${bare}: this is no setting` : `${key}: there is no such setting`);
+    if (!known && !OTHERS.includes(key)) throw new Error(key === "" ? `${bare}: not a setting` : `${key}: unknown setting`);
     const value = string ?? plain ?? "";
     if (key === "command") values.set("kind", value === "checkerboard" ? "checker" : "deltille");
     else if (key === "untagged" && value === "true") values.set("family", "");
     else if (key === "dense" && value === "true") values.set("family", PLACES);
     else if (known?.endsWith("_mm")) {
       const [, number, unit = ""] = /^([\d.]+)\s*(mm|cm|m|in)?$/.exec(value) ?? [];
-      if (number === undefined) throw new Error(`${key}: ${value} is no length, such as 20mm`);
+      if (number === undefined) throw new Error(`${key}: ${value} is not a valid length (for example 20mm)`);
       values.set(known, String(Number(number) * (UNITS[unit] ?? 1)));
     } else if (known) values.set(known, value);
   }
   return settled(values);
 }
 
-/** A template of these settings, for the program. */
+/** Returns a template of these settings for the command-line program. */
 export function template(settings: Settings): string {
   const lines = [`command = "${settings.kind === "checker" ? "checkerboard" : "board"}"`];
   const done = new Set<string>();

@@ -1,14 +1,14 @@
-// What the parts of the page know of each other.
+// State shared by the parts of the page.
 import type { Sought } from "./worker";
 
-/** The target of “Make”, and whether it is what photographs are to be looked at for. */
+/** The target of “Make”, and whether “Detect” should search for it. */
 export const made = { json: "", name: "", isWanted: false };
 
-/** A photograph that was looked at. */
+/** A processed photograph. */
 export type Shot = { name: string; json: string; corners: number; labelled: boolean };
 
-/** What was seen, and in what. */
+/** The target searched for, and the processed photographs. */
 export const seen: { sought: Sought | null; shots: Shot[] } = { sought: null, shots: [] };
 
-/** The name of a file without its ending: what it shows is called so. */
+/** The name of a file without its extension, used as the name of its view. */
 export const stem = (name: string) => name.replace(/\.[^.]*$/, "");

@@ -1,14 +1,14 @@
-// A solid with its texture: turned by hand, and unfolded into its net.
+// A textured solid, rotated by hand and unfolded into its net.
 import { AmbientLight, Box3, type BufferAttribute, DirectionalLight, Matrix4, Mesh, type Object3D, PerspectiveCamera, Scene, Vector3, WebGLRenderer } from "three";
 import { OrbitControls } from "three/examples/jsm/controls/OrbitControls.js";
 import { GLTFLoader } from "three/examples/jsm/loaders/GLTFLoader.js";
 import type { Hinge } from "./worker";
 
-/** The height of the picture to its width, and to that of the window, so that what moves it is seen, too. */
+/** Height of the view as a fraction of its width, and of the window, so that its controls stay visible. */
 const HIGH = 0.8;
 const OF_WINDOW = 0.6;
 
-/** Of the box around what is shown, how far away the camera is. */
+/** Camera distance as a multiple of the diagonal of the bounding box. */
 const AWAY = 1.35;
 
 const METRES = 1e-3;
@@ -16,11 +16,11 @@ const METRES = 1e-3;
 let renderer: WebGLRenderer | null = null;
 
 export type Folding = {
-  /** Shows it unfolded by a part: 0 is the solid, 1 the net. */
+  /** Unfolds by a fraction: 0 is the solid, 1 the net. */
   unfold(part: number): void;
-  /** Fits it into the room that there is. */
+  /** Fits the view into the available space. */
   fit(): void;
-  /** Gives back what the graphics hardware holds of it. */
+  /** Frees its graphics memory. */
   end(): void;
 };
 
@@ -28,7 +28,7 @@ export function read(bytes: Uint8Array): Promise<Object3D> {
   return new Promise((resolve, reject) => new GLTFLoader().parse(bytes.slice().buffer, "", (gltf) => resolve(gltf.scene), reject));
 }
 
-/** Each face's motion from the solid to where it lies when so much is unfolded. */
+/** The motion of each face from the solid to its position when unfolded by a fraction. */
 function motions(hinges: Hinge[], part: number): Map<number, Matrix4> {
   const found = new Map<number, Matrix4>();
   for (const { face, on, ends_mm, angle_rad } of hinges) {
@@ -78,7 +78,7 @@ export async function showMesh(place: HTMLElement, glb: Uint8Array, hinges: Hing
     return { position, normal, positions: Float32Array.from(position.array), normals: Float32Array.from(normal.array) };
   });
 
-  /** From where the camera looks, which stays as it was turned. */
+  /** Viewing direction, kept as the user rotated it. */
   let towards = new Vector3(0.9, 0.7, 1.2).normalize();
   function look(): void {
     const box = new Box3().setFromObject(object, true);

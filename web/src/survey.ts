@@ -1,21 +1,21 @@
-// What the pictures taken cover so far: corners in each part of the camera's picture, and how the board was tilted.
+// Image coverage so far: corners in each cell of the image, and tilts of the board.
 import { el, shape } from "./dom";
 import { words } from "./words";
 import type { Survey } from "./worker";
 
-/** Tilts of the rings, degrees, and the tilt at the edge of the plot. */
+/** Tilts of the rings and at the edge of the plot, degrees. */
 const RINGS = [20, 40, 60];
 const EDGE = 70;
 
 const degrees = (rad: number) => (180 / Math.PI) * rad;
 
-/** How strongly a cell is tinted, from 0 to 1; of none not at all, and of few enough to be seen. */
+/** Tint of each cell, from 0 to 1: 0 without corners, and visible from the first corner on. */
 export function tints({ counts }: Survey): number[] {
   const most = Math.max(...counts, 1);
   return counts.map((count) => (count === 0 ? 0 : 0.25 + 0.75 * Math.sqrt(count / most)));
 }
 
-/** What there is to say, and the two figures. */
+/** Returns a summary in words, and the two figures. */
 export function surveyed(survey: Survey): { said: string; figures: HTMLElement[] } {
   const text = words.calibrate.survey;
   const tilts = survey.tilts.filter((tilt) => tilt !== null);
@@ -28,7 +28,7 @@ export function surveyed(survey: Survey): { said: string; figures: HTMLElement[]
   return { said: `${[text.pictures(survey.tilts.length), covered, range].filter(Boolean).join("; ")}.`, figures };
 }
 
-/** The picture of the camera, its cells tinted by the number of corners in them. */
+/** The image area, its cells tinted by the number of corners in them. */
 function coverage(survey: Survey, label: string): SVGElement {
   const [width, height] = survey.size_px;
   const [columns, rows] = survey.cells;
@@ -37,7 +37,7 @@ function coverage(survey: Survey, label: string): SVGElement {
   return shape("svg", { viewBox: `0 0 ${width} ${height}`, role: "img", "aria-label": label, class: "coverage" }, ...cells);
 }
 
-/** A dot for each picture: as far from the middle as the board was tilted, where it was farther away. */
+/** One dot per image: distance from the centre is the tilt, direction is where the board is farther away. */
 function leanings(tilts: [number, number][], label: string): SVGElement {
   const rings = RINGS.flatMap((tilt) => [shape("circle", { r: tilt }), shape("text", { x: tilt * Math.SQRT1_2 + 1.5, y: tilt * Math.SQRT1_2 + 1.5 }, `${tilt}°`)]);
   const dots = tilts.map(([tilt, away]) => {

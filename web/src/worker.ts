@@ -1,4 +1,4 @@
-// The worker's side: calls of the page to the WebAssembly modules.
+// The worker: runs calls of the page in the WebAssembly modules.
 import type * as Make from "../pkg/make/deltille.js";
 import makeCode from "../pkg/make/deltille_bg.wasm?url";
 import type * as Photo from "../pkg/photo/deltille.js";
@@ -13,7 +13,7 @@ import { familyFile, familyNames } from "./families-files";
 
 type Module<T> = T & { default: (options: { module_or_path: URL }) => Promise<unknown> };
 
-/** A module that is loaded when it is first asked for. */
+/** A module loaded on first use. */
 function once<T>(code: string, load: () => Promise<unknown>): () => Promise<T> {
   let loading: Promise<T> | null = null;
   const begin = async () => {
@@ -23,7 +23,7 @@ function once<T>(code: string, load: () => Promise<unknown>): () => Promise<T> {
   };
   return () => {
     loading ??= begin();
-    // What could not be loaded is asked for again.
+    // Retry after a failed load.
     loading.catch(() => (loading = null));
     return loading;
   };
@@ -43,11 +43,11 @@ export type Solid = { glb: Uint8Array; hinges: Hinge[] };
 export type Proof = { passed: boolean; line: string; sentences: string[]; files: number };
 export type Seen = { json: string; csv: string; orpc: string; reasons: string[]; ms: number };
 export type Shown = Seen & { width: number; height: number; grey: Uint8Array };
-/** How the board is held against what is proposed. */
+/** How the board is held, compared with the proposed pose. */
 export type Holding = { held: "unseen" | "elsewhere" | "turned" | "moving" | "blurred" | "steady" | "taken"; part: number };
-/** The next picture, and how sure the camera is. */
+/** The next proposed image, and the projection uncertainty. */
 export type Next = { words: string; enough: boolean; uncertainty_px: number | null; expected_px: number | null; outlines_px: [number, number][][]; upwards_px: [[number, number], [number, number]] | null };
-/** What pictures show of the camera's: corners in cells of it, and of each the tilt of the board and where to, rad. */
+/** Image coverage: corners per cell, and for each image the tilt of the board and its direction, rad. */
 export type Survey = { size_px: [number, number]; cells: [number, number]; counts: number[]; covered: number; tilts: ([number, number] | null)[] };
 export type Watched = Seen & { keep: boolean; held: Holding | null; pixels: Uint8ClampedArray };
 export type Recognised = { target: string; spec: Record<string, unknown>; tags: number; corners: number; shown: number };
@@ -60,14 +60,14 @@ export type FamilyFigures = {
   correctable: number;
   kind: string;
   histogram: Record<string, number>;
-  /** How many codes no family exceeds. */
+  /** Upper bounds on the number of codes. */
   linear_programming: number;
   sphere_packing: number;
-  /** How often a tag turns into itself, and the cell whose content each cell then receives. */
+  /** Rotation steps per full turn, and for each cell the cell whose content it receives in one step. */
   turns: number;
   rotation: number[];
 };
-/** How often what is no tag is taken for one, with 0, 1, … cells corrected; in natural pictures where that is known. */
+/** False-positive rates with 0, 1, … cells corrected; null in natural images if unknown. */
 export type FalsePositives = { coins: number[]; natural: number[] | null; accepted: number; recommended: number | null };
 export type Figures = {
   rms_px: number;
@@ -80,13 +80,13 @@ export type Figures = {
 };
 export type Result = { figures: Figures; said: string[]; files: { name: string; text: string }[] };
 
-/** The ink of a print, as several pictures show it together: for the library, and in words. */
+/** Ink spread of a print, estimated from several images: for the library, and in words. */
 export type Ink = { estimate: string; words: string };
 
-/** What is looked for: the description of a target, or an untagged board. */
+/** The target to find: the description of one, or an untagged board. */
 export type Sought = { target: string } | { grid: string };
 
-/** What has memory of a module, and gives it back when the work is done. */
+/** An object in the memory of a module, to be freed after use. */
 type Held = { free(): void };
 
 async function using<T extends Held, R>(made: T, work: (made: T) => R | Promise<R>): Promise<R> {
@@ -112,7 +112,7 @@ async function finderOf(sought: Sought, ink: Ink | null = null): Promise<See.Fin
   else {
     const name = family_of(sought.target);
     const file = name === undefined ? undefined : await familyFile(name);
-    if (name !== undefined && file === undefined) throw new Error(`the target has tags of the family ${name}, which does not come along`);
+    if (name !== undefined && file === undefined) throw new Error(`the target uses tag family ${name}, which is not bundled with this page`);
     made = Finder.of_target(sought.target, file);
   }
   if (ink) made = made.with_ink(ink.estimate);
@@ -121,7 +121,7 @@ async function finderOf(sought: Sought, ink: Ink | null = null): Promise<See.Fin
   return made;
 }
 
-/** The codes of a family, which are few enough to be kept. */
+/** The codes of a family, cached as they are small. */
 function codesOf(name: string): Promise<Make.Codes> {
   const known = codes.get(name);
   if (known) return known;
@@ -137,8 +137,8 @@ async function pictureOf(photograph: Photo.Photograph): Promise<See.Picture> {
   return Picture.of_grey(width, height, photograph.is_deep(), photograph.grey(), photograph.orientation());
 }
 
-/** What is told of a picture, and how long it took to find. */
-function told(finder: See.Finder, picture: See.Picture, name: string, also: (found: See.Found) => void = () => undefined): Seen {
+/** Detects in an image; returns the results and the time taken. */
+function detect(finder: See.Finder, picture: See.Picture, name: string, also: (found: See.Found) => void = () => undefined): Seen {
   const begin = performance.now();
   const found = finder.find(picture, name);
   const ms = performance.now() - begin;
@@ -207,15 +207,15 @@ const calls = {
     const [{ Photograph }, finder] = await Promise.all([photographer(), finderOf(sought, ink)]);
     return using(new Photograph(name, bytes), async (photograph) => {
       const [width = 0, height = 0] = photograph.size();
-      const seen = await using(await pictureOf(photograph), (picture) => told(finder, picture, name));
-      // A byte for each pixel, as all photographs are kept.
+      const seen = await using(await pictureOf(photograph), (picture) => detect(finder, picture, name));
+      // One byte per pixel, as all photographs are kept in memory.
       const colours = photograph.shown();
       const grey = new Uint8Array(width * height);
       for (let i = 0; i < grey.length; i++) grey[i] = colours[4 * i] ?? 0;
       return { ...seen, width, height, grey };
     });
   },
-  /** What photographs say together of the ink of the print; nothing where looking again would find nothing else. */
+  /** Estimates the ink spread from all photographs of a print; null if detecting again would change nothing. */
   async ink(sought: Sought, found: unknown[]): Promise<Ink | null> {
     const [estimate, words] = (await finderOf(sought)).ink_of_all(JSON.stringify(found)) ?? [];
     return estimate !== undefined && words !== undefined ? { estimate, words } : null;
@@ -234,7 +234,7 @@ const calls = {
       }),
     );
   },
-  /** Refuses what describes no target. */
+  /** Throws if the description is invalid. */
   async know(sought: Sought): Promise<void> {
     await finderOf(sought);
   },
@@ -242,7 +242,7 @@ const calls = {
     const { Photograph } = await photographer();
     return using(new Photograph(name, bytes), (photograph) => photograph.overlay(found));
   },
-  /** Begins to watch a stream: no frame was seen yet. */
+  /** Starts a webcam session. */
   async watch(): Promise<void> {
     const { Watcher } = await seer();
     watcher?.free();
@@ -250,7 +250,7 @@ const calls = {
     guide?.free();
     guide = null;
   },
-  /** Begins to propose pictures, those that were taken in mind. */
+  /** Starts proposing images, taking those already captured into account. */
   async guide(target: string, width: number, height: number, model: string, taken: { name: string; json: string }[]): Promise<Next> {
     const { Guide } = await solver();
     guide?.free();
@@ -258,12 +258,12 @@ const calls = {
     for (const { name, json } of taken) guide.take(name, json);
     return JSON.parse(guide.next()) as Next;
   },
-  /** Without what was proposed, as it cannot be held there. */
+  /** Skips the proposed pose. */
   async refuse(): Promise<Next | null> {
     guide?.refuse();
     return guide ? (JSON.parse(guide.next()) as Next) : null;
   },
-  /** A picture of the stream was taken: what is next. */
+  /** Adds a captured frame and returns the next proposal. */
   async take(name: string, json: string): Promise<Next | null> {
     guide?.take(name, json);
     return guide ? (JSON.parse(guide.next()) as Next) : null;
@@ -273,7 +273,7 @@ const calls = {
     const rgba = new Uint8Array(pixels.buffer, pixels.byteOffset, pixels.byteLength);
     return using(Picture.of_colours(width, height, rgba), (picture) => {
       let keep = false;
-      const seen = told(finder, picture, name, (found) => (keep = watcher?.look(found) ?? false));
+      const seen = detect(finder, picture, name, (found) => (keep = watcher?.look(found) ?? false));
       const held = guide ? (JSON.parse(guide.look(time, seen.json)) as Holding) : null;
       return { ...seen, keep, held, pixels };
     });
@@ -306,11 +306,11 @@ const calls = {
     const found = (await codesOf(name)).decode(word, errors);
     return found ? [...found] : null;
   },
-  /** A word after its tag was turned once. */
+  /** The word of a tag after one rotation step. */
   async turned(name: string, word: bigint): Promise<bigint> {
     return (await codesOf(name)).turned(word);
   },
-  /** The shares of tags that are read, and misread, at each of these rates of wrong cells. */
+  /** The fractions of tags read and misread at each of these rates of wrong cells. */
   async reading(name: string, rates: number[]): Promise<[number, number][]> {
     const shares = (await codesOf(name)).reading(Float64Array.from(rates));
     return rates.map((_, i) => [shares[2 * i] ?? 0, shares[2 * i + 1] ?? 0]);
@@ -323,7 +323,7 @@ const calls = {
 export type Calls = typeof calls;
 export type Name = keyof Calls;
 
-/** What need not be copied on its way to the page. */
+/** Buffers that are transferred to the page instead of copied. */
 function handedOver(result: unknown): Transferable[] {
   if (typeof result !== "object" || result === null) return [];
   return Object.values(result).flatMap((value) => (ArrayBuffer.isView(value) && value.buffer instanceof ArrayBuffer ? [value.buffer] : []));

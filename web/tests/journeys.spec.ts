@@ -14,7 +14,7 @@ const scratch = () => mkdtempSync(join(tmpdir(), "page-"));
 type Detection = { grids: { corners: { id: number; x: number; y: number }[] }[] };
 const corners = (of: Detection) => of.grids.flatMap((grid) => grid.corners);
 
-/** The largest relative difference of two numbers in the same place; infinite where anything else differs. */
+/** The largest relative difference of two corresponding numbers; infinite if anything else differs. */
 function apart(one: unknown, other: unknown): number {
   if (typeof one === "number" && typeof other === "number") return Math.abs(one - other) / Math.max(Math.abs(one), Math.abs(other), 1e-300);
   if (typeof one !== "object" || typeof other !== "object" || one === null || other === null) return one === other ? 0 : Infinity;
@@ -23,7 +23,7 @@ function apart(one: unknown, other: unknown): number {
   return Math.max(0, ...pairs.map(([key, value], i) => (others[i]?.[0] === key ? apart(value, others[i]?.[1]) : Infinity)));
 }
 
-/** The numbers of a text, and what is between them. */
+/** The numbers of a text, and the text between them. */
 function split(text: string): { words: string[]; numbers: number[] } {
   const number = /-?\d+(?:\.\d+)?(?:e-?\d+)?/g;
   return { words: text.split(number), numbers: (text.match(number) ?? []).map(Number) };
@@ -36,7 +36,7 @@ async function downloaded(page: Page, click: () => Promise<void>): Promise<Buffe
 
 const press = (page: Page, button: string) => downloaded(page, () => page.getByRole("button", { name: button, exact: true }).click());
 
-/** Files are dropped as from another window. */
+/** Drops files as from another window. */
 async function drop(page: Page, files: { name: string; content: Buffer }[]): Promise<void> {
   const given = files.map(({ name, content }) => ({ name, text: content.toString("base64") }));
   const data = await page.evaluateHandle((given) => {
@@ -50,18 +50,18 @@ async function drop(page: Page, files: { name: string; content: Buffer }[]): Pro
 test.beforeEach(strict);
 
 test.describe("make", () => {
-  test("a board is designed, proved line by line, and downloaded as the program writes it", async ({ page }) => {
+  test("a board is designed, verified line by line, and downloaded as the program writes it", async ({ page }) => {
     await page.goto("/");
     await expect(page.getByText("110 corners")).toBeVisible({ timeout: 30_000 });
     await page.getByLabel("Rows of corners").fill("1");
-    await expect(page.getByRole("alert")).toContainText("Rows of corners: give a whole number from 2 to 500.");
+    await expect(page.getByRole("alert")).toContainText("Rows of corners: enter a whole number from 2 to 500.");
     await screen(page, "make-problem");
     await page.getByLabel("Rows of corners").fill("8");
-    await page.getByLabel("Corners in a row").fill("9");
+    await page.getByLabel("Corners per row").fill("9");
     await expect(page.getByText("72 corners")).toBeVisible();
     await expect(page.getByRole("alert")).toBeHidden();
-    await expect(page.getByText(/ids of delTag25h7 are left for other targets/)).toBeVisible();
-    await expect(page.getByText(/Your camera can use it from 15 cm, where it fills the picture, to 1\.8 m/)).toBeVisible();
+    await expect(page.getByText(/ids of delTag25h7 remain for other targets/)).toBeVisible();
+    await expect(page.getByText(/Working range of your camera: 15 cm, where the target fills the image, to 1\.8 m/)).toBeVisible();
     await expect.poll(() => page.url()).toContain("rows=8&cols=9");
 
     const made = scratch();
@@ -69,28 +69,28 @@ test.describe("make", () => {
     for (const [button, file] of [["PDF", "board.pdf"], ["SVG", "board.svg"], ["PNG", "board.png"], ["JSON", "board.json"], ["DSC", "board.dsc"]] as const) {
       expect((await press(page, button)).equals(readFileSync(join(made, file))), file).toBe(true);
     }
-    await page.getByRole("button", { name: "Prove it" }).click();
-    await expect(page.getByText("Proved: all 4 files show this target")).toBeVisible({ timeout: 90_000 });
+    await page.getByRole("button", { name: "Verify" }).click();
+    await expect(page.getByText("Verified: all 4 files show exactly this target")).toBeVisible({ timeout: 90_000 });
     const lines = await page.locator(".lines > li").allTextContents();
     const said = deltille("verify", join(made, "board.json"), ...["pdf", "svg", "png", "dsc"].map((format) => join(made, `board.${format}`)));
     expect(lines).toEqual(said.trim().split("\n").slice(0, -1));
     await screen(page, "make");
-    // The address carries the settings.
+    // The address contains the settings.
     await page.reload();
     await expect(page.getByText("72 corners")).toBeVisible({ timeout: 30_000 });
   });
 
-  test("a link carries all settings", async ({ page, context }) => {
+  test("a link contains all settings", async ({ page, context }) => {
     await context.grantPermissions(["clipboard-read", "clipboard-write"]);
     await page.goto("/");
     await page.getByLabel("Target", { exact: true }).selectOption("checker");
-    await page.getByLabel("Family of the tags").selectOption("aprilTag36h11");
+    await page.getByLabel("Tag family").selectOption("aprilTag36h11");
     await page.getByText("More settings").click();
     await page.getByLabel("First tag id").fill("40");
-    await page.getByLabel("Squares with tags").selectOption("white");
+    await page.getByLabel("Tagged squares").selectOption("white");
     await page.getByLabel("Orientation").selectOption("portrait");
     await page.getByLabel("Paper", { exact: true }).selectOption("A3");
-    await page.getByLabel("Edge of a tile, mm").fill("18.5");
+    await page.getByLabel("Tile edge, mm").fill("18.5");
     await page.getByRole("button", { name: "Copy a link" }).click();
     await expect(page.getByRole("button", { name: "Copied." })).toBeVisible();
     const link = await page.evaluate(() => navigator.clipboard.readText());
@@ -105,11 +105,11 @@ test.describe("make", () => {
     expect(first.equals(readFileSync(join(made, "checkerboard.json")))).toBe(true);
   });
 
-  test("templates are offered, saved, and taken by the program", async ({ page }) => {
+  test("templates are offered, saved, and accepted by the program", async ({ page }) => {
     await page.goto("/");
     for (const file of readdirSync(join(root, "templates")).filter((name) => name.endsWith(".toml"))) {
       const name = file.replace(".toml", "");
-      await page.getByLabel("Begin with a template").selectOption(name);
+      await page.getByLabel("Start from a template").selectOption(name);
       await expect(page.getByLabel("Name", { exact: true })).toHaveValue(name);
       const [made, again] = [scratch(), scratch()];
       const command = readFileSync(join(root, "templates", file), "utf8").includes('"checkerboard"') ? "checkerboard" : "board";
@@ -122,7 +122,7 @@ test.describe("make", () => {
       await drop(page, [{ name: "saved.toml", content: saved }]);
       expect((await press(page, "JSON")).equals(readFileSync(join(made, `${name}.json`))), name).toBe(true);
     }
-    // A template that the program saved, of a board over several pages.
+    // A template saved by the program, for a board over several pages.
     const wall = scratch();
     const saved = join(wall, "saved.toml");
     drawn("board", "--rows", "5", "--cols", "6", "--edge", "40mm", "--paper", "A4", "--poster", "--name", "wall", "--save-template", saved, "-o", wall);
@@ -131,7 +131,7 @@ test.describe("make", () => {
     expect((await press(page, "PDF")).equals(readFileSync(join(wall, "wall.pdf")))).toBe(true);
   });
 
-  test("an icosahedron is turned, unfolded, and its files are the program's", async ({ page }) => {
+  test("an icosahedron is rotated and unfolded, and its files equal the program's", async ({ page }) => {
     await page.goto("/");
     await page.getByLabel("Target", { exact: true }).selectOption("icosahedron");
     await expect(page.getByText("720 corners")).toBeVisible({ timeout: 30_000 });
@@ -157,7 +157,7 @@ test.describe("make", () => {
     }
     // Bare faces, white on black.
     await page.getByLabel("Target", { exact: true }).selectOption("octahedron");
-    await page.getByLabel("Family of the tags").selectOption("");
+    await page.getByLabel("Tag family").selectOption("");
     await page.getByText("More settings").click();
     await page.getByLabel("White tiles on black").check();
     await expect(page.getByText("288 corners")).toBeVisible({ timeout: 30_000 });
@@ -165,35 +165,35 @@ test.describe("make", () => {
     expect((await press(page, "PDF")).equals(readFileSync(join(made, "octahedron.pdf")))).toBe(true);
   });
 
-  test("numbers that are none are told of by the names of their fields, and nothing is made of them", async ({ page }) => {
+  test("invalid numbers are reported by the label of their field and draw nothing", async ({ page }) => {
     await page.goto("/");
     await expect(page.getByText("110 corners")).toBeVisible({ timeout: 30_000 });
     for (const [label, wrong, right, said] of [
-      ["Rows of corners", "", "8", "Rows of corners: give a whole number from 2 to 500."],
-      ["Corners in a row", "3.5", "9", "Corners in a row: give a whole number from 2 to 500."],
-      ["Edge of a tile, mm", "-1", "", "Edge of a tile, mm: give a number from 1 to 1000."],
-      ["First tag id", "1e10", "0", "First tag id: give a whole number from 0 to 4294967295."],
+      ["Rows of corners", "", "8", "Rows of corners: enter a whole number from 2 to 500."],
+      ["Corners per row", "3.5", "9", "Corners per row: enter a whole number from 2 to 500."],
+      ["Tile edge, mm", "-1", "", "Tile edge, mm: enter a number from 1 to 1000."],
+      ["First tag id", "1e10", "0", "First tag id: enter a whole number from 0 to 4294967295."],
     ] as const) {
       if (label === "First tag id") await page.getByText("More settings").click();
       await page.getByLabel(label).fill(wrong);
       await expect(page.getByRole("alert")).toHaveText(said);
-      for (const name of ["PDF", "Prove it"]) await expect(page.getByRole("button", { name, exact: true })).toBeDisabled();
+      for (const name of ["PDF", "Verify"]) await expect(page.getByRole("button", { name, exact: true })).toBeDisabled();
       await page.getByLabel(label).fill(right);
       await expect(page.getByRole("alert")).toBeHidden();
     }
     await expect(page.getByText("72 corners")).toBeVisible();
-    await expect(page.getByText(/Your camera can use it from 15 cm/)).toBeVisible();
+    await expect(page.getByText(/Working range of your camera: 15 cm/)).toBeVisible();
     await page.getByLabel("Field of view, °").fill("0");
-    await expect(page.getByText("Field of view, °: give a number from 1 to 170.")).toBeVisible();
+    await expect(page.getByText("Horizontal field of view, °: enter a number from 1 to 170.")).toBeVisible();
     await page.getByLabel("Field of view, °").fill("60");
-    await expect(page.getByText(/Your camera can use it from 15 cm/)).toBeVisible();
-    // A checkerboard has no tags unless they are asked for.
+    await expect(page.getByText(/Working range of your camera: 15 cm/)).toBeVisible();
+    // A checkerboard has no tags by default.
     await page.getByLabel("Target", { exact: true }).selectOption("checker");
-    await expect(page.getByLabel("Family of the tags")).toHaveValue("");
+    await expect(page.getByLabel("Tag family")).toHaveValue("");
     await expect(page.getByLabel("First tag id")).toHaveCount(0);
   });
 
-  test("what an address says wrongly is as usual, and the address says what is shown", async ({ page }) => {
+  test("invalid settings in an address fall back to defaults, and the address follows the settings", async ({ page }) => {
     for (const nonsense of ["kind=foo&orientation=upside&tags_in=purple", "kind=mesh&name=part", "rows=many"]) {
       await page.goto("about:blank");
       await page.goto(`/#make?${nonsense}`);
@@ -205,26 +205,26 @@ test.describe("make", () => {
     await expect(page.getByText("720 corners")).toBeVisible({ timeout: 30_000 });
     await expect(page.getByLabel("Name", { exact: true })).toHaveValue("icosahedron");
     await expect(page.getByLabel("Paper", { exact: true })).toHaveValue("900x1300mm");
-    // Settings stay in the address when another part was looked at.
-    for (const name of ["See", "Make"]) await page.getByRole("link", { name, exact: true }).click();
+    // Settings return to the address after a visit to another part.
+    for (const name of ["Detect", "Make"]) await page.getByRole("link", { name, exact: true }).click();
     await expect.poll(() => page.url()).toContain("kind=icosahedron&paper=900x1300mm");
     await page.reload();
     await expect(page.getByText("720 corners")).toBeVisible({ timeout: 30_000 });
     await page.goto("/#make?rows=1");
     await expect(page.getByRole("alert")).toContainText("Rows of corners");
-    // A mesh is in no address.
+    // A mesh is not part of the address.
     await page.goto("/");
     await drop(page, [{ name: "body.obj", content: Buffer.from(tetrahedron) }]);
     await expect(page.locator(".solid canvas")).toBeVisible({ timeout: 30_000 });
     await expect(page.getByRole("button", { name: "Copy a link" })).toBeHidden();
     expect(page.url()).not.toContain("mesh");
     await drop(page, [{ name: "other.json", content: Buffer.from('{"kind": "other"}') }]);
-    await expect(page.getByRole("alert")).toHaveText("other.json: these are no settings of a target");
+    await expect(page.getByRole("alert")).toHaveText("other.json: not a settings file");
     await drop(page, [{ name: "board.json", content: content("board.json") }]);
-    await expect(page.getByRole("alert")).toContainText("board.json: this describes a target that was made");
+    await expect(page.getByRole("alert")).toContainText("board.json: this is the description of a finished target");
   });
 
-  test("a mesh is dropped, whatever its format", async ({ page }) => {
+  test("meshes of all formats can be dropped", async ({ page }) => {
     await page.goto("/");
     const made = scratch();
     writeFileSync(join(made, "body.obj"), tetrahedron);
@@ -247,14 +247,14 @@ test.describe("make", () => {
     await drop(page, [{ name: "noise.glb", content: Buffer.from("glTF no more") }]);
     await expect(page.getByRole("alert")).toContainText("noise.glb: ");
     await drop(page, [{ name: "a.toml", content: Buffer.from("rows = 5\nnonsense = 3\n") }]);
-    await expect(page.getByRole("alert")).toContainText("a.toml: nonsense: there is no such setting");
+    await expect(page.getByRole("alert")).toContainText("a.toml: nonsense: unknown setting");
     await drop(page, [{ name: "a.json", content: Buffer.from("[1, 2") }]);
-    await expect(page.getByRole("alert")).toContainText("a.json: these are no settings of a target");
+    await expect(page.getByRole("alert")).toContainText("a.json: not a settings file");
   });
 });
 
 test.describe("see", () => {
-  test("corners of dropped photographs are those of the program, and so are all results", async ({ page }) => {
+  test("corners and result files of dropped photographs equal those of the program", async ({ page }) => {
     await page.goto("/#see");
     await drop(page, ["board.json", "0.png", "1.png"].map((name) => ({ name, content: content(name) })));
     await expect(page.getByRole("button", { name: /0\.png 72 corners/ })).toBeVisible({ timeout: 30_000 });
@@ -266,22 +266,22 @@ test.describe("see", () => {
     const worst = Math.max(...corners(found as Detection).map(({ x, y }, i) => Math.hypot(x - (corners(expected as Detection)[i]?.x ?? NaN), y - (corners(expected as Detection)[i]?.y ?? NaN))));
     console.log(`corners differ by ${worst} px at most`);
     expect(worst).toBeLessThan(1e-9);
-    // Deviations of the tone and the ink come of products whose order is the processor's.
+    // Standard deviations of tone and ink depend on the processor's order of summation.
     expect(apart(found, expected)).toBeLessThan(1e-10);
     expect(corners(found as Detection)).toEqual(corners(expected as Detection));
     for (const [button, file] of [["CSV", "0.csv"], ["ORPC", "0.orpc"], ["Overlay (PNG)", "0.overlay.png"]] as const) {
       expect((await press(page, button)).equals(readFileSync(join(out, file))), file).toBe(true);
     }
     const ms = await page.locator(".stage").getByText(/\d+ ms\./).textContent();
-    console.log(`1280 × 960 is looked at in ${/(\d+) ms/.exec(ms ?? "")?.[1]} ms`);
+    console.log(`1280 × 960 is processed in ${/(\d+) ms/.exec(ms ?? "")?.[1]} ms`);
     const canvas = page.locator("canvas.photo");
     const [box, at] = [await canvas.boundingBox(), corners(found as Detection)[30]];
-    if (!box || !at) throw new Error("there is no picture");
+    if (!box || !at) throw new Error("the image is missing");
     await canvas.hover({ position: { x: ((at.x + 2) * box.width) / 1280, y: ((at.y + 1) * box.width) / 1280 } });
     await expect(page.locator(".lens")).toBeVisible();
     await expect(page.getByText(/Row \d+, column \d+, id \d+: ± 0\.0\d+ × 0\.0\d+ px/)).toBeVisible();
     await screen(page, "see");
-    // The keyboard goes from corner to corner.
+    // The keyboard moves from corner to corner.
     await canvas.focus();
     await page.keyboard.press("ArrowRight");
     const one = await page.getByText(/Row \d+, column/).textContent();
@@ -291,7 +291,7 @@ test.describe("see", () => {
     await expect(page.locator(".lens")).toBeHidden();
   });
 
-  test("photographs of one print are looked at with the ink that all of them show, as by the program", async ({ page }) => {
+  test("photographs of one print are processed with their combined ink estimate, as by the program", async ({ page }) => {
     const out = scratch();
     const photograph = readFileSync(join(root, "tests/photographs/robot-hand-0108.png"));
     const darker = PNG.sync.read(photograph);
@@ -301,7 +301,7 @@ test.describe("see", () => {
     deltille("detect", join(out, "one.png"), join(out, "other.png"), "--grid", "deltille", "-o", out);
     await page.goto("/#see");
     await chooseFiles(page, [join(out, "one.png"), join(out, "other.png")]);
-    await expect(page.getByText(/As 2 photographs of one print show together, what is dark has grown by [\d.]+ ± [\d.]+ % of an edge on every side/)).toBeVisible({ timeout: 60_000 });
+    await expect(page.getByText(/Combined estimate from 2 photographs of one print: .*[\d.]+ ± [\d.]+ %/)).toBeVisible({ timeout: 60_000 });
     for (const name of ["one", "other"]) {
       await page.getByRole("button", { name: new RegExp(`^${name}\\.png`) }).click();
       const [found, expected] = [(await press(page, "JSON")).toString(), readFileSync(join(out, `${name}.json`), "utf8")].map((text) => JSON.parse(text) as Detection);
@@ -311,28 +311,28 @@ test.describe("see", () => {
     await screen(page, "see-ink");
   });
 
-  test("targets are recognised by their tags, in the pictures that come along too", async ({ page }) => {
+  test("targets are identified by their tags, also in the sample images", async ({ page }) => {
     await page.goto("/#see");
-    await page.getByRole("button", { name: "Take a rendered board" }).click();
-    await expect(page.getByText("Recognised: a deltille board of 9 × 12 corners with tags of delTag25h7 from id 0 on.")).toBeVisible({ timeout: 60_000 });
+    await page.getByRole("button", { name: "Use the rendered sample board" }).click();
+    await expect(page.getByText("Identified: a deltille board of 9 × 12 corners with delTag25h7 tags, starting at id 0.")).toBeVisible({ timeout: 60_000 });
     await expect(page.getByRole("button", { name: /board\.png 108 corners, 12 tags/ })).toBeVisible({ timeout: 30_000 });
-    await page.getByLabel("Edge of its tiles, mm").fill("24.5");
+    await page.getByLabel("Tile edge, mm").fill("24.5");
     await page.keyboard.press("Tab");
     await expect(page.getByRole("button", { name: /board\.png 108 corners, 12 tags/ })).toBeVisible({ timeout: 30_000 });
     await screen(page, "see-recognised");
     await page.getByRole("button", { name: "Remove all" }).click();
-    await page.getByRole("button", { name: "Take a photograph" }).click();
+    await page.getByRole("button", { name: "Use the sample photograph" }).click();
     await expect(page.getByText("under CC BY 4.0")).toBeVisible({ timeout: 60_000 });
     await expect(page.getByRole("button", { name: /robot-hand\.png 110 corners/ })).toBeVisible({ timeout: 60_000 });
     await screen(page, "see-sample");
     await page.getByRole("button", { name: "Remove all" }).click();
     await chooseFiles(page, [join(folder, "solid.png")]);
-    await expect(page.getByText(/Recognised: the icosahedron, by \d+ tags/)).toBeVisible({ timeout: 60_000 });
+    await expect(page.getByText(/Identified: the icosahedron, from \d+ tags/)).toBeVisible({ timeout: 60_000 });
     await expect(page.getByRole("button", { name: /solid\.png \d{3} corners/ })).toBeVisible({ timeout: 30_000 });
     await screen(page, "see-solid");
   });
 
-  test("hostile files are refused in a sentence, and the page goes on", async ({ page }) => {
+  test("hostile files are rejected with a message, and the page stays usable", async ({ page }) => {
     await page.goto("/#see");
     const png = content("0.png");
     const bomb = Buffer.from(png.subarray(0, 33));
@@ -346,27 +346,27 @@ test.describe("see", () => {
       { name: "text.tif", mimeType: "image/tiff", buffer: Buffer.from("II*\0 this is no picture at all") },
     ];
     await chooseFiles(page, files);
-    for (const { name } of files) await expect(page.getByRole("button", { name: new RegExp(name.replace(".", "\\.")) })).toContainText(/not|damaged|cannot|empty|more than/i, { timeout: 30_000 });
+    for (const { name } of files) await expect(page.getByRole("button", { name: new RegExp(name.replace(".", "\\.")) })).toContainText(/not|damaged|cannot|empty|more than|exceeds|too large|invalid/i, { timeout: 30_000 });
     await screen(page, "see-hostile");
     await chooseFiles(page, [{ name: "broken.json", mimeType: "application/json", buffer: Buffer.from('{"schema": "deltille/target/1"') }]);
     await expect(page.getByRole("button", { name: /cut\.png/ })).toContainText(/\w+ \w+/, { timeout: 30_000 });
-    await page.getByLabel("What is in them").selectOption("auto");
+    await page.getByLabel("Target in the photographs").selectOption("auto");
     await chooseFiles(page, [join(folder, "0.png")]);
     await expect(page.getByRole("button", { name: /0\.png \d+ corners/ })).toBeVisible({ timeout: 30_000 });
   });
 });
 
-test("folders are dropped, none counts twice, and one is removed", async ({ page, context }) => {
+test("folders can be dropped, duplicates are skipped, and a photograph can be removed", async ({ page, context }) => {
   await page.goto("/#see");
   const here = scratch();
   mkdirSync(join(here, "more"));
   for (const name of ["0.png", "1.png", "more/2.png"]) writeFileSync(join(here, name), content(name.replace("more/", "")));
   const devtools = await context.newCDPSession(page);
-  // Beside the place for it.
+  // Outside the drop area.
   const dropped = async (...files: string[]) => {
     for (const type of ["dragEnter", "dragOver", "drop"] as const) await devtools.send("Input.dispatchDragEvent", { type, x: 900, y: 500, data: { items: [], files, dragOperationsMask: 1 } });
   };
-  await expect(page.getByText("Nothing was looked at yet.")).toBeVisible();
+  await expect(page.getByText("No photographs yet.")).toBeVisible();
   await dropped(here);
   const photographs = page.getByRole("button", { name: /\.png 72 corners/ });
   await expect(photographs).toHaveText([/^0\.png/, /^1\.png/, /^2\.png/], { timeout: 60_000 });
@@ -375,14 +375,14 @@ test("folders are dropped, none counts twice, and one is removed", async ({ page
   await photographs.nth(1).click();
   await page.getByRole("button", { name: "Remove this one" }).click();
   await expect(photographs).toHaveText([/^0\.png/, /^2\.png/]);
-  // What describes no target is told of, and changes nothing.
+  // A file that is not a description is reported and changes nothing.
   for (const [name, text] of [["other.json", '{"kind": "other"}'], ["cut.JSON", '{"schema": "deltille/target/1"']] as const) {
     await chooseFiles(page, [{ name, mimeType: "application/json", buffer: Buffer.from(text) }]);
     await expect(page.getByRole("alert")).toContainText(`${name}: `);
     await expect(photographs).toHaveCount(2);
   }
   await page.getByRole("link", { name: "Calibrate" }).click();
-  await expect(page.getByText("2 pictures with labelled corners")).toBeVisible();
+  await expect(page.getByText("2 images with labelled corners")).toBeVisible();
 });
 
 test.describe("calibrate", () => {
@@ -392,21 +392,21 @@ test.describe("calibrate", () => {
     await chooseFiles(page, [join(folder, "board.json"), ...shots]);
     await expect(page.getByRole("button", { name: /9\.png \d+ corners/ })).toBeVisible({ timeout: 60_000 });
     await page.getByRole("link", { name: "Calibrate" }).click();
-    await expect(page.getByText("10 pictures with labelled corners")).toBeVisible();
-    const covered = page.getByText(/10 pictures; \d+ % of the camera's picture covered; tilts of \d+° to \d+°/);
+    await expect(page.getByText("10 images with labelled corners")).toBeVisible();
+    const covered = page.getByText(/10 images; \d+ % of the image area covered; tilts from \d+° to \d+°/);
     await expect(covered).toBeVisible({ timeout: 30_000 });
     const [, part, least, most] = (/; (\d+) %.* (\d+)° to (\d+)°/.exec((await covered.textContent()) ?? "") ?? []).map(Number);
-    await expect(page.getByRole("img", { name: `${part} % of the camera's picture covered` })).toBeVisible();
-    await expect(page.getByRole("img", { name: `tilts of ${least}° to ${most}°` })).toBeVisible();
+    await expect(page.getByRole("img", { name: `${part} % of the image area covered` })).toBeVisible();
+    await expect(page.getByRole("img", { name: `tilts from ${least}° to ${most}°` })).toBeVisible();
     await page.getByRole("button", { name: "Calibrate", exact: true }).click();
-    await expect(page.getByText(/Residuals of 0\.0\d+ px over 10 views/)).toBeVisible({ timeout: 60_000 });
+    await expect(page.getByText(/Reprojection error: 0\.0\d+ px RMS per axis over 10 views/)).toBeVisible({ timeout: 60_000 });
     await screen(page, "calibrate");
-    // The program finds the same camera in the same photographs.
+    // The program computes the same calibration from the same photographs.
     const [detections, out, target] = [scratch(), scratch(), ["--target", join(folder, "board.json")]];
     deltille("detect", ...shots, ...target, "-o", detections);
     deltille("calibrate", detections, ...target, "--model", "radtan", "--format", "own,opencv,ros", "--report", join(out, "camera-report.html"), "-o", out);
     const read = (file: string) => readFileSync(join(out, file), "utf8");
-    // Sums of products are in the order that the processor's vectors have, which is not that of WebAssembly: last digits differ.
+    // Last digits differ: the order of summation depends on the processor's vector width, which WebAssembly does not share.
     for (const file of ["camera.yaml", "camera.json", "camera-opencv.yaml", "camera-ros.yaml"]) {
       const [text, others] = [(await press(page, file)).toString(), read(file)].map(split);
       expect(text?.words, file).toEqual(others?.words);
@@ -414,16 +414,16 @@ test.describe("calibrate", () => {
       console.log(`${file} differs by ${worst.toExponential(1)} of a number at most`);
       expect(worst, file).toBeLessThan(1e-6);
     }
-    // Drawings are rounded to a tenth of a pixel; the page has no options.
-    const [drawn, others] = [(await press(page, "The whole report")).toString(), read("camera-report.html").replace(/<span class="option">--print-scale(.?)<\/span>/, "scale$1")].map(split);
+    // Drawings are rounded to a tenth of a pixel. The page names a setting where the program names its option.
+    const [drawn, others] = [(await press(page, "Full report")).toString(), read("camera-report.html").replace(/<span class="option">--print-scale(.?)<\/span>/, "scale$1")].map(split);
     expect(drawn?.words).toEqual(others?.words);
     expect(Math.max(...(drawn?.numbers ?? []).map((number, i) => Math.abs(number - (others?.numbers[i] ?? NaN))))).toBeLessThan(0.11);
 
-    // What was covered, counted in the program's files.
+    // Coverage, counted in the program's files.
     const seen = shots.map((_, i) => corners(JSON.parse(readFileSync(join(detections, `${i}.json`), "utf8")) as Detection));
     const cells = new Set(seen.flat().map(({ x, y }) => `${Math.floor((x + 0.5) / 80)} ${Math.floor((y + 0.5) / 80)}`));
     expect(part).toBe(Math.round((100 * cells.size) / (16 * 12)));
-    // And how the board was tilted against the line of sight to the middle of its corners, the lens taken for a pinhole.
+    // Tilt of the board against the line of sight to the centroid of its corners, with a pinhole model.
     const { views } = JSON.parse(read("camera.json")) as { views: { camera_from_target: { rotation: number[] } }[] };
     const tilts = views.map(({ camera_from_target: { rotation } }, i) => {
       const middle = (axis: "x" | "y") => (seen[i] ?? []).reduce((sum, corner) => sum + corner[axis], 0) / (seen[i]?.length ?? NaN);
@@ -433,11 +433,11 @@ test.describe("calibrate", () => {
     expect(Math.abs(Math.min(...tilts) - (least ?? NaN))).toBeLessThan(1);
     expect(Math.abs(Math.max(...tilts) - (most ?? NaN))).toBeLessThan(1);
 
-    // What is shown is told to be of another model.
+    // The result is marked as outdated after a change of the model.
     await page.getByLabel("Camera model").selectOption("rational");
-    await expect(page.getByText("This is of other pictures, or of another model")).toBeVisible();
+    await expect(page.getByText("The images or the model changed after this calibration")).toBeVisible();
     await page.getByRole("button", { name: "Calibrate", exact: true }).click();
-    await expect(page.getByText("This is of other pictures, or of another model")).toBeHidden();
+    await expect(page.getByText("The images or the model changed after this calibration")).toBeHidden();
 
     for (const scheme of ["light", "dark"] as const) {
       await page.emulateMedia({ colorScheme: scheme });
@@ -447,40 +447,40 @@ test.describe("calibrate", () => {
     }
   });
 
-  test("what is missing is said", async ({ page }) => {
+  test("missing inputs are reported", async ({ page }) => {
     await page.goto("/#calibrate");
     await page.getByRole("button", { name: "Calibrate", exact: true }).click();
-    await expect(page.getByRole("alert")).toContainText("no photograph with labelled corners yet");
+    await expect(page.getByRole("alert")).toContainText("no images with labelled corners yet");
     await page.getByRole("button", { name: "Use a webcam" }).click();
-    await expect(page.getByRole("alert")).toContainText("not known what to look for");
+    await expect(page.getByRole("alert")).toContainText("No target is selected");
   });
 
-  test("the next picture is proposed, and taken where the board is held there", async ({ page, context }) => {
+  test("the next image is proposed, and captured once the board is held there", async ({ page, context }) => {
     await context.grantPermissions(["camera"]);
     await page.goto("/#see");
     await chooseFiles(page, [join(folder, "board.json"), join(folder, "0.png")]);
     await expect(page.getByRole("button", { name: /0\.png 72 corners/ })).toBeVisible({ timeout: 30_000 });
     await page.getByRole("link", { name: "Calibrate" }).click();
     await page.getByRole("button", { name: "Use a webcam" }).click();
-    await expect(page.getByText("Hold the board in the middle of the picture, about 25 cm away, facing the camera.")).toBeVisible({ timeout: 30_000 });
+    await expect(page.locator(".wish")).toContainText(/25 cm/, { timeout: 30_000 });
     await screen(page, "calibrate-guided-first");
-    // It is taken by itself, and another one is proposed, which the video does not show.
-    await expect(page.getByText("1 picture taken")).toBeVisible({ timeout: 60_000 });
-    await expect(page.getByText(/tilted away by 40°/)).toBeVisible();
+    // It is captured automatically, and another pose is proposed, which the video does not show.
+    await expect(page.getByText("1 image captured")).toBeVisible({ timeout: 60_000 });
+    await expect(page.locator(".wish")).toContainText(/40°/);
     await screen(page, "calibrate-guided");
     const wish = page.locator(".wish");
     const before = await wish.textContent();
-    await page.getByRole("button", { name: "It cannot be held there" }).click();
+    await page.getByRole("button", { name: "Skip this pose" }).click();
     await expect(wish).not.toHaveText(before ?? "");
-    // Pictures taken by hand count, too; with a camera it is said how sure it is.
+    // Manual captures count, too; once there is a calibration, its uncertainty is shown.
     for (let taken = 2; taken <= 7; taken++) {
-      await page.getByRole("button", { name: "Take this one" }).click();
-      await expect(page.getByText(new RegExp(`${taken} pictures taken`))).toBeVisible({ timeout: 30_000 });
+      await page.getByRole("button", { name: "Capture now" }).click();
+      await expect(page.getByText(new RegExp(`${taken} images captured`))).toBeVisible({ timeout: 30_000 });
       await page.waitForTimeout(400);
     }
-    await expect(page.getByText(/Distant points are known to [\d.]+ px, with this picture to/)).toBeVisible({ timeout: 30_000 });
-    // Frames of the video that come again count once.
-    await expect(page.getByText(/\d pictures; \d+ % of the camera's picture covered; (tilts of|tilted by) /)).toBeVisible({ timeout: 30_000 });
+    await expect(page.getByText(/Projection uncertainty of distant points: [\d.]+ px, after this image/)).toBeVisible({ timeout: 30_000 });
+    // Repeated frames of the video count once.
+    await expect(page.getByText(/\d images; \d+ % of the image area covered; tilts? /)).toBeVisible({ timeout: 30_000 });
     await screen(page, "calibrate-guided-sure");
     await page.getByRole("button", { name: "Stop the webcam" }).click();
   });
@@ -488,39 +488,39 @@ test.describe("calibrate", () => {
 
 test("a tag is damaged and corrected", async ({ page }) => {
   await page.goto("/#families");
-  await expect(page.getByText("Read as tag 0.")).toBeVisible({ timeout: 30_000 });
+  await expect(page.getByText("Decoded as tag 0.")).toBeVisible({ timeout: 30_000 });
   const cells = page.getByRole("switch");
-  // The middle of the box around a triangle lies on its edge.
+  // The centre of the bounding box of a triangle lies on its edge, so a click there is ambiguous.
   await cells.nth(3).dispatchEvent("click");
-  await expect(page.getByText("Read as tag 0, 1 wrong cell corrected.")).toBeVisible();
+  await expect(page.getByText("Decoded as tag 0, 1 wrong cell corrected.")).toBeVisible();
   await cells.nth(7).press("Space");
   await cells.nth(11).dispatchEvent("click");
-  await expect(page.getByText("Read as tag 0, 3 wrong cells corrected.")).toBeVisible();
+  await expect(page.getByText("Decoded as tag 0, 3 wrong cells corrected.")).toBeVisible();
   await screen(page, "families");
   await page.getByRole("button", { name: "Repair" }).click();
-  await expect(page.getByText("Read as tag 0.")).toBeVisible();
+  await expect(page.getByText("Decoded as tag 0.")).toBeVisible();
   await page.getByLabel("Tag id").fill("343");
-  await expect(page.getByText("Give a whole number from 0 to 342.")).toBeVisible();
+  await expect(page.getByText("Enter a whole number from 0 to 342.")).toBeVisible();
   await page.getByLabel("Tag id").fill("7");
-  await expect(page.getByText("Read as tag 7.")).toBeVisible();
+  await expect(page.getByText("Decoded as tag 7.")).toBeVisible();
   await page.getByLabel("Family").selectOption("aprilTag36h11");
   await expect(page.getByText("587 codes")).toBeVisible({ timeout: 30_000 });
   await screen(page, "families-square");
 });
 
-test("the mathematics of families is drawn as it is computed otherwise", async ({ page }) => {
+test("figures of families agree with independent computations", async ({ page }) => {
   await page.goto("/#families");
   await page.getByLabel("Family").selectOption("d25h7");
   const figures = page.locator(".figures");
   const row = (name: string) => figures.getByRole("row", { name });
-  await expect(row("d25h7 has")).toContainText("1,208", { timeout: 30_000 });
-  // A third of 2^25 words over balls of three cells; that of linear programming is in docs/families.md.
+  await expect(row("Codes in d25h7")).toContainText("1,208", { timeout: 30_000 });
+  // A third of 2^25 words, divided by the size of a ball of radius three. The linear-programming bound is in docs/families.md.
   const ball = 1 + 25 + (25 * 24) / 2 + (25 * 24 * 23) / 6;
   await expect(row("sphere packing")).toContainText(Math.floor(Math.floor(2 ** 25 / ball) / 3).toLocaleString("en"));
   await expect(row("linear programming")).toContainText("3,478");
 
-  // A turn takes each cell of a circle to the place of the next.
-  await expect(page.getByText("in 8 circles of 3; the one in the middle stays")).toBeVisible();
+  // A rotation moves each cell of a cycle to the position of the next.
+  await expect(page.getByText("in 8 cycles of 3; the centre cell stays in place")).toBeVisible();
   const cells = page.getByRole("switch");
   const middles = await cells.evaluateAll((all) =>
     all.map((cell) => {
@@ -531,13 +531,13 @@ test("the mathematics of families is drawn as it is computed otherwise", async (
   const turned = ([u = 0, v = 0]: number[]) => middles.findIndex(([x = 0, y = 0]) => Math.hypot(x - (1 - u - v), y - u) < 1e-9);
   const cycle = [3, turned(middles[3] ?? []), turned(middles[turned(middles[3] ?? [])] ?? []), 3].map((cell) => `cell ${cell + 1}`);
   await cells.nth(3).focus();
-  await expect(page.getByText(`A turn by 120° takes the content of ${cycle.join(" to ")}.`)).toBeVisible();
-  await page.getByRole("button", { name: "Turn by 120°" }).click();
-  await expect(page.getByText("Read as tag 0, turned by 120°.")).toBeVisible();
+  await expect(page.getByText(`A rotation by 120° moves the content of ${cycle.join(" to ")}.`)).toBeVisible();
+  await page.getByRole("button", { name: "Rotate by 120°" }).click();
+  await expect(page.getByText("Decoded as tag 0, rotated by 120°.")).toBeVisible();
   await cells.nth(5).press("Space");
-  await expect(page.getByText("Read as tag 0, turned by 120°, 1 wrong cell corrected.")).toBeVisible();
+  await expect(page.getByText("Decoded as tag 0, rotated by 120°, 1 wrong cell corrected.")).toBeVisible();
 
-  // A tag is read as a word where the cells in which they differ are few, whichever were wrong: counted cell by cell.
+  // A tag is read as a code that differs from it in few enough cells, whichever were wrong: counted cell by cell.
   const rate = 0.1;
   await page.getByRole("slider", { name: "Wrong cells" }).fill(String(200 * rate));
   const family = JSON.parse(readFileSync(join(root, "crates/core/families/d25h7.json"), "utf8")) as { distance_histogram: Record<string, number>; codes: string[] };
@@ -551,9 +551,9 @@ test("the mathematics of families is drawn as it is computed otherwise", async (
   };
   const misread = Object.entries(family.distance_histogram).reduce((sum, [apart, pairs]) => sum + ((2 * pairs) / (3 * family.codes.length)) * near(Number(apart)), 0);
   const percent = (share: number) => `${(100 * share).toFixed(1)} %`;
-  await expect(figures.getByText("Where 10 % of all cells are wrong")).toContainText(`${percent(near(0))} of the tags are read, ${percent(1 - near(0) - misread)} refused and one in ${Number((1 / misread).toPrecision(2)).toLocaleString("en")} misread.`);
+  await expect(figures.getByText("With 10 % of all cells wrong")).toContainText(`${percent(near(0))} of the tags are read, ${percent(1 - near(0) - misread)} are rejected and one in ${Number((1 / misread).toPrecision(2)).toLocaleString("en")} is misread.`);
 
-  // False positives are those that `deltag info` states.
+  // False-positive rates equal those of `deltag info`.
   const stated = JSON.parse(execFileSync(join(dirname(program), "deltag"), ["info", "d25h7", "--json"], { encoding: "utf8" })) as { false_positive_rate: number[]; natural_false_positive_rate: number[]; recommended_correction: number };
   const rates = figures.locator(".rates tbody tr");
   for (const [count, name] of ["none", "1", "up to 2", "up to 3"].entries()) {
@@ -561,43 +561,43 @@ test("the mathematics of families is drawn as it is computed otherwise", async (
     await expect(rates.nth(count).locator("th, td")).toHaveText([name, ...both.map((rate) => rate.toExponential(1))], { timeout: 30_000 });
   }
   expect(stated.recommended_correction).toBe(0);
-  await expect(figures.getByText("Whoever believes single tags corrects nothing")).toBeVisible();
+  await expect(figures.getByText("To trust single tags, correct no cells")).toBeVisible();
   await cells.nth(9).hover();
   await screen(page, "families-figures");
 });
 
-test("once loaded, the page works without a network", async ({ page, context }) => {
+test("once loaded, the page works offline", async ({ page, context }) => {
   await page.goto("/");
   await expect(page.getByText("110 corners")).toBeVisible({ timeout: 30_000 });
   await page.evaluate(async () => void (await navigator.serviceWorker.ready));
   await context.setOffline(true);
   await page.reload();
   await expect(page.getByText("110 corners")).toBeVisible({ timeout: 30_000 });
-  await page.getByRole("link", { name: "See" }).click();
+  await page.getByRole("link", { name: "Detect" }).click();
   await expect(page.getByRole("button", { name: "Choose photographs" })).toBeVisible();
   await chooseFiles(page, [join(folder, "0.png")]);
   await expect(page.getByRole("button", { name: /0\.png 72 corners/ })).toBeVisible({ timeout: 60_000 });
 });
 
-test("the keyboard goes everywhere", async ({ page }) => {
+test("the keyboard reaches everything", async ({ page }) => {
   await page.goto("/");
   await expect(page.getByText("110 corners")).toBeVisible({ timeout: 30_000 });
   await page.keyboard.press("Tab");
   await expect(page.getByRole("link", { name: "Skip to content" })).toBeFocused();
-  for (const name of ["Make", "See", "Calibrate", "Families"]) {
+  for (const name of ["Make", "Detect", "Calibrate", "Families"]) {
     await page.keyboard.press("Tab");
     await expect(page.getByRole("link", { name, exact: true })).toBeFocused();
   }
   await page.keyboard.press("Enter");
-  await expect(page.getByText("Read as tag 0.")).toBeVisible({ timeout: 30_000 });
-  // To the content of this part, and from there on.
+  await expect(page.getByText("Decoded as tag 0.")).toBeVisible({ timeout: 30_000 });
+  // Skips to the content of this part, and continues from there.
   await page.getByRole("link", { name: "Skip to content" }).press("Enter");
   await page.keyboard.press("Tab");
   await expect(page.getByLabel("Family")).toBeFocused();
 });
 
-/** What each part shows when it is there. */
-const there = { make: "110 corners", see: "Nothing was looked at yet.", calibrate: "0 pictures with labelled corners", families: "Tags that are seen badly" };
+/** A text that each part shows once it is loaded. */
+const there = { make: "110 corners", see: "No photographs yet.", calibrate: "0 images with labelled corners", families: "Decoding under noise" };
 for (const [part, sign] of Object.entries(there)) {
   test(`${part} fits a phone, light and dark`, async ({ page }) => {
     await page.goto(`/#${part}`);

@@ -1,4 +1,4 @@
-// The package for npm as its users have it: packed, installed in an empty folder, and its README's examples run there. The corners
+// Tests the npm package as users get it: packs it, installs it in an empty folder and runs the examples of its README. The corners
 // are compared with those of the program (target/release/deltille, or DELTILLE_PROGRAM).
 import assert from "node:assert/strict";
 import { execFileSync } from "node:child_process";
@@ -30,8 +30,8 @@ const name = run("node", "target.mjs").trim();
 run(program, "board", "--rows", "10", "--cols", "11", "--paper", "A4", "--name", "board", "-o", "made");
 assert.ok(readFileSync(join(folder, name)).equals(readFileSync(join(folder, "made/board.pdf"))));
 
-// The types hold together.
+// The type declarations compile.
 writeFileSync(join(folder, "typed.ts"), 'import { Finder } from "deltille/see";\nexport const finder: Finder = Finder.of_grid("checker", 0, 0);\n');
 run("node", join(web, "node_modules/typescript/bin/tsc"), "--noEmit", "--strict", "--module", "nodenext", "--target", "es2022", "--lib", "es2022,dom,esnext.disposable", "typed.ts");
 rmSync(folder, { recursive: true });
-console.log(`the package is as its README says: ${found.length} corners as the program finds them, ${name} as it writes it`);
+console.log(`the examples of the README work: ${found.length} corners equal those of the program, and so does ${name}`);

@@ -1,4 +1,4 @@
-// What all tests do with the page.
+// Helpers of all page tests.
 import type { Page } from "@playwright/test";
 
 export const screen = (page: Page, name: string) => page.screenshot({ path: `test-results/screens/${name}.png`, fullPage: true });

@@ -1,4 +1,4 @@
-// What the tests show to the page: photographs of a board, made by the program, and a video of it for the webcam.
+// Test inputs, rendered by the program: photographs of a board, and a video of it for the webcam.
 import { execFileSync } from "node:child_process";
 import { existsSync, mkdirSync, readFileSync, writeFileSync } from "node:fs";
 import { join } from "node:path";
@@ -9,7 +9,7 @@ const root = fileURLToPath(new URL("../..", import.meta.url));
 export const program = process.env.DELTILLE_PROGRAM ?? join(root, "target/release/deltille");
 export const folder = join(root, "web/test-results/pictures");
 
-/** Where the camera stands, what is up in its picture, and what it looks at, mm: tilts to all sides, the board all over the picture. */
+/** Camera position, up direction and target point, mm: the board is tilted to all sides and covers the whole image. */
 const VIEWS = [
   ["0,-50,420", "0,0,1", "115,60,0"],
   ["300,60,330", "0,1,0", "60,15,0"],
@@ -23,7 +23,7 @@ const VIEWS = [
   ["330,-80,380", "0,1,0", "50,105,0"],
 ] as const;
 
-/** A mesh of four faces with edges of 150 mm. */
+/** A tetrahedral mesh with edges of 150 mm. */
 export const tetrahedron = ((side: number) => {
   const [height, up] = [(side * Math.sqrt(3)) / 2, side * Math.sqrt(2 / 3)];
   const places = [[0, 0, 0], [side, 0, 0], [side / 2, height, 0], [side / 2, height / 3, up]];
@@ -34,7 +34,7 @@ export function deltille(...given: string[]): string {
   return execFileSync(program, given, { encoding: "utf8", stdio: ["ignore", "pipe", "pipe"] });
 }
 
-/** Makes a target and its files, to be compared. That these show the target is proved by the tests of the program. */
+/** Makes a target and its files for comparison. The tests of the program verify that they show the target. */
 export const drawn = (...given: string[]): string => deltille(...given, "--no-verify");
 
 export default function make(): void {
@@ -47,8 +47,8 @@ export default function make(): void {
   });
   drawn("icosahedron", "-o", folder, "--force");
   deltille("render", join(folder, "icosahedron.json"), "--camera", camera, "--eye", "150,220,600", "-o", join(folder, "solid.png"), "--force");
-  // 640 × 480, at thirty a second: where the first picture is proposed, then at a few other places. The camera is the one that is
-  // assumed before anything is known.
+  // 640 × 480 at 30 frames per second: first at the first proposed pose, then at a few others. The camera is the one that the guide
+  // assumes before the first image.
   const small = join(folder, "small.yaml");
   const focal = 320 / Math.tan(1.15 / 2);
   writeFileSync(small, `width: 640\nheight: 480\nfocal_px: [${focal}, ${focal}]\ncentre_px: [319.5, 239.5]\nmodel: pinhole\ndistortion: []\n`);
@@ -56,8 +56,8 @@ export default function make(): void {
   mkdirSync(join(folder, "none"), { recursive: true });
   deltille("guide", join(folder, "none"), "--target", join(folder, "board.json"), "--camera", small, "--once", "-o", next, "--force");
   const { camera_from_target: pose } = JSON.parse(readFileSync(next, "utf8")) as { camera_from_target: { rotation: number[]; translation_mm: number[] } };
-  // Facing the camera: half a turn about the x axis.
-  if (pose.rotation[0] !== 1) throw new Error("the first picture is proposed otherwise");
+  // Facing the camera: a rotation by 180° about the x axis.
+  if (pose.rotation[0] !== 1) throw new Error("the first proposed pose does not face the camera");
   const facing = ["--pose", [Math.PI, 0, 0, ...pose.translation_mm].join(",")];
   const places: [string[], number][] = [[facing, 45], ...["100,-60,380", "250,120,330", "-40,180,340"].map((eye): [string[], number] => [["--eye", eye], 20])];
   const frames: Buffer[] = [Buffer.from("YUV4MPEG2 W640 H480 F30:1 Ip A1:1 C420jpeg\n")];
@@ -71,7 +71,7 @@ export default function make(): void {
   writeFileSync(join(folder, "../webcam.y4m"), Buffer.concat(frames));
 }
 
-/** Grey values of a picture. */
+/** Grey values of an image. */
 function pixels(path: string): Buffer {
   const { data } = PNG.sync.read(readFileSync(path));
   return Buffer.from(data.filter((_, i) => i % 4 === 0));

@@ -3,7 +3,7 @@ import { join } from "node:path";
 import { fileURLToPath } from "node:url";
 import { deltille, folder } from "./pictures";
 
-// The pictures of the page in README.md: no test, but made as one, by `npm run pictures`.
+// Screenshots of the page for README.md, not a test; `npm run pictures` takes them.
 test.use({ viewport: { width: 1100, height: 800 }, deviceScaleFactor: 0.8, colorScheme: "light" });
 
 const images = fileURLToPath(new URL("../../docs/images", import.meta.url));
@@ -19,7 +19,7 @@ test("make", async ({ page }) => {
 });
 
 test("see", async ({ page }) => {
-  // Without noise, of which a PNG would be large.
+  // Without noise, which would make the PNG large.
   const desk = join(folder, "desk.png");
   deltille("render", join(folder, "board.json"), "--camera", fileURLToPath(new URL("../../templates/camera.yaml", import.meta.url)), "--eye", "330,-90,290", "--noise", "0", "-o", desk, "--force");
   await page.goto("/#see");
@@ -36,6 +36,6 @@ test("calibrate", async ({ page }) => {
   await page.getByRole("button", { name: /9\.png 72 corners/ }).waitFor();
   await page.getByRole("link", { name: "Calibrate" }).click();
   await page.getByRole("button", { name: "Calibrate", exact: true }).click();
-  await page.getByText("Residuals of").waitFor();
+  await page.getByText("Reprojection error").waitFor();
   await picture(page, "calibrate");
 });

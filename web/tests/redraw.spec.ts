@@ -1,9 +1,9 @@
 import { expect, test } from "@playwright/test";
 
-// The browser as it starts by itself: the other journeys have it draw as if there were a graphics card, for the solid.
+// The browser with its default options: the other journeys emulate a graphics card, which the solid needs.
 test.use({ launchOptions: { executablePath: process.env.CHROMIUM ?? "/usr/bin/chromium", args: ["--no-sandbox", "--disable-quic"] } });
 
-test("a sheet is drawn anew within 0.1 s of a change", async ({ page }) => {
+test("a change redraws the sheet within 0.1 s", async ({ page }) => {
 await page.goto("/");
 await expect(page.getByText("110 corners")).toBeVisible({ timeout: 30_000 });
 await page.waitForTimeout(1000);
@@ -11,7 +11,7 @@ await page.waitForTimeout(1000);
 const times = await page.evaluate(async () => {
   const rows = document.querySelector<HTMLInputElement>("form input[type=number]");
   const sheet = document.querySelector<HTMLImageElement>(".sheet");
-  if (!rows || !sheet) throw new Error("there is no form");
+  if (!rows || !sheet) throw new Error("the form is missing");
   const times: number[] = [];
   for (let count = 11; count < 31; count++) {
     const loaded = new Promise((resolve) => sheet.addEventListener("load", resolve, { once: true }));

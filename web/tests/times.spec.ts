@@ -1,4 +1,4 @@
-// What is measured, with nothing beside it.
+// Timing tests, which run alone.
 import { type Page, expect, test } from "@playwright/test";
 import { execFileSync } from "node:child_process";
 import { join } from "node:path";
@@ -7,7 +7,7 @@ import { folder } from "./pictures";
 
 test.beforeEach(strict);
 
-test("1280 × 960 is looked at in 0.1 s", async ({ page }) => {
+test("an image of 1280 × 960 is processed in 0.1 s", async ({ page }) => {
   await page.goto("/#see");
   const times: number[] = [];
   await chooseFiles(page, [join(folder, "board.json"), ...Array.from({ length: 10 }, (_, i) => join(folder, `${i}.png`))]);
@@ -21,17 +21,17 @@ test("1280 × 960 is looked at in 0.1 s", async ({ page }) => {
   expect(sorted[5]).toBeLessThanOrEqual(100);
 });
 
-test("a webcam is watched, pictures are taken by themselves, and memory stays as it is", async ({ page, context }) => {
+test("webcam images are captured automatically, and memory stays constant", async ({ page, context }) => {
   test.setTimeout(300_000);
   await context.grantPermissions(["camera"]);
   await page.goto("/#see");
   await chooseFiles(page, [join(folder, "board.json"), join(folder, "0.png")]);
   await expect(page.getByRole("button", { name: /0\.png 72 corners/ })).toBeVisible({ timeout: 30_000 });
   await page.getByRole("link", { name: "Calibrate" }).click();
-  await page.getByLabel("The webcam takes pictures").selectOption("free");
+  await page.getByLabel("Capture images").selectOption("free");
   await page.getByRole("button", { name: "Use a webcam" }).click();
-  await expect(page.getByText(/[3-9] pictures taken/)).toBeVisible({ timeout: 60_000 });
-  await expect(page.getByText(/[3-9] pictures; \d+ % of the camera's picture covered/)).toBeVisible();
+  await expect(page.getByText(/[3-9] images captured/)).toBeVisible({ timeout: 60_000 });
+  await expect(page.getByText(/[3-9] images; \d+ % of the image area covered/)).toBeVisible();
   await screen(page, "calibrate-webcam");
   const canvas = page.locator("canvas.photo");
   const frames = async () => Number(await canvas.getAttribute("data-frames"));
@@ -39,17 +39,17 @@ test("a webcam is watched, pictures are taken by themselves, and memory stays as
   const [before, begin, first] = [await memory(page), Date.now(), await frames()];
   await expect.poll(frames, { timeout: 120_000 }).toBeGreaterThan(first + 980);
   const [end, last, after] = [Date.now(), await frames(), await memory(page)];
-  console.log(`webcam of 640 × 480: ${((1000 * (last - first)) / (end - begin)).toFixed(1)} frames a second; memory of the browser ${before.toFixed(0)} MB, ${last - first} frames later ${after.toFixed(0)} MB`);
-  // A frame has 1.2 MB of pixels, and 0.03 MB of what is found.
+  console.log(`webcam of 640 × 480: ${((1000 * (last - first)) / (end - begin)).toFixed(1)} frames per second; memory of the browser ${before.toFixed(0)} MB, ${last - first} frames later ${after.toFixed(0)} MB`);
+  // A frame has 1.2 MB of pixels and 0.03 MB of detections.
   expect(after - before).toBeLessThan(20);
   expect((1000 * (last - first)) / (end - begin)).toBeGreaterThan(10);
   await page.getByRole("button", { name: "Stop the webcam" }).click();
-  // The photograph counts again where the webcam's pictures are forgotten.
-  await page.getByRole("button", { name: "Forget the webcam's pictures" }).click();
-  await expect(page.getByText(/1 picture; \d+ % of the camera's picture covered; tilted by /)).toBeVisible({ timeout: 30_000 });
+  // The photograph counts again once the webcam's images are discarded.
+  await page.getByRole("button", { name: "Discard the webcam's images" }).click();
+  await expect(page.getByText(/1 image; \d+ % of the image area covered; tilt /)).toBeVisible({ timeout: 30_000 });
 });
 
-/** Memory of all processes of the browser, MB: the least of some moments, each after what is not used any more was given back. */
+/** Memory of the browser's renderer processes, MB: the smallest of several samples, each after garbage collection. */
 async function memory(page: Page): Promise<number> {
   const all: number[] = [];
   for (let moment = 0; moment < 5; moment++) {

@@ -1,5 +1,5 @@
-//! What `wasm-bindgen` does, without the program of that name, which would have to be installed in just the version of the
-//! library: makes a module for a browser, with its JavaScript and types, of what the compiler made.
+//! Makes a browser module, with JavaScript and type declarations, from a compiled WebAssembly file. It replaces the program
+//! `wasm-bindgen`, which would have to be installed in exactly the version of the library.
 
 use std::process::ExitCode;
 

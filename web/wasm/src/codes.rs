@@ -1,4 +1,4 @@
-//! Codes of tags, looked at and damaged.
+//! Tag codes: figures of families, decoding and error rates.
 
 use deltille_core::family::{
     ACCEPTED_FALSE_POSITIVES, Decoder, Family, corrected_within, shipped_families,
@@ -7,7 +7,7 @@ use wasm_bindgen::prelude::*;
 
 use crate::errors::Raise;
 
-/// What is known of the families that are shipped, as JSON: names, tilings, bits, distances, codes.
+/// Returns the bundled families as JSON: names, tilings, bits, distances, numbers of codes.
 #[wasm_bindgen]
 pub fn families() -> String {
     let known = shipped_families().map(|family| {
@@ -19,7 +19,7 @@ pub fn families() -> String {
     serde_json::Value::from_iter(known).to_string()
 }
 
-/// A family, with what decodes words that were read.
+/// A family with its decoder.
 #[wasm_bindgen]
 pub struct Codes {
     family: Family,
@@ -28,10 +28,10 @@ pub struct Codes {
 
 #[wasm_bindgen]
 impl Codes {
-    /// The family of a file.
+    /// Reads a family file.
     ///
     /// # Errors
-    /// In words, where it is no family file.
+    /// Throws if `file` is not a valid family file.
     #[wasm_bindgen(constructor)]
     pub fn new(file: &str) -> Result<Self, JsError> {
         let family = Family::from_json(file).raise()?;
@@ -39,8 +39,8 @@ impl Codes {
         Ok(Self { family, decoder })
     }
 
-    /// What is known of it, as JSON: bits, codes, distance, how many pairs of codes have each distance, how many codes no family
-    /// exceeds, how often a tag turns into itself, and the cell whose content each cell then receives.
+    /// Returns figures of the family as JSON: bits, codes, minimum distance, histogram of distances between codes, upper bounds
+    /// on the number of codes, rotation steps per full turn, and for each cell the cell whose content it receives in one step.
     pub fn figures(&self) -> String {
         let family = &self.family;
         let bounds = family.bounds();
@@ -54,7 +54,7 @@ impl Codes {
         .to_string()
     }
 
-    /// The cells of a tag as JSON: of each its corners on a tile of edge 1 with a border of so many widths of a cell.
+    /// Returns the cells of a tag as JSON: the corners of each on a tile of edge 1, with a border of `border` cell widths.
     pub fn cells(&self, border: f64) -> String {
         let cells = self.family.cells();
         let bits = self.family.dimension().bits();
@@ -64,26 +64,26 @@ impl Codes {
         serde_json::to_string(&all).unwrap_or_default()
     }
 
-    /// The codes of all tags.
+    /// Returns the codes of all tags.
     pub fn codes(&self) -> Vec<u64> {
         self.family.codes().to_vec()
     }
 
-    /// A word after the tag was turned counter-clockwise, by 120° or 90°.
+    /// Returns a word after a counter-clockwise rotation of its tag by 120° or 90°.
     pub fn turned(&self, word: u64) -> u64 {
         self.family.cells().rotate(word)
     }
 
-    /// The shares of tags that are read, and misread, where cells are wrong with each of these probabilities: one after the
-    /// other.
+    /// Returns the fractions of tags read and misread, alternating, for each probability of a wrong cell in `rates`.
     pub fn reading(&self, rates: &[f64]) -> Vec<f64> {
         let shares = rates.iter().filter_map(|&rate| self.family.reading(rate));
         shares.flat_map(|shares| [shares.read, shares.misread]).collect()
     }
 
-    /// How often a triangle or square with a border that is no tag is taken for one, as JSON, for each number of corrected
-    /// cells: where its cells are fair coins, and in natural pictures where that is known; the rate that is accepted of single
-    /// tags, and how many cells may be corrected by it. Takes a second or two for large families.
+    /// Returns false-positive rates as JSON: the probability that a bordered triangle or square without a tag is decoded, for
+    /// each number of corrected cells. `coins` assumes random cells, `natural` cells of natural images if their rate is known.
+    /// `accepted` is the rate accepted for single tags, `recommended` the number of cells to correct under it. Takes a second
+    /// or two for large families.
     pub fn false_positives(&self) -> String {
         let natural = self.family.natural_false_positive_rates();
         let recommended =
@@ -95,8 +95,8 @@ impl Codes {
         .to_string()
     }
 
-    /// The tag that a word is nearest to, with its turns and the number of cells that were wrong; nothing where none is
-    /// near enough.
+    /// Returns the id of the nearest tag, its rotation steps and the number of wrong cells; nothing if no code is within
+    /// `max_errors`.
     pub fn decode(&self, word: u64, max_errors: u32) -> Option<Vec<u32>> {
         let found = self.decoder.decode(word, max_errors)?;
         Some(vec![found.id, found.turns.into(), found.errors])

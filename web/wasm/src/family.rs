@@ -1,4 +1,4 @@
-//! The family of a target, from its file.
+//! Sets the family of a target from its file.
 
 use deltille_core::family::Family;
 use deltille_core::targets::{OtherFamily, Target};
@@ -6,17 +6,17 @@ use wasm_bindgen::prelude::*;
 
 use crate::errors::Raise;
 
-/// Sets the family of a target's tags, from the file that the page has fetched.
+/// Sets the family of a target's tags from a file that the page fetched.
 ///
 /// # Errors
-/// In words, where it is no family, or another one.
+/// Throws if the file is not a valid family file or does not match the target.
 pub fn set_family(target: &mut Target, file: Option<String>) -> Result<(), JsError> {
     let Some(file) = file else { return Ok(()) };
     let family = Family::from_json(&file).raise()?;
     target.set_family(&family).map_err(|why| {
         JsError::new(&match why {
             OtherFamily::Codes { name, wanted, found } => format!(
-                "the target has tags of another {name} than the one that is shipped: {wanted}, not {found}"
+                "the target was made with another version of family {name} (fingerprint {wanted}) than the bundled one ({found})"
             ),
             why => format!("the target {why}"),
         })

@@ -1,21 +1,21 @@
-//! The library in a browser: what forms and dropped files become, and what becomes of results.
+//! The library in a browser: turns settings and dropped files into targets and results.
 //!
-//! | module | its one job |
+//! | module | purpose |
 //! |---|---|
-//! | `make` | settings to targets and their files |
-//! | `prove` | files read back and compared with their target |
-//! | `photo` | photographs decoded, and detections drawn over them |
-//! | `see` | grey values, and frames of a webcam, to corners |
-//! | `solve` | corners to a camera and its page |
-//! | `codes` | codes of tags, looked at and damaged |
-//! | `family` | the family of a target, from its file |
-//! | `errors` | the library's words as exceptions |
+//! | `make` | makes targets and their files from settings |
+//! | `prove` | reads files back and compares them with their target |
+//! | `photo` | decodes photographs and draws detections over them |
+//! | `see` | detects corners in grey values and webcam frames |
+//! | `solve` | calibrates a camera from corners and writes its report |
+//! | `codes` | figures of tag families, decoding and error rates |
+//! | `family` | sets the family of a target from its file |
+//! | `errors` | converts errors of the library to JavaScript exceptions |
 //!
-//! It is built once for each of the first five, as modules that a page loads when it needs them; `codes` comes with `make`.
-//! Values travel as JSON of the library's own formats, files as bytes. No module carries the families: a page fetches the
-//! file of the one that is asked for.
+//! The crate is built once for each of the first five, as modules that a page loads on demand; `codes` is part of `make`.
+//! Values are passed as JSON in the library's own formats, files as bytes. No module contains the families: the page fetches
+//! the family file that it needs.
 
-#![allow(unreachable_pub, reason = "the interface is that of the page")]
+#![allow(unreachable_pub, reason = "the page is the only user of this interface")]
 
 #[cfg(feature = "make")]
 pub mod codes;
@@ -35,7 +35,7 @@ pub mod solve;
 
 use wasm_bindgen::prelude::*;
 
-/// The version of the library.
+/// Returns the version of the library.
 #[wasm_bindgen]
 pub fn version() -> String {
     env!("CARGO_PKG_VERSION").to_owned()
@@ -47,10 +47,10 @@ extern "C" {
     fn error(text: &str);
 }
 
-/// Where the library fails within, the browser's console says where; the page starts the module anew. Messages name settings
-/// as the page does.
+/// Logs panics, with their location, to the browser's console; the page restarts the module. Messages use the page's names of
+/// settings.
 #[wasm_bindgen(start)]
 pub fn start() {
     deltille_core::setting::speak(errors::name);
-    std::panic::set_hook(Box::new(|what| error(&format!("the library failed within: {what}"))));
+    std::panic::set_hook(Box::new(|panic| error(&format!("the library crashed: {panic}"))));
 }

@@ -1,4 +1,4 @@
-//! Settings to targets and their files.
+//! Makes targets and their files from settings.
 
 use deltille_core::family::Family;
 use deltille_core::lattice::GridKind;
@@ -15,7 +15,7 @@ use wasm_bindgen::prelude::*;
 
 use crate::errors::Raise;
 
-/// What a form says. What is left out is as the programs have it.
+/// Settings of the form. Missing ones have the defaults of the programs.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields, default)]
 struct Wanted {
@@ -116,7 +116,7 @@ impl Wanted {
         }
     }
 
-    /// The tags of a board or of the faces of a solid, unless there are none.
+    /// Returns the tags of a board or of the faces of a solid, or `None` for an untagged target.
     fn wanted_tags(&self, grid: GridKind, is_usual: bool) -> Option<TagSpec> {
         let is_wanted = self.family.as_ref().map_or(is_usual, |family| !family.is_empty());
         is_wanted.then(|| self.tags(grid))
@@ -146,12 +146,12 @@ impl Wanted {
                 let scaled = ClosedMesh::new(mesh.vertices(), mesh.faces()).raise()?;
                 SolidShape::Mesh(scaled.0)
             }
-            other => return Err(JsError::new(&format!("{other} is no kind of target"))),
+            other => return Err(JsError::new(&format!("unknown kind of target {other}"))),
         };
         let usual = SolidSpec::new(shape);
         if usual.square_tags.is_some() {
-            let what = "the mesh has rectangles and other faces, whose tags are of two families: make it with \
-                        `deltille solid --mesh`";
+            let what = "this mesh mixes rectangular and other faces, which need two tag families: use \
+                        `deltille solid --mesh` instead";
             return Err(JsError::new(what));
         }
         let mut spec = SolidSpec {
@@ -171,17 +171,17 @@ impl Wanted {
     }
 }
 
-/// The name of the family that settings ask for; nothing for a target without tags.
+/// Returns the name of the family that settings need; nothing for a target without tags.
 ///
 /// # Errors
-/// In words, where these are no settings.
+/// Throws if `settings` is invalid.
 #[wasm_bindgen]
 pub fn family_of_settings(settings: &str) -> Result<Option<String>, JsError> {
     let wanted: Wanted = serde_json::from_str(settings).raise()?;
     Ok(wanted.spec()?.family().map(str::to_owned))
 }
 
-/// A target that was made.
+/// A finished target.
 #[wasm_bindgen]
 pub struct Made {
     printing: Printing,
@@ -189,10 +189,11 @@ pub struct Made {
 
 #[wasm_bindgen]
 impl Made {
-    /// The target of settings, which are JSON, with the file of the family that these ask for ([`family_of_settings`]).
+    /// Makes the target described by `settings` (JSON). `family` is the content of the family file that [`family_of_settings`]
+    /// names.
     ///
     /// # Errors
-    /// In words, where there is no such target.
+    /// Throws if the settings are invalid or contradict each other.
     #[wasm_bindgen(constructor)]
     pub fn new(settings: &str, family: Option<String>) -> Result<Self, JsError> {
         let wanted: Wanted = serde_json::from_str(settings).raise()?;
@@ -204,36 +205,36 @@ impl Made {
         Ok(Self { printing })
     }
 
-    /// The description.
+    /// Returns the description of the target.
     pub fn json(&self) -> String {
         self.printing.to_json()
     }
 
-    /// What it offers and from where a camera can use it, as JSON.
+    /// Returns corner, tag and size figures of the target, and the detail a camera must resolve, as JSON.
     ///
     /// # Errors
-    /// In words, where the family of its tags is unknown.
+    /// Throws if the family of its tags is unknown.
     pub fn reach(&self) -> Result<String, JsError> {
         serde_json::to_string(&Reach::of(&self.printing.target).raise()?).raise()
     }
 
-    /// The nearest and the farthest distance, mm, at which a camera with a horizontal field of view, in degrees, and a
-    /// width of its pictures, px, can use it; nothing where there are none.
+    /// Returns the nearest and the farthest distance, mm, at which a camera can use the target; nothing if there is no such
+    /// distance. The camera is given by its horizontal field of view, degrees, and its image width, px.
     pub fn distances_mm(&self, field_of_view_deg: f64, width_px: f64) -> Option<Vec<f64>> {
         let focal_px = width_px / 2.0 / (field_of_view_deg.to_radians() / 2.0).tan();
         let reach = Reach::of(&self.printing.target).ok()?;
         Some(reach.distances_mm(focal_px, width_px)?.to_vec())
     }
 
-    /// How the faces of a solid hang together in its net, as JSON; an empty list where there is no net.
+    /// Returns how the faces of a solid are joined in its net, as JSON; an empty list if there is no net.
     pub fn hinges(&self) -> String {
         serde_json::to_string(&self.printing.hinges()).unwrap_or_default()
     }
 
-    /// Names and bytes of the files of a format, one after the other.
+    /// Returns names and bytes, alternating, of the files in a format.
     ///
     /// # Errors
-    /// In words, where the target has no such file.
+    /// Throws if the target cannot be written in this format.
     pub fn files(&self, format: &str, dpi: f64) -> Result<Array, JsError> {
         let what: What = format.parse().raise()?;
         let mut making = Making::default();

@@ -1,4 +1,4 @@
-//! Photographs decoded, and detections drawn over them.
+//! Decodes photographs and draws detections over them.
 
 use std::path::Path;
 
@@ -10,10 +10,10 @@ use wasm_bindgen::prelude::*;
 
 use crate::errors::Raise;
 
-/// Most pixels of a picture: what a browser holds in memory several times.
+/// Maximum number of pixels of an image: the browser keeps several copies in memory.
 const MOST_PIXELS: u64 = 64_000_000;
 
-/// A photograph, decoded as the programs do.
+/// A photograph, decoded as by the programs.
 #[wasm_bindgen]
 pub struct Photograph {
     photograph: photograph::Photograph,
@@ -24,7 +24,7 @@ impl Photograph {
     /// Decodes the content of a file.
     ///
     /// # Errors
-    /// In words, where it cannot be read.
+    /// Throws if the file cannot be decoded.
     #[wasm_bindgen(constructor)]
     pub fn new(name: &str, content: Vec<u8>) -> Result<Self, JsError> {
         let mut limits = Limits::default();
@@ -34,22 +34,22 @@ impl Photograph {
         Ok(Self { photograph })
     }
 
-    /// Width and height, px.
+    /// Returns width and height, px.
     pub fn size(&self) -> Vec<u32> {
         vec![self.photograph.image.width() as u32, self.photograph.image.height() as u32]
     }
 
-    /// How the file says that the pixels are to be turned for a viewer; 1 if not at all.
+    /// Returns the EXIF orientation; 1 if the image is upright.
     pub fn orientation(&self) -> u8 {
         self.photograph.notes.exif_orientation.unwrap_or(1)
     }
 
-    /// Whether grey values have 16 bits.
+    /// Returns whether grey values have 16 bits.
     pub fn is_deep(&self) -> bool {
         matches!(self.photograph.image, AnyGray::U16(_))
     }
 
-    /// The grey values, row by row; of 16 bits the lower byte first.
+    /// Returns the grey values, row by row; 16-bit values are little-endian.
     pub fn grey(&self) -> Vec<u8> {
         match &self.photograph.image {
             AnyGray::U8(image) => image.pixels().to_vec(),
@@ -57,7 +57,7 @@ impl Photograph {
         }
     }
 
-    /// Grey values of 8 bits as red, green, blue and alpha, row by row.
+    /// Returns the image as 8-bit RGBA, row by row.
     pub fn shown(&self) -> Vec<u8> {
         fn shown<T: Intensity>(pixels: &[T]) -> Vec<u8> {
             let byte = |v: &T| (v.to_f32() * (255.0 / T::FULL_SCALE)) as u8;
@@ -69,10 +69,10 @@ impl Photograph {
         }
     }
 
-    /// The picture with a detection drawn in, as `deltille detect --overlay` writes it: the bytes of a PNG.
+    /// Draws a detection over the image, as `deltille detect --overlay` does, and returns a PNG file.
     ///
     /// # Errors
-    /// In words, where the detection is none, or the picture is too large to draw on.
+    /// Throws if `found` is not a valid detection, or if the image is too large to draw on.
     pub fn overlay(&self, found: &str) -> Result<Vec<u8>, JsError> {
         overlay::png(&self.photograph.image, &detection::read(found).raise()?).raise()
     }

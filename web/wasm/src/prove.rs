@@ -1,18 +1,18 @@
-//! Files read back and compared with their target.
+//! Reads files back and compares them with their target.
 
 use deltille_layout::Printing;
 use deltille_verify::{Artifact, Verifier};
 use js_sys::Uint8Array;
 use wasm_bindgen::prelude::*;
 
-use crate::errors::{Raise, told};
+use crate::errors::{Raise, one_line};
 use crate::family::set_family;
 
-/// Reads a file, or the pages of one, back and compares it with the target of a description, whose tags are those of the
-/// family's file: the verdict as JSON, with the line that `deltille verify` prints and a sentence for each finding.
+/// Reads a file, or its pages, back and compares it with the target of a description. `family` is the content of the target's
+/// family file. Returns the verdict as JSON, with the line that `deltille verify` prints and a sentence for each finding.
 ///
 /// # Errors
-/// In words, where nothing can be compared.
+/// Throws if the description, the family or a file cannot be read.
 #[wasm_bindgen]
 pub fn prove(
     target: &str,
@@ -26,14 +26,14 @@ pub fn prove(
     let files = names.iter().zip(&contents);
     let artifacts: Vec<_> =
         files.map(|(name, bytes)| Artifact::new(name.clone(), bytes.to_vec())).collect();
-    let name = names.first().ok_or_else(|| JsError::new("there is no file"))?;
+    let name = names.first().ok_or_else(|| JsError::new("no file was given"))?;
     let verdict = verifier.verify(name, &artifacts).raise()?;
     let of_sheets = verdict.sheets.iter().flat_map(|sheet| &sheet.findings);
     let of_faces = verdict.faces.iter().flat_map(|face| &face.findings);
     let all = verdict.findings.iter().chain(of_sheets).chain(of_faces);
-    let sentences: Vec<String> = all.map(|finding| told(&finding)).collect();
+    let sentences: Vec<String> = all.map(|finding| one_line(&finding)).collect();
     let said = serde_json::json!({
-        "passed": verdict.passed, "line": told(&verdict), "sentences": sentences,
+        "passed": verdict.passed, "line": one_line(&verdict), "sentences": sentences,
     });
     Ok(said.to_string())
 }

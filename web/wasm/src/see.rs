@@ -1,4 +1,4 @@
-//! Grey values, and frames of a webcam, to corners.
+//! Detects corners in grey values and webcam frames.
 
 use deltille_core::detection::{Detection, InkEstimate, Watch};
 use deltille_core::family::Family;
@@ -12,7 +12,7 @@ use wasm_bindgen::prelude::*;
 use crate::errors::Raise;
 use crate::family::set_family;
 
-/// A picture that is looked at.
+/// An image for detection.
 #[wasm_bindgen]
 pub struct Picture {
     image: AnyGray,
@@ -21,11 +21,11 @@ pub struct Picture {
 
 #[wasm_bindgen]
 impl Picture {
-    /// Grey values, row by row, of 8 bits, or of 16 with the lower byte first; `orientation` is how the file says that they
-    /// are to be turned for a viewer, 1 if not at all.
+    /// Makes an image of 8-bit or little-endian 16-bit grey values, row by row. `orientation` is the EXIF orientation, 1 if the
+    /// image is upright.
     ///
     /// # Errors
-    /// In words, where these are not as many bytes as width and height say.
+    /// Throws if the number of bytes does not match width and height.
     pub fn of_grey(
         width: u32,
         height: u32,
@@ -46,10 +46,10 @@ impl Picture {
         Ok(Self { image: image.ok_or_else(wrong_size)?, notes })
     }
 
-    /// Pixels of red, green, blue and alpha, as of a frame of a video.
+    /// Makes an image of RGBA pixels, such as those of a video frame.
     ///
     /// # Errors
-    /// In words, where these are not as many as width and height say.
+    /// Throws if the number of bytes does not match width and height.
     pub fn of_colours(width: u32, height: u32, rgba: &[u8]) -> Result<Self, JsError> {
         let grey = grey_of_colours::<4>(width, height, rgba).ok_or_else(wrong_size)?;
         Ok(Self { image: AnyGray::U8(grey), notes: FileNotes::default() })
@@ -57,27 +57,27 @@ impl Picture {
 }
 
 fn wrong_size() -> JsError {
-    JsError::new("there are not as many pixels as width and height say")
+    JsError::new("the number of pixels does not match width and height")
 }
 
-/// Looks for a target, or for untagged boards.
+/// Detects a target, or untagged boards.
 #[wasm_bindgen]
 pub struct Finder {
     detector: Detector,
     target: Option<Target>,
 }
 
-/// What was found in a picture.
+/// The detections in an image.
 #[wasm_bindgen]
 pub struct Found {
     detection: Detection,
     target: Option<Target>,
 }
 
-/// The name of the family of a target's tags, where it has tags.
+/// Returns the name of a target's tag family; nothing for a target without tags.
 ///
 /// # Errors
-/// In words, where it is no description of a target.
+/// Throws if `target` is not a valid description.
 #[wasm_bindgen]
 pub fn family_of(target: &str) -> Result<Option<String>, JsError> {
     Ok(Target::from_json(target).raise()?.family.map(|family| family.name))
@@ -85,10 +85,10 @@ pub fn family_of(target: &str) -> Result<Option<String>, JsError> {
 
 #[wasm_bindgen]
 impl Finder {
-    /// Looks for the target of a description, with the file of the family that it names.
+    /// Makes a finder for the target of a description. `family` is the content of the family file that [`family_of`] names.
     ///
     /// # Errors
-    /// In words, where it is no description, or the family is another one.
+    /// Throws if the description is invalid, or if the family does not match it.
     pub fn of_target(target: &str, family: Option<String>) -> Result<Self, JsError> {
         let mut target = Target::from_json(target).raise()?;
         set_family(&mut target, family)?;
@@ -96,43 +96,43 @@ impl Finder {
         Ok(Self { detector, target: Some(target) })
     }
 
-    /// Looks for untagged boards of a tiling, `deltille` or `checker`. With rows and columns they are labelled where
-    /// they are seen whole; 0 where these are not known.
+    /// Makes a finder for untagged boards of a tiling, `deltille` or `checker`. If rows and columns are given (not 0), boards
+    /// that are completely visible are labelled.
     ///
     /// # Errors
-    /// In words, where there is no such tiling.
+    /// Throws if the tiling is unknown.
     pub fn of_grid(kind: &str, rows: u32, cols: u32) -> Result<Self, JsError> {
         let kind = match kind {
             "deltille" => GridKind::Deltille,
             "checker" => GridKind::Checker,
-            _ => return Err(JsError::new("the tiling is deltille or checker")),
+            _ => return Err(JsError::new("unknown tiling (known: deltille, checker)")),
         };
         let size = (rows > 0 && cols > 0).then_some((rows, cols));
         let detector = Detector::for_grid(kind, size, DetectorConfig::default());
         Ok(Self { detector, target: None })
     }
 
-    /// What pictures of one print say together of its ink: of the list of what was found in each, as JSON, one estimate, and
-    /// that in words. Nothing where a second look with it would find nothing else.
+    /// Combines the ink estimates of several images of one print (JSON list) into one. Returns it as JSON and in words, or
+    /// nothing if detecting again with it would change nothing.
     ///
     /// # Errors
-    /// In words, where it is no such list.
+    /// Throws if `found` is not a valid list of ink estimates.
     pub fn ink_of_all(&self, found: &str) -> Result<Option<Vec<String>>, JsError> {
         let found: Vec<Option<InkEstimate>> = serde_json::from_str(found).raise()?;
         let ink = self.detector.ink_of_all(&found);
         ink.map(|ink| Ok(vec![serde_json::to_string(&ink).raise()?, ink.to_string()])).transpose()
     }
 
-    /// One that looks again, with the ink that all pictures show.
+    /// Returns a finder that uses this ink estimate.
     ///
     /// # Errors
-    /// In words, where it is no estimate of ink.
+    /// Throws if `ink` is not a valid ink estimate.
     pub fn with_ink(self, ink: &str) -> Result<Self, JsError> {
         let ink: InkEstimate = serde_json::from_str(ink).raise()?;
         Ok(Self { detector: self.detector.with_ink(ink), ..self })
     }
 
-    /// Looks at a picture.
+    /// Detects targets in an image.
     pub fn find(&self, picture: &Picture, name: &str) -> Found {
         let mut detection = self.detector.detect(&picture.image, name);
         detection.file = picture.notes.clone();
@@ -142,37 +142,37 @@ impl Finder {
 
 #[wasm_bindgen]
 impl Found {
-    /// The detection as `deltille detect` writes it.
+    /// Returns the detection as JSON, as `deltille detect` writes it.
     pub fn json(&self) -> String {
         detection::write(&self.detection)
     }
 
-    /// The same as a table.
+    /// Returns the detection as a CSV table.
     pub fn csv(&self) -> String {
         csv::write(&self.detection)
     }
 
-    /// The same as the list that the reference detector writes.
+    /// Returns the detection in the ORPC format of the reference detector.
     pub fn orpc(&self) -> String {
         orpc::write(&self.detection, self.target.as_ref())
     }
 
-    /// Why nothing was found or labelled, in sentences.
+    /// Returns sentences that explain why nothing was found or labelled.
     pub fn reasons(&self) -> Vec<String> {
-        self.detection.reasons.iter().map(crate::errors::told).collect()
+        self.detection.reasons.iter().map(crate::errors::one_line).collect()
     }
 }
 
-/// Recognises targets by their tags.
+/// Identifies targets by their tags.
 #[wasm_bindgen]
 pub struct Recogniser(deltille_detect::Recogniser);
 
 #[wasm_bindgen]
 impl Recogniser {
-    /// One that knows the families of these files.
+    /// Makes a recogniser for these family files.
     ///
     /// # Errors
-    /// In words, where one of them is no family file.
+    /// Throws if one of them is not a valid family file.
     #[wasm_bindgen(constructor)]
     pub fn new(families: Vec<String>) -> Result<Self, JsError> {
         let read = families.iter().map(|file| Family::from_json(file));
@@ -180,8 +180,8 @@ impl Recogniser {
         Ok(Self(deltille_detect::Recogniser::new(families)))
     }
 
-    /// The target that a picture shows, as JSON: its description, the tags that were read, how many corners it has and how
-    /// many the picture shows. Nothing where none is known.
+    /// Identifies the target in an image and returns JSON: its description, the number of decoded tags, and the numbers of
+    /// corners of the target and in the image. Nothing if no target is identified.
     pub fn recognise(&self, picture: &Picture) -> Option<String> {
         let found = self.0.recognise(&picture.image)?;
         let [corners, shown] = found.corners;
@@ -193,20 +193,20 @@ impl Recogniser {
     }
 }
 
-/// Says which frames of a webcam are worth keeping.
+/// Selects webcam frames that are worth keeping.
 #[wasm_bindgen]
 #[derive(Default)]
 pub struct Watcher(Watch);
 
 #[wasm_bindgen]
 impl Watcher {
-    /// One that has seen nothing.
+    /// Makes a watcher without history.
     #[wasm_bindgen(constructor)]
     pub fn new() -> Self {
         Self::default()
     }
 
-    /// Whether the next frame is worth keeping: the target is held still in it, somewhere new.
+    /// Returns whether the next frame is worth keeping: the target is still, and in a new position.
     pub fn look(&mut self, found: &Found) -> bool {
         self.0.look(&found.detection).is_worth_keeping()
     }

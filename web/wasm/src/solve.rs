@@ -1,4 +1,4 @@
-//! Corners to a camera and its page.
+//! Calibrates a camera from corners and writes its report.
 
 use deltille_calibrate::{
     self, Calibration, Held, Holding, Intrinsics, Model, NextView, Reference, View, Words, views,
@@ -11,9 +11,9 @@ use deltille_files::export::{calibration, camera, detection, next_view, saved};
 use deltille_files::report::{Report, Survey};
 use wasm_bindgen::prelude::*;
 
-use crate::errors::{Raise, told};
+use crate::errors::{Raise, one_line};
 
-/// A calibrated camera: its files and its page.
+/// A calibrated camera with its files and report.
 #[wasm_bindgen]
 pub struct Solved {
     json: String,
@@ -27,10 +27,10 @@ pub struct Solved {
 
 #[wasm_bindgen]
 impl Solved {
-    /// Calibrates a camera from detections (the JSON that was found in each picture) of a target.
+    /// Calibrates a camera from detections of a target, one JSON text per image.
     ///
     /// # Errors
-    /// In words, where views are too few, too much alike, or do not belong together.
+    /// Throws if there are too few views, if they are too similar, or if they do not belong together.
     #[wasm_bindgen(constructor)]
     pub fn new(
         target: &str,
@@ -53,11 +53,11 @@ impl Solved {
         let mut estimate = calibration.solve().raise()?;
         let diagnoses = calibration.explain(&estimate);
         estimate.excluded.splice(0..0, shown.left_out.into_iter().map(|(_, out)| out));
-        let found = estimate.cameras.first().ok_or_else(|| JsError::new("there is no camera"))?;
+        let found = estimate.cameras.first().ok_or_else(|| JsError::new("no camera was calibrated"))?;
         let words = Words::new(&estimate, None);
-        let said = diagnoses.iter().map(|diagnosis| told(&words.sentence(diagnosis))).collect();
+        let said = diagnoses.iter().map(|diagnosis| one_line(&words.sentence(diagnosis))).collect();
         let mut page = Report::new("camera", &estimate);
-        // Too few views to compare models are no error.
+        // Having too few views to compare models is not an error.
         let models = [calibration.compare_models(0).unwrap_or_default()];
         (page.diagnoses, page.stated) = (&diagnoses, calibration.panels());
         (page.print, page.models) = (print, &models);
@@ -85,48 +85,48 @@ impl Solved {
         })
     }
 
-    /// The calibration as `deltille calibrate` writes it.
+    /// Returns the calibration as JSON, as `deltille calibrate` writes it.
     pub fn json(&self) -> String {
         self.json.clone()
     }
 
-    /// The camera file of the programs.
+    /// Returns the camera file of the programs.
     pub fn yaml(&self) -> String {
         self.yaml.clone()
     }
 
-    /// That of OpenCV, where it has such a lens.
+    /// Returns the camera file for OpenCV, if OpenCV supports the model.
     pub fn opencv(&self) -> Option<String> {
         self.opencv.clone()
     }
 
-    /// That of ROS, where it has such a lens.
+    /// Returns the camera file for ROS, if ROS supports the model.
     pub fn ros(&self) -> Option<String> {
         self.ros.clone()
     }
 
-    /// The page of the calibration.
+    /// Returns the report as HTML.
     pub fn page(&self) -> String {
         self.page.clone()
     }
 
-    /// What is to be said of it, in sentences.
+    /// Returns the diagnoses, in sentences.
     pub fn said(&self) -> Vec<String> {
         self.said.clone()
     }
 
-    /// Its figures, as JSON.
+    /// Returns the results as JSON.
     pub fn figures(&self) -> String {
         self.figures.clone()
     }
 }
 
-/// What pictures of a target show of the camera's so far, as JSON: the size of the picture, columns and rows of cells, the corners
-/// in each of these row by row, the part of the cells that shows any, and of each picture by how much the board is tilted and in
-/// which direction it is farther away, rad from right towards below; `null` of solids. Nothing where no picture shows the target.
+/// Returns the image coverage of detections as JSON: the image size, columns and rows of cells, the number of corners in each
+/// cell row by row, and the fraction of cells with corners. For each image it gives the tilt of the board and the direction in
+/// which the board is farther away, rad from right towards down; `null` for solids. Nothing if no image shows the target.
 ///
 /// # Errors
-/// In words, where detections are none, or of pictures of different sizes, or there is no such model.
+/// Throws if a detection is invalid, if the images have different sizes, or if the model is unknown.
 #[wasm_bindgen]
 pub fn survey(
     target: &str,
@@ -143,7 +143,7 @@ pub fn survey(
         let calibration = Calibration::of(&reference, reference.panels());
         calibration.camera("camera", views.clone(), intrinsics).solve().ok()
     };
-    // Of too few pictures, or too much alike, by the camera that is assumed before anything is known.
+    // With too few images, or too similar ones, use the camera that the guide assumes at first.
     let estimate = solve(model.into()).or_else(|| {
         let assumed = deltille_calibrate::Guide::new(&target, size_px, model)?.next(0, None).camera;
         solve(Intrinsics::Known(assumed))
@@ -153,25 +153,25 @@ pub fn survey(
     };
     let survey = Survey::new(camera);
     let tilts = survey.views.iter().map(|view| view.tilt_rad.zip(view.away_rad));
-    let told = serde_json::json!({
+    let json = serde_json::json!({
         "size_px": size_px, "cells": survey.cells, "counts": survey.counts, "covered": survey.covered(),
         "tilts": tilts.collect::<Vec<_>>(),
     });
-    Ok(Some(told.to_string()))
+    Ok(Some(json.to_string()))
 }
 
-/// Detections with their names.
+/// Reads detections and pairs them with their names.
 fn read(names: Vec<String>, detections: &[String]) -> Result<Vec<(String, Detection)>, JsError> {
     let read = detections.iter().map(|text| detection::read(text));
     Ok(names.into_iter().zip(read.collect::<Result<Vec<_>, _>>().raise()?).collect())
 }
 
-/// Where the panels of a target are.
+/// Returns the poses of the panels of a target.
 fn places(reference: &Reference) -> impl Iterator<Item = Pose> {
     reference.panels().into_iter().map(|panel| panel.target_from_panel)
 }
 
-/// Proposes the pictures of a webcam, one after the other, and says when the board is held as proposed.
+/// Proposes the next webcam image, and reports when the board is held as proposed.
 #[wasm_bindgen]
 pub struct Guide {
     target: Target,
@@ -184,25 +184,25 @@ pub struct Guide {
 
 #[wasm_bindgen]
 impl Guide {
-    /// One for pictures of a target of this width and height by a camera of a model.
+    /// Makes a guide for a target, an image size and a camera model.
     ///
     /// # Errors
-    /// In words, where there is no such model, or nothing to propose for it.
+    /// Throws if the model is unknown, or if no images can be proposed for it.
     #[wasm_bindgen(constructor)]
     pub fn new(target: &str, width: u32, height: u32, model: &str) -> Result<Self, JsError> {
         let target = Target::from_json(target).raise()?;
         let model: Model = model.parse().raise()?;
         let guide = deltille_calibrate::Guide::new(&target, [width, height], model)
-            .ok_or_else(|| JsError::new("no pictures are proposed for this target and model"))?;
+            .ok_or_else(|| JsError::new("guided capture does not support this target and model"))?;
         let next = guide.next(0, None);
         let holding = Holding::new(&next, places(&Reference::Target(&target)));
         Ok(Self { target, guide, views: Vec::new(), refused: Vec::new(), next, holding })
     }
 
-    /// A picture was taken, with the JSON of what was found in it.
+    /// Adds a captured image, given as the JSON of its detection.
     ///
     /// # Errors
-    /// In words, where it is no detection.
+    /// Throws if `found` is not a valid detection.
     pub fn take(&mut self, name: &str, found: &str) -> Result<(), JsError> {
         let view = self.view(name, found)?;
         self.views.extend(view);
@@ -210,22 +210,22 @@ impl Guide {
         Ok(())
     }
 
-    /// The board cannot be held as it is proposed.
+    /// Skips the proposed pose.
     pub fn refuse(&mut self) {
         self.refused.push(self.next.clone());
         self.propose();
     }
 
-    /// The next picture, as `deltille guide` writes it.
+    /// Returns the next proposal, as `deltille guide` writes it.
     pub fn next(&self) -> String {
         next_view::write(&self.next, &self.target.name, self.views.len(), self.next.is_enough(None))
     }
 
-    /// How the board is held in a picture that was taken at a time, s: a word, and the part of the time for which it has been
-    /// held as proposed.
+    /// Returns how the board is held in a frame taken at `time_s`: a word, and the fraction of the required holding time that
+    /// has passed.
     ///
     /// # Errors
-    /// In words, where it is no detection.
+    /// Throws if `found` is not a valid detection.
     pub fn look(&mut self, time_s: f64, found: &str) -> Result<String, JsError> {
         let view = self.view("frame", found)?;
         let held = self.holding.look(time_s, view.as_ref(), None);
@@ -243,7 +243,7 @@ impl Guide {
 
     fn view(&self, name: &str, found: &str) -> Result<Option<View>, JsError> {
         let named = [(name.to_owned(), detection::read(found).raise()?)];
-        // A picture without corners of the target is none, and no error.
+        // An image without corners of the target is not a view, but not an error either.
         let shown = views(&named, &Reference::Target(&self.target)).ok();
         Ok(shown.and_then(|shown| shown.views.into_iter().next()))
     }
