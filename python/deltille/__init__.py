@@ -1,7 +1,7 @@
-"""Deltille calibration targets: made, proved, found, and cameras calibrated with them.
+"""Make, verify and detect deltille calibration targets, and calibrate cameras with them.
 
-Lengths are millimetres and angles radians; pixel centres are at integer coordinates, y down. The frame of a board is
-right-handed with x right, y up on the print, z towards the viewer; that of a camera has x right, y down, z forward.
+Lengths are in millimetres and angles in radians. Pixel centres are at integer coordinates, y down. The frame of a board is
+right-handed with x right, y up on the print, z towards the viewer; the frame of a camera has x right, y down, z forward.
 
 >>> import deltille
 >>> board = deltille.Board(10, 11, edge_mm=20)
@@ -74,7 +74,7 @@ from .errors import (
     VerifyError,
 )
 
-# What needs other packages, or nothing of the compiled part, is written in Python.
+# Methods that need other packages are written in Python.
 Detection.to_opencv = _opencv_points  # type: ignore[method-assign]
 Detection.plot = _plot  # type: ignore[method-assign]
 Detection._repr_html_ = _repr_html  # type: ignore[method-assign]

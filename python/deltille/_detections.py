@@ -1,4 +1,4 @@
-"""What other packages take of detections: points for OpenCV, pictures for matplotlib and notebooks."""
+"""Detections for other packages: points for OpenCV, plots for matplotlib and notebooks."""
 
 from __future__ import annotations
 
@@ -20,14 +20,14 @@ __all__ = ["opencv_points", "plot", "repr_html", "stereo_to_opencv", "to_opencv"
 
 
 def opencv_points(self: Detection) -> tuple[Points, Points]:
-    """Corners with labels as OpenCV takes them.
+    """Returns the labelled corners in OpenCV's format.
 
     Returns
     -------
     object_points : ndarray of N × 3, float32
-        Places on the target, mm.
+        Positions on the target, mm.
     image_points : ndarray of N × 2, float32
-        Positions, px.
+        Positions in the image, px.
 
     Examples
     --------
@@ -43,21 +43,21 @@ def opencv_points(self: Detection) -> tuple[Points, Points]:
 def to_opencv(
     detections: Sequence[Detection | Failure], *, least_corners: int = 6
 ) -> tuple[list[Points], list[Points]]:
-    """Corners with labels of many pictures, as ``cv2.calibrateCamera`` takes them.
+    """Returns the labelled corners of many images in the format of ``cv2.calibrateCamera``.
 
     Parameters
     ----------
     detections : sequence of Detection
-        What could not be read is passed over.
+        Failures are skipped.
     least_corners : int, optional
-        Pictures with fewer corners are left out.
+        Images with fewer corners are skipped.
 
     Returns
     -------
     object_points : list of ndarray of N × 3, float32
-        Places on the target, mm.
+        Positions on the target, mm.
     image_points : list of ndarray of N × 2, float32
-        Positions, px.
+        Positions in the image, px.
     """
     points = [opencv_points(detection) for detection in detections if detection.error is None]
     points = [(objects, pixels) for objects, pixels in points if len(objects) >= least_corners]
@@ -67,28 +67,28 @@ def to_opencv(
 def stereo_to_opencv(
     left: Sequence[Detection], right: Sequence[Detection], *, least_corners: int = 6
 ) -> tuple[list[Points], list[Points], list[Points]]:
-    """Corners that two cameras saw at the same moments, as ``cv2.stereoCalibrate`` takes them.
+    """Returns the corners that two cameras observed at the same times, in the format of ``cv2.stereoCalibrate``.
 
     Parameters
     ----------
     left, right : sequence of Detection
-        Of the same moments in the same order.
+        Detections at the same times in the same order.
     least_corners : int, optional
-        Moments in which fewer corners are in both pictures are left out.
+        Pairs of images with fewer common corners are skipped.
 
     Returns
     -------
     object_points : list of ndarray of N × 3, float32
-        Places on the target, mm.
+        Positions on the target, mm.
     left_points, right_points : list of ndarray of N × 2, float32
-        Positions, px.
+        Positions in the image, px.
     """
     import numpy
 
     if len(left) != len(right):
         from .errors import DetectionError
 
-        raise DetectionError(f"left and right: {len(left)} and {len(right)} pictures are not of the same moments")
+        raise DetectionError(f"left and right must have the same number of images, got {len(left)} and {len(right)}")
     objects: list[Points] = []
     lefts: list[Points] = []
     rights: list[Points] = []
@@ -112,16 +112,16 @@ def plot(
     *,
     ids: bool = False,
 ) -> Any:
-    """Draw the corners with matplotlib (``pip install deltille[plot]``).
+    """Draws the corners with matplotlib (``pip install deltille[plot]``).
 
     Parameters
     ----------
     image : ndarray, optional
-        The picture, drawn below them.
+        The image, drawn below them.
     ax : matplotlib.axes.Axes, optional
-        Where to draw; the current axes if left out.
+        Axes to draw on; defaults to the current axes.
     ids : bool, optional
-        Whether ids are written beside the corners.
+        Write the ids next to the corners.
 
     Returns
     -------
@@ -139,7 +139,7 @@ def plot(
         label = "no labels" if grid.panel is None else f"panel {grid.panel}"
         ax.plot(pixels[:, 0], pixels[:, 1], "+", label=label)
         if ids:
-            # Tiles are black and white: numbers stand out from both.
+            # Outlined, so that numbers are legible on black and white tiles.
             outline = [patheffects.withStroke(linewidth=1.5, foreground="white")]
             for (x, y), number in zip(pixels, grid.ids):
                 if number >= 0:
@@ -159,7 +159,7 @@ _COLOURS = ("#1f77b4", "#ff7f0e", "#2ca02c", "#d62728", "#9467bd", "#8c564b", "#
 
 
 def repr_html(self: Detection) -> str:
-    """A small picture of the corners for notebooks."""
+    """Renders a small plot of the corners for notebooks."""
     width, height = max(self.width, 1), max(self.height, 1)
     radius = max(width, height) / 320
     dots: list[str] = []

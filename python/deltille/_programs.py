@@ -1,9 +1,9 @@
-"""The programs ``deltille`` and ``deltag``: entry points that hand over to the compiled part."""
+"""Entry points of the programs ``deltille`` and ``deltag``, which run in the compiled module."""
 
 import signal
 import sys
 
-# Until the program has handlers of its own a signal ends it, and does not wait for Python code that never comes.
+# Until the program installs its own handlers, Ctrl-C ends the process at once: no Python code runs to raise KeyboardInterrupt.
 signal.signal(signal.SIGINT, signal.SIG_DFL)
 
 from ._core import _run  # noqa: E402
@@ -12,12 +12,12 @@ __all__ = ["deltag", "deltille"]
 
 
 def deltille() -> None:
-    """Run ``deltille`` with the arguments of the command line; does not return."""
+    """Runs ``deltille`` with the arguments of the command line; does not return."""
     _leave("deltille")
 
 
 def deltag() -> None:
-    """Run ``deltag`` with the arguments of the command line; does not return."""
+    """Runs ``deltag`` with the arguments of the command line; does not return."""
     _leave("deltag")
 
 

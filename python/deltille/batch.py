@@ -1,4 +1,4 @@
-"""Many pictures at a time, on the threads of one machine."""
+"""Detection in many images, on the threads of one machine."""
 
 from __future__ import annotations
 
@@ -25,14 +25,14 @@ __all__ = ["Failure", "detect_many", "load_detections"]
 
 
 class Failure:
-    """A picture that could not be read, in the place of its detection.
+    """An image that could not be read, in place of its detection.
 
     Attributes
     ----------
     image : str
-        Name of the picture.
+        Name of the image.
     error : Error
-        Why.
+        The reason.
     """
 
     def __init__(self, image: str, error: Error) -> None:
@@ -58,36 +58,36 @@ def detect_many(
     ink_of_all: bool = True,
     accept_damaged: bool = False,
 ) -> list[Result]:
-    """Find a target in many pictures, several at a time.
+    """Detects a target in many images, several in parallel.
 
     Parameters
     ----------
     pictures : iterable of path-like, bytes or ndarray
-        Photographs, contents of their files, or pictures as of :meth:`Detector.detect`.
+        Paths of photographs, contents of their files, or arrays as for :meth:`Detector.detect`.
     target : Target, sequence of Target, or Detector
-        What is looked for.
+        The target to find.
     workers : int, optional
-        Pictures at a time; one for each processor if left out.
+        Number of images processed in parallel; defaults to the number of processors.
     progress : callable, optional
-        Such as ``tqdm.tqdm``: called with an iterable, and with ``total`` where that is known.
+        A wrapper such as ``tqdm.tqdm``, called with an iterable, and with ``total`` if the number of images is known.
     ink_of_all : bool, optional
-        Whether all pictures are looked at once more, with what they say together of the ink, as ``deltille detect``
-        does. Arrays are kept for that.
+        Repeat detection in all images with their combined ink estimate, as ``deltille detect`` does. Arrays are kept in
+        memory for that.
     accept_damaged : bool, optional
-        Whether JPEG files of which a part is missing are read too.
+        Accept truncated JPEG files.
 
     Returns
     -------
     list of Detection or Failure
-        In the order of the pictures. A picture that cannot be read is a :class:`Failure`, which is false, has no
-        corners, and an attribute ``error``; of a :class:`Detection` the attribute is ``None``.
+        Results in the order of the images. An image that cannot be read gives a :class:`Failure`, which is false, has no
+        corners, and has the reason in ``error``. For a :class:`Detection`, ``error`` is ``None``.
     """
     if isinstance(pictures, (str, bytes, os.PathLike)) or hasattr(pictures, "shape"):
-        raise TypeError("pictures: give a list of them, [picture]")
+        raise TypeError("pictures: expected a list, [picture]")
     detector = target if isinstance(target, Detector) else Detector(target)
     count = workers if workers is not None else (os.cpu_count() or 1)
     if count < 1:
-        raise ValueError("workers: give 1 or more")
+        raise ValueError("workers must be at least 1")
     total = len(pictures) if isinstance(pictures, Sized) else None
     seen: list[Picture] = []
 
@@ -116,28 +116,28 @@ def load_detections(
     *,
     assume_target: bool = False,
 ) -> list[Result]:
-    """Detections of many pictures from files.
+    """Reads the detections of many images from files.
 
     Parameters
     ----------
     path : path-like
-        A folder of the ``.json`` files that ``deltille detect`` writes, or of its tables in Parquet, as
-        :mod:`deltille.ray` writes them too; or one of the two tables, beside which the other lies.
+        A folder with ``.json`` files or Parquet tables of ``deltille detect`` or :mod:`deltille.ray`; or one of the two
+        tables, if the other is next to it.
     target : Target or sequence of Target, optional
-        What was looked for, from which :attr:`Detection.object_points` come.
+        The target searched for, needed for :attr:`Detection.object_points`.
     assume_target : bool, optional
-        Whether the target is taken even where the files name another one.
+        Use the target even if the files name another one.
 
     Returns
     -------
     list of Detection or Failure
-        In the order of the files' names, from tables of the pictures'. A picture that could not be read when they were
-        made is a :class:`Failure`.
+        Results in the order of the file names, or of the image names in tables. An image that could not be read during
+        detection gives a :class:`Failure`.
 
     Raises
     ------
     FileError
-        When there are no such files, or one is damaged.
+        If there are no such files, or if one is damaged.
     """
     place = Path(path)
     texts = sorted(place.glob("*.json")) if place.is_dir() else []
@@ -168,7 +168,7 @@ def _all(
 def _in_order(
     detector: Detector, pictures: Iterator[Picture], workers: int, accept_damaged: bool
 ) -> Iterator[Result]:
-    """Results in the order of the pictures; few more pictures than workers are in memory."""
+    """Yields results in the order of the images; at most twice as many images as workers are in memory."""
     pool = ThreadPoolExecutor(workers, thread_name_prefix="deltille")
     waiting: deque[Future[Result]] = deque()
     try:
@@ -179,7 +179,7 @@ def _in_order(
         while waiting:
             yield waiting.popleft().result()
     finally:
-        # What has begun ends; nothing else begins, as after Ctrl-C.
+        # After Ctrl-C, running work finishes and pending work is cancelled.
         pool.shutdown(wait=True, cancel_futures=True)
 
 

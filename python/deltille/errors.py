@@ -1,6 +1,6 @@
-"""What is raised, with the library's words.
+"""Exceptions of this package.
 
-Every exception is an :class:`Error`; most are a :class:`ValueError` too, files an :class:`OSError`.
+Every exception is an :class:`Error`. Most are also a :class:`ValueError`; those of files are an :class:`OSError`.
 """
 
 import errno as _errno
@@ -31,31 +31,31 @@ class Error(Exception):
 
 
 class ArgumentError(Error, ValueError):
-    """An array of another shape than is wanted, or a number out of its range."""
+    """An array of the wrong shape, or a number out of range."""
 
 
 class TargetError(Error, ValueError):
-    """A target that cannot be made or used."""
+    """An invalid or unusable target."""
 
 
 class FamilyError(Error, ValueError):
-    """A family of tags that cannot be used."""
+    """An unusable family of tags."""
 
 
 class ImageError(Error, ValueError):
-    """A picture that is none: an array of another kind, or a file that cannot be read."""
+    """An invalid image: an unsupported array, or a file that cannot be decoded."""
 
 
 class DetectionError(Error, ValueError):
-    """A detector that cannot be made, or a detection that cannot be read."""
+    """An invalid detector, or a detection that cannot be read."""
 
 
 class CalibrationError(Error, ValueError):
-    """A calibration that has no solution, or is asked for wrongly."""
+    """A calibration that failed, or invalid arguments of one."""
 
 
 class CameraError(Error, ValueError):
-    """A camera that cannot be used, or that a format cannot carry."""
+    """An unusable camera, or one that a format does not support."""
 
 
 class VerifyError(Error, ValueError):
@@ -65,13 +65,13 @@ class VerifyError(Error, ValueError):
 class FileError(Error, OSError):
     """A file that cannot be read or written.
 
-    Where the system says why, ``errno``, ``strerror`` and ``filename`` are set as in every :class:`OSError`; else they are
-    ``None``, and the words are the library's.
+    If the operating system reports the reason, ``errno``, ``strerror`` and ``filename`` are set as in every :class:`OSError`.
+    Otherwise they are ``None``, and the message is that of the library.
     """
 
 
 class MissingFileError(FileError, FileNotFoundError):
-    """A file that is not there; ``filename`` is its name."""
+    """A missing file; ``filename`` is its name."""
 
 
 class PermissionFileError(FileError, PermissionError):
@@ -79,11 +79,11 @@ class PermissionFileError(FileError, PermissionError):
 
 
 class FolderError(FileError, IsADirectoryError):
-    """A folder where a file is needed; ``filename`` is its name."""
+    """A folder in place of a file; ``filename`` is its name."""
 
 
 def _of_system(number: _Optional[int], filename: str) -> FileError:
-    """The exception for a number of the system; without one, of a folder where a file is needed."""
+    """Returns the exception for an ``errno``; without one, for a folder in place of a file."""
     plain: _Any
     if number is None:
         plain = OSError(_errno.EISDIR, _os.strerror(_errno.EISDIR))
@@ -98,7 +98,7 @@ def _of_system(number: _Optional[int], filename: str) -> FileError:
     return kind(plain.errno, plain.strerror, filename)
 
 
-# Where they are imported from.
+# Show the public module in tracebacks.
 for _class in (
     Error,
     ArgumentError,

@@ -1,10 +1,10 @@
-"""Detections of more pictures than one machine should look at, by Ray (``pip install 'deltille[ray]'``).
+"""Detection in large sets of images on a Ray cluster (``pip install 'deltille[ray]'``).
 
-:func:`detect` makes a dataset, a row for each corner or for each picture; :func:`detect_to` writes both as Parquet
-into a folder or bucket, leaves out what stands there already, and ``deltille calibrate`` reads the folder.
+:func:`detect` makes a dataset with a row for each corner or for each image. :func:`detect_to` writes both as Parquet tables
+into a folder or bucket, and skips images that already have results; ``deltille calibrate`` reads the folder.
 
-Only paths, or encoded files, travel to the workers, and small tables come back: decoded pictures stay in the process
-that looks at them, which is one thread. What Ray does when a process or a machine is lost is its own.
+Only paths or encoded files are sent to the workers, and small tables come back. Decoded images stay in the process that
+handles them, which uses one thread. Ray handles lost processes and machines.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 
 __all__ = ["CORNERS", "PICTURES", "Summary", "detect", "detect_to", "done"]
 
-#: What was asked of a table's pictures, in its metadata.
+#: Metadata key of a table: a hash of the target and the options of its images.
 ASKED = b"deltille.asked"
 
 #: Columns of the table of corners.
@@ -60,7 +60,7 @@ CORNERS = pa.schema(
     metadata={"deltille.schema": "deltille/corners/1"},
 )
 
-#: Columns of the table of pictures.
+#: Columns of the table of images.
 PICTURES = pa.schema(
     [
         ("image", pa.string()),
@@ -92,7 +92,7 @@ PICTURES = pa.schema(
     metadata={"deltille.schema": "deltille/pictures/1"},
 )
 
-# Of a corner in a row that holds its picture: all but the picture's name.
+# Columns of a corner nested in the row of its image: all except the name of the image.
 _CORNER = pa.struct(list(CORNERS)[1:])
 _BOTH = pa.schema([*PICTURES, pa.field("found", pa.list_(_CORNER))])
 
@@ -100,14 +100,14 @@ _ENDINGS = (".png", ".jpg", ".jpeg", ".tif", ".tiff", ".bmp", ".pgm", ".ppm", ".
 
 
 class Summary:
-    """What :func:`detect_to` did.
+    """Summary of a run of :func:`detect_to`.
 
     Attributes
     ----------
     pictures, corners, errors : int
-        Pictures that were looked at, corners found in them, and how many of the pictures could not be read.
+        Number of images processed, of corners found in them, and of images that could not be read.
     skipped : int
-        Pictures that stood in the folder already. Those of a dataset, whose length is not known, count as nothing.
+        Number of images that already had results. Images of a dataset are not counted, as its length is not known.
     """
 
     def __init__(self, pictures: int, corners: int, errors: int, skipped: int) -> None:
@@ -134,47 +134,47 @@ def detect(
     accept_damaged: bool = False,
     **options: Any,
 ) -> "ray.data.Dataset":
-    """Find a target in pictures, on all machines of a cluster.
+    """Detects a target in images, on all machines of a cluster.
 
     Parameters
     ----------
     pictures : str, path-like, sequence of these, or ray.data.Dataset
-        Photographs and folders of them, on any filesystem that Ray reads (``"s3://bucket/day"``); every worker has to
-        reach it. Or a dataset with a column ``path``, or with ``bytes`` (encoded files, as of
-        :func:`ray.data.read_binary_files` with ``include_paths=True``) beside it.
+        Photographs and folders of them, on any filesystem that Ray supports (``"s3://bucket/day"``) and every worker can
+        access. Or a dataset with a column ``path``, and optionally ``bytes`` (encoded files, as from
+        :func:`ray.data.read_binary_files` with ``include_paths=True``).
     target : Target or sequence of Target, optional
-        What is looked for.
+        The target to find.
     per : str, optional
-        ``"corner"``: a row for each corner, with the columns :data:`CORNERS`. ``"picture"``: a row for each picture,
-        :data:`PICTURES`; one that could not be read has a text in ``error``. ``"both"``: the latter with a column
-        ``found``, a list of corners.
+        ``"corner"``: one row per corner, with the columns :data:`CORNERS`. ``"picture"``: one row per image, with the
+        columns :data:`PICTURES`; images that could not be read have a message in ``error``. ``"both"``: one row per image
+        with an additional column ``found``, the list of its corners.
     concurrency : int or (int, int), optional
-        How many processes look at pictures, or the least and the most; one for each processor of the cluster if left
-        out, and one less for a dataset, which takes processors itself. Each takes one processor.
+        Number of detecting processes, or its minimum and maximum. Defaults to the number of processors of the cluster, or
+        one less for a dataset, which needs processors itself. Each process uses one processor.
     batch_size : int, optional
-        Pictures that a process is given at a time. It holds the bytes and pixels of one only.
+        Number of images sent to a process at a time. The process keeps the bytes and pixels of only one in memory.
     filesystem : pyarrow.fs.FileSystem or fsspec filesystem, optional
-        Where the paths are; found from them if left out.
+        Filesystem of the paths; by default derived from them.
     accept_damaged : bool, optional
-        Whether JPEG files of which a part is missing are read too.
+        Accept truncated JPEG files.
     **options
-        For :class:`deltille.Detector`, such as ``grid``, ``rows``, ``cols`` or ``ink``. Each picture is seen by
-        itself: what pictures say together of the ink is not found here, but may be given as ``ink``, in µm.
+        Options of :class:`deltille.Detector`, such as ``grid``, ``rows``, ``cols`` or ``ink``. Images are processed
+        independently, without a combined ink estimate; pass a known ink spread as ``ink``, in µm.
 
     Returns
     -------
     ray.data.Dataset
-        Made when it is consumed, in no order.
+        A dataset that is computed when it is consumed, in arbitrary order.
 
     Raises
     ------
     FileNotFoundError
-        Where a path is not there.
+        If a path does not exist.
     deltille.Error
-        Where there is nothing to look for.
+        If neither a target nor a grid is given.
     """
     if per not in ("corner", "picture", "both"):
-        raise ValueError('per: give "corner", "picture" or "both"')
+        raise ValueError(f'unknown per {per} (known: "corner", "picture", "both")')
     found: ray.data.Dataset
     found, _ = _detect(pictures, frozenset(), target, per, concurrency, batch_size, filesystem, accept_damaged, options)
     return found
@@ -192,20 +192,19 @@ def detect_to(
     pictures_per_file: int = 1000,
     **options: Any,
 ) -> Summary:
-    """Find a target in pictures and write what comes of it, as it comes, to ``folder/corners`` and ``folder/pictures``.
+    """Detects a target in images and writes results continuously to ``folder/corners`` and ``folder/pictures``.
 
-    A picture that stands in the folder already is not read again, with or without corners or an error: after a run
-    that was stopped, the same call does the rest. ``deltille calibrate FOLDER --target …`` reads the folder.
+    Images that already have results in the folder are skipped, even if they have no corners or an error: repeat the same call
+    to resume an interrupted run. ``deltille calibrate FOLDER --target …`` reads the folder.
 
     Parameters
     ----------
     folder : str or path-like
-        A folder or bucket that every worker reaches; made where it is not there.
+        A folder or bucket that every worker can access; created if necessary.
     pictures, target, concurrency, batch_size, filesystem, accept_damaged, **options
-        As of :func:`detect`; `filesystem` is that of the pictures.
+        See :func:`detect`; `filesystem` is that of the images.
     pictures_per_file : int, optional
-        How many pictures a file of either table has at least. What is in no file yet is done again after a run that
-        was stopped.
+        Minimum number of images per file of either table. An interrupted run loses images that are not in a file yet.
 
     Returns
     -------
@@ -214,17 +213,17 @@ def detect_to(
     Raises
     ------
     deltille.DetectionError
-        Where the folder has tables of another target or of other options.
+        If the folder contains results for another target or other options.
     """
     if pictures_per_file < 1:
-        raise ValueError("pictures_per_file: give 1 or more")
+        raise ValueError("pictures_per_file must be at least 1")
     to, root = _place(folder)
     asked = _asked(target, {**options, "accept_damaged": accept_damaged})
     for path in _files(to, f"{root}/pictures")[:1]:
         with to.open_input_file(path) as file:
             known = (pq.read_schema(file).metadata or {}).get(ASKED, asked)
         if known != asked:
-            what = "what stands there was looked at for another target, or with other options: give another folder"
+            what = "the folder contains results for another target or other options; use another folder"
             raise deltille.DetectionError(f"{folder}: {what}")
     _remove_halves(to, root)
     there = done(folder)
@@ -233,8 +232,8 @@ def detect_to(
     )
     if dataset is None:
         return Summary(0, 0, 0, skipped)
-    # One process for all files, as each that Ray starts costs a second. It takes no processor: all of them look at
-    # pictures, and would never end if nothing were written.
+    # One process writes all files, as starting one takes Ray a second. It reserves no processor: the detecting processes take
+    # them all, and would wait forever for the writer.
     written = dataset.map_batches(
         _Writing,
         batch_size=pictures_per_file,
@@ -249,7 +248,7 @@ def detect_to(
 
 
 def done(folder: Union[str, "os.PathLike[str]"]) -> frozenset[str]:
-    """The pictures that stand in a folder of :func:`detect_to`."""
+    """Returns the names of the images with results in a folder of :func:`detect_to`."""
     to, root = _place(folder)
     names: set[str] = set()
     for path in _files(to, f"{root}/pictures"):
@@ -259,24 +258,24 @@ def done(folder: Union[str, "os.PathLike[str]"]) -> frozenset[str]:
 
 
 def _asked(target: Optional[Targets], options: dict[str, Any]) -> bytes:
-    """What tells pictures that were looked at for one target, with one set of options, from others."""
+    """Returns a hash of the target and the options."""
     targets = [] if target is None else [target] if isinstance(target, deltille.Target) else list(target)
     asked = [[one.to_json() for one in targets], sorted((name, str(value)) for name, value in options.items())]
     return hashlib.sha256(json.dumps(asked).encode()).hexdigest().encode()
 
 
 def _place(path: Union[str, "os.PathLike[str]"]) -> tuple[pafs.FileSystem, str]:
-    """The filesystem of a path, and the path in it."""
+    """Returns the filesystem of a path, and the path in it."""
     text = os.fspath(path)
     if "://" in text:
         filesystem, inside = pafs.FileSystem.from_uri(text)
         return filesystem, inside.rstrip("/")
-    # Workers have another working directory.
+    # Workers have a different working directory.
     return pafs.LocalFileSystem(), os.path.abspath(text)
 
 
 def _files(filesystem: pafs.FileSystem, folder: str) -> list[str]:
-    """The tables in a folder."""
+    """Returns the tables in a folder."""
     selector = pafs.FileSelector(folder, allow_not_found=True)
     found = filesystem.get_file_info(selector)
     names = [info for info in found if info.is_file and not info.base_name.startswith(".")]
@@ -284,7 +283,7 @@ def _files(filesystem: pafs.FileSystem, folder: str) -> list[str]:
 
 
 def _remove_halves(filesystem: pafs.FileSystem, root: str) -> None:
-    """Removes files of corners whose pictures were not written."""
+    """Removes files of corners without a matching file of images."""
     name = os.path.basename
     whole = {name(path) for path in _files(filesystem, f"{root}/pictures")}
     for path in _files(filesystem, f"{root}/corners"):
@@ -303,10 +302,10 @@ def _detect(
     accept_damaged: bool,
     options: dict[str, Any],
 ) -> tuple[Any, int]:
-    """The dataset, ``None`` where nothing is left to do, and how many pictures are not in it."""
+    """Returns the dataset, or ``None`` if nothing is left to do, and the number of skipped images."""
     if batch_size < 1:
-        raise ValueError("batch_size: give 1 or more")
-    # What is wrong with the options is said here and not by every worker.
+        raise ValueError("batch_size must be at least 1")
+    # Report wrong options here, not in every worker.
     deltille.Detector(target, **options)
     skipped = 0
     if filesystem is not None and not isinstance(filesystem, pafs.FileSystem):
@@ -314,7 +313,7 @@ def _detect(
     if isinstance(pictures, ray.data.Dataset):
         names = set(pictures.schema().names)
         if "path" not in names:
-            raise ValueError("pictures: the dataset has no column path, the name of each picture")
+            raise ValueError("pictures: the dataset has no column path with the names of the images")
         dataset = pictures
     else:
         paths = _listed(pictures, filesystem)
@@ -328,7 +327,7 @@ def _detect(
     if concurrency is None:
         resources: Callable[[], dict[str, float]] = ray.cluster_resources
         processors = max(1, int(resources().get("CPU", 1)))
-        # Whatever makes a dataset needs processors, too, and would wait for them for ever.
+        # The stages that make a dataset need a processor, too, and would wait for it forever.
         concurrency = processors if pictures is not dataset else (1, max(1, processors - 1))
     least, most = concurrency if isinstance(concurrency, tuple) else (concurrency, concurrency)
     found = dataset.map_batches(
@@ -350,7 +349,7 @@ def _detect(
 
 
 def _listed(paths: Paths, filesystem: Any) -> list[str]:
-    """The pictures among paths and in folders, by name, each as it was given."""
+    """Lists the images among paths and in folders, sorted by name within a folder."""
     listed: list[str] = []
     for path in [paths] if isinstance(paths, (str, os.PathLike)) else paths:
         text = os.fspath(path)
@@ -372,7 +371,7 @@ def _listed(paths: Paths, filesystem: Any) -> list[str]:
 
 
 class _Looking:
-    """A process that looks at pictures."""
+    """A process that detects in images."""
 
     def __init__(
         self,
@@ -383,7 +382,7 @@ class _Looking:
         accept_damaged: bool,
         there: frozenset[str],
     ) -> None:
-        # Ray runs as many processes as there are processors.
+        # Ray runs one process per processor.
         os.environ["RAYON_NUM_THREADS"] = "1"
         self.detector = deltille.Detector(target, **options)
         self.per = per
@@ -396,7 +395,7 @@ class _Looking:
         names = batch.column_names
         content = batch["bytes"] if "bytes" in names else [None] * len(batch)
         for path, encoded in zip(batch["path"], content):
-            # One picture at a time: a batch of files may be large.
+            # One image at a time: a batch of files may be large.
             name = path.as_py()
             if name in self.there:
                 continue
@@ -481,7 +480,7 @@ def _field(record: Any, name: str) -> Any:
 
 
 def _corners(image: str, found: "deltille.Detection") -> pa.Table:
-    """The corners of a picture."""
+    """Makes the table of corners of an image."""
     grids = found.grid_indices
     each = found.grids
     cov, pixels, places = found.covariances, found.pixels, found.object_points
@@ -494,7 +493,7 @@ def _corners(image: str, found: "deltille.Detection") -> pa.Table:
         return pa.array(ids, mask=ids < 0).cast(pa.uint32())
 
     def number(values: Any) -> pa.Array:
-        # NaN is a number that is not known.
+        # NaN stands for unknown numbers.
         return pa.array(values, pa.float64(), from_pandas=True)
 
     columns = {
@@ -524,10 +523,10 @@ def _corners(image: str, found: "deltille.Detection") -> pa.Table:
 
 
 class _Writing:
-    """A process that writes rows of pictures as a file of corners and then one of pictures, of the same name.
+    """A process that writes rows of images as a file of corners and then a file of images, with the same name.
 
-    A picture counts as done once it is among the pictures. A file of corners without its pictures is ignored by
-    whoever reads the folder, and removed by the next run.
+    An image counts as done once it is in a file of images. Readers ignore a file of corners without a file of images, and the
+    next run removes it.
     """
 
     def __init__(self, filesystem: pafs.FileSystem, root: str, run: str, asked: bytes) -> None:
@@ -549,7 +548,7 @@ class _Writing:
         image = pictures["image"].combine_chunks().take(pa.compute.list_parent_indices(lists))
         columns = [image, *(values.field(field.name) for field in list(CORNERS)[1:])]
         corners = pa.table(columns, schema=CORNERS)
-        # What is done again, as a process was lost, writes the same files again.
+        # Work repeated after a lost process writes the same files again.
         of_these = hashlib.sha256("\n".join(pictures["image"].to_pylist()).encode()).hexdigest()
         name = f"{self.run}-{of_these[:16]}.parquet"
         self._put(corners, f"{self.root}/corners", name)
@@ -558,9 +557,9 @@ class _Writing:
         return pa.table({"pictures": [len(pictures)], "corners": [len(corners)], "errors": [errors]})
 
     def _put(self, table: pa.Table, folder: str, name: str) -> None:
-        """A file that is there as a whole or not at all."""
+        """Writes a file atomically."""
         if not isinstance(self.filesystem, pafs.LocalFileSystem):
-            # Of a bucket an object is there once its stream is closed.
+            # An object in a bucket appears when its stream is closed.
             with self.filesystem.open_output_stream(f"{folder}/{name}") as file:
                 pq.write_table(table, file, compression="snappy")
             return

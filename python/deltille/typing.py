@@ -1,6 +1,6 @@
-"""Types in the signatures of this package, for annotations of one's own.
+"""Types in the signatures of this package, for annotations in your own code.
 
-Nothing of it is needed to use the package, which does not import this module.
+The package itself does not import this module.
 """
 
 from __future__ import annotations

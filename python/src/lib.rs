@@ -1,16 +1,16 @@
-//! The Python package `deltille`, thin over the library: what arrays become, and what becomes of results.
+//! The Python package `deltille`, a thin layer over the library: converts arguments and results.
 //!
-//! Comes in: a call from Python with arrays, paths and keywords. Goes out: a class of the package, arrays, or an exception.
+//! Input: a call from Python with arrays, paths and keywords. Output: a class of the package, arrays, or an exception.
 //!
-//! 1. `boundary` takes what Python gives, and makes exceptions of errors.
-//! 2. `targets` are made, written and verified.
-//! 3. `see` finds them in pictures.
-//! 4. `calibrate` makes cameras and rigs of what was found, and compares them.
+//! 1. `boundary` converts values and errors.
+//! 2. `targets` makes, writes and verifies targets.
+//! 3. `see` renders targets and detects them in images.
+//! 4. `calibrate` calibrates cameras and rigs from detections, and compares them.
 //! 5. `programs` runs `deltille` and `deltag`.
 //!
-//! What can be named in Python is listed below, in `_core`.
+//! `_core`, below, lists the names visible in Python.
 
-#![allow(unreachable_pub, reason = "the interface is that of Python")]
+#![allow(unreachable_pub, reason = "Python is the only user of this interface")]
 
 mod boundary;
 mod calibrate;
@@ -20,10 +20,10 @@ mod targets;
 
 use pyo3::prelude::*;
 
-/// What pickle restores a value by: a function and its arguments.
+/// The result of `__reduce__`: a function that restores a value, and its arguments.
 type Reduced<'py, A> = PyResult<(Bound<'py, PyAny>, A)>;
 
-/// Makes a class of plain data one that pickle and copy take, as JSON.
+/// Makes a class of plain data picklable, as JSON.
 macro_rules! pickles {
     ($class:ident) => {
         #[pymethods]

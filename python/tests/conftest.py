@@ -1,4 +1,4 @@
-"""Tests of the installed package; they read photographs of the repository and run from any folder."""
+"""Tests of the installed package. They read photographs of the repository, and run from any folder."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ def pytest_addoption(parser):
 def pytest_collection_modifyitems(config, items):
     if config.getoption("--long"):
         return
-    skipped = pytest.mark.skip(reason="takes minutes: give --long")
+    skipped = pytest.mark.skip(reason="takes minutes; run with --long")
     for item in items:
         if "long" in item.keywords:
             item.add_marker(skipped)
@@ -34,7 +34,7 @@ def root() -> Path:
 
 
 def script(name: str) -> str:
-    """A program that the package installed."""
+    """Returns a program installed by the package."""
     found = shutil.which(name, path=sysconfig.get_path("scripts"))
     assert found, f"{name} is not installed"
     return found
@@ -42,7 +42,7 @@ def script(name: str) -> str:
 
 @pytest.fixture(scope="session")
 def program() -> str:
-    """The native program where it was built, else that of the package."""
+    """Returns the native program if it was built, otherwise that of the package."""
     native = os.environ.get("DELTILLE_PROGRAM")
     return native or script("deltille")
 

@@ -1,4 +1,4 @@
-"""Arrays of any layout give the same corners, and what is no picture one clear exception."""
+"""Arrays of any layout give the same corners, and invalid arrays raise a clear exception."""
 
 import gc
 import sys
@@ -60,7 +60,7 @@ LAYOUTS = {
 
 @pytest.mark.parametrize("layout", LAYOUTS)
 @pytest.mark.parametrize("dtype", ["uint8", "uint16", "float32"])
-def test_every_layout_gives_the_same(detector, board, camera, layout, dtype):
+def test_every_layout_gives_the_same_corners(detector, board, camera, layout, dtype):
     picture, _ = deltille.render(board, camera, eye=(0, -50, 420), dtype=dtype)
     expected = detector.detect(picture)
     assert len(expected) == 56
@@ -72,7 +72,7 @@ def test_every_layout_gives_the_same(detector, board, camera, layout, dtype):
     assert (given == before).all()
 
 
-def test_colours_are_grey_as_the_program_makes_them(detector, picture, tmp_path):
+def test_colours_are_converted_to_grey_as_by_the_program(detector, picture, tmp_path):
     cv2 = pytest.importorskip("cv2")
     generator = numpy.random.default_rng(1)
     tint = generator.integers(0, 20, (*picture.shape, 3))
@@ -83,8 +83,8 @@ def test_colours_are_grey_as_the_program_makes_them(detector, picture, tmp_path)
         assert (detector.detect(layout).pixels == expected).all()
 
 
-def test_a_view_is_looked_at_where_it_lies(detector, picture):
-    """A borrowed picture stays what it is while it is looked at, and its memory is let go of."""
+def test_a_view_is_detected_without_a_copy(detector, picture):
+    """A borrowed image is unchanged during detection, and released afterwards."""
     whole = numpy.tile(picture, (1, 2)).copy()
     left = whole[:, : picture.shape[1]]
     assert (detector.detect(left).pixels == detector.detect(picture).pixels).all()
@@ -123,13 +123,13 @@ WRONG = {
 
 
 @pytest.mark.parametrize("what", WRONG)
-def test_what_is_no_picture_is_refused(detector, what):
+def test_invalid_images_are_rejected(detector, what):
     with pytest.raises(deltille.ImageError) as refused:
         detector.detect(WRONG[what])
     assert "\n" not in str(refused.value) and "`" not in str(refused.value)
 
 
-def test_small_and_large_pictures(detector):
+def test_small_and_large_images(detector):
     for shape in [(1, 1), (1, 5000), (5000, 1), (2, 3), (24, 24)]:
         assert len(detector.detect(numpy.zeros(shape, numpy.uint8))) == 0
     few = deltille.Detector(detector.targets, max_pixels=1000)

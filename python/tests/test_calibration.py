@@ -8,7 +8,7 @@ import pytest
 import deltille
 
 
-def test_a_camera_is_found_with_its_uncertainties(calibration, camera, detections):
+def test_a_camera_is_calibrated_with_its_uncertainties(calibration, camera, detections):
     assert calibration.model == "radtan" and calibration.camera.model == "pinhole"
     found = calibration.camera.parameters
     names = calibration.camera.parameter_names
@@ -35,7 +35,7 @@ def test_a_camera_is_found_with_its_uncertainties(calibration, camera, detection
     assert calibration.excluded == [] and all(said.sentence for said in calibration.diagnoses)
 
 
-def test_the_next_view_is_where_the_camera_is_known_least(board, camera, detections):
+def test_the_next_view_is_where_the_uncertainty_is_largest(board, camera, detections):
     first = deltille.next_view([], board, size_px=(1280, 960))
     assert first.uncertainty_px is None and not first.is_enough() and "facing the camera" in first.words
     assert first.pixels.shape == (len(first.labels), 2) and len(first.outlines) == 1
@@ -57,7 +57,7 @@ def test_the_next_view_is_where_the_camera_is_known_least(board, camera, detecti
         deltille.next_view([], board)
 
 
-def test_residuals_are_those_of_the_projection(calibration, board):
+def test_residuals_equal_detections_minus_projections(calibration, board):
     view = calibration.views[3]
     order = numpy.argsort(board.corner_ids)
     points = view.pose.apply(board.corners[order][view.ids])
@@ -65,7 +65,7 @@ def test_residuals_are_those_of_the_projection(calibration, board):
     numpy.testing.assert_allclose(view.pixels - predicted, view.residuals, atol=1e-8)
 
 
-def test_the_camera_is_that_of_the_program(program, detections, board, calibration, tmp_path):
+def test_the_calibration_equals_that_of_the_program(program, detections, board, calibration, tmp_path):
     board.save(tmp_path)
     (tmp_path / "corners").mkdir()
     for i, detection in enumerate(detections):
@@ -78,7 +78,7 @@ def test_the_camera_is_that_of_the_program(program, detections, board, calibrati
     assert again.camera == deltille.Camera.load(tmp_path / "camera.yaml") == calibration.camera
 
 
-def test_calibrations_are_written_and_read(calibration, board, tmp_path):
+def test_calibrations_survive_writing_and_reading(calibration, board, tmp_path):
     path = calibration.save(tmp_path / "a.json", residuals=True)
     again = deltille.Calibration.load(path, target=board)
     assert again.camera == calibration.camera
@@ -100,7 +100,7 @@ def test_calibrations_are_written_and_read(calibration, board, tmp_path):
 def test_other_models(detections, board, model):
     found = deltille.calibrate(detections, board, model)
     assert found.model == model and found.rms_px < 0.1
-    with pytest.raises(deltille.CalibrationError, match="no model"):
+    with pytest.raises(deltille.CalibrationError, match="model"):
         deltille.calibrate(detections, board, "none")
 
 
@@ -176,8 +176,8 @@ def test_rigs(board, camera, tmp_path):
         deltille.Calibration.load(path)
 
 
-def test_what_cannot_be_calibrated_is_told(detections, board):
-    with pytest.raises(deltille.CalibrationError, match="usable views"):
+def test_impossible_calibrations_are_reported(detections, board):
+    with pytest.raises(deltille.CalibrationError, match="views"):
         deltille.calibrate(detections[:1], board)
     with pytest.raises(deltille.CalibrationError):
         deltille.calibrate([])
@@ -187,7 +187,7 @@ def test_what_cannot_be_calibrated_is_told(detections, board):
         deltille.calibrate([*detections, detections[0]])
 
 
-def test_what_is_loaded_says_what_was_saved(detections, board, tmp_path):
+def test_loaded_calibrations_equal_saved_ones(detections, board, tmp_path):
     found = deltille.calibrate(detections, board, hold_out=5)
     found.save(tmp_path / "plain.json")
     found.save(tmp_path / "listed.json", residuals=True)
@@ -206,26 +206,26 @@ def test_what_is_loaded_says_what_was_saved(detections, board, tmp_path):
         deltille.Rig.load(tmp_path / "plain.json")
 
 
-def test_pictures_that_cannot_be_read_are_passed_over(pictures, board):
+def test_failures_are_skipped(pictures, board):
     found = deltille.detect_many([*pictures, b"no picture"], board)
     assert found[-1].error and not found[-1]
     names = [f"view{i}" for i in range(len(found))]
     calibration = deltille.calibrate(found, board, names=names)
     assert calibration.views[-1].name == names[len(pictures) - 1]
     assert len(deltille.to_opencv(found)[0]) == len(pictures)
-    with pytest.raises(TypeError, match="give a list"):
+    with pytest.raises(TypeError, match="expected a list"):
         deltille.calibrate(found[0], board)
-    with pytest.raises(TypeError, match="give a list"):
+    with pytest.raises(TypeError, match="expected a list"):
         deltille.detect_many("photograph.png", board)
 
 
-def test_labels_of_another_target_are_refused(detections):
+def test_labels_of_another_target_are_rejected(detections):
     other = deltille.Board(9, 8, edge_mm=20)
     with pytest.raises(deltille.DetectionError, match="it was detected as desk .* but the target given is board"):
         deltille.Detection.from_json(detections[0].to_json(), target=other)
 
 
-def test_a_board_of_another_size_is_refused(tmp_path, board, camera, detections, calibration):
+def test_a_board_of_another_size_is_rejected(tmp_path, board, camera, detections, calibration):
     larger = deltille.Board(7, 8, edge_mm=25, name="desk")
     own, other = board.identity, larger.identity
     assert own["labels"] == other["labels"] and own["fingerprint"] != other["fingerprint"]

@@ -26,7 +26,7 @@ def test_rays_and_projections_are_inverse(model, distortion, tmp_path):
             camera.distortion
 
 
-def test_what_a_lens_does_not_reach_is_nan():
+def test_points_outside_the_lens_are_nan():
     camera = deltille.Camera(640, 480, 500)
     assert numpy.isnan(camera.project([[0, 0, -100]])).all()
     assert camera.project(numpy.zeros((0, 3))).shape == (0, 2)
@@ -38,7 +38,7 @@ def test_what_a_lens_does_not_reach_is_nan():
         camera.project([1, 2, 3])
 
 
-def test_wrong_cameras_are_refused(tmp_path):
+def test_invalid_cameras_are_rejected(tmp_path):
     for wrong in [{"focal_px": 0}, {"focal_px": float("nan")}, {"model": "x"}, {"distortion": [1] * 20}, {"width": 0}]:
         with pytest.raises(deltille.CameraError):
             deltille.Camera(**{"width": 640, "height": 480, "focal_px": 500, **wrong})
@@ -65,7 +65,7 @@ def test_poses_are_motions():
         deltille.Pose((numpy.nan, 0, 0))
 
 
-def test_a_synthetic_picture_has_its_truth(board, camera):
+def test_a_synthetic_image_has_its_truth(board, camera):
     picture, truth = deltille.render(board, camera, eye=(60, -50, 400), noise=0, blur_px=1)
     assert picture.shape == (960, 1280) and picture.dtype == numpy.uint8
     numpy.testing.assert_allclose(camera.project(truth.pose.apply(truth.object_points)), truth.pixels, atol=1e-9)

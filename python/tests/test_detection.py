@@ -11,7 +11,7 @@ import deltille
 
 
 def of_program(program, folder, pictures, *options):
-    """What the program finds."""
+    """Detections of the program."""
     command = [program, "detect", *map(str, pictures), *options, "-o", str(folder), "--format", "json"]
     subprocess.run(command, check=True, capture_output=True)
     return [(folder / f"{picture.stem}.json").read_text() for picture in pictures]
@@ -21,7 +21,7 @@ def of_program(program, folder, pictures, *options):
     ("name", "grid", "rows", "cols"),
     [("robot-hand-0108.png", "deltille", 10, 11), ("fisheye-0200.png", "checker", 8, 11)],
 )
-def test_corners_are_those_of_the_program_bit_by_bit(program, root, tmp_path, name, grid, rows, cols):
+def test_corners_equal_those_of_the_program_bit_by_bit(program, root, tmp_path, name, grid, rows, cols):
     photograph = root / "tests/photographs" / name
     [text] = of_program(program, tmp_path, [photograph], "--grid", grid, "--rows", str(rows), "--cols", str(cols))
     detector = deltille.Detector(grid=grid, rows=rows, cols=cols)
@@ -32,7 +32,7 @@ def test_corners_are_those_of_the_program_bit_by_bit(program, root, tmp_path, na
     assert detector.detect_bytes(photograph.read_bytes(), name=name) == found
     with pytest.raises(deltille.ImageError, match="cut.png"):
         detector.detect_bytes(photograph.read_bytes()[:5000], name="cut.png")
-    # The same from an array that another program decoded.
+    # The same from an array decoded by another program.
     cv2 = pytest.importorskip("cv2")
     array = cv2.imread(str(photograph), cv2.IMREAD_UNCHANGED)
     assert (detector.detect(array).pixels == found.pixels).all()
@@ -40,7 +40,7 @@ def test_corners_are_those_of_the_program_bit_by_bit(program, root, tmp_path, na
 
 
 @pytest.mark.parametrize(("folder", "grid", "rows", "cols"), [("robot-hand", "deltille", 10, 11), ("fisheye", "checker", 8, 11)])
-def test_many_photographs_are_those_of_the_program(program, root, tmp_path, folder, grid, rows, cols):
+def test_many_photographs_agree_with_the_program(program, root, tmp_path, folder, grid, rows, cols):
     shared = Path(os.environ.get("DELTILLE_DATA", root / "../shared/data"))
     here = (root / "tests/photographs").glob(f"{folder}-*.png")
     photographs = [*here, *sorted((shared / folder).glob("*.png"))[:5]]
@@ -50,7 +50,7 @@ def test_many_photographs_are_those_of_the_program(program, root, tmp_path, fold
     assert [result.to_json() for result in found] == texts
 
 
-def test_a_detection_is_arrays(detections, board):
+def test_a_detection_has_arrays(detections, board):
     found = detections[0]
     assert len(found) == 56 and not found.mirrored
     assert found.pixels.shape == (56, 2) and found.object_points.shape == (56, 3)
@@ -71,7 +71,7 @@ def test_a_detection_is_arrays(detections, board):
     assert "circle" in found._repr_html_()
 
 
-def test_a_picture_that_shows_nothing_says_why(board):
+def test_an_empty_image_gives_the_reason(board):
     detector = deltille.Detector(board)
     found = detector.detect(numpy.zeros((480, 640), numpy.uint8))
     assert len(found) == 0 and found.pixels.shape == (0, 2) and found.object_points.shape == (0, 3)
@@ -82,12 +82,12 @@ def test_a_picture_that_shows_nothing_says_why(board):
     assert found.to_opencv()[0].shape == (0, 3)
 
 
-def test_labels_that_are_not_known_are_told(pictures):
+def test_unlabelled_corners_are_marked(pictures):
     found = deltille.Detector(grid="deltille").detect(pictures[0])
     assert (found.ids == -1).all() and numpy.isnan(found.object_points).all() and (found.panels == -1).all()
 
 
-def test_several_targets_are_told_apart(camera):
+def test_several_targets_are_distinguished(camera):
     front = deltille.Board(5, 6, name="front")
     back = deltille.Board(5, 6, name="back", first_id=50)
     picture, _ = deltille.render(back, camera, eye=(60, -40, 300))
@@ -98,7 +98,7 @@ def test_several_targets_are_told_apart(camera):
         deltille.Detector([front, deltille.Board(5, 6, name="other")])
 
 
-def test_files_of_detections(detections, board, tmp_path):
+def test_detections_survive_writing_and_reading(detections, board, tmp_path):
     path = detections[0].save(tmp_path / "a.json")
     assert json.loads(path.read_text())["schema"] == "deltille/detection/1"
     again = deltille.Detection.load(path, target=board)
@@ -112,7 +112,7 @@ def test_files_of_detections(detections, board, tmp_path):
         detections[0].save(tmp_path / "a.txt", "txt")
 
 
-def test_many_pictures_are_in_order_and_none_is_lost(board, pictures, detections, tmp_path):
+def test_results_of_many_images_are_in_order_and_complete(board, pictures, detections, tmp_path):
     broken = tmp_path / "broken.png"
     broken.write_bytes(b"no picture")
     asked = []
@@ -135,7 +135,7 @@ def test_many_pictures_are_in_order_and_none_is_lost(board, pictures, detections
     assert len(deltille.detect_many(iter(pictures[:3]), board, progress=bar)) == 3
 
 
-def test_a_detection_is_drawn(detections, pictures, tmp_path):
+def test_a_detection_can_be_plotted(detections, pictures, tmp_path):
     matplotlib = pytest.importorskip("matplotlib")
     matplotlib.use("Agg")
     axes = detections[0].plot(pictures[0], ids=True)
@@ -143,7 +143,7 @@ def test_a_detection_is_drawn(detections, pictures, tmp_path):
     matplotlib.pyplot.close(axes.figure)
 
 
-def test_detections_of_files_and_tables_are_the_same(program, root, tmp_path):
+def test_detections_from_files_and_tables_are_equal(program, root, tmp_path):
     photographs = tmp_path / "photographs"
     photographs.mkdir()
     (photographs / "cut.png").write_bytes(b"\x89PNG\r\n\x1a\n")

@@ -10,15 +10,15 @@ import pytest
 import deltille
 
 
-def test_errors_are_of_python_with_the_words_of_the_library(tmp_path):
+def test_errors_are_python_exceptions_with_messages_of_the_library(tmp_path):
     cases = [
-        (deltille.TargetError, ValueError, lambda: deltille.Board(1, 5), "rows: 1 is not between"),
+        (deltille.TargetError, ValueError, lambda: deltille.Board(1, 5), "rows"),
         (deltille.TargetError, ValueError, lambda: deltille.Board(40, 50, edge_mm=50, paper="A4"), "paper: "),
         (deltille.TargetError, ValueError, lambda: deltille.Board(4, 5, paper="B9"), ""),
         (deltille.FamilyError, ValueError, lambda: deltille.Board(4, 5, family="none"), "none"),
         (deltille.FileError, OSError, lambda: deltille.Target.load(tmp_path / "none.json"), "none.json"),
         (deltille.TargetError, ValueError, lambda: deltille.Target.from_json("{}"), "schema"),
-        (deltille.DetectionError, ValueError, lambda: deltille.Detector(grid="squares"), "deltille or checker"),
+        (deltille.DetectionError, ValueError, lambda: deltille.Detector(grid="squares"), "deltille, checker"),
         (deltille.DetectionError, ValueError, lambda: deltille.Detector(grid="checker", rows=4), "rows and cols"),
         (deltille.DetectionError, ValueError, lambda: deltille.Detector(grid="checker", tone="x"), "tone"),
         (deltille.ImageError, ValueError, lambda: deltille.Detector(grid="checker").detect_bytes(b"GIF89a", name="a.gif"), "a.gif"),
@@ -26,22 +26,22 @@ def test_errors_are_of_python_with_the_words_of_the_library(tmp_path):
         (deltille.TargetError, ValueError, lambda: deltille.Board(4, 5).files("stl"), "solid"),
         (deltille.TargetError, ValueError, lambda: deltille.Board(4, 5).files("gltf", texture_px=0), "texture_px"),
         (deltille.TargetError, ValueError, lambda: deltille.Board(4, 5).files("gltf", texture_px=20), "texels"),
-        (deltille.TargetError, ValueError, lambda: deltille.Board(4, 5).files("gltf", textures=0), "textures: give 1 to 64"),
+        (deltille.TargetError, ValueError, lambda: deltille.Board(4, 5).files("gltf", textures=0), "textures must be from 1 to 64"),
         (deltille.TargetError, ValueError, lambda: deltille.Board(4, 5).files("gltf", textures=2), "1 face"),
-        (deltille.TargetError, ValueError, lambda: deltille.Icosahedron().files("obj", texture_px=1024), "or textures 4"),
+        (deltille.TargetError, ValueError, lambda: deltille.Icosahedron().files("obj", texture_px=1024), "textures"),
         (deltille.TargetError, ValueError, lambda: deltille.Board(4, 5).svg(3), "page 3"),
         (deltille.TargetError, ValueError, lambda: deltille.Board(4, 5).svg(-1), "page -1"),
-        (deltille.TargetError, ValueError, lambda: deltille.Board(-1, 5), "rows: give a whole number from 0, not -1"),
+        (deltille.TargetError, ValueError, lambda: deltille.Board(-1, 5), "rows: expected a whole number from 0, got -1"),
         (deltille.TargetError, ValueError, lambda: deltille.Icosahedron(first_id=2**40), f"first_id: {2**40} is too"),
-        (deltille.CameraError, ValueError, lambda: deltille.Camera(-4, 5, 1), "width: give"),
-        (deltille.CameraError, ValueError, lambda: deltille.Camera(640, 480, float("nan")), "focal_px: NaN is not between"),
-        (deltille.CameraError, ValueError, lambda: deltille.Camera(640, 480, 500, model="radtan", distortion=[0] * 5), "radtan has 4"),
-        (deltille.ArgumentError, ValueError, lambda: deltille.Pose(rvec=(1, 2)), "rvec: 3 numbers are wanted, not 2"),
-        (deltille.ArgumentError, ValueError, lambda: deltille.Pose(tvec=(1, 2, float("inf"))), "tvec: inf is not between"),
-        (deltille.ArgumentError, ValueError, lambda: deltille.Pose().apply([1, 2, 3]), "points: N × 3 are wanted, not 3 in a row"),
+        (deltille.CameraError, ValueError, lambda: deltille.Camera(-4, 5, 1), "width: expected"),
+        (deltille.CameraError, ValueError, lambda: deltille.Camera(640, 480, float("nan")), "focal_px"),
+        (deltille.CameraError, ValueError, lambda: deltille.Camera(640, 480, 500, model="radtan", distortion=[0] * 5), "radtan has at most 4"),
+        (deltille.ArgumentError, ValueError, lambda: deltille.Pose(rvec=(1, 2)), "rvec: expected 3 numbers, got 2"),
+        (deltille.ArgumentError, ValueError, lambda: deltille.Pose(tvec=(1, 2, float("inf"))), "tvec"),
+        (deltille.ArgumentError, ValueError, lambda: deltille.Pose().apply([1, 2, 3]), "points: expected an array of N × 3, got a vector of 3"),
         (deltille.ArgumentError, ValueError, lambda: deltille.Pose.from_matrix(numpy.ones((4, 4))), "matrix: the last row"),
         (deltille.ArgumentError, ValueError, lambda: deltille.Pose.from_matrix(numpy.diag([1, 1, -1, 1])), "reflection"),
-        (deltille.ArgumentError, ValueError, lambda: deltille.Camera(640, 480, 500).project([[1, 2]]), "points: N × 3 are wanted, not 1 × 2"),
+        (deltille.ArgumentError, ValueError, lambda: deltille.Camera(640, 480, 500).project([[1, 2]]), "points: expected an array of N × 3, got 1 × 2"),
         (deltille.MissingFileError, FileNotFoundError, lambda: deltille.Detector(grid="checker").detect_file(tmp_path / "a.png"), "a.png"),
         (deltille.MissingFileError, FileNotFoundError, lambda: deltille.Camera.load(tmp_path / "a.yaml"), "a.yaml"),
         (deltille.MissingFileError, FileNotFoundError, lambda: deltille.Family.load(tmp_path / "f.json"), "f.json"),
@@ -57,7 +57,7 @@ def test_errors_are_of_python_with_the_words_of_the_library(tmp_path):
         assert type(raised.value).__module__ == "deltille"
 
 
-def test_a_missing_file_is_told_as_the_system_tells_it(tmp_path):
+def test_a_missing_file_raises_the_error_of_the_system(tmp_path):
     with pytest.raises(FileNotFoundError) as raised:
         deltille.Target.load(tmp_path / "none.json")
     assert raised.value.errno == errno.ENOENT and raised.value.filename == str(tmp_path / "none.json")
@@ -66,7 +66,7 @@ def test_a_missing_file_is_told_as_the_system_tells_it(tmp_path):
     assert not isinstance(raised.value, FileNotFoundError)
 
 
-def test_errors_of_files_are_those_of_the_system_and_survive_pickling(tmp_path):
+def test_file_errors_have_errno_and_survive_pickling(tmp_path):
     locked = tmp_path / "locked.json"
     locked.write_text("{}")
     cases = [
@@ -86,7 +86,7 @@ def test_errors_of_files_are_those_of_the_system_and_survive_pickling(tmp_path):
                 assert type(error) is kind and isinstance(error, deltille.FileError)
                 assert (error.errno, error.strerror, error.filename) == (number, os.strerror(number), str(path)), read
                 assert str(error) == f"[Errno {number}] {os.strerror(number)}: {str(path)!r}"
-    # What the system has no number for has the library's words.
+    # Errors without an errno have the message of the library.
     words = deltille.FileError("a.csv: names two formats")
     assert str(pickle.loads(pickle.dumps(words))) == "a.csv: names two formats" and words.errno is None
 
@@ -99,8 +99,8 @@ def test_wrong_types_are_type_errors(board):
             wrong()
 
 
-def test_a_mistake_within_is_an_exception_too(board, camera):
-    """No call with odd numbers ends in anything but an exception of this package, or a result."""
+def test_extreme_numbers_give_a_result_or_an_exception(board, camera):
+    """Calls with extreme numbers end with an exception of this package, or with a result."""
     odd = [0.0, -1.0, 1e300, -1e300, float("nan"), float("inf"), 1e-300]
     for number in odd:
         for call in [lambda: deltille.Board(4, 5, edge_mm=number), lambda: deltille.Icosahedron(edge_mm=number),
@@ -116,7 +116,7 @@ def test_a_mistake_within_is_an_exception_too(board, camera):
                 pass
 
 
-def test_docstrings_are_there():
+def test_all_public_names_have_docstrings():
     for name in deltille.__all__:
         thing = getattr(deltille, name)
         if name == "__version__":

@@ -6,7 +6,7 @@ import pytest
 import deltille
 
 
-def test_families_are_arrays_of_codes():
+def test_families_have_arrays_of_codes():
     assert "d25h7" in deltille.Family.shipped()
     family = deltille.Family.load("delTag25h7")
     assert family.codes.dtype == numpy.uint64 and len(family) == len(family.codes) == 343
@@ -33,9 +33,9 @@ def test_words_are_decoded_with_their_errors():
         family.decode(numpy.array([1 << 30], numpy.uint64))
 
 
-def test_a_search_tells_how_far_it_is_and_can_be_ended(tmp_path):
-    told = []
-    family = deltille.search_family("d16h7", work=1, seed=3, callback=lambda part, codes: told.append((part, codes)))
+def test_a_search_reports_progress_and_can_be_stopped(tmp_path):
+    reports = []
+    family = deltille.search_family("d16h7", work=1, seed=3, callback=lambda part, codes: reports.append((part, codes)))
     assert len(family) > 0 and family.distance == 7
     again = deltille.search_family("d16h7", work=1, seed=3)
     assert (again.codes == family.codes).all()

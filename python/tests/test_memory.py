@@ -1,4 +1,4 @@
-"""Nothing grows: references, memory of the interpreter, memory of the process."""
+"""References, memory of the interpreter and memory of the process stay constant."""
 
 import gc
 import os
@@ -25,7 +25,7 @@ def use(board, detector, camera, picture):
 
 
 def grown(calls: int, board, camera) -> tuple[int, int]:
-    """How much the interpreter and the process have grown after so many calls, bytes."""
+    """Growth of the interpreter and of the process after this number of calls, bytes."""
     small = deltille.Camera(320, 240, 280)
     picture, _ = deltille.render(board, small, eye=(70, -50, 350))
     detector = deltille.Detector(board)
@@ -45,19 +45,19 @@ def grown(calls: int, board, camera) -> tuple[int, int]:
 
 
 @pytest.mark.skipif(not os.path.exists("/proc/self/statm"), reason="memory as Linux tells it")
-def test_nothing_grows(board, camera):
+def test_memory_stays_constant(board, camera):
     kept, resident_bytes = grown(200, board, camera)
     assert kept < 50_000 and resident_bytes < 20_000_000
 
 
 @pytest.mark.long
 @pytest.mark.skipif(not os.path.exists("/proc/self/statm"), reason="memory as Linux tells it")
-def test_nothing_grows_in_a_hundred_thousand_calls(board, camera):
+def test_memory_stays_constant_over_a_hundred_thousand_calls(board, camera):
     kept, resident_bytes = grown(100_000, board, camera)
     assert kept < 100_000 and resident_bytes < 30_000_000
 
 
-def test_results_outlive_what_they_came_of(board, camera):
+def test_results_outlive_their_sources(board, camera):
     picture, _ = deltille.render(board, camera, eye=(70, -50, 350))
     found = deltille.Detector(deltille.Target.from_json(board.to_json())).detect(picture)
     expected = found.pixels.copy()

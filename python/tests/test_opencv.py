@@ -1,4 +1,4 @@
-"""OpenCV takes our corners, and has the same lenses."""
+"""OpenCV accepts our corners, and its lens models agree with ours."""
 
 import numpy
 import pytest
@@ -47,7 +47,7 @@ def test_stereo_calibrate_takes_our_corners(board, camera, detections, pictures)
      [0.1, 0.02, 0.001, -0.002, 0.01, 0.3, 0.05, 0.01],
      [0.1, 0.02, 0.001, -0.002, 0.01, 0.3, 0.05, 0.01, 1e-3, 2e-3, -1e-3, 5e-4]],
 )
-def test_perspective_lenses_are_those_of_opencv(distortion):
+def test_perspective_lenses_agree_with_opencv(distortion):
     camera = deltille.Camera(1280, 960, (900, 910), (630, 470), distortion=distortion)
     points = numpy.random.default_rng(1).uniform((-200, -150, 300), (200, 150, 600), (1000, 3))
     pose = deltille.Pose((0.1, -0.2, 0.3), (10, 20, 30))
@@ -59,14 +59,14 @@ def test_perspective_lenses_are_those_of_opencv(distortion):
     numpy.testing.assert_allclose(camera.project(back * 500), ours, atol=1e-6)
 
 
-def test_fisheyes_are_those_of_opencv():
+def test_fisheyes_agree_with_opencv():
     camera = deltille.Camera(1280, 960, (300, 310), (630, 470), model="fisheye", distortion=[0.01, -0.02, 0.003, -1e-4])
     points = numpy.random.default_rng(1).uniform((-400, -400, 50), (400, 400, 600), (1000, 3))
     theirs, _ = cv2.fisheye.projectPoints(points[:, None], numpy.zeros(3), numpy.zeros(3), camera.matrix, camera.distortion)
     numpy.testing.assert_allclose(camera.project(points), theirs[:, 0], atol=1e-9)
 
 
-def test_cameras_are_written_for_opencv(calibration, tmp_path):
+def test_opencv_reads_our_camera_files(calibration, tmp_path):
     path = calibration.save(tmp_path / "a.yaml", "opencv")
     storage = cv2.FileStorage(str(path), cv2.FILE_STORAGE_READ)
     numpy.testing.assert_array_equal(storage.getNode("camera_matrix").mat(), calibration.camera.matrix)

@@ -1,4 +1,4 @@
-"""The programs that the package installs are those of Rust."""
+"""The programs installed by the package behave like the native ones."""
 
 import os
 import signal
@@ -26,7 +26,7 @@ def test_programs_are_installed(tmp_path):
     assert done.returncode == 0
 
 
-def test_exit_codes_and_one_line(tmp_path):
+def test_errors_have_an_exit_code_and_one_line(tmp_path):
     done = run("deltille", "board", "--rows", "1", "--cols", "5")
     assert done.returncode == 2 and done.stdout == "" and done.stderr.count("\n") == 1
     assert done.stderr.startswith("error: ")
@@ -36,7 +36,7 @@ def test_exit_codes_and_one_line(tmp_path):
 
 
 @pytest.mark.skipif(os.name == "nt", reason="signals of Unix")
-def test_signals_end_the_program_as_the_native_one(tmp_path):
+def test_signals_end_the_program_like_the_native_one(tmp_path):
     for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
         command = [script("deltag"), "gen-family", "d36h9", "--time", "60", "--from-nothing", "-o", "a.json"]
         process = subprocess.Popen(command, cwd=tmp_path, stderr=subprocess.PIPE, stdout=subprocess.PIPE)
@@ -55,19 +55,19 @@ def test_signals_end_the_program_as_the_native_one(tmp_path):
 
 
 @pytest.mark.skipif(os.name == "nt", reason="pipes of Unix")
-def test_a_reader_that_goes_away_ends_it():
+def test_a_closed_pipe_ends_the_program():
     command = f"'{script('deltag')}' by-rank d36h9 --ranks 0-9999 2>/dev/null | head -1; echo ${{PIPESTATUS[0]}}"
     done = subprocess.run(["bash", "-c", command], capture_output=True, text=True)
     assert done.stdout.splitlines()[-1] in ("0", "141", "2")
 
 
-def test_starting_takes_no_numpy():
+def test_programs_start_without_numpy():
     code = "import sys, deltille._programs; print('numpy' in sys.modules)"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
     assert done.stdout.strip() == "False"
 
 
-def test_arguments_that_are_no_text():
+def test_arguments_that_are_not_text():
     if os.name == "nt":
         pytest.skip("paths of Unix")
     done = subprocess.run([script("deltille"), "detect", b"\xff\xfe.png", "--grid", b"\xff"], capture_output=True)

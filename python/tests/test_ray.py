@@ -1,4 +1,4 @@
-"""Detection on a cluster: the same corners as of one process, nothing lost and nothing done twice."""
+"""Detection on a cluster gives the same corners as one process, loses nothing and repeats nothing."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ def target():
 
 @pytest.fixture(scope="module")
 def shots(tmp_path_factory, target) -> Path:
-    """Nine photographs in two folders, and a file that is none."""
+    """Nine photographs in two folders, and a file that is not an image."""
     folder = tmp_path_factory.mktemp("shots")
     camera = deltille.Camera(480, 360, 450.0)
     middle = target.corners.mean(axis=0)
@@ -94,11 +94,11 @@ def test_encoded_files_and_paths_of_a_dataset(shots, target):
         deltille.ray.detect(ray.data.range(3), target)
 
 
-def test_what_is_written_is_not_done_again_and_makes_a_camera(shots, target, tmp_path):
+def test_written_results_are_skipped_and_can_be_calibrated(shots, target, tmp_path):
     out = tmp_path / "found"
     first = deltille.ray.detect_to(out, shots / "a", target, pictures_per_file=2, batch_size=2)
     assert (first.pictures, first.errors, first.skipped) == (5, 0, 0)
-    # What a task leaves that is lost between its two files.
+    # The file left by a task that is lost between writing its two files.
     orphan = out / "corners/lost-000000.parquet"
     shutil.copy(next((out / "corners").iterdir()), orphan)
     second = deltille.ray.detect_to(out, shots, target)
@@ -139,14 +139,14 @@ def test_filesystems(shots, target):
     assert {row["corners"] for row in uri} == {row["corners"] for row in pictures}
 
 
-def test_what_is_wrong_is_said_before_anything_is_done(shots, target, tmp_path):
+def test_errors_are_reported_before_work_starts(shots, target, tmp_path):
     with pytest.raises(FileNotFoundError, match="nowhere"):
         deltille.ray.detect(shots / "nowhere", target)
     with pytest.raises(ValueError, match="per"):
         deltille.ray.detect(shots, target, per="row")
     with pytest.raises(deltille.Error):
         deltille.ray.detect(shots)
-    # A folder without a picture is no error, as one that was emptied by a run before.
+    # A folder without images is not an error; a run before may have emptied it.
     (tmp_path / "empty").mkdir()
     assert deltille.ray.detect(tmp_path / "empty", target).count() == 0
     assert deltille.ray.detect_to(tmp_path / "out", tmp_path / "empty", target).pictures == 0
@@ -158,7 +158,7 @@ def test_both_tables_are_one_dataset(shots, target):
     assert table["corners"].to_pylist() == [len(row) for row in table["found"].to_pylist()]
 
 
-def test_a_folder_of_another_target_is_refused(tmp_path):
+def test_a_folder_of_another_target_is_rejected(tmp_path):
     board, other = deltille.Board(5, 6, edge_mm=20), deltille.Board(5, 7, edge_mm=20)
     camera = deltille.Camera(320, 240, 300)
     pictures = tmp_path / "pictures"
@@ -169,7 +169,7 @@ def test_a_folder_of_another_target_is_refused(tmp_path):
     assert deltille.ray.detect_to(found, pictures, board).pictures == 1
     assert deltille.ray.detect_to(found, pictures, board).skipped == 1
     for changed in ({"target": other}, {"target": board, "tone": "linear"}):
-        with pytest.raises(deltille.DetectionError, match="give another folder"):
+        with pytest.raises(deltille.DetectionError, match="use another folder"):
             deltille.ray.detect_to(found, pictures, **changed)
 
 

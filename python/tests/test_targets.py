@@ -22,7 +22,7 @@ def test_a_board_has_corners_and_tags_in_mm():
     assert board.family.name == "delTag25h7"
 
 
-def test_boards_take_what_the_program_takes(tmp_path):
+def test_boards_accept_the_options_of_the_program(tmp_path):
     assert deltille.Board(10, 11, paper="A3").corners[-1, 0] > 200
     assert deltille.Board(10, 11, tags=False).tags == []
     assert deltille.Board(5, 6, family="d36h9", first_id=100).tag_ids.min() == 100
@@ -31,7 +31,7 @@ def test_boards_take_what_the_program_takes(tmp_path):
     assert deltille.Board(4, 5, boards=3).panels == [0, 1, 2]
 
 
-def test_a_logo_is_a_file_or_a_text_and_in_the_target_file(tmp_path):
+def test_a_logo_is_a_file_or_text_and_stored_in_the_target_file(tmp_path):
     svg = '<svg xmlns="http://www.w3.org/2000/svg"><path d="M0 9H20L10 0Z"/></svg>'
     (tmp_path / "logo.svg").write_text(svg)
     board = deltille.Board(5, 6, edge_mm=20, logo=tmp_path / "logo.svg", logo_height_mm=6)
@@ -73,7 +73,7 @@ def test_the_description_of_another_board_is_kept(tmp_path, board):
     assert deltille.Target.load(tmp_path / "desk.json") == larger
 
 
-def test_what_is_printed_is_proved_in_memory(board):
+def test_prints_are_verified_in_memory(board):
     assert board.pdf().startswith(b"%PDF")
     assert board.svg().lstrip().startswith("<")
     assert board.verify()
@@ -110,11 +110,11 @@ def test_solids_are_meshes_too(tmp_path, root):
     cube = deltille.Cube(edge_mm=80)
     assert len(cube.panels) == 6 and cube.family.name == "aprilTag36h11" and cube.verify()
     assert deltille.Octahedron(skeleton=True).files("skeleton")
-    with pytest.raises(deltille.TargetError, match="without skeleton=True"):
+    with pytest.raises(deltille.TargetError, match="skeleton=True"):
         deltille.Octahedron(wall_mm=3)
 
 
-def test_a_target_is_shown_in_notebooks(board):
+def test_notebooks_show_a_preview_of_a_target(board):
     html = board._repr_html_()
     assert "<svg" in html and html.endswith("</div>")
     xml = html[html.index("<svg") : html.rindex("</div>")]
@@ -123,7 +123,7 @@ def test_a_target_is_shown_in_notebooks(board):
     tree.parse(io.StringIO(xml))
 
 
-def test_targets_by_cameras_that_saw_them_are_measured(detections, board, tmp_path):
+def test_calibration_can_measure_the_target(detections, board, tmp_path):
     found = deltille.calibrate(detections, board, measure_target=True)
     measured = found.measured_target
     assert measured.is_measured and not board.is_measured

@@ -1,4 +1,4 @@
-"""One detector for several threads, and Ctrl-C."""
+"""One detector in several threads, and Ctrl-C."""
 
 import os
 import signal
@@ -22,7 +22,7 @@ def test_a_detector_serves_several_threads(board, pictures, detections):
         assert (one.pixels == other.pixels).all()
 
 
-def test_a_detector_goes_to_other_processes(board, pictures, detections):
+def test_a_detector_can_be_sent_to_other_processes(board, pictures, detections):
     import pickle
 
     for detector in (deltille.Detector(board, tone="linear"), deltille.Detector(grid="checker", rows=4, cols=5)):
@@ -39,7 +39,7 @@ WITH_INK = """{"schema": "deltille/detection/1", "image": "a", "width": 9, "heig
     "ink": {"edges": 0.01, "edges_deviation": 0.0001, "um": 200, "um_deviation": 2, "used": true, "pictures": 1}}"""
 
 
-def test_others_run_meanwhile(board):
+def test_other_threads_run_during_detection(board):
     picture = numpy.random.default_rng(1).integers(0, 255, (3000, 4000), numpy.uint8)
     detector, ticks, ended = deltille.Detector(board), [], threading.Event()
 

@@ -1,4 +1,4 @@
-"""Stubs and module agree, and a user's script is clean."""
+"""Stubs and module agree, and type checkers accept a user's script."""
 
 import importlib.util
 import re
@@ -68,9 +68,9 @@ def test_the_recipes_of_the_guide_are_clean_under_mypy(root, tmp_path):
     pytest.importorskip("mypy")
     recipes = re.findall(r"```python\n(.*?)```", (root / "docs/python.md").read_text(), re.S)
     assert len(recipes) >= 8
-    # Each goes on where the one before ended.
+    # Each recipe continues the previous one.
     (tmp_path / "recipes.py").write_text("\n".join(recipes))
-    # Names are used again for other things, as readers of one recipe do not mind; of OpenCV's types nothing is said.
+    # Recipes reuse names with other types, and OpenCV may have no types.
     command = [sys.executable, "-m", "mypy", "--strict", "--allow-redefinition", "--ignore-missing-imports", "recipes.py"]
     done = subprocess.run(command, capture_output=True, text=True, cwd=tmp_path)
     assert done.returncode == 0, done.stdout + done.stderr
@@ -96,7 +96,7 @@ def test_stubs_and_module_agree(tmp_path):
 def test_the_package_is_clean_under_mypy(tmp_path):
     pytest.importorskip("mypy")
     command = [sys.executable, "-m", "mypy", "--strict", "-p", "deltille"]
-    # What the extras bring may have no types, or not be there.
+    # Packages of the extras may have no types, or be missing.
     command += ["--ignore-missing-imports"]
     if importlib.util.find_spec("ray") is None:
         command += ["--allow-subclassing-any"]

@@ -1,4 +1,4 @@
-"""What functions return are values: they can be pickled, copied and compared."""
+"""Results are values: they can be pickled, copied and compared."""
 
 import copy
 import pickle
@@ -17,7 +17,7 @@ def again(value):
 
 @pytest.fixture(scope="module")
 def rig(board, camera):
-    """Two cameras that see a board at the same moments."""
+    """Two cameras that observe a board at the same times."""
     right_from_left = deltille.Pose(rvec=(0, 0.1, 0), tvec=(-80, 0, 10))
     detector = deltille.Detector(board)
     seen = {"left": [], "right": []}
@@ -51,7 +51,7 @@ def test_rigs_and_their_parts(rig, board, tmp_path):
     numpy.testing.assert_allclose(loaded.poses[1].matrix, rig.poses[1].matrix, atol=1e-9)
 
 
-def test_a_rig_is_made_of_any_mapping(rig, detections, board):
+def test_a_rig_accepts_any_mapping(rig, detections, board):
     from types import MappingProxyType
 
     with pytest.raises(deltille.CalibrationError, match="a rig has at least two cameras"):

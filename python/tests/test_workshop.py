@@ -1,4 +1,4 @@
-"""Targets are made by Python as by the program, byte for byte, and other programs read them."""
+"""Python makes the same files as the program, byte for byte, and other programs can read them."""
 
 import pickle
 import subprocess
@@ -65,14 +65,14 @@ def test_files_are_those_of_the_program(make, arguments, formats, sizes, program
 
 
 def page(target, dpi=200):
-    """The first page in grey, as another program decodes it."""
+    """Returns the first page in grey, decoded by OpenCV."""
     cv2 = pytest.importorskip("cv2")
     png = next(iter(target.files("png", dpi=dpi).values()))
     return cv2, cv2.imdecode(numpy.frombuffer(png, numpy.uint8), cv2.IMREAD_GRAYSCALE)
 
 
 def plane_error_mm(cv2, pixels, places):
-    """How far places in pixels are from those in mm by one homography, at most."""
+    """Returns the largest error, mm, of points mapped from pixels by the best homography."""
     mapping, _ = cv2.findHomography(numpy.float64(pixels), numpy.float64(places))
     found = cv2.perspectiveTransform(numpy.float64(pixels)[None], mapping)[0]
     return numpy.abs(found - places).max()
@@ -86,7 +86,7 @@ def test_opencv_reads_charuco_boards():
     corners, ids, _, markers = cv2.aruco.CharucoDetector(board).detectBoard(image)
     assert sorted(ids.ravel()) == sorted(own.corner_ids) and len(markers) == len(own.tags)
     by_id = dict(zip(own.corner_ids, own.corners[:, :2]))
-    # Both have the same frame.
+    # Both use the same frame.
     numpy.testing.assert_allclose(own.corners[numpy.argsort(own.corner_ids)], board.getChessboardCorners(), atol=1e-4)
     assert plane_error_mm(cv2, corners.reshape(-1, 2), [by_id[i] for i in ids.ravel()]) < 0.05
 
@@ -103,30 +103,30 @@ def test_opencv_reads_grids_of_circles():
         assert plane_error_mm(cv2, centres.reshape(-1, 2), places) < 0.1
 
 
-def test_kalibrs_file_is_that_of_the_grid():
+def test_the_kalibr_file_describes_the_grid():
     yaml = deltille.AprilGrid((6, 5), tag_mm=24, gap=0.25, first_id=7, name="grid").files("kalibr")["grid.yaml"].decode()
     fields = dict(line.split("#")[0].split(":") for line in yaml.splitlines())
     assert {key: value.strip() for key, value in fields.items()} == {
         "target_type": "'aprilgrid'", "tagCols": "6", "tagRows": "5", "tagSize": "0.024", "tagSpacing": "0.25", "codeOffset": "7"}
     for other in (deltille.AprilGrid((6, 5), tag_border=1), deltille.Board(4, 5)):
-        with pytest.raises(deltille.TargetError, match="Kalibr reads"):
+        with pytest.raises(deltille.TargetError, match="Kalibr"):
             other.files("kalibr")
 
 
-def test_a_kerf_grows_plates_and_shrinks_what_is_black():
+def test_a_kerf_grows_plates_and_shrinks_black_parts():
     board = deltille.Board(4, 5, edge_mm=20, tags=False)
     without, with_kerf = (outlines(board.files("laser-svg", kerf_mm=kerf)["board-laser.svg"].decode()) for kerf in (0, 0.2))
     assert with_kerf.keys() == without.keys() and len(with_kerf["cut"]) == 1
     by = numpy.ptp(with_kerf["cut"][0], axis=0) - numpy.ptp(without["cut"][0], axis=0)
     numpy.testing.assert_allclose(by, 0.2, atol=1e-4)
-    # A triangle that is moved inwards by d is similar: its area is that of a side shorter by 2 √3 d.
+    # A triangle offset inwards by d stays similar: its sides become shorter by 2 √3 d.
     ratio = (1 - 2 * 3**0.5 * 0.1 / 20) ** 2
     for before, after in zip(without["engrave"], with_kerf["engrave"]):
         assert abs(area(after) / area(before) - ratio) < 1e-4
 
 
 def outlines(svg):
-    """Closed outlines by the id of their group."""
+    """Returns the closed outlines by kind: cut or engrave."""
     import re
     import xml.etree.ElementTree as tree
 
@@ -145,16 +145,16 @@ def area(points):
     return abs(numpy.dot(x, numpy.roll(y, 1)) - numpy.dot(y, numpy.roll(x, 1))) / 2
 
 
-def test_what_says_nothing_is_refused():
+def test_unused_or_invalid_keywords_are_rejected():
     board, cube = deltille.Board(4, 5), deltille.Cube(edge_mm=80)
     two = deltille.Board(4, 5, two_sided_mm=3)
     cases = [
-        (lambda: board.files("pdf", kerf_mm=0.1), "kerf_mm: it says nothing without"),
-        (lambda: board.files("gltf", inlay_mm=0.1), "inlay_mm: it says nothing without 3mf"),
-        (lambda: board.files("pdf", plate_mm=3), "plate_mm: it says nothing without"),
-        (lambda: board.save("none", texture_px=512), "texture_px: it says nothing without"),
-        (lambda: cube.files("gltf", plate_mm=3), "plate_mm: a solid has no plate"),
-        (lambda: two.files("gltf", plate_mm=3), "as thick as two_sided_mm says"),
+        (lambda: board.files("pdf", kerf_mm=0.1), "kerf_mm needs"),
+        (lambda: board.files("gltf", inlay_mm=0.1), "inlay_mm needs 3mf"),
+        (lambda: board.files("pdf", plate_mm=3), "plate_mm needs"),
+        (lambda: board.save("none", texture_px=512), "texture_px needs"),
+        (lambda: cube.files("gltf", plate_mm=3), "plate_mm applies to boards only"),
+        (lambda: two.files("gltf", plate_mm=3), "plate_mm conflicts with two_sided_mm"),
         (lambda: board.files("laser-dxf", kerf_mm=30), "kerf"),
         (lambda: board.files("laser-dxf", kerf_mm=float("nan")), "kerf"),
         (lambda: deltille.Board(4, 5, note="ü"), "note: "),
@@ -165,7 +165,7 @@ def test_what_says_nothing_is_refused():
         (lambda: deltille.Charuco((2, 5)), "squares: "),
         (lambda: deltille.Charuco((5, 5), dictionary="9x9"), "dictionary: "),
         (lambda: deltille.Charuco((5, 5), marker_mm=40), "marker_mm: "),
-        (lambda: deltille.Charuco((5, -5)), "squares: give a whole number"),
+        (lambda: deltille.Charuco((5, -5)), "squares: expected a whole number"),
         (lambda: deltille.Charuco((5, 5), dictionary="4x4_50", first_id=45), "first_id: "),
         (lambda: deltille.AprilGrid((1, 5)), "tags: "),
         (lambda: deltille.AprilGrid((5, 5), gap=2), "gap: "),
@@ -184,19 +184,19 @@ def test_what_says_nothing_is_refused():
             wrong()
 
 
-def test_ids_that_both_have_are_refused():
+def test_shared_ids_are_rejected():
     board = deltille.Board(4, 5)
     with pytest.raises(deltille.TargetError, match="first_id"):
         board.check_beside(deltille.Icosahedron())
     board.check_beside(deltille.Icosahedron(first_id=50, board_id=7))
 
 
-def test_single_tags_are_believed_by_what_natural_pictures_show():
+def test_recommended_correction_follows_natural_images():
     family = deltille.Family.load("delTag25h7")
     natural, coins = family.natural_false_positive_rates(), family.false_positive_rates()
     assert natural.shape == coins.shape == (family.correctable + 1,)
     assert (numpy.diff(natural) > 0).all() and (numpy.diff(coins) > 0).all() and (coins > natural).all()
-    # Fair coins: the words within t cells of a code in any turn, of all words.
+    # Random cells: the fraction of words within t cells of a code, in any rotation.
     within = numpy.cumsum([1, 25, 25 * 24 // 2, 25 * 24 * 23 // 6])
     numpy.testing.assert_allclose(coins, 3 * len(family) * within / 2**25, rtol=1e-9)
     limit = family.recommended_correction()

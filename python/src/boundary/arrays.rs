@@ -1,4 +1,4 @@
-//! Arrays of many small things, and back; numbers that arguments give; plain data as dictionaries.
+//! Converts between Rust values and numpy arrays, checks numeric arguments, and turns plain data into dictionaries.
 
 use deltille::calibrate::Matrix;
 use deltille::glam::DMat3;
@@ -9,18 +9,18 @@ use pyo3::prelude::*;
 
 use super::errors;
 
-/// Rows of so many numbers as an array of N × so many.
+/// Converts rows of `N` numbers to an array with `N` columns.
 pub fn rows<'py, T: Element + Copy, const N: usize>(
     py: Python<'py>,
     rows: impl IntoIterator<Item = [T; N]>,
 ) -> Bound<'py, PyArray2<T>> {
     let flat: Vec<T> = rows.into_iter().flatten().collect();
     let count = flat.len() / N;
-    let array = Array2::from_shape_vec((count, N), flat).expect("every row has so many");
+    let array = Array2::from_shape_vec((count, N), flat).expect("every row has N numbers");
     array.into_pyarray(py)
 }
 
-/// Symmetric matrices xx, xy, yy as an array of N × 2 × 2; what is not known is NaN.
+/// Converts symmetric matrices (xx, xy, yy) to an array of N × 2 × 2; unknown ones are NaN.
 pub fn covariances<'py>(
     py: Python<'py>,
     all: impl IntoIterator<Item = Option<[f64; 3]>>,
@@ -34,7 +34,7 @@ pub fn covariances<'py>(
     array.expect("four numbers each").into_pyarray(py)
 }
 
-/// One number each.
+/// Converts numbers to a one-dimensional array.
 pub fn column<T: Element>(
     py: Python<'_>,
     all: impl IntoIterator<Item = T>,
@@ -42,27 +42,28 @@ pub fn column<T: Element>(
     all.into_iter().collect::<Array1<T>>().into_pyarray(py)
 }
 
-/// A matrix.
+/// Converts a matrix to an array.
 pub fn matrix<'py>(py: Python<'py>, matrix: &Matrix) -> Bound<'py, PyArray2<f64>> {
     let (rows, columns) = (matrix.rows(), matrix.columns());
     Array2::from_shape_fn((rows, columns), |(i, j)| matrix[(i, j)]).into_pyarray(py)
 }
 
-/// A 3 × 3 matrix.
+/// Converts a 3 × 3 matrix to an array.
 pub fn matrix3<'py>(py: Python<'py>, matrix: &DMat3) -> Bound<'py, PyArray2<f64>> {
     rows(py, [0, 1, 2].map(|row| matrix.row(row).to_array()))
 }
 
-/// Rows of so many numbers each, of an array of N × so many or anything that makes one.
+/// Reads rows of `N` numbers from an array with `N` columns, or from anything numpy converts to one.
 ///
 /// # Errors
-/// Where it is something else, with the argument's name.
+/// Returns an error with the argument's name if `given` has another shape or type.
 pub fn rows_of<const N: usize>(
     argument: &str,
     given: &Bound<'_, PyAny>,
 ) -> PyResult<Vec<[f64; N]>> {
-    let wrong =
-        |what: String| errors::argument(format!("{argument}: N × {N} are wanted, not {what}"));
+    let wrong = |what: String| {
+        errors::argument(format!("{argument}: expected an array of N × {N}, got {what}"))
+    };
     let Ok(array) = given.extract::<PyArrayLikeDyn<'_, f64, numpy::AllowTypeChange>>() else {
         return Err(wrong(given.get_type().qualname()?.to_string()));
     };
@@ -75,10 +76,10 @@ pub fn rows_of<const N: usize>(
     }
 }
 
-/// So many numbers of a range, also where an array has them in several dimensions, as OpenCV's vectors.
+/// Reads `N` numbers in a range. The array may have several dimensions, like OpenCV's vectors.
 ///
 /// # Errors
-/// Where it is something else, with the argument's name, of a class.
+/// Returns an error of class `class` with the argument's name if the count, the type or a number is wrong.
 pub fn vector<const N: usize>(
     argument: &str,
     given: &Bound<'_, PyAny>,
@@ -87,14 +88,14 @@ pub fn vector<const N: usize>(
 ) -> PyResult<[f64; N]> {
     let all = numbers(argument, given, range, class)?;
     let count = all.len();
-    let wrong = |_| class(format!("{argument}: {N} numbers are wanted, not {count}"));
+    let wrong = |_| class(format!("{argument}: expected {N} numbers, got {count}"));
     all.try_into().map_err(wrong)
 }
 
-/// Numbers of a range in a row, alike.
+/// Reads any number of numbers in a range.
 ///
 /// # Errors
-/// Where it is something else, with the argument's name.
+/// Returns an error of class `class` with the argument's name if the type or a number is wrong.
 pub fn numbers(
     argument: &str,
     given: &Bound<'_, PyAny>,
@@ -103,7 +104,7 @@ pub fn numbers(
 ) -> PyResult<Vec<f64>> {
     let Ok(array) = given.extract::<PyArrayLikeDyn<'_, f64, numpy::AllowTypeChange>>() else {
         let kind = given.get_type().qualname()?;
-        return Err(class(format!("{argument}: numbers are wanted, not {kind}")));
+        return Err(class(format!("{argument}: expected numbers, got {kind}")));
     };
     let array = array.as_array();
     let checked = array.iter().map(|&number| range.check(number));
@@ -111,10 +112,10 @@ pub fn numbers(
     checked.map_err(|error| class(format!("{argument}: {error}")))
 }
 
-/// A number of a range.
+/// Checks that a number is in a range.
 ///
 /// # Errors
-/// Where it is another one, with the argument's name, of a class.
+/// Returns an error of class `class` with the argument's name if it is not.
 pub fn number(
     argument: &str,
     given: f64,
@@ -124,32 +125,32 @@ pub fn number(
     range.check(given).map_err(|error| class(format!("{argument}: {error}")))
 }
 
-/// A shape as it is read.
+/// Formats an array shape.
 pub fn shape_in_words(shape: &[usize]) -> String {
     match shape {
         [] => "a single number".to_owned(),
-        [count] => format!("{count} in a row"),
+        [count] => format!("a vector of {count}"),
         _ => shape.iter().map(usize::to_string).collect::<Vec<_>>().join(" × "),
     }
 }
 
-/// A whole number that the library's own type holds.
+/// Converts a Python integer to the library's type.
 ///
 /// # Errors
-/// Where it is negative or too large, with the argument's name, of a class.
+/// Returns an error of class `class` with the argument's name if it is negative or too large.
 pub fn whole<T: TryFrom<i64>>(
     argument: &str,
     given: i64,
     class: fn(String) -> PyErr,
 ) -> PyResult<T> {
     let wrong = |_| match given {
-        ..0 => class(format!("{argument}: give a whole number from 0, not {given}")),
+        ..0 => class(format!("{argument}: expected a whole number from 0, got {given}")),
         _ => class(format!("{argument}: {given} is too large")),
     };
     given.try_into().map_err(wrong)
 }
 
-/// A distance at which projections are looked at, mm; infinity where none is given.
+/// Checks the distance at which projections are evaluated, mm; `None` stands for infinity.
 pub fn distance(distance_mm: Option<f64>) -> PyResult<Option<f64>> {
     let given = distance_mm.filter(|mm| *mm != f64::INFINITY);
     let checked =
@@ -157,7 +158,7 @@ pub fn distance(distance_mm: Option<f64>) -> PyResult<Option<f64>> {
     checked.transpose()
 }
 
-/// Plain data as a dictionary.
+/// Converts plain data to a dictionary.
 pub fn record<'py>(py: Python<'py>, data: &impl serde::Serialize) -> PyResult<Bound<'py, PyAny>> {
     let text = serde_json::to_string(data).unwrap_or_default();
     py.import("json")?.call_method1("loads", (text,))

@@ -1,4 +1,4 @@
-//! From the library's errors to exceptions, in the words of Python.
+//! Converts errors of the library to Python exceptions, with settings named by their keywords.
 
 use std::error::Error;
 use std::ffi::CString;
@@ -12,7 +12,7 @@ use deltille_core::words::with_short_quotes;
 use pyo3::exceptions::{PyKeyboardInterrupt, PyUserWarning};
 use pyo3::prelude::*;
 
-/// The exceptions, which are written in Python as most of them have two bases.
+/// The exceptions. They are written in Python because most of them have two bases.
 pub mod raised {
     #![allow(missing_docs, reason = "the macro makes types without documentation")]
     pyo3::import_exception!(deltille.errors, Error);
@@ -27,7 +27,7 @@ pub mod raised {
     pyo3::import_exception!(deltille.errors, FileError);
 }
 
-/// What a setting is called here.
+/// Returns the keyword of a setting.
 pub fn keyword(setting: Setting) -> String {
     let keyword = match setting {
         Setting::AprilGridGap => "gap",
@@ -121,18 +121,18 @@ pub fn keyword(setting: Setting) -> String {
     keyword.to_owned()
 }
 
-/// A message of the library on one line.
-pub fn told(message: &impl Display) -> String {
+/// Formats a message on one line.
+pub fn one_line(message: &impl Display) -> String {
     with_short_quotes(&message.to_string().replace('\n', " ")).into_owned()
 }
 
-/// What became of work that was not to be finished.
+/// Why work ended without a result.
 pub enum Fault {
-    /// An exception.
+    /// Python raised an exception.
     Raised(PyErr),
-    /// Ctrl-C came.
+    /// The user pressed Ctrl-C.
     Interrupted,
-    /// The library failed within.
+    /// The library crashed.
     Broken(String),
 }
 
@@ -148,23 +148,24 @@ impl From<Fault> for PyErr {
 
 impl From<limits::Broken> for Fault {
     fn from(_: limits::Broken) -> Self {
-        let report = "please report it with what you called";
-        Self::Broken(format!("the library failed within, which is a mistake in it: {report}"))
+        Self::Broken(
+            "internal error in deltille; please report it with the call that caused it".to_owned(),
+        )
     }
 }
 
-/// Makes exceptions of errors.
+/// Converts errors to exceptions.
 pub trait Raise<T> {
-    /// An exception of a class, with the error's words.
+    /// Converts an error to an exception of class `class` with its message.
     ///
     /// # Errors
-    /// Where there is an error.
+    /// Returns the exception if `self` is an error.
     fn raise(self, class: fn(String) -> PyErr) -> PyResult<T>;
 }
 
 impl<T, E: Display> Raise<T> for Result<T, E> {
     fn raise(self, class: fn(String) -> PyErr) -> PyResult<T> {
-        self.map_err(|error| class(told(&error)))
+        self.map_err(|error| class(one_line(&error)))
     }
 }
 
@@ -178,25 +179,25 @@ macro_rules! classes {
 }
 
 classes! {
-    argument => ArgumentError: "An array of another shape, or a number out of range.";
-    target => TargetError: "A target that cannot be made or used.";
-    family => FamilyError: "A family that cannot be used.";
-    image => ImageError: "A picture that is none.";
-    detection => DetectionError: "A detector that cannot be made, or a detection that cannot be read.";
-    calibration => CalibrationError: "A calibration that has no solution.";
-    camera => CameraError: "A camera that cannot be used.";
+    argument => ArgumentError: "An array of the wrong shape, or a number out of range.";
+    target => TargetError: "An invalid or unusable target.";
+    family => FamilyError: "An unusable family.";
+    image => ImageError: "An invalid image.";
+    detection => DetectionError: "An invalid detector or detection.";
+    calibration => CalibrationError: "A calibration that failed.";
+    camera => CameraError: "An unusable camera.";
     verify => VerifyError: "A file that cannot be compared.";
     file => FileError: "A file that cannot be read or written.";
 }
 
-/// Makes exceptions of the errors of a file.
+/// Converts errors of a file to exceptions.
 pub trait RaiseFile<T> {
-    /// An exception of a class, with the error's words. Where the system does not give the file, it is a `FileError`
-    /// with the system's number and words and the file's name, of a missing file a `MissingFileError`, of one that may
-    /// not be used a `PermissionFileError`, of a folder in its place a `FolderError`.
+    /// Converts an error to an exception of class `class` with its message. If the operating system refused access, it is
+    /// a `FileError` with `errno`, `strerror` and `filename`: `MissingFileError` for a missing file,
+    /// `PermissionFileError` for missing permissions, `FolderError` for a folder instead of a file.
     ///
     /// # Errors
-    /// Where there is an error.
+    /// Returns the exception if `self` is an error.
     fn raise_of_file(self, path: &Path, class: fn(String) -> PyErr) -> PyResult<T>;
 }
 
@@ -206,7 +207,7 @@ impl<T, E: Error + 'static> RaiseFile<T> for Result<T, E> {
             let mut cause: Option<&(dyn Error + 'static)> = Some(&error);
             let (mut number, mut at) = (None, path);
             while let Some(error) = cause {
-                // The file may be another one, which that of the path names.
+                // The file at `path` may refer to another file, which caused the error.
                 if let Some(ReadError::Io { path, .. }) = error.downcast_ref() {
                     at = path;
                 }
@@ -214,10 +215,10 @@ impl<T, E: Error + 'static> RaiseFile<T> for Result<T, E> {
                 number = number.or(system.and_then(io::Error::raw_os_error));
                 cause = error.source();
             }
-            let words = told(&error);
-            // A folder is refused before the system is asked, in these words.
+            let words = one_line(&error);
+            // The library rejects folders itself, without a system call; recognise its message.
             let refused = limits::check_file(at).err().filter(|_| number.is_none() && at.is_dir());
-            let is_folder = refused.is_some_and(|refused| words.contains(&told(&refused)));
+            let is_folder = refused.is_some_and(|refused| words.contains(&one_line(&refused)));
             match number.is_some() || is_folder {
                 true => of_system(number, at).unwrap_or_else(|wrong| wrong),
                 false => class(words),
@@ -226,7 +227,7 @@ impl<T, E: Error + 'static> RaiseFile<T> for Result<T, E> {
     }
 }
 
-/// The exception for a number of the system, of a folder where a file is needed for none.
+/// Returns the exception for an `errno`; without one, for a folder where a file is needed.
 fn of_system(number: Option<i32>, path: &Path) -> PyResult<PyErr> {
     Python::attach(|py| {
         let make = py.import("deltille.errors")?.getattr("_of_system")?;
@@ -234,16 +235,16 @@ fn of_system(number: Option<i32>, path: &Path) -> PyResult<PyErr> {
     })
 }
 
-/// Issues a `UserWarning` at the caller's line.
+/// Issues a `UserWarning` at the line of the caller.
 pub fn warn(py: Python<'_>, what: &str) -> PyResult<()> {
     let what = CString::new(what.replace('\0', "")).unwrap_or_default();
     PyErr::warn(py, &py.get_type::<PyUserWarning>(), &what, 2)
 }
 
-/// Does work without the interpreter's lock; a panic becomes an exception.
+/// Runs work without the interpreter's lock.
 ///
 /// # Errors
-/// Where the work panics.
+/// Returns an exception if the work panics.
 pub fn unlocked<T: Send>(py: Python<'_>, work: impl FnOnce() -> T + Send) -> PyResult<T> {
     py.detach(|| limits::caught(work)).map_err(|broken| Fault::from(broken).into())
 }

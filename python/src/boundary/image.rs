@@ -1,4 +1,4 @@
-//! Pictures from arrays, without a copy where their layout allows.
+//! Converts arrays to images, without a copy if their layout allows.
 
 use std::borrow::Cow;
 
@@ -15,7 +15,7 @@ use pyo3::prelude::*;
 use super::arrays::shape_in_words;
 use super::errors::{self, Raise, raised};
 
-/// A picture that Python holds, or a copy of it.
+/// An image borrowed from Python, or a copy of it.
 pub enum Picture<'py> {
     /// 8 bits.
     U8(PyReadonlyArray2<'py, u8>),
@@ -23,7 +23,7 @@ pub enum Picture<'py> {
     U16(PyReadonlyArray2<'py, u16>),
     /// Floats from 0 to 1.
     F32(PyReadonlyArray2<'py, f32>),
-    /// Grey values of a picture of colours, or a copy in another layout.
+    /// Grey values of a colour image, or a copy in another layout.
     Grey(Gray<u8>),
     /// A copy in another layout.
     Deep(Gray<u16>),
@@ -31,19 +31,19 @@ pub enum Picture<'py> {
     Float(Gray<f32>),
 }
 
-/// What pictures are.
-const WANTED: &str = "a picture is an array of H × W of uint8, uint16 or float32 (0 to 1), or of H × W × 3 of uint8 (RGB)";
+/// The supported arrays, as part of messages.
+const WANTED: &str = "expected an image of H × W with dtype uint8, uint16 or float32 (0 to 1), or of H × W × 3 with dtype uint8 (RGB)";
 
 impl<'py> Picture<'py> {
-    /// A picture of an array of any strides.
+    /// Reads an image from an array with any strides.
     ///
     /// # Errors
-    /// Where the array is no picture.
+    /// Returns an error if the shape or type of the array is not supported.
     pub fn of(array: &Bound<'py, PyAny>, limits: &Limits) -> PyResult<Self> {
         let refused = |what: String| raised::ImageError::new_err(format!("{what}: {WANTED}"));
         let Ok(found) = array.cast::<PyUntypedArray>() else {
             let kind = array.get_type().qualname()?;
-            return Err(refused(format!("{kind} is no numpy array")));
+            return Err(refused(format!("{kind} is not a numpy array")));
         };
         let shape = found.shape().to_vec();
         if shape.contains(&0) {
@@ -53,7 +53,7 @@ impl<'py> Picture<'py> {
             [height, width] | [height, width, 3] => [*height, *width],
             _ => {
                 return Err(refused(format!(
-                    "an array of {} is no picture",
+                    "an array of {} is not an image",
                     shape_in_words(&shape)
                 )));
             }
@@ -66,13 +66,13 @@ impl<'py> Picture<'py> {
         let py = array.py();
         if shape.len() == 3 {
             if !is(dtype::<u8>(py)) {
-                return Err(refused(format!("colours of {kind}")));
+                return Err(refused(format!("unsupported dtype {kind} for colours")));
             }
             let colours = array.cast::<PyArray3<u8>>()?.try_readonly()?;
             let grey = grey_of_colours(wide, high, bytes_of(colours.as_array()));
-            return Ok(Self::Grey(grey.ok_or_else(|| refused("colours".to_owned()))?));
+            return Ok(Self::Grey(grey.ok_or_else(|| refused("unsupported colours".to_owned()))?));
         }
-        // Of another byte order they are of an equal type only after a copy.
+        // Arrays with another byte order have to be copied first.
         let native = || array.call_method1("astype", (kind.call_method1("newbyteorder", ("=",))?,));
         match (kind.kind(), kind.itemsize()) {
             _ if is(dtype::<u8>(py)) => Self::grey((array, limits), Self::U8, Self::Grey),
@@ -83,14 +83,14 @@ impl<'py> Picture<'py> {
                 Ok(picture)
             }
             (b'u', 2) | (b'f', 4) => Self::of(&native()?, limits),
-            _ => Err(refused(format!("pixels of {kind}"))),
+            _ => Err(refused(format!("unsupported dtype {kind}"))),
         }
     }
 
-    /// The array itself where it lies in rows, else a copy.
+    /// Borrows the array if its rows are contiguous, otherwise copies it.
     fn grey<T: Element + Intensity>(
         (array, limits): (&Bound<'py, PyAny>, &Limits),
-        held: fn(PyReadonlyArray2<'py, T>) -> Self,
+        borrowed: fn(PyReadonlyArray2<'py, T>) -> Self,
         copied: fn(Gray<T>) -> Self,
     ) -> PyResult<Self> {
         let pixels = array.cast::<PyArray2<T>>()?;
@@ -99,19 +99,19 @@ impl<'py> Picture<'py> {
         }
         let pixels = pixels.try_readonly()?;
         if rows(&pixels.as_array()).is_some() {
-            return Ok(held(pixels));
+            return Ok(borrowed(pixels));
         }
         let view = pixels.as_array();
         let (height, width) = view.dim();
         Ok(copied(Gray::from_fn(width, height, |x, y| view[[y, x]])))
     }
 
-    /// Refuses floats that run from 0 to 255, say, and what is no number.
+    /// Rejects NaN and floats outside 0 to 1, such as images scaled to 255.
     fn check_range(&self) -> Result<(), String> {
         fn check(mut pixels: impl Iterator<Item = f32>) -> Result<(), String> {
             pixels.find(|value| !(0.0..=1.0).contains(value)).map_or(Ok(()), |value| {
                 Err(format!(
-                    "a float picture runs from 0, black, to 1, white, and this has {value}"
+                    "float images range from 0 (black) to 1 (white), but this one contains {value}"
                 ))
             })
         }
@@ -122,7 +122,7 @@ impl<'py> Picture<'py> {
         }
     }
 
-    /// What detectors take.
+    /// Returns the view that detectors take.
     pub fn view(&self) -> Option<ImageView<'_>> {
         Some(match self {
             Self::U8(pixels) => rows(&pixels.as_array())?.into(),
@@ -135,26 +135,26 @@ impl<'py> Picture<'py> {
     }
 }
 
-/// Colours one after the other.
+/// Returns the colours as contiguous bytes.
 fn bytes_of(colours: ArrayView3<'_, u8>) -> Vec<u8> {
     let bytes = Cow::from(colours.as_slice().unwrap_or_default());
     if bytes.is_empty() { colours.iter().copied().collect() } else { bytes.into_owned() }
 }
 
-/// An array as rows of pixels, where it lies in memory like that: one after the other, from the top.
+/// Returns the array as rows of pixels if its memory layout allows: contiguous rows, from the top.
 #[allow(unsafe_code, reason = "ndarray has no slice of an array with gaps between its rows")]
 fn rows<'a, T: Intensity>(pixels: &ArrayView2<'a, T>) -> Option<View<'a, T>> {
     let (height, width) = pixels.dim();
     let [down, across] = [pixels.strides()[0], pixels.strides()[1]];
-    // The stride of an axis of one element says nothing.
+    // The stride of an axis with one element is meaningless.
     let stride = if height == 1 { width } else { usize::try_from(down).ok()? };
     if stride < width || (width > 1 && across != 1) {
         return None;
     }
     let count = (height - 1).checked_mul(stride)?.checked_add(width)?;
-    // SAFETY: the array has at least one pixel, its first pixel is at `as_ptr`, and its last one `count - 1` pixels
-    // behind that, in the same allocation. The gaps between rows belong to that allocation too, and hold plain numbers.
-    // The array is borrowed for as long as the slice.
+    // SAFETY: the array has at least one pixel. Its first pixel is at `as_ptr`, and its last one `count - 1` pixels later
+    // in the same allocation. The gaps between rows belong to that allocation too, and contain plain numbers. The array is
+    // borrowed for as long as the slice.
     let all = unsafe { std::slice::from_raw_parts(pixels.as_ptr(), count) };
     View::new(width, height, stride, all)
 }

@@ -1,4 +1,4 @@
-//! Long work that Ctrl-C ends.
+//! Runs long work that Ctrl-C interrupts.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -11,17 +11,17 @@ use pyo3::prelude::*;
 
 use super::errors::Fault;
 
-/// How often signals are looked for.
+/// Interval between checks for signals.
 const EVERY: Duration = Duration::from_millis(50);
 
-/// How long work may take to come to its end after Ctrl-C; then it is left, and ends by itself.
+/// Time for work to stop after Ctrl-C. After that it is abandoned, and ends on its own.
 const PATIENCE: Duration = Duration::from_secs(2);
 
-/// Does work on a thread of its own, without the interpreter's lock, and looks for signals meanwhile. The work is told
-/// by the flag that it is to end.
+/// Runs work on a separate thread, without the interpreter's lock, and checks for signals meanwhile. The flag asks the work
+/// to stop.
 ///
 /// # Errors
-/// What a signal's handler raises, such as `KeyboardInterrupt`, and where the work panics.
+/// Returns the exception of a signal handler, such as `KeyboardInterrupt`, or an exception if the work panics.
 pub fn interruptible<T: Send + 'static>(
     py: Python<'_>,
     work: impl FnOnce(&Arc<AtomicBool>) -> T + Send + 'static,
@@ -29,7 +29,7 @@ pub fn interruptible<T: Send + 'static>(
     let stop = Arc::new(AtomicBool::new(false));
     let (sender, mut receiver) = mpsc::sync_channel(1);
     let flag = stop.clone();
-    // The receiver is gone where the work was left.
+    // Sending fails if the work was abandoned and the receiver is gone.
     let run = move || drop(sender.send(limits::caught(|| work(&flag))));
     thread::Builder::new().name("deltille".to_owned()).spawn(run)?;
     loop {

@@ -1,11 +1,11 @@
-//! Between Python and the library: values, files of text, exceptions, Ctrl-C.
+//! The boundary between Python and the library: values, text files, exceptions, Ctrl-C.
 //!
-//! Comes in: arrays, numbers and the library's errors. Goes out: pictures and points, arrays, exceptions.
+//! Input: arrays, numbers and the library's errors. Output: images and points, arrays, exceptions.
 //!
-//! 1. `image` takes a picture from an array, `arrays` points and numbers; `arrays` gives results back.
-//! 2. `interrupt` does long work, which Ctrl-C ends.
-//! 3. `text_file` writes text whole or not at all.
-//! 4. `errors` makes exceptions of errors, in the words of Python: a setting is called by its keyword.
+//! 1. `image` reads an image from an array, `arrays` reads points and numbers and returns results.
+//! 2. `interrupt` runs long work, which Ctrl-C interrupts.
+//! 3. `text_file` writes text files atomically.
+//! 4. `errors` converts errors to exceptions, with settings named by their keywords.
 
 pub mod arrays;
 pub mod errors;

@@ -1,4 +1,4 @@
-//! Files of text that calls write.
+//! Writes text files.
 
 use std::path::PathBuf;
 
@@ -7,7 +7,7 @@ use pyo3::prelude::*;
 
 use super::errors::{self, RaiseFile, raised};
 
-/// Writes a file of text whole or not at all.
+/// Writes a text file atomically.
 pub fn save_text(path: PathBuf, text: String, overwrite: bool) -> PyResult<PathBuf> {
     let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty());
     let folder = folder.unwrap_or(std::path::Path::new(".")).to_owned();

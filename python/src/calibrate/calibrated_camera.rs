@@ -1,4 +1,4 @@
-//! One camera as it was found, as arrays.
+//! One calibrated camera, as arrays.
 
 use std::sync::Arc;
 
@@ -15,10 +15,10 @@ use crate::boundary::errors::{raised, unlocked};
 use crate::see::camera::Camera;
 use crate::see::pose::Pose;
 
-/// One camera as it was found.
+/// A calibrated camera.
 ///
-/// Arrays of P parameters are in the order of :attr:`Camera.parameter_names`, those of the F parameters that were found
-/// in the order of :attr:`found`, those of N corners view after view.
+/// Arrays of P parameters are in the order of :attr:`Camera.parameter_names`, those of the F estimated parameters in the
+/// order of :attr:`found`, those of N corners view after view.
 #[pyclass(frozen, subclass, module = "deltille")]
 #[derive(Clone)]
 pub struct CalibratedCamera {
@@ -31,13 +31,13 @@ impl CalibratedCamera {
         &self.solved.estimate.cameras[self.index]
     }
 
-    /// A figure of the file that it was read from.
+    /// Returns a value from the file it was read from.
     fn in_file(&self, figure: &str) -> Option<f64> {
         self.solved.in_file(Some(self.index))?[figure].as_f64()
     }
 }
 
-/// A camera, or one of its views, that was pickled.
+/// Restores a pickled camera, or one of its views.
 #[pyfunction]
 pub fn _part<'py>(
     py: Python<'py>,
@@ -50,18 +50,22 @@ pub fn _part<'py>(
     let found = solved.estimate.cameras.get(camera);
     let is_there = found.is_some_and(|found| view.is_none_or(|view| view < found.views.len()));
     match (is_there, view) {
-        (false, _) => Err(raised::CalibrationError::new_err("there is no such camera or view")),
+        (false, _) => {
+            Err(raised::CalibrationError::new_err("the calibration has no such camera or view"))
+        }
         (true, None) => Ok(Bound::new(py, CalibratedCamera { solved, index: camera })?.into_any()),
         (true, Some(view)) => Ok(Bound::new(py, View { solved, camera, view })?.into_any()),
     }
 }
 
-/// Where deviations come from, by name.
+/// Parses the name of a source of uncertainty.
 fn source(name: &str) -> PyResult<Source> {
     match name {
         "noise" => Ok(Source::Noise),
         "observed" => Ok(Source::Observed),
-        _ => Err(raised::CalibrationError::new_err("source: give noise or observed")),
+        _ => Err(raised::CalibrationError::new_err(format!(
+            "unknown source {name} (known: noise, observed)"
+        ))),
     }
 }
 
@@ -81,64 +85,64 @@ impl CalibratedCamera {
         Camera(self.estimate().camera.clone())
     }
 
-    /// The model that was found, such as ``"radtan"``; ``None`` where the camera was given.
+    /// The estimated model, such as ``"radtan"``; ``None`` if the camera was given.
     #[getter]
     fn model(&self) -> Option<String> {
         self.estimate().model.map(|model| model.to_string())
     }
 
-    /// Names of the F parameters that were found.
+    /// Names of the F estimated parameters.
     #[getter]
     fn found(&self) -> Vec<String> {
         self.estimate().found().map(str::to_owned).collect()
     }
 
-    /// Covariance of the parameters that were found, F × F, float64, from the noise of the corners.
+    /// Covariance of the estimated parameters, F × F, float64, from the noise of the corners.
     #[getter]
     fn covariance<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray2<f64>> {
         arrays::matrix(py, &self.estimate().covariance)
     }
 
-    /// The same covariance as the frames agree with each other; ``None`` of too few frames.
+    /// Covariance of the estimated parameters, F × F, float64, from the scatter between frames; ``None`` with too few frames.
     #[getter]
     fn observed_covariance<'py>(&self, py: Python<'py>) -> Option<Bound<'py, PyArray2<f64>>> {
         let found = self.estimate().covariance_from(Source::Observed);
         found.map(|covariance| arrays::matrix(py, covariance))
     }
 
-    /// Standard deviations of all parameters, P, float64; NaN of those that were given.
+    /// Standard deviations of all parameters, P, float64; NaN for given ones.
     #[getter]
     fn sd<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
         let parameters = self.estimate().parameters.iter();
         arrays::column(py, parameters.map(|parameter| parameter.sd.unwrap_or(f64::NAN)))
     }
 
-    /// The same as the frames agree with each other; NaN where that is not known.
+    /// Standard deviations from the scatter between frames, P, float64; NaN if not known.
     #[getter]
     fn observed_sd<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
         let found = self.estimate().observed_sd().into_iter();
         arrays::column(py, found.map(|sd| sd.unwrap_or(f64::NAN)))
     }
 
-    /// Names of parameters that the views cannot tell apart.
+    /// Names of ill-conditioned parameters, which the views cannot distinguish.
     #[getter]
     fn ill_conditioned(&self) -> Vec<String> {
         self.estimate().ill_conditioned.clone()
     }
 
-    /// Root mean square error of a coordinate over its corners, px.
+    /// Reprojection error over all corners, px: RMS per axis.
     #[getter]
     fn rms_px(&self) -> f64 {
         self.estimate().rms_px
     }
 
-    /// The same of the corners that are no outliers, px.
+    /// Reprojection error over the inliers, px: RMS per axis.
     #[getter]
     fn inlier_rms_px(&self) -> f64 {
         self.in_file("inlier_rms_px").unwrap_or_else(|| self.estimate().inlier_rms_px())
     }
 
-    /// How many corners took part.
+    /// Number of corners used.
     #[getter]
     fn corner_count(&self) -> usize {
         match self.in_file("corners") {
@@ -147,7 +151,7 @@ impl CalibratedCamera {
         }
     }
 
-    /// How many corners are outliers.
+    /// Number of outliers among the corners.
     #[getter]
     fn outlier_count(&self) -> usize {
         match self.in_file("outliers") {
@@ -156,26 +160,26 @@ impl CalibratedCamera {
         }
     }
 
-    /// Where the camera is on the rig: camera from rig; of a single camera the identity.
+    /// Pose of the camera on the rig: camera from rig; the identity for a single camera.
     #[getter]
     fn pose(&self) -> Pose {
         Pose(self.estimate().camera_from_rig)
     }
 
-    /// Standard deviations of that pose, 6, float64: a rotation (rad) and a translation (mm) about the camera's axes;
-    /// NaN where it was not to be found, as of the first camera.
+    /// Standard deviations of that pose, 6, float64: a rotation (rad) and a translation (mm) about the camera's axes; NaN if
+    /// it was not estimated, as for the first camera.
     #[getter]
     fn pose_sd<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
         arrays::column(py, self.estimate().pose_sd.unwrap_or([f64::NAN; 6]))
     }
 
-    /// By how many frames its pictures are late.
+    /// Number of frames by which its images lag.
     #[getter]
     fn delay(&self) -> i32 {
         self.estimate().delay
     }
 
-    /// The views that took part.
+    /// The views used.
     #[getter]
     fn views(&self) -> Vec<View> {
         let all = 0..self.estimate().views.len();
@@ -191,35 +195,35 @@ impl CalibratedCamera {
         arrays::column(py, (0..).zip(&self.estimate().views).flat_map(of).collect::<Vec<_>>())
     }
 
-    /// How sure projections are where corners were seen.
+    /// Computes the projection uncertainty in the region covered by corners.
     ///
     /// Parameters
     /// ----------
     /// distance_mm : float, optional
-    ///     How far points are, mm; infinity if left out.
+    ///     Distance of the points, mm; defaults to infinity.
     /// source : str, optional
-    ///     ``"noise"`` of the corners, or ``"observed"``: how far the frames agree with each other.
+    ///     ``"noise"`` of the corners, or ``"observed"`` scatter between frames.
     ///
     /// Returns
     /// -------
     /// float or None
-    ///     Standard deviation of a coordinate, px; ``None`` where it is not known.
+    ///     Standard deviation per axis, px; ``None`` if not known.
     #[pyo3(signature = (distance_mm = None, source = "noise"))]
     fn projection_sd(&self, distance_mm: Option<f64>, source: &str) -> PyResult<Option<f64>> {
         Ok(self.estimate().projection_sd_px(distance(distance_mm)?, self::source(source)?))
     }
 
-    /// How sure projections are over the image.
+    /// Computes the projection uncertainty over the image.
     ///
     /// Parameters
     /// ----------
     /// distance_mm, source
-    ///     As of :meth:`projection_sd`.
+    ///     See :meth:`projection_sd`.
     ///
     /// Returns
     /// -------
     /// ndarray of R × C, float64, or None
-    ///     Standard deviations along the worst direction, px, of R × C places that cover the image; NaN beyond the lens.
+    ///     Standard deviations along the worst direction, px, at R × C positions that cover the image; NaN outside the lens.
     #[pyo3(signature = (distance_mm = None, source = "noise"))]
     fn uncertainty_map<'py>(
         &self,
@@ -236,19 +240,19 @@ impl CalibratedCamera {
         }))
     }
 
-    /// Covariances of where the camera projects what pixels show.
+    /// Computes the covariances of projections to these pixels.
     ///
     /// Parameters
     /// ----------
     /// pixels : array of N × 2
     ///     Positions, px.
     /// distance_mm, source
-    ///     As of :meth:`projection_sd`.
+    ///     See :meth:`projection_sd`.
     ///
     /// Returns
     /// -------
     /// ndarray of N × 2 × 2, float64
-    ///     px²; NaN beyond the lens, or where it is not known.
+    ///     px²; NaN outside the lens, or if not known.
     #[pyo3(signature = (pixels, distance_mm = None, source = "noise"))]
     fn projection_covariance<'py>(
         &self,
@@ -270,8 +274,8 @@ impl CalibratedCamera {
         Ok(arrays::covariances(py, found))
     }
 
-    /// The models that were tried where one was to be chosen, each as a dictionary: ``model``, ``parameters``,
-    /// ``held_out_px``, ``is_stable``, ``holds``, ``chosen``.
+    /// The models compared for ``model="auto"``, each as a dictionary: ``model``, ``parameters``, ``held_out_px``,
+    /// ``is_stable``, ``holds`` (adequate), ``chosen``.
     #[getter]
     fn candidates<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         let tried = self.solved.models.get(self.index).map(Vec::as_slice).unwrap_or_default();

@@ -1,4 +1,4 @@
-//! Calibrations and rigs: files, pages, and what is said of them.
+//! Calibrations and rigs: files, reports and diagnoses.
 
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -25,11 +25,11 @@ use crate::see::detection::Targets;
 use crate::see::pose::Pose;
 use crate::targets::target::Target;
 
-/// A calibrated camera, with all that is said about it.
+/// A calibrated camera with its diagnoses.
 #[pyclass(frozen, extends = CalibratedCamera, module = "deltille")]
 pub struct Calibration;
 
-/// Cameras that are fixed to each other, and where they are.
+/// A calibrated rig: cameras fixed relative to each other, and their poses.
 #[pyclass(frozen, module = "deltille")]
 pub struct Rig {
     pub solved: Arc<Solved>,
@@ -43,14 +43,14 @@ macro_rules! whole {
     ($class:ident, $is_rig:literal, $self:ident: $kind:ty => $solved:expr) => {
         #[pymethods]
         impl $class {
-            /// What is to be said about it.
+            /// The diagnoses of this calibration.
             #[getter]
             fn diagnoses($self: $kind) -> Vec<Diagnosis> {
                 let said = $solved.said().into_iter();
                 said.map(|(record, is_failure)| Diagnosis { record, is_failure }).collect()
             }
 
-            /// Views and frames that took no part, and why.
+            /// Views and frames that were excluded, and why.
             #[getter]
             fn excluded($self: $kind) -> Vec<Excluded> {
                 let one = |out: &solver::Excluded| Excluded {
@@ -59,7 +59,7 @@ macro_rules! whole {
                     image: out.image.clone(),
                     panel: out.panel,
                     corners: out.corners,
-                    reason: errors::told(&out.reason),
+                    reason: errors::one_line(&out.reason),
                 };
                 if let Some(file) = $solved.in_file(None) {
                     let all = file["excluded"].as_array().map_or(&[][..], Vec::as_slice);
@@ -68,21 +68,21 @@ macro_rules! whole {
                 $solved.estimate.excluded.iter().map(one).collect()
             }
 
-            /// A-posteriori standard deviation of a coordinate, by whose square covariances are scaled.
+            /// A-posteriori standard deviation per axis; covariances are scaled by its square.
             #[getter]
             fn sigma($self: $kind) -> f64 {
                 let file = $solved.in_file(None).and_then(|file| file["sigma"].as_f64());
                 file.unwrap_or($solved.estimate.sigma)
             }
 
-            /// The deviation that was added to that of every corner, px; ``None`` with equal weights.
+            /// Standard deviation added to that of every corner, px; ``None`` with equal weights.
             #[getter]
             fn common_px($self: $kind) -> Option<f64> {
                 let file = $solved.in_file(None).and_then(|file| file["common_px"].as_f64());
                 file.or($solved.estimate.common_px)
             }
 
-            /// Root mean square error of a coordinate in what was held out, px; ``None`` where nothing was.
+            /// Reprojection error in held-out views, px: RMS per axis; ``None`` without held-out views.
             #[getter]
             fn held_out_rms_px($self: $kind) -> Option<f64> {
                 if let Some(file) = $solved.in_file(None) {
@@ -91,8 +91,8 @@ macro_rules! whole {
                 $solved.estimate.held_out.as_ref().map(|test| test.rms_px)
             }
 
-            /// How far the sheet of the board is bent, mm, and how sure that is (F), where that was to be found:
-            /// ``bent_mm``, ``stretched_mm``, ``f_ratio``, ``is_significant``.
+            /// Estimated shape of the sheet: ``bent_mm``, ``stretched_mm``, ``f_ratio`` (F statistic), ``is_significant``;
+            /// ``None`` if it was not estimated.
             #[getter]
             fn board_shape<'py>($self: $kind, py: Python<'py>) -> PyResult<Option<Bound<'py, PyAny>>> {
                 let data = $solved.estimate.shape.map(|found| {
@@ -104,12 +104,12 @@ macro_rules! whole {
                 data.map(|data| record(py, &data)).transpose()
             }
 
-            /// The text of its file.
+            /// Returns the text of its file.
             ///
             /// Parameters
             /// ----------
             /// residuals : bool, optional
-            ///     Whether every corner is listed; what was loaded is written as it was.
+            ///     List every corner. A loaded calibration is written unchanged.
             ///
             /// Returns
             /// -------
@@ -119,7 +119,7 @@ macro_rules! whole {
                 text_of(&$solved, residuals)
             }
 
-            /// Writes a page that shows what the calibration is worth, and what would make it better.
+            /// Writes an HTML report on the quality of the calibration and possible improvements.
             ///
             /// Parameters
             /// ----------
@@ -127,7 +127,7 @@ macro_rules! whole {
             ///     An ``.html`` file.
             /// title : str, optional
             /// overwrite : bool, optional
-            ///     Whether a file of another kind is replaced.
+            ///     Replace an existing file even if it is of another kind.
             ///
             /// Returns
             /// -------
@@ -142,8 +142,8 @@ macro_rules! whole {
             ) -> PyResult<PathBuf> {
                 let solved = $solved.clone();
                 if !solved.is_whole() {
-                    let what = "a page needs the corners and all that is said of them: make it where the camera is \
-                                calibrated, or save with residuals=True and load with the target what has no diagnosis";
+                    let what = "this calibration lacks data for a report: write the report right after calibrating, or, if \
+                                there are no diagnoses, save with residuals=True and load with the target";
                     return Err(errors::calibration(what.to_owned()));
                 }
                 let usual = if $is_rig { "rig" } else { "camera" };
@@ -171,7 +171,7 @@ impl Calibration {
     /// ----------
     /// path : path-like
     /// target : Target, optional
-    ///     What was photographed, from which :attr:`ids` come.
+    ///     The target, needed for :attr:`ids`.
     ///
     /// Returns
     /// -------
@@ -188,14 +188,14 @@ impl Calibration {
     /// Parameters
     /// ----------
     /// path : path-like
-    ///     A ``.json`` file, or that of another program.
+    ///     A ``.json`` file, or a file of another program.
     /// format : str, optional
-    ///     ``"json"``, which :meth:`load` reads back, or a format of :meth:`Camera.save`; ``"nerfstudio"`` has the
-    ///     poses of the views too.
+    ///     ``"json"``, which :meth:`load` reads back, or a format of :meth:`Camera.save`; ``"nerfstudio"`` includes the poses
+    ///     of the views.
     /// residuals : bool, optional
-    ///     Whether every corner is listed in the ``.json``.
+    ///     List every corner in the ``.json``.
     /// overwrite : bool, optional
-    ///     Whether a file of another kind is replaced.
+    ///     Replace an existing file even if it is of another kind.
     ///
     /// Returns
     /// -------
@@ -227,7 +227,7 @@ impl Calibration {
         save_text(path, text, overwrite)
     }
 
-    /// The target with its corners where they were measured; ``None`` where they were not.
+    /// The target with measured corner positions; ``None`` if they were not measured.
     #[getter]
     fn measured_target(slf: PyRef<'_, Self>) -> PyResult<Option<Target>> {
         let solved = &slf.as_super().solved;
@@ -252,13 +252,13 @@ impl Calibration {
     }
 }
 
-/// A calibration that was pickled.
+/// Restores a pickled calibration.
 #[pyfunction]
 pub fn _calibration(py: Python<'_>, json: &str, targets: Vec<String>) -> PyResult<Py<Calibration>> {
     Py::new(py, calibration(Arc::new(restored(json, &targets)?)))
 }
 
-/// A rig that was pickled.
+/// Restores a pickled rig.
 #[pyfunction]
 pub fn _rig(json: &str, targets: Vec<String>) -> PyResult<Rig> {
     Ok(Rig { solved: Arc::new(restored(json, &targets)?) })
@@ -272,7 +272,7 @@ impl Rig {
     /// ----------
     /// path : path-like
     /// target : Target or sequence of Target, optional
-    ///     What was photographed, from which the ids of corners come.
+    ///     The target, needed for the ids of the corners.
     ///
     /// Returns
     /// -------
@@ -283,7 +283,7 @@ impl Rig {
         Ok(Self { solved: Arc::new(read(&path, target, true)?) })
     }
 
-    /// The cameras by their names, in the order given; the first is the frame of the rig.
+    /// The cameras by their names, in the given order; the first defines the frame of the rig.
     #[getter]
     fn cameras<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, pyo3::types::PyDict>> {
         let all = pyo3::types::PyDict::new(py);
@@ -294,13 +294,13 @@ impl Rig {
         Ok(all)
     }
 
-    /// Names of the frames: moments at which pictures were taken.
+    /// Names of the frames: times at which images were taken.
     #[getter]
     fn frames(&self) -> Vec<String> {
         self.solved.estimate.frames.iter().map(|frame| frame.name.clone()).collect()
     }
 
-    /// Where the target was in each frame: rig from target.
+    /// Pose of the target in each frame: rig from target.
     #[getter]
     fn poses(&self) -> Vec<Pose> {
         self.solved.estimate.frames.iter().map(|frame| Pose(frame.rig_from_target)).collect()
@@ -313,14 +313,14 @@ impl Rig {
         arrays::rows(py, self.solved.estimate.frames.iter().map(|frame| frame.pose_sd))
     }
 
-    /// Root mean square error of a coordinate over all corners, px.
+    /// Reprojection error over all corners, px: RMS per axis.
     #[getter]
     fn rms_px(&self) -> f64 {
         let file = self.solved.in_file(None).and_then(|file| file["rms_px"].as_f64());
         file.unwrap_or(self.solved.estimate.rms_px)
     }
 
-    /// The targets with their panels where they were found, where that was asked for.
+    /// The targets with refined panel poses or measured corners; empty if neither was estimated.
     #[getter]
     fn refined_targets(&self) -> PyResult<Vec<Target>> {
         let estimate = &self.solved.estimate;
@@ -344,13 +344,13 @@ impl Rig {
     /// Parameters
     /// ----------
     /// path : path-like
-    ///     A ``.json`` file, or that of another program.
+    ///     A ``.json`` file, or a file of another program.
     /// format : str, optional
     ///     ``"json"``, which :meth:`load` reads back, or one for other programs, such as ``"kalibr"``.
     /// residuals : bool, optional
-    ///     Whether every corner is listed in the ``.json``.
+    ///     List every corner in the ``.json``.
     /// overwrite : bool, optional
-    ///     Whether a file of another kind is replaced.
+    ///     Replace an existing file even if it is of another kind.
     ///
     /// Returns
     /// -------
@@ -395,10 +395,10 @@ impl Rig {
     }
 }
 
-/// The text of a file, with its corners where they are asked for.
+/// Returns the text of a file, with its corners if requested.
 fn text_of(solved: &Solved, residuals: bool) -> PyResult<String> {
     if residuals && !solved.has_corners() {
-        let what = "residuals: the file that this was loaded from has none: save them where it was calibrated";
+        let what = "residuals: the loaded file contains none; save with residuals=True right after calibrating";
         return Err(errors::calibration(what.to_owned()));
     }
     let listed = if residuals { Residuals::Listed } else { Residuals::LeftOut };
@@ -410,14 +410,12 @@ fn read(path: &std::path::Path, target: Option<Targets>, is_rig: bool) -> PyResu
     let targets = target.map(|targets| targets.0).unwrap_or_default();
     let targets = targets.iter().map(|target| (*target.printing).clone()).collect();
     let wrong = |what: String| raised::FileError::new_err(format!("{}: {what}", path.display()));
-    let solved = of_text(&text, targets).map_err(|error| wrong(errors::told(&error)))?;
+    let solved = of_text(&text, targets).map_err(|error| wrong(errors::one_line(&error)))?;
     if is_rig && !solved.is_rig {
-        return Err(wrong(
-            "this is a calibration of one camera: read it by Calibration.load".to_owned(),
-        ));
+        return Err(wrong("this is a calibration of one camera; use Calibration.load".to_owned()));
     }
     if !is_rig && solved.is_rig {
-        return Err(wrong("this is a rig: read it by Rig.load".to_owned()));
+        return Err(wrong("this is a rig; use Rig.load".to_owned()));
     }
     Ok(solved)
 }

@@ -1,4 +1,4 @@
-//! Whether two calibrations differ, and where a target is.
+//! Tests whether two calibrations differ, and estimates the pose of a target.
 
 use std::sync::Arc;
 
@@ -23,7 +23,7 @@ use crate::see::detection::{Detection, Targets};
 use crate::see::pose::Pose;
 use crate::targets::target::Target;
 
-/// A camera as found, or as given.
+/// A calibrated or given camera.
 pub struct Compared(Estimate);
 
 impl Compared {
@@ -33,7 +33,7 @@ impl Compared {
         Self(estimate)
     }
 
-    /// Cameras of a calibration; the uncertainties of one that failed are not to be trusted.
+    /// Takes the cameras of a calibration, without uncertainties if it failed, as they are not reliable then.
     fn of_solved(mut cameras: Vec<CameraEstimate>, solved: &Solved) -> Self {
         if solved.said().iter().any(|(_, is_failure)| *is_failure) {
             cameras.iter_mut().for_each(CameraEstimate::forget_uncertainties);
@@ -59,7 +59,7 @@ impl<'a, 'py> FromPyObject<'a, 'py> for Compared {
     }
 }
 
-/// Where cameras are compared.
+/// The image region in which cameras are compared.
 #[derive(FromPyObject)]
 pub enum Part {
     Name(String),
@@ -75,7 +75,8 @@ impl Part {
             Self::Name(name) if name == "seen" => Ok(Region::Seen),
             Self::Name(name) if name == "image" => Ok(Region::Image),
             _ => {
-                let what = "region: give seen, image, or four pixels (left, top, right, bottom)";
+                let what =
+                    "invalid region (known: seen, image, or (left, top, right, bottom) in px)";
                 Err(raised::CalibrationError::new_err(what))
             }
         }
@@ -97,13 +98,13 @@ impl Comparison {
         &self.name
     }
 
-    /// Root mean square difference of a coordinate, px.
+    /// RMS difference per axis, px.
     #[getter]
     fn rms_px(&self) -> f64 {
         self.found.rms_px
     }
 
-    /// The same as the uncertainties of both have it, px; ``None`` where they are not known.
+    /// RMS difference per axis expected from the uncertainties of both, px; ``None`` if they are not known.
     #[getter]
     fn expected_px(&self) -> Option<f64> {
         self.found.expected_px
@@ -115,111 +116,111 @@ impl Comparison {
         self.found.largest_px()
     }
 
-    /// How often chance makes them differ as much where the camera is the same.
+    /// Probability (p-value) that noise alone makes them differ as much, if the camera is unchanged.
     #[getter]
     fn chance(&self) -> Option<f64> {
         self.found.chance
     }
 
-    /// Why it cannot be judged whether the camera has changed, as a sentence; ``None`` where it can.
+    /// Why the significance of the difference is not known, as a sentence; ``None`` if it is.
     #[getter]
     fn why_undecided(&self) -> Option<&'static str> {
         self.found.why_undecided()
     }
 
-    /// Whether they differ by more than chance makes; ``None`` where uncertainties are not known.
+    /// Whether they differ significantly; ``None`` if uncertainties are not known.
     #[getter]
     fn is_significant(&self) -> Option<bool> {
         self.found.is_significant()
     }
 
-    /// What the second camera sees is this motion of what the first one sees.
+    /// Motion of the first camera that is compensated before comparing: a rotation, and a translation for points at a
+    /// finite distance.
     #[getter]
     fn second_from_first(&self) -> Pose {
         Pose(self.found.second_from_first)
     }
 
-    /// Places of the first image that were compared, N × 2, float64, px.
+    /// Positions compared in the first image, N × 2, float64, px.
     #[getter]
     fn pixels<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray2<f64>> {
         arrays::rows(py, self.found.compared().map(|place| place.pixel.to_array()))
     }
 
-    /// By how much the second camera differs there, N × 2, float64, px.
+    /// Differences of the second camera there, N × 2, float64, px.
     #[getter]
     fn differences<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray2<f64>> {
         arrays::rows(py, self.found.compared().map(|place| place.by.to_array()))
     }
 
-    /// Standard deviations of a coordinate as the uncertainties of both have them, N, float64, px; NaN where they are
-    /// not known.
+    /// Standard deviations per axis from the uncertainties of both, N, float64, px; NaN if not known.
     #[getter]
     fn sd_px<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
         arrays::column(py, self.found.compared().map(|place| place.sd_px.unwrap_or(f64::NAN)))
     }
 
-    /// The text that ``deltille compare`` writes.
+    /// Returns the text that ``deltille compare`` writes.
     fn to_json(&self) -> String {
         comparison::write(&[&self.name], std::slice::from_ref(&self.found), &[])
     }
 
     fn __repr__(&self) -> String {
-        let said = told_significant(self.found.is_significant());
-        format!("<Comparison: {:.4} px rms{said}>", self.found.rms_px)
+        let significance = significance(self.found.is_significant());
+        format!("<Comparison: {:.4} px rms{significance}>", self.found.rms_px)
     }
 }
 
-fn told_significant(is_significant: Option<bool>) -> &'static str {
+fn significance(is_significant: Option<bool>) -> &'static str {
     match is_significant {
-        Some(true) => ", more than chance makes",
-        Some(false) => ", no more than chance makes",
-        None => ", cannot be judged",
+        Some(true) => ", significant",
+        Some(false) => ", not significant",
+        None => ", significance unknown",
     }
 }
 
-/// How a camera of a rig is elsewhere than before.
+/// Motion of a camera of a rig between two calibrations.
 #[pyclass(frozen, module = "deltille")]
 pub struct Motion(CameraMotion);
 
 #[pymethods]
 impl Motion {
-    /// The camera from which it is seen.
+    /// Name of the reference camera.
     #[getter]
     fn of_frame(&self) -> &str {
         &self.0.from
     }
 
-    /// The camera.
+    /// Name of the camera that moved.
     #[getter]
     fn name(&self) -> &str {
         &self.0.to
     }
 
-    /// By how much it is turned along its axes, 3, float64, rad.
+    /// Rotation about its axes, 3, float64, rad.
     #[getter]
     fn turn_rad<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
         arrays::column(py, self.0.turn_rad.to_array())
     }
 
-    /// By how much it is elsewhere along its axes, 3, float64, mm.
+    /// Translation along its axes, 3, float64, mm.
     #[getter]
     fn moved_mm<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
         arrays::column(py, self.0.moved_mm.to_array())
     }
 
-    /// How often chance makes as large a motion; ``None`` where deviations are not known.
+    /// Probability (p-value) that noise alone makes as large a motion; ``None`` if uncertainties are not known.
     #[getter]
     fn chance(&self) -> Option<f64> {
         self.0.chance
     }
 
-    /// Why it cannot be judged whether it has moved, as a sentence; ``None`` where it can.
+    /// Why the significance of the motion is not known, as a sentence; ``None`` if it is.
     #[getter]
     fn why_undecided(&self) -> Option<&'static str> {
         self.0.why_undecided()
     }
 
-    /// Whether it moved by more than the deviations explain; ``None`` where these are not known.
+    /// Whether it moved significantly; ``None`` if uncertainties are not known.
     #[getter]
     fn is_significant(&self) -> Option<bool> {
         self.0.is_significant()
@@ -228,8 +229,8 @@ impl Motion {
     fn __repr__(&self) -> String {
         let CameraMotion { from, to, turn_rad, moved_mm, .. } = &self.0;
         let (turn, moved) = (turn_rad.length(), moved_mm.length());
-        let said = told_significant(self.0.is_significant());
-        format!("<Motion of {to} from {from}: {turn:.6} rad, {moved:.4} mm{said}>")
+        let significance = significance(self.0.is_significant());
+        format!("<Motion of {to} from {from}: {turn:.6} rad, {moved:.4} mm{significance}>")
     }
 }
 
@@ -251,18 +252,18 @@ fn compared(
     Ok(named.map(|((one, _), found)| Comparison { name: one.name.clone(), found }).collect())
 }
 
-/// Says whether two calibrations of a camera differ by more than chance.
+/// Tests whether two calibrations of a camera differ significantly.
 ///
 /// Parameters
 /// ----------
 /// first, second : Calibration, CalibratedCamera or Camera
-///     Of a :class:`Camera` no uncertainty is known.
+///     A :class:`Camera` has no known uncertainty.
 /// distance_mm : float, optional
-///     How far the points are by which they are compared, mm; infinity if left out.
+///     Distance of the points compared, mm; defaults to infinity.
 /// region : str or (float, float, float, float), optional
-///     ``"seen"``, where both saw corners, ``"image"``, or pixels left, top, right, bottom.
+///     ``"seen"``, where both observed corners (default), ``"image"``, or pixels left, top, right, bottom.
 /// assume_target : bool, optional
-///     Whether they are compared even where both were calibrated with the same tags at different sizes.
+///     Compare even if both were calibrated with the same tags at different sizes.
 ///
 /// Returns
 /// -------
@@ -282,19 +283,19 @@ pub fn compare(
     compare_boards(["first", "second"], [&mut first, &mut second], assume_target)
         .raise(errors::calibration)?;
     let ([one], [other]) = (first.cameras.as_slice(), second.cameras.as_slice()) else {
-        let what = "rigs are compared by compare_rigs";
+        let what = "use compare_rigs to compare rigs";
         return Err(raised::CalibrationError::new_err(what));
     };
     Ok(compared(py, &[(one, other)], distance_mm, region)?.remove(0))
 }
 
-/// Says whether two calibrations of a rig differ by more than chance: cameras of the same name, and where they are.
+/// Tests whether two calibrations of a rig differ significantly: cameras of the same name, and their poses.
 ///
 /// Parameters
 /// ----------
 /// first, second : Rig
 /// distance_mm, region, assume_target
-///     As of :func:`compare`.
+///     See :func:`compare`.
 ///
 /// Returns
 /// -------
@@ -322,14 +323,14 @@ pub fn compare_rigs(
         own.filter_map(|one| Some((one, others.iter().find(|other| other.name == one.name)?)));
     let pairs: Vec<_> = pairs.collect();
     if pairs.is_empty() {
-        let what = "no camera is in both: give two calibrations of the same rig";
+        let what = "the rigs have no camera name in common; pass two calibrations of the same rig";
         return Err(raised::CalibrationError::new_err(what));
     }
     let found = compared(py, &pairs, distance_mm, region)?;
     Ok((found, CameraMotion::of_rig(&pairs).into_iter().map(Motion).collect()))
 }
 
-/// Where a target is in a picture of a known camera.
+/// Pose of a target in an image of a known camera.
 #[pyclass(frozen, module = "deltille")]
 pub struct Located {
     asked: Asked,
@@ -340,7 +341,7 @@ pub struct Located {
     target: String,
 }
 
-/// What a pose comes from.
+/// The inputs of a pose.
 #[derive(Clone)]
 struct Asked {
     detection: Detection,
@@ -357,7 +358,7 @@ impl Located {
 
 #[pymethods]
 impl Located {
-    /// Camera from target; ``None`` where it is not known.
+    /// Camera from target; ``None`` if it is not known.
     #[getter]
     fn pose(&self) -> Option<Pose> {
         self.view().map(|view| Pose(view.pose))
@@ -370,32 +371,32 @@ impl Located {
         Some(arrays::column(py, frame.pose_sd))
     }
 
-    /// Why there is no pose, as a sentence; ``None`` where there is one.
+    /// Why there is no pose, as a sentence; ``None`` if there is one.
     #[getter]
     fn why(&self) -> Option<&str> {
         self.why.as_deref()
     }
 
-    /// What else is to be said, in sentences.
+    /// Warnings about the pose, in sentences.
     #[getter]
     fn warnings(&self) -> Vec<String> {
         self.warnings.clone()
     }
 
-    /// Root mean square error of a coordinate, px; NaN without a pose.
+    /// Reprojection error, px: RMS per axis; NaN without a pose.
     #[getter]
     fn rms_px(&self) -> f64 {
         self.view().map_or(f64::NAN, |view| view.rms_px)
     }
 
-    /// Residuals of the corners, N × 2, float64, px: detected less predicted position.
+    /// Residuals of the corners, N × 2, float64, px: detected minus predicted position.
     #[getter]
     fn residuals<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray2<f64>> {
         let corners = self.view().into_iter().flat_map(|view| &view.corners);
         arrays::rows(py, corners.map(|corner| corner.residual.to_array()))
     }
 
-    /// The line that ``deltille pose`` writes.
+    /// Returns the line that ``deltille pose`` writes.
     fn to_json(&self) -> String {
         let found = self.estimate.as_ref().zip(self.view());
         match found {
@@ -419,32 +420,32 @@ impl Located {
     fn __repr__(&self) -> String {
         match (self.view(), &self.why) {
             (Some(view), _) => {
-                format!("<Located {}, rms {:.4} px>", Pose(view.pose).told(), view.rms_px)
+                format!("<Located {}, rms {:.4} px>", Pose(view.pose).text(), view.rms_px)
             }
-            (None, why) => format!("<Located nowhere: {}>", why.as_deref().unwrap_or("")),
+            (None, why) => format!("<Located without pose: {}>", why.as_deref().unwrap_or("")),
         }
     }
 }
 
-/// Says where a target is in a picture of a known camera.
+/// Estimates the pose of a target in an image of a known camera.
 ///
 /// Parameters
 /// ----------
 /// detection : Detection
-///     What was found in the picture.
+///     The detections in the image.
 /// camera : Camera
 ///     The camera that took it.
 /// target : Target, optional
-///     The target; that of the detection if left out.
+///     The target; defaults to that of the detection.
 /// print_scale : float or (float, float), optional
-///     Measured over stated length of the check bars, across and up the sheet.
+///     Measured length of the check bars over the nominal one, across and up the sheet.
 /// assume_target : bool, optional
-///     Whether the target is taken even where the detection names another one.
+///     Use the target even if the detection names another one.
 ///
 /// Returns
 /// -------
 /// Located
-///     Where there is no pose, :attr:`Located.why` says why.
+///     If there is no pose, :attr:`Located.why` gives the reason.
 #[pyfunction]
 #[pyo3(name = "pose", signature = (detection, camera, target = None, *, print_scale = None,
     assume_target = false))]
@@ -460,8 +461,8 @@ pub fn pose_of(
     let wrong = |what: &str| Err(raised::CalibrationError::new_err(what.to_owned()));
     let [target] = targets.as_slice() else {
         return match targets.is_empty() {
-            true => wrong("give a target: the detection does not know what was looked for"),
-            false => wrong("several targets were looked for: say which one"),
+            true => wrong("target is missing, and the detection has none"),
+            false => wrong("the detection has several targets; pass the one to locate"),
         };
     };
     let print_scale = print_scale.map(print_scale_of).transpose()?;
@@ -477,7 +478,7 @@ pub fn pose_of(
     Asked { detection, camera, target, print_scale }.located(py)
 }
 
-/// A pose that was pickled: it is found again.
+/// Restores a pickled pose by estimating it again.
 #[pyfunction]
 pub fn _located(
     py: Python<'_>,
@@ -513,14 +514,14 @@ impl Asked {
         let nowhere = |why: String| of(Some(why), None, Vec::new());
         let mut views = match views(&named, &reference) {
             Ok(shown) => shown.views,
-            Err(error) => return Ok(nowhere(errors::told(&error))),
+            Err(error) => return Ok(nowhere(errors::one_line(&error))),
         };
         sheet.put_on(Some(target), &mut views).raise(errors::calibration)?;
         let panels = sheet.panels(&reference).raise(errors::calibration)?;
         let camera = self.camera.0.clone();
         let calibration = calibrate::Calibration::new(panels).camera("", views, camera);
         match calibration.located(found).raise(errors::calibration)? {
-            Err(why) => Ok(nowhere(errors::told(&why))),
+            Err(why) => Ok(nowhere(errors::one_line(&why))),
             Ok(estimate) => {
                 let words = Words::new(&estimate, None);
                 let is_of_picture = |said: &&Diagnosis| !matches!(said, Diagnosis::LensEnds { .. });

@@ -1,4 +1,4 @@
-//! Calibrations as they are asked for, by keywords.
+//! The functions `calibrate` and `rig`.
 
 use std::collections::BTreeMap;
 use std::path::PathBuf;
@@ -22,43 +22,44 @@ use crate::see::detector::sides;
 /// Parameters
 /// ----------
 /// detections : sequence of Detection
-///     Of pictures of one camera; 20 or more with the board tilted by 20° to 45° are good.
+///     Detections in images of one camera; 20 or more with the board tilted by 20° to 45° work well.
 /// target : Target, optional
-///     What was photographed; that of the detections if left out.
+///     The target; defaults to that of the detections.
 /// model : str, optional
-///     That of ``deltille calibrate --model``: ``"radtan"`` for usual lenses, ``"kannala-brandt"`` for fisheyes, and
-///     others, or ``"auto"``, which takes the one that holds views best that took no part.
+///     ``"radtan"``, ``"radtan5"``, ``"rational"``, ``"thin-prism"``, ``"kannala-brandt"``, ``"eucm"``,
+///     ``"double-sphere"``, ``"pupil"``, ``"spline"``, or ``"auto"``, which selects the model with the lowest error on
+///     held-out views.
 /// camera : Camera, optional
-///     A known camera, of which only the poses are found.
+///     A known camera, which is kept fixed; only the poses are estimated.
 /// grid : str, optional
-///     Without a target the tiling of an untagged board, ``"deltille"`` or ``"checker"``.
+///     Tiling of an untagged board, instead of a target: ``"deltille"`` or ``"checker"``.
 /// rows, cols : int, optional
-///     Its rows and columns of corners, where they are known.
+///     Its rows and columns of corners, if known.
 /// edge_mm : float, optional
-///     The edge of its tiles, mm.
+///     Edge of its tiles, mm.
 /// hold_out : int, optional
-///     Every n-th view takes no part, and tells how well the others predict it.
+///     Hold out every n-th view, and report how well the others predict it.
 /// loss : str, optional
-///     How corners far off count: ``"huber"``, ``"cauchy"`` or ``"none"`` (least squares).
+///     Robust loss for outliers: ``"huber"``, ``"cauchy"`` or ``"none"`` (least squares).
 /// weights : str, optional
 ///     ``"covariance"`` of the detections, or ``"equal"``.
 /// board_shape : bool, optional
-///     Whether it is found, too, how the sheet is bent and stretched.
+///     Estimate bending and stretching of the sheet, too.
 /// measure_target : bool, optional
-///     Whether the place of every corner is found, too.
+///     Estimate the position of every corner, too.
 /// shape : path-like, optional
-///     A file of a calibration with ``board_shape``, whose sheet this is.
+///     File of an earlier calibration of the same sheet with ``board_shape``.
 /// print_scale : float or (float, float), optional
-///     Measured over stated length of the check bars, across and up the sheet.
+///     Measured length of the check bars over the nominal one, across and up the sheet.
 /// distances_mm : sequence of float, optional
-///     For which the uncertainty of projections is told.
+///     Distances for which the projection uncertainty is reported.
 /// names : sequence of str, optional
 ///     Names of the views.
 /// assume_target : bool, optional
-///     Whether the target is taken even where the detections name another one.
+///     Use the target even if the detections name another one.
 /// board_accuracy_mm : float, optional
-///     Standard deviation of the board's corners from the description, mm, for the observed deviations; 0.1, at most
-///     0.5 % of an edge, if left out, and of a measured target what it says of itself.
+///     Standard deviation of the board's corners from the description, mm, for the observed uncertainties. Defaults to 0.1,
+///     but at most 0.5 % of an edge; for a measured target, to the value in its file.
 ///
 /// Returns
 /// -------
@@ -67,7 +68,7 @@ use crate::see::detector::sides;
 /// Raises
 /// ------
 /// CalibrationError
-///     Where views are too few, too much alike, or do not belong together.
+///     If there are too few views, if they are too similar, or if they do not belong together.
 #[pyfunction]
 #[pyo3(signature = (detections, target = None, model = "radtan", *, camera = None, grid = None, rows = None,
     cols = None, edge_mm = None, hold_out = None, loss = "huber", weights = "covariance", board_shape = false,
@@ -105,7 +106,7 @@ pub fn calibrate(
         let text = Limits::default().read_text(&path).raise_of_file(&path, errors::file)?;
         let sheet = read_sheet(&text, &seen.reference().identities());
         let wrong = |error| {
-            raised::FileError::new_err(format!("{}: {}", path.display(), errors::told(&error)))
+            raised::FileError::new_err(format!("{}: {}", path.display(), errors::one_line(&error)))
         };
         how.sheet = sheet.map_err(wrong)?;
     }
@@ -118,30 +119,30 @@ pub fn calibrate(
     Py::new(py, calibration(Arc::new(solved)))
 }
 
-/// The targets that detections looked for, where nothing else is said.
+/// Returns the targets of the detections, the default if no target is given.
 pub fn of_detections(detections: &[PyRef<'_, Detection>], is_grid: bool) -> Option<Targets> {
     let first = detections.first().filter(|_| !is_grid)?;
     (!first.targets.is_empty()).then(|| Targets(first.targets.clone()))
 }
 
-/// Calibrates cameras that are fixed to each other.
+/// Calibrates the intrinsics and extrinsics of a multi-camera rig.
 ///
 /// Parameters
 /// ----------
 /// cameras : dict of str to sequence of Detection
-///     What each camera saw; pictures of one moment have the same name. The first camera is the frame of the rig.
+///     Detections of each camera; images taken at the same time have the same name. The first camera defines the frame of
+///     the rig.
 /// target : Target or sequence of Target, optional
-///     What was photographed: one target, or several that do not move against each other; that of the detections if
-///     left out.
+///     The target, or several that do not move relative to each other; defaults to those of the detections.
 /// model : str, optional
-///     As of :func:`calibrate`.
+///     See :func:`calibrate`.
 /// known : dict of str to Camera, optional
-///     Cameras that are known and kept.
+///     Known cameras, which are kept fixed.
 /// refine_target : bool, optional
-///     Whether it is found, too, where the panels are on the target.
+///     Estimate the poses of the panels on the target, too.
 /// hold_out, loss, weights, board_shape, measure_target, print_scale, distances_mm, assume_target,
 /// board_accuracy_mm
-///     As of :func:`calibrate`.
+///     See :func:`calibrate`.
 ///
 /// Returns
 /// -------
@@ -150,7 +151,7 @@ pub fn of_detections(detections: &[PyRef<'_, Detection>], is_grid: bool) -> Opti
 /// Raises
 /// ------
 /// CalibrationError
-///     Where views are too few, or nothing ties the cameras to each other.
+///     If there are too few views, or if no views connect the cameras.
 #[pyfunction]
 #[pyo3(signature = (cameras, target = None, model = "radtan", *, known = None, refine_target = false,
     hold_out = None, loss = "huber", weights = "covariance", board_shape = false, measure_target = false,
@@ -180,7 +181,7 @@ pub fn rig(
     how.refine_target = refine_target;
     if cameras.len()? < 2 && !refine_target {
         return wrong(
-            "a rig has at least two cameras; calibrate takes one, and so does refine_target"
+            "a rig has at least two cameras; for one, use calibrate or refine_target=True"
                 .to_owned(),
         );
     }
@@ -189,7 +190,7 @@ pub fn rig(
     for camera in cameras.items()?.iter() {
         let (name, detections): (String, Bound<'_, PyAny>) = camera.extract()?;
         targets::Name::new(&name)
-            .map_err(|error| raised::CalibrationError::new_err(errors::told(&error)))?;
+            .map_err(|error| raised::CalibrationError::new_err(errors::one_line(&error)))?;
         let detections: Results<'_> = detections.extract()?;
         target = target.or_else(|| of_detections(&detections.all, false));
         let known = known.remove(&name).map(|camera| camera.0.clone());
@@ -203,14 +204,14 @@ pub fn rig(
                 detections.iter().find(|(_, own)| theirs.iter().any(|(_, it)| is_same(own, it)));
             if let Some((picture, _)) = twice {
                 return wrong(format!(
-                    "{name}: {picture} has the same corners as a picture of {of}"
+                    "{name}: {picture} has the same corners as an image of {of}"
                 ));
             }
         }
         all.push(OneCamera { name, detections, known });
     }
     if let Some(name) = known.keys().next() {
-        return wrong(format!("known: there is no camera {name}"));
+        return wrong(format!("known: unknown camera {name}"));
     }
     let seen = Seen::of(target, None, [None, None], None)?;
     let solved = solve(py, seen, all, true, ModelChoice::of(model)?, how)?;

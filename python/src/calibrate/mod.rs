@@ -1,14 +1,14 @@
-//! Calibrations: from detections to cameras and rigs.
+//! Calibrates cameras and rigs from detections.
 //!
-//! Comes in: detections, their target, and keywords. Goes out: a `Calibration` or `Rig`. Calls meet the files in this
+//! Input: detections, their target, and keywords. Output: a `Calibration` or `Rig`. Calls pass through the files in this
 //! order:
 //!
-//! 1. `keywords` are `calibrate` and `rig` as they are called.
-//! 2. `solving` is what is asked for as values, and the work.
-//! 3. `calibration` is the result, `calibrated_camera` one camera of it, `views` its views and what is said of them.
-//! 4. `pickled` restores each of these.
-//! 5. `next_view` says which view to take next.
-//! 6. `comparison` says whether two results differ, and where a target is.
+//! 1. `keywords` contains the functions `calibrate` and `rig`.
+//! 2. `solving` holds their checked arguments, and solves.
+//! 3. `calibration` is the result, `calibrated_camera` one of its cameras, `views` its views and diagnoses.
+//! 4. `pickled` restores each of these after pickling.
+//! 5. `next_view` proposes the next view.
+//! 6. `comparison` tests whether two calibrations differ, and estimates the pose of a target.
 
 pub mod calibrated_camera;
 pub mod calibration;

@@ -1,4 +1,4 @@
-//! Which view of a target to take next.
+//! Proposes the next view of a target.
 
 use deltille::calibrate::{Guide, Guided, Intrinsics, Reference, views};
 use deltille::export::next_view::write;
@@ -14,7 +14,7 @@ use crate::see::camera::Camera;
 use crate::see::detection::{Results, Targets};
 use crate::see::pose::Pose;
 
-/// A view that is proposed: where to hold the board so that the camera is known best.
+/// A proposed view: the pose of the board that improves the calibration most.
 #[pyclass(frozen, module = "deltille")]
 pub struct NextView {
     next: deltille::calibrate::NextView,
@@ -24,39 +24,38 @@ pub struct NextView {
 
 #[pymethods]
 impl NextView {
-    /// How many views there are so far.
+    /// Number of views so far.
     #[getter]
     fn views(&self) -> usize {
         self.views
     }
 
-    /// What a person is to do; left and right are those of the picture.
+    /// Instructions for the user; left and right are those of the image.
     #[getter]
     fn words(&self) -> String {
         self.next.to_string()
     }
 
-    /// The pose of the target.
+    /// Proposed pose: camera from target.
     #[getter]
     fn camera_from_target(&self) -> Pose {
         Pose(self.next.camera_from_target)
     }
 
-    /// Outlines of the panels that are seen from the front, N × 2 each, float64, px; they may reach beyond the image.
+    /// Outlines of the panels visible from the front, N × 2 each, float64, px; they may extend beyond the image.
     #[getter]
     fn outlines<'py>(&self, py: Python<'py>) -> Vec<Bound<'py, PyArray2<f64>>> {
         let outlines = self.next.outlines.iter();
         outlines.map(|outline| arrays::rows(py, outline.iter().map(|at| at.to_array()))).collect()
     }
 
-    /// An arrow from the middle of the board towards its upper side, 2 × 2, float64, px; ``None`` where the lens does not
-    /// see there.
+    /// An arrow from the centre of the board towards its upper side, 2 × 2, float64, px; ``None`` if it is outside the lens.
     #[getter]
     fn upwards<'py>(&self, py: Python<'py>) -> Option<Bound<'py, PyArray2<f64>>> {
         self.next.upwards.map(|ends| arrays::rows(py, ends.iter().map(|at| at.to_array())))
     }
 
-    /// The corners that are expected to be found, N × 2, float64, px.
+    /// Expected positions of the corners, N × 2, float64, px.
     #[getter]
     fn pixels<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray2<f64>> {
         arrays::rows(py, self.next.corners.iter().map(|corner| corner.pixel.to_array()))
@@ -72,37 +71,37 @@ impl NextView {
         )
     }
 
-    /// How far the middle of the board is from the camera, mm.
+    /// Distance of the centre of the board from the camera, mm.
     #[getter]
     fn distance_mm(&self) -> f64 {
         self.next.distance_mm
     }
 
-    /// The angle between the board's normal and the line of sight, rad.
+    /// Angle between the board's normal and the line of sight, rad.
     #[getter]
     fn tilt_rad(&self) -> f64 {
         self.next.tilt_rad
     }
 
-    /// How sure projections at infinity are so far over the whole image, px; ``None`` before there is a camera.
+    /// Current projection uncertainty at infinity over the whole image, px (1σ); ``None`` before there is a calibration.
     #[getter]
     fn uncertainty_px(&self) -> Option<f64> {
         self.next.now_px
     }
 
-    /// How sure they are expected to be with this view, px.
+    /// Expected projection uncertainty with this view, px (1σ).
     #[getter]
     fn expected_px(&self) -> Option<f64> {
         self.next.expected_px
     }
 
-    /// Whether no more views are needed.
+    /// Returns whether no more views are needed.
     ///
     /// Parameters
     /// ----------
     /// until_px : float, optional
-    ///     How sure projections are to be; if left out, whether this view would lower their uncertainty by less than
-    ///     3 %.
+    ///     Required projection uncertainty, px. By default, views are enough once this one would lower the uncertainty by
+    ///     less than 3 %.
     ///
     /// Returns
     /// -------
@@ -112,7 +111,7 @@ impl NextView {
         self.next.is_enough(until_px)
     }
 
-    /// The text that ``deltille guide`` writes.
+    /// Returns the text that ``deltille guide`` writes.
     fn to_json(&self) -> String {
         write(&self.next, &self.target, self.views, self.next.is_enough(None))
     }
@@ -122,26 +121,26 @@ impl NextView {
     }
 }
 
-/// Says which view of a target to take next, so that projections are known best over the whole image.
+/// Proposes the next view of a target that lowers the projection uncertainty over the whole image most.
 ///
 /// Parameters
 /// ----------
 /// detections : sequence of Detection
-///     Of the pictures so far; none, one or two are fine.
+///     Detections in the images so far; the sequence may be empty.
 /// target : Target, optional
-///     What is photographed; that of the detections if left out.
+///     The target; defaults to that of the detections.
 /// model : str, optional
-///     As of :func:`calibrate`, but ``"auto"`` and ``"spline"``.
+///     See :func:`calibrate`; ``"auto"`` and ``"spline"`` are not supported.
 /// size_px : (int, int), optional
-///     Width and height of the pictures, before there is one.
+///     Width and height of the images; required before the first image unless ``camera`` is given.
 /// camera : Camera, optional
-///     The camera as it is nearly; all its parameters are found anew.
+///     Initial guess of the camera; all its parameters are estimated.
 /// nearest_mm, farthest_mm : float, optional
-///     Distances at which the board can be held and is in focus.
+///     Range of distances at which the board can be held and is in focus.
 /// avoid : sequence of NextView, optional
 ///     Views that cannot be taken.
 /// assume_target : bool, optional
-///     As of :func:`calibrate`.
+///     See :func:`calibrate`.
 ///
 /// Returns
 /// -------
@@ -150,7 +149,7 @@ impl NextView {
 /// Raises
 /// ------
 /// CalibrationError
-///     Where the size of the pictures is not known, or detections do not belong to the target.
+///     If the size of the images is not known, or if detections do not belong to the target.
 #[pyfunction]
 #[pyo3(signature = (detections, target = None, model = "radtan", *, size_px = None, camera = None,
     nearest_mm = None, farthest_mm = None, avoid = None, assume_target = false))]
@@ -171,7 +170,7 @@ pub fn next_view(
     let target = target.or_else(|| of_detections(&detections.all, false));
     let seen = Seen::of(target, None, [None; 2], None)?;
     let [target] = seen.targets() else {
-        return Err(wrong("target: give one at a time"));
+        return Err(wrong("next_view needs exactly one target"));
     };
     let checked = |name: &str, mm: Option<f64>| {
         mm.map(|mm| number(name, mm, distance_mm::RANGE, errors::calibration)).transpose()
@@ -183,7 +182,7 @@ pub fn next_view(
         (None, ModelChoice(Some(model))) => model.into(),
         (None, ModelChoice(None)) => {
             return Err(wrong(
-                "model: auto chooses when the pictures are there: give the richest one",
+                "model auto needs images to choose from; pass the model with the most parameters you consider",
             ));
         }
     };
@@ -192,10 +191,10 @@ pub fn next_view(
     let side = |side: i64| whole("size_px", side, errors::calibration);
     let size_px = size_px.map(|(width, height)| Ok::<_, PyErr>([side(width)?, side(height)?]));
     let size = of_pictures.or(of_camera).or(size_px.transpose()?);
-    let size = size.ok_or_else(|| wrong("size_px: give it before there is a picture"))?;
+    let size = size.ok_or_else(|| wrong("size_px is required before the first image"))?;
     let guide = Guide::new(target, size, intrinsics);
     let guide = guide.ok_or_else(|| {
-        wrong("there is no guide to a target without corners, to a spline, or to a camera of another size")
+        wrong("no view can be proposed: the target has no corners, the model is spline, or the camera has another image size")
     })?;
     let avoided: Vec<deltille::calibrate::NextView> =
         avoid.unwrap_or_default().iter().map(|view| view.next.clone()).collect();

@@ -1,4 +1,4 @@
-//! What pickle restores calibrations, their cameras and views by.
+//! Pickling of calibrations, their cameras and views.
 
 use deltille::calibrate::{Estimate, Reference};
 use deltille::export::calibration::Residuals;
@@ -9,10 +9,10 @@ use pyo3::prelude::*;
 use super::solving::Solved;
 use crate::boundary::errors::{self, Raise};
 
-/// What a part of a calibration is restored from: the whole, its targets, the camera, and the view, if it is one.
+/// Data to restore part of a calibration: its whole text, the targets, the camera, and the view, if any.
 pub type Part = (String, Vec<String>, usize, Option<usize>);
 
-/// What pickle restores a calibration or a rig by.
+/// Returns the result of `__reduce__` for a calibration or a rig.
 pub fn pickled<'py>(
     py: Python<'py>,
     restore: &str,
@@ -23,13 +23,13 @@ pub fn pickled<'py>(
     Ok((restore, (solved.json(Residuals::Listed), targets)))
 }
 
-/// What was pickled.
+/// Restores a pickled calibration or rig.
 pub fn restored(json: &str, targets: &[String]) -> PyResult<Solved> {
     let targets = targets.iter().map(|text| Printing::from_json(text).raise(errors::target));
     of_text(json, targets.collect::<PyResult<_>>()?).raise(errors::calibration)
 }
 
-/// A calibration or rig of a text.
+/// Reads a calibration or rig from text.
 pub fn of_text(text: &str, targets: Vec<Printing>) -> Result<Solved, saved::SavedError> {
     let scene: Vec<_> = targets.iter().map(|printing| printing.target.clone()).collect();
     let estimate: Estimate = match scene.as_slice() {

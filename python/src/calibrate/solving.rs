@@ -1,4 +1,4 @@
-//! From detections to calibrations: what is asked for, and the work.
+//! Solves calibrations: checked arguments, and the work.
 
 use std::collections::BTreeSet;
 use std::path::Path;
@@ -23,12 +23,12 @@ use crate::boundary::interrupt::interruptible;
 use crate::see::detection::{Detection, Targets};
 use crate::see::detector::{size, tiling};
 
-/// What was photographed.
+/// The photographed target.
 pub enum Seen {
-    /// Targets, of which there is at least one.
+    /// At least one target.
     Targets {
         targets: Vec<targets::Target>,
-        /// The same with their sheets.
+        /// The targets with their sheets.
         printed: Vec<Printing>,
     },
     /// An untagged board.
@@ -36,7 +36,7 @@ pub enum Seen {
 }
 
 impl Seen {
-    /// What is asked for: targets, or a grid with its edge.
+    /// Checks the arguments: targets, or a grid with its edge.
     pub fn of(
         target: Option<Targets>,
         grid: Option<&str>,
@@ -46,7 +46,7 @@ impl Seen {
         let wrong = |what: &str| Err(raised::CalibrationError::new_err(what.to_owned()));
         match (target.map(|targets| targets.0).unwrap_or_default(), grid) {
             (found, None) if found.is_empty() => wrong(
-                "give a target, or grid=\"deltille\" or \"checker\" with edge_mm for untagged boards",
+                "pass a target, or grid=\"deltille\" or \"checker\" with edge_mm for untagged boards",
             ),
             (found, None) => {
                 let own = |target: &crate::targets::target::Target| (*target.printing).clone();
@@ -56,17 +56,17 @@ impl Seen {
             }
             (found, Some(grid)) if found.is_empty() => {
                 let Some(edge_mm) = edge_mm else {
-                    return wrong("edge_mm: a board of a grid needs the edge of its tiles, mm");
+                    return wrong("grid needs edge_mm, the edge of its tiles in mm");
                 };
                 let edge_mm = number("edge_mm", edge_mm, edge_mm::RANGE, errors::calibration)?;
                 let size = size(rows, cols)?.map(|(rows, cols)| [rows, cols]);
                 Ok(Self::Grid(UntaggedGrid { kind: tiling(grid)?, edge_mm, size }))
             }
-            _ => wrong("give a target or a grid, not both"),
+            _ => wrong("target and grid exclude each other"),
         }
     }
 
-    /// What views refer to.
+    /// Returns the reference of the views.
     pub fn reference(&self) -> Reference<'_> {
         match self {
             Self::Targets { targets, .. } => match targets.as_slice() {
@@ -77,7 +77,7 @@ impl Seen {
         }
     }
 
-    /// The targets, none of a grid.
+    /// Returns the targets; none for a grid.
     pub fn targets(&self) -> &[targets::Target] {
         match self {
             Self::Targets { targets, .. } => targets,
@@ -85,7 +85,7 @@ impl Seen {
         }
     }
 
-    /// The targets with their sheets, none of a grid.
+    /// Returns the targets with their sheets; none for a grid.
     fn printed(&self) -> &[Printing] {
         match self {
             Self::Targets { printed, .. } => printed,
@@ -94,7 +94,7 @@ impl Seen {
     }
 }
 
-/// How a calibration is solved.
+/// Options of a calibration.
 #[derive(Clone)]
 pub struct How {
     pub loss: Loss,
@@ -110,7 +110,7 @@ pub struct How {
 }
 
 impl How {
-    /// What the two functions have in common.
+    /// Checks the options that `calibrate` and `rig` share.
     pub fn of(
         loss: &str,
         weights: &str,
@@ -124,15 +124,17 @@ impl How {
             "huber" => Loss::Huber,
             "cauchy" => Loss::Cauchy,
             "none" => Loss::Squared,
-            _ => return Err(wrong("loss: give huber, cauchy or none")),
+            _ => return Err(wrong(&format!("unknown loss {loss} (known: huber, cauchy, none)"))),
         };
         let weights = match weights {
             "covariance" => Weights::Covariance,
             "equal" => Weights::Equal,
-            _ => return Err(wrong("weights: give covariance or equal")),
+            _ => {
+                return Err(wrong(&format!("unknown weights {weights} (known: covariance, equal)")));
+            }
         };
         if hold_out.is_some_and(|every| every < 2) {
-            return Err(wrong("hold_out: every n-th view is kept out, n from 2"));
+            return Err(wrong("hold_out must be at least 2"));
         }
         let hold_out = hold_out.map(|every| whole("hold_out", every, errors::calibration));
         let distances_mm = distances_mm.unwrap_or_default();
@@ -158,7 +160,7 @@ impl How {
     }
 }
 
-/// How a print came out across and up the sheet: measured over stated length, one number or two.
+/// Reads the print scale across and up the sheet: measured over nominal length, one number or two.
 pub fn print_scale_of(given: &Bound<'_, PyAny>) -> PyResult<[f64; 2]> {
     match given.extract::<f64>() {
         Ok(both) => Ok([number("print_scale", both, print_scale::RANGE, errors::calibration)?; 2]),
@@ -166,7 +168,7 @@ pub fn print_scale_of(given: &Bound<'_, PyAny>) -> PyResult<[f64; 2]> {
     }
 }
 
-/// A model, or the choice of one.
+/// A model, or `None` for automatic selection.
 #[derive(Clone, Copy)]
 pub struct ModelChoice(pub Option<Model>);
 
@@ -177,14 +179,15 @@ impl ModelChoice {
             _ => match text.parse() {
                 Ok(model) => Ok(Self(Some(model))),
                 Err(error) => {
-                    let what = format!("{}, or auto, which chooses one", errors::told(&error));
+                    let what =
+                        format!("{}, or auto for automatic selection", errors::one_line(&error));
                     Err(errors::calibration(what))
                 }
             },
         }
     }
 
-    /// The model with the most parameters that may be chosen.
+    /// Returns the model with the most parameters among the choices.
     pub fn richest(self) -> Model {
         self.0.unwrap_or(Model::ThinPrism)
     }
@@ -197,15 +200,15 @@ impl ModelChoice {
 /// Detections with the names of their views.
 pub type Named = Vec<(String, detect::Detection)>;
 
-/// Detections as views: named as they are asked to be, else after their pictures, else by their place. A picture that is
-/// there twice counts once.
+/// Names the views of detections: by `names`, otherwise after their images, otherwise by their index. Duplicate images are
+/// skipped with a warning.
 pub fn named(
     py: Python<'_>,
     detections: &[PyRef<'_, Detection>],
     names: Option<Vec<String>>,
 ) -> PyResult<Named> {
     if names.as_ref().is_some_and(|names| names.len() != detections.len()) {
-        let what = "names: give as many as there are detections";
+        let what = "names must have one entry per detection";
         return Err(raised::CalibrationError::new_err(what));
     }
     let mut all: Named = Vec::new();
@@ -219,7 +222,10 @@ pub fn named(
             !found.grids.is_empty() && found.grids == other.grids
         };
         if let Some((first, _)) = all.iter().find(is_same) {
-            errors::warn(py, &format!("{name}: the same corners as in {first}, counted once"))?;
+            errors::warn(
+                py,
+                &format!("{name} has the same corners as {first}; it is counted once"),
+            )?;
             continue;
         }
         all.push((name, (**found).clone()));
@@ -227,7 +233,7 @@ pub fn named(
     Ok(all)
 }
 
-/// Takes detections for those of the targets that are given, whatever they name.
+/// Assigns detections to the given targets, even if they name others.
 pub fn assume(detections: &mut Named, targets: &[targets::Target]) {
     let given: Vec<_> = targets.iter().map(targets::Target::identity).collect();
     for (_, found) in detections {
@@ -235,25 +241,25 @@ pub fn assume(detections: &mut Named, targets: &[targets::Target]) {
     }
 }
 
-/// What came of it.
+/// The result of a calibration.
 pub struct Solved {
     pub estimate: Estimate,
     pub diagnoses: Vec<Diagnosis>,
     pub print: Print,
-    /// Where the target's file has its panels.
+    /// Poses of the panels in the target's file.
     pub stated: Vec<PanelPlace>,
-    /// Models that were tried, by camera.
+    /// The models compared, by camera.
     pub models: Vec<Vec<Candidate>>,
     pub targets: Vec<Printing>,
     pub model: String,
-    /// Whether it is a rig, which may have one camera.
+    /// Whether it is a rig, which may have a single camera.
     pub is_rig: bool,
-    /// The file that it was read from, and what that says.
+    /// The text and content of the file it was read from.
     pub file: Option<(String, Value)>,
 }
 
 impl Solved {
-    /// One that was read from a file.
+    /// Makes a result read from a file.
     pub fn read(estimate: Estimate, targets: Vec<Printing>, model: String, text: &str) -> Self {
         let whole: Option<Value> = serde_json::from_str(text).ok();
         let file = whole.map(|whole| (text.to_owned(), whole));
@@ -271,13 +277,13 @@ impl Solved {
         }
     }
 
-    /// What the file says that it was read from, of a camera where it has several.
+    /// Returns the content of the file it was read from, restricted to a camera if there are several.
     pub fn in_file(&self, camera: Option<usize>) -> Option<&Value> {
         let (_, whole) = self.file.as_ref()?;
         Some(camera.and_then(|camera| whole["cameras"].get(camera)).unwrap_or(whole))
     }
 
-    /// Whether all is known that a page shows: of a file the sentences alone are, not what they come from.
+    /// Whether all data for a report is known. A file contains the sentences of diagnoses, but not their data.
     pub fn is_whole(&self) -> bool {
         let is_said =
             |file: &Value| file["diagnoses"].as_array().is_some_and(|all| !all.is_empty());
@@ -285,12 +291,12 @@ impl Solved {
         self.has_corners() && !self.in_file(None).is_some_and(is_lost)
     }
 
-    /// Whether the corners that it comes from are known.
+    /// Whether the corners it was calibrated from are known.
     pub fn has_corners(&self) -> bool {
         self.estimate.cameras.iter().any(|camera| camera.corner_count() > 0)
     }
 
-    /// What the programs write of it.
+    /// Returns the text that the programs write.
     pub fn json(&self, residuals: Residuals) -> String {
         if let Some((text, _)) = &self.file {
             return text.clone();
@@ -302,12 +308,12 @@ impl Solved {
         }
     }
 
-    /// Whether another one is the same, corner by corner.
+    /// Whether two results are equal, corner by corner.
     pub fn is_same(&self, other: &Self) -> bool {
         self.json(Residuals::Listed) == other.json(Residuals::Listed)
     }
 
-    /// What is said of it, as plain data with a sentence each.
+    /// Returns the diagnoses as plain data with a sentence each, and whether each is a failure.
     pub fn said(&self) -> Vec<(Value, bool)> {
         if let Some(file) = self.in_file(None) {
             let is_failure =
@@ -330,13 +336,13 @@ impl Solved {
     }
 }
 
-/// What a file says of a calibration: what is wrong together, and the other diagnoses.
+/// Returns the findings and diagnoses in a file.
 fn records_of(file: &Value) -> Vec<Value> {
     let all = ["findings", "diagnoses"].map(|list| file[list].as_array().cloned());
     all.into_iter().flatten().flatten().collect()
 }
 
-/// A camera to be found, or known, with what it saw.
+/// A known or unknown camera with its detections.
 pub struct OneCamera {
     pub name: String,
     pub detections: Named,
@@ -368,7 +374,7 @@ pub fn solve(
                 && let Some((twice, _)) =
                     camera.detections.iter().find(|(name, _)| !taken.insert((index, name.clone())))
             {
-                let what = format!("{}: two pictures are named {twice}", camera.name);
+                let what = format!("{}: two images are named {twice}", camera.name);
                 return Err(raised::CalibrationError::new_err(what));
             }
             ink.extend(camera.detections.iter().filter_map(|(_, found)| {
@@ -388,7 +394,7 @@ pub fn solve(
             let target = seen.targets().first();
             how.sheet.put_on(target, &mut of_camera).raise(errors::calibration)?;
             if of_camera.is_empty() {
-                let what = format!("{}: no picture shows the target", camera.name);
+                let what = format!("{}: no image shows the target", camera.name);
                 return Err(raised::CalibrationError::new_err(what));
             }
             let known = camera.known.map(Intrinsics::Known);
@@ -436,7 +442,7 @@ pub fn solve(
         return Err(raised::CalibrationError::new_err(text));
     }
     if estimate.frames.is_empty() {
-        let what = "no view shows the target as this camera sees it";
+        let what = "no view is consistent with this camera";
         return Err(raised::CalibrationError::new_err(what));
     }
     estimate.excluded.splice(0..0, left_out);

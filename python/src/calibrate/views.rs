@@ -1,4 +1,4 @@
-//! What is said of a calibration, and its views with their residuals.
+//! Diagnoses of a calibration, and its views with their residuals.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -17,7 +17,7 @@ use crate::boundary::errors;
 use crate::pickles;
 use crate::see::pose::Pose;
 
-/// Something that is said of a calibration, with what to do about it.
+/// A finding about a calibration, with what to do about it.
 #[pyclass(frozen, module = "deltille", eq)]
 #[derive(PartialEq, Serialize, Deserialize)]
 pub struct Diagnosis {
@@ -36,16 +36,16 @@ impl Diagnosis {
     /// The sentence.
     #[getter]
     fn sentence(&self) -> String {
-        errors::told(&self.record["text"].as_str().unwrap_or_default())
+        errors::one_line(&self.record["text"].as_str().unwrap_or_default())
     }
 
-    /// Whether what was found is not to be used as it is.
+    /// Whether the calibration failed and must not be used.
     #[getter]
     fn is_failure(&self) -> bool {
         self.is_failure
     }
 
-    /// All figures by their names, as in the file of the calibration.
+    /// All values by name, as in the file of the calibration.
     #[getter]
     fn figures<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         record(py, &self.record)
@@ -61,7 +61,7 @@ impl Diagnosis {
 }
 
 impl Excluded {
-    /// As a file has it.
+    /// Reads a record of a calibration file.
     pub fn read(record: &serde_json::Value) -> Self {
         let text = |field: &str| record[field].as_str().map(str::to_owned);
         let number = |field: &str| record[field].as_u64();
@@ -71,28 +71,28 @@ impl Excluded {
             image: text("image").unwrap_or_default(),
             panel: number("panel").map(|panel| panel as u32),
             corners: number("corners").unwrap_or(0) as usize,
-            reason: errors::told(&text("reason").unwrap_or_default()),
+            reason: errors::one_line(&text("reason").unwrap_or_default()),
         }
     }
 }
 
 pickles!(Diagnosis);
 
-/// A view, frame or panel that took no part, and why.
+/// An excluded view, frame or panel, and why.
 #[pyclass(frozen, get_all, module = "deltille", eq)]
 #[derive(PartialEq, Serialize, Deserialize)]
 pub struct Excluded {
     /// Name of the view, or of the frame of a rig.
     pub view: String,
-    /// Name of the camera in a rig; ``None`` where all are meant.
+    /// Name of the camera in a rig; ``None`` for all cameras.
     pub camera: Option<String>,
-    /// Name of the picture; empty where pictures of several cameras are meant.
+    /// Name of the image; empty for images of several cameras.
     pub image: String,
-    /// Id of the panel that is wrong in itself; ``None`` where the view does not fit as a whole.
+    /// Id of the inconsistent panel; ``None`` if the whole view is excluded.
     pub panel: Option<u32>,
-    /// How many corners were left out by it.
+    /// Number of excluded corners.
     pub corners: usize,
-    /// Why.
+    /// The reason.
     pub reason: String,
 }
 
@@ -113,7 +113,7 @@ pub struct View {
     pub view: usize,
 }
 
-/// Ids of corners on a target by panel, row and column.
+/// Returns the ids of corners on the targets by panel, row and column.
 pub fn corner_ids(targets: &[Printing]) -> BTreeMap<(usize, i32, i32), i64> {
     let panels = targets.iter().flat_map(|printing| &printing.target.panels).enumerate();
     let of_panel = |(index, panel): (usize, &targets::Panel)| {
@@ -123,12 +123,12 @@ pub fn corner_ids(targets: &[Printing]) -> BTreeMap<(usize, i32, i32), i64> {
     panels.flat_map(of_panel).collect()
 }
 
-/// The arrays of all corners of some views.
+/// Implements the arrays of all corners of some views.
 macro_rules! residual_arrays {
     ($class:ident, $self:ident => $views:expr, $solved:expr) => {
         #[pymethods]
         impl $class {
-            /// Residuals of the corners, N × 2, float64, px: detected less predicted position.
+            /// Residuals of the corners, N × 2, float64, px: detected minus predicted position.
             #[getter]
             fn residuals<'py>(&$self, py: Python<'py>) -> Bound<'py, PyArray2<f64>> {
                 let corners = $views.iter().flat_map(|view: &ViewEstimate| &view.corners);
@@ -142,7 +142,7 @@ macro_rules! residual_arrays {
                 arrays::rows(py, corners.map(|corner| corner.pixel.to_array()))
             }
 
-            /// Ids of the corners on the target, N, int64; −1 where the target is not known.
+            /// Ids of the corners on the target, N, int64; −1 if the target is not known.
             #[getter]
             fn ids<'py>(&$self, py: Python<'py>) -> Bound<'py, PyArray1<i64>> {
                 let ids = $crate::calibrate::views::corner_ids(&$solved.targets);
@@ -158,7 +158,7 @@ macro_rules! residual_arrays {
                 arrays::rows(py, corners.map(|corner| [corner.row.into(), corner.col.into()]))
             }
 
-            /// Whether each residual is larger than chance explains, N, bool.
+            /// Whether each corner is an outlier, N, bool: its residual is larger than noise explains.
             #[getter]
             fn outliers<'py>(&$self, py: Python<'py>) -> Bound<'py, PyArray1<bool>> {
                 let corners = $views.iter().flat_map(|view: &ViewEstimate| &view.corners);
@@ -179,33 +179,33 @@ impl View {
 
 #[pymethods]
 impl View {
-    /// Its name.
+    /// Name of the view.
     #[getter]
     fn name(&self) -> &str {
         &self.estimate().name
     }
 
-    /// File name of its picture.
+    /// File name of its image.
     #[getter]
     fn image(&self) -> &str {
         &self.estimate().image
     }
 
-    /// Where the target is: camera from target.
+    /// Pose of the target: camera from target.
     #[getter]
     fn pose(&self) -> Pose {
         Pose(self.estimate().pose)
     }
 
-    /// Standard deviations of the target's pose in the frame of the rig, or of the only camera, 6, float64: a
-    /// rotation about the frame's axes (rad) and a translation (mm).
+    /// Standard deviations of the target's pose in the frame of the rig, or of the single camera, 6, float64: a rotation
+    /// about the frame's axes (rad) and a translation (mm).
     #[getter]
     fn pose_sd<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
         let frame = self.solved.estimate.frames.get(self.estimate().frame);
         arrays::column(py, frame.map_or([f64::NAN; 6], |frame| frame.pose_sd))
     }
 
-    /// Root mean square error of a coordinate, px.
+    /// Reprojection error, px: RMS per axis.
     #[getter]
     fn rms_px(&self) -> f64 {
         self.estimate().rms_px

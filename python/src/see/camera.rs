@@ -1,4 +1,4 @@
-//! Cameras: projection, and files of other programs.
+//! Cameras: projection, and camera files of this package and of other programs.
 
 use std::path::PathBuf;
 
@@ -18,7 +18,7 @@ use crate::boundary::arrays::{self, number, vector, whole};
 use crate::boundary::errors::{self, Raise, RaiseFile, raised, unlocked};
 use crate::boundary::text_file::save_text;
 
-/// A camera with its lens: where points are seen, and along which rays pixels look.
+/// A camera with its lens: projects points to pixels, and unprojects pixels to rays.
 ///
 /// Pixel centres are at integers, y down; the camera frame has x right, y down, z forward.
 ///
@@ -29,27 +29,27 @@ use crate::boundary::text_file::save_text;
 /// focal_px : float or (float, float)
 ///     Focal lengths along x and y, px.
 /// centre_px : (float, float), optional
-///     Principal point, px; the middle of the image if left out.
+///     Principal point, px; defaults to the centre of the image.
 /// model : str, optional
-///     ``"pinhole"`` (Brown–Conrady), ``"fisheye"`` (Kannala–Brandt), ``"eucm"``, ``"double-sphere"`` or ``"pupil"``; the
-///     names of :func:`calibrate` are taken too, of which ``"radtan"``, ``"radtan5"``, ``"rational"`` and
-///     ``"thin-prism"`` are a pinhole with 4, 5, 8 and 12 coefficients, and ``"kannala-brandt"`` is a fisheye.
+///     ``"pinhole"`` (Brown–Conrady), ``"fisheye"`` (Kannala–Brandt), ``"eucm"``, ``"double-sphere"`` or ``"pupil"``.
+///     The names of :func:`calibrate` work, too: ``"radtan"``, ``"radtan5"``, ``"rational"`` and ``"thin-prism"`` are a
+///     pinhole with 4, 5, 8 and 12 coefficients, and ``"kannala-brandt"`` is a fisheye.
 /// distortion : sequence of floats, optional
-///     Coefficients in the order of the model: of ``"pinhole"`` k1 k2 p1 p2 k3 k4 k5 k6 s1 s2 s3 s4 as in OpenCV, of
-///     ``"fisheye"`` k1 k2 k3 k4 or more; what is left out at the end is zero.
+///     Coefficients in the order of the model: k1 k2 p1 p2 k3 k4 k5 k6 s1 s2 s3 s4 for ``"pinhole"``, as in OpenCV, and
+///     k1 k2 k3 k4 or more for ``"fisheye"``. Omitted trailing coefficients are zero.
 ///
 /// Raises
 /// ------
 /// CameraError
-///     Where this is no camera.
+///     If the parameters do not describe a valid camera.
 #[pyclass(frozen, module = "deltille", eq)]
 #[derive(Clone, PartialEq)]
 pub struct Camera(pub camera::Camera);
 
-/// What focal lengths are, px.
+/// Valid focal lengths, px.
 const FOCAL: Range = focal_px::RANGE;
 
-/// The lens of a camera file that a model is, and with how many coefficients at most.
+/// Returns the lens of a model in camera files, and its maximum number of coefficients.
 fn lens_of(model: &str) -> (&str, usize) {
     match Model::named().find(|(name, of_name)| *name == model && of_name.kind().name() != *name) {
         Some((_, of_name)) => (of_name.kind().name(), of_name.found()),
@@ -85,7 +85,7 @@ impl Camera {
         let (lens, most) = lens_of(model);
         if distortion.len() > most {
             let count = distortion.len();
-            let what = format!("distortion: {model} has {most} coefficients, not {count}");
+            let what = format!("distortion: {model} has at most {most} coefficients, got {count}");
             return Err(errors::camera(what));
         }
         let text = json!({
@@ -95,7 +95,7 @@ impl Camera {
         camera::Camera::from_yaml(&text.to_string()).map(Self).raise(errors::camera)
     }
 
-    /// Reads a camera file: one of this package (``.yaml``), of ROS or OpenCV.
+    /// Reads a camera file of this package (``.yaml``), of ROS or of OpenCV.
     ///
     /// Parameters
     /// ----------
@@ -114,13 +114,13 @@ impl Camera {
         Ok(Self(file.camera))
     }
 
-    /// The camera of a text, as :meth:`load` reads it from files.
+    /// Reads a camera from the text of a file, like :meth:`load`.
     #[staticmethod]
     fn from_yaml(text: &str) -> PyResult<Self> {
         camera::Camera::from_yaml(text).map(Self).raise(errors::camera)
     }
 
-    /// The text of this package's camera file.
+    /// Returns the text of this package's camera file.
     fn to_yaml(&self) -> String {
         self.0.to_yaml()
     }
@@ -132,10 +132,10 @@ impl Camera {
     /// path : path-like
     ///     The file.
     /// format : str, optional
-    ///     ``"own"``, which :meth:`load` reads back for every model, or that of another program, such as ``"opencv"``, of
-    ///     ``deltille.typing.CameraFormat``.
+    ///     ``"own"``, which :meth:`load` reads back for every model, ``"opencv"``, ``"ros"``, ``"kalibr"``, ``"colmap"``,
+    ///     ``"nerfstudio"`` or ``"mrcal"``.
     /// overwrite : bool, optional
-    ///     Whether a file of another kind is replaced.
+    ///     Replace an existing file even if it is of another kind.
     ///
     /// Returns
     /// -------
@@ -144,7 +144,7 @@ impl Camera {
     /// Raises
     /// ------
     /// CameraError
-    ///     Where the format has no such lens.
+    ///     If the format does not support this lens.
     #[pyo3(signature = (path, format = "own", *, overwrite = false))]
     fn save(&self, path: PathBuf, format: &str, overwrite: bool) -> PyResult<PathBuf> {
         let stem = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
@@ -175,42 +175,42 @@ impl Camera {
         self.0.parameter_names()
     }
 
-    /// Values of all parameters, float64, in the order of :attr:`parameter_names`; lengths in px, of a pupil in mm.
+    /// Values of all parameters, float64, in the order of :attr:`parameter_names`; lengths in px, those of a pupil in mm.
     #[getter]
     fn parameters<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
         arrays::column(py, self.0.parameters())
     }
 
-    /// The camera matrix of 3 × 3, float64, as OpenCV has it.
+    /// The 3 × 3 camera matrix, float64, as in OpenCV.
     #[getter]
     fn matrix<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray2<f64>> {
         let ([fx, fy], [cx, cy]) = (self.0.focal_px.to_array(), self.0.centre_px.to_array());
         arrays::rows(py, [[fx, 0.0, cx], [0.0, fy, cy], [0.0, 0.0, 1.0]])
     }
 
-    /// The coefficients of distortion for OpenCV, float64: 4, 5, 8 or 12, of a fisheye the 4 of ``cv2.fisheye``.
+    /// Distortion coefficients for OpenCV, float64: 4, 5, 8 or 12, or the 4 of ``cv2.fisheye`` for a fisheye.
     ///
     /// Raises
     /// ------
     /// CameraError
-    ///     Where OpenCV has no such lens.
+    ///     If OpenCV does not support this lens.
     #[getter]
     fn distortion<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray1<f64>>> {
         let found = formats::opencv_coefficients(&self.0).raise(errors::camera)?;
         Ok(arrays::column(py, found.values))
     }
 
-    /// Where points are seen.
+    /// Projects points to pixels.
     ///
     /// Parameters
     /// ----------
     /// points : array of N × 3
-    ///     Places in the camera frame, mm.
+    ///     Points in the camera frame, mm.
     ///
     /// Returns
     /// -------
     /// ndarray of N × 2, float64
-    ///     Pixels, which may lie outside the image; NaN where the lens does not reach.
+    ///     Pixels, which may lie outside the image; NaN for points that the lens does not project.
     fn project<'py>(
         &self,
         py: Python<'py>,
@@ -225,7 +225,7 @@ impl Camera {
         Ok(arrays::rows(py, seen))
     }
 
-    /// The directions in which pixels look.
+    /// Unprojects pixels to viewing directions.
     ///
     /// Parameters
     /// ----------
@@ -235,8 +235,7 @@ impl Camera {
     /// Returns
     /// -------
     /// ndarray of N × 3, float64
-    ///     Unit vectors of the camera frame; NaN where the lens does not reach. See :meth:`rays` for a lens that is not
-    ///     central.
+    ///     Unit vectors in the camera frame; NaN for pixels outside the lens. For a non-central lens, see :meth:`rays`.
     fn unproject<'py>(
         &self,
         py: Python<'py>,
@@ -245,7 +244,7 @@ impl Camera {
         Ok(self.rays(py, pixels)?.1)
     }
 
-    /// The rays along which pixels look.
+    /// Unprojects pixels to rays.
     ///
     /// Parameters
     /// ----------
@@ -255,9 +254,9 @@ impl Camera {
     /// Returns
     /// -------
     /// origins : ndarray of N × 3, float64
-    ///     Where they begin in the camera frame, mm: zero unless the lens is a ``pupil``.
+    ///     Origins in the camera frame, mm: zero unless the lens is a ``pupil``.
     /// directions : ndarray of N × 3, float64
-    ///     Unit vectors; NaN where the lens does not reach.
+    ///     Unit vectors; NaN for pixels outside the lens.
     #[expect(clippy::type_complexity, reason = "two arrays")]
     fn rays<'py>(
         &self,
@@ -295,7 +294,7 @@ impl Camera {
 }
 
 impl Camera {
-    /// The text of a file of another program.
+    /// Returns the text of a camera file in a format.
     pub fn text(
         &self,
         format: &str,

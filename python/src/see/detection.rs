@@ -1,4 +1,4 @@
-//! What was found in a picture.
+//! The result of detection in an image.
 
 use std::collections::BTreeMap;
 use std::path::PathBuf;
@@ -23,7 +23,7 @@ use crate::pickles;
 use crate::targets::families;
 use crate::targets::target::Target;
 
-/// Why a picture, or a grid in it, has no labels.
+/// Why an image, or a grid in it, has no labels.
 #[pyclass(frozen, module = "deltille", eq)]
 #[derive(PartialEq, Serialize, Deserialize)]
 pub struct Reason(pub detect::Reason);
@@ -37,19 +37,19 @@ impl Reason {
         kind.as_str().unwrap_or_default().to_owned()
     }
 
-    /// What to do about it, as a sentence.
+    /// The reason and what to do about it, as a sentence.
     #[getter]
     fn sentence(&self) -> String {
-        errors::told(&self.0)
+        errors::one_line(&self.0)
     }
 
-    /// Index of the grid that it is about; ``None`` for the whole picture.
+    /// Index of the grid concerned; ``None`` for the whole image.
     #[getter]
     fn grid(&self) -> Option<usize> {
         self.0.grid
     }
 
-    /// What was measured, by names with units.
+    /// Measured values; the keys include units.
     #[getter]
     fn figures(&self) -> BTreeMap<String, f64> {
         self.0.figures.clone()
@@ -66,7 +66,7 @@ impl Reason {
 
 pickles!(Reason);
 
-/// A tag that was read in a picture.
+/// A tag decoded in an image.
 #[pyclass(frozen, get_all, module = "deltille", eq)]
 #[derive(Clone, PartialEq, Serialize, Deserialize)]
 pub struct DecodedTag {
@@ -74,7 +74,7 @@ pub struct DecodedTag {
     id: u32,
     /// Name of its family.
     family: String,
-    /// Id of the panel that it lies on; ``None`` where the grid has no labels.
+    /// Id of its panel; ``None`` if the grid has no labels.
     panel: Option<u32>,
     /// Row of the lower left vertex of its tile.
     row: i32,
@@ -93,9 +93,9 @@ impl DecodedTag {
     }
 }
 
-/// What was found in one picture: corners with their labels, places and covariances.
+/// The detections in one image: corners with their labels, positions and covariances.
 ///
-/// All arrays have a row for each of the N corners, in the same order, grid after grid; each access makes a new array.
+/// All arrays have one row for each of the N corners, in the same order, grid after grid. Each access makes a new array.
 #[pyclass(frozen, module = "deltille")]
 #[derive(Clone)]
 pub struct Detection {
@@ -103,9 +103,9 @@ pub struct Detection {
     pub targets: Vec<Target>,
 }
 
-/// A connected piece of a tiling in a picture.
+/// A connected part of a tiling in an image.
 ///
-/// The arrays are those of :class:`Detection`, of one grid.
+/// The arrays are those of :class:`Detection`, restricted to this grid.
 #[pyclass(frozen, module = "deltille")]
 #[derive(Clone)]
 pub struct Grid {
@@ -118,7 +118,7 @@ impl Detection {
         self.found.grids.iter()
     }
 
-    /// The target of a grid, where it is known.
+    /// Returns the target of a grid, if it is known.
     fn target_of(&self, grid: &detect::Grid) -> Option<&targets::Target> {
         let named =
             |name: &String| self.targets.iter().find(|target| *target.target().name == **name);
@@ -129,7 +129,7 @@ impl Detection {
         found.map(|found| found.target())
     }
 
-    /// A detection with its targets, which are taken even where it names others if they are assumed.
+    /// Attaches targets to a detection; `assume_target` accepts them even if the detection names others.
     fn of(
         mut found: detect::Detection,
         targets: Vec<Target>,
@@ -142,7 +142,7 @@ impl Detection {
         Self { found: Arc::new(found), targets }.checked()
     }
 
-    /// The same, where its labels are those of its targets: of others they would be places that were never seen.
+    /// Checks that the labels belong to the targets: otherwise they would refer to points that were never observed.
     fn checked(self) -> PyResult<Self> {
         let labelled = self.found.grids.iter().filter(|grid| grid.panel.is_some());
         for (grid, target) in labelled.filter_map(|grid| Some((grid, self.target_of(grid)?))) {
@@ -152,7 +152,7 @@ impl Detection {
         Ok(self)
     }
 
-    /// Places of the corners of a grid on their target, mm.
+    /// Returns the positions of the corners of a grid on their target, mm.
     fn places(&self, grid: &detect::Grid) -> Vec<[f64; 3]> {
         let target = self.target_of(grid);
         let panel = target.zip(grid.panel);
@@ -170,7 +170,7 @@ impl Detection {
     }
 }
 
-/// Ids for an array: −1 where there is none.
+/// Converts an id for an array: −1 if there is none.
 fn id(id: Option<u32>) -> i64 {
     id.map_or(-1, i64::from)
 }
@@ -186,41 +186,41 @@ macro_rules! corner_arrays {
                 arrays::rows(py, corners.map(|corner| [corner.x, corner.y]))
             }
 
-            /// Places on the target, N × 3, float64, mm; NaN where a corner has no label.
+            /// Positions on the target, N × 3, float64, mm; NaN for corners without labels.
             #[getter]
             fn object_points<'py>(&$self, py: Python<'py>) -> Bound<'py, PyArray2<f64>> {
                 arrays::rows(py, $grids.flat_map(|grid| $of.places(grid)))
             }
 
-            /// Ids in the target, N, int64; −1 where a corner has no label.
+            /// Ids in the target, N, int64; −1 for corners without labels.
             #[getter]
             fn ids<'py>(&$self, py: Python<'py>) -> Bound<'py, PyArray1<i64>> {
                 let corners = $grids.flat_map(|grid| &grid.corners);
                 arrays::column(py, corners.map(|corner| id(corner.id)))
             }
 
-            /// Lattice rows, N, int64: on the panel, or relative where the grid has no labels.
+            /// Lattice rows, N, int64: absolute on the panel, or relative if the grid has no labels.
             #[getter]
             fn rows<'py>(&$self, py: Python<'py>) -> Bound<'py, PyArray1<i64>> {
                 let corners = $grids.flat_map(|grid| &grid.corners);
                 arrays::column(py, corners.map(|corner| i64::from(corner.row)))
             }
 
-            /// Lattice columns, N, int64, alike.
+            /// Lattice columns, N, int64: absolute on the panel, or relative if the grid has no labels.
             #[getter]
             fn cols<'py>(&$self, py: Python<'py>) -> Bound<'py, PyArray1<i64>> {
                 let corners = $grids.flat_map(|grid| &grid.corners);
                 arrays::column(py, corners.map(|corner| i64::from(corner.col)))
             }
 
-            /// Covariances of the positions, N × 2 × 2, float64, px²; NaN where the method gives none.
+            /// Covariances of the positions, N × 2 × 2, float64, px²; NaN if the method computes none.
             #[getter]
             fn covariances<'py>(&$self, py: Python<'py>) -> Bound<'py, PyArray3<f64>> {
                 let corners = $grids.flat_map(|grid| &grid.corners);
                 arrays::covariances(py, corners.map(|corner| corner.cov))
             }
 
-            /// The tags that were read.
+            /// The decoded tags.
             #[getter]
             fn tags(&$self) -> Vec<DecodedTag> {
                 let of_grid = |grid: &detect::Grid| {
@@ -237,7 +237,7 @@ macro_rules! corner_arrays {
                 $grids.flat_map(of_grid).collect()
             }
 
-            /// Whether what was found is seen as in a mirror.
+            /// Whether a grid is a mirror image.
             #[getter]
             fn mirrored(&$self) -> bool {
                 let mut grids = $grids;
@@ -256,13 +256,13 @@ corner_arrays!(Grid, self => std::iter::once(&self.of.found.grids[self.index]), 
 
 #[pymethods]
 impl Grid {
-    /// Id of the panel; ``None`` where the grid has no labels.
+    /// Id of the panel; ``None`` if the grid has no labels.
     #[getter]
     fn panel(&self) -> Option<u32> {
         self.of.found.grids[self.index].panel
     }
 
-    /// Name of the target that it belongs to, where several were looked for.
+    /// Name of its target, if the detector searched for several.
     #[getter]
     fn target(&self) -> Option<&str> {
         self.of.found.grids[self.index].target.as_deref()
@@ -295,9 +295,9 @@ impl Detection {
     /// ----------
     /// path : path-like
     /// target : Target or sequence of Target, optional
-    ///     What was looked for, from which :attr:`object_points` come.
+    ///     The target searched for; :attr:`object_points` are its corners.
     /// assume_target : bool, optional
-    ///     Whether the target is taken even where the file names another one.
+    ///     Use the target even if the file names another one.
     ///
     /// Returns
     /// -------
@@ -313,7 +313,7 @@ impl Detection {
         Self::from_json(&text, target, assume_target).map_err(wrong)
     }
 
-    /// The detection of a text, as :meth:`load` reads it from files.
+    /// Reads a detection from the text of a file, like :meth:`load`.
     #[staticmethod]
     #[pyo3(signature = (text, *, target = None, assume_target = false))]
     fn from_json(text: &str, target: Option<Targets>, assume_target: bool) -> PyResult<Self> {
@@ -321,7 +321,7 @@ impl Detection {
         Self::of(found, target.map(|targets| targets.0).unwrap_or_default(), assume_target)
     }
 
-    /// The text that ``deltille detect`` writes.
+    /// Returns the text that ``deltille detect`` writes.
     fn to_json(&self) -> String {
         detection::write(&self.found)
     }
@@ -334,7 +334,7 @@ impl Detection {
     /// format : str, optional
     ///     ``"json"``, which :meth:`load` reads back, or one for other programs, such as ``"csv"``.
     /// overwrite : bool, optional
-    ///     Whether a file of another kind is replaced.
+    ///     Replace an existing file even if it is of another kind.
     ///
     /// Returns
     /// -------
@@ -349,43 +349,43 @@ impl Detection {
         save_text(path, text, overwrite)
     }
 
-    /// Name of the picture.
+    /// Name of the image.
     #[getter]
     fn image(&self) -> &str {
         &self.found.image
     }
 
-    /// Width of the picture, px.
+    /// Width of the image, px.
     #[getter]
     fn width(&self) -> u32 {
         self.found.width
     }
 
-    /// Height of the picture, px.
+    /// Height of the image, px.
     #[getter]
     fn height(&self) -> u32 {
         self.found.height
     }
 
-    /// ``None``, by which results of many pictures are told from failures.
+    /// Always ``None``; distinguishes detections from failures in the results of many images.
     #[getter]
     fn error(&self) -> Option<bool> {
         None
     }
 
-    /// The targets that were looked for.
+    /// The targets searched for.
     #[getter]
     fn targets(&self) -> Vec<Target> {
         self.targets.clone()
     }
 
-    /// The grids: labelled ones by the id of their panel, then the others, largest first.
+    /// The grids: labelled ones in the order of their panel ids, then the others, largest first.
     #[getter(grids)]
     fn all_grids(&self) -> Vec<Grid> {
         (0..self.found.grids.len()).map(|index| Grid { of: self.clone(), index }).collect()
     }
 
-    /// Ids of the panels on which the corners lie, N, int64; −1 where a corner has no label.
+    /// Ids of the panels of the corners, N, int64; −1 for corners without labels.
     #[getter]
     fn panels<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<i64>> {
         let of = |grid: &detect::Grid| std::iter::repeat_n(id(grid.panel), grid.corners.len());
@@ -400,46 +400,46 @@ impl Detection {
         arrays::column(py, (0..).zip(&self.found.grids).flat_map(of).collect::<Vec<_>>())
     }
 
-    /// Why nothing was found, or nothing was labelled; ``None`` where there is nothing to say.
+    /// Why nothing was found or labelled; ``None`` if there is no such reason.
     #[getter]
     fn why(&self) -> Option<Reason> {
         self.found.reasons.first().cloned().map(Reason)
     }
 
-    /// All reasons why there is no more.
+    /// All reasons why something was not found or labelled.
     #[getter]
     fn reasons(&self) -> Vec<Reason> {
         self.found.reasons.iter().cloned().map(Reason).collect()
     }
 
-    /// What was found of the camera's tone curve: ``kappa``, ``kappa_deviation``, ``black``, ``white``, ``used`` and
-    /// others; ``None`` where it was not looked for.
+    /// Estimate of the camera's tone curve: ``kappa``, ``kappa_deviation`` (1σ), ``black``, ``white``, ``used`` and
+    /// others; ``None`` if it was not estimated.
     #[getter]
     fn tone<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyAny>>> {
         self.found.tone.map(|tone| record(py, &tone)).transpose()
     }
 
-    /// What was found of the spread of ink on the print: ``um``, ``um_deviation``, ``edges``, ``used`` and others;
-    /// ``None`` where it was not looked for.
+    /// Estimate of the ink spread of the print: ``um``, ``um_deviation`` (1σ), ``edges``, ``used`` and others; ``None`` if
+    /// it was not estimated.
     #[getter]
     fn ink<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyAny>>> {
         self.found.ink.map(|ink| record(py, &ink)).transpose()
     }
 
-    /// The targets that were looked for, by which results of different targets are told apart: ``name``, ``fingerprint``,
-    /// ``labels``, ``panels``, ``corners`` and ``edge_mm`` of each; empty where they are not known.
+    /// Identities of the targets searched for, which distinguish results of different targets: ``name``, ``fingerprint``,
+    /// ``labels``, ``panels``, ``corners`` and ``edge_mm`` of each; empty if they are not known.
     #[getter]
     fn target_identities<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         record(py, &self.found.targets)
     }
 
-    /// How EXIF says that the pixels are to be turned for a viewer, 2 to 8; ``None`` if not at all.
+    /// EXIF orientation, 2 to 8; ``None`` if the image is upright.
     #[getter]
     fn exif_orientation(&self) -> Option<u8> {
         self.found.file.exif_orientation
     }
 
-    /// Why some pixels do not come from the file; ``None`` of a whole one.
+    /// Why some pixels are missing from the file; ``None`` for an intact file.
     #[getter]
     fn damage(&self) -> Option<&str> {
         self.found.file.damage.as_deref()
@@ -467,19 +467,19 @@ impl Detection {
     }
 }
 
-/// A detection that was pickled.
+/// Restores a pickled detection.
 #[pyfunction]
 pub fn _detection(json: &str, targets: Vec<PyRef<'_, Target>>) -> PyResult<Detection> {
     let found = Arc::new(detection::read(json).raise(errors::detection)?);
     Ok(Detection { found, targets: targets.iter().map(|target| (**target).clone()).collect() })
 }
 
-/// A grid that was pickled.
+/// Restores a pickled grid.
 #[pyfunction]
 pub fn _grid(of: &Detection, index: usize) -> PyResult<Grid> {
     match index < of.found.grids.len() {
         true => Ok(Grid { of: of.clone(), index }),
-        false => Err(raised::DetectionError::new_err(format!("there is no grid {index}"))),
+        false => Err(raised::DetectionError::new_err(format!("the detection has no grid {index}"))),
     }
 }
 
@@ -498,10 +498,10 @@ impl<'a, 'py> FromPyObject<'a, 'py> for Targets {
     }
 }
 
-/// What came of a picture: its name, and its detection or why it could not be read.
+/// The result for an image: its name, and its detection or why it could not be read.
 type Row = (String, Option<Detection>, Option<String>);
 
-/// Detections from tables: Parquet files, or the folders that hold them.
+/// Reads detections from tables: Parquet files, or folders that contain them.
 #[pyfunction]
 pub fn _tables(
     paths: Vec<PathBuf>,
@@ -531,14 +531,14 @@ pub fn _tables(
     read.pictures.into_iter().map(row).collect()
 }
 
-/// What `detect_many` gives, without the pictures that could not be read.
+/// Results of `detect_many`, without the images that could not be read.
 pub struct Results<'py> {
     pub all: Vec<PyRef<'py, Detection>>,
     is_read: Vec<bool>,
 }
 
 impl Results<'_> {
-    /// The names of those that were read, of names of all.
+    /// Selects the names of the images that were read from the names of all.
     pub fn names(&self, names: Option<Vec<String>>) -> Option<Vec<String>> {
         let names = names?;
         if names.len() != self.is_read.len() {
@@ -555,7 +555,7 @@ impl<'a, 'py> FromPyObject<'a, 'py> for Results<'py> {
     fn extract(given: Borrowed<'a, 'py, PyAny>) -> PyResult<Self> {
         let wrong = |what: String| PyTypeError::new_err(format!("detections: {what}"));
         if given.cast::<Detection>().is_ok() {
-            return Err(wrong("give a list of them, [detection]".to_owned()));
+            return Err(wrong("expected a list, [detection]".to_owned()));
         }
         let (mut all, mut is_read) = (Vec::new(), Vec::new());
         for one in given.try_iter()? {
@@ -567,7 +567,7 @@ impl<'a, 'py> FromPyObject<'a, 'py> for Results<'py> {
                 is_read.push(false);
             } else {
                 let kind = one.get_type().qualname()?;
-                return Err(wrong(format!("{kind} is no Detection")));
+                return Err(wrong(format!("expected Detection, got {kind}")));
             }
         }
         Ok(Self { all, is_read })

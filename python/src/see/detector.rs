@@ -1,4 +1,4 @@
-//! Finding targets in pictures.
+//! Detects targets in images.
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -17,33 +17,33 @@ use crate::boundary::errors::{self, Raise, RaiseFile, raised, unlocked};
 use crate::boundary::image::Picture;
 use crate::targets::target::Target;
 
-/// Finds targets, or untagged boards, in pictures. One detector may be used by several threads at a time.
+/// Detects targets, or untagged boards, in images. Several threads can use one detector at the same time.
 ///
 /// Parameters
 /// ----------
 /// target : Target or sequence of Target, optional
-///     What is looked for.
+///     The target to find.
 /// grid : str, optional
-///     Without a target the tiling of untagged boards: ``"deltille"`` or ``"checker"``.
+///     Tiling of untagged boards, instead of a target: ``"deltille"`` or ``"checker"``.
 /// rows, cols : int, optional
-///     Rows of corners and corners in each row of such a board, which is labelled where it is seen whole.
+///     Rows of corners and corners per row of an untagged board; it is labelled if it is completely visible.
 /// tone : str or float, optional
-///     The camera's tone curve: ``"auto"`` (found from the corners), ``"linear"``, ``"srgb"``, or a gamma.
+///     Tone curve of the camera: ``"auto"`` (estimated from the corners), ``"linear"``, ``"srgb"``, or a gamma.
 /// ink : str or float, optional
-///     How far ink has spread on the print: ``"auto"`` (found from the corners), ``"none"``, or µm.
+///     Ink spread of the print: ``"auto"`` (estimated from the corners), ``"none"``, or µm.
 /// allow_mirrored : bool, optional
-///     Whether grids seen as in a mirror get labels too.
+///     Label mirrored grids, too.
 /// max_errors : int, optional
-///     Most cells of a tag that may be corrected; as many as the family always mends if left out.
+///     Maximum number of corrected cells per tag; defaults to what the family always corrects.
 /// refine : str, optional
-///     ``"model"``, with covariances, or ``"polynomial"``, that of the paper.
+///     Subpixel method: ``"model"``, with covariances, or ``"polynomial"``, the method of the paper.
 /// max_pixels : int, optional
-///     Most pixels of a picture.
+///     Maximum number of pixels of an image.
 ///
 /// Raises
 /// ------
 /// DetectionError
-///     Where there is nothing to look for, or two targets cannot be told apart.
+///     If neither a target nor a grid is given, or if two targets cannot be distinguished.
 ///
 /// Examples
 /// --------
@@ -61,7 +61,7 @@ pub struct Detector {
     asked: Arc<Asked>,
 }
 
-/// The keywords by which a detector was made, to make it again elsewhere.
+/// The keywords of a detector, for pickling.
 #[derive(Clone, Default)]
 struct Asked {
     grid: Option<String>,
@@ -91,16 +91,18 @@ impl NameOrNumber {
     }
 }
 
-/// A tiling by its name.
+/// Parses the name of a tiling.
 pub fn tiling(name: &str) -> PyResult<GridKind> {
     match name {
         "deltille" => Ok(GridKind::Deltille),
         "checker" => Ok(GridKind::Checker),
-        _ => Err(raised::DetectionError::new_err("grid: give deltille or checker")),
+        _ => Err(raised::DetectionError::new_err(format!(
+            "unknown grid {name} (known: deltille, checker)"
+        ))),
     }
 }
 
-/// Rows and columns, where they are given.
+/// Checks rows and columns, if they are given.
 pub fn sides(rows: Option<i64>, cols: Option<i64>) -> PyResult<[Option<u32>; 2]> {
     let side = |name: &str, side: Option<i64>| {
         side.map(|side| whole(name, side, errors::detection)).transpose()
@@ -108,7 +110,7 @@ pub fn sides(rows: Option<i64>, cols: Option<i64>) -> PyResult<[Option<u32>; 2]>
     Ok([side("rows", rows)?, side("cols", cols)?])
 }
 
-/// A board's rows and columns, which are both known or neither.
+/// Checks the rows and columns of a board, of which both or neither must be given.
 pub fn size(rows: Option<u32>, cols: Option<u32>) -> PyResult<Option<(u32, u32)>> {
     let wrong = |what: &str| Err(raised::DetectionError::new_err(what.to_owned()));
     match (rows, cols) {
@@ -116,8 +118,8 @@ pub fn size(rows: Option<u32>, cols: Option<u32>) -> PyResult<Option<(u32, u32)>
             Ok(Some((rows, cols)))
         }
         (None, None) => Ok(None),
-        (Some(_), Some(_)) => wrong("rows and cols: a board has 2 to 500 of each"),
-        _ => wrong("give rows and cols, or neither"),
+        (Some(_), Some(_)) => wrong("rows and cols must be from 2 to 500"),
+        _ => wrong("rows and cols must be given together"),
     }
 }
 
@@ -166,7 +168,11 @@ impl Detector {
             .refinement(match refine {
                 "model" => Refinement::Model,
                 "polynomial" => Refinement::Polynomial,
-                _ => return Err(wrong("refine: give model or polynomial".to_owned())),
+                _ => {
+                    return Err(wrong(format!(
+                        "unknown refine {refine} (known: model, polynomial)"
+                    )));
+                }
             });
         let mut limits = Limits::default();
         limits.max_pixels = max_pixels;
@@ -175,27 +181,28 @@ impl Detector {
         let detector = match (targets.as_slice(), grid) {
             ([], Some(grid)) => {
                 if allow_mirrored && size.is_none() {
-                    let what = "allow_mirrored needs labels: give a target, or rows and cols";
+                    let what = "allow_mirrored needs a target, or rows and cols";
                     return Err(wrong(what.to_owned()));
                 }
                 if matches!(ink, Ink::Um(um) if um != 0.0) {
-                    let what = "ink: µm need the size of the tiles: give a target, or ink=\"none\"";
+                    let what =
+                        "ink in µm needs the size of the tiles: pass a target, or ink=\"none\"";
                     return Err(wrong(what.to_owned()));
                 }
                 detect::Detector::for_grid(tiling(grid)?, size, config)
             }
             ([], None) => {
-                let what = "give a target, or grid=\"deltille\" or \"checker\" for untagged boards";
+                let what = "pass a target, or grid=\"deltille\" or \"checker\" for untagged boards";
                 return Err(wrong(what.to_owned()));
             }
             (_, Some(_)) => {
-                return Err(wrong("give a target or a grid, not both".to_owned()));
+                return Err(wrong("target and grid exclude each other".to_owned()));
             }
             (targets, None) => {
                 for family in targets.iter().filter_map(|target| target.codes()) {
                     if let Some(limit) = max_errors.filter(|limit| *limit > family.correctable()) {
                         return Err(wrong(format!(
-                            "max_errors: {limit} is more than the {} bits that {} can correct",
+                            "max_errors {limit} exceeds the {} cells that {} can correct",
                             family.correctable(),
                             family.name()
                         )));
@@ -209,46 +216,48 @@ impl Detector {
         Ok(Self { detector: Arc::new(detector), targets, limits, asked })
     }
 
-    /// Finds what is looked for in a picture.
+    /// Detects the target in an image.
     ///
-    /// The interpreter's lock is released meanwhile; the array must not be changed by other threads.
+    /// The interpreter's lock is released meanwhile; other threads must not change the array.
     ///
     /// Parameters
     /// ----------
     /// image : ndarray
-    ///     H × W of uint8, uint16 or float32 (0, black, to 1, white), or H × W × 3 of uint8 in the order red, green,
-    ///     blue (of OpenCV's blue, green, red give ``image[..., ::-1]``). Any strides; rows that lie in memory as they
-    ///     are read are not copied.
+    ///     H × W of uint8, uint16 or float32 (0, black, to 1, white), or H × W × 3 of uint8 in the order red, green, blue
+    ///     (for OpenCV's blue, green, red, pass ``image[..., ::-1]``). Any strides are allowed; contiguous rows are not
+    ///     copied.
     /// name : str, optional
-    ///     Name of the picture, which is noted in the result.
+    ///     Name of the image, stored in the result.
     ///
     /// Returns
     /// -------
     /// Detection
-    ///     Where nothing was found, :attr:`Detection.why` says why.
+    ///     If nothing was found, :attr:`Detection.why` gives the reason.
     ///
     /// Raises
     /// ------
     /// ImageError
-    ///     Where the array is no picture.
+    ///     If the array is not an image.
     #[pyo3(signature = (image, *, name = ""))]
     fn detect(&self, py: Python<'_>, image: &Bound<'_, PyAny>, name: &str) -> PyResult<Detection> {
         let picture = Picture::of(image, &self.limits)?;
         let Some(view) = picture.view() else {
-            return Err(raised::ImageError::new_err("the array has no rows of pixels"));
+            return Err(raised::ImageError::new_err(
+                "the memory layout of the array is not supported",
+            ));
         };
         let found = unlocked(py, || self.detector.detect(view, name))?;
         Ok(Detection { found: Arc::new(found), targets: self.targets.clone() })
     }
 
-    /// Finds what is looked for in a photograph, decoded as ``deltille detect`` does.
+    /// Detects the target in a photograph, decoded as by ``deltille detect``.
     ///
     /// Parameters
     /// ----------
     /// path : path-like
     ///     PNG, JPEG, TIFF, BMP, PGM or WebP.
     /// accept_damaged : bool, optional
-    ///     Whether JPEG files of which a part is missing are read too.
+    ///     Accept truncated JPEG files.
     ///
     /// Returns
     /// -------
@@ -257,9 +266,9 @@ impl Detector {
     /// Raises
     /// ------
     /// FileError
-    ///     Where the file cannot be opened; a :class:`MissingFileError` where it is not there.
+    ///     If the file cannot be opened; a :class:`MissingFileError` if it does not exist.
     /// ImageError
-    ///     Where it is no picture.
+    ///     If the file is not an image.
     #[pyo3(signature = (path, *, accept_damaged = false))]
     fn detect_file(
         &self,
@@ -278,16 +287,16 @@ impl Detector {
         Ok(Detection { found: Arc::new(found), targets: self.targets.clone() })
     }
 
-    /// Finds what is looked for in a photograph whose file somebody else has read, decoded as :meth:`detect_file` does.
+    /// Detects the target in the content of a photograph file, decoded as by :meth:`detect_file`.
     ///
     /// Parameters
     /// ----------
     /// data : bytes
     ///     Content of a PNG, JPEG, TIFF, BMP, PGM or WebP file.
     /// name : str, optional
-    ///     Name of the picture, which is noted in the result.
+    ///     Name of the image, stored in the result.
     /// accept_damaged : bool, optional
-    ///     Whether JPEG files of which a part is missing are read too.
+    ///     Accept truncated JPEG files.
     ///
     /// Returns
     /// -------
@@ -296,7 +305,7 @@ impl Detector {
     /// Raises
     /// ------
     /// ImageError
-    ///     Where this is no picture.
+    ///     If the data is not an image.
     #[pyo3(signature = (data, *, name = "", accept_damaged = false))]
     fn detect_bytes(
         &self,
@@ -316,7 +325,7 @@ impl Detector {
         Ok(Detection { found: Arc::new(found), targets: self.targets.clone() })
     }
 
-    /// The same detector for a second look at pictures of one print, with what they say together of the ink.
+    /// Returns a detector for a second pass over images of one print, with their combined ink estimate.
     ///
     /// Parameters
     /// ----------
@@ -325,14 +334,14 @@ impl Detector {
     /// Returns
     /// -------
     /// Detector or None
-    ///     ``None`` where a second look would find nothing else.
+    ///     ``None`` if a second pass would change nothing.
     fn with_ink_of(&self, detections: Vec<PyRef<'_, Detection>>) -> Option<Self> {
         let found: Vec<_> = detections.iter().map(|seen| seen.found.ink).collect();
         let detector = self.detector.with_ink_of(&found)?;
         Some(Self { detector: Arc::new(detector), ..self.clone() })
     }
 
-    /// The targets that are looked for.
+    /// The targets to find.
     #[getter]
     fn targets(&self) -> Vec<Target> {
         self.targets.clone()
@@ -369,7 +378,7 @@ impl Detector {
     }
 }
 
-/// A detector that was pickled.
+/// Restores a pickled detector.
 #[pyfunction]
 pub fn _detector<'py>(
     py: Python<'py>,

@@ -1,11 +1,11 @@
-//! Pictures of targets: what a camera sees, and what is found in it.
+//! Images of targets: projection, rendering and detection.
 //!
-//! Comes in: targets, cameras and pictures. Goes out: a `Detection` of each picture.
+//! Input: targets, cameras and images. Output: a `Detection` for each image.
 //!
-//! 1. `camera` projects, and is read from and written for other programs; `pose` is a rigid motion.
-//! 2. `rendering` takes a synthetic picture with them, with the true places of its corners.
-//! 3. `detector` finds targets in pictures.
-//! 4. `detection` is what it found: corners, tags, or the reason why there are none.
+//! 1. `camera` projects points, and reads and writes camera files; `pose` is a rigid motion.
+//! 2. `rendering` renders synthetic images with the true positions of the corners.
+//! 3. `detector` finds targets in images.
+//! 4. `detection` is the result: corners, tags, or the reason why there are none.
 
 pub mod camera;
 pub mod detection;

@@ -12,13 +12,13 @@ use crate::boundary::errors::{self, raised};
 
 /// A rigid motion ``y = R x + t`` between two frames, in millimetres.
 ///
-/// A pose is named after its frames: ``camera_from_target`` takes points of the target to the frame of the camera
+/// A pose is named after its frames: ``camera_from_target`` maps points of the target to the frame of the camera
 /// (x right, y down, z forward). ``a_from_b @ b_from_c`` is ``a_from_c``.
 ///
 /// Parameters
 /// ----------
 /// rvec : sequence of 3 floats, optional
-///     Rotation vector (axis times angle), in radians, as OpenCV has it.
+///     Rotation vector (axis times angle), in radians, as in OpenCV.
 /// tvec : sequence of 3 floats, optional
 ///     Translation in mm.
 ///
@@ -46,14 +46,14 @@ impl Pose {
         Ok(Self(camera::Pose { rotation, translation: tvec.into() }))
     }
 
-    /// The pose of a camera that stands at ``eye`` and looks at ``at``: camera from target.
+    /// Returns the pose of a camera at ``eye`` that looks at ``at``: camera from target.
     ///
     /// Parameters
     /// ----------
     /// eye, at : sequence of 3 floats
-    ///     Places in the frame of the target, mm.
+    ///     Points in the frame of the target, mm.
     /// up : sequence of 3 floats, optional
-    ///     What is up in the picture; z unless the camera looks along it, then y.
+    ///     Up direction of the image; defaults to z, or to y if the camera looks along z.
     ///
     /// Returns
     /// -------
@@ -70,12 +70,12 @@ impl Pose {
         Self::looking_at(place("eye", eye)?, place("at", at)?, up)
     }
 
-    /// The pose of a 4 × 4 matrix.
+    /// Converts a matrix to a pose.
     ///
     /// Parameters
     /// ----------
     /// matrix : array of 4 × 4, or of 3 × 4
-    ///     Rotation and translation (mm).
+    ///     Rotation matrix and translation (mm).
     ///
     /// Returns
     /// -------
@@ -85,31 +85,29 @@ impl Pose {
         let wrong = |what: &str| Err(raised::ArgumentError::new_err(format!("matrix: {what}")));
         let rows = arrays::rows_of::<4>("matrix", matrix)?;
         let ([x, y, z] | [x, y, z, _]) = rows.as_slice() else {
-            return wrong("a pose is 4 × 4, or 3 × 4");
+            return wrong("expected 4 × 4 or 3 × 4");
         };
         let outside = rows.iter().flatten().find_map(|&number| place_mm::RANGE.check(number).err());
         if let Some(outside) = outside {
             return wrong(&outside.to_string());
         }
         if rows.get(3).is_some_and(|last| *last != [0.0, 0.0, 0.0, 1.0]) {
-            return wrong("the last row of a pose is 0 0 0 1");
+            return wrong("the last row must be 0 0 0 1");
         }
         let column = |j: usize| DVec3::new(x[j], y[j], z[j]);
         let rotation = DMat3::from_cols(column(0), column(1), column(2));
         let off = rotation.transpose() * rotation - DMat3::IDENTITY;
         if off.to_cols_array().iter().any(|part| part.abs() > 1e-6) {
-            return wrong(
-                "its first three columns are no rotation: not of length 1 at right angles",
-            );
+            return wrong("the first three columns are not a rotation (orthonormal)");
         }
         if rotation.determinant() < 0.0 {
-            return wrong("its first three columns are a reflection, not a rotation");
+            return wrong("the first three columns are a reflection, not a rotation");
         }
         let rotation = DQuat::from_mat3(&rotation).normalize();
         Ok(Self(camera::Pose { rotation, translation: column(3) }))
     }
 
-    /// The motion as a matrix of 4 × 4, float64.
+    /// The motion as a 4 × 4 matrix, float64.
     #[getter]
     fn matrix<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray2<f64>> {
         let rotation = DMat3::from_quat(self.0.rotation);
@@ -120,43 +118,43 @@ impl Pose {
         arrays::rows(py, [row(0), row(1), row(2), [0.0, 0.0, 0.0, 1.0]])
     }
 
-    /// The rotation as a matrix of 3 × 3, float64.
+    /// The rotation as a 3 × 3 matrix, float64.
     #[getter]
     fn rotation<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray2<f64>> {
         arrays::matrix3(py, &DMat3::from_quat(self.0.rotation))
     }
 
-    /// The rotation as a vector of 3: axis times angle in radians, as OpenCV has it.
+    /// The rotation vector: axis times angle in radians, as in OpenCV.
     #[getter]
     fn rvec<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
         let [turn, _] = self.0.off(&camera::Pose::IDENTITY);
         arrays::column(py, turn.to_array())
     }
 
-    /// The translation as a vector of 3, in mm.
+    /// The translation vector, mm.
     #[getter]
     fn tvec<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
         arrays::column(py, self.0.translation.to_array())
     }
 
-    /// Where the origin of the second frame is in the first, a vector of 3, in mm: of ``camera_from_target`` the
-    /// place of the camera.
+    /// The origin of the destination frame in the source frame, mm: for ``camera_from_target``, the position of the camera on
+    /// the target.
     #[getter]
     fn origin<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
         arrays::column(py, self.0.inverse().translation.to_array())
     }
 
-    /// The motion back.
+    /// Returns the inverse motion.
     fn inverse(&self) -> Self {
         Self(self.0.inverse())
     }
 
-    /// Points of the second frame for points of the first.
+    /// Maps points from the source frame to the destination frame.
     ///
     /// Parameters
     /// ----------
     /// points : array of N × 3
-    ///     Places in mm.
+    ///     Points, mm.
     ///
     /// Returns
     /// -------
@@ -174,14 +172,14 @@ impl Pose {
     fn __matmul__(&self, first: &Bound<'_, PyAny>) -> PyResult<Self> {
         match first.cast::<Self>() {
             Ok(first) => Ok(Self(self.0.after(&first.get().0))),
-            Err(_) => Err(PyTypeError::new_err(
-                "pose @ pose is a pose; points are moved by pose.apply(points)",
-            )),
+            Err(_) => {
+                Err(PyTypeError::new_err("@ combines two poses; use pose.apply(points) for points"))
+            }
         }
     }
 
     fn __repr__(&self) -> String {
-        self.told()
+        self.text()
     }
 
     fn __reduce__<'py>(slf: &Bound<'py, Self>) -> crate::Reduced<'py, ([f64; 4], [f64; 3])> {
@@ -189,7 +187,7 @@ impl Pose {
         Ok((slf.get_type().getattr("_of")?, (rotation.to_array(), translation.to_array())))
     }
 
-    /// A pose that was pickled.
+    /// Restores a pickled pose.
     #[staticmethod]
     fn _of(quaternion: [f64; 4], translation: [f64; 3]) -> Self {
         let rotation = DQuat::from_array(quaternion);
@@ -198,15 +196,15 @@ impl Pose {
 }
 
 impl Pose {
-    /// The pose of a camera that stands somewhere and looks at something.
+    /// Returns the pose of a camera at `eye` that looks at `at`.
     pub fn looking_at(eye: [f64; 3], at: [f64; 3], up: Option<[f64; 3]>) -> PyResult<Self> {
         let pose = camera::Pose::viewing(eye.into(), at.into(), up.map(DVec3::from));
-        let wrong = "up must not be parallel to the line of sight, nor eye be at";
+        let wrong = "up must not be parallel to the line of sight, and eye and at must differ";
         pose.map(Self).ok_or_else(|| raised::ArgumentError::new_err(wrong))
     }
 
-    /// As it is made.
-    pub fn told(&self) -> String {
+    /// Formats the pose as the expression that makes it.
+    pub fn text(&self) -> String {
         let [turn, _] = self.0.off(&camera::Pose::IDENTITY);
         let t = self.0.translation;
         format!(

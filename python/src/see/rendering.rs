@@ -1,4 +1,4 @@
-//! Synthetic pictures of targets, with the true places of their corners.
+//! Synthetic images of targets, with the true positions of their corners.
 
 use std::path::PathBuf;
 
@@ -18,7 +18,7 @@ use crate::boundary::errors::{self, Raise, RaiseFile, raised};
 use crate::boundary::interrupt::interruptible;
 use crate::targets::target::Target;
 
-/// The true places of the N corners that a synthetic picture shows.
+/// The true positions of the N corners visible in a synthetic image.
 #[pyclass(frozen, module = "deltille")]
 pub struct Truth {
     corners: Vec<TruthCorner>,
@@ -35,7 +35,7 @@ impl Truth {
         arrays::rows(py, self.corners.iter().map(|corner| [corner.x, corner.y]))
     }
 
-    /// Places on the target, N × 3, float64, mm.
+    /// Positions on the target, N × 3, float64, mm.
     #[getter]
     fn object_points<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray2<f64>> {
         arrays::rows(py, self.corners.iter().map(|corner| corner.target_mm.to_array()))
@@ -65,13 +65,13 @@ impl Truth {
         arrays::column(py, self.corners.iter().map(|corner| i64::from(corner.panel)))
     }
 
-    /// Where the target is: camera from target.
+    /// Pose of the target: camera from target.
     #[getter]
     fn pose(&self) -> Pose {
         self.pose
     }
 
-    /// Reads what ``deltille render`` writes beside a picture.
+    /// Reads the truth file that ``deltille render`` writes next to an image.
     ///
     /// Parameters
     /// ----------
@@ -84,22 +84,23 @@ impl Truth {
     fn load(path: PathBuf) -> PyResult<Self> {
         let text = Limits::default().read_text(&path).raise_of_file(&path, errors::file)?;
         let found = truth::read(&text);
-        let wrong = |error| errors::file(format!("{}: {}", path.display(), errors::told(&error)));
+        let wrong =
+            |error| errors::file(format!("{}: {}", path.display(), errors::one_line(&error)));
         found.map(Self::from).map_err(wrong)
     }
 
-    /// The truth of a text, as :meth:`load` reads it from files.
+    /// Reads the truth from the text of a file, like :meth:`load`.
     #[staticmethod]
     fn from_json(text: &str) -> PyResult<Self> {
         truth::read(text).map(Self::from).raise(errors::file)
     }
 
-    /// The text that ``deltille render`` writes beside a picture.
+    /// Returns the text that ``deltille render`` writes next to an image.
     ///
     /// Parameters
     /// ----------
     /// image : str, optional
-    ///     Name of the picture's file.
+    ///     Name of the image file.
     #[pyo3(signature = (image = ""))]
     fn to_json(&self, image: &str) -> String {
         truth::write(image, &self.target, &self.pose.0, &self.light, &self.corners)
@@ -125,7 +126,7 @@ impl From<truth::Truth> for Truth {
     }
 }
 
-/// Takes a synthetic picture of a target.
+/// Renders a synthetic image of a target.
 ///
 /// Parameters
 /// ----------
@@ -135,19 +136,19 @@ impl From<truth::Truth> for Truth {
 /// pose : Pose, optional
 ///     Camera from target.
 /// eye : sequence of 3 floats, optional
-///     Instead of ``pose``: where the camera stands in the target's frame, mm.
+///     Position of the camera in the target's frame, mm, instead of ``pose``.
 /// look_at : sequence of 3 floats, optional
-///     What it looks at, mm; the middle of all corners if left out.
+///     Point it looks at, mm; defaults to the centroid of the corners.
 /// up : sequence of 3 floats, optional
-///     What is up in the picture.
+///     Up direction of the image.
 /// blur_px : float, optional
 ///     Standard deviation of the blur, px.
 /// noise : float, optional
-///     Standard deviation of the noise, of full scale 1.
+///     Standard deviation of the noise, relative to full scale.
 /// gradient : (float, float), optional
-///     Relative change of the light across and down the picture, -2 to 2; none if left out.
+///     Relative change of the light across and down the image, -2 to 2; defaults to none.
 /// white, black, background : float, optional
-///     Grey values of paper, print and what is around, of full scale 1.
+///     Grey values of paper, print and background, relative to full scale.
 /// seed : int, optional
 ///     Seed of the noise.
 /// dtype : str, optional
@@ -156,9 +157,9 @@ impl From<truth::Truth> for Truth {
 /// Returns
 /// -------
 /// image : ndarray of H × W
-///     Grey values of the type that was asked for.
+///     Grey values of the requested type.
 /// truth : Truth
-///     The true places of all corners in view.
+///     The true positions of all corners in view.
 #[pyfunction]
 #[pyo3(signature = (target, camera, pose = None, *, eye = None, look_at = None, up = None, blur_px = 0.8,
     noise = 0.01, gradient = None, white = 0.9, black = 0.1, background = 0.5, seed = 0, dtype = "uint8"))]
@@ -184,8 +185,10 @@ pub fn render<'py>(
     let own = target.clone();
     let of = own.target();
     if !of.is_one_scene() {
-        let what =
-            format!("{} has several loose boards: render targets of one board, or solids", of.name);
+        let what = format!(
+            "{} has several separate boards; only a single board or a solid can be rendered",
+            of.name
+        );
         return Err(wrong(what));
     }
     let camera = camera.0.clone();
@@ -208,9 +211,7 @@ pub fn render<'py>(
     let pose = match (pose, eye) {
         (Some(pose), None) if look_at.or(up).is_none() => *pose,
         (Some(_), None) => {
-            return Err(wrong(
-                "look_at and up belong to eye: a pose says where it looks".to_owned(),
-            ));
+            return Err(wrong("look_at and up need eye, and exclude pose".to_owned()));
         }
         (None, Some(eye)) => {
             let places = own.all().map(|(_, corner)| corner.target_mm);
@@ -218,7 +219,7 @@ pub fn render<'py>(
             Pose::looking_at(place("eye", eye)?, look_at.unwrap_or(middle.to_array()), up)?
         }
         _ => {
-            let what = "give pose, or eye for where the camera stands";
+            let what = "pass pose or eye (the position of the camera), not both";
             return Err(wrong(what.to_owned()));
         }
     };
@@ -234,7 +235,7 @@ pub fn render<'py>(
     let (image, corners) = drawn.raise(errors::target)?;
     let shape = (image.height(), image.width());
     let pixels = image.pixels();
-    let full = "a picture has all its pixels";
+    let full = "an image has all its pixels";
     let array = match dtype {
         "uint8" => {
             let grey = pixels.iter().map(|v| (v * 255.0 + 0.5) as u8).collect();
@@ -248,7 +249,7 @@ pub fn render<'py>(
             let grey = pixels.to_vec();
             Array2::from_shape_vec(shape, grey).expect(full).into_pyarray(py).into_any()
         }
-        _ => return Err(wrong("dtype: give uint8, uint16 or float32".to_owned())),
+        _ => return Err(wrong(format!("unknown dtype {dtype} (known: uint8, uint16, float32)"))),
     };
     Ok((array, Truth { corners, pose, light, target: name }))
 }

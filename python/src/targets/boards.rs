@@ -1,4 +1,4 @@
-//! Boards from what is asked for.
+//! Deltille boards and checkerboards.
 
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -15,10 +15,10 @@ use super::target::Target;
 use crate::boundary::arrays::whole;
 use crate::boundary::errors::{self, raised};
 
-/// What a board is, and the family of its tags.
+/// A specification, and the family of its tags.
 pub type Made = (TargetSpec, Option<Arc<family::Family>>);
 
-/// A board of a kind; what has a default of its own is added.
+/// The settings of a board; missing ones get their defaults.
 struct Wanted {
     grid: GridKind,
     size: [i64; 2],
@@ -30,7 +30,7 @@ struct Wanted {
     two_sided_mm: Option<f64>,
 }
 
-/// Tags as they are asked for.
+/// The settings of tags.
 pub struct Tags {
     pub family: Option<FamilyChoice>,
     pub tags_in: TagsIn,
@@ -41,7 +41,7 @@ pub struct Tags {
 }
 
 impl Tags {
-    /// What a specification says, and the family.
+    /// Returns the specification, and the family.
     pub fn spec(self, grid: GridKind) -> PyResult<(TagSpec, Arc<family::Family>)> {
         let default = TagSpec::usual(grid, None, self.tags_in);
         let usual_family = FamilyChoice::Name(PathBuf::from(default.family));
@@ -79,7 +79,7 @@ impl Wanted {
     }
 }
 
-/// How far tags are from each other.
+/// Checks the spacing of tags.
 pub fn spacing_of(tag_spacing: Option<i64>) -> PyResult<Option<u32>> {
     tag_spacing.map(|rows| whole("tag_spacing", rows, errors::target)).transpose()
 }
@@ -90,37 +90,37 @@ flat! {
     /// Parameters
     /// ----------
     /// rows, cols : int
-    ///     Rows of corners, and corners in each row, 2 to 500.
+    ///     Rows of corners, and corners per row, 2 to 500.
     /// edge_mm : float, optional
-    ///     Edge of a tile, mm; 20, or with ``paper`` the largest in whole mm that fits it.
+    ///     Edge of a tile, mm; defaults to 20, or with ``paper`` to the largest whole number that fits.
     /// family : Family, str or path-like, optional
-    ///     Family of the tags, see :meth:`Family.shipped`; delTag25h7 if left out. ``"dense9"`` for a place code in every
-    ///     upright tile.
+    ///     Family of the tags, see :meth:`Family.shipped`; defaults to delTag25h7. ``"dense9"`` places a position code in
+    ///     every upright tile.
     /// tags : bool, optional
-    ///     ``False`` for a board without tags.
+    ///     ``False`` makes a board without tags.
     /// tag_spacing : int, optional
-    ///     A tag in every n-th row and column.
+    ///     Place a tag in every n-th row and column.
     /// tag_border : float, optional
-    ///     Black border of a tag, in widths of a bit.
+    ///     Width of the black border of a tag, in cells.
     /// hole_mm : float, optional
-    ///     Diameter of a hole in the middle of each tag, for a screw or a camera; the family must leave the cells there free
+    ///     Diameter of a hole in the centre of each tag, for a screw or a camera; the family must leave the cells there free
     ///     (``deltag gen-family --free centre``).
     /// first_id : int, optional
     ///     Id of the first tag; the others follow.
     /// boards : int, optional
-    ///     Number of boards, alike but for their ids, each on a sheet of its own.
+    ///     Number of boards, which differ only in their ids, each on its own sheet.
     /// board_id : int, optional
     ///     Id of the first board.
     /// inverted : bool, optional
-    ///     Whether black and white are exchanged.
+    ///     Exchange black and white.
     /// poster : bool, optional
-    ///     Whether a board that is larger than the paper is printed over several pages, to be joined.
+    ///     Split a board larger than the paper across several pages, to be joined.
     /// packed : bool, optional
-    ///     Whether as many boards as fit are printed on each sheet, to be cut apart.
+    ///     Print as many boards as fit on each sheet, to be cut apart.
     /// two_sided_mm : float, optional
-    ///     Thickness of a plate that carries a board on its back, too, mm.
+    ///     Thickness of a plate with boards on both sides, mm.
     /// tag_ids : bool, optional
-    ///     Whether the id of each tag is printed beside it, in small type.
+    ///     Print the id of each tag next to it, in small type.
     Board, "board",
     (rows: i64, cols: i64),
     (
@@ -165,15 +165,15 @@ flat! {
     /// Parameters
     /// ----------
     /// rows, cols : int
-    ///     Rows of inner corners, and corners in each row, 2 to 500.
+    ///     Rows of inner corners, and corners per row, 2 to 500.
     /// edge_mm : float, optional
-    ///     Edge of a square, mm; 20, or with ``paper`` the largest in whole mm that fits it.
+    ///     Edge of a square, mm; defaults to 20, or with ``paper`` to the largest whole number that fits.
     /// family : Family, str or path-like, optional
-    ///     ``"aprilTag36h11"``, ``"aprilTag25h9"`` or ``"aprilTag16h5"``; no tags if left out.
+    ///     ``"aprilTag36h11"``, ``"aprilTag25h9"`` or ``"aprilTag16h5"``; defaults to no tags.
     /// tags_in : str, optional
-    ///     Squares that carry the tags, ``"black"`` or ``"white"``.
+    ///     Squares with tags, ``"black"`` or ``"white"``.
     /// tag_spacing, tag_border, first_id, boards, board_id, inverted, poster, packed, two_sided_mm, tag_ids
-    ///     As of :class:`Board`.
+    ///     See :class:`Board`.
     Checkerboard, "checkerboard",
     (rows: i64, cols: i64),
     (
@@ -196,7 +196,10 @@ flat! {
         let tags_in = match tags_in {
             "black" => TagsIn::Black,
             "white" => TagsIn::White,
-            _ => return Err(raised::TargetError::new_err("tags_in: give black or white")),
+            _ => {
+                let what = format!("unknown tags_in {tags_in} (known: black, white)");
+                return Err(raised::TargetError::new_err(what));
+            }
         };
         let spacing = spacing_of(tag_spacing)?;
         let first_id = whole("first_id", first_id, errors::target)?;

@@ -18,7 +18,7 @@ use crate::boundary::errors::{self, Raise, RaiseFile, raised, unlocked};
 use crate::boundary::interrupt::interruptible;
 use crate::boundary::text_file::save_text;
 
-/// A family of tags: codes with a Hamming distance in all turns.
+/// A family of tags: codes with a minimum Hamming distance over all rotations.
 #[pyclass(frozen, module = "deltille")]
 #[derive(Clone)]
 pub struct Family {
@@ -50,7 +50,7 @@ impl<'a, 'py> FromPyObject<'a, 'py> for FamilyChoice {
 }
 
 impl FamilyChoice {
-    /// What a specification calls it, and the family.
+    /// Returns its name in specifications, and the family.
     pub fn resolve(self) -> PyResult<(String, Arc<family::Family>)> {
         match self {
             Self::Family(family) => Ok((family.name().to_owned(), family)),
@@ -65,12 +65,12 @@ impl FamilyChoice {
 
 #[pymethods]
 impl Family {
-    /// A shipped family by its name, or one of a file.
+    /// Loads a bundled family by its name, or a family from a file.
     ///
     /// Parameters
     /// ----------
     /// name_or_path : str or path-like
-    ///     Such as ``"delTag25h7"``, see :meth:`shipped`, or a ``.json`` of ``deltag gen-family``.
+    ///     A name such as ``"delTag25h7"``, see :meth:`shipped`, or a ``.json`` file of ``deltag gen-family``.
     ///
     /// Returns
     /// -------
@@ -82,19 +82,19 @@ impl Family {
         Ok(Arc::new(found).into())
     }
 
-    /// The family of a text, as :meth:`load` reads it from files.
+    /// Reads a family from the text of a file, like :meth:`load`.
     #[staticmethod]
     fn from_json(text: &str) -> PyResult<Self> {
         Ok(Arc::new(family::Family::from_json(text).raise(errors::family)?).into())
     }
 
-    /// Names of the families that come with the package.
+    /// Returns the names of the families bundled with the package.
     #[staticmethod]
     fn shipped() -> Vec<&'static str> {
         family::shipped_names()
     }
 
-    /// The text of the family's file.
+    /// Returns the text of the family's file.
     fn to_json(&self) -> String {
         self.family.to_json()
     }
@@ -105,7 +105,7 @@ impl Family {
     /// ----------
     /// path : path-like
     /// overwrite : bool, optional
-    ///     Whether a file of another kind is replaced.
+    ///     Replace an existing file even if it is of another kind.
     ///
     /// Returns
     /// -------
@@ -115,31 +115,31 @@ impl Family {
         save_text(path, self.to_json(), overwrite)
     }
 
-    /// Its name.
+    /// Name of the family.
     #[getter]
     fn name(&self) -> &str {
         self.family.name()
     }
 
-    /// Number of cells of a tag that carry bits.
+    /// Number of data cells (bits) of a tag.
     #[getter]
     fn bits(&self) -> u32 {
         self.family.dimension().bits()
     }
 
-    /// Least number of cells in which two tags differ, in any turn.
+    /// Minimum Hamming distance of two tags, over all rotations.
     #[getter]
     fn distance(&self) -> u32 {
         self.family.distance()
     }
 
-    /// Number of misread cells that are always mended.
+    /// Number of misread cells that are always corrected.
     #[getter]
     fn correctable(&self) -> u32 {
         self.family.correctable()
     }
 
-    /// ``"deltille"`` of triangular tags, ``"checker"`` of square ones.
+    /// ``"deltille"`` for triangular tags, ``"checker"`` for square ones.
     #[getter]
     fn kind(&self) -> &'static str {
         kind(self.family.kind())
@@ -151,20 +151,20 @@ impl Family {
         self.family.fingerprint()
     }
 
-    /// The codes, N, uint64; a tag's id is its place.
+    /// The codes, N, uint64; the id of a tag is its index.
     #[getter]
     fn codes<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<u64>> {
         arrays::column(py, self.family.codes().iter().copied())
     }
 
-    /// How many pairs of codes, in all turns, have which distance.
+    /// Computes the histogram of Hamming distances between codes, over all rotations.
     ///
     /// Returns
     /// -------
     /// distances : ndarray of D, int64
     ///     Distances that occur, in cells.
     /// counts : ndarray of D, int64
-    ///     How often each does.
+    ///     Number of pairs at each distance.
     #[expect(clippy::type_complexity, reason = "two arrays")]
     fn distances<'py>(
         &self,
@@ -177,7 +177,7 @@ impl Family {
         Ok((distances, arrays::column(py, found.values().map(number))))
     }
 
-    /// How likely fair coins are taken for a tag.
+    /// Computes the false-positive rates for random cells.
     ///
     /// Returns
     /// -------
@@ -187,12 +187,12 @@ impl Family {
         arrays::column(py, self.family.false_positive_rates())
     }
 
-    /// How likely a triangle with a border in a natural picture is taken for a tag.
+    /// Computes the probability that a triangle with a border in a natural image is decoded as a tag.
     ///
     /// Returns
     /// -------
     /// ndarray of :attr:`correctable` + 1, float64, or None
-    ///     Probabilities with 0, 1, … corrected cells, known within a factor of 3; ``None`` of square tags and of place
+    ///     Probabilities with 0, 1, … corrected cells, known within a factor of 3; ``None`` for square tags and for position
     ///     codes.
     fn natural_false_positive_rates<'py>(
         &self,
@@ -203,43 +203,44 @@ impl Family {
         Ok(rates.map(|rates| arrays::column(py, rates)))
     }
 
-    /// How many cells whoever believes single tags may correct, so that natural false positives stay rare.
+    /// Computes how many cells to correct at most if single tags are trusted, so that false positives in natural images stay
+    /// rare.
     ///
     /// Parameters
     /// ----------
     /// accepted : float, optional
-    ///     Greatest probability that a triangle with a border in a natural picture is taken for a tag.
+    ///     Maximum probability that a triangle with a border in a natural image is decoded as a tag.
     ///
     /// Returns
     /// -------
     /// int or None
-    ///     ``None`` where that is greater even with nothing corrected, and where natural rates are not known.
+    ///     ``None`` if the rate is larger even without correction, or if natural rates are not known.
     #[pyo3(signature = (accepted = 1e-4))]
     fn recommended_correction(&self, py: Python<'_>, accepted: f64) -> PyResult<Option<u32>> {
         if !(0.0..=1.0).contains(&accepted) {
-            return Err(raised::FamilyError::new_err("accepted: give a probability, 0 to 1"));
+            return Err(raised::FamilyError::new_err("accepted must be a probability from 0 to 1"));
         }
         let family = self.family.clone();
         unlocked(py, move || family.recommended_correction(accepted))
     }
 
-    /// Finds the nearest codes, in any turn, to words that were read.
+    /// Decodes words: finds the nearest codes in any rotation.
     ///
     /// Parameters
     /// ----------
     /// words : array of N, uint64
-    ///     A bit for each cell.
+    ///     Words with one bit per cell.
     /// max_errors : int, optional
-    ///     Most cells that may be misread; :attr:`correctable` if left out, up to which answers are unique.
+    ///     Maximum number of misread cells; defaults to :attr:`correctable`, up to which results are unique.
     ///
     /// Returns
     /// -------
     /// ids : ndarray of N, int64
-    ///     Ids of the tags; −1 where no code is near enough.
+    ///     Ids of the tags; −1 if no code is close enough.
     /// rotations : ndarray of N, int64
-    ///     Counter-clockwise turns, by 120° or of square tags 90°, that give the word read; −1 where there is none.
+    ///     Number of counter-clockwise rotations of the tag, by 120° or, for square tags, 90°; −1 if no code is close enough.
     /// corrected : ndarray of N, int64
-    ///     Number of cells that were misread; −1 where there is none.
+    ///     Number of misread cells; −1 if no code is close enough.
     #[expect(clippy::type_complexity, reason = "three arrays")]
     #[pyo3(signature = (words, max_errors = None))]
     fn decode<'py>(
@@ -296,7 +297,7 @@ impl Family {
     }
 }
 
-/// The name of a tiling.
+/// Returns the name of a tiling.
 pub fn kind(kind: GridKind) -> &'static str {
     match kind {
         GridKind::Deltille => "deltille",
@@ -304,23 +305,23 @@ pub fn kind(kind: GridKind) -> &'static str {
     }
 }
 
-/// Searches a family of triangular tags, starting from the best that is known.
+/// Searches for a family of triangular tags, starting from the best known one.
 ///
 /// Parameters
 /// ----------
 /// name : str
-///     What is searched, such as ``"d25h7"``: 25 bits at a distance of 7.
+///     Name of the family, such as ``"d25h7"``: 25 bits, Hamming distance 7.
 /// seconds : float, optional
-///     How long; what is found then depends on the machine.
+///     Duration of the search; the result then depends on the machine.
 /// work : int, optional
-///     An amount of work instead of a time, which gives the same codes on every machine.
+///     Amount of work instead of a duration; gives the same codes on every machine.
 /// seed : int, optional
 ///     Seed of the random choices.
 /// from_nothing : bool, optional
-///     Whether it starts from nothing instead of what is known.
+///     Start from scratch instead of from the best known family.
 /// callback : callable, optional
-///     Called now and then with the part that is done (0 to 1) and the number of codes so far. Where it returns
-///     ``False`` the search ends with the best family so far.
+///     Called regularly with the fraction done (0 to 1) and the number of codes so far. If it returns ``False``, the search
+///     ends with the best family so far.
 ///
 /// Returns
 /// -------
@@ -340,11 +341,11 @@ pub fn search_family(
     let parts = name.strip_prefix('d').and_then(|rest| rest.split_once('h'));
     let numbers = parts.and_then(|(bits, h)| Some((bits.parse().ok()?, h.parse().ok()?)));
     let (bits, distance): (u32, u32) =
-        numbers.ok_or_else(|| wrong("give bits and distance, such as d25h7"))?;
+        numbers.ok_or_else(|| wrong("expected bits and distance, such as d25h7"))?;
     let dimension = Dimension::from_bits(bits).raise(errors::family)?;
     family::check_name(name, dimension, distance).raise(errors::family)?;
     if !(0.0..=1e9).contains(&seconds) {
-        return Err(wrong("seconds: give a time from 0 to 1e9"));
+        return Err(wrong("seconds must be from 0 to 1e9"));
     }
     let budget = match work {
         Some(steps) => Budget::Work(whole("work", steps, errors::family)?),
@@ -358,7 +359,7 @@ pub fn search_family(
         let start = if from_nothing { None } else { search.start() };
         let report = |progress: Progress| {
             if let Some(callback) = &callback {
-                told(callback, progress, stop, &error);
+                report_progress(callback, progress, stop, &error);
             }
         };
         let control = Control::default().cancel(stop).report(&report);
@@ -370,14 +371,19 @@ pub fn search_family(
     match found {
         Ok(found) => Ok(Arc::new(found).into()),
         Err(FamilyError::Field { field, .. }) if field == "codes" => {
-            Err(wrong("no word satisfies the rules at this distance: take a smaller one"))
+            Err(wrong("no word satisfies the rules at this distance; use a smaller distance"))
         }
-        Err(error) => Err(errors::family(errors::told(&error))),
+        Err(error) => Err(errors::family(errors::one_line(&error))),
     }
 }
 
-/// Tells somebody who asked how far a search has come.
-fn told(callback: &Py<PyAny>, progress: Progress, stop: &AtomicBool, error: &Mutex<Option<PyErr>>) {
+/// Reports the progress of a search to the callback.
+fn report_progress(
+    callback: &Py<PyAny>,
+    progress: Progress,
+    stop: &AtomicBool,
+    error: &Mutex<Option<PyErr>>,
+) {
     let part = progress.done as f64 / progress.total.max(1) as f64;
     let answer = Python::attach(|py| {
         let answer = callback.call1(py, (part.min(1.0), progress.codes))?;

@@ -1,4 +1,4 @@
-//! How files are made of a target: formats and keywords of `files` and `save`.
+//! Checks the formats and keywords of `files` and `save`.
 
 use deltille::export::artifacts::{Making, What};
 use deltille::export::mesh::{MAX_TEXTURE_PX, Resolution};
@@ -16,7 +16,7 @@ pub enum Formats {
 }
 
 impl Formats {
-    /// What they stand for.
+    /// Parses the names of the formats.
     pub fn parsed(self) -> PyResult<Vec<What>> {
         let names = match self {
             Self::One(format) => vec![format],
@@ -26,7 +26,7 @@ impl Formats {
     }
 }
 
-/// Keywords as they are given.
+/// The keywords of `files` and `save`.
 #[derive(Clone, Copy)]
 pub struct Keywords {
     pub dpi: f64,
@@ -39,12 +39,12 @@ pub struct Keywords {
 }
 
 impl Keywords {
-    /// How files of these formats are made of a target.
+    /// Checks the keywords for files of these formats.
     pub fn making(self, target: &Target, formats: &[What]) -> PyResult<Making> {
         self.check_use(target, formats)?;
-        let is_no_dpi = |dpi: f64| !(1.0..=1e5).contains(&dpi);
-        if is_no_dpi(self.dpi) || self.texture_dpi.is_some_and(is_no_dpi) {
-            return Err(raised::TargetError::new_err("dpi: give dots per inch from 1 to 100000"));
+        let is_invalid = |dpi: f64| !(1.0..=1e5).contains(&dpi);
+        if is_invalid(self.dpi) || self.texture_dpi.is_some_and(is_invalid) {
+            return Err(raised::TargetError::new_err("dpi must be from 1 to 100000"));
         }
         let mut making = Making::default();
         making.dpi = self.dpi;
@@ -53,18 +53,18 @@ impl Keywords {
             (Some(dpi), None) => Resolution::Dpi(dpi),
             (None, Some(px)) => {
                 let side = u32::try_from(px).ok().filter(|px| (1..=MAX_TEXTURE_PX).contains(px));
-                let refused = || format!("texture_px: give 1 to {MAX_TEXTURE_PX}");
+                let refused = || format!("texture_px must be from 1 to {MAX_TEXTURE_PX}");
                 Resolution::Side(side.ok_or_else(|| raised::TargetError::new_err(refused()))?)
             }
             (Some(_), Some(_)) => {
                 return Err(raised::TargetError::new_err(
-                    "texture_dpi and texture_px: give one of them",
+                    "texture_dpi and texture_px exclude each other",
                 ));
             }
         };
         if let Some(textures) = self.textures {
             let count = u32::try_from(textures).ok().filter(|n| (1..=MAX_TEXTURES).contains(n));
-            let refused = || format!("textures: give 1 to {MAX_TEXTURES}");
+            let refused = || format!("textures must be from 1 to {MAX_TEXTURES}");
             making.mesh.textures = count.ok_or_else(|| raised::TargetError::new_err(refused()))?;
         }
         making.mesh.plate_mm = self.plate_mm.unwrap_or(making.mesh.plate_mm);
@@ -73,7 +73,7 @@ impl Keywords {
         Ok(making)
     }
 
-    /// Refuses keywords that nothing asked for makes use of.
+    /// Rejects keywords that none of the formats uses.
     fn check_use(&self, target: &Target, formats: &[What]) -> PyResult<()> {
         use What::{LaserDxf, LaserSvg, ThreeMf};
         let asked = |of: &[What]| formats.iter().any(|format| of.contains(format));
@@ -81,11 +81,12 @@ impl Keywords {
         let is_solid = matches!(target.spec, TargetSpec::Solid(_));
         if self.plate_mm.is_some() && is_solid {
             return Err(raised::TargetError::new_err(
-                "plate_mm: a solid has no plate: leave it out",
+                "plate_mm applies to boards only, not to solids",
             ));
         }
         if self.plate_mm.is_some() && target.spec.two_sided_mm().is_some() {
-            let problem = "plate_mm: the plate is as thick as two_sided_mm says: leave it out";
+            let problem =
+                "plate_mm conflicts with two_sided_mm, which sets the thickness of the plate";
             return Err(raised::TargetError::new_err(problem));
         }
         let any = textured || asked(&[ThreeMf]);
@@ -104,9 +105,9 @@ impl Keywords {
             ),
         ];
         match idle.into_iter().find(|(_, is_given, is_used, _)| *is_given && !is_used) {
-            Some((keyword, .., needed)) => Err(raised::TargetError::new_err(format!(
-                "{keyword}: it says nothing without {needed}, or leave it out"
-            ))),
+            Some((keyword, .., needed)) => {
+                Err(raised::TargetError::new_err(format!("{keyword} needs {needed}")))
+            }
             None => Ok(()),
         }
     }

@@ -1,4 +1,4 @@
-//! Targets that other programs define: ChArUco boards, AprilGrids, grids of circles.
+//! Targets defined by other programs: ChArUco boards, AprilGrids, circle grids.
 
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -14,29 +14,29 @@ use super::target::Target;
 use crate::boundary::arrays::whole;
 use crate::boundary::errors;
 
-/// Columns and rows, as OpenCV has them.
+/// Checks columns and rows, in OpenCV's order.
 fn size_of(name: &str, (columns, rows): (i64, i64)) -> PyResult<[u32; 2]> {
     Ok([whole(name, columns, errors::target)?, whole(name, rows, errors::target)?])
 }
 
 flat! {
-    /// A ChArUco board, with OpenCV's ids and frame: the origin is the upper left corner of the board, y runs down and
-    /// z into it.
+    /// A ChArUco board, with OpenCV's ids and frame: the origin is the upper left corner of the board, y points down and z
+    /// into the board.
     ///
     /// Parameters
     /// ----------
     /// squares : tuple of int
-    ///     Squares in each row, and rows of squares, 3 to 200: OpenCV's ``size``.
+    ///     Squares per row, and rows of squares, 3 to 200: OpenCV's ``size``.
     /// square_mm : float, optional
     ///     Edge of a square, mm: OpenCV's ``squareLength``.
     /// marker_mm : float, optional
-    ///     Side of a marker with its black border, mm, ``markerLength``; three quarters of the square if left out.
+    ///     Side of a marker with its black border, mm: ``markerLength``; defaults to three quarters of the square.
     /// dictionary : str, optional
-    ///     OpenCV's, such as ``"5x5_100"``, ``"DICT_6X6_250"`` or ``"apriltag_36h11"``.
+    ///     OpenCV's dictionary, such as ``"5x5_100"``, ``"DICT_6X6_250"`` or ``"apriltag_36h11"``.
     /// first_id : int, optional
     ///     Id of the first marker; the others follow.
     /// legacy : bool, optional
-    ///     Whether the pattern is that of OpenCV before 4.6.
+    ///     Use the pattern of OpenCV before 4.6.
     /// board_id : int, optional
     ///     Id of the board.
     Charuco, "charuco",
@@ -50,7 +50,7 @@ flat! {
         board_id: i64 = 0,
     ),
     |on| {
-        // A name that is unknown is refused with the other numbers.
+        // Unknown names are rejected later, with the other settings.
         let dictionary = named(dictionary);
         let usual = CharucoSpec::new(size_of("squares", squares)?, square_mm, &dictionary);
         let spec = CharucoSpec {
@@ -65,28 +65,28 @@ flat! {
     }
 }
 
-/// The whole name of a dictionary.
+/// Returns the full name of a dictionary.
 fn named(text: &str) -> String {
     dictionary(text).map_or(text, |(name, _)| name).to_owned()
 }
 
 flat! {
-    /// An AprilGrid, with Kalibr's numbers and frame; ``save(folder, ["pdf", "kalibr"])`` writes its target file, too.
+    /// An AprilGrid, with Kalibr's ids and frame; ``save(folder, ["pdf", "kalibr"])`` also writes Kalibr's target file.
     ///
     /// Parameters
     /// ----------
     /// tags : tuple of int
-    ///     Tags in each row, and rows of tags, 2 to 100: Kalibr's ``tagCols`` and ``tagRows``.
+    ///     Tags per row, and rows of tags, 2 to 100: Kalibr's ``tagCols`` and ``tagRows``.
     /// tag_mm : float, optional
-    ///     Side of a tag with its black border, mm, Kalibr's ``tagSize``.
+    ///     Side of a tag with its black border, mm: Kalibr's ``tagSize``.
     /// gap : float, optional
-    ///     Width of the gaps between tags, in tags, 0.1 to 0.9, Kalibr's ``tagSpacing``.
+    ///     Width of the gaps between tags, as a fraction of the tag, 0.1 to 0.9: Kalibr's ``tagSpacing``.
     /// family : Family, str or path-like, optional
-    ///     Family of the tags; Kalibr reads aprilTag36h11 only.
+    ///     Family of the tags; Kalibr supports only aprilTag36h11.
     /// first_id : int, optional
     ///     Id of the first tag, at the lower left; the others follow row by row.
     /// tag_border : float, optional
-    ///     Black border of a tag, in widths of a bit, 1 to 10: Kalibr reads 2 only, most others 1.
+    ///     Width of the black border of a tag, in cells, 1 to 10: Kalibr supports only 2, most other programs only 1.
     /// board_id : int, optional
     ///     Id of the board.
     AprilGrid, "aprilgrid",
@@ -121,13 +121,13 @@ flat! {
     /// Parameters
     /// ----------
     /// circles : tuple of int
-    ///     Circles in each row, and rows, 2 to 200: OpenCV's ``patternSize``.
+    ///     Circles per row, and rows, 2 to 200: OpenCV's ``patternSize``.
     /// asymmetric : bool, optional
-    ///     Whether every second row is shifted: ``CALIB_CB_ASYMMETRIC_GRID``.
+    ///     Shift every second row: ``CALIB_CB_ASYMMETRIC_GRID``.
     /// spacing_mm : float, optional
-    ///     Distance from row to row, mm; along a row too, in an asymmetric grid half of it.
+    ///     Distance between rows, mm. Circles of a row have the same distance; in an asymmetric grid, twice that.
     /// diameter_mm : float, optional
-    ///     Diameter of a circle, mm; half of the spacing if left out.
+    ///     Diameter of a circle, mm; defaults to half of the spacing.
     /// board_id : int, optional
     ///     Id of the board.
     Circles, "circles",

@@ -1,4 +1,4 @@
-//! What targets are printed on, and how: keywords that all of them have.
+//! Common keywords of targets for paper and print.
 
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -13,7 +13,7 @@ use pyo3::prelude::*;
 use super::target::Target;
 use crate::boundary::errors::{self, Raise, RaiseFile};
 
-/// What a target is printed on.
+/// Checks the settings of the paper.
 pub fn paper(
     size: Option<&str>,
     orientation: &str,
@@ -29,7 +29,7 @@ pub fn paper(
     })
 }
 
-/// A paper with a logo, which is a file or the text of an SVG.
+/// Adds a logo, given as a file or as the text of an SVG.
 pub fn with_logo(
     paper: PaperSpec,
     logo: Option<PathBuf>,
@@ -52,7 +52,7 @@ pub fn with_logo(
     Ok(PaperSpec { logo: Some(logo), logo_height_mm, ..paper })
 }
 
-/// A target on its paper.
+/// Makes a target and lays it out on its paper.
 pub fn build(
     name: &str,
     spec: &TargetSpec,
@@ -65,9 +65,9 @@ pub fn build(
     Ok(Target { printing: Arc::new(printing.raise(errors::target)?) })
 }
 
-/// A class of flat targets: its name, that of its files, what must be given, keywords of its own with their defaults, and
-/// a block that makes a specification and its family with them. Keywords of paper and print are added, and told at the end
-/// of its documentation; the block may change the paper.
+/// Defines a class of flat targets from its name, the default name of its files, its required arguments, its keywords with
+/// their defaults, and a block that makes the specification and the family. The keywords of paper and print are added, also to
+/// the documentation; the block may change the paper.
 macro_rules! flat {
     (
         $(#[$doc:meta])*
@@ -78,33 +78,33 @@ macro_rules! flat {
     ) => {
         $(#[$doc])*
         /// paper : str, optional
-        ///     ``"A4"``, ``"letter"``, ``"297x420mm"``, …; the smallest of A4 to A0 that takes the target if left out.
+        ///     ``"A4"``, ``"letter"``, ``"297x420mm"``, …; defaults to the smallest of A4 to A0 that fits the target.
         /// orientation : str, optional
         ///     ``"auto"``, ``"portrait"`` or ``"landscape"``.
         /// margin_mm : float, optional
-        ///     Blank along the edges of the paper, mm.
+        ///     Blank margin of the paper, mm.
         /// note : str, optional
-        ///     Printed on the label of every sheet beside the name, such as whose it is.
+        ///     Text printed next to the name on the label of every sheet, such as the owner.
         /// logo : str or path-like, optional
-        ///     An SVG, or the text of one, that is printed black at the other end of the label's strip: filled paths and
-        ///     strokes; white is paper.
+        ///     An SVG file, or the text of one, printed in black at the other end of the label strip: filled paths and
+        ///     strokes; white parts stay blank.
         /// logo_height_mm : float, optional
-        ///     Height of the logo, mm; that of the strip if left out.
+        ///     Height of the logo, mm; defaults to that of the strip.
         /// guide_page : bool, optional
-        ///     Whether a page with a picture, what to do, and a ruler is added.
+        ///     Add a page with a figure, instructions and a ruler.
         /// mirrored : bool, optional
-        ///     Whether the mirror image is printed, for the back of glass; positions are those that are seen through it.
+        ///     Print the mirror image, for the back of glass; positions are those seen through the glass.
         /// white : str, optional
-        ///     Name of a spot colour of the PDF, such as ``"White"``, that lies beneath all of each page.
+        ///     Name of a spot colour of the PDF, such as ``"White"``, printed beneath the whole page.
         /// contour : str, optional
-        ///     Name of a spot colour of the PDF, such as ``"CutContour"``, of a line to cut along.
+        ///     Name of a spot colour of the PDF, such as ``"CutContour"``, for the cut line.
         /// name : str, optional
-        ///     Stem of the names of its files, printed on the sheet.
+        ///     Name of the target, printed on the sheet; the stem of its file names.
         ///
         /// Raises
         /// ------
         /// TargetError
-        ///     Where no such target can be made.
+        ///     If the settings are invalid or contradict each other.
         #[pyclass(frozen, extends = Target, module = "deltille")]
         pub struct $class;
 
@@ -132,7 +132,7 @@ macro_rules! flat {
             ) -> PyResult<PyClassInitializer<Self>> {
                 let solids = deltille::layout::SolidSheets::default();
                 let of_all = crate::targets::paper::paper(paper, orientation, margin_mm, solids)?;
-                #[allow(unused_mut, reason = "few targets have a say in it")]
+                #[allow(unused_mut, reason = "few targets change it")]
                 let mut $paper = crate::targets::paper::with_logo(
                     PaperSpec { note, guide_page, ..of_all },
                     logo,

@@ -1,4 +1,4 @@
-//! The class that a target had before it was pickled.
+//! Restores pickled targets in their class.
 
 use std::sync::Arc;
 
@@ -11,7 +11,7 @@ use super::solids::{Cube, Cuboid, Icosahedron, Octahedron, Solid, Tetrahedron};
 use super::target::Target;
 use crate::boundary::errors::{self, Raise};
 
-/// A target that was pickled.
+/// Restores a pickled target.
 #[pyfunction]
 pub fn _target<'py>(
     py: Python<'py>,

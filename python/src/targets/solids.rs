@@ -1,4 +1,4 @@
-//! Solids from what is asked for.
+//! Solids.
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -20,7 +20,7 @@ use super::target::Target;
 use crate::boundary::arrays::whole;
 use crate::boundary::errors::{self, Raise, RaiseFile, raised};
 
-/// A shape, and what is said of its solids alone.
+/// A shape, with the settings that apply to this shape only.
 struct Shape {
     shape: SolidShape,
     name: String,
@@ -36,7 +36,7 @@ impl From<SolidShape> for Shape {
 }
 
 impl Shape {
-    /// Puts the tags of rectangular faces beside those of others, where there are both.
+    /// Adds the tags of rectangular faces to those of the others, if there are both.
     fn with_squares(
         self,
         usual: Option<TagSpec>,
@@ -44,8 +44,8 @@ impl Shape {
     ) -> PyResult<(Option<TagSpec>, Arc<Family>)> {
         let Some(usual) = usual else {
             let is_asked = self.square_family.is_some() || self.first_square_id.is_some();
-            let unused = "square_family, first_square_id: the mesh has no rectangles beside other faces: give family \
-                          or first_id";
+            let unused = "square_family and first_square_id need a mesh with rectangular and other faces; use family and \
+                          first_id instead";
             return if is_asked {
                 Err(raised::TargetError::new_err(unused))
             } else {
@@ -63,7 +63,7 @@ impl Shape {
     }
 }
 
-/// A solid as it is asked for.
+/// The settings of a solid.
 struct Solids {
     shape: Shape,
     edge_mm: Option<f64>,
@@ -107,8 +107,8 @@ impl Solids {
     }
 }
 
-/// A class of solids: its name, what must be given, keywords of its own with their defaults, and a block that makes its
-/// shape of them. What all solids are asked for is added, and told at the end of its documentation.
+/// Defines a class of solids from its name, its required arguments, its keywords with their defaults, and a block that makes
+/// its shape. The common keywords of solids are added, also to the documentation.
 macro_rules! solid {
     (
         $(#[$doc:meta])*
@@ -119,34 +119,34 @@ macro_rules! solid {
     ) => {
         $(#[$doc])*
         /// edge_mm : float, optional
-        ///     Edge of the solid, mm; 150 if left out. Of a cuboid or mesh the mean of its edges, to which it is scaled;
-        ///     as it is if left out.
+        ///     Edge of the solid, mm; defaults to 150. A cuboid or mesh is scaled so that its mean edge has this length; by
+        ///     default it is not scaled.
         /// tiles : int, optional
-        ///     Black tiles along each side of a face; 10 if left out, squares 8.
+        ///     Black tiles along each side of a face; defaults to 10, or to 8 for squares.
         /// face_margin_mm : float, optional
-        ///     Blank between a face's edges and its tiles, mm.
+        ///     Blank margin between the edges of a face and its tiles, mm.
         /// family : Family, str or path-like, optional
-        ///     Family of the tags; delTag25h7 if left out, of squares aprilTag36h11.
+        ///     Family of the tags; defaults to delTag25h7, or to aprilTag36h11 for squares.
         /// tags : bool, optional
-        ///     ``False`` for bare tilings, whose faces cannot be told apart.
+        ///     ``False`` makes untagged faces, which cannot be distinguished.
         /// tag_spacing, tag_border, hole_mm, first_id, board_id, inverted
-        ///     As of :class:`Board`. White tiles on black have a margin of 8 mm unless another is given.
+        ///     See :class:`Board`. White tiles on black have a default margin of 8 mm.
         /// skeleton : bool, optional
-        ///     Whether it has a frame that holds its faces as panels.
+        ///     Add a frame that holds the faces as panels.
         /// panel_thickness_mm, wall_mm, rib_mm : float, optional
         ///     Sizes of that frame, mm.
         /// per_face : bool, optional
-        ///     Whether each face is printed on a sheet of its own instead of a net.
+        ///     Print each face on its own sheet instead of a net.
         /// allow_seams : bool, optional
-        ///     Whether a net that is larger than the paper stays in one piece, over pages that are joined along seams
-        ///     through its tiles, instead of in pieces of whole faces.
+        ///     Split a net larger than the paper across pages that are joined along seams through its tiles, instead of into
+        ///     pieces of whole faces.
         /// tag_ids, guide_page, paper, orientation, margin_mm, note, logo, logo_height_mm, name
-        ///     As of :class:`Board`.
+        ///     See :class:`Board`.
         ///
         /// Raises
         /// ------
         /// TargetError
-        ///     Where no such solid can be made.
+        ///     If the settings are invalid or contradict each other.
         #[pyclass(frozen, extends = Target, module = "deltille")]
         pub struct $class;
 
@@ -222,21 +222,21 @@ fn sheets(per_face: bool, allow_seams: bool) -> PyResult<SolidSheets> {
         (false, false) => Ok(SolidSheets::Net),
         (false, true) => Ok(SolidSheets::SeamedNet),
         (true, false) => Ok(SolidSheets::PerFace),
-        (true, true) => Err(errors::argument(
-            "allow_seams: single faces have no seams: leave per_face out".to_owned(),
-        )),
+        (true, true) => {
+            Err(errors::argument("allow_seams and per_face exclude each other".to_owned()))
+        }
     }
 }
 
-/// The skeleton that is asked for; its sizes say nothing without it.
+/// Checks the settings of the skeleton; its sizes need `skeleton=True`.
 fn frame(
     is_wanted: bool,
     [panel_thickness_mm, wall_mm, rib_mm]: [Option<f64>; 3],
 ) -> PyResult<Option<SkeletonSpec>> {
     if !is_wanted {
-        let is_said = [panel_thickness_mm, wall_mm, rib_mm].iter().any(Option::is_some);
-        let unused = "panel_thickness_mm, wall_mm and rib_mm say nothing without skeleton=True";
-        return if is_said { Err(raised::TargetError::new_err(unused)) } else { Ok(None) };
+        let is_given = [panel_thickness_mm, wall_mm, rib_mm].iter().any(Option::is_some);
+        let unused = "panel_thickness_mm, wall_mm and rib_mm need skeleton=True";
+        return if is_given { Err(raised::TargetError::new_err(unused)) } else { Ok(None) };
     }
     let usual = SkeletonSpec::default();
     Ok(Some(SkeletonSpec {
@@ -247,35 +247,35 @@ fn frame(
 }
 
 solid! {
-    /// A tetrahedron whose four faces carry tagged boards.
+    /// A tetrahedron with tagged boards on its four faces.
     ///
     /// Parameters
     /// ----------
     Tetrahedron, (), (), SolidShape::Tetrahedron
 }
 solid! {
-    /// An octahedron whose eight faces carry tagged boards.
+    /// An octahedron with tagged boards on its eight faces.
     ///
     /// Parameters
     /// ----------
     Octahedron, (), (), SolidShape::Octahedron
 }
 solid! {
-    /// An icosahedron whose twenty faces carry tagged boards.
+    /// An icosahedron with tagged boards on its twenty faces.
     ///
     /// Parameters
     /// ----------
     Icosahedron, (), (), SolidShape::Icosahedron
 }
 solid! {
-    /// A cube whose six faces carry tagged checkerboards.
+    /// A cube with tagged checkerboards on its six faces.
     ///
     /// Parameters
     /// ----------
     Cube, (), (), SolidShape::Cube
 }
 solid! {
-    /// A cuboid whose six faces carry tagged checkerboards.
+    /// A cuboid with tagged checkerboards on its six faces.
     ///
     /// Parameters
     /// ----------
@@ -284,8 +284,8 @@ solid! {
     Cuboid, (size_mm: [f64; 3]), (), SolidShape::Cuboid(size_mm.into())
 }
 solid! {
-    /// A solid of any closed mesh of flat, convex faces, with a board on each: deltille tiles on triangles, which must be
-    /// nearly equilateral, and on most others, checkerboards on rectangles.
+    /// A solid from any closed mesh of flat, convex faces, with a board on each face: checkerboards on rectangles, and deltille
+    /// tiles on most other faces. Triangles must be nearly equilateral.
     ///
     /// Parameters
     /// ----------
@@ -294,11 +294,11 @@ solid! {
     /// scale : float, optional
     ///     Millimetres per unit of the mesh, such as 1000 for metres.
     /// allow_skew : bool, optional
-    ///     Whether faces that are far from equilateral are taken, as long as a board fits.
+    ///     Accept triangles that are far from equilateral, as long as a board fits.
     /// square_family : Family, str or path-like, optional
-    ///     Family of the square tags, where the mesh has rectangular faces and others; aprilTag36h11 if left out.
+    ///     Family of the square tags, if the mesh has rectangular and other faces; defaults to aprilTag36h11.
     /// first_square_id : int, optional
-    ///     Id of the first square tag there.
+    ///     Id of the first square tag.
     Solid,
     (mesh: PathBuf),
     (
@@ -317,11 +317,11 @@ solid! {
 fn read_mesh(path: &Path, scale: f64, allow_skew: bool) -> PyResult<ClosedMesh> {
     let text = Limits::default().read(path).raise_of_file(path, errors::file)?;
     let wrong = |what: String| raised::TargetError::new_err(format!("{}: {what}", path.display()));
-    let (mesh, _) = solid_mesh::read(&text).map_err(|error| wrong(errors::told(&error)))?;
+    let (mesh, _) = solid_mesh::read(&text).map_err(|error| wrong(errors::one_line(&error)))?;
     let (face, deviation) = mesh.most_skewed();
     if deviation > NEAR_EQUILATERAL && !allow_skew {
         return Err(wrong(format!(
-            "edges of triangle {} deviate by {:.1} % from their mean, more than {:.0} %: give allow_skew=True to put \
+            "the edges of triangle {} deviate by {:.1} % from their mean (limit {:.0} %); use allow_skew=True to put \
              smaller boards on such faces",
             face + 1,
             100.0 * deviation,
@@ -330,5 +330,5 @@ fn read_mesh(path: &Path, scale: f64, allow_skew: bool) -> PyResult<ClosedMesh> 
     }
     let vertices: Vec<_> = mesh.vertices().iter().map(|&vertex| vertex * scale).collect();
     let scaled = ClosedMesh::new(&vertices, mesh.faces());
-    scaled.map(|(mesh, _)| mesh).map_err(|error| wrong(errors::told(&error)))
+    scaled.map(|(mesh, _)| mesh).map_err(|error| wrong(errors::one_line(&error)))
 }

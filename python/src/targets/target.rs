@@ -1,4 +1,4 @@
-//! Targets: what they are, and what is made of them.
+//! Targets: geometry, files and verification.
 
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -23,10 +23,10 @@ use crate::boundary::errors::{self, Raise, RaiseFile, raised, unlocked};
 use crate::boundary::interrupt::interruptible;
 use crate::pickles;
 
-/// What is printed, photographed and found: panels with corners and tags, in millimetres.
+/// A calibration target: panels with corners and tags, in millimetres.
 ///
-/// Made by :class:`Board`, :class:`Checkerboard`, :class:`Icosahedron` and the others, or read by :meth:`load`. The
-/// frame of a board is right-handed: x right, y up on the print, z towards the viewer.
+/// Make one with :class:`Board`, :class:`Checkerboard`, :class:`Icosahedron` and the other classes, or read one with
+/// :meth:`load`. The frame of a board is right-handed: x right, y up on the print, z towards the viewer.
 #[pyclass(frozen, subclass, module = "deltille")]
 #[derive(Clone)]
 pub struct Target {
@@ -34,17 +34,17 @@ pub struct Target {
 }
 
 impl Target {
-    /// All corners with their panels.
+    /// Iterates over all corners with their panels.
     pub fn all(&self) -> impl Iterator<Item = (&Panel, &Corner)> {
         of(self.target())
     }
 
-    /// Its geometry and tags, whatever it is printed on.
+    /// Returns its geometry and tags, without the layout of its print.
     pub fn target(&self) -> &targets::Target {
         &self.printing.target
     }
 
-    /// A target with the family that was given, else the one that it names.
+    /// Sets the given family, or the one that the target names.
     pub fn with_family(mut printing: Printing, family: Option<FamilyChoice>) -> PyResult<Self> {
         let target = &mut printing.target;
         match family {
@@ -62,7 +62,7 @@ impl Target {
         Ok(Self { printing: Arc::new(printing) })
     }
 
-    /// The family of its tags, which was looked up when it was made or read.
+    /// Returns the family of its tags, which was set when it was made or read.
     pub fn codes(&self) -> Option<&deltille::family::Family> {
         self.target().family().ok().flatten()
     }
@@ -72,20 +72,20 @@ impl Target {
     }
 }
 
-/// All corners of a target with their panels.
+/// Iterates over all corners of a target with their panels.
 pub fn of(target: &targets::Target) -> impl Iterator<Item = (&Panel, &Corner)> {
     target.panels.iter().flat_map(|panel| panel.corners.iter().map(move |corner| (panel, corner)))
 }
 
 #[pymethods]
 impl Target {
-    /// Reads a target: the ``.json`` that was written with it, or a ``.dsc``.
+    /// Reads a target from its ``.json`` description, or from a ``.dsc``.
     ///
     /// Parameters
     /// ----------
     /// path : path-like
     /// family : Family, str or path-like, optional
-    ///     The family of its tags, where that is not shipped.
+    ///     The family of its tags, if it is not bundled.
     ///
     /// Returns
     /// -------
@@ -98,32 +98,33 @@ impl Target {
         Self::with_family(target, family)
     }
 
-    /// The target of a text, as :meth:`load` reads it from files.
+    /// Reads a target from the text of a file, like :meth:`load`.
     #[staticmethod]
     #[pyo3(signature = (text, *, family = None))]
     fn from_json(text: &str, family: Option<FamilyChoice>) -> PyResult<Self> {
         Self::with_family(Printing::from_json(text).raise(errors::target)?, family)
     }
 
-    /// The text of the target's description.
+    /// Returns the text of the target's description.
     fn to_json(&self) -> String {
         self.printing.to_json()
     }
 
-    /// Name of the target, which is the stem of the names of its files.
+    /// Name of the target, which is the stem of its file names.
     #[getter]
     fn name(&self) -> &str {
         &self.target().name
     }
 
-    /// What tells this target from others, whatever it is called and printed on: ``name``, ``fingerprint``, ``labels``,
-    /// ``panels``, ``corners`` and ``edge_mm``; of a measured or refined target also ``plan``, the fingerprint of its print.
+    /// Identity of the target, which distinguishes it from others independently of its name and print: ``name``,
+    /// ``fingerprint``, ``labels``, ``panels``, ``corners`` and ``edge_mm``; for a measured or refined target also ``plan``,
+    /// the fingerprint of its print.
     #[getter]
     fn identity<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         arrays::record(py, &self.target().identity())
     }
 
-    /// Places of all corners in the target's frame, N × 3, float64, mm: where they were measured, else as planned.
+    /// Positions of all corners in the target's frame, N × 3, float64, mm: measured if known, otherwise nominal.
     #[getter]
     fn corners<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray2<f64>> {
         arrays::rows(py, self.all().map(|(panel, corner)| panel.place_mm(corner).to_array()))
@@ -147,13 +148,13 @@ impl Target {
         arrays::column(py, self.all().map(|(_, corner)| i64::from(corner.col)))
     }
 
-    /// Ids of the panels on which the corners lie, N, int64.
+    /// Ids of the panels of the corners, N, int64.
     #[getter]
     fn corner_panels<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<i64>> {
         arrays::column(py, self.all().map(|(panel, _)| i64::from(panel.id)))
     }
 
-    /// The tags: ids, panels and places of their centres.
+    /// The tags: ids, panels and positions of their centres.
     #[getter]
     fn tags(&self) -> Vec<Tag> {
         let of_panel = |panel: &Panel| {
@@ -187,25 +188,25 @@ impl Target {
         self.target().panels.iter().map(|panel| panel.id).collect()
     }
 
-    /// The family of the tags; ``None`` of a target without.
+    /// The family of the tags; ``None`` for a target without tags.
     #[getter]
     fn family(&self) -> Option<Family> {
         self.codes().map(|family| Arc::new(family.clone()).into())
     }
 
-    /// Whether places of its corners were measured.
+    /// Whether the positions of its corners were measured.
     #[getter]
     fn is_measured(&self) -> bool {
         self.target().is_measured()
     }
 
-    /// Number of pages that it is printed on.
+    /// Number of printed pages.
     #[getter]
     fn page_count(&self) -> usize {
         self.printing.page_count()
     }
 
-    /// What is printed, as PDF.
+    /// Returns the print as PDF.
     ///
     /// Returns
     /// -------
@@ -214,12 +215,12 @@ impl Target {
         Ok(self.made(What::Pdf, Making::default())?.remove(0).1)
     }
 
-    /// A page as SVG.
+    /// Returns a page as SVG.
     ///
     /// Parameters
     /// ----------
     /// page : int, optional
-    ///     Which one, from 0.
+    ///     Index of the page, from 0.
     ///
     /// Returns
     /// -------
@@ -229,39 +230,42 @@ impl Target {
         let pages = self.made(What::Svg, Making::default())?;
         let count = pages.len();
         let found = usize::try_from(page).ok().and_then(|page| pages.into_iter().nth(page));
-        let none =
-            || raised::TargetError::new_err(format!("page {page}: there are {count}, from 0"));
+        let none = || {
+            raised::TargetError::new_err(format!(
+                "page {page} does not exist: the target has {count}, numbered from 0"
+            ))
+        };
         Ok(String::from_utf8_lossy(&found.ok_or_else(none)?.1).into_owned())
     }
 
-    /// Everything of one format in memory.
+    /// Makes all files of one format in memory.
     ///
     /// Parameters
     /// ----------
     /// format : str
-    ///     ``"json"``, ``"pdf"``, ``"svg"``, ``"png"``, ``"dsc"``, ``"dsc-original"``; as meshes ``"gltf"``,
-    ///     ``"obj"``, ``"sdf"``, ``"urdf"``, ``"mjcf"``, ``"usd"``, and to print in two colours ``"3mf"``; of a solid also ``"stl"``, ``"skeleton"``, ``"skeleton-3mf"``, ``"panels"`` (DXF)
-    ///     and ``"net"`` (DXF). For a laser ``"laser-dxf"`` and ``"laser-svg"``; of an AprilGrid ``"kalibr"``.
+    ///     ``"json"``, ``"pdf"``, ``"svg"``, ``"png"``, ``"dsc"``, ``"dsc-original"``. Meshes: ``"gltf"``, ``"obj"``,
+    ///     ``"sdf"``, ``"urdf"``, ``"mjcf"``, ``"usd"``, and ``"3mf"`` for two-colour printing. For solids also ``"stl"``,
+    ///     ``"skeleton"``, ``"skeleton-3mf"``, ``"panels"`` (DXF) and ``"net"`` (DXF). For lasers ``"laser-dxf"`` and
+    ///     ``"laser-svg"``. For an AprilGrid ``"kalibr"``.
     /// dpi : float, optional
     ///     Resolution of PNG pages, dots per inch.
     /// texture_dpi : float, optional
-    ///     Resolution of the texture of a mesh; 20 px for a bit of a tag if left out.
+    ///     Resolution of the texture of a mesh, dots per inch; defaults to 20 px per cell of a tag.
     /// texture_px : int, optional
-    ///     Or its longest side; at least 4 px for a bit, of a checkerboard 12.
+    ///     Longest side of the texture, px, instead of its resolution; at least 4 px per cell, or 12 for a checkerboard.
     /// textures : int, optional
-    ///     Among how many textures the faces are shared, up to 64, each of that resolution or size; one if left out.
+    ///     Number of textures among which the faces are divided, up to 64, each of that resolution or size; defaults to one.
     /// plate_mm : float, optional
-    ///     Thickness of the plate of a board in a mesh, mm; 3 if left out.
+    ///     Thickness of the plate of a board in a mesh, mm; defaults to 3.
     /// inlay_mm : float, optional
-    ///     Depth of what is black in a 3MF, mm; 0.4 if left out.
+    ///     Depth of the black parts in a 3MF, mm; defaults to 0.4.
     /// kerf_mm : float, optional
-    ///     Width that the beam of a laser takes away, mm: engraved outlines are drawn smaller by half of it on each side,
-    ///     plates larger.
+    ///     Kerf of the laser, mm: engraved outlines are drawn smaller by half of it on each side, plates larger.
     ///
     /// Returns
     /// -------
     /// dict of str to bytes
-    ///     Contents by names of files.
+    ///     File contents by file name.
     #[pyo3(signature = (format, *, dpi = 300.0, texture_dpi = None, texture_px = None, textures = None,
         plate_mm = None, inlay_mm = None, kerf_mm = None))]
     #[expect(clippy::too_many_arguments, reason = "keywords")]
@@ -288,18 +292,18 @@ impl Target {
         Ok(files)
     }
 
-    /// Writes the description and files to print, cut or render, all or none.
+    /// Writes the description, and files to print, cut or render: all or none.
     ///
     /// Parameters
     /// ----------
     /// folder : path-like
-    ///     Where they go; it is made where there is none.
+    ///     Output folder, created if necessary.
     /// formats : sequence of str, optional
-    ///     Of those of :meth:`files`; PDF if left out. The ``.json`` is always written.
+    ///     Formats of :meth:`files`; defaults to PDF. The ``.json`` is always written.
     /// dpi, texture_dpi, texture_px, textures, plate_mm, inlay_mm, kerf_mm
-    ///     As of :meth:`files`.
+    ///     See :meth:`files`.
     /// overwrite : bool, optional
-    ///     Whether files of another kind are replaced.
+    ///     Replace existing files even if they are of another kind.
     ///
     /// Returns
     /// -------
@@ -330,7 +334,7 @@ impl Target {
             let mut files = self.made(What::Json, making)?;
             for &what in formats.iter().filter(|what| **what != What::Json) {
                 for (name, bytes) in self.made(what, making)? {
-                    // Models for simulators have the files of the OBJ in common.
+                    // Models for simulators share the files of the OBJ.
                     if files.iter().all(|(other, _)| *other != name) {
                         files.push((name, bytes));
                     }
@@ -340,8 +344,7 @@ impl Target {
         })?
     }
 
-    /// Checks that this target can be used together with another one: no tag of the same family and no board has the same
-    /// id.
+    /// Checks that this target can be used together with another one: they share no board id, and no tag id of the same family.
     ///
     /// Parameters
     /// ----------
@@ -350,7 +353,7 @@ impl Target {
     /// Raises
     /// ------
     /// TargetError
-    ///     Where both have an id; it names the first that is free.
+    ///     If they share an id; the message names the first free one.
     fn check_beside(&self, other: &Self) -> PyResult<()> {
         self.target().check_beside(other.target()).raise(errors::target)
     }
@@ -360,9 +363,9 @@ impl Target {
     /// Parameters
     /// ----------
     /// artifact : path-like or bytes, optional
-    ///     The file, or its content. Without, what :meth:`save` would write is made in memory and proved.
+    ///     The file, or its content. By default, the file that :meth:`save` would write is made in memory and verified.
     /// name : str, optional
-    ///     Name of the file where its content is given, such as ``"desk.pdf"``; its ending tells the format.
+    ///     Name of the file if its content is given, such as ``"desk.pdf"``; the extension selects the format.
     ///
     /// Returns
     /// -------
@@ -371,7 +374,7 @@ impl Target {
     /// Raises
     /// ------
     /// VerifyError
-    ///     Where nothing can be compared, such as where the file cannot be read.
+    ///     If the comparison is not possible, for example because the file cannot be read.
     #[pyo3(signature = (artifact = None, *, name = None))]
     fn verify(
         &self,
@@ -396,12 +399,12 @@ impl Target {
         interruptible(py, move |stop| Verdict::of(&own.printing, proof, stop))?
     }
 
-    /// Makes the list of corners and tags that the reference detector reads.
+    /// Returns the list of corners and tags for the reference detector.
     ///
     /// Parameters
     /// ----------
     /// dialect : str, optional
-    ///     ``"fork"`` or ``"original"``, as that detector's version reads.
+    ///     ``"fork"`` or ``"original"``, depending on the version of that detector.
     ///
     /// Returns
     /// -------
@@ -412,11 +415,11 @@ impl Target {
         export::dsc::write(self.target(), dialect).raise(errors::target)
     }
 
-    /// A small picture of the first page for notebooks.
+    /// Renders a preview of the first page for notebooks.
     fn _repr_html_(&self) -> String {
         let Ok(pages) = self.made(What::Svg, Making::default()) else { return self.__repr__() };
         let page = String::from_utf8_lossy(&pages[0].1).into_owned();
-        // Its size is that of the paper: only the view box is kept.
+        // Drop the paper size and keep only the view box.
         let start = page.find("<svg").unwrap_or(0);
         let (head, body) = page[start..].split_once('>').unwrap_or(("<svg", ""));
         let view_box = head.split("viewBox=\"").nth(1).and_then(|rest| rest.split('"').next());
@@ -454,7 +457,7 @@ impl Target {
         let restore = slf.py().import("deltille._core")?.getattr("_target")?;
         let own = slf.get();
         let family = own.codes().map(|family| family.to_json());
-        // A family has no file in common with that of its squares.
+        // The family of the squares has its own file.
         let is_mixed = own.target().family.as_ref().is_some_and(|family| family.squares.is_some());
         let squares = own.codes().filter(|_| is_mixed);
         let squares = squares.and_then(|family| family.of_tiling(GridKind::Checker));
@@ -476,7 +479,7 @@ pub struct Tag {
     row: i32,
     /// Column of that vertex.
     col: i32,
-    /// Its centre in the target's frame, mm.
+    /// Centre in the target's frame, mm.
     centre: [f64; 3],
 }
 

@@ -1,4 +1,4 @@
-//! What a comparison of a file with its target says.
+//! The result of comparing a file with its target.
 
 use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
@@ -11,14 +11,14 @@ use serde_json::Value;
 
 use crate::boundary::errors::{self, Raise, RaiseFile};
 
-/// Content of a file, or where it is.
+/// The content or path of a file.
 #[derive(FromPyObject)]
 pub enum Proof {
     Bytes(Vec<u8>),
     Path(PathBuf),
 }
 
-/// Whether a file shows its target, and what it shows otherwise.
+/// Whether a file shows its target, and how it differs.
 #[pyclass(frozen, module = "deltille")]
 pub struct Verdict {
     verdict: verify::Verdict,
@@ -26,7 +26,7 @@ pub struct Verdict {
 }
 
 impl Verdict {
-    /// Compares a file by its name, which is on disk or in memory.
+    /// Compares a file with its target, on disk or, if `files` is given, in memory.
     pub fn of(
         printing: &Printing,
         (name, files): (String, Option<Files>),
@@ -50,7 +50,7 @@ impl Verdict {
 
 #[pymethods]
 impl Verdict {
-    /// Whether the file shows the target, and nothing else.
+    /// Whether the file shows exactly the target.
     #[getter]
     fn passed(&self) -> bool {
         self.verdict.passed
@@ -62,16 +62,16 @@ impl Verdict {
         &self.verdict.artifact
     }
 
-    /// What is wrong with it, in sentences.
+    /// Differences from the target, in sentences.
     #[getter]
     fn findings(&self) -> Vec<String> {
         let of_sheets = self.verdict.sheets.iter().flat_map(|sheet| &sheet.findings);
         let of_faces = self.verdict.faces.iter().flat_map(|face| &face.findings);
         let all = self.verdict.findings.iter().chain(of_sheets).chain(of_faces);
-        all.map(|finding| errors::told(&finding)).collect()
+        all.map(|finding| errors::one_line(&finding)).collect()
     }
 
-    /// Everything that was measured and found, as JSON.
+    /// Returns all measurements and findings as JSON.
     fn to_json(&self) -> String {
         self.record.to_string()
     }
