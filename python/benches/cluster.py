@@ -1,11 +1,11 @@
-"""Detection of many pictures on a cluster of this machine's processors, with a worker killed in the middle.
+"""Times detection in many images on a Ray cluster of this machine's processors, and kills a worker during the run.
 
-    python python/benches/cluster.py FOLDER                   # 20,000 pictures, some ten minutes, 1 GB in FOLDER
+    python python/benches/cluster.py FOLDER                   # 20,000 images, about ten minutes, 1 GB in FOLDER
     python python/benches/cluster.py FOLDER --pictures 2000
 
-Needs ``deltille[ray]``, pillow and psutil. Pictures are made once: some hundred views of a board, each with many noises,
-1 % of the files damaged. They are looked at by one process without Ray, by one worker, by two, and by two of which one
-is killed; the last must account for every picture with the very same corners as the first.
+Needs ``deltille[ray]``, pillow and psutil. Images are made once: 300 views of a board, each with many noise samples, with 1 %
+of the files damaged. They are processed without Ray, by one worker, by two, and by two of which one is killed. Every run must
+account for every image, with exactly the same corners.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ DAMAGED = 0.01
 
 
 def make(folder: Path, count: int) -> deltille.Target:
-    """The pictures, where they are not there yet."""
+    """Makes the images, unless they exist."""
     folder.mkdir(parents=True, exist_ok=True)
     board = deltille.Board(8, 9, edge_mm=20)
     camera = deltille.Camera(*SIZE, 450.0)
@@ -64,7 +64,7 @@ def make(folder: Path, count: int) -> deltille.Target:
 
 
 def by_one_process(shots: Path, board: deltille.Target) -> tuple[pa.Table, pa.Table]:
-    """Both tables, without Ray."""
+    """Returns both tables, without Ray."""
     detector = deltille.Detector(board)
     rows = _Rows()
     for path in sorted(shots.iterdir()):
@@ -87,14 +87,14 @@ def written(folder: Path) -> tuple[pa.Table, pa.Table]:
 
 
 class Watch(threading.Thread):
-    """Looks at the memory of the workers once a second, and may kill one of them."""
+    """Records the memory of the workers once a second, and optionally kills one of them."""
 
     def __init__(self, kill_when: float | None, folder: Path, count: int) -> None:
         super().__init__(daemon=True)
         self.kill_when, self.folder, self.count = kill_when, folder, count
         self.killed: int | None = None
         self.memory: dict[int, list[float]] = {}
-        # When it was seen first and last.
+        # Processor time at the first and the last sample.
         self.processor: dict[int, tuple[float, float]] = {}
         self.is_over = threading.Event()
 
@@ -116,7 +116,7 @@ class Watch(threading.Thread):
                     victim.kill()
 
     def words(self) -> str:
-        """Memory of each worker after a quarter of its time, and the most of the rest."""
+        """Returns the memory of each worker after a quarter of its time, and its maximum afterwards."""
         parts = []
         for pid, seen in self.memory.items():
             quarter = seen[len(seen) // 4 :]
@@ -126,7 +126,7 @@ class Watch(threading.Thread):
 
 
 def workers() -> list[psutil.Process]:
-    """Processes of this run that look at pictures."""
+    """Returns the detecting processes of this run."""
     found = []
     for process in psutil.Process().children(recursive=True):
         try:
@@ -138,9 +138,9 @@ def workers() -> list[psutil.Process]:
 
 
 def by_ray(folder: Path, shots: Path, board: deltille.Target, count: int, processes: int, kill: bool) -> float:
-    """Seconds that it took."""
+    """Runs Ray and returns the time taken, s."""
     shutil.rmtree(folder, ignore_errors=True)
-    # Some time passes until the workers are there.
+    # The workers take some time to start.
     watch = Watch(0.4 if kill else None, folder, count)
     watch.start()
     before = psutil.cpu_times()
@@ -150,14 +150,14 @@ def by_ray(folder: Path, shots: Path, board: deltille.Target, count: int, proces
     after = psutil.cpu_times()
     watch.is_over.set()
     watch.join()
-    # On a machine that others use, too, this tells what is left of it.
+    # On a shared machine, this shows the share of processor time that was available.
     busy = sum(getattr(after, kind) - getattr(before, kind) for kind in ("user", "nice", "system"))
     own = sum(last - first for first, last in watch.processor.values())
     if kill and watch.killed is None:
-        sys.exit("no worker was killed: take more pictures")
+        sys.exit("no worker was killed: use more images")
     what = f"{processes} worker{'s' * (processes > 1)}{', one killed' * kill}"
-    print(f"{what}: {seconds:.1f} s, {count / seconds:.0f} pictures/s, {summary}; {watch.words()}", flush=True)
-    print(f"  {own:.0f} s of processors in workers, of {busy:.0f} s of all programs of the machine", flush=True)
+    print(f"{what}: {seconds:.1f} s, {count / seconds:.0f} images/s, {summary}; {watch.words()}", flush=True)
+    print(f"  processor time: {own:.0f} s in workers, {busy:.0f} s in all programs", flush=True)
     return seconds
 
 
@@ -165,18 +165,18 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("folder", type=Path)
     parser.add_argument("--pictures", type=int, default=20_000)
-    parser.add_argument("--program", help="the program deltille, to calibrate from what was written")
+    parser.add_argument("--program", help="the program deltille, to calibrate from the results")
     arguments = parser.parse_args()
     folder, count = arguments.folder.resolve(), arguments.pictures
     board = make(folder, count)
     shots = folder / "pictures"
     size = sum(path.stat().st_size for path in shots.iterdir())
-    print(f"{count} pictures of {SIZE[0]} × {SIZE[1]}, {size / 1e6:.0f} MB", flush=True)
+    print(f"{count} images of {SIZE[0]} × {SIZE[1]}, {size / 1e6:.0f} MB", flush=True)
 
     begin = time.perf_counter()
     alone = by_one_process(shots, board)
     seconds = time.perf_counter() - begin
-    print(f"without Ray: {seconds:.1f} s, {count / seconds:.0f} pictures/s; load {os.getloadavg()[0]:.1f}", flush=True)
+    print(f"without Ray: {seconds:.1f} s, {count / seconds:.0f} images/s; load {os.getloadavg()[0]:.1f}", flush=True)
 
     ray.init(num_cpus=2, include_dashboard=False, log_to_driver=False, logging_level="warning")
     context = ray.data.DataContext.get_current()
@@ -191,12 +191,12 @@ def main() -> None:
         for what, expected, found in zip(("corners", "pictures"), alone, written(folder / name)):
             same = in_order(expected).equals(in_order(found))
             failed += [] if same else [f"{name}: {what}"]
-            print(f"{name}: {what}: {len(found)} rows, {'the same' if same else 'NOT the same'} as of one process")
+            print(f"{name}: {what}: {len(found)} rows, {'the same' if same else 'NOT the same'} as from one process")
     errors = len(alone[1]) - alone[1]["error"].null_count
-    print(f"{errors} pictures could not be read, each a row with its error")
+    print(f"{errors} images could not be read; each has a row with its error")
     again = deltille.ray.detect_to(folder / "killed", shots, board)
-    print(f"once more: {again}")
-    failed += [] if (again.pictures, again.skipped) == (0, count) else ["once more"]
+    print(f"repeated: {again}")
+    failed += [] if (again.pictures, again.skipped) == (0, count) else ["repeated"]
     if arguments.program:
         (folder / "board.json").write_text(board.to_json())
         few = folder / "few"

@@ -1,4 +1,4 @@
-"""What a call from Python costs beside the library itself, what threads gain, and what a hundred thousand calls keep.
+"""Measures the overhead of calls from Python, the speed-up by threads, and memory growth over many calls.
 
     python python/benches/overhead.py            # a minute
     python python/benches/overhead.py --calls 100000
@@ -26,7 +26,7 @@ import deltille
 
 
 def resident() -> int:
-    """Memory of the process, bytes; 0 where the system does not tell."""
+    """Memory of the process, bytes; 0 if not available."""
     try:
         return int(Path("/proc/self/statm").read_text().split()[1]) * os.sysconf("SC_PAGE_SIZE")
     except OSError:
@@ -34,7 +34,7 @@ def resident() -> int:
 
 
 def milliseconds(work, repeats: int) -> float:
-    """The median time of a call."""
+    """Median time of a call, ms."""
     times = []
     for _ in range(repeats):
         start = time.perf_counter()
@@ -44,7 +44,7 @@ def milliseconds(work, repeats: int) -> float:
 
 
 def rate(detector, board, camera, workers: int) -> float:
-    """Pictures per second with so many threads; the best of some rounds, as others use the machine too."""
+    """Images per second with this number of threads; the best of twelve rounds, as the machine may be shared."""
     pictures = [deltille.render(board, camera, eye=(100, -60 + i, 420), seed=i)[0] for i in range(16)]
     best = 0.0
     with ThreadPoolExecutor(workers) as pool:
@@ -70,25 +70,25 @@ def main() -> None:
         print(rate(detector, board, camera, arguments.workers))
         return
 
-    # A picture in which nothing is to be found takes the library the least: what else a call takes shows best.
+    # An image without a target takes the library least time, so that the overhead of the call dominates.
     blank = numpy.zeros((1200, 1600), numpy.uint8)
     small = numpy.zeros((1, 1), numpy.uint8)
-    print(f"call with a picture of one pixel: {milliseconds(lambda: detector.detect(small), 2000):.4f} ms")
-    print(f"call with a black picture of 1600 × 1200: {milliseconds(lambda: detector.detect(blank), arguments.repeats):.3f} ms")
+    print(f"call with an image of one pixel: {milliseconds(lambda: detector.detect(small), 2000):.4f} ms")
+    print(f"call with a black image of 1600 × 1200: {milliseconds(lambda: detector.detect(blank), arguments.repeats):.3f} ms")
 
     picture, _ = deltille.render(board, camera, eye=(100, -60, 420))
     of_call = milliseconds(lambda: detector.detect(picture), arguments.repeats)
     print(f"call with a board in 1600 × 1200: {of_call:.2f} ms")
     found = detector.detect(picture)
     arrays = milliseconds(lambda: (found.pixels, found.ids, found.object_points, found.covariances), 200)
-    print(f"its arrays: {arrays:.4f} ms")
+    print(f"arrays of the result: {arrays:.4f} ms")
     wide = numpy.zeros((1200, 3200), numpy.uint8)
     wide[:, :1600] = picture
-    print(f"of a view: {milliseconds(lambda: detector.detect(wide[:, :1600]), arguments.repeats):.2f} ms")
+    print(f"call with a view: {milliseconds(lambda: detector.detect(wide[:, :1600]), arguments.repeats):.2f} ms")
     turned = numpy.ascontiguousarray(picture.T).T
-    print(f"transposed, copied: {milliseconds(lambda: detector.detect(turned), arguments.repeats):.2f} ms")
+    print(f"call with a transposed image, which is copied: {milliseconds(lambda: detector.detect(turned), arguments.repeats):.2f} ms")
 
-    # The library by itself, as its own program measures it.
+    # The library alone, as measured by its own program.
     program = shutil.which("deltille", path=sysconfig.get_path("scripts"))
     with tempfile.TemporaryDirectory() as folder:
         board.save(folder)
@@ -96,18 +96,17 @@ def main() -> None:
         path.write_bytes(b"P5 1600 1200 255\n" + picture.tobytes())
         command = [program, "bench", "detect", str(path), "--target", str(Path(folder) / "board.json")]
         done = subprocess.run(command, capture_output=True, text=True)
-        print("the library by itself:")
+        print("the library alone:")
         print(re.sub(r"^", "    ", done.stdout or done.stderr, flags=re.M).rstrip())
 
-    # The library shares out parts of a picture too, on as many threads as are said before it begins; so each number
-    # of threads is a process of its own.
+    # The library also splits an image among threads. Their number is fixed at the start, so each one needs its own process.
     rates = {}
     for workers in (1, 2):
         command = [sys.executable, __file__, "--workers", str(workers)]
         environment = {**os.environ, "RAYON_NUM_THREADS": str(workers)}
         done = subprocess.run(command, capture_output=True, text=True, env=environment, check=True)
         rates[workers] = float(done.stdout)
-    print(f"1 thread {rates[1]:.1f}, 2 threads {rates[2]:.1f} pictures/s: {rates[2] / rates[1]:.2f} times")
+    print(f"1 thread {rates[1]:.1f}, 2 threads {rates[2]:.1f} images/s: {rates[2] / rates[1]:.2f} times")
 
     tiny, _ = deltille.render(board, deltille.Camera(320, 240, 280), eye=(100, -60, 420))
     for _ in range(200):

@@ -1,7 +1,7 @@
 """Calibrate a camera from photographs of a board: with this package, and with OpenCV on the same corners.
 
     python calibrate_camera.py board.json photos/*.jpg
-    python calibrate_camera.py                # photographs that are made here
+    python calibrate_camera.py                # with synthetic photographs
 """
 
 import sys
@@ -14,7 +14,7 @@ import deltille
 
 
 def photographs(board: deltille.Target) -> list[numpy.ndarray]:
-    """Synthetic photographs by a camera with a known lens."""
+    """Renders synthetic photographs with a known camera."""
     camera = deltille.Camera(1280, 960, 1100, distortion=[-0.12, 0.05, 0.0005, -0.001])
     generator = numpy.random.default_rng(1)
     eyes = generator.uniform((-80, -80, 280), (280, 260, 420), (20, 3))
@@ -34,13 +34,13 @@ def main() -> None:
             print(f"{result.image}: {result.error or result.why}")
     detections = [result for result in results if not result.error]
 
-    # Ours: every fifth view takes no part, and tells how well the others predict it.
+    # This package: every fifth view is held out, to test how well the others predict it.
     calibration = deltille.calibrate(detections, board, model="radtan", hold_out=5)
     camera = calibration.camera
     for name, value, sd in zip(camera.parameter_names, camera.parameters, calibration.sd):
         if sd == sd:
             print(f"{name:5} {value:12.5f} ± {sd:.5f}")
-    print(f"rms {calibration.rms_px:.4f} px, {calibration.held_out_rms_px:.4f} px in views held out")
+    print(f"rms {calibration.rms_px:.4f} px, {calibration.held_out_rms_px:.4f} px in held-out views")
     for diagnosis in calibration.diagnoses:
         print("warning:", diagnosis)
     calibration.save("camera.json")
@@ -48,11 +48,11 @@ def main() -> None:
     camera.save("camera-opencv.yaml", "opencv")
     calibration.report("camera.html")
 
-    # OpenCV, on our corners.
+    # OpenCV, on the same corners.
     objects, pixels = deltille.to_opencv(detections)
     size = (detections[0].width, detections[0].height)
     rms, matrix, distortion, _, _ = cv2.calibrateCamera(objects, pixels, size, None, None, flags=cv2.CALIB_FIX_K3)
-    print(f"OpenCV: rms {rms / 2**0.5:.4f} px a coordinate, fx {matrix[0, 0]:.3f}, ours {camera.matrix[0, 0]:.3f}")
+    print(f"OpenCV: rms {rms / 2**0.5:.4f} px per axis, fx {matrix[0, 0]:.3f}, ours {camera.matrix[0, 0]:.3f}")
     theirs = deltille.Camera(*size, (matrix[0, 0], matrix[1, 1]), (matrix[0, 2], matrix[1, 2]), distortion=distortion.ravel())
     print(f"both differ by {deltille.compare(calibration, theirs).rms_px:.4f} px over the image")
     print("wrote", ", ".join(str(path) for path in sorted(Path(".").glob("camera*"))))

@@ -1,9 +1,9 @@
-"""Find a board in a folder or bucket of photographs on a Ray cluster, and calibrate from what was written.
+"""Detect a board in a folder or bucket of photographs on a Ray cluster, and calibrate from the results.
 
     python cluster.py board.json s3://bucket/photographs s3://bucket/found
     python cluster.py board.json photographs found && deltille calibrate found --target board.json --model radtan
 
-Without a cluster the processors of this machine are one. After a run that was stopped the same command does the rest.
+Without a cluster, Ray uses the processors of this machine. Repeat the command to resume an interrupted run.
 """
 
 import sys

@@ -1,10 +1,10 @@
-"""Follow a board in the frames of a webcam or a video: corners and pose of each, drawn over the picture.
+"""Track a board in a webcam or a video: corners and pose in each frame, drawn over the image.
 
     python follow_video.py 0                  # a webcam
     python follow_video.py video.mp4          # a file
-    python follow_video.py                    # a video that is made here
+    python follow_video.py                    # a synthetic video
 
-With ``--show`` a window shows the frames; without it the last one is written as a picture.
+With ``--show``, a window shows the frames. The last frame is written to followed.png.
 """
 
 import sys
@@ -19,7 +19,7 @@ import deltille
 
 
 def made_here(board: deltille.Target, camera: deltille.Camera, folder: Path) -> str:
-    """A video of the board by a camera that goes round it."""
+    """Renders a video of the board with a moving camera."""
     path = str(folder / "board.avi")
     writer = cv2.VideoWriter(path, cv2.VideoWriter_fourcc(*"MJPG"), 10, (camera.width, camera.height))
     for frame in range(20):
@@ -34,7 +34,7 @@ def made_here(board: deltille.Target, camera: deltille.Camera, folder: Path) -> 
 def main() -> None:
     arguments = [argument for argument in sys.argv[1:] if argument != "--show"]
     board = deltille.Board(10, 11, edge_mm=20, name="desk")
-    # Without a calibration a guess does for drawing: 60° across.
+    # Without a calibration, a guess is good enough for drawing: a horizontal field of view of 60°.
     camera = deltille.Camera(960, 720, 960 / 2 / numpy.tan(numpy.radians(30)))
     detector = deltille.Detector(board)
     with tempfile.TemporaryDirectory() as folder:
@@ -46,7 +46,7 @@ def main() -> None:
             if not there:
                 break
             start = time.perf_counter()
-            # OpenCV's colours are blue, green, red; this is a view, not a copy.
+            # OpenCV's colours are blue, green, red; this makes a view, not a copy.
             found = detector.detect(picture[..., ::-1], name=f"frame {frames}")
             located = deltille.pose(found, camera) if found else None
             milliseconds = 1e3 * (time.perf_counter() - start)

@@ -1,4 +1,4 @@
-"""Make a board, write it to print, and prove the file by reading it back.
+"""Make a board, write it for printing, and verify the file by reading it back.
 
     python print_board.py [FOLDER]
 """
@@ -11,11 +11,11 @@ import deltille
 
 def main() -> None:
     folder = Path(sys.argv[1] if len(sys.argv) > 1 else "desk")
-    # 10 rows of 11 corners, tiles of 20 mm, tags of the family that is the default.
+    # 10 rows of 11 corners, tiles of 20 mm, tags of the default family.
     board = deltille.Board(10, 11, edge_mm=20, name="desk")
     for path in board.save(folder, formats=["pdf"]):
         print("wrote", path)
-    # Print it at 100 %, and lay a ruler along the check bars.
+    # Print it at 100 %, and measure the check bars with a ruler.
     verdict = board.verify(folder / "desk.pdf")
     print(verdict)
     if not verdict:

@@ -1,8 +1,8 @@
-"""Calibrate two cameras that look at an icosahedron: where they are to each other, and where its faces really are.
+"""Calibrate a rig of two cameras with an icosahedron: extrinsics of the cameras, and the true poses of its faces.
 
     python rig_with_icosahedron.py
 
-The pictures are made here, so that what is found can be compared with the truth.
+The images are synthetic, so that the results can be compared with the truth.
 """
 
 import numpy
@@ -13,7 +13,7 @@ import deltille
 def main() -> None:
     target = deltille.Icosahedron(edge_mm=100, name="ico")
     camera = deltille.Camera(1600, 1200, 1600 / 2 / numpy.tan(0.25))
-    # Two cameras, a quarter of a metre apart, looking at the same place.
+    # Two cameras, a quarter of a metre apart, that look at the same point.
     places = {
         "left": deltille.Pose.looking_at((-125, 0, 0), (0, 0, 700), (0, -1, 0)),
         "right": deltille.Pose.looking_at((125, 0, 0), (0, 0, 700), (0, -1, 0)),
@@ -30,9 +30,9 @@ def main() -> None:
     detector = deltille.Detector(target)
     seen = {}
     for name, of_camera in pictures.items():
-        # Pictures of one moment have the same name: their places in the list.
+        # Images taken at the same time have the same name, here their index in the list.
         found = deltille.detect_many(of_camera, detector, ink_of_all=False)
-        print(f"{name}: {sum(len(one) for one in found)} corners in {len(found)} pictures")
+        print(f"{name}: {sum(len(one) for one in found)} corners in {len(found)} images")
         seen[name] = found
 
     rig = deltille.rig(seen, target, refine_target=True)
@@ -42,12 +42,12 @@ def main() -> None:
     off = right.pose @ truth.inverse()
     print(f"right camera: {numpy.linalg.norm(right.pose.tvec - truth.tvec):.3f} mm and "
           f"{numpy.degrees(numpy.linalg.norm(off.rvec)):.4f}° off the truth")
-    print("stated deviations:", numpy.round(right.pose_sd[3:], 3), "mm")
+    print("standard deviations:", numpy.round(right.pose_sd[3:], 3), "mm")
     rig.save("rig.json")
     rig.report("rig.html")
     [refined] = rig.refined_targets
     moved = numpy.linalg.norm(refined.corners - target.corners, axis=1)
-    print(f"corners are up to {moved.max():.3f} mm beside their places")
+    print(f"corners are up to {moved.max():.3f} mm from their nominal positions")
     refined.save(".", formats=[])
 
 
