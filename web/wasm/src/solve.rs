@@ -53,7 +53,8 @@ impl Solved {
         let mut estimate = calibration.solve().raise()?;
         let diagnoses = calibration.explain(&estimate);
         estimate.excluded.splice(0..0, shown.left_out.into_iter().map(|(_, out)| out));
-        let found = estimate.cameras.first().ok_or_else(|| JsError::new("no camera was calibrated"))?;
+        let found =
+            estimate.cameras.first().ok_or_else(|| JsError::new("no camera was calibrated"))?;
         let words = Words::new(&estimate, None);
         let said = diagnoses.iter().map(|diagnosis| one_line(&words.sentence(diagnosis))).collect();
         let mut page = Report::new("camera", &estimate);
