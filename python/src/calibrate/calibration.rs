@@ -369,8 +369,7 @@ impl Rig {
         } else {
             let files = RIG_FORMATS.iter().flat_map(|format| format.files);
             let file = named(files, format).map_err(|what| {
-                let what = what.replacen("is not", "is not json,", 1);
-                raised::CameraError::new_err(format!("format: {what}"))
+                raised::CameraError::new_err(what.replacen("known: ", "known: json, ", 1))
             })?;
             let found = estimate.cameras.iter();
             let placed = found.map(|found| (&*found.name, &found.camera, found.camera_from_rig));

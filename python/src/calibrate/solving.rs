@@ -130,7 +130,9 @@ impl How {
             "covariance" => Weights::Covariance,
             "equal" => Weights::Equal,
             _ => {
-                return Err(wrong(&format!("unknown weights {weights} (known: covariance, equal)")));
+                return Err(wrong(&format!(
+                    "unknown weights {weights} (known: covariance, equal)"
+                )));
             }
         };
         if hold_out.is_some_and(|every| every < 2) {

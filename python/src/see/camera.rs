@@ -301,8 +301,7 @@ impl Camera {
         name: &str,
         views: &[(&str, camera::Pose)],
     ) -> PyResult<String> {
-        let format = named(CAMERA_FORMATS, format)
-            .map_err(|what| raised::CameraError::new_err(format!("format: {what}")))?;
+        let format = named(CAMERA_FORMATS, format).map_err(raised::CameraError::new_err)?;
         let (camera, calibrated_with) = (self.0.clone(), Vec::new());
         let file = CameraFile { camera, calibrated_with, failed: None };
         let text = format.text(&Written { file: &file, name, views });

@@ -343,8 +343,7 @@ impl Detection {
     fn save(&self, path: PathBuf, format: &str, overwrite: bool) -> PyResult<PathBuf> {
         let target = self.targets.first().map(|target| target.target());
         let of_image = DETECTION_FORMATS.iter().filter(|format| format.is_of_one_image());
-        let format = named(of_image, format)
-            .map_err(|what| raised::DetectionError::new_err(format!("format: {what}")))?;
+        let format = named(of_image, format).map_err(raised::DetectionError::new_err)?;
         let text = format.text(&self.found, target).unwrap_or_default();
         save_text(path, text, overwrite)
     }

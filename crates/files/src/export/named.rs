@@ -1,18 +1,18 @@
-//! Formats that are asked for by name. Each kind of them is a table, of which options, help texts and errors are made.
+//! Formats by name. Options, help texts and errors are made from one table for each kind of format.
 
 /// A format, as a line of a table.
 pub trait Format: Sync + 'static {
-    /// What it is asked for by.
+    /// Its name in options and keywords.
     fn name(&self) -> &'static str;
 
-    /// What is written, for a help text.
+    /// A phrase for help texts that says what is written.
     fn help(&self) -> String;
 }
 
-/// The format of that name.
+/// Returns the format of that name.
 ///
 /// # Errors
-/// Where there is none, with the names that there are.
+/// Returns an error that lists the known names if no format has this name.
 pub fn named<'a, F: Format>(
     all: impl IntoIterator<Item = &'a F>,
     name: &str,
@@ -24,6 +24,5 @@ pub fn named<'a, F: Format>(
         }
         names.push(format.name());
     }
-    let last = names.pop().unwrap_or_default();
-    Err(format!("{name} is not {} or {last}", names.join(", ")))
+    Err(format!("unknown format {name} (known: {})", names.join(", ")))
 }
