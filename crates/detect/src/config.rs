@@ -1,4 +1,4 @@
-//! Settings of a detector, and the least that it looks for in any image.
+//! Settings of a detector.
 
 use super::refine::refiner::Refinement;
 use deltille_core::detection::{Ink, Tone};
@@ -14,45 +14,46 @@ use deltille_core::detection::{Ink, Tone};
 #[derive(Clone, Debug, Default, PartialEq)]
 #[non_exhaustive]
 pub struct DetectorConfig {
-    /// Most bits of a tag that may be corrected; `None` for ⌊(h − 1)/2⌋, where h is the distance of its family.
+    /// Maximum number of corrected bits in a tag. `None` means ⌊(h − 1)/2⌋, where h is the Hamming distance of its
+    /// family.
     pub max_bit_errors: Option<u32>,
-    /// Whether grids seen as in a mirror get labels too. They are those of the print, and belong to no
-    /// camera that looks at it: use them only to find out what was mirrored.
+    /// Whether mirrored grids are labelled too. Their labels are those of the print, and no camera that looks at the
+    /// print directly can see it so. Use them only to find out what mirrored the image.
     pub allow_mirrored: bool,
-    /// How the positions of corners are refined.
+    /// Method that refines the positions of the corners.
     pub refinement: Refinement,
-    /// The camera's tone curve.
+    /// Tone curve of the camera.
     pub tone: Tone,
-    /// How far ink has spread on the print.
+    /// Ink spread (dot gain) of the print.
     pub ink: Ink,
 }
 
 impl DetectorConfig {
-    /// With as many bits of a tag corrected, at most; see [`Self::max_bit_errors`].
+    /// Sets the maximum number of corrected bits in a tag; see [`Self::max_bit_errors`].
     #[must_use]
     pub fn max_bit_errors(self, max_bit_errors: Option<u32>) -> Self {
         Self { max_bit_errors, ..self }
     }
 
-    /// With labels for grids seen as in a mirror, or without; see [`Self::allow_mirrored`].
+    /// Enables or disables labels for mirrored grids; see [`Self::allow_mirrored`].
     #[must_use]
     pub fn allow_mirrored(self, allow_mirrored: bool) -> Self {
         Self { allow_mirrored, ..self }
     }
 
-    /// With positions of corners refined like this.
+    /// Sets the method that refines the positions of the corners.
     #[must_use]
     pub fn refinement(self, refinement: Refinement) -> Self {
         Self { refinement, ..self }
     }
 
-    /// With the camera's tone curve.
+    /// Sets the tone curve of the camera.
     #[must_use]
     pub fn tone(self, tone: Tone) -> Self {
         Self { tone, ..self }
     }
 
-    /// With the spread of ink on the print.
+    /// Sets the ink spread of the print.
     #[must_use]
     pub fn ink(self, ink: Ink) -> Self {
         Self { ink, ..self }

@@ -1,4 +1,4 @@
-//! The detector of targets: what it looks for, and what it finds in a picture, of one tiling or of both.
+//! The detector: the targets it detects and its results for an image, for one tiling or both.
 
 use super::config::DetectorConfig;
 use super::levels::{MIN_LEVEL_SIDE, levels_of};
@@ -27,17 +27,17 @@ use deltille_core::targets::{Target, TargetIdentity, UnknownCodes};
 #[derive(Clone, Debug)]
 pub struct Detector {
     main: OneTiling,
-    /// That of the targets of the other tiling, where there are such.
+    /// Stages for the targets of the other tiling, if any.
     other: Option<Box<OneTiling>>,
-    /// The targets that are looked for.
+    /// Identities of the targets to detect.
     targets: Vec<TargetIdentity>,
 }
 
 impl Detector {
-    /// A detector of a target with the default settings, see [`Self::for_target`].
+    /// Creates a detector for a target with the default settings; see [`Self::for_target`].
     ///
     /// # Errors
-    /// Where the family of its tags is unknown.
+    /// Returns an error if the family of the tags is unknown.
     ///
     /// ```
     /// use deltille_detect::Detector;
@@ -53,26 +53,27 @@ impl Detector {
         Self::for_target(target, DetectorConfig::default())
     }
 
-    /// A detector of grids whatever they belong to.
+    /// Creates a detector for grids of any target.
     ///
-    /// With `size`, the rows and columns of corners of a zigzag board or of a checkerboard, a grid
-    /// that shows the whole board is labelled from its lower left corner; all other grids have
-    /// relative labels. On a checkerboard that is the corner whose upper right square is dark when
-    /// the print is turned so that it is the lower left one. A board whose rows + columns is even
-    /// looks the same after half a turn; the lowest such corner in the image is then taken.
+    /// `size` is the number of rows and columns of corners of an untagged board. If it is given, a grid that shows the
+    /// whole board is labelled from its lower left corner. All other grids get relative labels.
+    ///
+    /// On a checkerboard, (0, 0) is the corner whose upper right square is dark while that corner is the lower left
+    /// one. If rows + columns is even, the board looks the same after a rotation by 180°. The candidate that lies lower
+    /// in the image then becomes (0, 0).
     pub fn for_grid(kind: GridKind, size: Option<(u32, u32)>, config: DetectorConfig) -> Self {
         let labels = Labels::of_size(kind, size, &config);
         let main = OneTiling::new(kind, labels, TagAreas::default(), None, config);
         Self { main, other: None, targets: Vec::new() }
     }
 
-    /// A detector of a target.
+    /// Creates a detector for a target.
     ///
-    /// An untagged panel is labelled where it is seen whole and nothing else of the target looks so;
-    /// see [`Self::for_grid`] for which corner of a checkerboard is the first then.
+    /// An untagged panel is labelled if it is seen whole and no other panel of the target has the same outline.
+    /// [`Self::for_grid`] defines the first corner of an untagged checkerboard.
     ///
     /// # Errors
-    /// Where the family of its tags is unknown, see [`Target::set_family`].
+    /// Returns an error if the family of the tags is unknown; see [`Target::set_family`].
     pub fn for_target(target: &Target, config: DetectorConfig) -> Result<Self, UnknownCodes> {
         let family = target.family()?;
         let mut of_tilings = target.tilings().map(|kind| {
@@ -88,11 +89,12 @@ impl Detector {
         Ok(Self { main, other, targets: vec![target.identity()] })
     }
 
-    /// A detector of several targets, which looks for all in one pass over a picture;
-    /// [`Grid::target`](crate::Grid::target) says which one a grid belongs to.
+    /// Creates a detector for several targets, which it detects in one pass over an image.
+    /// [`Grid::target`](crate::Grid::target) names the target of each grid.
     ///
     /// # Errors
-    /// Where two targets cannot be distinguished, or the family of their tags is unknown.
+    /// Returns an error if two targets cannot be distinguished, if a target has circles instead of tiles, or if the
+    /// family of their tags is unknown.
     ///
     /// ```
     /// use deltille_detect::{Detector, DetectorConfig};
@@ -115,7 +117,7 @@ impl Detector {
         let families = targets.iter().map(|target| target.family());
         let families: Vec<Option<&Family>> = families.collect::<Result<_, _>>()?;
         let of_kind = |kind: GridKind| {
-            // What of each target has this tiling, with the family of its tags.
+            // The part of each target with this tiling, and the family of its tags.
             let has_it = |(target, _): &(&&Target, _)| {
                 kind_of(target) == kind || target.tilings().any(|own| own == kind)
             };
@@ -146,17 +148,17 @@ impl Detector {
         Ok(Self { main, other: of_kinds.next().map(Box::new), targets })
     }
 
-    /// The same detector with a clock, by which it notes how long each stage took, see [`Detection::timing_ms`].
+    /// Returns this detector with a clock that times each stage; see [`Detection::timing_ms`].
     pub fn with_clock(self, clock: Clock) -> Self {
         let other = self.other.map(|other| Box::new(other.with_clock(clock)));
         Self { main: self.main.with_clock(clock), other, ..self }
     }
 
-    /// The same detector for a print whose spread of ink was estimated before.
+    /// Returns this detector for a print whose ink spread is already estimated.
     pub fn with_ink(self, ink: InkEstimate) -> Self {
         let edge_mm = self.main.edge_mm;
         let of_other = |other: Box<OneTiling>| match (edge_mm, other.edge_mm) {
-            // As far on tiles of another size.
+            // The same ink spread in mm, as a fraction of edges of another length.
             (Some(edge_mm), Some(other_mm)) => {
                 let mut ink = ink;
                 for edges in [&mut ink.edges, &mut ink.edges_deviation] {
@@ -170,33 +172,33 @@ impl Detector {
         Self { main: self.main.with_ink(ink), other, ..self }
     }
 
-    /// What is known of the ink from other pictures, see [`Self::with_ink`].
+    /// Returns the ink spread estimated from other images; see [`Self::with_ink`].
     pub fn known_ink(&self) -> Option<InkEstimate> {
         self.main.ink
     }
 
-    /// What pictures of one print say together of its ink, given what each says: `None` where the ink was given, and where
-    /// a second look with it would find nothing else.
+    /// Combines the ink estimates of several images of one print. Returns `None` if the ink was given, or if a second
+    /// pass with the combined estimate would change nothing.
     pub fn ink_of_all(&self, found: &[Option<InkEstimate>]) -> Option<InkEstimate> {
         let known: Vec<InkEstimate> = found.iter().copied().flatten().collect();
         let is_worth = self.main.is_ink_asked() && found.len() > 1;
         InkEstimate::of_all(&known).filter(|ink| ink.used && is_worth)
     }
 
-    /// The same detector for a second look at these pictures: those that say little of the ink are seen with what all say,
+    /// Returns this detector for a second pass over the same images, with the combined ink estimate of
     /// [`Self::ink_of_all`].
     pub fn with_ink_of(&self, found: &[Option<InkEstimate>]) -> Option<Self> {
         Some(self.clone().with_ink(self.ink_of_all(found)?))
     }
 
-    /// Finds the grids in one image and labels their corners; `name` is only noted in the result.
+    /// Detects the grids in an image and labels their corners. `name` is copied to the result.
     ///
-    /// An image without a grid is no error: [`Detection::reasons`] says why there is none.
+    /// An image without a grid is not an error: [`Detection::reasons`] contains the reason.
     pub fn detect<'a>(&self, image: impl Into<ImageView<'a>>, name: &str) -> Detection {
         self.detect_view(image.into(), name)
     }
 
-    /// [`Self::detect`], compiled here and not in every crate that uses it.
+    /// Implements [`Self::detect`], compiled here instead of in every crate that uses it.
     fn detect_view(&self, image: ImageView, name: &str) -> Detection {
         let mut timing = self.main.timing();
         let pyramid = Pyramid::new(image, levels_of(image), MIN_LEVEL_SIDE);
@@ -212,25 +214,25 @@ impl Detector {
     }
 }
 
-/// What looks for a target of one tiling.
+/// Creates the stages for a target of one tiling.
 fn of_one_tiling(target: &Target, family: Option<&Family>, config: DetectorConfig) -> OneTiling {
     let labels = Labels::of_target(target, family, &config);
     let tag_areas = family.map(|family| TagAreas::of(target, family)).unwrap_or_default();
     OneTiling::new(kind_of(target), labels, tag_areas, edge_of(&[target]), config)
 }
 
-/// The tiling of a target.
+/// Returns the tiling of a target.
 fn kind_of(target: &Target) -> GridKind {
     target.panels.first().map_or(GridKind::Deltille, |panel| panel.kind)
 }
 
-/// The edge of the tiles, mm, where all have the same.
+/// Returns the edge length of the tiles, mm, if all tiles have the same.
 fn edge_of(targets: &[&Target]) -> Option<f64> {
     let edges = || targets.iter().flat_map(|target| &target.panels).map(|panel| panel.edge_mm);
     edges().next().filter(|first| edges().all(|edge| edge == *first))
 }
 
-/// What was found of both tilings in one picture. What one of them shows is no reason why nothing was found.
+/// Combines the detections of both tilings in one image. A grid of one tiling is not a reason for failure in the other.
 fn both(deltille: Detection, checker: Detection) -> Detection {
     let is_there = |found: &Detection| found.grids.iter().any(|grid| grid.panel.is_some());
     let [main, other] = match is_there(&checker) && !is_there(&deltille) {

@@ -1,11 +1,11 @@
-//! Numbers that a processor works on at once.
+//! SIMD lanes.
 
-/// As many as the widest processors have, of single precision.
+/// Number of single-precision lanes of the widest processors.
 pub(crate) const LANES: usize = 16;
 
-/// Their sum: by halves, as sixteen additions one after the other wait for each other.
+/// Returns the sum of the lanes. Adds by halves, because sixteen additions in sequence would wait for each other.
 ///
-/// Not within the loop that makes them, which would keep sixteen numbers then instead of one vector.
+/// Not inlined: within the loop that computes the lanes, the compiler would keep sixteen numbers instead of one vector.
 #[inline(never)]
 pub(crate) fn sum(lanes: &[f32; LANES]) -> f32 {
     let (mut eight, mut four) = ([0.0; LANES / 2], [0.0; LANES / 4]);

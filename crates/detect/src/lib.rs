@@ -1,21 +1,21 @@
-//! From pixels to labelled corners.
+//! Detection: from an image to labelled corners.
 //!
-//! Comes in: an image, and what is looked for. Goes out: a [`Detection`]. Data meets the chapters in this order, each from
-//! the paper (§3) with what measurements added:
+//! Input: an image and the targets to detect. Output: a [`Detection`]. The modules run in this order. Each follows
+//! section 3 of the paper, extended by measured improvements:
 //!
-//! 1. `levels` chooses the levels of the image's pyramid.
-//! 2. `corners` finds corners one by one, with the edges that meet there.
-//! 3. `grid` joins them: lattice coordinates without origin.
+//! 1. `levels` chooses the levels of the image pyramid.
+//! 2. `corners` finds single corners and the edges that meet there.
+//! 3. `grid` joins corners into grids: lattice coordinates without an origin.
 //! 4. `labels` reads tags and decides where on the target a grid lies.
 //! 5. `refine` fits the final positions and their covariances to the raw pixels.
 //!
-//! The result is [`deltille_core::detection`].
+//! [`deltille_core::detection`] defines the result.
 //!
-//! `one_tiling` runs these stages, `nothing_seen` says why they end without a grid. `detector` looks for targets of both
-//! tilings with the settings of `config`, `recognise` guesses the target where none is given, `scene`
-//! tells whether several targets can be distinguished. A module imports from chapters above it in this list, never in a circle.
+//! `one_tiling` runs these stages, and `nothing_seen` finds the reason if they end without a grid. `detector` detects
+//! targets of both tilings with the settings of `config`. `recognise` guesses the target if none is given. `scene`
+//! checks whether several targets can be distinguished. A module imports only from modules above it in this list.
 //!
-//! Both tilings go the same way; `tiling` says where they differ, and `lanes` how many numbers a processor works on at once.
+//! Both tilings share the code: `tiling` contains the differences, and `lanes` the number of SIMD lanes.
 
 mod config;
 mod corners;

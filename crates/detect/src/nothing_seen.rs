@@ -1,4 +1,4 @@
-//! Why a picture shows no grid of a tiling: it shows one of the other, or too small a one, or neither.
+//! Finds the reason why an image shows no grid of a tiling: a grid of the other tiling, too small a grid, or neither.
 
 use super::labels::why;
 use super::levels::{MIN_LEVEL_SIDE, PYRAMID_LEVELS};
@@ -9,12 +9,12 @@ use deltille_core::detection::{MIN_UNTAGGED_EDGE_PX, Reason, ReasonKind};
 use deltille_core::lattice::GridKind;
 use deltille_core::raster::{Gray, PYRAMID_FULL_SCALE, Pyramid};
 
-/// A grid of the other tiling with fewer corners is no reason to ask whether that was meant.
+/// Fewest corners of a grid of the other tiling that is reported as a mistaken tiling.
 const LEAST_OTHER_CORNERS: usize = 20;
 
-/// Why there are no grids in a picture with so many corners.
+/// Returns the reason why an image with this number of corners has no grid.
 pub(super) fn nothing_found<const N: usize>(pyramid: &Pyramid, corners: usize) -> Reason {
-    // At half the size, which takes a quarter of the time.
+    // Half the size takes a quarter of the time.
     let half = pyramid.levels().get(1).map(|level| {
         let to_one = 1.0 / PYRAMID_FULL_SCALE;
         Pyramid::new(&level.map(|v| f32::from(v) * to_one), PYRAMID_LEVELS - 1, MIN_LEVEL_SIDE)
@@ -36,12 +36,12 @@ pub(super) fn nothing_found<const N: usize>(pyramid: &Pyramid, corners: usize) -
     reason
 }
 
-/// The edge of the tiles, px, of a grid that shows in the part of a picture with the most contrast if that is enlarged to
-/// twice its size, and is too small as it is.
+/// Returns the edge length in px of a grid that is too small to detect. Enlarges the part of the image with the most
+/// contrast to twice its size to find it.
 fn edge_of_small_tiles<const N: usize>(level: &Gray<i16>) -> Option<f64> {
-    /// Width and height of the part, px: enlarged it has half a megapixel, and twenty corners 7 px apart fill a hundredth of it.
+    /// Width and height of the part, px. Enlarged, it has half a megapixel. Twenty corners 7 px apart fill 1 % of it.
     const PART: [usize; 2] = [400, 300];
-    /// Tiles half as large as the least are seen so.
+    /// Magnification: shows tiles down to half the minimum size.
     const TIMES: usize = 2;
     let size = [level.width().min(PART[0]), level.height().min(PART[1])];
     let [left, top] = busiest_part(level, size);
@@ -58,9 +58,9 @@ fn edge_of_small_tiles<const N: usize>(level: &Gray<i16>) -> Option<f64> {
     (largest.len() >= LEAST_OTHER_CORNERS && edge_px < MIN_UNTAGGED_EDGE_PX).then_some(edge_px)
 }
 
-/// The first pixel of the part of so many columns and rows around the square with the most contrast.
+/// Returns the first pixel of a part of the given columns and rows, around the square with the most contrast.
 fn busiest_part(level: &Gray<i16>, size: [usize; 2]) -> [usize; 2] {
-    /// Side of the square, px: twenty corners of tiles that are too small fit into it.
+    /// Side of the square, px. Twenty corners of tiles that are too small fit into it.
     const SQUARE: usize = 64;
     let contrast = |[x, y]: [usize; 2]| {
         let [right, bottom] = [(x + SQUARE).min(level.width()), (y + SQUARE).min(level.height())];
@@ -78,7 +78,7 @@ fn busiest_part(level: &Gray<i16>, size: [usize; 2]) -> [usize; 2] {
     [around(x, size[0], level.width()), around(y, size[1], level.height())]
 }
 
-/// Corners of the largest grid of a tiling.
+/// Returns the number of corners of the largest grid of a tiling.
 fn most_corners<const N: usize>(finder: &SaddleFinder<N>, pyramid: &Pyramid) -> usize {
     let saddles = finder.find(pyramid);
     grids(finder, pyramid, &saddles, None).iter().map(|grid| grid.len()).max().unwrap_or(0)

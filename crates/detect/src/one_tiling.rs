@@ -1,4 +1,4 @@
-//! The stages of detection in their order, for the targets of one tiling.
+//! The stages of detection for the targets of one tiling.
 
 use std::collections::BTreeMap;
 use std::time::Duration;
@@ -27,8 +27,9 @@ use deltille_core::lattice::GridKind;
 use deltille_core::raster::{ImageView, Pyramid};
 use deltille_core::targets::least_untagged_corners;
 
-/// Largest blur of a grid that no tag vouches for, as a part of the edge: it leaves less than a tenth of the wave after the
-/// fundamental one, in which the model reads a blur of 0.25 of the edge, of three waves 0.155.
+/// Largest blur of an untagged grid, as a fraction of the edge length. At this blur, the second wave has less than a
+/// tenth of the amplitude of the fundamental wave. From the fundamental wave alone the model reads a blur of 0.25 of the
+/// edge, from three waves 0.155.
 const fn max_untagged_blur(kind: GridKind) -> f64 {
     match kind {
         GridKind::Deltille => 0.14,
@@ -36,49 +37,49 @@ const fn max_untagged_blur(kind: GridKind) -> f64 {
     }
 }
 
-/// Grids that are told why they have no labels: the largest ones.
+/// Maximum number of reported reasons for missing labels. The largest grids are reported.
 const MOST_REASONS: usize = 3;
 
-/// A level on which the whole board is looked for has so many pixels for each of its corners: where the board covers a
-/// third of the picture, its edges are 18 px long there.
+/// Fewest pixels per corner of a level on which the whole board is searched. If the board covers a third of the image,
+/// its edges are 18 px long there.
 const LEAST_PX2_A_CORNER: usize = 1000;
 
-/// Edges on such a level are no shorter than this, px: the fit of a corner reads as far, and what it reads of the next
-/// corners displaces it.
+/// Minimum edge length on a coarser level, px. The corner fit reads pixels up to this distance, and pixels of the next
+/// corners displace it.
 const MIN_COARSE_EDGE_PX: f64 = 7.0;
 
-/// Radius of the polynomial that refines, px: the reference detector's.
+/// Radius of the polynomial refinement, px: that of the reference detector.
 const POLYNOMIAL_RADIUS: usize = 3;
 
-/// Micrometres in a millimetre.
+/// Micrometres per millimetre.
 const UM_IN_MM: f64 = 1e3;
 
-/// Largest radius of the model that refines, px: beyond, lenses bend edges more than a wider
-/// window gains.
+/// Largest radius of the model refinement, px. Beyond it, lens distortion bends edges by more than a wider window
+/// gains.
 const MODEL_RADIUS: usize = 10;
 
-/// A picture and its pyramid.
+/// An image and its pyramid.
 #[derive(Clone, Copy)]
 pub(super) struct Frame<'a> {
     pub(super) image: ImageView<'a>,
     pub(super) pyramid: &'a Pyramid<'a>,
 }
 
-/// Grids, each with why it has no labels.
+/// Grids, each with the reason why it has no labels.
 type Judged = Vec<(Grid, Option<Reason>)>;
 
-/// What a picture shows.
+/// Result for an image.
 struct Found {
     grids: Judged,
-    /// What the grids have in common.
+    /// Optics that the grids have in common.
     optics: Optics,
-    /// Why others are left out.
+    /// Reasons why other grids are left out.
     left_out: Vec<Reason>,
-    /// How many corners were seen.
+    /// Number of detected corners.
     saddles: usize,
 }
 
-/// Finds the corners of a tiling.
+/// Finder for the corners of a tiling.
 #[derive(Clone, Debug)]
 enum Finder {
     Deltille(SaddleFinder<DELTILLE>),
@@ -99,16 +100,16 @@ impl Finder {
 pub(super) struct OneTiling {
     finder: Finder,
     refiner: Refiner,
-    /// Where tiles show something else than their colour.
+    /// Areas where tiles show something other than their colour.
     tag_areas: TagAreas,
     labels: Labels,
-    /// Edge of the tiles, mm, where all panels have the same.
+    /// Edge length of the tiles, mm, if all panels have the same.
     pub(super) edge_mm: Option<f64>,
-    /// Whether the ink was given.
+    /// Whether the ink spread was given.
     is_ink_given: bool,
-    /// What is known of the ink from other pictures.
+    /// Ink spread estimated from other images.
     pub(super) ink: Option<InkEstimate>,
-    /// What the stages are timed with, if at all.
+    /// Clock that times the stages, if any.
     clock: Option<Clock>,
 }
 
@@ -125,22 +126,22 @@ impl OneTiling {
         Self { finder, refiner, tag_areas, labels, edge_mm, is_ink_given, ink: None, clock: None }
     }
 
-    /// The same with a clock, by which it notes how long each stage took.
+    /// Returns these stages with a clock that times each of them.
     pub(super) fn with_clock(self, clock: Clock) -> Self {
         Self { clock: Some(clock), ..self }
     }
 
-    /// The same for a print whose spread of ink was estimated before.
+    /// Returns these stages for a print whose ink spread is already estimated.
     pub(super) fn with_ink(self, ink: InkEstimate) -> Self {
         Self { refiner: self.refiner.with_ink(Some(ink.edges)), ink: Some(ink), ..self }
     }
 
-    /// Whether pictures are asked for the ink.
+    /// Returns whether the ink spread is estimated from images.
     pub(super) fn is_ink_asked(&self) -> bool {
         !self.is_ink_given
     }
 
-    /// What a picture shows; `name` is only noted in the result.
+    /// Returns the detection of an image. `name` is copied to the result.
     pub(super) fn detect(&self, frame: Frame, timing: Timing, name: &str) -> Detection {
         match &self.finder {
             Finder::Deltille(finder) => self.detect_with(finder, frame, timing, name),
@@ -148,7 +149,7 @@ impl OneTiling {
         }
     }
 
-    /// The durations of its stages, from now on.
+    /// Starts the stopwatch of the stages.
     pub(super) fn timing(&self) -> Timing {
         Timing::start(self.clock)
     }
@@ -198,9 +199,9 @@ impl OneTiling {
         found
     }
 
-    /// The board, where one alone is looked for, if a coarser level of the pyramid shows all of it and nothing else
-    /// that is like it. What finer levels would add is the places of its corners, and these are refined: if one of them
-    /// is not found then, the finer levels are searched too.
+    /// Searches for a single board on the coarser levels of the pyramid. Returns it if a level shows the whole board
+    /// and nothing similar. Finer levels would add only the positions of corners, which are refined anyway. If
+    /// refinement loses a corner, the finer levels are searched too.
     fn whole_on_coarser_level<const N: usize>(
         &self,
         finder: &SaddleFinder<N>,
@@ -241,7 +242,7 @@ impl OneTiling {
         })
     }
 
-    /// All grids of a picture with their labels, refined.
+    /// Finds, labels and refines all grids of an image.
     fn all_grids<const N: usize>(
         &self,
         finder: &SaddleFinder<N>,
@@ -267,7 +268,7 @@ impl OneTiling {
         if grids.is_empty() && self.labels.are_wanted() {
             let found = foreshortened_grids(finder, pyramid);
             grids = self.plausible::<N>(frame, &found, &mut left_out);
-            // Compressed patterns of all kinds have triangles and squares too.
+            // Foreshortened patterns of all kinds contain triangles and squares too.
             grids.retain(|(grid, _)| is_labelled(grid));
             timing.lap("foreshortened");
         }
@@ -276,7 +277,7 @@ impl OneTiling {
         Found { grids, optics, left_out, saddles: saddles.len() }
     }
 
-    /// Grids with their corners refined, those that are still grids, and what they have in common.
+    /// Refines the corners of the grids. Returns those that still are grids, and the optics that they have in common.
     fn refined<const N: usize>(&self, frame: Frame, grids: Judged) -> (Judged, Optics) {
         let least = least_untagged_corners(kind::<N>()) as usize;
         let mut fitter = CornerFitter::default();
@@ -293,12 +294,12 @@ impl OneTiling {
         grids.retain(|(grid, _)| {
             is_labelled(grid) || is_of_squares(frame.image, grid, may_have_tags)
         });
-        // Of what was no corner, some is gone.
+        // Refinement has removed some false corners.
         refuse_patterns(frame.pyramid, &mut grids);
         (grids, optics)
     }
 
-    /// The grids with their labels that may be what is looked for, and why others are left out.
+    /// Returns the labelled grids that may belong to a target. Adds the reasons for the others to `left_out`.
     fn plausible<const N: usize>(
         &self,
         frame: Frame,
@@ -320,7 +321,7 @@ impl OneTiling {
                 Some(Reason::new(ReasonKind::TooSmall, figures))
             } else if corners > most {
                 let figures = [("corners", corners as f64), ("expected", most as f64)];
-                // Tags that were read tell more.
+                // Tags that were read give a more specific reason.
                 let by_tags = no_labels.clone().filter(|reason| reason.kind.is_of_tags_read());
                 let kind = match self.labels.are_wanted() {
                     true => ReasonKind::NotWhole,
@@ -350,8 +351,8 @@ impl OneTiling {
         grids
     }
 
-    /// Refines all grids on the level of the pyramid that suits their blur; what they have in common, and for
-    /// each grid whether the blur leaves of it but a wave.
+    /// Refines all grids on the level of the pyramid that suits their blur. Returns the common optics, and for each
+    /// grid whether the blur leaves only a wave of it.
     fn refine(
         &self,
         fitter: &mut CornerFitter,
@@ -367,7 +368,7 @@ impl OneTiling {
             grids.iter_mut().for_each(|grid| grid.moved_to_level(number));
             let blurs = self.refiner.blurs(fitter, level, grids, &self.tag_areas);
             let optics = self.refiner.optics(fitter, level, grids, &blurs, &self.tag_areas);
-            // A picture that moved is as sharp as ever across its way.
+            // Motion blur leaves an image sharp across the direction of motion.
             let found = is_sampled(&blurs, optics.narrowest())
                 .then(|| self.refine_under(fitter, image, grids, &optics, &blurs));
             grids.iter_mut().for_each(|grid| grid.moved_from_level(number));
@@ -380,7 +381,7 @@ impl OneTiling {
         (optics, are_waves)
     }
 
-    /// [`Self::refine`] in an image that shows the grids under these optics and blurs, px.
+    /// Refines the grids in an image that shows them under these optics and blurs, px; see [`Self::refine`].
     fn refine_under(
         &self,
         fitter: &mut CornerFitter,
@@ -398,7 +399,7 @@ impl OneTiling {
     }
 }
 
-/// The shortest distance between neighbours in a grid, px.
+/// Returns the shortest distance between neighbours in a grid, px.
 fn shortest_edge_px<const N: usize>(grid: &SaddleGrid) -> f64 {
     let edges = grid.iter().flat_map(|(&vertex, placed)| {
         let next = (0..N / 2).filter_map(move |k| grid.get(&(vertex + step::<N>(k))));
@@ -407,24 +408,24 @@ fn shortest_edge_px<const N: usize>(grid: &SaddleGrid) -> f64 {
     edges.fold(f64::INFINITY, f64::min)
 }
 
-/// Whether tags, or the outline of a mirrored board, tell that a grid is one.
+/// Returns whether tags, or the outline of a mirrored board, confirm a grid.
 fn is_vouched_for(grid: &Grid) -> bool {
     !grid.tags.is_empty() || grid.mirrored
 }
 
-/// Whether a grid is known to be one, by tags or as a whole.
+/// Returns whether a grid is confirmed by tags or as a whole board.
 fn is_labelled(grid: &Grid) -> bool {
     is_vouched_for(grid) || grid.panel.is_some()
 }
 
-/// Leaves out grids that go on where they end, unless they are known.
+/// Removes unconfirmed grids whose pattern continues beyond their border.
 fn refuse_patterns(pyramid: &Pyramid, grids: &mut Judged) {
     loop {
         let all: Vec<&Grid> = grids.iter().map(|(grid, _)| grid).collect();
         let mut goes_on = go_on(&pyramid.levels()[0], &all).into_iter();
         let count = grids.len();
         grids.retain(|(grid, _)| goes_on.next() != Some(true) || is_labelled(grid));
-        // What is refused is part of the pattern that others end at.
+        // A removed grid is part of the pattern into which others may continue.
         if grids.len() == count {
             return;
         }
@@ -443,7 +444,7 @@ fn refiner(kind: GridKind, config: DetectorConfig, edge_mm: Option<f64>) -> Refi
 
 /// Stopwatch of the stages.
 pub(super) struct Timing {
-    /// The clock, and when the last stage ended.
+    /// The clock, and the end of the last stage.
     last: Option<(Clock, Duration)>,
     laps: BTreeMap<String, f64>,
 }

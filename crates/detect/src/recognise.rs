@@ -1,9 +1,9 @@
-//! Which target a picture shows, by its tags alone.
+//! Recognises the target in an image by its tags alone.
 //!
-//! Tiles of a grid are read as tags of every family that is known. A family whose codes are there by no chance tells how the
-//! grid is turned; the ids of its tags, which follow each other by row and column, tell how many there are in a row and
-//! so how wide the board is. What comes of it is a guess, which counts where the picture has labels by it: the evidence
-//! of the whole board decides here as for a target that is known.
+//! Tiles of a grid are read as tags of every known family. A family whose codes are significant gives the rotation of
+//! the grid. The ids of its tags increase by row and column, so they give the number of tags per row and the width of
+//! the board. The result is a guess. It is accepted if the detector labels the image with it: the evidence of the whole
+//! board decides, as for a given target.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -23,46 +23,47 @@ use deltille_core::targets::{
     tagged_tiles,
 };
 
-/// Grids that are looked at, the largest ones.
+/// Maximum number of grids that are read, the largest first.
 const MOST_GRIDS: usize = 4;
 
-/// Fewest corners of a grid that is looked at: those of a tile with its neighbours, which a tag needs.
+/// Fewest corners of a grid that is read: those of a tile and its neighbours, which a tag needs.
 const FEWEST_CORNERS: usize = 12;
 
-/// Most tiles of a grid that are read.
+/// Maximum number of tiles that are read in a grid.
 const MOST_TILES: usize = 600;
 
-/// Evidence from which tags are there by no chance, nats: once in a million, for each of the ways to read them.
+/// Evidence from which tags are significant, nats: noise exceeds it once in a million, for each way to read them.
 const LEAST_EVIDENCE: f64 = 18.0;
 
-/// A corner that is seen beyond a board costs as much as so many that are not seen on it: a cover hides corners, and next to
-/// nothing makes them. So an outer row is believed from a quarter of its corners on; with 1 it would be half.
+/// Cost of a corner seen beyond a board, relative to a corner of the board that is not seen. Covers hide corners, but
+/// hardly anything imitates them. With 3, an outer row is accepted from a quarter of its corners on; with 1 it would be
+/// half.
 const COST_BEYOND: usize = 3;
 
-/// Rows and columns that a board may have beyond what is seen.
+/// Maximum number of rows and columns of a board beyond the visible ones.
 const MOST_BEYOND: u32 = 12;
 
-/// The widest spacing of tags that is tried.
+/// Widest spacing of tags that is tried.
 const WIDEST_SPACING: i32 = 8;
 
-/// Tags that may not be as on a board that is tried, of so many.
+/// One tag in so many may contradict a board that is tried.
 const ODD_TAGS: usize = 12;
 
-/// A target that was recognised.
+/// A recognised target.
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct Recognised {
-    /// The target. Its edges have the usual length: no picture tells how large a print is.
+    /// The target. Its edges have the default length, because an image does not show the size of a print.
     pub target: Target,
-    /// Tags that were read.
+    /// Number of tags that were read.
     pub tags: usize,
-    /// Corners of the target, and how many of them the picture shows. What lies beyond a picture is not known: where
-    /// they are fewer, the board may be larger still.
+    /// Number of corners of the target, and number of them visible in the image. The board may extend beyond the image:
+    /// if the second number is smaller, it may be larger still.
     pub corners: [usize; 2],
 }
 
-/// Recognises targets by the tags of some families: a board, whatever its rows, columns and ids, or one of the solids as they
-/// are made where nothing else is asked for.
+/// Recognises targets by the tags of given families: a board of any rows, columns and ids, or a solid with default
+/// settings.
 ///
 /// ```
 /// use deltille_detect::Recogniser;
@@ -75,11 +76,11 @@ pub struct Recognised {
 /// ```
 #[derive(Clone, Debug)]
 pub struct Recogniser {
-    /// Families whose tags have the same cells: of one tiling, with as many bits.
+    /// Families by layout of cells: tiling and number of bits.
     alike: BTreeMap<(GridKind, u32), Vec<Known>>,
 }
 
-/// A family that is looked for.
+/// A family to read.
 #[derive(Clone, Debug)]
 struct Known {
     family: Family,
@@ -87,7 +88,7 @@ struct Known {
 }
 
 impl Recogniser {
-    /// One that knows these families.
+    /// Creates a recogniser of these families.
     pub fn new(families: Vec<Family>) -> Self {
         let mut alike = BTreeMap::<_, Vec<Known>>::new();
         for family in families {
@@ -98,7 +99,7 @@ impl Recogniser {
         Self { alike }
     }
 
-    /// The target that a picture shows; `None` where there is none that is known.
+    /// Returns the target in an image; `None` if the image shows no tags of a known family.
     pub fn recognise<'a>(&self, image: impl Into<ImageView<'a>>) -> Option<Recognised> {
         let image = image.into();
         let pyramid = Pyramid::new(image, levels_of(image), MIN_LEVEL_SIDE);
@@ -109,14 +110,14 @@ impl Recogniser {
         let boards = all.iter().filter_map(|seen| Some((seen, TargetSpec::Board(seen.board()?))));
         let solids =
             all.iter().take(1).flat_map(|seen| seen.solids().into_iter().map(move |of| (seen, of)));
-        // Two faces of a solid may look like a board, whose corners are fewer then.
+        // Two faces of a solid may look like a board, which then has fewer corners.
         let guesses = boards.take(1).chain(solids);
         let known = guesses.filter_map(|(seen, spec)| confirmed(image, seen, spec));
         known.reduce(|best, other| if other.corners[1] > best.corners[1] { other } else { best })
     }
 }
 
-/// The target of a guess, where it has labels in the picture.
+/// Builds the guessed target and returns it if the detector labels the image with it.
 fn confirmed(image: ImageView, seen: &Sighting, spec: TargetSpec) -> Option<Recognised> {
     let name = match &spec {
         TargetSpec::Solid(solid) => solid.shape.name(),
@@ -140,23 +141,23 @@ struct Seen {
     turns: u8,
 }
 
-/// Tags of a family in a grid, all turned alike.
+/// Tags of a family in a grid, all with the same orientation.
 struct Sighting<'a> {
     kind: GridKind,
     family: &'a Family,
     border_bits: f64,
     tags_in: TagsIn,
     inverted: bool,
-    /// Lower left vertex and id of each tag, in the grid turned upright.
+    /// Lower left vertex and id of each tag, in the upright grid.
     tags: Vec<(Vertex, u32)>,
-    /// Corners of the grid turned upright.
+    /// Corners of the upright grid.
     corners: BTreeSet<Vertex>,
-    /// How much more likely than by chance, nats.
+    /// Log-likelihood ratio over noise, nats.
     evidence: f64,
 }
 
 impl Recogniser {
-    /// What the grids of a tiling show.
+    /// Reads the grids of a tiling.
     fn sightings<const N: usize>(&self, image: ImageView, pyramid: &Pyramid) -> Vec<Sighting<'_>> {
         let kind = kind::<N>();
         let of_kind = self.alike.iter().filter(|((of, _), _)| *of == kind);
@@ -177,14 +178,14 @@ impl Recogniser {
         let mut all = Vec::new();
         for families in alike {
             for &(tags_in, border_bits) in &places {
-                // The cells are the same, so tiles are read once for all.
+                // The layout of cells is the same, so tiles are read once for all families.
                 let place = TagPlace::with(border_bits, tags_in);
                 let reader = TagReader::new(&families[0].family, place);
                 for (grid, inverted) in found.iter().flat_map(|grid| [(grid, false), (grid, true)])
                 {
                     let read = reader.read(image, grid, inverted, MOST_TILES);
                     all.extend(families.iter().filter_map(|known| {
-                        let (tags, evidence) = turned_alike(&read, known, &reader)?;
+                        let (tags, evidence) = same_orientation(&read, known, &reader)?;
                         let family = &known.family;
                         let way = Way { kind, family, border_bits, tags_in, inverted };
                         Some(way.sighting(&tags, evidence, grid))
@@ -196,7 +197,7 @@ impl Recogniser {
     }
 }
 
-/// How tags are read.
+/// A way to read tags.
 struct Way<'a> {
     kind: GridKind,
     family: &'a Family,
@@ -206,7 +207,7 @@ struct Way<'a> {
 }
 
 impl<'a> Way<'a> {
-    /// The tags of a grid, which is turned so that the first is upright.
+    /// Returns the tags of a grid, rotated so that the first tag is upright.
     fn sighting(self, seen: &[Seen], evidence: f64, grid: &SaddleGrid) -> Sighting<'a> {
         let Self { kind, family, border_bits, tags_in, inverted } = self;
         let upright = LatticeMap::new(kind, i32::from(turns_of(kind, &seen[0])), Vertex::new(0, 0));
@@ -220,14 +221,14 @@ impl<'a> Way<'a> {
     }
 }
 
-/// Turns of the lattice that set a tag upright.
+/// Returns the lattice rotations that set a tag upright.
 fn turns_of(kind: GridKind, seen: &Seen) -> u8 {
     panel_from_grid(seen.tile, kind.tag_tile(Vertex::new(0, 0)), seen.turns).turns()
 }
 
-/// The tags of a family that are turned alike, as those of a board are, and the evidence for them; `None` where chance
-/// may have made them.
-fn turned_alike(
+/// Returns the tags of a family that have the same orientation, as on a board, and the evidence for them. Returns
+/// `None` if they are not significant.
+fn same_orientation(
     read: &Read,
     Known { family, decoder }: &Known,
     reader: &TagReader,
@@ -244,7 +245,7 @@ fn turned_alike(
         let seen = Seen { tile: reading.tile, id: decoded.id, turns: decoded.turns };
         let (tags, evidence) = by_turns.entry(turns_of(family.kind(), &seen)).or_default();
         tags.push(seen);
-        // Of all tiles some may be tags by chance.
+        // Some of all tiles may look like tags by coincidence.
         *evidence -= (chance * read.readings.len() as f64).min(1.0).ln();
     }
     let best = by_turns.into_values().max_by(|a, b| a.1.total_cmp(&b.1));
@@ -258,7 +259,7 @@ impl Sighting<'_> {
         TagSpec { family, first_id, spacing, border_bits, tags_in, hole_mm: None }
     }
 
-    /// The smallest board that has these tags in these places, and these corners.
+    /// Returns the smallest board with these tags in these positions, and these corners.
     fn board(&self) -> Option<BoardSpec> {
         let range = |of: fn(&Vertex) -> i32| {
             let least = self.corners.iter().map(of).min()?;
@@ -281,7 +282,7 @@ impl Sighting<'_> {
                     };
                     let on_board =
                         self.corners.iter().filter(|&&v| board.contains(&(v + shift))).count();
-                    // What is seen beyond the board is no corner of it, and speaks against it.
+                    // Corners seen beyond the board are evidence against it.
                     let cost =
                         board.len() - on_board + COST_BEYOND * (self.corners.len() - on_board);
                     if best.as_ref().is_none_or(|(least, _)| cost < *least) {
@@ -299,14 +300,14 @@ impl Sighting<'_> {
         Some(BoardSpec { edge_mm: BoardSpec::USUAL_EDGE_MM, ..spec })
     }
 
-    /// Most corners in a row.
+    /// Returns the number of corners in the longest row.
     fn longest_row(&self) -> Option<i32> {
         let mut counts = BTreeMap::<i32, i32>::new();
         self.corners.iter().for_each(|v| *counts.entry(v.row).or_default() += 1);
         counts.into_values().max()
     }
 
-    /// The spacings that the places of the tags allow.
+    /// Returns the spacings that fit the positions of the tags.
     fn spacings(&self) -> impl Iterator<Item = i32> + use<> {
         let gcd = |mut a: i32, mut b: i32| {
             while b != 0 {
@@ -322,12 +323,13 @@ impl Sighting<'_> {
         (1..=WIDEST_SPACING).filter(move |spacing| common % spacing == 0).rev()
     }
 
-    /// The first id with which the tags are those of a board of these corners, and the way from the grid to the board.
+    /// Returns the first id that explains the tags on a board of these corners, and the shift from the grid to the
+    /// board.
     fn laid_on(&self, vertices: &[Vertex], spacing: i32) -> Option<(u32, Vertex)> {
         let places = tagged_tiles(self.kind, vertices, spacing as u32, self.tags_in);
         let index: BTreeMap<Vertex, u32> = places.iter().copied().zip(0..).collect();
         let odd = self.tags.len() / ODD_TAGS;
-        // One of so many must be as on the board.
+        // At least one of these tags must fit the board.
         self.tags.iter().take(odd + 1).find_map(|&(at, id)| {
             index.iter().find_map(|(&place, &k)| {
                 let (first_id, shift) = (id.checked_sub(k)?, place - at);
@@ -340,7 +342,7 @@ impl Sighting<'_> {
         })
     }
 
-    /// The solids that may have these tags, as they are made where nothing else is asked for.
+    /// Returns the solids with default settings that may have these tags.
     fn solids(&self) -> Vec<TargetSpec> {
         let usual = TagSpec::default();
         if self.kind != GridKind::Deltille || self.family.name() != usual.family || self.inverted {
@@ -366,7 +368,7 @@ mod tests {
     use deltille_core::raster::Gray;
     use deltille_layout::synth::{Light, scene_of_target};
 
-    /// A picture of a target from an eye that looks at a place of it, mm.
+    /// Renders an image of a target from an eye that looks at a point, mm.
     fn picture(target: &Target, eye: [f64; 3], at: [f64; 3]) -> Gray<f32> {
         let scene = scene_of_target(target).unwrap();
         let pose = Pose::looking_at(DVec3::from(eye), DVec3::from(at), DVec3::Y);
@@ -387,7 +389,7 @@ mod tests {
     }
 
     #[test]
-    fn boards_are_recognised_with_their_ids_whichever_way_they_are_turned() {
+    fn boards_are_recognised_with_their_ids_in_any_orientation() {
         let mut with_tags = BoardSpec::deltille(8, 12, 20.0);
         with_tags.tags = Some(TagSpec {
             family: "delTag36h11".to_owned(),
@@ -420,16 +422,16 @@ mod tests {
     }
 
     #[test]
-    fn of_a_board_that_is_cut_what_is_seen_is_recognised() {
+    fn the_visible_part_of_a_cut_board_is_recognised() {
         let target = board(&BoardSpec::deltille(14, 16, 20.0));
         // The lower left part.
         let found = recognised(&target, [100.0, 70.0, 230.0], [100.0, 70.0, 0.0]).unwrap();
-        let TargetSpec::Board(spec) = &found.target.spec else { panic!("no board") };
+        let TargetSpec::Board(spec) = &found.target.spec else { panic!("not a board") };
         let tags = spec.tags.as_ref().unwrap();
         assert_eq!((tags.family.as_str(), tags.spacing), ("delTag25h7", 3));
         let [all, seen] = found.corners;
         assert!(seen > 45 && seen <= all, "{seen} of {all}");
-        // Tags of the picture are at places of the board that is printed.
+        // The printed board contains the ids of the tags that were read.
         let ids: BTreeSet<u32> = target.panels[0].tags.iter().map(|tag| tag.id).collect();
         let guessed = &found.target.panels[0].tags;
         assert!(guessed.iter().filter(|tag| ids.contains(&tag.id)).count() >= found.tags);
@@ -446,7 +448,7 @@ mod tests {
     }
 
     #[test]
-    fn what_has_no_tags_is_not_recognised() {
+    fn untagged_boards_are_not_recognised() {
         for kind in [GridKind::Deltille, GridKind::Checker] {
             let target = board(&BoardSpec { tags: None, ..BoardSpec::new(kind, 9, 10, 20.0) });
             let eye = [100.0, 80.0, 330.0];

@@ -1,4 +1,4 @@
-//! Several targets in one picture: whether they can be distinguished.
+//! Checks whether several targets in one image can be distinguished.
 
 use std::collections::BTreeSet;
 
@@ -7,61 +7,61 @@ use deltille_core::lattice::GridKind;
 use deltille_core::setting::Setting::{BoardBoardId, TagFirstId};
 use deltille_core::targets::{Target, UnknownCodes};
 
-/// Why targets cannot be looked for together. Messages say what to do about it.
+/// Reason why a set of targets cannot be detected together. Messages say how to fix it.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum SceneError {
-    /// No target.
-    #[error("there is no target to look for")]
+    /// No target was given.
+    #[error("no target given: pass at least one target")]
     Empty,
-    /// A target without corners of tiles.
+    /// A target has circles instead of tile corners.
     #[error(
-        "{name} has circles, and detection finds corners of tiles: OpenCV's `findCirclesGrid` finds its circles"
+        "{name} is a circle grid, and deltille detects only corners of tiles: use OpenCV's `findCirclesGrid`"
     )]
     Circles {
-        /// The target.
+        /// Name of the target.
         name: String,
     },
-    /// The codes of a target's tags are not known.
+    /// The codes of a target's tags are unknown.
     #[error(transparent)]
     UnknownCodes(#[from] UnknownCodes),
-    /// Targets of one name, by which results tell them apart.
-    #[error("two targets are named {name}: give each its own name")]
+    /// Two targets have the same name. Results identify targets by name.
+    #[error("two targets have the name {name}: give each target a unique name")]
     SameName {
-        /// The name.
+        /// The shared name.
         name: String,
     },
-    /// Targets that show the same tags.
+    /// Two targets contain the same tag.
     #[error(
-        "{first} and {second} both show tag {id} of {family}: make one of them with other ids, by {}",
+        "{first} and {second} share tag {id} of {family}: change the ids of one target with {}",
         if family == places::NAME { BoardBoardId } else { TagFirstId }
     )]
     SameTag {
-        /// A target.
+        /// Name of the first target.
         first: String,
-        /// Another one.
+        /// Name of the second target.
         second: String,
-        /// Id of a tag that both have.
+        /// Id of the shared tag.
         id: u32,
-        /// Name of its family.
+        /// Name of the tag's family.
         family: String,
     },
-    /// Targets without tags and of one outline.
+    /// Two targets have no tags and the same outline.
     #[error(
-        "{first} and {second} have no tags and look alike: give one of them tags, or other rows and columns"
+        "{first} and {second} have no tags and the same outline: add tags to one, or change its rows or columns"
     )]
     SameOutline {
-        /// A target.
+        /// Name of the first target.
         first: String,
-        /// Another one.
+        /// Name of the second target.
         second: String,
     },
 }
 
-/// Refuses targets that detection does not find.
+/// Checks that all targets have tile corners.
 ///
 /// # Errors
-/// Where one has circles instead of tiles.
+/// Returns an error if a target has circles instead of tiles.
 pub(super) fn check_detectable(targets: &[&Target]) -> Result<(), SceneError> {
     let has_discs = |target: &&&Target| target.panels.iter().any(|panel| panel.discs_mm.is_some());
     match targets.iter().find(has_discs) {
@@ -70,10 +70,11 @@ pub(super) fn check_detectable(targets: &[&Target]) -> Result<(), SceneError> {
     }
 }
 
-/// Refuses targets that cannot be told apart in a picture.
+/// Checks that the targets can be distinguished in an image.
 ///
 /// # Errors
-/// Where there is none, or two have the same name, a tag in common, or no tags and the same outline.
+/// Returns an error if `targets` is empty, or if two targets have the same name, share a tag, or have no tags and the
+/// same outline.
 pub fn check_distinct(targets: &[&Target]) -> Result<(), SceneError> {
     if targets.is_empty() {
         return Err(SceneError::Empty);
@@ -109,7 +110,7 @@ fn check_pair(one: &Target, other: &Target) -> Result<(), SceneError> {
     Ok(())
 }
 
-/// Tiling, rows and columns of the panels without tags.
+/// Returns tiling, rows and columns of the panels without tags.
 fn outlines(target: &Target) -> BTreeSet<(GridKind, [u32; 2], bool)> {
     let untagged = target.panels.iter().filter(|panel| panel.tags.is_empty());
     untagged.map(|panel| (panel.kind, panel.matrix, panel.inverted)).collect()

@@ -1,5 +1,5 @@
-//! Where the two tilings differ: N rays meet at a corner, six of a deltille grid, four of a
-//! checkerboard. What follows from N alone is written once, generic over it.
+//! Differences between the two tilings: N rays meet at a corner, six on a deltille grid, four on a checkerboard. Code
+//! that depends only on N is generic over it.
 //!
 //! ```text
 //!        2 ╱ 1                1          steps along the rays, counter-clockwise on the print;
@@ -9,28 +9,28 @@
 
 use deltille_core::lattice::{GridKind, Vertex};
 
-/// Rays at a corner of a deltille grid.
+/// Number of rays at a corner of a deltille grid.
 pub(crate) const DELTILLE: usize = 6;
 
-/// Rays at a corner of a checkerboard.
+/// Number of rays at a corner of a checkerboard.
 pub(crate) const CHECKER: usize = 4;
 
-/// The tiling with N rays at a corner.
+/// Returns the tiling with N rays at a corner.
 pub(crate) const fn kind<const N: usize>() -> GridKind {
     if N == DELTILLE { GridKind::Deltille } else { GridKind::Checker }
 }
 
-/// The step along direction `k` of the lattice, counted modulo N.
+/// Returns the lattice step along direction `k`, counted modulo N.
 pub(crate) fn step<const N: usize>(k: usize) -> Vertex {
     kind::<N>().steps()[k % N]
 }
 
-/// The N neighbours of a vertex, counter-clockwise.
+/// Returns the N neighbours of a vertex, counter-clockwise.
 pub(crate) fn neighbours<const N: usize>(vertex: Vertex) -> [Vertex; N] {
     std::array::from_fn(|k| vertex + step::<N>(k))
 }
 
-/// Vertices of the tiles whose first vertex is `vertex`, counter-clockwise.
+/// Returns the vertices of the tiles whose first vertex is `vertex`, counter-clockwise.
 pub(crate) fn tiles_from<const N: usize>(vertex: Vertex) -> Vec<Vec<Vertex>> {
     kind::<N>().tiles_from(vertex).map(|tile| tile.vertices().collect()).collect()
 }

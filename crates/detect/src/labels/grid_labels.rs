@@ -1,8 +1,8 @@
-//! How the corners of a grid get absolute labels: by tags, by an outline, or not at all.
+//! Absolute labels for the corners of a grid: by tags, by an outline, or none.
 //!
-//! A picture may show a board as in a mirror, flopped by a scanner, a projector or the camera's driver. Its grid
-//! is a right-handed lattice like any other, but lies on the panel with rows and columns exchanged. Labels
-//! of such a grid belong to no view of the print, so they are given only where they are asked for.
+//! An image may show a board mirrored by a scanner, a projector or the camera's driver. A mirrored grid is still a
+//! right-handed lattice, but it lies on the panel with rows and columns exchanged. No direct view of the print has such
+//! labels, so they are given only on request.
 
 use std::collections::btree_map::Entry;
 use std::collections::{BTreeMap, BTreeSet};
@@ -26,18 +26,18 @@ pub(crate) struct FoundGrid<'a> {
     pub corners: &'a SaddleGrid,
 }
 
-/// How corners get absolute labels.
+/// Labels for the corners of grids.
 #[derive(Clone, Debug)]
 pub(crate) struct Labels {
     source: Source,
-    /// The board, where one alone is looked for.
+    /// The board, if it is the only target.
     whole: Option<WholeBoard>,
     allow_mirrored: bool,
 }
 
 #[derive(Clone, Debug)]
 enum Source {
-    /// They do not.
+    /// No absolute labels.
     None,
     /// By the outline of a board that is seen whole.
     Outline(BTreeSet<Vertex>),
@@ -45,11 +45,11 @@ enum Source {
     Rectangle([u32; 2]),
     /// By the tags of a target, or by the outlines of its untagged panels.
     Target { tags: Option<Box<TagLabeller>>, panels: Vec<TargetPanel> },
-    /// By whichever of several targets a grid belongs to, by their names.
+    /// By the target, among several, to which a grid belongs; each with its name.
     Scene(Vec<(String, Labels)>),
 }
 
-/// What the detector must know of a panel.
+/// Properties of a panel that the detector needs.
 #[derive(Clone, Debug)]
 struct TargetPanel {
     id: u32,
@@ -61,12 +61,12 @@ struct TargetPanel {
     corner_ids: BTreeMap<Vertex, u32>,
 }
 
-/// More corners than any board has: of 140 × 140 every one would have 14 px in a picture of 4 megapixels. Fabrics and
-/// grids on screens have more, and made-up pictures so many that to refine them takes minutes.
+/// Maximum number of corners of a board. A board of 140 × 140 corners has edges of 14 px in an image of 4
+/// megapixels. Fabrics and grids on screens have more, and synthetic images so many that refinement takes minutes.
 pub(crate) const MOST_CORNERS: usize = 20_000;
 
 impl Labels {
-    /// By the rows and columns of an untagged board, where they are known.
+    /// Creates labels by the rows and columns of an untagged board, if they are known.
     pub(crate) fn of_size(
         kind: GridKind,
         size: Option<(u32, u32)>,
@@ -84,7 +84,7 @@ impl Labels {
         Self { source, whole, allow_mirrored: config.allow_mirrored }
     }
 
-    /// By the tags of a target, and the outlines of its untagged panels.
+    /// Creates labels by the tags of a target and the outlines of its untagged panels.
     pub(crate) fn of_target(
         target: &Target,
         family: Option<&Family>,
@@ -111,14 +111,13 @@ impl Labels {
         Self { source, whole, allow_mirrored: config.allow_mirrored }
     }
 
-    /// By the tags and outlines of several targets that can be told apart, each with its name.
+    /// Creates labels by the tags and outlines of several distinguishable targets, each with its name.
     pub(crate) fn of_scene(targets: Vec<(String, Self)>) -> Self {
         let allow_mirrored = targets.iter().any(|(_, labels)| labels.allow_mirrored);
         Self { source: Source::Scene(targets), whole: None, allow_mirrored }
     }
 
-    /// The panels in a grid; the grid itself with relative labels where there are none, and why there are
-    /// none.
+    /// Returns the panels in a grid. If there are none, returns the grid with relative labels, and the reason.
     pub(crate) fn label(
         &self,
         image: ImageView,
@@ -162,31 +161,31 @@ impl Labels {
                 if !self.allow_mirrored && labelled.iter().any(|labelled| labelled.mirrored) {
                     return vec![in_mirror(found)];
                 }
-                // What hangs on to labelled panels without being part of one is not reported.
+                // Corners that are joined to labelled panels without belonging to one are not reported.
                 labelled.iter().map(|l| (on_panel(found, &panels[l.panel], l), None)).collect()
             }
         }
     }
 
-    /// The board, where one alone is looked for.
+    /// Returns the board, if it is the only target.
     pub(crate) fn whole(&self) -> Option<&WholeBoard> {
         self.whole.as_ref()
     }
 
-    /// Whether labels are looked for.
+    /// Returns whether absolute labels are requested.
     pub(crate) fn are_wanted(&self) -> bool {
         !matches!(self.source, Source::None)
     }
 
-    /// Corners of the largest thing that is looked for. What has more, and no tag that vouches for it, is another
-    /// thing: a halftone, a fabric or a tiled floor is as regular as a board, but seldom as small.
+    /// Returns the number of corners of the largest target. A larger grid without a tag is something else: a halftone,
+    /// a fabric or a tiled floor is as regular as a board, but seldom as small.
     pub(crate) fn most_corners(&self) -> usize {
         match &self.source {
             Source::None => MOST_CORNERS,
             Source::Outline(outline) => outline.len(),
             Source::Rectangle([rows, cols]) => *rows as usize * *cols as usize,
             Source::Target { panels, .. } => {
-                // Faces without tags may be seen side by side as one grid.
+                // Untagged faces may appear side by side as one grid.
                 let untagged = panels.iter().filter(|panel| !panel.tagged);
                 let together = untagged.map(|panel| panel.corner_ids.len()).sum();
                 largest(panels).max(together)
@@ -197,7 +196,7 @@ impl Labels {
         }
     }
 
-    /// A grid on the outline of an untagged board, which a mirror image may fit as well.
+    /// Labels a grid by the outline of an untagged board, which its mirror image may also fit.
     fn on_outline(
         &self,
         found: FoundGrid,
@@ -220,8 +219,8 @@ impl Labels {
     }
 }
 
-/// The panels in a grid, of the first target that has it: no two have the same tags. Where none has, what a target says
-/// whose tags were read.
+/// Returns the panels of the first target in a grid; no two targets share tags. If no target fits, returns the result
+/// of a target whose tags were read.
 fn in_scene(
     targets: &[(String, Labels)],
     image: ImageView,
@@ -246,14 +245,14 @@ fn in_scene(
     without.into_iter().skip(first).take(1).collect()
 }
 
-/// A grid seen as in a mirror, which gets no labels.
+/// Returns a mirrored grid without labels, and the reason.
 fn in_mirror(found: FoundGrid) -> (Grid, Option<Reason>) {
     let why = Reason::new(ReasonKind::Mirrored, [("corners", found.corners.len() as f64)]);
     (Grid { mirrored: true, ..unlabelled(found) }, Some(why))
 }
 
-/// Leaves out of grids of one panel what a larger one, which comes before, has already: beside a tag of
-/// few pixels corners may be found twice, a pixel apart. What is a whole edge apart is told.
+/// Removes corners and tags that a larger grid of the same panel, earlier in the list, already contains. Beside a tag
+/// of few pixels, a corner may be found twice, 1 px apart. Returns a reason if copies are a whole edge apart.
 pub(crate) fn report_once(grids: &mut Vec<(Grid, Option<Reason>)>) -> Option<Reason> {
     let (mut corners, mut tags) = (BTreeMap::new(), BTreeSet::new());
     let mut elsewhere = 0;
@@ -292,18 +291,19 @@ fn on_panel(found: FoundGrid, panel: &TargetPanel, labelled: &Labelled) -> Grid 
     Grid { mirrored: labelled.mirrored, ..labels }
 }
 
-/// Corners of the largest panel.
+/// Returns the number of corners of the largest panel.
 fn largest(panels: &[TargetPanel]) -> usize {
     panels.iter().map(|panel| panel.corner_ids.len()).max().unwrap_or(0)
 }
 
-/// Whether a grid has all corners of several untagged panels, such as those of a solid, which nothing tells apart.
+/// Returns whether a grid has as many corners as several untagged panels, such as faces of a solid, that cannot be
+/// distinguished.
 fn are_alike(panels: &[TargetPanel], grid: &SaddleGrid) -> bool {
     let is_full = |panel: &&TargetPanel| !panel.tagged && panel.corner_ids.len() == grid.len();
     panels.iter().filter(is_full).count() > 1
 }
 
-/// The grid, as it is seen or in a mirror, on the one untagged panel whose outline it fills.
+/// Returns the grid, direct or mirrored, on the only untagged panel whose outline it fills.
 fn on_untagged_panel(found: FoundGrid, panels: &[TargetPanel], is_mirrored: bool) -> Option<Grid> {
     let turned = if is_mirrored { mirror_image(found.corners) } else { found.corners.clone() };
     let mut fitting = panels.iter().filter(|panel| !panel.tagged).filter_map(|panel| {
@@ -328,7 +328,7 @@ fn on_untagged_panel(found: FoundGrid, panels: &[TargetPanel], is_mirrored: bool
     Some(Grid { mirrored: is_mirrored, ..labels })
 }
 
-/// A grid with new labels, ordered by them; corners without a label are left out.
+/// Returns a grid with new labels, sorted by them. Corners without a label are omitted.
 fn relabelled(
     found: FoundGrid,
     label: impl Fn(Vertex) -> Option<(Vertex, Option<u32>)>,

@@ -1,17 +1,18 @@
-//! What a grid tells about light and blur before its tags are read: black and white on the edges of its
-//! tiles, and how wide the edges are.
+//! Light and blur of a grid, measured before its tags are read: black and white at the edges of the tiles, and the
+//! width of the edges.
 //!
-//! Across an edge, at the signed distance d from it, positive on the bright side, a picture shows
+//! Let d be the signed distance from an edge, positive on the bright side. The brightness across the edge is
 //!
 //! ```text
 //!     I(d) = o + a (S + κ (1 − S²)),     S = erf(d / √2σ),     σ² = nᵀ Σ n
 //! ```
 //!
-//! with the edge's normal n, the covariance Σ of the blur, and κ the curvature of the camera's tone curve. Edges
-//! of several directions give Σ, so that motion is a blur as well.
+//! with the normal n of the edge, the covariance Σ of the blur, and the curvature κ of the camera's tone curve. Edges
+//! of several directions determine Σ, so motion counts as blur.
 //!
-//! Limits: motion is taken for the Gaussian of its variance, and one blur for the whole grid. Where white is
-//! saturated the edge shows less of itself: a share θ of the way to white is as bright as white, and S is cut there.
+//! Limits: motion is modelled as a Gaussian of the same variance, and the whole grid has one blur. Where white is
+//! saturated, less of the edge is visible: from a share θ of white on, everything is as bright as white, and S is cut
+//! there.
 
 use std::collections::BTreeMap;
 
@@ -23,66 +24,69 @@ use crate::refine::blurred_corner::erf_sqrt_half;
 use deltille_core::lattice::{GridKind, Tile, Vertex};
 use deltille_core::raster::ImageView;
 
-/// Samples across an edge.
+/// Number of samples across an edge.
 const ACROSS: usize = 13;
 
-/// Places along an edge whose mean is taken, far from its corners.
+/// Positions along an edge that are averaged, far from its corners.
 const ALONG: [f64; 3] = [0.38, 0.5, 0.62];
 
-/// Edges that tell the blur: more of them would tell it no better than the model of the blur is.
+/// Number of edges that determine the blur. More edges gain nothing, because the blur model itself is no more accurate.
 const BLUR_EDGES: usize = 150;
 
-/// Each deviation of the blur that is tried is a tenth greater than the last, so that the true one is off by 6 % at most.
+/// Ratio of successive standard deviations of the blur that are tried. The nearest is within 6 % of the true one.
 const BLUR_STEP: f64 = 1.12;
 
-/// The least of them, px: sharper than pixels and their interpolation are.
+/// Smallest standard deviation of the blur, px. Pixels and their interpolation are never sharper.
 const LEAST_BLUR_PX: f64 = 0.35;
 
-/// How many there are: the last has 6 px, half a tile.
+/// Number of standard deviations that are tried. The last is 6 px, half a tile.
 const BLUR_STEPS: i32 = 26;
 
-/// Every so manieth of them is tried first, then those around the best.
+/// Stride of the coarse search, which is followed by those around the best.
 const COARSE_STEPS: i32 = 4;
 
-/// Edges of a direction that tell how much of white is clipped.
+/// Number of edges per direction that determine the clipping of white.
 const CLIPPED_EDGES: usize = 20;
 
-/// The part of the image's full scale from which a pixel may be saturated.
+/// Fraction of full scale from which a pixel may be saturated.
 const SATURATED: f64 = 0.985;
 
-/// Shares of white that may be as bright as the sensor tells: white is exposed up to eight times too much.
+/// Shares of white from which the sensor may saturate: white is overexposed up to eight times.
 const CLIPPED_SHARES: [f64; 8] = [1.0, 0.85, 0.65, 0.5, 0.35, 0.25, 0.18, 0.12];
 
-/// Less clipping is believed unless it leaves so many times the squares that more would leave: sharp edges of
-/// a drawn page, where all white is full scale, fit any share.
+/// Factor by which stronger clipping must reduce the sum of squares to be accepted. Sharp edges of a rendered page,
+/// where all white is full scale, fit any share.
 const CLIPPING_GAIN: f64 = 1.5;
 
-/// Deviation of a sample that any picture has, of full scale: half a step of 8 bits.
+/// Minimum standard deviation of a sample, of full scale: half a step of 8 bits.
 const LEAST_DEVIATION: f64 = 0.002;
 
-/// Variance of the levels that an edge tells, over that of a sample: a few samples on either side tell them.
+/// Variance of the levels measured at an edge, relative to that of a sample. A few samples on either side determine
+/// them.
 const EDGE_VARIANCE: f64 = 0.16;
 
-/// Deviation of the slopes of black and white over a tile, over the contrast: steeper ones are noise.
+/// Standard deviation of the slopes of black and white over a tile, relative to the contrast. Steeper slopes are noise.
 const SLOPE: f64 = 0.2;
 
-/// Largest curvature of a tone curve: that of gamma 2.6 between white and a black of a twentieth is 0.4.
+/// Largest curvature of a tone curve. Gamma 2.6 between white and a black of 1/20 has 0.4.
 const MOST_CURVATURE: f64 = 0.45;
 
-/// A smaller curvature changes a share of white by less than half a thousandth, a quarter of what rounding to 8 bits does.
+/// Curvature below which the curve counts as straight. It changes a share of white by less than 0.0005, a quarter of
+/// the rounding to 8 bits.
 const STRAIGHT: f64 = 1e-3;
 
-/// Of S = ±1 the determinant of an edge's equations is of the order of the square of the number of samples; this is one
-/// whose S are all the same.
+/// Determinant below which the equations of an edge have no solution. If S is ±1, the determinant is of the order of
+/// the square of the number of samples. It vanishes if all S are the same.
 const NO_EDGE: f64 = 1e-6;
 
-/// Prior information on the curvature where it is not told, over what a sample half-way up an edge tells: it stays 0.
-const HELD: f64 = 1e6;
+/// Prior information that keeps the curvature at 0 where the samples do not determine it. Unit: the information of a
+/// sample half-way up an edge.
+const STRONG_PRIOR: f64 = 1e6;
 
-/// The same where it is told: a tenth of a sample.
-const HARDLY_HELD: f64 = 0.1;
+/// The same where samples do determine the curvature: a tenth of a sample.
+const WEAK_PRIOR: f64 = 0.1;
 
-/// How far from the edges tiles are plain, in the units of tile coordinates.
+/// Distance from the edges up to which tiles are plain, in tile coordinates.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct ClearDepth {
     /// In dark tiles.
@@ -98,9 +102,9 @@ pub(crate) struct GridLight {
     pub blur_px2: [f64; 3],
     /// κ.
     pub tone: f64,
-    /// θ: the share of white from which pixels are saturated, 1 where white is not.
+    /// θ: the share of white from which pixels are saturated; 1 if white is not saturated.
     pub clipped_share: f64,
-    /// Deviation of a sample from the model, over the contrast.
+    /// Standard deviation of a sample from the model, relative to the contrast.
     pub noise: f64,
     kind: GridKind,
     clear: ClearDepth,
@@ -114,24 +118,24 @@ pub(crate) struct Levels {
 }
 
 impl Levels {
-    /// Black at a point of the tile, and how much brighter white is.
+    /// Returns black at a point of the tile, and the contrast to white.
     pub(crate) fn at(&self, DVec2 { x: u, y: v }: DVec2) -> [f64; 2] {
         [self.dark, self.contrast].map(|[a, b, c]| a + b * u + c * v)
     }
 }
 
-/// An edge and what was sampled across it.
+/// An edge and the samples across it.
 struct Profile {
     distances_px: [f64; ACROSS],
     values: [f64; ACROSS],
     normal: DVec2,
     saturated: bool,
-    /// Variance of a sample by what differs along the edge.
+    /// Variance of a sample, from the differences along the edge.
     variance: f64,
 }
 
 impl GridLight {
-    /// That of a grid; `None` where too little of it is seen.
+    /// Measures a grid; `None` if too little of it is visible.
     pub(crate) fn of(
         image: ImageView,
         grid: &SaddleGrid,
@@ -150,7 +154,7 @@ impl GridLight {
         let every = (grid.len() * directions).div_ceil(BLUR_EDGES).max(1);
         let edges = grid.keys().flat_map(|&v| (0..directions).map(move |k| (v, k)));
         let mut by_direction: Vec<Vec<Profile>> = (0..directions).map(|_| Vec::new()).collect();
-        // Every nth edge, with n prime to the number of directions, so that all have their share.
+        // Every nth edge, with n coprime to the number of directions, so that all directions are sampled.
         let every = if every.is_multiple_of(directions) { every + 1 } else { every };
         for (vertex, k) in edges.step_by(every) {
             by_direction[k].extend(light.profile(image, grid, vertex, k));
@@ -194,21 +198,21 @@ impl GridLight {
         if light.clipped_share < 1.0 {
             light.tone = 0.0;
         }
-        // Contrasts are twice the amplitude. What the fits leave shows shapes of the blur that are no Gaussian, but
-        // hardly noise, where samples lie closer than pixels.
+        // Contrasts are twice the amplitude. Residuals of the fits include blur that is not Gaussian, but hardly any
+        // noise where samples are denser than pixels.
         let left = squares / freedom * ALONG.len() as f64;
         light.noise = left.max(variances / power).sqrt() / 2.0;
         light.blur_px2 = covariance(&widths);
         Some(light)
     }
 
-    /// Deviation of the blur in px, the mean of all directions.
+    /// Returns the standard deviation of the blur, px, averaged over all directions.
     pub(crate) fn blur_px(&self) -> f64 {
         (0.5 * (self.blur_px2[0] + self.blur_px2[2])).sqrt()
     }
 
-    /// The share of white that a pixel shows, of a brightness on the scale of black 0 and white 1; from
-    /// the clipped share on it may be more.
+    /// Returns the share of white in a pixel. `brightness` is on the scale of black 0 and white 1. From the clipped
+    /// share on, the result is a lower bound.
     pub(crate) fn share(&self, brightness: f64) -> f64 {
         if self.clipped_share < 1.0 {
             return brightness * self.clipped_share;
@@ -223,7 +227,7 @@ impl GridLight {
         0.5 + 0.5 * s
     }
 
-    /// Black and white over a tile whose corners are in the grid.
+    /// Returns black and white over a tile whose corners are in the grid.
     pub(crate) fn levels(
         &self,
         image: ImageView,
@@ -273,7 +277,7 @@ impl GridLight {
         Some(Levels { dark, contrast })
     }
 
-    /// Black at an edge, and how much brighter white is.
+    /// Returns black at an edge, and the contrast to white.
     fn edge_levels(&self, profile: &Profile) -> Option<[f64; 2]> {
         let DVec2 { x, y } = profile.normal;
         let [xx, xy, yy] = self.blur_px2;
@@ -297,7 +301,7 @@ impl GridLight {
         (half > 0.0).then_some([middle - half, 2.0 * half])
     }
 
-    /// What lies across the edge along step `k` from a vertex; `None` where a tile beside it leaves the image.
+    /// Samples across the edge along step `k` from a vertex. Returns `None` if a tile beside it leaves the image.
     fn profile(
         &self,
         image: ImageView,
@@ -349,7 +353,7 @@ impl GridLight {
             }
             let [a, b, c] = samples;
             *value = (a + b + c) / 3.0;
-            // What rises evenly cancels; 1 + 4 + 1 variances are left.
+            // A linear slope cancels; 1 + 4 + 1 variances remain.
             variance += (a - 2.0 * b + c).powi(2) / (6 * ACROSS) as f64;
             saturated += usize::from(*value >= full);
         }
@@ -358,8 +362,8 @@ impl GridLight {
     }
 }
 
-/// What is left of S at a distance from an edge where everything from a share of white on looks white: on the
-/// scale of black −1 and what looks white 1.
+/// Returns the visible part of S at a distance from an edge, if everything from a share of white on looks white. Scale:
+/// black is −1, and apparent white is 1.
 fn shown(distance_px: f64, sigma_px: f64, clipped_share: f64) -> f64 {
     let s = f64::from(erf_sqrt_half((distance_px / sigma_px) as f32));
     let share = (0.5 + 0.5 * s).min(clipped_share) / clipped_share;
@@ -368,13 +372,13 @@ fn shown(distance_px: f64, sigma_px: f64, clipped_share: f64) -> f64 {
 
 struct ProfileFit {
     half_contrast: f64,
-    /// κ times the half contrast.
+    /// κ times half the contrast.
     curved: f64,
     squares: f64,
 }
 
 impl Profile {
-    /// Least squares for o, a and aκ.
+    /// Fits o, a and aκ by least squares.
     fn fit(&self, sigma_px: f64, clipped_share: f64) -> Option<ProfileFit> {
         let mut normal = Matrix3::<f64>::zeros();
         let mut right = Vector3::zeros();
@@ -386,15 +390,15 @@ impl Profile {
             right += row * value;
             power += value * value;
         }
-        // Sharp edges have no samples that tell the curvature, and what is cut off looks like it.
-        normal[(2, 2)] += if clipped_share < 1.0 { HELD } else { HARDLY_HELD };
+        // Sharp edges have no samples that determine the curvature, and clipping looks like it.
+        normal[(2, 2)] += if clipped_share < 1.0 { STRONG_PRIOR } else { WEAK_PRIOR };
         let solution = normal.cholesky()?.solve(&right);
         let squares = (power - solution.dot(&right)).max(0.0);
         Some(ProfileFit { half_contrast: solution[1], curved: solution[2], squares })
     }
 }
 
-/// The width of the blur across edges of one direction that leaves least, px, and what it leaves.
+/// Returns the width of the blur, px, that fits edges of one direction best, and its sum of squares.
 fn best_width(profiles: &[&Profile], clipped_share: f64) -> (f64, f64) {
     let coarse = best_step(profiles, clipped_share, (0..BLUR_STEPS).step_by(COARSE_STEPS as usize));
     let around = (coarse.0 - COARSE_STEPS + 1).max(0)..(coarse.0 + COARSE_STEPS).min(BLUR_STEPS);
@@ -402,7 +406,7 @@ fn best_width(profiles: &[&Profile], clipped_share: f64) -> (f64, f64) {
     (LEAST_BLUR_PX * BLUR_STEP.powi(step), left)
 }
 
-/// Of some steps of the blur's deviation the one that leaves least, and what it leaves.
+/// Returns the best of several steps of the standard deviation of the blur, and its sum of squares.
 fn best_step(
     profiles: &[&Profile],
     clipped_share: f64,
@@ -410,7 +414,7 @@ fn best_step(
 ) -> (i32, f64) {
     let left = |step: i32| {
         let sigma_px = LEAST_BLUR_PX * BLUR_STEP.powi(step);
-        // Where nothing of the edge is left it cannot be fitted.
+        // If nothing of the edge is left, it cannot be fitted.
         let squares = profiles
             .iter()
             .map(|p| p.fit(sigma_px, clipped_share).map_or(f64::INFINITY, |fit| fit.squares));
@@ -420,8 +424,8 @@ fn best_step(
     all.min_by(|a, b| a.1.total_cmp(&b.1)).unwrap_or((0, f64::INFINITY))
 }
 
-/// θ: the largest with which some edges of all directions leave nearly the least, or no more than samples of this
-/// deviation do.
+/// Returns θ, the largest share for which edges of all directions fit nearly best, or as well as samples with this
+/// standard deviation allow.
 fn clipped_share(by_direction: &[Vec<Profile>], deviation: f64) -> f64 {
     let some: Vec<Vec<&Profile>> = by_direction
         .iter()
@@ -437,14 +441,14 @@ fn clipped_share(by_direction: &[Vec<Profile>], deviation: f64) -> f64 {
     tried.into_iter().find(|(left, _)| *left <= limit).map_or(1.0, |(_, share)| share)
 }
 
-/// The covariance Σ whose variances nᵀΣn are those given, as nearly as one can; a little rounder where the directions
-/// do not tell it.
+/// Returns the covariance Σ whose variances nᵀΣn fit the given ones best. It is slightly rounder where the directions
+/// do not determine it.
 fn covariance(widths: &[([f64; 3], f64)]) -> [f64; 3] {
-    /// Weight of being round, against one direction's equation.
+    /// Weight of roundness, relative to the equation of one direction.
     const ROUND: f64 = 0.01;
-    /// Least variance in any direction, over that of the sharpest edges. It stays a covariance so, and motion may blur another
-    /// direction less than all those of edges. From 0.15 to 0.6 tags read under strong motion change by 0.8 %; with 1 there are
-    /// 2 % fewer.
+    /// Minimum variance in any direction, relative to that of the sharpest edges. It keeps Σ positive definite, and
+    /// motion may blur another direction less than all edge directions. From 0.15 to 0.6, the number of tags read under
+    /// strong motion changes by 0.8 %; with 1 it is 2 % lower.
     const SHARPEST: f64 = 0.3;
     let mean = widths.iter().map(|w| w.1).sum::<f64>() / widths.len().max(1) as f64;
     let mut normal = Matrix3::<f64>::identity() * ROUND;
@@ -456,7 +460,7 @@ fn covariance(widths: &[([f64; 3], f64)]) -> [f64; 3] {
     }
     let solution =
         normal.try_inverse().map_or(Vector3::new(mean, 0.0, mean), |inverse| inverse * right);
-    // Never sharper than the sharpest direction, so that it stays a covariance.
+    // Never sharper than the sharpest direction, so that Σ stays positive definite.
     let least = widths.iter().map(|w| w.1).fold(mean, f64::min) * SHARPEST;
     let (half_sum, half_difference) =
         (0.5 * (solution.x + solution.z), 0.5 * (solution.x - solution.z));

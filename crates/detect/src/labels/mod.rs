@@ -1,12 +1,12 @@
-//! From grids to labels: which corner of which panel each corner is.
+//! Labelling: assigns each corner of a grid to a corner of a panel.
 //!
-//! Comes in: the image and a grid. Goes out: the grid with panel, rows and columns, or the reason why it has none.
+//! Input: the image and a grid. Output: the grid with panel, rows and columns, or the reason why it has no labels.
 //!
 //! 1. `grid_light` measures black, white and blur on the edges of the tiles.
-//! 2. `tags` samples every tile through its map (`tile_map`); `soft_cells` gives the log-odds of its cells.
+//! 2. `tags` samples every tile through its map (`tile_map`); `soft_cells` computes the log-odds of its cells.
 //! 3. `tag_words` compares them with the words of the target.
-//! 4. `placement` lets all tiles decide together where the grid lies on the target.
-//! 5. `grid_labels` gives each grid its labels, by tags or by an outline; `why` finds the reason where there are none.
+//! 4. `placement` combines the evidence of all tiles to decide where the grid lies on the target.
+//! 5. `grid_labels` labels each grid, by tags or by an outline; `why` finds the reason for missing labels.
 
 pub(crate) mod grid_labels;
 pub(crate) mod grid_light;

@@ -1,23 +1,21 @@
-//! Soft decisions on the cells of a tag from the pixels of its tile: the log-odds of all cells from
-//! all samples at once, by linear Bayesian estimation under a known point spread function.
+//! Soft decisions on the cells of a tag from the pixels of its tile. Linear Bayesian estimation under a known point
+//! spread function gives the log-odds of all cells from all samples at once.
 //!
-//! With the border at 0 and white at 1, a sample at p is the sum of the cells c weighted by their
-//! share W in its blurred neighbourhood, and of the white beyond the border. With s = ±1 for white
-//! and black cells,
+//! Let the border be 0 and white 1. A sample at p is the sum of the cells c, weighted by their share W in its blurred
+//! neighbourhood, plus the white beyond the border. With s = ±1 for white and black cells,
 //!
 //! ```text
 //!     x(p) = ½ Σ W(p,c) (1 + s(c)) + white(p) + error of the levels + noise
 //!     m    = K (x − ½ Σ W − white),     K = (WᵀW/σ² + 1)⁻¹ Wᵀ/σ²
 //! ```
 //!
-//! is the posterior mean of s, v its variance, and m/v half the log-odds that the cell is white.
-//! Errors of the grey levels, linear over the tile, are further unknowns that are solved for
-//! together with the cells.
+//! is the posterior mean of s, v its variance, and m/v half the log-odds that the cell is white. Errors of the grey
+//! levels are linear over the tile. They are additional unknowns, solved together with the cells.
 //!
-//! The shares depend only on the blur in tile coordinates, which neighbouring tiles have in common:
-//! K is computed once, and each tile then costs one multiplication.
+//! The shares depend only on the blur in tile coordinates, which neighbouring tiles share. So K is computed once, and
+//! each tile costs one multiplication.
 //!
-//! Limits: cells are treated as independent, although their errors are not where the blur is wide.
+//! Limits: cells are treated as independent, although wide blur correlates their errors.
 
 use std::collections::BTreeMap;
 use std::rc::Rc;
@@ -28,101 +26,100 @@ use nalgebra::{DMatrix, Matrix2};
 use crate::refine::blurred_corner::erf_sqrt_half;
 use deltille_core::lattice::{GridKind, TagCells};
 
-/// A triangle is divided into 3² parts, of which a square has two.
+/// Subdivision of a cell: a triangle has 3² parts, a square twice as many.
 const DIVISIONS: usize = 3;
 
-/// Standard deviation of the blur that is added, in bit-widths: about the size of a part of a cell,
-/// which is represented by its middle.
+/// Standard deviation of the added blur, bit-widths: about the size of a part of a cell, which is represented by its
+/// centre.
 const PART_BLUR_BITS: f64 = 0.14;
 
-/// Step by which blurs are distinguished: a seventh of their standard deviation.
+/// Step between distinct blurs, in log variance: a seventh of their standard deviation.
 const LOG_VARIANCE_STEP: f64 = 0.3;
 
-/// Step by which their correlations are: a fifth.
+/// Step between distinct correlations of the blur: a fifth.
 const CORRELATION_STEP: f64 = 0.2;
 
-/// Standard deviation of a sample by model errors, over the contrast: positions, the shape of the
-/// blur, dirt.
+/// Standard deviation of a sample by model errors, relative to the contrast: positions, shape of the blur, dirt.
 const MODEL_ERROR: f64 = 0.05;
 
-/// Number of pixels over which a sample between them averages the noise: 1 / (2/3)².
+/// Number of pixels over which an interpolated sample averages the noise: 1 / (2/3)².
 const SAMPLE_PX2: f64 = 2.25;
 
-/// Factor of the noise variance of a sample: black, white and the width of the blur are measured
-/// with the same noise.
+/// Factor of the noise variance of a sample. Black, white and the width of the blur are measured with the same noise.
 const NOISE_WEIGHT: f64 = 1.5;
 
-/// Largest correlation of a blur in tile coordinates: the middle of what is rounded to 1, which no covariance has.
+/// Largest correlation of a blur in tile coordinates: the centre of the interval rounded to 1, because no covariance
+/// has a correlation of 1.
 const MOST_CORRELATION: f64 = 0.95;
 
-/// Squared distance, in deviations of the blur, beyond which a part of a cell does not count: e⁻⁸ of what it would in the
-/// middle.
+/// Squared distance, in σ of the blur, beyond which a part of a cell is ignored. Its weight there is e⁻⁸ of that in the
+/// centre.
 const FAR_SIGMAS2: f64 = 16.0;
 
-/// Least variance of a cell: with less its odds are beyond [`MOST_HALF_ODDS`] anyhow.
+/// Minimum variance of a cell. With less, its odds exceed [`MOST_HALF_ODDS`] anyway.
 const LEAST_VARIANCE: f64 = 1e-3;
 
-/// Least deviation of what a sample would show, over the contrast: a fiftieth of [`MODEL_ERROR`].
+/// Minimum standard deviation of a predicted sample, relative to the contrast: a fiftieth of [`MODEL_ERROR`].
 const LEAST_SPREAD: f32 = 1e-3;
 
-/// Where less of a distribution lies above its bound, the mean is within a quarter deviation of the bound, and the error
-/// function is off by a part in a thousand of what is left.
+/// Probability above the bound from which the truncated mean is computed. Below it, the mean is within σ/4 of the
+/// bound, and the error function is off by 1/1000 of the remaining probability.
 const LEAST_ABOVE: f32 = 1e-4;
 
-/// Standard deviation of the grey levels, over the contrast.
+/// Standard deviation of the grey levels, relative to the contrast.
 const LEVEL_ERROR: f64 = 0.15;
 
 /// Standard deviation of their slopes over a tile.
 const SLOPE_ERROR: f64 = 0.2;
 
-/// Greatest half log-odds of a cell: one in two hundred is dirty on the print.
+/// Largest half log-odds of a cell: one in two hundred is dirty on the print.
 const MOST_HALF_ODDS: f64 = 2.6;
 
-/// Unknowns beside the cells: the level and its slopes along u and v.
+/// Number of unknowns beside the cells: the level and its slopes along u and v.
 const LEVELS: usize = 3;
 
-/// Rounds in which saturated or missing samples are replaced by the expectation from the others.
+/// Number of iterations that replace saturated or missing samples by their expectation from the others.
 const ROUNDS: usize = 6;
 
-/// The positions at which cells are sampled, and the geometry by which blur mixes them.
+/// Sample positions of the cells, and the geometry by which blur mixes cells.
 #[derive(Clone, Debug)]
 pub(crate) struct CellModel {
     kind: GridKind,
     bits: usize,
-    /// Length of the tile's edge, bit-widths.
+    /// Edge length of the tile, bit-widths.
     width: f64,
-    /// Distance from the tile's edges to the border of the tag.
+    /// Distance from the tile's edges to the border of the tag, bit-widths.
     margin_bits: f64,
-    /// Positions of samples, in tile coordinates.
+    /// Sample positions, in tile coordinates.
     points: Vec<DVec2>,
-    /// Parts of the cells: the bit, and their middle in tile coordinates.
+    /// Parts of the cells: bit, and centre in tile coordinates.
     parts: Vec<(usize, DVec2)>,
 }
 
-/// The blur in tile coordinates, and the noise.
+/// Blur in tile coordinates, and noise.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct TileBlur {
     /// Covariance uu, uv, vv, bit-widths².
     pub covariance: [f64; 3],
-    /// Area of a bit-width squared of tile coordinates, px².
+    /// Area of a squared bit-width of tile coordinates, px².
     pub area_px2: f64,
-    /// Standard deviation of a sample, over the contrast.
+    /// Standard deviation of a sample, relative to the contrast.
     pub noise: f64,
 }
 
-/// The estimator K with the terms that belong to it.
+/// The estimator K and its related terms.
 #[derive(Debug)]
 pub(crate) struct Mixing {
     bits: usize,
     /// ½ Σ W + white, by sample.
     middle: Vec<f32>,
-    /// By bit.
+    /// Rows of K, by bit.
     gain: Vec<Vec<f32>>,
-    /// ½ W by sample.
+    /// ½ W, by sample.
     half_shares: Vec<Vec<f32>>,
-    /// 1/v by bit.
+    /// 1/v, by bit.
     inverse_variance: Vec<f32>,
-    /// By sample, the deviation of what it would show if nothing were known of the cells.
+    /// Standard deviation of the predicted sample if nothing is known of the cells, by sample.
     spread: Vec<f32>,
 }
 
@@ -141,8 +138,8 @@ pub(crate) enum Sample {
 }
 
 impl CellModel {
-    /// A model for tags whose cells begin `inset_bits`, and whose border begins `margin_bits`, from
-    /// the edges of their tiles, in bit-widths.
+    /// Creates a model for tags. Their cells begin `inset_bits` from the edges of the tile, and their border
+    /// `margin_bits`, in bit-widths.
     pub(crate) fn new(cells: &TagCells, inset_bits: f64, margin_bits: f64) -> Self {
         let bits = cells.dimension().bits();
         let points = (0..bits).flat_map(|bit| {
@@ -165,27 +162,27 @@ impl CellModel {
         }
     }
 
-    /// The positions at which a tile is sampled, in tile coordinates.
+    /// Returns the sample positions of a tile, in tile coordinates.
     pub(crate) fn points(&self) -> &[DVec2] {
         &self.points
     }
 
-    /// The same with the bit of the cell that each is in.
+    /// Returns the sample positions, each with the bit of its cell.
     pub(crate) fn points_by_bit(&self) -> impl Iterator<Item = (usize, &DVec2)> {
         let of_cell = self.points.len() / self.bits;
         self.points.iter().enumerate().map(move |(i, point)| (i / of_cell, point))
     }
 
-    /// Length of the tile's edge, bit-widths.
+    /// Returns the edge length of the tile, bit-widths.
     pub(crate) fn width(&self) -> f64 {
         self.width
     }
 
-    /// The mixing for a blur, from the cache `known` where one for nearly the same blur exists;
-    /// `None` where the equations cannot be solved.
+    /// Returns the mixing for a blur, from the cache `known` if it contains nearly the same blur. Returns `None` if the
+    /// equations cannot be solved.
     pub(crate) fn mixing(&self, blur: TileBlur, known: &mut Mixings) -> Option<Rc<Mixing>> {
         let [uu, uv, vv] = blur.covariance;
-        // Isotropic on the print: steps along u and v lie 60° apart there, so that uu = vv = 1/sin² 60° and uv = −cos 60° of that.
+        // Isotropic on the print. Steps along u and v are 60° apart, so uu = vv = 1/sin² 60° and uv = −cos 60° of that.
         let [puu, puv] = match self.kind {
             GridKind::Deltille => [4.0 / 3.0, -2.0 / 3.0],
             GridKind::Checker => [1.0, 0.0],
@@ -233,7 +230,7 @@ impl CellModel {
         }
         let white: Vec<f64> =
             self.points.iter().map(|&p| self.white_beyond(p, [uu, uv, vv])).collect();
-        // Samples closer than pixels share their noise.
+        // Samples denser than pixels share their noise.
         let samples_px2 = n as f64 / (bits as f64 * self.cell_area() * area_px2);
         let variance = NOISE_WEIGHT * noise * noise * (SAMPLE_PX2 * samples_px2).max(1.0)
             + MODEL_ERROR * MODEL_ERROR * samples_px2.max(1.0);
@@ -261,7 +258,7 @@ impl CellModel {
         })
     }
 
-    /// Area of a cell in squared bit-widths of the coordinates.
+    /// Returns the area of a cell in squared bit-widths of the coordinates.
     fn cell_area(&self) -> f64 {
         match self.kind {
             GridKind::Deltille => 0.5,
@@ -269,7 +266,7 @@ impl CellModel {
         }
     }
 
-    /// The share of the white around the border in a sample.
+    /// Returns the share of the white around the border in a sample.
     fn white_beyond(&self, point: DVec2, [uu, uv, vv]: [f64; 3]) -> f64 {
         let beyond = |inside_bits: f64, variance: f64| {
             0.5 - 0.5 * f64::from(erf_sqrt_half((inside_bits / variance.sqrt()) as f32))
@@ -285,7 +282,7 @@ impl CellModel {
 }
 
 impl Mixing {
-    /// Half the log-odds that each cell is white, by bit; `samples` are at the positions of
+    /// Returns half the log-odds that each cell is white, by bit. `samples` are at the positions of
     /// [`CellModel::points`].
     pub(crate) fn half_odds(&self, samples: &[Sample]) -> Vec<f32> {
         let whole = samples.iter().all(|sample| matches!(sample, Sample::Share(_)));
@@ -323,7 +320,7 @@ impl Mixing {
     }
 
     fn means(&self, off_middle: &[f32]) -> Vec<f32> {
-        /// Sums that do not wait for each other.
+        /// Number of independent sums, which do not wait for each other.
         const EIGHT: usize = 8;
         let of_bit = |gain: &Vec<f32>| {
             let mut lanes = [0.0f32; EIGHT];
@@ -340,7 +337,7 @@ impl Mixing {
     }
 }
 
-/// Mean of a normal distribution with this mean and standard deviation, truncated below at `least`.
+/// Returns the mean of a normal distribution truncated below at `least`.
 fn mean_above(least: f32, mean: f32, deviation: f32) -> f32 {
     let deviation = deviation.max(LEAST_SPREAD);
     let at = (least - mean) / deviation;
@@ -352,7 +349,7 @@ fn mean_above(least: f32, mean: f32, deviation: f32) -> f32 {
     mean + deviation * density / above
 }
 
-/// Middles of the equal triangles that a cell is divided into.
+/// Returns the centres of the equal triangles into which a cell is divided.
 fn parts_of(cell: &[DVec2]) -> Vec<DVec2> {
     let third = 1.0 / (3.0 * DIVISIONS as f64);
     let rows = (0..DIVISIONS).flat_map(|j| (0..DIVISIONS - j).map(move |i| (i, j)));
@@ -373,8 +370,8 @@ fn parts_of(cell: &[DVec2]) -> Vec<DVec2> {
     middles.collect()
 }
 
-/// Converts a covariance xx, xy, yy, px², to tile coordinates whose unit steps along u and v are
-/// the vectors `a` and `b`, px; also returns the area of a unit square, px².
+/// Converts a covariance xx, xy, yy, px², to tile coordinates whose unit steps along u and v are the vectors `a` and
+/// `b`, px. Also returns the area of a unit square, px².
 pub(crate) fn in_tile([xx, xy, yy]: [f64; 3], [a, b]: [DVec2; 2]) -> Option<([f64; 3], f64)> {
     let jacobian = Matrix2::new(a.x, b.x, a.y, b.y);
     let determinant = jacobian.determinant().abs();
@@ -396,7 +393,7 @@ mod tests {
     const MARGIN_BITS: f64 = 0.5;
     const INSET_BITS: f64 = 1.5;
 
-    /// Whether a polygon of either winding has a point.
+    /// Returns whether a polygon of either winding contains a point.
     fn has(polygon: &[DVec2], point: DVec2) -> bool {
         let side = |i: usize| {
             let (a, b) = (polygon[i], polygon[(i + 1) % polygon.len()]);
@@ -405,7 +402,7 @@ mod tests {
         (1..polygon.len()).all(|i| side(i) == side(0))
     }
 
-    /// What a tag shows at a place of its tile: 1 for white.
+    /// Returns the printed value of a tag at a point of its tile: 1 is white.
     fn drawn(cells: &TagCells, word: u64, point: DVec2) -> f32 {
         let DVec2 { x: u, y: v } = point;
         let (width, margin) = (cells.width(INSET_BITS), MARGIN_BITS);
@@ -421,8 +418,7 @@ mod tests {
         bit.map_or(0.0, |bit| f32::from(u8::from(word >> bit & 1 == 1)))
     }
 
-    /// Random samples of a tag under a blur that is the same in all directions on the print, and
-    /// that blur.
+    /// Returns random samples of a tag under a blur that is isotropic on the print, and the blur.
     fn seen(
         model: &CellModel,
         cells: &TagCells,
@@ -436,7 +432,7 @@ mod tests {
             for _ in 0..400 {
                 let [a, b]: [f64; 2] = [0; 2].map(|_| noise.sample(rng));
                 let off = match cells.kind() {
-                    // Steps along u and v lie 60° apart.
+                    // Steps along u and v are 60° apart.
                     GridKind::Deltille => DVec2::new(a - b / 3f64.sqrt(), 2.0 * b / 3f64.sqrt()),
                     GridKind::Checker => DVec2::new(a, b),
                 };
@@ -456,10 +452,10 @@ mod tests {
         TileBlur { covariance, area_px2: 16.0, noise: 0.05 }
     }
 
-    /// The model reads tags that are drawn and blurred without it: all cells under a weak blur, and
-    /// under a strong one no more are wrong than the odds say.
+    /// The model reads tags that are rendered and blurred independently of it. Under weak blur all cells are right.
+    /// Under strong blur no more are wrong than the odds predict.
     #[test]
-    fn cells_are_as_often_wrong_as_their_odds_say() {
+    fn cell_errors_match_the_odds() {
         let mut rng = ChaCha8Rng::seed_from_u64(4);
         for kind in [GridKind::Deltille, GridKind::Checker] {
             let cells = TagCells::of(kind, Dimension::from_bits(25).unwrap());
@@ -479,14 +475,14 @@ mod tests {
                     wrong as f32 <= 1.2 * expected,
                     "{kind:?}, {bits}: {wrong}, expected {expected}"
                 );
-                assert!(bits > 0.3 || wrong == 0, "{kind:?}: {wrong} under hardly any blur");
+                assert!(bits > 0.3 || wrong == 0, "{kind:?}: {wrong} wrong under weak blur");
             }
         }
     }
 
-    /// Erased samples say nothing, and a bound says no more than what lies at it.
+    /// Erased samples contain no information, and a lower bound no more than its value.
     #[test]
-    fn what_is_not_seen_is_not_known() {
+    fn unseen_cells_stay_unknown() {
         let mut rng = ChaCha8Rng::seed_from_u64(5);
         let cells = TagCells::of(GridKind::Deltille, Dimension::from_bits(16).unwrap());
         let model = CellModel::new(&cells, INSET_BITS, MARGIN_BITS);
@@ -502,6 +498,6 @@ mod tests {
         let (seen, bounded) = (mixing.half_odds(&samples), mixing.half_odds(&bounds));
         let sure =
             |odds: &[f32]| odds.iter().filter(|half| **half < 0.0).map(|half| -half).sum::<f32>();
-        assert!(sure(&bounded) < sure(&seen), "black is not known from a bound below");
+        assert!(sure(&bounded) < sure(&seen), "a lower bound determines black");
     }
 }

@@ -1,26 +1,26 @@
-//! The words that the tags of a target may show, and what a tile's cells say about each.
+//! Words of the tags of a target, and the evidence of a tile's cells for each.
 
 use deltille_core::family::Family;
 
-/// How many codes the cells' frequencies in the family count for, against those of the target.
+/// Weight of the cell frequencies of the family against those of the target, in codes.
 const FAMILY_WEIGHT: f64 = 16.0;
 
-/// Frequencies are no nearer to 0 and 1.
+/// Minimum distance of a frequency from 0 and 1.
 const LEAST_FREQUENCY: f64 = 0.05;
 
-/// Codes of a target in all their turns.
+/// Codes of a target in all rotations.
 #[derive(Clone, Debug)]
 pub(crate) struct TargetWords {
     ids: Vec<u32>,
     turns: usize,
-    /// Of code i turned k times: word i · turns + k.
+    /// Code i rotated k times is word i · turns + k.
     words: Vec<u64>,
-    /// How often each cell is white, by turn.
+    /// Frequency of white in each cell, by rotation.
     frequencies: Vec<Vec<f32>>,
 }
 
 impl TargetWords {
-    /// Those of some codes of a family.
+    /// Creates the words of some codes of a family.
     pub(crate) fn new(family: &Family, ids: Vec<u32>) -> Self {
         let cells = family.cells();
         let turns = usize::from(family.kind().turns());
@@ -60,28 +60,27 @@ impl TargetWords {
         Self { ids, turns, words, frequencies }
     }
 
-    /// How many there are.
+    /// Returns the number of words.
     pub(crate) fn len(&self) -> usize {
         self.words.len()
     }
 
-    /// How many turns each code has.
+    /// Returns the number of rotations of a code.
     pub(crate) fn turns(&self) -> usize {
         self.turns
     }
 
-    /// The index of an id's code.
+    /// Returns the index of the code with an id.
     pub(crate) fn code_of(&self, id: u32) -> Option<usize> {
         self.ids.binary_search(&id).ok()
     }
 
-    /// A word.
+    /// Returns a word.
     pub(crate) fn word(&self, index: usize) -> u64 {
         self.words[index]
     }
 
-    /// Λ of every word, nats: how much more likely the cells are if they show that word than any that is
-    /// drawn by the cells' frequencies.
+    /// Returns Λ of every word, nats: the log-likelihood ratio of the word to words drawn by the cell frequencies.
     pub(crate) fn evidence(&self, half_odds: &[f32]) -> Vec<f32> {
         let bytes = half_odds.len().div_ceil(8);
         // Sum of the half odds of the white cells, for each value of each byte of 8 cells.
@@ -106,14 +105,14 @@ impl TargetWords {
         self.words.iter().enumerate().map(evidence).collect()
     }
 
-    /// Λ of any word, nats.
+    /// Returns Λ of any word, nats.
     pub(crate) fn evidence_of(&self, word: u64, half_odds: &[f32]) -> f32 {
         let sign = |bit: usize| if word >> bit & 1 == 1 { 1.0 } else { -1.0 };
         let sum: f32 = half_odds.iter().enumerate().map(|(bit, odds)| sign(bit) * odds).sum();
         sum - self.unrelated(half_odds)[0]
     }
 
-    /// Σ ln( p e^l + (1 − p) e^−l ), by turn.
+    /// Returns Σ ln( p e^l + (1 − p) e^−l ), by rotation.
     fn unrelated(&self, half_odds: &[f32]) -> Vec<f32> {
         let of_turn = |frequencies: &Vec<f32>| {
             let cells = half_odds.iter().zip(frequencies);
@@ -129,8 +128,8 @@ mod tests {
 
     use super::*;
 
-    /// Whatever a tile shows, the mean of e^Λ over words drawn by the cells' frequencies is 1, so that chance has e^Λ
-    /// above n less often than once in n (Markov). Λ of all words together is that of each.
+    /// For any tile, the mean of e^Λ over words drawn by the cell frequencies is 1. By Markov's inequality, e^Λ of
+    /// noise exceeds n less often than once in n. Computed together or one by one, Λ is the same.
     #[test]
     fn the_mean_evidence_of_drawn_words_is_one() {
         let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(2);

@@ -1,4 +1,4 @@
-//! Reading tags out of tiles: for every cell the odds that it is white.
+//! Reads the tags in tiles: the odds that each cell is white.
 
 use std::collections::BTreeMap;
 
@@ -13,30 +13,32 @@ use deltille_core::lattice::{GridKind, Tile, Vertex};
 use deltille_core::raster::ImageView;
 use deltille_core::targets::{Panel, TagsIn};
 
-/// The contrast at the edges of a tile must be this part of that at its corners.
+/// Minimum contrast at the edges of a tile, relative to that at its corners.
 const MIN_CONTRAST: f64 = 0.4;
 
-/// Samples this much brighter than the white around, in contrasts, and [`GLARE_NOISE`] deviations more are no paper.
+/// Contrasts above the surrounding white from which a sample counts as glare, in addition to [`GLARE_NOISE`] standard
+/// deviations. Paper is never so bright.
 const GLARE: f64 = 0.35;
 
-/// Without these deviations of the noise, it would take away white cells alone; beyond three it seldom lies.
+/// Standard deviations of the noise added to [`GLARE`]. Without them, noise would erase white cells only. It seldom
+/// exceeds 3σ.
 const GLARE_NOISE: f64 = 3.0;
 
-/// The part of the image's full scale from which a pixel may be saturated.
+/// Fraction of full scale from which a pixel may be saturated.
 const SATURATED: f64 = 0.985;
 
-/// Depth to which bright tiles without tags are looked into, and dark ones, in tile coordinates.
+/// Depth from the edge at which untagged tiles, bright and dark, are sampled, in tile coordinates.
 const PLAIN_DEPTH: f64 = 0.2;
 
-/// The least depth, where a tag leaves no more.
+/// Minimum depth, where a tag leaves no more.
 const LEAST_DEPTH: f64 = 0.06;
 
-/// Half the way over which a tile's map is differentiated, in tile coordinates: from the middle, a third of a triangle, it
-/// stays inside.
+/// Half the interval over which the map of a tile is differentiated, in tile coordinates. It stays inside the tile,
+/// because the centre of a triangle is at a third.
 const BESIDE: f64 = 0.25;
 
-/// Shares of white that are taken for what they are. What is farther off is no noise. With 0.25 to 4 beyond black and white
-/// the same tags are read; with 0 there are 1.5 % fewer, as noise goes beyond.
+/// Range of shares of white that are used as measured; values outside are not noise. A range of 0.25 to 4 beyond black
+/// and white reads the same tags. With 0 it reads 1.5 % fewer, because noise exceeds it.
 const SHARES: [f64; 2] = [-0.5, 1.5];
 
 /// The cells of a tile.
@@ -44,47 +46,46 @@ const SHARES: [f64; 2] = [-0.5, 1.5];
 pub(crate) struct Reading {
     /// The tile, in the grid's vertices.
     pub tile: Tile,
-    /// Half the logarithm of the odds that a cell is of the colour around the border, by bit in the
-    /// coordinates of [`Tile::frame`].
+    /// Half the log-odds that a cell has the colour around the border, by bit in the coordinates of [`Tile::frame`].
     pub half_odds: Vec<f32>,
 }
 
 impl Reading {
-    /// The most likely word.
+    /// Returns the most likely word.
     pub(crate) fn word(&self) -> u64 {
         self.half_odds.iter().rev().fold(0, |word, odds| word << 1 | u64::from(*odds > 0.0))
     }
 
-    /// How much the cells tell, bits: one for each that is known, none for each that may be either.
-    pub(crate) fn bits_told(&self) -> f64 {
-        let told = |&half_odds: &f32| {
+    /// Returns the information in the cells, bits: one for each certain cell, none for each cell that may be either.
+    pub(crate) fn information_bits(&self) -> f64 {
+        let known = |&half_odds: &f32| {
             let wrong = 1.0 / (1.0 + (2.0 * f64::from(half_odds.abs())).exp());
             let right = 1.0 - wrong;
             1.0 + right * right.log2() + wrong * wrong.max(f64::MIN_POSITIVE).log2()
         };
-        self.half_odds.iter().map(told).sum()
+        self.half_odds.iter().map(known).sum()
     }
 }
 
-/// How the tags of a panel lie in their tiles.
+/// Position of the tags of a panel in their tiles.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct TagPlace {
     /// Width of the border, bit-widths along the edge.
     border_bits: f64,
-    /// Blank between the edges of the tile and the border.
+    /// Blank margin between the edges of the tile and the border, bit-widths.
     margin_bits: f64,
     tags_in: TagsIn,
-    /// Width of every second row and column of tiles, in edges, where these are gaps between tags.
+    /// Width of every second row and column of tiles, in edges, if these are gaps between tags.
     gap_edges: Option<f64>,
 }
 
 impl TagPlace {
-    /// That of tags with a border of so many bits.
+    /// Returns the position of tags with a border of `border_bits`.
     pub(crate) fn with(border_bits: f64, tags_in: TagsIn) -> Self {
         Self { border_bits, margin_bits: tags_in.margin_bits(), tags_in, gap_edges: None }
     }
 
-    /// That of the tags of `panel`.
+    /// Returns the position of the tags of `panel`.
     pub(crate) fn of(panel: &Panel) -> Self {
         let border_bits = panel.border_bits.unwrap_or(1.0);
         let (margin_bits, tags_in) = (panel.tag_margin_bits(), panel.tags_in);
@@ -92,17 +93,17 @@ impl TagPlace {
     }
 }
 
-/// Black and white beside edges of tiles that were looked at, by their vertex and direction.
+/// Black and white beside edges of tiles that were read, by vertex and direction.
 type EdgeLevels = BTreeMap<(Vertex, usize), Option<[f64; 2]>>;
 
-/// What reading a tile leaves for the next ones of its grid.
+/// Results of reading a tile that the next tiles of its grid reuse.
 #[derive(Default)]
 struct Known {
     mixings: Mixings,
     edges: EdgeLevels,
 }
 
-/// Reads the tags of one family that lie alike in their tiles.
+/// Reads the tags of one family that have the same position in their tiles.
 #[derive(Clone, Debug)]
 pub(crate) struct TagReader {
     kind: GridKind,
@@ -110,25 +111,25 @@ pub(crate) struct TagReader {
     gap_edges: Option<f64>,
     model: CellModel,
     clear: ClearDepth,
-    /// For each bit the one whose cell takes its place in a mirror.
+    /// For each bit, the bit whose cell takes its position in a mirror image.
     mirror: Vec<u8>,
-    /// Bits of cells that no code uses, where there may be a hole.
+    /// Bits of cells that no code uses, and that may have a hole.
     free: u64,
 }
 
-/// What was read in a grid.
+/// Readings of a grid.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Read {
     /// Tiles that may carry a tag.
     pub readings: Vec<Reading>,
-    /// The median length of a bit, px.
+    /// Median length of a bit, px.
     pub bit_px: f64,
-    /// Deviation of the blur, px.
+    /// Standard deviation of the blur, px.
     pub blur_px: f64,
 }
 
 impl TagReader {
-    /// A reader for tags that lie so in their tiles.
+    /// Creates a reader for tags in this position.
     pub(crate) fn new(family: &Family, place: TagPlace) -> Self {
         let TagPlace { border_bits, margin_bits, tags_in, gap_edges } = place;
         let cells = family.cells();
@@ -151,8 +152,8 @@ impl TagReader {
         }
     }
 
-    /// Reads tiles of a grid whose corners are known: those that may carry a tag of a board that is not
-    /// inverted, or of one that is; no more than `most` of them, spread over the grid.
+    /// Reads tiles of a grid whose corners are known. Only tiles that may carry a tag are read, of a board that is
+    /// inverted or not. At most `most` tiles are read, spread over the grid.
     pub(crate) fn read(
         &self,
         image: ImageView,
@@ -186,7 +187,7 @@ impl TagReader {
         Read { readings, bit_px, blur_px: light.blur_px() }
     }
 
-    /// What a tile without a tag shows: it is of one colour all over.
+    /// Returns the word of an untagged tile, which has a single colour.
     pub(crate) fn plain_word(&self) -> u64 {
         match self.tags_in {
             TagsIn::Black => 0,
@@ -194,7 +195,7 @@ impl TagReader {
         }
     }
 
-    /// A reading as it would be in a mirror.
+    /// Returns a reading as seen in a mirror.
     pub(crate) fn mirrored(&self, reading: &Reading) -> Reading {
         let tile = reading.tile;
         Reading {
@@ -229,7 +230,7 @@ impl TagReader {
         let mixing =
             self.model.mixing(TileBlur { covariance, area_px2, noise }, &mut known.mixings)?;
         let (right, lower) = (image.width() as f64 - 1.0, image.height() as f64 - 1.0);
-        // Cells of the colour around the border are 1, on inverted boards dark ones.
+        // Cells of the colour around the border are 1: the dark ones on inverted boards.
         let inverted = tile.is_dark() != (self.tags_in == TagsIn::Black);
         let full = SATURATED * f64::from(image.full_scale());
         let brightest = 1.0 + GLARE + GLARE_NOISE * light.noise;
@@ -264,7 +265,7 @@ impl TagReader {
             }
         }
         let mut half_odds = mixing.half_odds(&samples);
-        // What is in a hole tells nothing.
+        // Cells in a hole contain no information.
         for (bit, odds) in half_odds.iter_mut().enumerate() {
             if self.free >> bit & 1 == 1 {
                 *odds = 0.0;
@@ -275,7 +276,7 @@ impl TagReader {
     }
 }
 
-/// Contrast between dark and bright around the corners of a tile, in units of the image.
+/// Returns the contrast between dark and bright around the corners of a tile, in units of the image.
 fn corner_contrast(image: ImageView, grid: &SaddleGrid, tile: Tile) -> f64 {
     let amplitudes = tile.vertices().filter_map(|v| grid.get(&v));
     let least = amplitudes.map(|p| p.amplitude).fold(f64::INFINITY, f64::min);
@@ -295,7 +296,7 @@ mod tests {
     use deltille_layout::synth::{Light, scene_of_sheet};
     use deltille_layout::{PaperSpec, Printing};
 
-    /// Ids of the tags that are read of a printed board of 8 × 10 corners, each with the number of its wrong cells.
+    /// Returns the ids of the tags read from a printed board of 8 × 10 corners, each with its number of wrong cells.
     fn read_back(printed: &Printing, target: &Target) -> Vec<(u32, u32)> {
         let sheets = printed.draw().unwrap().sheets;
         let scene = scene_of_sheet(printed, &sheets[0], 0);
@@ -311,7 +312,7 @@ mod tests {
         tags.map(|tag| (tag.id, tag.errors)).collect()
     }
 
-    /// The largest tags, whose cells fill a machine word, are read like others, on inverted boards, too.
+    /// The largest tags, whose cells fill a machine word, are read like others, also on inverted boards.
     #[test]
     fn tags_of_64_cells_are_read() {
         for inverted in [false, true] {
@@ -325,9 +326,9 @@ mod tests {
         }
     }
 
-    /// Whatever is in the free cells, all tags of a board are read, and without an error.
+    /// All tags of a board are read without an error, for any content of the free cells.
     #[test]
-    fn what_is_in_free_cells_does_not_matter() {
+    fn content_of_free_cells_does_not_matter() {
         for like in ["delTag25h7", "delTag36h9"] {
             let like = Family::shipped(like).unwrap();
             let free = FreeCells::Centre.mask(like.dimension());

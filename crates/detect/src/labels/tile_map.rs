@@ -4,15 +4,14 @@ use nalgebra::{RowVector2, SMatrix, SVector};
 use crate::grid::saddle_grid::SaddleGrid;
 use deltille_core::lattice::{Tile, Vertex};
 
-/// Weight of a tile's own corners in the fit; the surroundings only bend the map.
+/// Weight of a tile's own corners in the fit. Other corners only bend the map.
 const OWN_WEIGHT: f64 = 8.0;
 
-/// Penalty on the bending terms, in units of one corner's equation: where few corners are known
-/// the map falls back to an affine one.
+/// Penalty on the bending terms, in units of one corner's equation. If few corners are known, the map becomes affine.
 const BENDING_PENALTY: f64 = 0.05;
 
-/// Image positions of the points of a tile: a quadratic map fitted to its corners and to the
-/// corners around it, so that perspective and distortion are followed.
+/// Image positions of the points of a tile: a quadratic map fitted to its corners and to those around it, so that it
+/// follows perspective and distortion.
 #[derive(Clone, Debug)]
 pub(crate) struct TileMap {
     /// Coefficients of 1, u, v, u², uv, v² for x and for y.
@@ -20,9 +19,8 @@ pub(crate) struct TileMap {
 }
 
 impl TileMap {
-    /// The map of `tile`, in the coordinates of [`Tile::frame`]; `None` unless all its corners are
-    /// in the grid. `gap` is the width of every second row and column of tiles, in edges, where these are gaps
-    /// between tags.
+    /// Creates the map of `tile`, in the coordinates of [`Tile::frame`]. Returns `None` unless all its corners are in
+    /// the grid. `gap` is the width of every second row and column of tiles, in edges, if these are gaps between tags.
     pub(crate) fn new(grid: &SaddleGrid, tile: Tile, gap: Option<f64>) -> Option<Self> {
         let kind = tile.kind();
         let own = tile.vertices();
@@ -55,7 +53,7 @@ impl TileMap {
         Some(Self { coefficients: [column(0), column(1)] })
     }
 
-    /// Image position of the tile point (u, v), px.
+    /// Returns the image position of the tile point (u, v), px.
     pub(crate) fn image_from_tile(&self, point: DVec2) -> DVec2 {
         let monomials = monomials(point);
         let value = |row: [f64; 6]| row.iter().zip(&monomials).map(|(c, m)| c * m).sum::<f64>();
@@ -63,8 +61,8 @@ impl TileMap {
     }
 }
 
-/// The width of the tiles next to one, in widths of that one, where every second is a gap: whichever the tile is, tag or
-/// small square, is told by how far the corners beyond it are.
+/// Returns the width of the tiles next to a tile, in widths of that tile, if every second tile is a gap. The distance
+/// of the corners beyond the tile shows whether it is a tag or a small square.
 fn next_tiles(known: &[(Vertex, DVec2)], tile: Tile, gap: f64) -> f64 {
     let own: Vec<Vertex> = tile.vertices().collect();
     let (mut inside, mut outside) = ((0.0, 0.0), (0.0, 0.0));
@@ -90,11 +88,11 @@ fn monomials(DVec2 { x: u, y: v }: DVec2) -> [f64; 6] {
     [1.0, u, v, u * u, u * v, v * v]
 }
 
-/// Coordinates of a vertex in the frame of a tile: the two edges from A are steps along
-/// the row and the column.
+/// Returns the coordinates of a vertex in the frame of a tile. The two edges from A are steps along the row and the
+/// column.
 fn tile_coordinates([a, b, _]: [Vertex; 3], vertex: Vertex) -> DVec2 {
     let offset = vertex - a;
-    // Upright: B − A is one column; inverted: B − A is one column backwards, and so is C − A.
+    // Upright: B − A is one column. Inverted: B − A is one column backwards, and so is C − A.
     let sign = f64::from((b - a).col);
     sign * DVec2::new(offset.col.into(), offset.row.into())
 }
@@ -105,7 +103,8 @@ mod tests {
     use crate::grid::saddle_grid::PlacedSaddle;
     use deltille_core::lattice::GridKind;
 
-    /// Tiles of an AprilGrid, seen straight: the middle of each is in its middle, at the rim of the grid too.
+    /// Tiles of an AprilGrid, seen straight on: the centre of each is mapped to its centre, also at the border of the
+    /// grid.
     #[test]
     fn gaps_between_tags_do_not_bend_the_map() {
         let gap = 0.3;

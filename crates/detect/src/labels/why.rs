@@ -1,4 +1,4 @@
-//! What a picture without labels can tell of the reason.
+//! Finds the reason why an image has no labels.
 
 use glam::DVec2;
 
@@ -9,37 +9,38 @@ use deltille_core::lattice::GridKind;
 use deltille_core::raster::{Gray, PYRAMID_FULL_SCALE, Pyramid};
 use deltille_core::statistics::median;
 
-/// A picture whose brightest pixels are under this part of full scale is too dark to show a board in
-/// more than a dozen grey levels.
+/// Brightest pixels, of full scale, below which an image is too dark. It cannot show a board in more than a dozen grey
+/// levels.
 const DARK: f64 = 0.06;
 
-/// A picture more of which is saturated than this shows nothing else.
+/// Fraction of saturated pixels above which an image is overexposed.
 const MOSTLY_SATURATED: f64 = 0.6;
 
-/// From this part of full scale on a pixel is saturated.
+/// Fraction of full scale from which a pixel is saturated.
 const SATURATED: f64 = 0.985;
 
 /// Blur that hides corners on all levels of the pyramid, px.
 const HIDING_BLUR_PX: f64 = 6.0;
 
-/// Cells of a board of tags are read from this length on, px, however sharp they are.
+/// Minimum length of a readable cell on a board of tags, px, for any sharpness.
 const LEAST_BIT_PX: f64 = 1.25;
 
-/// And from this length on in deviations of the blur.
+/// Minimum length of a readable cell, in standard deviations of the blur.
 const LEAST_BIT_BLURS: f64 = 1.0;
 
-/// Single tags are read where cells are so many times as long as a board of them needs.
+/// Factor by which cells must be longer to read a single tag than to read a board.
 const TAG_FOR_TAG: f64 = 2.0;
 
-/// One pixel in so many may be darker or brighter than all that the picture shows: dead, hot, or a spark, which the smoothing
-/// of level 0 spreads over nine. So a dark picture with one hot pixel in 9000 is still dark. From 250 to 4000 the
-/// blur that is told changes by 4 %; at 100 a small board in the light is taken for sparks.
+/// One pixel in so many may be outside the range of the image: dead, hot, or a spark. The smoothing of level 0 spreads
+/// each over nine pixels, so a dark image with one hot pixel in 9000 is still dark. From 250 to 4000 the reported blur
+/// changes by 4 %. At 100, a small board in the light counts as sparks.
 const PIXELS_A_DEAD_ONE: usize = 1000;
 
-/// One pixel in so many may be steeper than the sharpest edges. The edges of a single tile of a board, 100 px long, are as many in two megapixels.
+/// One pixel in so many may be steeper than the sharpest edges. In two megapixels, the edges of a single tile of a
+/// board, 100 px long, have as many pixels.
 const PIXELS_A_STEEP_ONE: usize = 5000;
 
-/// Why nothing was found in a picture with so many corners of its tiling.
+/// Returns the reason why nothing was found in an image with this number of corners of its tiling.
 pub(crate) fn nothing_found(pyramid: &Pyramid, corners: usize) -> Reason {
     let level = &pyramid.levels()[0];
     let [low, high] = range(level);
@@ -63,7 +64,7 @@ pub(crate) fn nothing_found(pyramid: &Pyramid, corners: usize) -> Reason {
     Reason::new(ReasonKind::NoCorners, [])
 }
 
-/// Why the tags of a grid gave no labels.
+/// Returns the reason why the tags of a grid gave no labels.
 pub(crate) fn no_labels(evidence: &TagEvidence, grid: &SaddleGrid, size: [usize; 2]) -> Reason {
     let corners = ("corners", grid.len() as f64);
     if evidence.is_ambiguous {
@@ -105,7 +106,7 @@ pub(crate) fn no_labels(evidence: &TagEvidence, grid: &SaddleGrid, size: [usize;
     Reason::new(ReasonKind::NoTags, [("tiles", evidence.tiles as f64)])
 }
 
-/// Why a grid is not labelled by an outline of so many corners.
+/// Returns the reason why a grid is not labelled by an outline of `expected` corners.
 pub(crate) fn no_outline(grid: &SaddleGrid, expected: usize, size: [usize; 2]) -> Reason {
     let figures = [("corners", grid.len() as f64), ("expected", expected as f64)];
     let kind = if grid.len() < expected && ends_at_border(grid, size) {
@@ -116,7 +117,7 @@ pub(crate) fn no_outline(grid: &SaddleGrid, expected: usize, size: [usize; 2]) -
     Reason::new(kind, figures)
 }
 
-/// Whether some corner lies less than an edge's length from the border of the picture.
+/// Returns whether a corner lies less than an edge length from the border of the image.
 fn ends_at_border(grid: &SaddleGrid, [width, height]: [usize; 2]) -> bool {
     let Some(edge_px) = edge_px(grid) else {
         return false;
@@ -127,7 +128,7 @@ fn ends_at_border(grid: &SaddleGrid, [width, height]: [usize; 2]) -> bool {
     })
 }
 
-/// The median distance of corners that follow each other in a row or column, px; `None` where there are none such.
+/// Returns the median distance of successive corners in a row or column, px; `None` if there are none.
 pub(crate) fn edge_px(grid: &SaddleGrid) -> Option<f64> {
     let lengths = grid.iter().flat_map(|(&v, placed)| {
         let beside = GridKind::Checker.neighbours(v).filter_map(|n| grid.get(&n));
@@ -139,7 +140,7 @@ pub(crate) fn edge_px(grid: &SaddleGrid) -> Option<f64> {
     median(lengths.collect())
 }
 
-/// Darkest and brightest pixels, but for one in [`PIXELS_A_DEAD_ONE`].
+/// Returns the darkest and brightest pixels, ignoring one in [`PIXELS_A_DEAD_ONE`].
 fn range(level: &Gray<i16>) -> [f64; 2] {
     let mut counts = vec![0usize; PYRAMID_FULL_SCALE as usize + 1];
     for &value in level.pixels() {
@@ -156,8 +157,8 @@ fn range(level: &Gray<i16>) -> [f64; 2] {
     [low as f64, high as f64]
 }
 
-/// Deviation of the blur of the steepest edges, px, taken to have all of the contrast: an edge of contrast c is as
-/// steep as c / (√2π σ).
+/// Returns the standard deviation of the blur of the steepest edges, px. They are assumed to have the full contrast: an
+/// edge of contrast c has a slope of c / (√2π σ).
 fn sharpest_edge_px(level: &Gray<i16>, contrast: f64) -> f64 {
     let steps = (1..level.height()).flat_map(|y| {
         let (row, above) = (level.row(y), level.row(y - 1));

@@ -1,4 +1,4 @@
-//! What a print cannot show, so that a placement is refused whatever speaks for it.
+//! Contradictions: content that no print can show, which refutes a placement regardless of its evidence.
 
 use std::collections::BTreeSet;
 
@@ -11,13 +11,14 @@ use crate::grid::saddle_grid::{SaddleGrid, mirrored};
 use deltille_core::lattice::Vertex;
 use deltille_core::statistics::median;
 
-/// Contrast of a corner, over that predicted from its neighbours, from which no tile is missing there. At the tip of a tile of
-/// the border one dark tile of three, or of two, is missing, which leaves 2/3 to 0.8, or half, of the contrast.
+/// Contrast of a corner, relative to that predicted from its neighbours, from which no tile is missing there. At the
+/// tip of a border tile, one dark tile of three or two is missing. That leaves 2/3 to 0.8, or half, of the contrast.
 const FULL_CONTRAST: f64 = 0.9;
 
 impl TagLabeller {
-    /// Numbers of tiles that agree and that contradict a placement, where some do beyond doubt: clear codes that a hidden tile
-    /// does not show by chance, and a grid that continues beyond a panel which has nothing beside it.
+    /// Returns the numbers of tiles that agree with and contradict a placement, if some contradict it beyond doubt.
+    /// These are clear codes that a hidden tile does not show by coincidence, and a grid that continues beyond an
+    /// isolated panel.
     pub(super) fn contradiction(
         &self,
         sight: &Sight,
@@ -38,7 +39,7 @@ impl TagLabeller {
             };
             shown.code[0] > CLEARLY_OTHER && !is_predicted && (shown.is_foreign || is_of_panel())
         };
-        // Codes of places are alike, and many: a misread one is another one.
+        // Place codes are many and similar: a misread code is another code.
         let readings = 0..sight.readings.len();
         let elsewhere = readings.filter(|&index| !self.is_dense && is_elsewhere(index)).count();
         let beyond = if self.panels_abut { 0 } else { self.beyond(sight, grid, placement) };
@@ -49,10 +50,10 @@ impl TagLabeller {
         })
     }
 
-    /// How many corners of a grid beyond the panel show that the print continues there. Along its border the tips of tiles may
-    /// pass for corners, but these are a single row, and of less contrast: one of the tiles that meet at a corner is missing.
-    /// Where most corners next to the panel have full contrast, they count; so do the tiles that have all of their corners
-    /// beyond the panel.
+    /// Returns the number of corners beyond the panel which show that the print continues there. Along its border, tips
+    /// of tiles may pass for corners. These form a single row and have less contrast, because a tile is missing at
+    /// each. If most corners next to the panel have full contrast, they count. Tiles with all corners beyond the panel
+    /// always count.
     fn beyond(&self, sight: &Sight, grid: &SaddleGrid, placement: &Placement) -> usize {
         let Some(kind) = sight.readings.first().map(|reading| reading.tile.kind()) else {
             return 0;
@@ -64,7 +65,7 @@ impl TagLabeller {
         let beyond: BTreeSet<Vertex> = grid.keys().copied().filter(|&v| !is_on(v)).collect();
         let tiles = beyond.iter().flat_map(|&vertex| kind.tiles_from(vertex));
         let tiles = tiles.filter(|tile| tile.vertices().all(|v| beyond.contains(&v))).count();
-        // Contrasts over those that two corners in line on the panel predict.
+        // Contrasts relative to those predicted by two collinear corners on the panel.
         let contrasts = beyond.iter().filter_map(|&vertex| {
             let predicted = kind.neighbours(vertex).filter_map(|next| {
                 let (near, far) = (on_panel(next)?, on_panel(next + (next - vertex))?);
@@ -77,9 +78,9 @@ impl TagLabeller {
         tiles.max(if 2 * full > contrasts.len() { full } else { 0 })
     }
 
-    /// The joint evidence of all tiles of a grid that show codes, for all its placements together,
-    /// each panel only once: how much better they explain the codes than a board that has the same
-    /// codes anywhere, nats; and the numbers of tiles that agree and disagree.
+    /// Returns the joint evidence, nats, of all tiles of a grid that show codes, for all its placements; each panel
+    /// counts once. It compares them with a board that has the same codes anywhere. Also returns the numbers of tiles
+    /// that agree and disagree.
     pub(super) fn together(&self, sights: &[Sight], placements: &[Placement]) -> (f64, [usize; 2]) {
         let mut panels = BTreeSet::new();
         let once: Vec<&Placement> = placements.iter().filter(|p| panels.insert(p.panel)).collect();

@@ -1,4 +1,4 @@
-//! Which placements of a grid are taken: those with sufficient evidence that nothing contradicts.
+//! Selects the placements of a grid that have sufficient evidence and no contradiction.
 
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 
@@ -12,31 +12,30 @@ use deltille_core::detection::DecodedTag;
 use deltille_core::lattice::{LatticeMap, Vertex};
 use deltille_core::raster::ImageView;
 
-/// Least evidence after correction for the number of placements, nats: 6 bits, so that a picture
-/// without the target is labelled less than once in 64 times. Markov's inequality leaves a factor
-/// of about ten on top of that; a board of other tags, all of which would have to be hidden, much
-/// more.
+/// Minimum evidence after correction for the number of placements, nats: 6 bits, so that fewer than one in 64 images
+/// without the target is labelled. Markov's inequality adds a margin of about ten. For a board of other tags the margin
+/// is much larger, because all of them would have to be hidden.
 const MIN_EVIDENCE: f64 = 6.0 * std::f64::consts::LN_2;
 
-/// Least lead over any other placement that puts the same corners elsewhere, nats.
+/// Minimum lead over any other placement that puts the same corners elsewhere, nats.
 const MIN_LEAD: f64 = 6.0 * std::f64::consts::LN_2;
 
-/// Evidence from which mirrored placements are not tested any more, nats.
+/// Evidence from which mirrored placements are not tested, nats.
 const BEYOND_DOUBT: f64 = 40.0;
 
-/// Most placements that are evaluated, best proposals first.
+/// Maximum number of placements that are evaluated, best proposals first.
 const MOST_PROPOSALS: usize = 64;
 
-/// Most tiles that are read in a grid: the evidence of so many is beyond doubt, or worth nothing.
+/// Maximum number of tiles that are read in a grid: with so many, the evidence is conclusive or worthless.
 pub(super) const MOST_TILES: usize = 2000;
 
-/// Time to read a tile from the image, in units of a comparison of a tile with one word.
+/// Time to read a tile from the image, in comparisons of a tile with one word.
 const READING_COST: usize = 1000;
 
-/// The placements with sufficient evidence, and why there are no others.
+/// Placements with sufficient evidence, and the reason if there are no others.
 #[derive(Default)]
 struct Placed {
-    /// The placements, which have no corner of the grid in common.
+    /// The placements, which share no corner of the grid.
     placements: Vec<Placement>,
     /// See [`TagEvidence::is_ambiguous`].
     is_ambiguous: bool,
@@ -45,8 +44,8 @@ struct Placed {
 }
 
 impl TagLabeller {
-    /// Identifies the panels in a grid, whose positions are px of `image`, by the tags that are read
-    /// there; `budget` is reduced by the cost, and where it is exhausted nothing more is read.
+    /// Identifies the panels in a grid by its tags. Positions are px of `image`. `budget` is reduced by the cost; once
+    /// it is exhausted, no more tiles are read.
     pub(crate) fn label(
         &self,
         image: ImageView,
@@ -73,8 +72,8 @@ impl TagLabeller {
         self.decide(sights, grid, evidence)
     }
 
-    /// Completes the evidence of a grid by the panels that its sights identify. The mirror image is
-    /// tested only where the picture as it is leaves doubt.
+    /// Completes the evidence of a grid with the panels that its sights identify. The mirror image is tested only if
+    /// the direct image leaves doubt.
     pub(super) fn decide(
         &self,
         mut sights: Vec<Sight>,
@@ -105,7 +104,7 @@ impl TagLabeller {
         evidence.found = placed.placements.iter().map(labelled).collect();
         if evidence.found.is_empty() {
             let needed_bits = (self.family_words.max(1) as f64).log2();
-            let is_unread = |reading: &&Reading| reading.bits_told() < needed_bits;
+            let is_unread = |reading: &&Reading| reading.information_bits() < needed_bits;
             let as_seen = sights.iter().filter(|sight| !sight.way.mirrored);
             evidence.unread = as_seen.flat_map(|sight| &sight.readings).filter(is_unread).count();
         }
@@ -116,20 +115,19 @@ impl TagLabeller {
         evidence
     }
 
-    /// The ways in which the target's panels are read in a picture as it is.
+    /// Returns the ways to read the target's panels in a direct image.
     fn ways_to_read(&self) -> BTreeSet<Way> {
         let tagged = self.panels.iter().filter(|panel| !panel.tags.is_empty());
         tagged.map(LabelPanel::way).collect()
     }
 
-    /// The placements with sufficient evidence, best first. Each takes its corners from the grid, and
-    /// the others are judged again by the tiles that are left, as several faces of a solid may lie in
-    /// one grid.
+    /// Returns the placements with sufficient evidence, best first. Each takes its corners from the grid. The others
+    /// are judged again by the remaining tiles, because several faces of a solid may lie in one grid.
     fn place(&self, sights: &[Sight], grid: &SaddleGrid) -> Placed {
         let proposals = self.proposals(sights);
         let tiles: usize = sights.iter().map(|sight| sight.readings.len()).sum();
-        // Bonferroni: about as many placements may be proposed as there are tiles times their places and turns, and by chance
-        // the best of n exceeds E with a probability of up to n e^−E.
+        // Bonferroni correction: the number of possible placements is about the number of tiles times their positions
+        // and rotations. By coincidence, the best of n exceeds E with a probability of up to n e^−E.
         let ways = ((tiles * self.ways).max(1) as f64).ln();
         let mut placed = Placed::default();
         let mut taken = BTreeSet::new();
@@ -159,16 +157,16 @@ impl TagLabeller {
             let is_ambiguous = rivals.into_iter().any(|rival| {
                 self.on_panel(sights, grid, rival).keys().any(|v| vertices.contains_key(v))
             });
-            // One that does not count takes its corners, too: nothing else is to label them.
+            // A rejected placement takes its corners, too: no other placement may label them.
             let before = taken.len();
             taken.extend(vertices.into_keys());
-            let is_told_from_nature = || {
+            let is_distinct_from_nature = || {
                 let over_nature = self.over_nature(&sights[best.sight], best);
                 over_nature.is_none_or(|evidence| evidence - ways >= MIN_EVIDENCE)
             };
             if is_ambiguous {
                 placed.is_ambiguous = true;
-            } else if is_told_from_nature() {
+            } else if is_distinct_from_nature() {
                 placed.placements.push(*best);
             }
             if taken.len() == before {
@@ -192,9 +190,8 @@ impl TagLabeller {
         placed
     }
 
-    /// The placements for which single tiles speak, with the sum of the evidence of these tiles, most
-    /// first. The sum leaves out what is against a placement: it serves to choose which ones are
-    /// judged.
+    /// Returns the placements that single tiles propose, sorted by the evidence of these tiles. The sum omits evidence
+    /// against a placement, because it only selects those that are judged.
     fn proposals(&self, sights: &[Sight]) -> Vec<Placement> {
         let turns = self.words.turns();
         let mut sums: HashMap<(usize, usize, LatticeMap), f64> = HashMap::new();
@@ -225,7 +222,7 @@ impl TagLabeller {
         proposals
     }
 
-    /// Panel vertex of every grid vertex that a placement takes to a corner of its panel.
+    /// Returns the panel vertex of every grid vertex that a placement maps to a corner of its panel.
     fn on_panel(
         &self,
         sights: &[Sight],
@@ -241,7 +238,7 @@ impl TagLabeller {
             .collect()
     }
 
-    /// The corners and tags of a placement.
+    /// Returns the corners and tags of a placement.
     fn labelled(&self, sights: &[Sight], grid: &SaddleGrid, placement: &Placement) -> Labelled {
         let sight = &sights[placement.sight];
         let mut tags: Vec<DecodedTag> = self

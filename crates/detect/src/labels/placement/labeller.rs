@@ -1,4 +1,4 @@
-//! The labeller of a target, what it needs of its panels, and what it tells of a grid.
+//! The labeller of a target, the properties of panels that it needs, and its result for a grid.
 
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 
@@ -10,11 +10,11 @@ use deltille_core::family::{Decoder, Family, NaturalWords};
 use deltille_core::lattice::{GridKind, Tile, Vertex};
 use deltille_core::targets::{TagsIn, Target};
 
-/// Comparisons of a tile with a word that are made in a picture: some hundredths of a second.
+/// Maximum number of comparisons of a tile with a word in an image: some hundredths of a second.
 const BUDGET: usize = 4_000_000;
 
-/// The computing time that is left for reading tags in a picture, in comparisons of a tile with a
-/// word; counted rather than measured, so that results are the same on every computer.
+/// Remaining computing time for tags in an image, in comparisons of a tile with a word. It is counted instead of
+/// measured, so that results are the same on every computer.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Budget(pub(super) usize);
 
@@ -29,11 +29,11 @@ impl Default for Budget {
 pub(crate) struct Labelled {
     /// Index of the panel in the target.
     pub panel: usize,
-    /// Whether the picture shows it as in a mirror.
+    /// Whether the image shows it mirrored.
     pub mirrored: bool,
     /// Panel vertex of every grid vertex that is a corner of the panel.
     pub vertices: BTreeMap<Vertex, Vertex>,
-    /// Tags whose reading speaks for the placement, with rows and columns of the panel, sorted by them.
+    /// Tags whose reading supports the placement, with rows and columns of the panel, sorted by them.
     pub tags: Vec<DecodedTag>,
 }
 
@@ -42,78 +42,75 @@ pub(crate) struct Labelled {
 pub(crate) struct TagEvidence {
     /// The panels that were identified.
     pub found: Vec<Labelled>,
-    /// Tiles that may carry a tag.
+    /// Number of tiles that may carry a tag.
     pub tiles: usize,
-    /// The median side of a cell of a tag, px.
+    /// Median side of a cell of a tag, px.
     pub bit_px: f64,
     /// Standard deviation of the blur, px.
     pub blur_px: f64,
     /// Ids of the family that were read and do not belong to the target.
     pub foreign_ids: BTreeSet<u32>,
-    /// Number of tiles whose cells are read with certainty and are no code of the family.
+    /// Number of tiles whose cells are read with certainty and are not a code of the family.
     pub no_codes: usize,
-    /// Number of tiles whose cells do not determine a code of the family, where no panel was
-    /// identified.
+    /// Number of tiles whose cells do not determine a code of the family, if no panel was identified.
     pub unread: usize,
     /// Whether a placement has sufficient evidence, but another one nearly as much.
     pub is_ambiguous: bool,
-    /// Numbers of tiles that agree and that disagree with a placement whose evidence would suffice
-    /// without the latter.
+    /// Numbers of tiles that agree and disagree with a placement whose evidence suffices without the latter.
     pub contradicted: Option<[usize; 2]>,
     /// Whether the budget was exhausted before the grid was read.
     pub is_cut_short: bool,
 }
 
-/// Labels grids with the panels of a tagged target. A *word* is a code as its cells are read from one
-/// of the orientations of its tile, so that each code has three words on a deltille grid and four on
-/// a checkerboard.
+/// Labels grids with the panels of a tagged target. A *word* is a code as read in one orientation of its tile. Each
+/// code has three words on a deltille grid and four on a checkerboard.
 #[derive(Clone, Debug)]
 pub(crate) struct TagLabeller {
-    /// One for each way in which the tags of a panel lie in their tiles.
+    /// One reader for each position of tags in their tiles.
     pub(super) readers: Vec<TagReader>,
     /// Name of the family.
     pub(super) family: String,
     /// Whether every tile has a place code.
     pub(super) is_dense: bool,
-    /// Decoder of the whole family; none of place codes, as each of their words is a code.
+    /// Decoder of the whole family; `None` for place codes, because each of their words is a code.
     pub(super) decoder: Option<Decoder>,
-    /// How likely words are in natural pictures, of triangular tags that tell a place alone.
+    /// Probabilities of words in natural images, for triangular tags of which one alone identifies a position.
     pub(super) natural: Option<NaturalWords>,
-    /// Greatest number of misread cells at which a word certainly is a code of the family.
+    /// Maximum number of misread cells at which a word certainly is a code of the family.
     pub(super) sure_errors: u32,
-    /// The number of words of the family.
+    /// Number of words of the family.
     pub(super) family_words: usize,
-    /// Greatest number of misread cells of a tag that counts, if there is one.
+    /// Maximum number of misread cells of a tag that counts, if limited.
     pub(super) max_errors: Option<u32>,
-    /// The words of the target.
+    /// Words of the target.
     pub(super) words: TargetWords,
-    /// What labelling needs of each panel of the target, in their order.
+    /// Properties of each panel of the target, in order.
     pub(super) panels: Vec<LabelPanel>,
-    /// Whether panels may lie in one grid, as the faces of a solid.
+    /// Whether several panels may lie in one grid, as the faces of a solid.
     pub(super) panels_abut: bool,
     /// Panels and tiles of each code of the target.
     pub(super) places: Vec<Vec<(usize, Tile)>>,
-    /// In how many ways a tile may lie on the target.
+    /// Number of positions and rotations of a tile on the target.
     pub(super) ways: usize,
 }
 
-/// A panel of the target as labelling needs it, in its lattice coordinates.
+/// A panel of the target, in its lattice coordinates.
 #[derive(Clone, Debug)]
 pub(super) struct LabelPanel {
-    /// Index of the reader for the place of tags in their tiles.
+    /// Index of the reader for the position of tags in their tiles.
     pub(super) reader: usize,
     /// Whether black and white are exchanged.
     pub(super) inverted: bool,
-    /// Its corners.
+    /// Corners of the panel.
     pub(super) corners: BTreeSet<Vertex>,
-    /// The tag in each tile that has one.
+    /// The tag in each tagged tile.
     pub(super) tags: BTreeMap<Tile, LabelTag>,
-    /// All tiles of the colour that tags are in, with a tag or without.
+    /// All tiles of the colour that carries tags, tagged or not.
     pub(super) tiles: BTreeSet<Tile>,
 }
 
 impl LabelPanel {
-    /// How its tags are read in a picture as it is.
+    /// Returns the way to read its tags in a direct image.
     pub(super) fn way(&self) -> Way {
         Way { reader: self.reader, inverted: self.inverted, mirrored: false }
     }
@@ -127,7 +124,7 @@ pub(super) struct LabelTag {
     pub(super) code: usize,
 }
 
-/// A way in which the tags of a grid are read.
+/// A way to read the tags of a grid.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) struct Way {
     /// Index of the reader.
@@ -139,14 +136,13 @@ pub(super) struct Way {
 }
 
 impl TagLabeller {
-    /// A labeller for the tags of `target`, whose codes are those of `family`; `None` when the
-    /// target has no tags. Tags with more than `max_errors` misread cells do not count, where that
-    /// is given.
+    /// Creates a labeller for the tags of `target`, whose codes belong to `family`. Returns `None` if the target has no
+    /// tags. Tags with more than `max_errors` misread cells do not count, if that is given.
     pub(crate) fn new(target: &Target, family: &Family, max_errors: Option<u32>) -> Option<Self> {
         Self::with_decoder(target, family, max_errors, || Decoder::new(family))
     }
 
-    /// See [`Self::new`]; the decoder of the whole family is asked for where the target has tags.
+    /// Creates the labeller; see [`Self::new`]. `decoder` is called for the whole family if the target has tags.
     pub(super) fn with_decoder(
         target: &Target,
         family: &Family,
@@ -157,7 +153,7 @@ impl TagLabeller {
             target.panels.iter().flat_map(|panel| &panel.tags).map(|tag| tag.id).collect();
         let coded: BTreeMap<u32, u64> =
             ids.into_iter().filter_map(|id| Some((id, family.code(id)?))).collect();
-        // Many places of a board of place codes show the same.
+        // Many positions of a board of place codes show the same.
         let mut shown = BTreeSet::new();
         let ids: Vec<u32> =
             coded.iter().filter(|&(_, code)| shown.insert(code)).map(|(&id, _)| id).collect();

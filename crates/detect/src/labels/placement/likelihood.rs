@@ -1,4 +1,4 @@
-//! How well a placement explains the tiles of a grid.
+//! Likelihood of the tiles of a grid under a placement.
 
 use std::collections::BTreeSet;
 
@@ -9,18 +9,18 @@ use super::sight::Sight;
 use crate::grid::saddle_grid::mirrored;
 use deltille_core::lattice::{LatticeMap, Tile, Vertex};
 
-/// Least evidence of a single tile that proposes a placement, nats.
+/// Minimum evidence of a single tile that proposes a placement, nats.
 pub(super) const PROPOSING: f64 = 1.0;
 
-/// A tile under a placement: log-likelihood ratios, nats, over cells drawn at random.
+/// A tile under a placement: log-likelihood ratios over random cells, nats.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Judged {
-    /// If it is as the placement predicts, for each probability in [`DIRTY`].
+    /// For the predicted content, for each probability in [`DIRTY`].
     pub(super) predicted: [f64; DIRTY.len()],
-    /// If the board has tags in the same tiles, but another code in this one.
+    /// For a board with tags in the same tiles, but another code in this one.
     pub(super) other_code: [f64; DIRTY.len()],
-    /// If the board shows plain tiles and codes as it likes, for each fraction in [`PLAIN_PARTS`]; `None`
-    /// for tiles beyond the panel.
+    /// For a board of arbitrary plain tiles and codes, for each fraction in [`PLAIN_PARTS`]; `None` for tiles beyond
+    /// the panel.
     pub(super) of_board: Option<[f64; PLAIN_PARTS.len()]>,
 }
 
@@ -31,15 +31,15 @@ pub(super) struct Placement {
     pub(super) sight: usize,
     /// Index of the panel.
     pub(super) panel: usize,
-    /// Motion of the lattice from the grid, mirrored if the sight is, to the panel.
+    /// Motion of the lattice from the grid (mirrored if the sight is) to the panel.
     pub(super) map: LatticeMap,
-    /// Evidence for it, nats; of a proposal the sum over the tiles that speak for it.
+    /// Evidence for it, nats. For a proposal: the sum over the tiles that support it.
     pub(super) evidence: f64,
 }
 
 impl TagLabeller {
-    /// Evidence for a placement, nats, from tiles none of whose corners is taken: the log-likelihood of
-    /// its prediction, less that of the better of the two boards that are not the target.
+    /// Returns the evidence for a placement, nats, from tiles without taken corners: the log-likelihood of its
+    /// prediction, less that of the better of the two boards that are not the target.
     pub(super) fn evidence(
         &self,
         sight: &Sight,
@@ -57,7 +57,7 @@ impl TagLabeller {
         mean(predicted) - greatest(of_board).max(mean(other_codes))
     }
 
-    /// Evidence for a placement over natural pictures, nats, where a single tag speaks for it.
+    /// Returns the evidence for a placement over natural images, nats, if a single tag supports it.
     pub(super) fn over_nature(&self, sight: &Sight, placement: &Placement) -> Option<f64> {
         let natural = self.natural.as_ref()?;
         let mut speaking = self.expected(placement).filter_map(|(tile, tag, turns)| {
@@ -73,8 +73,8 @@ impl TagLabeller {
         Some(of_code - natural.log_likelihood(half_odds))
     }
 
-    /// Numbers of tiles that agree and that disagree with a placement; a tile disagrees if a board that
-    /// shows what it likes explains it clearly better.
+    /// Returns the numbers of tiles that agree and disagree with a placement. A tile disagrees if a board of arbitrary
+    /// content explains it clearly better.
     pub(super) fn agreement(&self, sight: &Sight, placement: &Placement) -> [usize; 2] {
         let against = |tile: &Judged| {
             greatest(tile.predicted) < tile.of_board.map_or(0.0, greatest) - PROPOSING
@@ -84,7 +84,7 @@ impl TagLabeller {
         [agreeing.len(), against.len()]
     }
 
-    /// The tiles of a sight under a placement, without those that have a corner which is taken.
+    /// Returns the tiles of a sight under a placement, without those that have a taken corner.
     pub(super) fn judged(
         &self,
         sight: &Sight,
@@ -99,7 +99,7 @@ impl TagLabeller {
         tiles.filter_map(move |index| self.judge(sight, placement, index))
     }
 
-    /// A reading under a placement; `None` where this predicts nothing of its tile.
+    /// Judges a reading under a placement. Returns `None` if the placement predicts nothing for its tile.
     pub(super) fn judge(
         &self,
         sight: &Sight,
@@ -111,10 +111,10 @@ impl TagLabeller {
         let on_panel = placement.map.apply_tile(tile);
         if let Some(tag) = panel.tags.get(&on_panel) {
             let word = self.words.turns() * tag.code + turns_of(placement.map, tile);
-            // The boards that it is compared with have the best code other than the predicted one.
+            // The boards for comparison have the best code other than the predicted one.
             let but = usize::from(shown.word == word);
             let evidence = sight.evidence[index][word].into();
-            // Where every tile has a tag, no plain ones tell how many are hidden.
+            // If every tile has a tag, no plain tiles show how many are hidden.
             let hidden = |chance| if self.is_dense { chance } else { SPOILT };
             let predicted = DIRTY.map(|chance| or_spoilt(evidence, hidden(chance)));
             let other_code = [shown.code[but]; DIRTY.len()];
@@ -132,8 +132,8 @@ impl TagLabeller {
         }
     }
 
-    /// The tags of the panel under a placement: tile of the grid (mirrored if its sight is), tag, and the number of
-    /// counter-clockwise turns of the tag in that tile.
+    /// Returns the tags of the panel under a placement: tile of the grid (mirrored if its sight is), tag, and number of
+    /// counter-clockwise rotations of the tag in that tile.
     pub(super) fn expected(
         &self,
         placement: &Placement,

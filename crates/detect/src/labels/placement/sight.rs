@@ -1,4 +1,4 @@
-//! What the tiles of a grid show, whatever the placement.
+//! Content of the tiles of a grid, independent of the placement.
 
 use std::collections::BTreeMap;
 
@@ -7,11 +7,11 @@ use super::labeller::{TagEvidence, TagLabeller, Way};
 use crate::labels::tags::Reading;
 use deltille_core::lattice::Tile;
 
-/// Evidence from which a tile certainly shows a code that is not predicted, nats: such as a code that the target does not
-/// have, or has elsewhere.
+/// Evidence from which a tile certainly shows a code that is not predicted, nats: a code that the target does not have,
+/// or has elsewhere.
 pub(super) const CLEARLY_OTHER: f64 = 7.0;
 
-/// The readings of the tiles of a grid in one way.
+/// Readings of the tiles of a grid in one way.
 pub(super) struct Sight {
     /// How they were read.
     pub(super) way: Way,
@@ -21,11 +21,11 @@ pub(super) struct Sight {
     pub(super) readings: Vec<Reading>,
     /// Λ of each reading for each word of the target, nats.
     pub(super) evidence: Vec<Vec<f32>>,
-    /// The contents of each reading.
+    /// Content of each reading.
     pub(super) shown: Vec<Shown>,
 }
 
-/// What a tile shows, whatever the placement: log-likelihood ratios, nats, over cells drawn at random.
+/// Content of a tile, independent of the placement: log-likelihood ratios over random cells, nats.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Shown {
     /// If it is predicted to be plain, for each probability in [`DIRTY`].
@@ -34,17 +34,16 @@ pub(super) struct Shown {
     pub(super) word: usize,
     /// Whether a code of the family that the target does not have fits better.
     pub(super) is_foreign: bool,
-    /// If it shows random cells, or the best of all codes, whichever fits better: with `word` among the
-    /// codes, and without it.
+    /// For random cells or the best of all codes, whichever fits better: with `word` among the codes, and without it.
     pub(super) code: [f64; 2],
-    /// If it belongs to a board of which each fraction in [`PLAIN_PARTS`] is plain and the other tiles
-    /// show the best code: with `word` and without it, as above.
+    /// For a tile of a board of which each fraction in [`PLAIN_PARTS`] is plain and the other tiles show the best code:
+    /// with `word` and without it, as above.
     pub(super) of_board: [[f64; PLAIN_PARTS.len()]; 2],
 }
 
 impl TagLabeller {
-    /// Compares readings with all words of the target; what they say beyond that, such as codes of the
-    /// family that the target does not have, is added to `noted`.
+    /// Compares readings with all words of the target. Further findings, such as codes of the family that the target
+    /// does not have, are added to `noted`.
     pub(super) fn sight(&self, way: Way, readings: Vec<Reading>, noted: &mut TagEvidence) -> Sight {
         let plain = self.readers[way.reader].plain_word();
         let mut evidence = Vec::with_capacity(readings.len());
@@ -66,8 +65,8 @@ impl TagLabeller {
         Sight { way, index, readings, evidence, shown }
     }
 
-    /// What a tile shows, by its evidence for the words of the target; `plain` is the word of a tile
-    /// without a tag.
+    /// Returns the content of a tile, by its evidence for the words of the target. `plain` is the word of an untagged
+    /// tile.
     fn shown(
         &self,
         reading: &Reading,
@@ -114,17 +113,18 @@ impl TagLabeller {
     }
 }
 
-/// Whether the cells of a tile are read with certainty and are not all the same.
+/// Returns whether the cells of a tile are read with certainty and are not all the same.
 fn is_word(reading: &Reading) -> bool {
-    /// Half odds of a cell that is read right 19 times of 20.
+    /// Half odds of a cell that is right 19 times out of 20.
     const SURE: f32 = 1.5;
-    /// So many of so many cells are read so, or the tile does not count. Of 64 boards of other families 11 are told, and 3 of 160
-    /// other boards, all dirty, are taken for one. With 8 of 10 it is 15 and 9, with 19 of 20 it is 10 and 1.
+    /// Minimum fraction of certain cells. It identifies 11 of 64 boards of other families, and mistakes 3 of 160 other
+    /// boards, all dirty, for one. With 8 of 10 these are 15 and 9, with 19 of 20 they are 10 and 1.
     const SURE_CELLS: [usize; 2] = [9, 10];
-    /// One cell in so many has the other colour. A tile without a tag is of one colour, but for dirt. Of 16 random cells fewer
-    /// are so once in 240 times, of 25 once in 1100. With 3 no dirt is taken for a tag, but of 16 cells one tag in 5 is left out.
+    /// At least one cell in so many must have the other colour, because an untagged tile has one colour except for
+    /// dirt. Of 16 random cells, fewer have it once in 240 times; of 25, once in 1100. With 3, no dirt counts as a tag,
+    /// but one tag in 5 of 16 cells is missed.
     const LEAST_OTHER: usize = 6;
-    // Of free cells nothing is known.
+    // Free cells contain no information.
     let n = reading.half_odds.iter().filter(|odds| odds.abs() > 0.0).count();
     let sure = |sign: f32| reading.half_odds.iter().filter(|&&odds| sign * odds > SURE).count();
     let (white, black) = (sure(1.0), sure(-1.0));

@@ -1,4 +1,4 @@
-//! Labels of boards whose tiles are read without doubt, in part, or under noise.
+//! Labels of boards whose tiles are read with certainty, in part, or under noise.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -14,22 +14,22 @@ use deltille_core::family::{Decoder, Family, shipped_names, square_names};
 use deltille_core::lattice::{Tile, Vertex};
 use deltille_core::targets::{BoardSpec, SolidShape, SolidSpec, TagSpec, Target, TargetSpec};
 
-/// Noise, of full scale, at which more than a tenth of the cells of four pixels a bit are taken for the other.
+/// Noise, of full scale, at which more than a tenth of the cells of 4 px per bit are misread.
 const NOISE_OF_A_TENTH: f64 = 0.335;
 
-/// Half odds of a cell that is read without doubt.
+/// Half odds of a certain cell.
 const SURE: f32 = 2.6;
 
-/// By the first reader, in a picture as it is.
+/// By the first reader, in a direct image.
 const AS_SEEN: Way = Way { reader: 0, inverted: false, mirrored: false };
 
-/// What is found of `asked` where the tiles of another target, or of the same, are read without doubt, in the grid
-/// that a picture of it or of its mirror image gives.
+/// Returns the evidence for `asked` if the tiles of `shown` are read with certainty, in the grid of a direct or
+/// mirrored image.
 fn found_in(family: &Family, asked: &Target, shown: &Target, flopped: bool) -> TagEvidence {
     found_by(&TagLabeller::new(asked, family, None).unwrap(), family, shown, flopped)
 }
 
-/// The same by the labeller of the target that is looked for.
+/// The same with a given labeller.
 fn found_by(labeller: &TagLabeller, family: &Family, shown: &Target, flopped: bool) -> TagEvidence {
     let side = |v: Vertex| if flopped { mirrored(v) } else { v };
     let panel = &shown.panels[0];
@@ -39,7 +39,7 @@ fn found_by(labeller: &TagLabeller, family: &Family, shown: &Target, flopped: bo
     let codes: BTreeMap<Tile, u64> =
         panel.tags.iter().map(|tag| (panel.tag_tile(tag), family.code(tag.id).unwrap())).collect();
     let reading = |tile: Tile| {
-        // Without a tag it is black all over.
+        // Untagged tiles are black.
         let code = codes.get(&tile).copied().unwrap_or(0);
         let odds = |bit: u32| if code >> bit & 1 == 1 { SURE } else { -SURE };
         let half_odds = (0..family.dimension().bits()).map(odds).collect();
@@ -65,7 +65,7 @@ fn board_of(family: &Family, [rows, cols]: [u32; 2], tags: TagSpec) -> Option<Ta
     Target::build("board", &TargetSpec::Board(spec), Some(family)).ok()
 }
 
-/// Boards of every family with about so many first ids, as they are and flopped.
+/// Boards of every family with about so many first ids, direct and mirrored.
 fn labels_are_those_of_the_print(first_ids: usize) {
     for name in shipped_names().into_iter().chain(square_names()) {
         let family = Family::shipped(name).unwrap();
@@ -94,17 +94,17 @@ fn labels_are_those_of_the_print(first_ids: usize) {
 }
 
 #[test]
-fn flopped_boards_are_told_from_boards() {
+fn flopped_boards_are_recognised() {
     labels_are_those_of_the_print(5);
 }
 
 #[test]
 #[ignore = "some minutes"]
-fn flopped_boards_of_every_first_id_are_told_from_boards() {
+fn flopped_boards_of_every_first_id_are_recognised() {
     labels_are_those_of_the_print(usize::MAX);
 }
 
-/// The same board with other ids of the family is none of the target's.
+/// The same board with other ids of the family is not the target.
 #[test]
 fn boards_of_other_ids_get_no_labels() {
     for name in shipped_names().into_iter().chain(square_names()) {
@@ -123,11 +123,11 @@ fn boards_of_other_ids_get_no_labels() {
     }
 }
 
-/// Boards of the same family and the same ids, but with other distances between the tags or of another size: where
-/// they agree in some tags, other tiles tell.
+/// Boards of the same family and ids, but with other distances between the tags or of another size: if some tags agree,
+/// other tiles contradict.
 #[test]
-fn boards_of_the_same_ids_in_other_places_get_no_labels() {
-    let mut told = 0;
+fn boards_of_the_same_ids_in_other_positions_get_no_labels() {
+    let mut contradicted = 0;
     for name in shipped_names().into_iter().chain(square_names()) {
         let family = Family::shipped(name).unwrap();
         let asked = board(&family, 0).unwrap();
@@ -140,15 +140,15 @@ fn boards_of_the_same_ids_in_other_places_get_no_labels() {
                 let evidence = found_in(&family, &asked, &shown, flopped);
                 let of = format!("{name}, {size:?}, spacing {spacing}, flopped: {flopped}");
                 assert!(evidence.found.is_empty(), "{of}: {:?}", evidence.found);
-                told += usize::from(evidence.contradicted.is_some());
+                contradicted += usize::from(evidence.contradicted.is_some());
             }
         }
     }
-    assert!(told > 20, "{told} times only it is said that other tiles contradict");
+    assert!(contradicted > 20, "only {contradicted} boards are contradicted by other tiles");
 }
 
-/// Boards of the same ids with other rows and columns are labelled only where all of their tags and corners are in the same
-/// places, as if the rest of the target were hidden. A single tag of 16 cells is no such evidence.
+/// Boards of the same ids with other rows and columns are labelled only if all of their tags and corners are in the
+/// same positions, as if the rest of the target were hidden. A single tag of 16 cells is not sufficient evidence.
 #[test]
 fn boards_of_other_rows_and_columns_get_no_labels() {
     let sizes = (5..12).flat_map(|rows| (6..13).map(move |cols| (rows, cols)));
@@ -172,10 +172,10 @@ fn boards_of_other_rows_and_columns_get_no_labels() {
     }
 }
 
-/// A board has the tags of some faces, but not as they lie on a solid: around each face that fits, and between
-/// them, are others.
+/// A board has the tags of some faces, but not as they lie on a solid: around each face that fits, and between them,
+/// are others.
 #[test]
-fn boards_are_no_faces_of_solids_with_the_same_ids() {
+fn boards_are_not_taken_for_faces_of_solids() {
     for name in shipped_names() {
         let family = Family::shipped(name).unwrap();
         let tags = TagSpec { family: name.to_owned(), ..TagSpec::default() };
@@ -186,7 +186,7 @@ fn boards_are_no_faces_of_solids_with_the_same_ids() {
             let Ok(solid) = Target::build("o", &TargetSpec::Solid(spec), Some(&family)) else {
                 continue;
             };
-            // Smaller boards have just the tags of a face, or one more.
+            // Smaller boards have only the tags of a face, or one more.
             for size in [[10, 11], [12, 16]] {
                 let Some(shown) = board_of(&family, size, TagSpec::default()) else {
                     continue;
@@ -200,8 +200,8 @@ fn boards_are_no_faces_of_solids_with_the_same_ids() {
     }
 }
 
-/// A part of the board with one tag, as a photograph of nothing else shows it, is labelled; but
-/// not if just one other tile clearly belongs to another board.
+/// A part of the board with one tag, in an image of nothing else, is labelled. It is not labelled if a single other
+/// tile clearly belongs to another board.
 #[test]
 fn one_tag_labels_where_nothing_contradicts_it() {
     let family = Family::shipped("delTag25h7").unwrap();
@@ -237,10 +237,10 @@ fn one_tag_labels_where_nothing_contradicts_it() {
     }
 }
 
-/// A white corner, as natural pictures show it, is a code of a family without a rule for complexity: alone it labels
-/// nothing. With another tag beside it, it does, and so does a complex code alone.
+/// A white corner, as in natural images, is a code of a family without a complexity rule. Alone it labels nothing. With
+/// another tag beside it, it does, and so does a complex code alone.
 #[test]
-fn what_natural_pictures_show_labels_nothing_alone() {
+fn one_natural_looking_tag_gives_no_labels() {
     let complex = Family::shipped("d36h9").unwrap();
     let codes = [&[0xf_0000_0000], &complex.codes()[..20]].concat();
     let source = deltille_core::family::Construction::Imported { source: "here".to_owned() };
@@ -267,13 +267,13 @@ fn what_natural_pictures_show_labels_nothing_alone() {
     }
 }
 
-/// Patches of three by four tiles of a board of a thousand tiles, anywhere, turned and seen as in a mirror: one of twenty
-/// cells is misread, and three of ten tiles are hidden by what has cells of its own.
+/// Patches of three by four tiles of a board of a thousand tiles, anywhere, rotated and mirrored. One of twenty cells
+/// is misread, and three of ten tiles are hidden by objects with cells of their own.
 #[test]
-fn patches_of_dense_boards_tell_their_place() {
+fn patches_of_dense_boards_determine_their_position() {
     use rand::{Rng, SeedableRng};
     use rand_distr::{Distribution, StandardNormal};
-    /// Noise of a cell by which one of twenty is taken for the other.
+    /// Noise of a cell at which one of twenty is misread.
     const NOISE: f64 = 0.608;
     let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(5);
     let spec = BoardSpec { tags: Some(TagSpec::dense()), ..BoardSpec::deltille(32, 33, 10.0) };
@@ -327,34 +327,33 @@ fn patches_of_dense_boards_tell_their_place() {
             assert_eq!(found[0].mirrored, flopped, "trial {trial}");
         }
     }
-    println!("{labelled} of {looked} patches are labelled");
+    println!("{labelled} of {looked} patches were labelled");
     assert!(labelled * 10 > looked * 9, "{labelled} of {looked}");
 }
 
-/// How single tags of d36h11, four pixels a bit, are read under noise.
+/// Statistics of reading single tags of d36h11, 4 px per bit, under noise.
 #[derive(Debug, Default)]
 struct NoisyTags {
     tags: usize,
-    /// Cells that are more likely the other than the one printed.
+    /// Cells that are more likely the opposite of the printed one.
     cell_errors: usize,
-    /// And as many as there should be by the odds.
+    /// Their expected number by the odds.
     expected_errors: f32,
     /// Tags with no more wrong cells than the family corrects.
     by_decisions: usize,
     /// Tags that label the corners around them.
     by_evidence: usize,
-    /// Other words under the same noise, and how often they were taken for a tag either way.
+    /// Other words under the same noise, and how often each method mistakes them for a tag.
     words: usize,
     false_decisions: usize,
     false_evidence: usize,
-    /// Λ of each tag where no other word has more, and the greatest of each of the other words.
+    /// Λ of each tag if no other word has more, and the greatest of each of the other words.
     of_tags: Vec<f32>,
     of_words: Vec<f32>,
 }
 
 impl NoisyTags {
-    /// The part of the tags that have more evidence than other words have as seldom as they pass for a tag by
-    /// decisions.
+    /// Returns the fraction of tags read by evidence, at the rate of false tags of decisions cell by cell.
     fn read_at_the_rate_of_decisions(&self) -> f64 {
         let mut of_words = self.of_words.clone();
         of_words.sort_by(|a, b| b.total_cmp(a));
@@ -433,7 +432,7 @@ fn noisy_tags(noise: f64, views: u64, words_a_view: usize) -> NoisyTags {
         let right = |found: Labelled| found.vertices.iter().all(|(from, to)| from == to);
         seen.by_evidence += usize::from(found(readings.clone()).is_some_and(right));
         for _ in 0..words_a_view {
-            // Cells turned over at random show a drawn word, under this noise.
+            // Randomly flipped cells show a random word under this noise.
             let mut other = readings.clone();
             for odds in &mut other[at].half_odds {
                 *odds *= if rng.random() { 1.0 } else { -1.0 };
@@ -451,10 +450,10 @@ fn noisy_tags(noise: f64, views: u64, words_a_view: usize) -> NoisyTags {
     seen
 }
 
-/// With noise that misleads some 10.5 % of cells, decisions cell by cell read 83 % of the tags.
+/// Under noise that flips some 10.5 % of cells, decisions cell by cell read 83 % of the tags.
 #[test]
 #[ignore = "a minute; prints the rates"]
-fn noisy_tags_are_read_by_evidence_no_more_often_wrong_than_by_decisions() {
+fn evidence_reads_noisy_tags_with_no_more_errors_than_decisions() {
     let seen = noisy_tags(NOISE_OF_A_TENTH, 4000, 50);
     let [tags, words] = [seen.tags, seen.words].map(|n| n as f64);
     let cell_errors = seen.cell_errors as f64 / (36.0 * tags);
@@ -474,7 +473,7 @@ fn noisy_tags_are_read_by_evidence_no_more_often_wrong_than_by_decisions() {
     assert!(seen.by_evidence > seen.by_decisions);
 }
 
-/// Whatever is seen in a board's tiles is taken for tags of another board less often than allowed for.
+/// Random content of a board's tiles is taken for tags of another board less often than allowed.
 #[test]
 fn boards_of_random_words_get_no_labels() {
     use rand::{Rng, SeedableRng};
@@ -489,7 +488,7 @@ fn boards_of_random_words_get_no_labels() {
         let panel = &target.panels[0];
         let grid: SaddleGrid = panel_vertices(panel).into_iter().map(|v| (v, placed)).collect();
         let wrong = (0..1000).filter(|trial| {
-            // From a single tile, the hardest to refuse, to many; cells sure, or hardly told.
+            // From a single tile, the hardest to reject, to many; cells certain or nearly undetermined.
             let tiles = grid.keys().map(|&v| Tile::upright(v)).take(1 + trial % 40);
             let strength = [2.6, 1.0, 0.3][trial % 3];
             let readings = tiles
