@@ -270,7 +270,7 @@ fn one_natural_looking_tag_gives_no_labels() {
 /// Patches of three by four tiles of a board of a thousand tiles, anywhere, rotated and mirrored. One of twenty cells
 /// is misread, and three of ten tiles are hidden by objects with cells of their own.
 #[test]
-fn patches_of_dense_boards_determine_their_position() {
+fn patches_of_dense_boards_tell_their_place() {
     use rand::{Rng, SeedableRng};
     use rand_distr::{Distribution, StandardNormal};
     /// Noise of a cell at which one of twenty is misread.
