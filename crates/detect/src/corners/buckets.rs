@@ -1,41 +1,40 @@
-//! Points that come one by one, by their neighbourhood: an image cut into squares, each with a list of
-//! the points in it.
+//! An incremental spatial index: the image is divided into squares, each with a list of the points in it.
 
 use glam::DVec2;
 
-/// Side of a square, px: corners are a few to a square where there are many.
+/// Side of a square, px. Where corners are dense, a square contains a few.
 const SIDE_PX: f64 = 16.0;
 
-/// The end of a list.
+/// Marks the end of a list.
 const NONE: u32 = u32::MAX;
 
-/// Points in an image, to which more may be added.
+/// Points in an image, to which more can be added.
 #[derive(Clone, Debug)]
 pub(crate) struct Buckets {
-    /// The corner of the first square, and the side of all, px.
+    /// Corner of the first square, and the side of all squares, px.
     origin: DVec2,
     side_px: f64,
     cols: usize,
     rows: usize,
-    /// The last point of each square.
+    /// Last point of each square.
     last: Vec<u32>,
-    /// The points, each with the one before it in its square.
+    /// The points, each with the previous one in its square.
     points: Vec<(DVec2, u32)>,
 }
 
 impl Buckets {
-    /// No points yet, of an image of some size, px; what lies outside is found too, if less quickly.
+    /// Creates an empty index for an image of the given size, px. Points outside are found too, but more slowly.
     pub(crate) fn new(width: usize, height: usize) -> Self {
         let count = |px: usize| (px as f64 / SIDE_PX) as usize + 1;
         Self::squares(DVec2::ZERO, SIDE_PX, [count(width), count(height)])
     }
 
-    /// These points, wherever they lie, numbered as they come.
+    /// Creates an index of points anywhere in the plane, numbered in order.
     pub(crate) fn of(points: &[DVec2]) -> Self {
         let least = points.iter().copied().fold(DVec2::INFINITY, DVec2::min);
         let span = points.iter().copied().fold(least, DVec2::max) - least;
         let few = (span.element_product() / points.len() as f64).sqrt();
-        // Points in a line span no area, and equal ones no length.
+        // Collinear points span no area, and equal points no length.
         let side = few.max(span.max_element() / points.len() as f64).max(1.0);
         let counts = (span / side).to_array().map(|count| count as usize + 1);
         let mut buckets = Self::squares(least, side, counts);
@@ -47,7 +46,7 @@ impl Buckets {
         Self { origin, side_px, cols, rows, last: vec![NONE; cols * rows], points: Vec::new() }
     }
 
-    /// Adds a point; they are numbered from 0 on.
+    /// Adds a point. Points are numbered from 0.
     pub(crate) fn insert(&mut self, point: DVec2) {
         let [col, row] = self.square(point);
         let last = &mut self.last[row * self.cols + col];
@@ -56,12 +55,12 @@ impl Buckets {
     }
 
     fn square(&self, place: DVec2) -> [usize; 2] {
-        // Conversions saturate, so points outside fall to the border.
+        // Conversions saturate, so points outside are assigned to the border.
         let DVec2 { x, y } = (place - self.origin) / self.side_px;
         [(x as usize).min(self.cols - 1), (y as usize).min(self.rows - 1)]
     }
 
-    /// The number of the point nearest to a place; `None` where there are no points.
+    /// Returns the number of the point nearest to a position; `None` if there are no points.
     pub(crate) fn nearest(&self, place: DVec2) -> Option<usize> {
         let mut reach = self.side_px;
         while reach.is_finite() && !self.points.is_empty() {
@@ -74,7 +73,7 @@ impl Buckets {
         None
     }
 
-    /// The numbers of the points within a distance of a place, px, and their squared distances.
+    /// Returns the numbers of the points within a distance of a position, px, and their squared distances.
     pub(crate) fn within(&self, place: DVec2, reach: f64) -> impl Iterator<Item = (usize, f64)> {
         let [left, top] = self.square(place - reach);
         let [right, bottom] = self.square(place + reach);
@@ -101,7 +100,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_is_within_reach_is_what_a_search_of_all_finds() {
+    fn points_within_reach_match_a_full_search() {
         let mut random = rand_chacha::ChaCha8Rng::seed_from_u64(2);
         let mut buckets = Buckets::new(300, 100);
         let mut points: Vec<DVec2> = Vec::new();

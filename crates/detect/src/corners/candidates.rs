@@ -1,4 +1,4 @@
-//! Candidates: where R, which [`super::ring`] gives for every pixel, is greatest.
+//! Candidates for corners: maxima of R, which [`super::ring`] computes for every pixel.
 
 #![allow(clippy::needless_range_loop, reason = "one index for all rows, so that vectors show")]
 
@@ -9,11 +9,11 @@ use multiversion::multiversion;
 use super::ring::{BLOCK, Block, RADIUS, ResponseRow, Threshold};
 use deltille_core::raster::{Gray, bands};
 
-/// Half-width of the window in which a candidate must be the strongest, px. Two corners can not be
-/// closer than a ring's radius, so half of it suppresses only echoes.
+/// Half-width of the window in which a candidate must be the strongest, px. Two corners cannot be closer than the
+/// radius of a ring, so half of it suppresses only echoes.
 const SUPPRESSION_RADIUS: usize = 2;
 
-/// Rows of which a maximum must be the strongest.
+/// Number of rows in which a maximum must be the strongest.
 const WINDOW_ROWS: usize = 2 * SUPPRESSION_RADIUS + 1;
 
 /// A pixel whose neighbourhood looks like a corner.
@@ -27,8 +27,8 @@ pub(crate) struct Candidate {
     pub response: f32,
 }
 
-/// All local maxima of R, for corners with N rays, above `4.5·min_amplitude²`, where `min_amplitude` is the smallest amplitude
-/// |α| of interest in units of the image (values of at most 10 bits). In reading order.
+/// Returns all local maxima of R above `4.5·min_amplitude²` for corners with N rays, in reading order. `min_amplitude`
+/// is the smallest amplitude |α| of interest in units of the image (values of at most 10 bits).
 pub(crate) fn candidates<const N: usize>(image: &Gray<i16>, min_amplitude: f32) -> Vec<Candidate> {
     let (width, height) = (image.width(), image.height());
     let margin = RADIUS + SUPPRESSION_RADIUS;
@@ -40,14 +40,14 @@ pub(crate) fn candidates<const N: usize>(image: &Gray<i16>, min_amplitude: f32) 
     bands(rows, width, |band| candidates_in_rows::<N>(image, band, threshold))
 }
 
-/// The maxima in some rows.
+/// Returns the maxima in a range of rows.
 fn candidates_in_rows<const N: usize>(
     image: &Gray<i16>,
     rows: Range<usize>,
     threshold: Threshold,
 ) -> Vec<Candidate> {
     let columns = image.width() - 2 * RADIUS;
-    // A rolling window of response rows: row y lives at y mod WINDOW_ROWS.
+    // A rolling window of response rows: row y is stored at y mod WINDOW_ROWS.
     let mut window: [ResponseRow; WINDOW_ROWS] = std::array::from_fn(|_| ResponseRow::new(columns));
     let mut found = Vec::new();
     let first = rows.start - SUPPRESSION_RADIUS;
@@ -60,15 +60,14 @@ fn candidates_in_rows<const N: usize>(
     found
 }
 
-/// Most maxima that [`maxima_near`] gives: the corner, if there is one, is among the strongest.
+/// Maximum number of results of [`maxima_near`]. A corner, if there is one, is among the strongest.
 const MAXIMA_NEAR: usize = 8;
 
-/// Farthest that [`maxima_near`] looks, px.
+/// Maximum search distance of [`maxima_near`], px.
 const MAX_REACH: usize = 24;
 
-/// Places around a pixel, within `reach` px of it in either coordinate, from which a fit may reach a
-/// corner: the strongest of those where R, be it what it may, is the greatest of nine. The nearest
-/// come first.
+/// Returns positions around a pixel, within `reach` px in either coordinate, from which a fit may reach a corner. These
+/// are the strongest 3 × 3 maxima of R, of any value. The nearest come first.
 pub(crate) fn maxima_near<const N: usize>(
     image: &Gray<i16>,
     place: [usize; 2],
@@ -84,7 +83,7 @@ pub(crate) fn maxima_near<const N: usize>(
     if columns.len() < 3 || rows.len() < 3 {
         return Vec::new();
     }
-    // Whole blocks are faster than what is left of one.
+    // Whole blocks are faster than a partial one.
     let whole = columns.len().next_multiple_of(BLOCK);
     let fits = columns.start + whole + RADIUS <= image.width();
     let computed = if fits { whole } else { columns.len() };
@@ -115,10 +114,10 @@ pub(crate) fn maxima_near<const N: usize>(
     found.into_iter().map(|c| [c.x, c.y]).collect()
 }
 
-/// Whether some of the middle one of three rows reach a threshold and none of the four places next to
-/// them is stronger.
+/// Returns whether a position of the middle of three rows reaches a threshold, and none of its four neighbours is
+/// stronger.
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
-fn may_hold_maximum(rows: [&Vec<f32>; 3], places: Range<usize>, threshold: f32) -> bool {
+fn may_contain_maximum(rows: [&Vec<f32>; 3], places: Range<usize>, threshold: f32) -> bool {
     let part = |row: usize, from: usize| &rows[row][from..from + places.len()];
     let (above, below) = (part(0, places.start), part(2, places.start));
     let here = part(1, places.start);
@@ -143,16 +142,16 @@ fn maxima_of_row(
 ) {
     let ResponseRow { responses: centre, blocks, .. } = &window[y % WINDOW_ROWS];
     let [above, below] = [y - 1, y + 1].map(|v| &window[v % WINDOW_ROWS].responses);
-    // Those that have all their neighbours.
+    // Positions that have all their neighbours.
     let inner = SUPPRESSION_RADIUS..centre.len() - SUPPRESSION_RADIUS;
     for (b, _) in blocks.iter().enumerate().filter(|&(_, &block)| block == Block::Promising) {
         let places = (b * BLOCK).max(inner.start)..((b + 1) * BLOCK).min(inner.end);
-        if !may_hold_maximum([above, centre, below], places.clone(), threshold) {
+        if !may_contain_maximum([above, centre, below], places.clone(), threshold) {
             continue;
         }
         for (i, response) in places.map(|i| (i, centre[i])) {
-            // Ties go to the later pixel in reading order, so exactly one of equal neighbours stays.
-            // Most fall short of one of the four next to them.
+            // Ties go to the later pixel in reading order, so exactly one of equal neighbours remains. Most pixels fall
+            // short of one of their four neighbours.
             let may_be = response > threshold
                 && centre[i - 1].max(above[i]) <= response
                 && centre[i + 1].max(below[i]) < response;
@@ -185,7 +184,7 @@ mod tests {
     use deltille_core::lattice::GridKind;
     use deltille_core::raster::Pyramid;
 
-    /// Sectors of 50 and 200, meeting at (cx, cy), turned by `angle`.
+    /// Renders sectors of 50 and 200 that meet at (cx, cy), rotated by `angle`.
     fn star(cx: f64, cy: f64, angle: f64, sectors: f64) -> Gray<i16> {
         let sharp = Gray::from_fn(40, 40, |x, y| {
             let theta = (y as f64 - cy).atan2(x as f64 - cx) + angle;
@@ -195,7 +194,7 @@ mod tests {
     }
 
     #[test]
-    fn one_candidate_at_a_corner_whatever_its_turn() {
+    fn one_candidate_at_a_corner_in_any_orientation() {
         for k in 0..12 {
             let turn = 0.1 * f64::from(k);
             for found in [
@@ -222,8 +221,8 @@ mod tests {
                 let other = strongest::<6>(&star(sectors));
                 assert!(other < deltille / 8.0, "{sectors} sectors: {other} of {deltille}");
             }
-            // Around a deltille corner there are two edges with sectors beside them: weaker
-            // candidates, which have no four sectors.
+            // Around a deltille corner, two edges with sectors beside them form weaker candidates, which do not have
+            // four sectors.
             for (sectors, part) in [(2.0, 0.125), (6.0, 0.75)] {
                 let other = strongest::<4>(&star(sectors));
                 assert!(other < part * checker, "{sectors} sectors: {other} of {checker}");
@@ -232,7 +231,7 @@ mod tests {
     }
 
     #[test]
-    fn bars_are_no_checkerboard_corners() {
+    fn bars_are_not_checkerboard_corners() {
         let checker = strongest::<4>(&star(20.0, 20.0, 0.05, 4.0));
         for k in 0..12 {
             let (sin, cos) = (0.27 * f64::from(k)).sin_cos();
@@ -248,8 +247,8 @@ mod tests {
     }
 
     #[test]
-    fn what_is_passed_over_holds_no_candidate() {
-        // Sectors of all sizes at all angles, edges, and noise of all strengths.
+    fn skipped_blocks_contain_no_candidate() {
+        // Sectors of all sizes and angles, edges, and noise of all strengths.
         let mut random = ChaCha8Rng::seed_from_u64(3);
         let image = Gray::from_fn(300, 200, |x, y| {
             let (u, v) = ((x % 50) as f64 - 24.3, (y % 40) as f64 - 19.6);
@@ -271,7 +270,7 @@ mod tests {
         }
     }
 
-    /// R pixel by pixel, and its maxima by looking at all of the window.
+    /// Computes R pixel by pixel, and its maxima by a search of the whole window.
     fn one_by_one<const N: usize>(image: &Gray<i16>, min_amplitude: f32) -> Vec<Candidate> {
         let response = |x: usize, y: usize| {
             let at = |k: usize, side: usize| {
@@ -304,7 +303,7 @@ mod tests {
     }
 
     #[test]
-    fn blocks_of_rows_of_any_length_find_what_single_pixels_do() {
+    fn blocks_find_the_same_as_single_pixels_for_any_row_length() {
         let mut random = ChaCha8Rng::seed_from_u64(4);
         for width in [13, 20, 24, 33, 40, 71] {
             let image = Gray::from_fn(width, 40, |_, _| random.random_range(0..1024));

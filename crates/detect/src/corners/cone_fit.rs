@@ -1,8 +1,8 @@
 //! Least-squares polynomials around a position, as one linear map of the pixels there.
 //!
-//! All positions share one window, so the coefficients are fixed kernels (the rows of (AᵀA)⁻¹Aᵀ,
-//! paper §3.1). The image is smoothed with a cone before the fit; both maps are linear and are
-//! kept as their product, so a fit over offsets within r + 1 reads (4r + 1)² pixels.
+//! All positions share one window, so the coefficients are fixed kernels (the rows of (AᵀA)⁻¹Aᵀ, paper §3.1). The image
+//! is smoothed with a cone before the fit. Both maps are linear and are stored as their product, so a fit over offsets
+//! within r + 1 reads (4r + 1)² pixels.
 
 use glam::DVec2;
 use multiversion::multiversion;
@@ -15,7 +15,7 @@ use deltille_core::raster::{ImageView, Intensity, View, of_any};
 /// Powers (i, j) of a monomial uⁱvʲ.
 pub(crate) type Powers = (i32, i32);
 
-/// Rows of kernels are padded to whole vectors, of which so much is worked on at a time.
+/// Number of lanes processed at a time. Kernel rows are padded to whole vectors.
 const HALF: usize = LANES / 2;
 
 /// Kernels of the first N coefficients of a polynomial.
@@ -24,17 +24,17 @@ pub(crate) struct ConeFit<const N: usize> {
     radius: usize,
     /// Side of the window of pixels that is read: 4r + 1.
     side: usize,
-    /// For each row of the window the weights of each coefficient, in groups of lanes.
+    /// Weights of each coefficient for each row of the window, in groups of lanes.
     kernels: Vec<[[f32; LANES]; N]>,
 }
 
-/// Singular values smaller than this are those of a design that lacks rank, which none does: above rounding, and below all
-/// that there are.
+/// Singular value below which a design lacks rank. It lies above rounding and below all actual singular values, so no
+/// design lacks rank.
 const RANK: f64 = 1e-12;
 
 impl<const N: usize> ConeFit<N> {
-    /// A fit of all `monomials`, over offsets within `radius` + 1 px after smoothing with a cone
-    /// of that radius; the coefficients of the first N are kept.
+    /// Creates a fit of all `monomials`, over offsets within `radius` + 1 px, after smoothing with a cone of that
+    /// radius. Keeps the coefficients of the first N.
     pub(crate) fn new(radius: usize, monomials: &[Powers]) -> Self {
         let r = radius as isize;
         let cone = |u: isize, v: isize| (radius as f64 + 1.0 - (u as f64).hypot(v as f64)).max(0.0);
@@ -62,12 +62,12 @@ impl<const N: usize> ConeFit<N> {
         Self { radius, side, kernels }
     }
 
-    /// The radius of the fit, px.
+    /// Returns the radius of the fit, px.
     pub(crate) fn radius(&self) -> usize {
         self.radius
     }
 
-    /// The coefficients around a position; `None` where the window leaves the image.
+    /// Returns the coefficients around a position; `None` if the window leaves the image.
     pub(crate) fn coefficients(&self, image: ImageView, DVec2 { x, y }: DVec2) -> Option<[f64; N]> {
         let reach = (2 * self.radius) as f64;
         let fits = x >= reach
@@ -85,8 +85,8 @@ impl<const N: usize> ConeFit<N> {
     }
 }
 
-/// The products of the kernels with bilinear samples of a window of `side` pixels, whose first
-/// pixel is (left, top), shifted by a fraction.
+/// Returns the products of the kernels with bilinear samples of a window of `side` pixels. Its first pixel is (left,
+/// top), shifted by a fraction.
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
 fn products<const N: usize, T: Intensity>(
     kernels: &[[[f32; LANES]; N]],
@@ -95,7 +95,7 @@ fn products<const N: usize, T: Intensity>(
     [left, top]: [usize; 2],
     [fx, fy]: [f32; 2],
 ) -> [f32; N] {
-    // Taking the centre's level away first keeps single precision exact enough at 16 bits.
+    // Subtracting the level of the centre first keeps single precision accurate enough at 16 bits.
     let level = image.at(left + side / 2, top + side / 2).to_f32();
     let mut sums = [[0.0f32; LANES]; N];
     for half in 0..2 {
@@ -108,7 +108,7 @@ fn products<const N: usize, T: Intensity>(
     sums.each_ref().map(lanes::sum)
 }
 
-/// The sums of half of the lanes, from `first` on, less `level`: so many stay in registers.
+/// Returns the sums of half of the lanes, from `first` on, minus `level`. These fit into registers.
 #[inline(always)]
 fn half_sums<const N: usize, T: Intensity>(
     kernels: &[[[f32; LANES]; N]],
@@ -145,8 +145,8 @@ fn half_sums<const N: usize, T: Intensity>(
     sums
 }
 
-/// Samples of a row between its pixels, from a column on, minus a level; behind the end of the row,
-/// where kernels have no weight, some number.
+/// Returns samples of a row between its pixels, from a column on, minus a level. Beyond the end of the row, where
+/// kernels have no weight, the values are arbitrary.
 #[inline(always)]
 fn blended<T: Intensity>(row: &[T], column: usize, fx: f32, level: f32) -> [f32; HALF] {
     let mut padded = [T::default(); HALF + 1];
@@ -158,7 +158,7 @@ fn blended<T: Intensity>(row: &[T], column: usize, fx: f32, level: f32) -> [f32;
             &padded
         }
     };
-    // Plain loops: a closure handed to the standard library would not be compiled for the target.
+    // Plain loops: a closure passed to the standard library would not be compiled for the target.
     let mut samples = [0.0; HALF];
     for i in 0..HALF {
         let (a, b) = (pixels[i].to_f32() - level, pixels[i + 1].to_f32() - level);

@@ -1,13 +1,13 @@
-//! The paper's corner: the umbilic point of a cubic surface fitted to the image.
+//! The corner of the paper: the umbilic point of a cubic surface fitted to the image.
 //!
-//! Over offsets Δ = (u, v) around a position the image is fitted by (Eq. 1)
+//! The surface over offsets Δ = (u, v) around a position is (Eq. 1)
 //!
 //! ```text
 //!     f(u,v) = c1 u³ + c2 u²v + c3 uv² + c4 v³ + c5 u² + c6 uv + c7 v² + c8 u + c9 v + c10
 //! ```
 //!
-//! (see [`super::cone_fit`]). A corner is where all second derivatives vanish (Eq. 3), and a star-shaped umbilic
-//! when J < 0 (Eq. 5), which depends on the cubic terms alone.
+//! (see [`super::cone_fit`]). A corner is a point where all second derivatives vanish (Eq. 3). It is a star-shaped
+//! umbilic if J < 0 (Eq. 5), which depends only on the cubic terms.
 
 use glam::DVec2;
 use nalgebra::{Matrix3x2, Vector3};
@@ -15,10 +15,10 @@ use nalgebra::{Matrix3x2, Vector3};
 use super::cone_fit::{ConeFit, Powers};
 use deltille_core::raster::ImageView;
 
-/// Number of coefficients kept: c1 … c7; slopes and level do not move the corner.
+/// Number of coefficients kept: c1 … c7. Slopes and level do not move the corner.
 const KEPT: usize = 7;
 
-/// A step shorter than this ends the iteration, px.
+/// Step length below which the iteration has converged, px.
 const CONVERGED_PX: f64 = 0.001;
 
 /// The cubic and quadratic coefficients c1 … c7 of a fitted surface.
@@ -29,13 +29,13 @@ pub(crate) struct CubicSurface {
 }
 
 impl CubicSurface {
-    /// J of Eq. 5; negative on star-shaped umbilics.
+    /// Returns J of Eq. 5; negative on star-shaped umbilics.
     pub(crate) fn star_discriminant(&self) -> f64 {
         let [c1, c2, c3, c4, ..] = self.c;
         3.0 * (c1 * c3 + c2 * c4) - (c2 * c2 + c3 * c3)
     }
 
-    /// The offset at which all second derivatives vanish, in the least-squares sense (Eq. 3).
+    /// Returns the offset at which all second derivatives vanish, in the least-squares sense (Eq. 3).
     pub(crate) fn umbilic_point(&self) -> Option<DVec2> {
         let [c1, c2, c3, c4, c5, c6, c7] = self.c;
         let a = Matrix3x2::new(6.0 * c1, 2.0 * c2, 2.0 * c2, 2.0 * c3, 2.0 * c3, 6.0 * c4);
@@ -46,7 +46,7 @@ impl CubicSurface {
         point.is_finite().then_some(point)
     }
 
-    /// The cubic terms c1 … c4.
+    /// Returns the cubic terms c1 … c4.
     pub(crate) fn form(&self) -> [f64; 4] {
         let [c1, c2, c3, c4, ..] = self.c;
         [c1, c2, c3, c4]
@@ -73,19 +73,18 @@ pub(crate) struct Umbilic {
 }
 
 impl CubicFit {
-    /// A fit over offsets within `radius` + 1 px, after smoothing with a cone of that radius.
+    /// Creates a fit over offsets within `radius` + 1 px, after smoothing with a cone of that radius.
     pub(crate) fn new(radius: usize) -> Self {
         Self { fit: ConeFit::new(radius, &MONOMIALS) }
     }
 
-    /// The surface around `position`; `None` where the window leaves the image.
+    /// Returns the surface around `position`; `None` if the window leaves the image.
     pub(crate) fn surface(&self, image: ImageView, position: DVec2) -> Option<CubicSurface> {
         Some(CubicSurface { c: self.fit.coefficients(image, position)? })
     }
 
-    /// Iterates from `start`, at most `iterations` times. `None` when the surface is no
-    /// star-shaped umbilic, a step or the whole way exceeds the radius, or the window leaves the
-    /// image.
+    /// Iterates from `start`, at most `iterations` times. Returns `None` if the surface is not a star-shaped umbilic,
+    /// if a step or the total displacement exceeds the radius, or if the window leaves the image.
     pub(crate) fn refine(
         &self,
         image: ImageView,
@@ -95,7 +94,7 @@ impl CubicFit {
         self.walk(image, start, iterations, CONVERGED_PX)
     }
 
-    /// [`Self::refine`] that ends with a step shorter than `converged_px`.
+    /// Iterates like [`Self::refine`], until a step is shorter than `converged_px`.
     pub(crate) fn walk(
         &self,
         image: ImageView,
@@ -124,7 +123,7 @@ impl CubicFit {
         Some(Umbilic { position, surface })
     }
 
-    /// The way from `start` to the umbilic point of the surface there; `None` when it is not star-shaped.
+    /// Returns the step from `start` to the umbilic point of the surface there; `None` if it is not star-shaped.
     pub(crate) fn step(&self, image: ImageView, start: DVec2) -> Option<DVec2> {
         let surface = self.surface(image, start)?;
         (surface.star_discriminant() < 0.0).then(|| surface.umbilic_point()).flatten()
@@ -136,7 +135,7 @@ mod tests {
     use super::*;
     use deltille_core::raster::Gray;
 
-    /// x³ − 3xy² about (cx, cy), plus slopes and a level that must not matter.
+    /// x³ − 3xy² about (cx, cy), plus slopes and a level that must have no effect.
     fn monkey_saddle(cx: f64, cy: f64) -> Gray<f32> {
         Gray::from_fn(64, 64, |x, y| {
             let (u, v) = (x as f64 - cx, y as f64 - cy);
@@ -157,7 +156,7 @@ mod tests {
     }
 
     #[test]
-    fn quadrics_planes_and_borders_are_refused() {
+    fn quadrics_planes_and_borders_are_rejected() {
         let fit = CubicFit::new(3);
         let saddle = Gray::from_fn(64, 64, |x, y| (x as f32 - 30.0) * (y as f32 - 30.0));
         let found = fit.refine((&saddle).into(), DVec2::splat(30.0), 5);

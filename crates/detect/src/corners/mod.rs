@@ -1,13 +1,14 @@
-//! From pixels to corners, one by one.
+//! Corners: from pixels to single corners.
 //!
-//! Comes in: the pyramid of an image. Goes out: corners with the edges that meet there ([`saddles::Saddle`]), not yet joined.
+//! Input: the pyramid of an image. Output: corners with the edges that meet there ([`saddles::Saddle`]), not yet
+//! joined.
 //!
-//! 1. `ring` measures how dark and bright alternate around each pixel, three times, or twice on checkerboards; `candidates`
-//!    are where that is greatest.
-//! 2. `polynomial` fits a cubic surface (`cubic`) or a quadric (`quadric`) by fixed kernels (`cone_fit`) and moves to the point
-//!    where all second derivatives, or the gradient, vanish; J < 0, or it is not a corner.
+//! 1. `ring` measures how dark and bright alternate around each pixel: three times, or twice on checkerboards.
+//!    `candidates` are the maxima of this measure.
+//! 2. `polynomial` fits a cubic surface (`cubic`) or a quadric (`quadric`) by fixed kernels (`cone_fit`). It moves to
+//!    the point where all second derivatives, or the gradient, vanish. Unless J < 0, it is not a corner.
 //! 3. `sectors` reads the six or four half-edges with their colours.
-//! 4. `saddles` runs these over all levels of the pyramid and merges what is found twice (`buckets`).
+//! 4. `saddles` runs these over all levels of the pyramid and merges duplicates (`buckets`).
 
 pub(crate) mod buckets;
 pub(crate) mod candidates;

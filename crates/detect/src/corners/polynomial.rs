@@ -1,5 +1,5 @@
-//! The paper's fit for either tiling: a cubic surface ([`super::cubic`]) or a quadric
-//! ([`super::quadric`]), and the form of its highest degree, whose zeros are the edges.
+//! The fit of the paper for either tiling: a cubic surface ([`super::cubic`]) or a quadric ([`super::quadric`]), and
+//! the form of its highest degree, whose zeros are the edges.
 
 use glam::DVec2;
 
@@ -8,38 +8,38 @@ use super::quadric::{QuadricFit, QuadricSaddle};
 use deltille_core::lattice::GridKind;
 use deltille_core::raster::ImageView;
 
-/// Most iterations of the cubic; the reference detector's.
+/// Maximum iterations of the cubic fit, as in the reference detector.
 const CUBIC_ITERATIONS: usize = 5;
 
-/// Most iterations of the quadric; the reference detector's.
+/// Maximum iterations of the quadric fit, as in the reference detector.
 const QUADRIC_ITERATIONS: usize = 20;
 
-/// Most iterations of a first look; the paper's.
+/// Maximum iterations of a first pass, as in the paper.
 const FIND_ITERATIONS: usize = 5;
 
-/// A first look ends with a step shorter than this, px: what is left is far less, and corners are told
-/// apart, and from where they should be, by tenths of a pixel.
+/// Step length that ends a first pass, px. The remaining error is much smaller. Corners are compared with each other
+/// and with their prediction by tenths of a pixel.
 const FOUND_PX: f64 = 0.03;
 
 /// A fit of one degree in one window.
 #[derive(Clone, Debug)]
 pub(crate) enum Polynomial {
-    /// Of deltille corners.
+    /// For deltille corners.
     Cubic(CubicFit),
-    /// Of checkerboard corners.
+    /// For checkerboard corners.
     Quadric(QuadricFit),
 }
 
 /// The terms of the highest degree of a fitted surface, from u³ or u² to v³ or v².
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum Form {
-    /// Of u³, u²v, uv², v³.
+    /// u³, u²v, uv², v³.
     Cubic([f64; 4]),
-    /// Of u², uv, v².
+    /// u², uv, v².
     Quadratic([f64; 3]),
 }
 
-/// A corner that a fit has found.
+/// A corner found by a fit.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct FittedCorner {
     /// Position, px.
@@ -61,8 +61,8 @@ impl From<QuadricSaddle> for FittedCorner {
 }
 
 impl Form {
-    /// The form along a unit vector: large where the image is bright. That of degree three is zero
-    /// along the edges, that of degree two about there.
+    /// Returns the form along a unit vector: large where the image is bright. It vanishes along the edges (degree
+    /// three) or near them (degree two).
     pub(crate) fn towards(&self, DVec2 { x: u, y: v }: DVec2) -> f64 {
         match *self {
             Form::Cubic([a, b, c, d]) => {
@@ -74,7 +74,7 @@ impl Form {
 }
 
 impl Polynomial {
-    /// The fit for corners of a kind over offsets within `radius` + 1 px.
+    /// Creates the fit for corners of a tiling, over offsets within `radius` + 1 px.
     pub(crate) fn new(kind: GridKind, radius: usize) -> Self {
         match kind {
             GridKind::Deltille => Self::Cubic(CubicFit::new(radius)),
@@ -82,7 +82,7 @@ impl Polynomial {
         }
     }
 
-    /// The reference detector's number of iterations.
+    /// Returns the number of iterations of the reference detector.
     pub(crate) fn usual_iterations(&self) -> usize {
         match self {
             Self::Cubic(_) => CUBIC_ITERATIONS,
@@ -90,7 +90,7 @@ impl Polynomial {
         }
     }
 
-    /// The corner that the fit reaches from `start` in at most so many iterations.
+    /// Returns the corner that the fit reaches from `start` in at most `iterations` iterations.
     pub(crate) fn refine(
         &self,
         image: ImageView,
@@ -103,7 +103,7 @@ impl Polynomial {
         }
     }
 
-    /// [`Self::refine`] as closely as a first look needs.
+    /// Fits like [`Self::refine`], as accurately as a first pass needs.
     pub(crate) fn find(&self, image: ImageView, start: DVec2) -> Option<FittedCorner> {
         let (most, found_px) = (FIND_ITERATIONS, FOUND_PX);
         match self {
@@ -112,7 +112,7 @@ impl Polynomial {
         }
     }
 
-    /// The first step of that fit, px; `None` where it sees no corner.
+    /// Returns the first step of the fit, px; `None` if there is no corner.
     pub(crate) fn step(&self, image: ImageView, start: DVec2) -> Option<DVec2> {
         match self {
             Self::Cubic(fit) => fit.step(image, start),

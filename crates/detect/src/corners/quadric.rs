@@ -1,11 +1,11 @@
-//! The paper's checkerboard corner: the saddle of a quadric fitted to the image.
+//! The checkerboard corner of the paper: the saddle point of a quadric fitted to the image.
 //!
 //! ```text
 //!     f(u,v) = c1 u² + c2 uv + c3 v² + c4 u + c5 v + c6
 //! ```
 //!
-//! The corner is the stationary point, 2c1 u + c2 v + c4 = 0 and c2 u + 2c3 v + c5 = 0, a saddle
-//! where the Hessian's determinant 4 c1 c3 − c2² is negative. The fit is [`super::cone_fit`]'s.
+//! The corner is the stationary point, 2c1 u + c2 v + c4 = 0 and c2 u + 2c3 v + c5 = 0. It is a saddle point if the
+//! determinant of the Hessian, 4 c1 c3 − c2², is negative. [`super::cone_fit`] computes the fit.
 
 use glam::DVec2;
 
@@ -15,10 +15,10 @@ use deltille_core::raster::ImageView;
 /// Monomials in the order of the coefficients.
 const MONOMIALS: [Powers; 6] = [(2, 0), (1, 1), (0, 2), (1, 0), (0, 1), (0, 0)];
 
-/// A step shorter than this ends the iteration, px.
+/// Step length below which the iteration has converged, px.
 const CONVERGED_PX: f64 = 0.001;
 
-/// A saddle found by iterating the fit.
+/// A saddle point found by iterating the fit.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct QuadricSaddle {
     /// Position, px.
@@ -34,13 +34,13 @@ pub(crate) struct QuadricFit {
 }
 
 impl QuadricFit {
-    /// A fit over offsets within `radius` + 1 px, after smoothing with a cone of that radius.
+    /// Creates a fit over offsets within `radius` + 1 px, after smoothing with a cone of that radius.
     pub(crate) fn new(radius: usize) -> Self {
         Self { fit: ConeFit::new(radius, &MONOMIALS) }
     }
 
-    /// Iterates from `start`, at most `iterations` times. `None` when the surface is no saddle, a
-    /// step or the whole way exceeds the radius, or the window leaves the image.
+    /// Iterates from `start`, at most `iterations` times. Returns `None` if the surface has no saddle point, if a step
+    /// or the total displacement exceeds the radius, or if the window leaves the image.
     pub(crate) fn refine(
         &self,
         image: ImageView,
@@ -50,7 +50,7 @@ impl QuadricFit {
         self.walk(image, start, iterations, CONVERGED_PX)
     }
 
-    /// [`Self::refine`] that ends with a step shorter than `converged_px`.
+    /// Iterates like [`Self::refine`], until a step is shorter than `converged_px`.
     pub(crate) fn walk(
         &self,
         image: ImageView,
@@ -76,13 +76,13 @@ impl QuadricFit {
         None
     }
 
-    /// The way from `start` to the saddle point of the surface there; `None` when it has none.
+    /// Returns the step from `start` to the saddle point of the surface there; `None` if it has none.
     pub(crate) fn step(&self, image: ImageView, start: DVec2) -> Option<DVec2> {
         stationary_point(self.fit.coefficients(image, start)?)
     }
 }
 
-/// The saddle point of a quadric; `None` for bowls and flat surfaces.
+/// Returns the saddle point of a quadric; `None` for bowls and flat surfaces.
 fn stationary_point([c1, c2, c3, c4, c5]: [f64; 5]) -> Option<DVec2> {
     let determinant = 4.0 * c1 * c3 - c2 * c2;
     let point = DVec2::new(c2 * c5 - 2.0 * c3 * c4, c2 * c4 - 2.0 * c1 * c5) / determinant;
@@ -107,7 +107,7 @@ mod tests {
     }
 
     #[test]
-    fn bowls_planes_and_borders_are_refused() {
+    fn bowls_planes_and_borders_are_rejected() {
         let fit = QuadricFit::new(3);
         assert!(
             fit.refine((&surface(|u, v| u * u + v * v)).into(), DVec2::splat(20.0), 5).is_none()

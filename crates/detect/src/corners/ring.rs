@@ -1,19 +1,18 @@
-//! How much every pixel looks like a corner: how a ring of twelve samples alternates three times, or twice.
+//! Corner response of every pixel: how clearly a ring of twelve samples alternates three times, or twice.
 //!
-//! On a circle the cubic form of a monkey saddle is `Re(α·e^{3iθ} + β·e^{iθ})`, and the paper's
-//! discriminant of star-shaped umbilics (Eq. 5) is `J ∝ |β|² − 9|α|²`. The ring measures the same
-//! α and β as third and first harmonic of twelve samples at 30° steps,
+//! On a circle, the cubic form of a monkey saddle is `Re(α·e^{3iθ} + β·e^{iθ})`. The discriminant of star-shaped
+//! umbilics (paper, Eq. 5) is `J ∝ |β|² − 9|α|²`. The ring measures the same α and β as third and first harmonic of
+//! twelve samples at 30° steps:
 //!
 //! ```text
 //!     R = 4.5|α|² − |β|² − ½V
 //! ```
 //!
-//! V is the variance of the sums of opposite samples: a monkey saddle is odd, `f(−Δ) = −f(Δ)` about
-//! its level, so V is noise there, while an edge that passes beside the centre shows in it. Edges
-//! through the centre have 9|α|² ≈ |β|², so |α|² has half the weight of the discriminant: up to 60°
-//! of tilt corners stay clear of that wherever their blur is small against the ring, which it is on
-//! some level of the pyramid. With twelve samples the third harmonic needs additions only, and the
-//! whole image costs about three nanoseconds a pixel.
+//! V is the variance of the sums of opposite samples. A monkey saddle is odd about its level, `f(−Δ) = −f(Δ)`, so V is
+//! noise there. An edge that passes beside the centre increases V. Edges through the centre have 9|α|² ≈ |β|², so |α|²
+//! has half the weight that it has in the discriminant. Up to 60° of tilt, corners stay clear of this limit if their
+//! blur is small against the ring, as it is on some level of the pyramid. With twelve samples the third harmonic needs
+//! only additions, and the whole image costs about 3 ns per pixel.
 //!
 //! A checkerboard corner is even, `f(−Δ) = f(Δ)`. Its α is the second harmonic, and
 //!
@@ -21,23 +20,22 @@
 //!     R = 4.5|α|² − ½V − 9(c − m)²
 //! ```
 //!
-//! Here V is the sum of squared differences of opposite samples, which edges beside the centre
-//! leave; a bar across the ring, which is even as well, leaves the difference of the centre c and
-//! the ring's mean m. At a corner, however narrow its sectors, these agree: blur makes the centre
-//! the mean over all directions. On the middle of a bar they differ by half of |α| or more, and on
-//! all but the widest by more than the 0.7|α| at which R vanishes.
+//! Here V is the sum of squared differences of opposite samples, which edges beside the centre cause. A bar across the
+//! ring is even as well, but its centre c differs from the mean m of the ring. At a corner, even with narrow sectors, c
+//! and m agree, because blur makes the centre the mean over all directions. On the middle of a bar they differ by half
+//! of |α| or more. On all but the widest bars they differ by more than the 0.7|α| at which R vanishes.
 //!
-//! Most of an image shows nothing, and what cannot reach the threshold need not be known. So pixels
-//! are looked at in blocks: R is at most 4.5|α|², and of |α|² the octagon
+//! Most of an image has no corners, and values below the threshold need not be computed. Pixels are therefore tested in
+//! blocks. R is at most 4.5|α|². For |α|², the octagon
 //!
 //! ```text
 //!     |z| ≤ max(|Re z|, |Im z|) + ½ min(|Re z|, |Im z|)
 //! ```
 //!
-//! is an upper bound, at most 12 % too large, that 16-bit additions give. Where it passes the
-//! threshold, a second look leaves out edges by lower bounds of what is taken away from it: of β, of V (half
-//! the square of the range of what it is the variance of, or a sixth of the square of Σ|d|, the sum of the
-//! six differences of opposite samples), or of c − m. Only blocks that pass both somewhere are computed, so that nothing is missed.
+//! is an upper bound, at most 12 % too large, that 16-bit additions compute. If it passes the threshold, a second test
+//! excludes edges by lower bounds of the subtracted terms: β, V or c − m. V is at least half the square of the range of
+//! the values whose variance it is. It is also at least a sixth of the square of Σ|d|, the sum of the six differences
+//! of opposite samples. Only blocks in which some pixel passes both tests are computed, so no corner is missed.
 
 #![allow(clippy::needless_range_loop, reason = "one index for all rows, so that vectors show")]
 
@@ -47,9 +45,9 @@ use crate::tiling::kind;
 use deltille_core::lattice::GridKind;
 use deltille_core::raster::Gray;
 
-/// Offsets of half the ring, near 0°, 30°, …, 150°; the other half is opposite. Radius 3.6 to 4 px:
-/// the smallest ring on which the twelve directions stay within 4° of multiples of 30°, so that it
-/// fits between a corner and the code of a small tag (5 px at 2 px a bit).
+/// Offsets of half the ring, near 0°, 30°, …, 150°; the other half is opposite. The radius is 3.6 to 4 px. This is the
+/// smallest ring on which the twelve directions stay within 4° of multiples of 30°. It fits between a corner and the
+/// code of a small tag (5 px at 2 px per bit).
 pub(super) const HALF_RING: [(isize, isize); 6] =
     [(4, 0), (3, 2), (2, 3), (0, 4), (-2, 3), (-3, 2)];
 
@@ -59,23 +57,22 @@ pub(crate) const PER_AMPLITUDE: f32 = 4.5;
 /// Largest offset in [`HALF_RING`], px.
 pub(super) const RADIUS: usize = 4;
 
-/// Pixels that are looked at in one go: a vector of 16-bit numbers. Twice as many would leave a third
-/// more of a photograph to compute.
+/// Pixels per block: a vector of 16-bit numbers. With twice as many, a third more of a photograph would be computed.
 pub(super) const BLOCK: usize = 16;
 
-/// The least R of interest, and what follows from it.
+/// The minimum R of interest, and the bounds derived from it.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Threshold {
     pub(super) response: f32,
-    /// No |6α| of a deltille corner up to this reaches it.
+    /// Largest |6α| of a deltille corner that does not reach it.
     pub(super) odd: i16,
-    /// No |12α| of a checkerboard corner up to this reaches it.
+    /// Largest |12α| of a checkerboard corner that does not reach it.
     pub(super) even: i16,
 }
 
 impl Threshold {
     pub(super) fn new(min_amplitude: f32) -> Self {
-        // Of harmonics six and twelve times α, as [`odd_may_reach`] and [`even_may_reach`] have them. The bounds are rounded
+        // Harmonics are six and twelve times α, as in [`odd_may_reach`] and [`even_may_reach`]. The bounds are rounded
         // down by up to a half.
         let below = |harmonic: f32| (harmonic.floor() - 1.0) as i16;
         Self {
@@ -86,14 +83,14 @@ impl Threshold {
     }
 }
 
-/// What is known of a block of a row.
+/// State of a block of a row.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Block {
-    /// Nothing in it reaches the threshold; all is 0.
+    /// Nothing in it reaches the threshold; all values are 0.
     Weak,
     /// Computed, and nothing in it exceeds the threshold.
     Computed,
-    /// Computed, and something does.
+    /// Computed, and something in it exceeds the threshold.
     Promising,
 }
 
@@ -102,11 +99,11 @@ pub(super) enum Block {
 pub(super) struct ResponseRow {
     pub(super) responses: Vec<f32>,
     pub(super) blocks: Vec<Block>,
-    /// Which blocks of the row are worth a second look.
+    /// Blocks of the row that need a second test.
     pub(super) flags: Vec<bool>,
 }
 
-/// A row of pixels at each place of the ring, opposite ones together.
+/// A row of pixels at each position of the ring, in opposite pairs.
 type Ring<'a> = [[&'a [i16]; 2]; 6];
 
 impl ResponseRow {
@@ -116,7 +113,7 @@ impl ResponseRow {
         Self { responses: vec![0.0; columns], blocks, flags }
     }
 
-    /// The responses of row `y` from column `x` on.
+    /// Computes the responses of row `y` from column `x` on.
     pub(super) fn compute<const N: usize>(
         &mut self,
         image: &Gray<i16>,
@@ -137,7 +134,7 @@ impl ResponseRow {
     }
 }
 
-/// R of deltille corners at places whose opposite samples are given.
+/// Computes R of deltille corners from opposite samples.
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
 fn odd_row(
     ring: Ring,
@@ -149,7 +146,7 @@ fn odd_row(
     let whole = out.len() / BLOCK;
     let blocks = in_blocks(ring, whole);
     let flags = &mut flags[..whole];
-    // All blocks are looked at before any is computed: nothing to be guessed, and no look waits.
+    // All blocks are tested before any is computed: no branch misprediction, and no test waits.
     for b in 0..whole {
         flags[b] = odd_may_reach(block(&blocks, b), threshold);
     }
@@ -177,7 +174,7 @@ fn odd_row(
     }
 }
 
-/// Whether the bound of |α| passes the threshold somewhere in a block.
+/// Returns whether the bound of |α| passes the threshold somewhere in a block.
 #[inline(always)]
 fn odd_may_reach(pixels: Pixels, threshold: Threshold) -> bool {
     let mut may_reach = false;
@@ -190,7 +187,7 @@ fn odd_may_reach(pixels: Pixels, threshold: Threshold) -> bool {
     may_reach
 }
 
-/// Whether it does where no edge takes R below zero.
+/// Returns whether the bound passes the threshold at a pixel where no edge makes R negative.
 #[inline(always)]
 fn odd_is_no_edge(pixels: Pixels, threshold: Threshold) -> bool {
     let mut may_reach = false;
@@ -204,11 +201,11 @@ fn odd_is_no_edge(pixels: Pixels, threshold: Threshold) -> bool {
             most = most.max(even);
         }
         let alpha = octagon(odd[0] - odd[2] + odd[4], odd[1] - odd[3] + odd[5]);
-        // 6β but for the rounding: R < 0 where it is 2.1213 times 6α.
+        // 6β except for rounding: R < 0 where it is 2.1213 times 6α.
         let (d1, d2) = (odd[1] - odd[5], odd[2] + odd[4]);
         let c1 = odd[0] + d1 - (d1 >> 3) + ((odd[2] - odd[4]) >> 1);
         let s1 = odd[3] + d2 - (d2 >> 3) + ((odd[1] + odd[5]) >> 1);
-        // V is no less than half the square of the range; R < 0 where that is 0.7071 of 6α.
+        // V is at least half the square of the range; R < 0 where that is 0.7071 of 6α.
         let is_edge = (c1.abs().max(s1.abs()) - 2 > 2 * alpha + (alpha >> 2))
             | (most - least > (alpha >> 1) + (alpha >> 2) + 1);
         may_reach |= (alpha > threshold.odd) & !is_edge;
@@ -225,7 +222,7 @@ fn odd_block(pixels: Pixels) -> [f32; BLOCK] {
     responses
 }
 
-/// R of checkerboard corners at places whose opposite samples are given, and the centres.
+/// Computes R of checkerboard corners from opposite samples and the centres.
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
 fn even_row(
     ring: Ring,
@@ -266,7 +263,7 @@ fn even_row(
     }
 }
 
-/// Whether the bound of |α| passes the threshold somewhere in a block.
+/// Returns whether the bound of |α| passes the threshold somewhere in a block.
 #[inline(always)]
 fn even_may_reach(pixels: Pixels, threshold: Threshold) -> bool {
     let mut may_reach = false;
@@ -274,14 +271,14 @@ fn even_may_reach(pixels: Pixels, threshold: Threshold) -> bool {
         let even = |k: usize| pixels[k][0][i] + pixels[k][1][i];
         let (e14, e52) = (even(1) - even(4), even(5) - even(2));
         let c2 = 2 * (even(0) - even(3)) + e14 + e52;
-        // √3 of it, or slightly more.
+        // √3 times it, or slightly more.
         let s2 = (e14 - e52).abs();
         may_reach |= octagon(c2, 2 * s2 - (s2 >> 2)) > threshold.even;
     }
     may_reach
 }
 
-/// Whether it does where neither an edge nor a bar takes R below zero.
+/// Returns whether the bound passes the threshold at a pixel where neither an edge nor a bar makes R negative.
 #[inline(always)]
 fn even_is_no_edge(pixels: Pixels, centres: &[i16; BLOCK], threshold: Threshold) -> bool {
     let mut may_reach = false;
@@ -294,8 +291,8 @@ fn even_is_no_edge(pixels: Pixels, centres: &[i16; BLOCK], threshold: Threshold)
         let (e14, e52) = (even[1] - even[4], even[5] - even[2]);
         let s2 = (e14 - e52).abs();
         let alpha = octagon(2 * (even[0] - even[3]) + e14 + e52, 2 * s2 - (s2 >> 2));
-        // V is no less than a sixth of their square, and R < 0 where they are 0.6124 of 12α.
-        // 12(c − m) leaves R < 0 where it is 0.7071 of 12α.
+        // V is at least a sixth of their square, and R < 0 where they are 0.6124 of 12α. For 12(c − m), R < 0 where it
+        // is 0.7071 of 12α.
         let sum = even[0] + even[1] + even[2] + even[3] + even[4] + even[5];
         let off = (12 * centres[i] - sum).abs();
         let is_edge = (differences > (alpha >> 1) + (alpha >> 3) + 2)
@@ -317,7 +314,7 @@ fn even_block(pixels: Pixels, centres: &[i16; BLOCK]) -> [f32; BLOCK] {
 /// A block of each of the rows of a ring.
 type Pixels<'a> = [[&'a [i16; BLOCK]; 2]; 6];
 
-/// Block `b`. (A loop, as below.)
+/// Returns block `b`. (A loop, as below.)
 #[inline(always)]
 fn block<'a>(blocks: &[[&'a [[i16; BLOCK]]; 2]; 6], b: usize) -> Pixels<'a> {
     let mut pixels = [[&[0; BLOCK]; 2]; 6];
@@ -329,7 +326,7 @@ fn block<'a>(blocks: &[[&'a [[i16; BLOCK]]; 2]; 6], b: usize) -> Pixels<'a> {
     pixels
 }
 
-/// The last pixels of each row, as many as a block has, if there are so many.
+/// Returns the last block of each row, if the rows are long enough.
 #[inline(always)]
 fn last_block<'a>(ring: Ring<'a>) -> Option<Pixels<'a>> {
     let mut pixels: Pixels<'a> = [[&[0; BLOCK]; 2]; 6];
@@ -341,8 +338,8 @@ fn last_block<'a>(ring: Ring<'a>) -> Option<Pixels<'a>> {
     Some(pixels)
 }
 
-/// The first `count` blocks of each row. (A loop: closures handed to the standard library would not
-/// be compiled for the target, and the lengths would be forgotten.)
+/// Returns the first `count` blocks of each row. (A loop: closures passed to the standard library would not be compiled
+/// for the target, and the lengths would be lost.)
 #[inline(always)]
 fn in_blocks<'a>(ring: Ring<'a>, count: usize) -> [[&'a [[i16; BLOCK]]; 2]; 6] {
     let mut blocks: [[&'a [[i16; BLOCK]]; 2]; 6] = [[&[]; 2]; 6];
@@ -354,7 +351,7 @@ fn in_blocks<'a>(ring: Ring<'a>, count: usize) -> [[&'a [[i16; BLOCK]]; 2]; 6] {
     blocks
 }
 
-/// Of a block that has been computed.
+/// Returns the state of a computed block.
 #[inline(always)]
 fn state(responses: &[f32; BLOCK], threshold: f32) -> Block {
     let mut any = false;
@@ -364,14 +361,14 @@ fn state(responses: &[f32; BLOCK], threshold: f32) -> Block {
     if any { Block::Promising } else { Block::Computed }
 }
 
-/// No less than the length of a vector, up to half a unit of rounding.
+/// Returns an upper bound of the length of a vector, up to half a unit of rounding.
 #[inline(always)]
 fn octagon(x: i16, y: i16) -> i16 {
     let (x, y) = (x.abs(), y.abs());
     x.max(y) + (x.min(y) >> 1)
 }
 
-/// R of a deltille corner; `at` gives the sample of a pair and a side.
+/// Returns R of a deltille corner; `at` returns the sample of a pair and a side.
 #[inline(always)]
 pub(super) fn odd_response(at: impl Fn(usize, usize) -> i16) -> f32 {
     let (mut odd, mut even) = ([0i16; 6], [0i16; 6]);
@@ -399,7 +396,7 @@ pub(super) fn odd_response(at: impl Fn(usize, usize) -> i16) -> f32 {
     alpha - beta - 0.5 * variance
 }
 
-/// R of a checkerboard corner; `at` gives the sample of a pair and a side.
+/// Returns R of a checkerboard corner; `at` returns the sample of a pair and a side.
 #[inline(always)]
 pub(super) fn even_response(at: impl Fn(usize, usize) -> i16, centre: i16) -> f32 {
     let (mut odd, mut even) = ([0i16; 6], [0i16; 6]);
@@ -417,7 +414,7 @@ pub(super) fn even_response(at: impl Fn(usize, usize) -> i16, centre: i16) -> f3
     }
     // |α|² is this over 12².
     let alpha = (c2 * c2 + 3 * (s2 * s2)) as f32 * (PER_AMPLITUDE / 144.0);
-    // 12(c − m), of which R takes 9(c − m)² away.
+    // 12(c − m); R subtracts 9(c − m)².
     let off = f32::from(12 * centre - sum);
     alpha - 0.5 * squares as f32 - off * off * (9.0 / 144.0)
 }

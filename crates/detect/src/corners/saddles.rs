@@ -1,4 +1,4 @@
-//! Corners one by one: candidates of all pyramid levels, fitted, read and merged.
+//! Single corners: candidates of all pyramid levels, fitted, read and merged.
 
 use glam::DVec2;
 
@@ -11,34 +11,34 @@ use crate::tiling::kind;
 use deltille_core::lattice::GridKind;
 use deltille_core::raster::{Gray, Pyramid};
 
-/// Radii of the fits, px. The middle one decides what is a corner; the reference detector's choice.
+/// Radii of the fits, px. The middle one decides whether there is a corner, as in the reference detector.
 const FIT_RADII: [usize; 3] = [2, 3, 4];
 
 /// Index of the usual fit.
 const USUAL: usize = 1;
 
-/// Finer and coarser candidates of one corner converge to points closer than this, px of the level.
+/// Merging distance, px of the level. Fine and coarse candidates of one corner converge to points closer than this.
 const MERGE_PX: f64 = 1.5;
 
-/// The weakest harmonic searched for, of 1023: a contrast of 3 grey levels in 8 bits, where
-/// rounding itself begins to draw shapes.
+/// Weakest harmonic that is searched for, of 1023: a contrast of 3 grey levels in 8 bits, where rounding itself begins
+/// to draw shapes.
 const MIN_AMPLITUDE: f32 = 6.0;
 
-/// Noise of the harmonic over that of a sample: the mean of twelve, times √2.
+/// Noise of the harmonic relative to that of a sample: the mean of twelve, times √2.
 const HARMONIC_NOISE: f32 = 0.408;
 
-/// Candidates must stand above the noise by this factor; at five, one pixel in a million passes.
+/// Factor by which candidates must exceed the noise. At five, one pixel in a million passes.
 const NOISE_FACTOR: f32 = 5.0;
 
-/// No board has more corners than one in so many pixels: tiles of seven pixels are the least that are told
-/// from waves. Noise has twice as many candidates.
+/// Minimum area per corner, px². Tiles of 7 px are the smallest that can be distinguished from waves. Noise has twice
+/// as many candidates.
 const LEAST_TILE_PX2: usize = 40;
 
-/// Nor more than a hundred thousand: five times as many as are refined of a picture.
+/// Maximum number of corners in an image: five times as many as are refined.
 const MOST_CORNERS: usize = 100_000;
 
-/// Of the candidates of a level two and a half times as many are looked at; nine in ten are none in pictures of leaves or
-/// grass.
+/// Maximum number of candidates per level, 2.5 times the number of corners. In images of leaves or grass, nine of ten
+/// candidates are not corners.
 const MOST_CANDIDATES: usize = 250_000;
 
 /// A corner with N rays in the image: a monkey saddle, or a saddle.
@@ -48,48 +48,48 @@ pub(crate) struct Saddle<const N: usize> {
     pub position: DVec2,
     /// Its edges and brightness.
     pub sectors: Sectors<N>,
-    /// The level of the pyramid on which it was read: the finest that shows it sharply.
+    /// Level of the pyramid on which it was read: the finest that shows it sharply.
     pub level: usize,
 }
 
-/// A corner is blurred on a level where it shows less than this part of the contrast that it has on
-/// the next coarser one, on the smallest circle of either: blur of more than two pixels. The coarser
-/// level then shows its edges better, and averages the grain that an enlarged picture has.
+/// Fraction of contrast below which a corner is blurred on a level, relative to the next coarser level. Both are
+/// measured on the smallest circle. A corner below it has more than 2 px of blur. The coarser level then shows its
+/// edges better, and averages the grain of an enlarged image.
 const MAX_BLURRED_CONTRAST: f64 = 0.5;
 
-/// And its middle leaves the level between dark and bright by less than this part of the contrast that one of the next
-/// [`LEVELS_OF_CONTRAST`] shows. Ink that has spread darkens the middle, the more the larger it is seen.
+/// Maximum deviation of the centre of a blurred corner from the level between dark and bright, relative to the contrast
+/// on one of the next [`LEVELS_OF_CONTRAST`]. Ink spread darkens the centre, more so in larger views.
 const MAX_BLURRED_SHIFT: f64 = 0.3;
 
-/// Coarser levels whose contrast counts: all of a picture whose shorter side is below 2400 px.
+/// Number of coarser levels whose contrast counts: all levels of an image whose shorter side is below 2400 px.
 const LEVELS_OF_CONTRAST: usize = 3;
 
-/// A corner moves by less than this when the window grows by one, px: it looks the same at every
-/// size. What is made up of two things at different distances does not. The paper's choice; corners
-/// of photographs move by less than 0.1 px.
+/// Maximum displacement of a corner when the window grows by one, px: a corner looks the same at every scale. A
+/// superposition of two objects at different distances does not. Value of the paper; corners of photographs move by
+/// less than 0.1 px.
 const STABLE_PX: f64 = 0.3;
 
 /// Finds and describes saddles in a pyramid.
 #[derive(Clone, Debug)]
 pub(crate) struct SaddleFinder<const N: usize> {
-    /// By rising radius.
+    /// Fits by increasing radius.
     fits: [Polynomial; FIT_RADII.len()],
 }
 
 impl<const N: usize> SaddleFinder<N> {
-    /// A finder; computes the pseudo-inverses of its fits once.
+    /// Creates a finder. Computes the pseudo-inverses of its fits once.
     pub(crate) fn new() -> Self {
         Self { fits: FIT_RADII.map(|radius| Polynomial::new(kind::<N>(), radius)) }
     }
 
-    /// All saddles of an image, in reading order.
+    /// Returns all saddles of an image, in reading order.
     pub(crate) fn find(&self, pyramid: &Pyramid) -> Vec<Saddle<N>> {
         let (mut noise, mut is_all_noise) = (0.0f32, true);
         let finest = &pyramid.levels()[0];
         let mut saddles = Merged::<N>::new(finest.width(), finest.height());
         for (n, level) in pyramid.levels().iter().enumerate() {
             let sampled = sample_noise(level);
-            // Grain that pixels share stays when they are averaged.
+            // Averaging does not remove grain that neighbouring pixels share.
             noise = noise.max(HARMONIC_NOISE * sampled.sigma);
             is_all_noise &= sampled.is_all;
             let candidates = if is_all_noise && NOISE_FACTOR * noise > MIN_AMPLITUDE {
@@ -99,7 +99,7 @@ impl<const N: usize> SaddleFinder<N> {
             };
             for candidate in candidates {
                 let start = DVec2::new(candidate.x as f64, candidate.y as f64);
-                // What lies on a corner of a finer level is that corner.
+                // A candidate on a corner of a finer level is that corner.
                 if n > 0 && saddles.is_known(Pyramid::to_level_0(n, start), n) {
                     continue;
                 }
@@ -138,9 +138,9 @@ impl<const N: usize> SaddleFinder<N> {
         all
     }
 
-    /// What a coarse level shows, followed to finer ones as long as these show it sharply. What is sharp
-    /// on a level, and no corner there, is none on a coarser one either: a thin line beside an edge,
-    /// say.
+    /// Follows a corner from a coarse level to finer ones as long as these show it sharply. If a level shows the
+    /// position sharply and has no corner there, the coarser ones have none either. An example is a thin line beside an
+    /// edge.
     fn sharpest(&self, pyramid: &Pyramid, coarse: Saddle<N>, is_stable: bool) -> Option<Saddle<N>> {
         let mut found = coarse;
         while found.level > 0 {
@@ -154,8 +154,8 @@ impl<const N: usize> SaddleFinder<N> {
         Some(found)
     }
 
-    /// The saddle of a checkerboard that a narrower fit reaches: squares seen at the rim of a
-    /// fisheye lens are no wider than the usual window. (Six sectors do not fit into the smaller.)
+    /// Returns the saddle of a checkerboard that a narrower fit reaches. Squares near the edge of a fisheye image are
+    /// no wider than the usual window. (Six sectors do not fit into the smaller one.)
     fn narrow(&self, pyramid: &Pyramid, start: DVec2) -> Option<Saddle<N>> {
         match kind::<N>() {
             GridKind::Deltille => None,
@@ -168,7 +168,7 @@ impl<const N: usize> SaddleFinder<N> {
         self.describe(&pyramid.levels()[0], 0, &corner, size)
     }
 
-    /// What a fit in an image that stands for a level has reached, if it is a corner; px of the image.
+    /// Describes the result of a fit in the image of a level, if it is a corner; px of that image.
     fn describe(
         &self,
         image: &Gray<i16>,
@@ -181,13 +181,13 @@ impl<const N: usize> SaddleFinder<N> {
         self.is_stable(image, corner.position, size).then_some(saddle)
     }
 
-    /// Whether the next wider fit stays in the same place.
+    /// Returns whether the next wider fit stays at the same position.
     fn is_stable(&self, image: &Gray<i16>, position: DVec2, size: usize) -> bool {
         let wider = &self.fits[size + 1];
         let moved = match kind::<N>() {
-            // One step tells.
+            // One step is sufficient.
             GridKind::Deltille => wider.step(image.into(), position),
-            // That of a quadric overshoots where the squares are as narrow as its window.
+            // A step of the quadric overshoots where the squares are as narrow as its window.
             GridKind::Checker => {
                 wider.find(image.into(), position).map(|corner| corner.position - position)
             }
@@ -195,7 +195,7 @@ impl<const N: usize> SaddleFinder<N> {
         moved.is_some_and(|moved| moved.length() < STABLE_PX)
     }
 
-    /// [`Self::near_in`] a level of a pyramid; places and reach in px of level 0.
+    /// Searches like [`Self::near_in`] on a level of a pyramid; positions and reach in px of level 0.
     pub(crate) fn near<S>(
         &self,
         pyramid: &Pyramid,
@@ -212,8 +212,8 @@ impl<const N: usize> SaddleFinder<N> {
         })
     }
 
-    /// What `accept` makes of the first saddle that it takes of those within `reach_px` of `place`, which the fit
-    /// reaches from starts further and further away.
+    /// Returns the first accepted saddle within `reach_px` of `place`. The fit starts from points at increasing
+    /// distances. `accept` converts a saddle to the result, or rejects it.
     pub(crate) fn near_in<S>(
         &self,
         image: &Gray<i16>,
@@ -221,7 +221,7 @@ impl<const N: usize> SaddleFinder<N> {
         reach_px: f64,
         accept: impl Fn(Saddle<N>) -> Option<S>,
     ) -> Option<S> {
-        // From the place itself, and from wherever a corner may be seen.
+        // Starts at the position itself and at every position of a possible corner.
         let pixel = place.to_array().map(|c| c.max(0.0).round() as usize);
         let maxima = maxima_near::<N>(image, pixel, reach_px.ceil() as usize);
         let mut starts =
@@ -230,7 +230,7 @@ impl<const N: usize> SaddleFinder<N> {
             GridKind::Deltille => &[USUAL],
             GridKind::Checker => &[USUAL, USUAL - 1],
         };
-        // Many starts lead to the same place, which is looked at once with each fit.
+        // Many starts lead to the same position, which is described once with each fit.
         let mut refused: Vec<(DVec2, usize)> = Vec::new();
         starts.find_map(|start| {
             sizes.iter().find_map(|&size| {
@@ -252,21 +252,21 @@ impl<const N: usize> SaddleFinder<N> {
     }
 }
 
-/// Candidates on a level whose harmonic is no weaker than `noise`, or than a quarter of that of the
-/// ninth strongest where this is less: an image that is all board has no plain part to tell its noise
-/// from, but then it has at least as many corners as a grid. (An image that is all noise tells it.)
+/// Returns the candidates on a level whose harmonic reaches `noise`, or a quarter of that of the ninth strongest if
+/// this is less. If a board fills the image, no plain part is left to measure the noise, but then there are at least as
+/// many corners as in a grid. (In an image of noise alone, the noise can be measured.)
 fn candidates_above_noise<const N: usize>(level: &Gray<i16>, noise: f32) -> Vec<Candidate> {
-    /// A grid of 3 × 3 corners has so many.
+    /// Number of corners in a grid of 3 × 3.
     const STRONGEST: usize = 9;
-    /// Part of the harmonic of the ninth strongest that weaker corners of a grid have at least. Boards that fill the picture
-    /// under uneven light need no more: at 0.5 three of 32 are lost and at 1 seven; from 0 to 0.25 none is.
+    /// Harmonic of the weakest corners of a grid, relative to the ninth strongest. Boards that fill the image under
+    /// uneven light need no less: at 0.5, three of 32 are lost, and at 1, seven. From 0 to 0.25, none is lost.
     const PART: f32 = 0.25;
     let ninth = |candidates: &[Candidate]| {
         let mut responses: Vec<f32> = candidates.iter().map(|c| c.response).collect();
         (responses.len() >= STRONGEST)
             .then(|| *responses.select_nth_unstable_by(STRONGEST - 1, |a, b| b.total_cmp(a)).1)
     };
-    // Nearly always there are nine that stand clear; what is weak need then not be looked for.
+    // Nearly always nine stand clear of the noise, so weak ones need not be searched.
     if noise > MIN_AMPLITUDE {
         let found = candidates::<N>(level, noise);
         if ninth(&found).is_some_and(|ninth| PART * PART * ninth >= PER_AMPLITUDE * noise * noise) {
@@ -282,12 +282,12 @@ fn candidates_above_noise<const N: usize>(level: &Gray<i16>, noise: f32) -> Vec<
     found
 }
 
-/// Whether a picture has more corners than any board would have in it.
+/// Returns whether an image has more corners than any board would have in it.
 pub(crate) fn too_many(pyramid: &Pyramid, corners: usize) -> bool {
     corners > (pyramid.levels()[0].pixels().len() / LEAST_TILE_PX2).min(MOST_CORNERS)
 }
 
-/// Keeps the strongest candidates, so many; of equals the first.
+/// Keeps the `count` strongest candidates, the first of equals.
 fn strongest(candidates: &mut Vec<Candidate>, count: usize) {
     if candidates.len() <= count || count == 0 {
         return;
@@ -303,9 +303,9 @@ fn strongest(candidates: &mut Vec<Candidate>, count: usize) {
     });
 }
 
-/// Whether a level shows a corner blurred; the coarsest never does, and no place at the border. Blur leaves
-/// in the middle the level between dark and bright; a gap between dots, which looks like a corner where
-/// blur closes it, has its own brightness.
+/// Returns whether a level shows a corner blurred; false on the coarsest level and at the border. Blur keeps the centre
+/// at the level between dark and bright. A gap between dots looks like a corner if blur closes it, but has its own
+/// brightness.
 fn is_blurred<const N: usize>(pyramid: &Pyramid, level: usize, position: DVec2) -> bool {
     let contrast = |n: usize| {
         let place = Pyramid::from_level_0(n, position);
@@ -319,38 +319,38 @@ fn is_blurred<const N: usize>(pyramid: &Pyramid, level: usize, position: DVec2) 
     })
 }
 
-/// Saddles with an index of their places, so that a corner found twice is kept once.
+/// Saddles with an index of their positions, so that duplicates are merged.
 struct Merged<const N: usize> {
-    /// With what is known better from coarser levels left out.
+    /// Saddles; those that coarser levels show better are removed.
     all: Vec<Option<Saddle<N>>>,
     /// Whether the level of a saddle shows it blurred.
     blurred: Vec<bool>,
     places: Buckets,
 }
 
-/// The distance within which saddles of a level are the same, px of level 0.
+/// Returns the distance within which saddles of a level are the same, px of level 0.
 pub(crate) fn merge_px(level: usize) -> f64 {
     MERGE_PX * f64::from(1u32 << level)
 }
 
 impl<const N: usize> Merged<N> {
-    /// Of an image of this size.
+    /// Creates an empty set for an image of this size.
     fn new(width: usize, height: usize) -> Self {
         Self { all: Vec::new(), blurred: Vec::new(), places: Buckets::new(width, height) }
     }
 
-    /// Saddles within a distance that is the merging distance of a level, px.
+    /// Returns the saddles within the merging distance of a level, px.
     fn within(&self, position: DVec2, level: usize) -> impl Iterator<Item = (usize, Saddle<N>)> {
         let near = self.places.within(position, merge_px(level));
         near.filter_map(|(i, _)| Some((i, self.all[i]?)))
     }
 
-    /// Whether a corner that is as good as what `level` shows lies about as near as a candidate to its own.
+    /// Returns whether an equally good corner is already known within the distance between a candidate and its corner.
     fn is_known(&self, position: DVec2, level: usize) -> bool {
         self.within(position, level).any(|(i, other)| !(self.blurred[i] && other.level < level))
     }
 
-    /// Whether nothing is known to be there that is as good as what `level` shows.
+    /// Returns whether no corner as good as that of `level` is known there.
     fn is_free(&self, position: DVec2, level: usize) -> bool {
         self.within(position, level).all(|(i, other)| {
             self.blurred[i] && other.level < level
@@ -374,52 +374,52 @@ impl<const N: usize> Merged<N> {
     }
 }
 
-/// Whether an image shows nothing but noise.
+/// Returns whether an image shows only noise.
 pub(crate) fn is_all_noise(image: &Gray<i16>) -> bool {
     sample_noise(image).is_all
 }
 
-/// What samples of a ring show beside corners.
+/// Noise of the samples of a ring beside corners.
 #[derive(Clone, Copy, Debug)]
 struct SampleNoise {
     /// Standard deviation, of 1023.
     sigma: f32,
-    /// Whether there is nothing else in the image: then it is known, however strong.
+    /// Whether the image contains only noise: then its strength is known, however large.
     is_all: bool,
 }
 
-/// What a sample of the ring shows beside a corner: noise, and grain
-/// smoothed by a camera's demosaicing or by enlarging, which pixels next to each other share.
+/// Measures the noise of a sample of the ring: noise, and grain that neighbouring pixels share because demosaicing or
+/// enlargement smoothed it.
 ///
-/// From |Laplacian| over a sparse raster, with the mask of Immerkær, "Fast noise variance
-/// estimation" (1996), which vanishes on planes and weakly curved surfaces, drawn out so that its
-/// nine samples are as far apart as those of the ring.
+/// The measure is |Laplacian| over a sparse raster, with the mask of Immerkær, "Fast noise variance estimation" (1996).
+/// The mask vanishes on planes and weakly curved surfaces. It is enlarged so that its nine samples are as far apart as
+/// those of the ring.
 fn sample_noise(image: &Gray<i16>) -> SampleNoise {
-    /// So many samples tell the quiet quantile to 3 %.
+    /// Number of samples that determines the quiet quantile to 3 %.
     const PLENTY: usize = 8000;
-    /// Pixels from one sample to the next, at least: the mask's nine are 8 px wide.
+    /// Minimum distance between samples, px: the nine samples of the mask are 8 px wide.
     const LEAST_STRIDE: usize = 8;
-    /// Distance of the mask's samples: the ring's radius.
+    /// Distance of the mask's samples: the radius of the ring.
     const STEP: usize = 4;
-    /// The part of the image that is taken to be plain: boards and houses leave little without an edge.
+    /// Fraction of the image that is assumed to be plain: boards and houses leave little without an edge.
     const QUIET: f64 = 0.1;
     /// σ over that quantile of |x| in Gaussian noise.
     const QUIET_TO_SIGMA: f32 = 1.0 / 0.1257;
-    /// Fewer samples tell quantiles no better than to a tenth.
+    /// Number of samples below which quantiles are uncertain by more than a tenth.
     const MANY: f64 = 4000.0;
     /// The quantile that edges change first.
     const LOUD: f64 = 0.99;
-    /// It over the median of |x| in Gaussian noise.
+    /// Its ratio to the median of |x| in Gaussian noise.
     const LOUD_TO_MIDDLE: f32 = 3.819;
-    /// The relative deviation of that ratio, times the root of the number of samples.
+    /// Relative standard deviation of that ratio, times the square root of the number of samples.
     const LOUD_DEVIATION: f64 = 1.7;
-    /// The median over the quiet quantile.
+    /// Ratio of the median to the quiet quantile.
     const MIDDLE_TO_QUIET: f32 = 5.367;
-    /// The relative deviation of that ratio alike.
+    /// Relative standard deviation of that ratio, in the same unit.
     const QUIET_DEVIATION: f64 = 3.0;
-    /// Ratios of Gaussian noise are off by more deviations than these once in four hundred.
+    /// Number of standard deviations that ratios of Gaussian noise exceed once in four hundred.
     const SURE: f64 = 3.0;
-    /// The mask's gain: √(1+4+1+4+16+4+1+4+1).
+    /// Gain of the mask: √(1+4+1+4+16+4+1+4+1).
     const GAIN: f32 = 6.0;
     let (width, height) = (image.width(), image.height());
     let stride = (width * height / PLENTY).isqrt().max(LEAST_STRIDE);
@@ -439,11 +439,11 @@ fn sample_noise(image: &Gray<i16>) -> SampleNoise {
     let count = magnitudes.len() as f64;
     let mut quantile = |part: f64| {
         let (_, &mut magnitude, _) = magnitudes.select_nth_unstable((part * count) as usize);
-        // Half a step of the quantisation more than nothing.
+        // Half a quantisation step above zero.
         magnitude as f32 + 0.5
     };
     let [quiet, middle, loud] = [QUIET, 0.5, LOUD].map(&mut quantile);
-    // Edges of a board on a twentieth of the image make the loud ones louder by a tenth.
+    // Edges of a board on a twentieth of the image raise the loud quantile by a tenth.
     let is_as = |ratio: f32, usual: f32, deviations: f64| {
         f64::from(ratio / usual - 1.0).abs() <= deviations / count.sqrt()
     };

@@ -1,9 +1,8 @@
 //! The edges that meet at a corner, six or four, as directions with a sign.
 //!
-//! The paper takes the polarities from the roots of the cubic or quadratic form. A circle around
-//! the corner tells more: each of the N half-edges by itself, so that perspective and distortion
-//! may bend them, and proof that dark and bright really alternate. The form's roots serve where the
-//! circle is too noisy to read.
+//! The paper takes the polarities from the roots of the cubic or quadratic form. A circle around the corner contains
+//! more information: each of the N half-edges separately, so that perspective and distortion may bend them. It also
+//! proves that dark and bright alternate. The roots of the form are used where the circle is too noisy to read.
 //!
 //! ```text
 //!          ray 2   ray 1            rays run counter-clockwise on the print (image angles fall,
@@ -15,7 +14,7 @@
 //!          ray 4   ray 5
 //! ```
 //!
-//! With four rays opposite sectors have the same colour, and those of one colour may be narrow.
+//! With four rays, opposite sectors have the same colour, and those of one colour may be narrow.
 
 use std::f64::consts::{PI, TAU};
 use std::sync::LazyLock;
@@ -28,38 +27,38 @@ use crate::tiling::kind;
 use deltille_core::lattice::GridKind;
 use deltille_core::raster::Gray;
 
-/// Samples on a circle. A sector seen at 75° is 17° wide; 7.5° steps put two samples into it.
+/// Number of samples on a circle. A sector seen at 75° is 17° wide; steps of 7.5° put two samples into it.
 const SAMPLES: usize = 48;
 
-/// Radii of the circles, px, in the order of trial. Larger circles give better directions, smaller
-/// ones stay clear of the neighbours on small boards.
+/// Radii of the circles, px, in the order of trial. Larger circles give better directions. Smaller ones stay clear of
+/// the neighbours on small boards.
 const RADII_PX: [f64; 4] = [6.0, 4.5, 8.0, 3.5];
 
-/// Samples within this part of the largest deviation from the mean count for neither side.
+/// Width of the dead band, as a fraction of the largest deviation from the mean. Samples within it count for neither
+/// side.
 const DEAD_BAND: f64 = 0.12;
 
-/// Where the form's roots give the rays, every sector must leave the level by this part of the
-/// circle's amplitude: half of what an evenly divided circle shows under its own noise.
+/// Minimum deviation of every sector from the level, relative to the amplitude of the circle, if the roots of the form
+/// give the rays. It is half the deviation of an evenly divided circle under its own noise.
 const MIN_SECTOR: f64 = 0.3;
 
-/// Largest deviation of opposite rays from a straight line. Perspective keeps lines straight;
-/// within a circle of 8 px no lens bends them by more than a few degrees, noise and blur add some.
+/// Largest deviation of opposite rays from a straight line. Perspective keeps lines straight. Within a circle of 8 px,
+/// no lens bends them by more than a few degrees; noise and blur add some.
 const MAX_BEND_RAD: f64 = 20.0 * PI / 180.0;
 
-/// The middle of a checkerboard corner leaves the mean around it by less than this part of the
-/// circle's amplitude. Blur makes it that mean, but ink spreads or squares stop short, and the middle
-/// may be dark or bright, off by the amplitude. A bar across the circle, which looks like a corner
-/// there, has its own brightness in its middle, off by up to twice the amplitude.
+/// Maximum deviation of the centre of a checkerboard corner from the mean around it, relative to the amplitude. Blur
+/// makes the centre that mean. If ink spreads or squares stop short, the centre may be dark or bright, off by the
+/// amplitude. A bar across the circle looks like a corner there, but its centre is off by up to twice the amplitude.
 const MAX_CENTRE: f64 = 1.2;
 
-/// Steps of the search for the level between two classes of unequal size; it settles in two.
+/// Iterations of the search for the level between two classes of unequal size; it settles in two.
 const LEVEL_STEPS: usize = 4;
 
 /// Directions and brightness around a corner.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Sectors<const N: usize> {
-    /// Image angles of the N half-edges, counter-clockwise on the print, starting with one that
-    /// has a dark sector on its counter-clockwise side. Radians.
+    /// Image angles of the N half-edges, radians, counter-clockwise on the print. The first has a dark sector on its
+    /// counter-clockwise side.
     pub rays: [f64; N],
     /// Brightness half-way between dark and bright.
     pub level: f64,
@@ -68,7 +67,7 @@ pub(crate) struct Sectors<const N: usize> {
 }
 
 impl<const N: usize> Sectors<N> {
-    /// Reads the sectors around `position`, from circles or else from the form's roots.
+    /// Reads the sectors around `position`, from circles or else from the roots of the form.
     pub(crate) fn read(image: &Gray<i16>, position: DVec2, form: &Form) -> Option<Self> {
         let circles = RADII_PX.iter().filter_map(|&radius| {
             Circle::<N>::sample(image, position, radius).filter(Circle::has_its_mean_in_the_middle)
@@ -85,8 +84,8 @@ impl<const N: usize> Sectors<N> {
     }
 }
 
-/// The level half-way between dark and bright and the mean deviation from it on the smallest circle around
-/// a place; `None` at the border.
+/// Returns the level half-way between dark and bright, and the mean deviation from it, on the smallest circle around a
+/// position; `None` at the border.
 pub(crate) fn contrast_around<const N: usize>(
     image: &Gray<i16>,
     position: DVec2,
@@ -96,23 +95,23 @@ pub(crate) fn contrast_around<const N: usize>(
     Some((circle.level, circle.amplitude()))
 }
 
-/// A sign change at an image angle; `rising` when brightness grows with the angle.
+/// A sign change at an image angle; `rising` if brightness grows with the angle.
 #[derive(Clone, Copy, Debug)]
 struct Crossing {
     angle: f64,
     rising: bool,
 }
 
-/// Brightness on a circle around a corner with N rays, by rising image angle.
+/// Brightness on a circle around a corner with N rays, by increasing image angle.
 struct Circle<const N: usize> {
     level: f64,
     deviations: [f64; SAMPLES],
-    /// Brightness of the middle minus the mean of the circle.
+    /// Brightness of the centre minus the mean of the circle.
     centre: f64,
 }
 
 impl<const N: usize> Circle<N> {
-    /// `None` when the circle leaves the image.
+    /// Samples a circle; `None` if it leaves the image.
     fn sample(image: &Gray<i16>, DVec2 { x, y }: DVec2, radius: f64) -> Option<Self> {
         let inside = x - radius >= 0.0
             && y - radius >= 0.0
@@ -132,7 +131,7 @@ impl<const N: usize> Circle<N> {
         Some(Self { level, deviations: values.map(|v| v - level), centre })
     }
 
-    /// Whether what is in the middle may be a corner; odd ones have proved it by their oddness.
+    /// Returns whether the centre may belong to a corner. Odd corners have already passed by their oddness.
     fn has_its_mean_in_the_middle(&self) -> bool {
         match kind::<N>() {
             GridKind::Deltille => true,
@@ -140,7 +139,7 @@ impl<const N: usize> Circle<N> {
         }
     }
 
-    /// Mean deviation from the level.
+    /// Returns the mean deviation from the level.
     fn amplitude(&self) -> f64 {
         sum(&self.deviations, f64::abs) / SAMPLES as f64
     }
@@ -149,15 +148,15 @@ impl<const N: usize> Circle<N> {
         Sectors { rays, level: self.level, amplitude: self.amplitude() }
     }
 
-    /// Whether the sectors between given rays are dark and bright in turn, on the average.
+    /// Returns whether the sectors between given rays are alternately dark and bright, on average.
     fn alternates(&self, rays: &[f64; N]) -> bool {
-        // How far behind the first ray the others are; rays run against the samples.
+        // Angles of the other rays behind the first; rays run against the samples.
         let behind = rays.map(|ray| in_one_turn(rays[0] - ray));
         let (mut sums, mut counts) = ([0.0; N], [0.0; N]);
         for (k, deviation) in self.deviations.iter().enumerate() {
             let here = in_one_turn(rays[0] - angle_of(k as f64));
             let sector = (0..N).rfind(|&i| behind[i] <= here).unwrap_or(0);
-            // What lies on a ray belongs to neither side.
+            // A sample on a ray belongs to neither side.
             if behind[sector] < here {
                 sums[sector] += deviation;
                 counts[sector] += 1.0;
@@ -170,11 +169,11 @@ impl<const N: usize> Circle<N> {
         })
     }
 
-    /// The N sign changes; `None` unless there are exactly so many.
+    /// Returns the N sign changes; `None` unless there are exactly N.
     fn crossings(&self) -> Option<[Crossing; N]> {
         let dead = DEAD_BAND * largest(&self.deviations);
         let clear = bits(&self.deviations, |d| d.abs() > dead);
-        // Nearly everything that is no corner ends here.
+        // Nearly all false corners end here.
         if changes(clear, bits(&self.deviations, |d| d > 0.0)) != N as u32 {
             return None;
         }
@@ -189,18 +188,18 @@ impl<const N: usize> Circle<N> {
             }
             a = b;
         }
-        // From before the first sample to after it is the last crossing of the circle.
+        // The crossing from before the first sample to after it is the last one of the circle.
         if crossings[0].angle > crossings[N - 1].angle {
             crossings.rotate_left(1);
         }
         (count == N).then_some(crossings)
     }
 
-    /// Zero of the straight line through the clear samples a and b (b after a, round the circle).
+    /// Returns the zero of the straight line through the clear samples a and b (b after a on the circle).
     fn crossing_between(&self, a: usize, b: usize) -> Crossing {
         let (from, to) = (self.deviations[a], self.deviations[b]);
         let steps = (b + SAMPLES - a) % SAMPLES;
-        // With samples in the dead band between them, the zero lies where the sign turns.
+        // If samples between them lie in the dead band, the zero is where the sign changes.
         let mut start = 0;
         while start + 1 < steps {
             let next = self.deviations[(a + start + 1) % SAMPLES];
@@ -222,13 +221,13 @@ static DIRECTIONS: LazyLock<Directions> = LazyLock::new(|| {
     Directions { cos: angles.map(f64::cos), sin: angles.map(f64::sin) }
 });
 
-/// Cosines and sines of the angles of samples.
+/// Cosines and sines of the sample angles.
 struct Directions {
     cos: [f64; SAMPLES],
     sin: [f64; SAMPLES],
 }
 
-/// Bilinear samples on a circle in an image, in steps that vectors can take.
+/// Returns bilinear samples on a circle in an image, in steps that vectorise.
 #[multiversion(targets("x86_64+avx2"))]
 fn on_circle(
     image: &Gray<i16>,
@@ -242,7 +241,7 @@ fn on_circle(
     for k in 0..SAMPLES {
         let u = x + radius * directions.cos[k];
         let v = y + radius * directions.sin[k];
-        // By way of signed numbers, which processors convert at once.
+        // Via signed numbers, which processors convert directly.
         let (left, top) = (u as i32, v as i32);
         fx[k] = (u - f64::from(left)) as f32;
         fy[k] = (v - f64::from(top)) as f32;
@@ -270,16 +269,16 @@ fn on_circle(
 /// A bit for each sample.
 const EVERY: u64 = (1 << SAMPLES) - 1;
 
-/// The bits of the samples of which something is true.
+/// Returns the bits of the samples that satisfy `is`.
 fn bits(values: &[f64; SAMPLES], is: impl Fn(f64) -> bool) -> u64 {
     values.iter().enumerate().fold(0, |bits, (k, &value)| bits | u64::from(is(value)) << k)
 }
 
-/// How often, round the circle, a clear sample is on another side than the clear one before it.
+/// Returns how often, around the circle, a clear sample is on another side than the previous clear one.
 fn changes(clear: u64, above: u64) -> u32 {
     let next = |bits: u64, by: usize| (bits << by | bits >> (SAMPLES - by)) & EVERY;
     let (mut known, mut sides) = (clear, clear & above);
-    // What is not clear takes the side of the nearest clear sample before it: one, two, four … before.
+    // An unclear sample takes the side of the nearest clear sample before it: one, two, four … before.
     for by in [1, 2, 4, 8, 16, 32] {
         sides |= next(sides, by) & !known;
         known |= next(known, by);
@@ -287,7 +286,7 @@ fn changes(clear: u64, above: u64) -> u32 {
     (sides ^ next(sides, 1)).count_ones()
 }
 
-/// The sum over the samples, in four parts that do not wait for each other.
+/// Returns the sum over the samples, in four independent parts.
 fn sum(values: &[f64; SAMPLES], of: impl Fn(f64) -> f64) -> f64 {
     let mut parts = [0.0; 4];
     for group in values.as_chunks::<4>().0 {
@@ -298,7 +297,7 @@ fn sum(values: &[f64; SAMPLES], of: impl Fn(f64) -> f64) -> f64 {
     (parts[0] + parts[1]) + (parts[2] + parts[3])
 }
 
-/// The largest size of a sample.
+/// Returns the largest absolute value of the samples.
 fn largest(values: &[f64; SAMPLES]) -> f64 {
     let mut parts = [0.0f64; 4];
     for group in values.as_chunks::<4>().0 {
@@ -309,7 +308,7 @@ fn largest(values: &[f64; SAMPLES]) -> f64 {
     parts[0].max(parts[1]).max(parts[2].max(parts[3]))
 }
 
-/// An angle between 0 and 2π; most need no division for that.
+/// Returns an angle between 0 and 2π; most need no division.
 fn in_one_turn(angle: f64) -> f64 {
     if (0.0..TAU).contains(&angle) {
         angle
@@ -324,7 +323,7 @@ fn angle_of(sample: f64) -> f64 {
     sample * TAU / SAMPLES as f64
 }
 
-/// The level half-way between the means of what is above and of what is below it.
+/// Returns the level half-way between the means of the values above and below it.
 fn between_classes(values: &[f64; SAMPLES], mean: f64) -> f64 {
     let mut level = mean;
     let total = SAMPLES as f64 * mean;
@@ -342,10 +341,10 @@ fn between_classes(values: &[f64; SAMPLES], mean: f64) -> f64 {
     level
 }
 
-/// Sum and number of the values above a level.
+/// Returns sum and number of the values above a level.
 #[multiversion(targets("x86_64+avx2"))]
 fn above_level(values: &[f64; SAMPLES], level: f64) -> [f64; 2] {
-    /// Two vectors of four, which do not wait for each other.
+    /// Two independent vectors of four.
     const LANES: usize = 8;
     let (mut sums, mut counts) = ([0.0; LANES], [0.0; LANES]);
     for group in values.as_chunks::<LANES>().0 {
@@ -363,7 +362,7 @@ fn above_level(values: &[f64; SAMPLES], level: f64) -> [f64; 2] {
     [sum, count]
 }
 
-/// The zeros of the form around the circle; `None` unless all roots are real.
+/// Returns the zeros of the form around the circle; `None` unless all roots are real.
 fn roots<const N: usize>(form: &Form) -> Option<[Crossing; N]> {
     let Directions { cos, sin } = &*DIRECTIONS;
     let values: [f64; SAMPLES] = std::array::from_fn(|k| form.towards(DVec2::new(cos[k], sin[k])));
@@ -383,23 +382,23 @@ fn roots<const N: usize>(form: &Form) -> Option<[Crossing; N]> {
     (count == N).then_some(crossings)
 }
 
-/// Rays in the order of [`Sectors::rays`]; `None` when opposite ones are not in line.
+/// Returns the rays in the order of [`Sectors::rays`]; `None` if opposite ones are not collinear.
 fn ordered_rays<const N: usize>(crossings: &[Crossing; N]) -> Option<[f64; N]> {
     let bend = |k: usize| turn(crossings[k].angle, crossings[k + N / 2].angle + PI).abs();
     let straight = (0..N / 2).all(|k| bend(k) <= MAX_BEND_RAD);
     if !straight {
         return None;
     }
-    // Falling image angle is counter-clockwise on the print. Going that way, a crossing that rises
-    // with the angle leads from bright to… dark: its counter-clockwise sector is dark.
+    // Falling image angle is counter-clockwise on the print. In that direction, a crossing that rises with the angle
+    // leads from bright to dark: its counter-clockwise sector is dark.
     let start = crossings.iter().position(|c| c.rising)?;
     Some(std::array::from_fn(|k| crossings[(start + N - k) % N].angle))
 }
 
-/// The turn from `from` to `to`, −π to π.
+/// Returns the angle from `from` to `to`, −π to π.
 pub(crate) fn turn(from: f64, to: f64) -> f64 {
     let turn = to - from;
-    // Most angles need no division to be brought into range: less than 3π is in it after one turn.
+    // Most angles are in range without a division: if the angle is less than 3π, one full turn suffices.
     let turn = if turn.abs() < 3.0 * PI { turn } else { turn.rem_euclid(TAU) };
     if turn > PI {
         turn - TAU
@@ -416,8 +415,8 @@ mod tests {
 
     const FLAT: Form = Form::Cubic([0.0; 4]);
 
-    /// A corner of N rays whose black tile lies between image angles −360°/N + tilt and tilt:
-    /// upright on the print, right of the corner.
+    /// Renders a corner of N rays whose black tile lies between image angles −360°/N + tilt and tilt: upright on the
+    /// print, to the right of the corner.
     fn corner<const N: usize>(tilt: f64) -> Gray<i16> {
         Gray::from_fn(41, 41, |x, y| {
             let theta = (y as f64 - 20.0).atan2(x as f64 - 20.0) - tilt;
@@ -444,13 +443,13 @@ mod tests {
             assert!((sectors.level - 400.0).abs() < 20.0 && sectors.amplitude > 250.0);
             for (i, &ray) in sectors.rays.iter().enumerate() {
                 let next = sectors.rays[(i + 1) % N];
-                assert!((turn(ray, next) + sector).abs() < 0.25, "evenly, image angles fall");
+                assert!((turn(ray, next) + sector).abs() < 0.25, "equal sectors; image angles fall");
                 let nearest = (0..N)
                     .map(|n| turn(ray, tilt - n as f64 * sector))
                     .min_by(|a, b| a.abs().total_cmp(&b.abs()));
                 assert!(nearest.unwrap().abs() < 0.12);
             }
-            // Half a sector counter-clockwise of ray 0 the image is dark.
+            // Half a sector counter-clockwise of ray 0, the image is dark.
             let middle = sectors.rays[0] - sector / 2.0;
             let value = image.bilinear(20.0 + 6.0 * middle.cos(), 20.0 + 6.0 * middle.sin());
             assert!(value < 400.0);
@@ -468,7 +467,7 @@ mod tests {
     }
 
     #[test]
-    fn circles_are_sampled_as_single_places_are() {
+    fn circles_are_sampled_like_single_points() {
         let image = Gray::from_fn(33, 29, |x, y| ((x * x * 31 + y * y * 17 + x * y) % 1024) as i16);
         for (centre, radius) in [([9.3, 12.9], 8.0), ([16.0, 14.5], 4.5), ([25.99, 3.5], 3.5)] {
             let values = on_circle(&image, centre.into(), radius, &DIRECTIONS);
@@ -486,14 +485,14 @@ mod tests {
         assert_eq!(changes(0, EVERY), 0);
         assert_eq!(changes(EVERY, 0b1111), 2);
         assert_eq!(changes(EVERY, 1 << 47 | 1), 2);
-        // A gap takes the side of what is before it, whatever it shows.
+        // A gap takes the side of the sample before it, regardless of its own value.
         assert_eq!(changes(EVERY & !0b1110, 0b0101), 2);
         assert_eq!(changes(1 | 1 << 20 | 1 << 40, 1 << 20), 2);
         assert_eq!(changes(1 | 1 << 20 | 1 << 30 | 1 << 40, 1 << 20 | 1 << 40), 4);
     }
 
     #[test]
-    fn a_bar_across_the_circle_is_no_corner() {
+    fn a_bar_across_the_circle_is_not_a_corner() {
         for half_width in [1.0, 2.0] {
             let bar = |value: i16| {
                 Gray::from_fn(41, 41, |_, y| {
@@ -506,7 +505,7 @@ mod tests {
     }
 
     #[test]
-    fn the_forms_roots_serve_as_rays() {
+    fn roots_of_the_form_serve_as_rays() {
         let monkey = Form::Cubic([1.0, 0.0, -3.0, 0.0]);
         let rays: [f64; 6] = ordered_rays(&roots(&monkey).unwrap()).unwrap();
         assert!(turn(rays[0], rays[3] + PI).abs() < 1e-9);

@@ -231,7 +231,7 @@ mod tests {
     }
 
     #[test]
-    fn what_belongs_to_another_grid_says_nothing() {
+    fn squares_of_another_grid_do_not_count() {
         let image = picture(|row, col| if (row + col) % 2 == 0 { 100 } else { 800 });
         let mut around = grid();
         around.corners.clear();

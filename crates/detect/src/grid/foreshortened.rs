@@ -159,7 +159,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_view_shows_a_place_where_it_says() {
+    fn views_show_points_at_their_mapped_positions() {
         let image = Gray::from_fn(200, 150, |x, y| {
             let [u, v] = [x as f64 - 120.3, y as f64 - 60.8];
             (1000.0 * (-(u * u + v * v) / 200.0).exp()) as i16

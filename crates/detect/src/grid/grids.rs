@@ -183,7 +183,7 @@ mod tests {
 
     /// Cells of a tag lie in one tile of a grid around them; what lies beside a grid, or across its edges, stays.
     #[test]
-    fn only_what_lies_in_one_tile_of_a_larger_grid_is_dropped() {
+    fn only_grids_within_one_tile_of_a_larger_grid_are_dropped() {
         fn check<const N: usize>(kind: GridKind) {
             let board = lattice(kind, 6, [100.0, 900.0], 100.0);
             // The middle of a tile, of an edge, and of nothing.

@@ -207,7 +207,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_predicted_is_as_wrong_as_it_says() {
+    fn prediction_errors_match_the_stated_uncertainty() {
         for beyond in 1..=3 {
             let known = |v: Vertex| (v.col <= 0 && v.row.abs() < 4).then(|| seen(v));
             let vertex = Vertex::new(0, beyond);

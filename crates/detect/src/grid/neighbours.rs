@@ -113,7 +113,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_nearest_are_those_that_a_search_of_all_finds() {
+    fn nearest_points_match_a_full_search() {
         let mut random = rand_chacha::ChaCha8Rng::seed_from_u64(1);
         for (count, [width, height]) in
             [(1, [5.0, 5.0]), (7, [900.0, 0.0]), (40, [3.0, 700.0]), (300, [640.0, 480.0])]
