@@ -205,7 +205,7 @@ fn odd_is_no_edge(pixels: Pixels, threshold: Threshold) -> bool {
         let (d1, d2) = (odd[1] - odd[5], odd[2] + odd[4]);
         let c1 = odd[0] + d1 - (d1 >> 3) + ((odd[2] - odd[4]) >> 1);
         let s1 = odd[3] + d2 - (d2 >> 3) + ((odd[1] + odd[5]) >> 1);
-        // V is at least half the square of the range; R < 0 where that is 0.7071 of 6α.
+        // V is at least half the square of the range; R < 0 where the range is 0.7071 of 6α.
         let is_edge = (c1.abs().max(s1.abs()) - 2 > 2 * alpha + (alpha >> 2))
             | (most - least > (alpha >> 1) + (alpha >> 2) + 1);
         may_reach |= (alpha > threshold.odd) & !is_edge;
@@ -291,8 +291,8 @@ fn even_is_no_edge(pixels: Pixels, centres: &[i16; BLOCK], threshold: Threshold)
         let (e14, e52) = (even[1] - even[4], even[5] - even[2]);
         let s2 = (e14 - e52).abs();
         let alpha = octagon(2 * (even[0] - even[3]) + e14 + e52, 2 * s2 - (s2 >> 2));
-        // V is at least a sixth of their square, and R < 0 where they are 0.6124 of 12α. For 12(c − m), R < 0 where it
-        // is 0.7071 of 12α.
+        // V is at least a sixth of the square of `differences`, so R < 0 where they are 0.6124 of 12α. For 12(c − m), R < 0
+        // where it is 0.7071 of 12α.
         let sum = even[0] + even[1] + even[2] + even[3] + even[4] + even[5];
         let off = (12 * centres[i] - sum).abs();
         let is_edge = (differences > (alpha >> 1) + (alpha >> 3) + 2)

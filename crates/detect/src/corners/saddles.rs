@@ -258,8 +258,8 @@ impl<const N: usize> SaddleFinder<N> {
 fn candidates_above_noise<const N: usize>(level: &Gray<i16>, noise: f32) -> Vec<Candidate> {
     /// Number of corners in a grid of 3 × 3.
     const STRONGEST: usize = 9;
-    /// Harmonic of the weakest corners of a grid, relative to the ninth strongest. Boards that fill the image under
-    /// uneven light need no less: at 0.5, three of 32 are lost, and at 1, seven. From 0 to 0.25, none is lost.
+    /// Harmonic of the weakest corners of a grid, relative to the ninth strongest. On boards that fill the image under
+    /// uneven light, values from 0 to 0.25 lose none of 32; 0.5 loses three, and 1 loses seven.
     const PART: f32 = 0.25;
     let ninth = |candidates: &[Candidate]| {
         let mut responses: Vec<f32> = candidates.iter().map(|c| c.response).collect();
@@ -345,7 +345,7 @@ impl<const N: usize> Merged<N> {
         near.filter_map(|(i, _)| Some((i, self.all[i]?)))
     }
 
-    /// Returns whether an equally good corner is already known within the distance between a candidate and its corner.
+    /// Returns whether a corner at least as good as that of `level` is known within the merging distance.
     fn is_known(&self, position: DVec2, level: usize) -> bool {
         self.within(position, level).any(|(i, other)| !(self.blurred[i] && other.level < level))
     }

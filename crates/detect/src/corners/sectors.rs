@@ -443,7 +443,10 @@ mod tests {
             assert!((sectors.level - 400.0).abs() < 20.0 && sectors.amplitude > 250.0);
             for (i, &ray) in sectors.rays.iter().enumerate() {
                 let next = sectors.rays[(i + 1) % N];
-                assert!((turn(ray, next) + sector).abs() < 0.25, "equal sectors; image angles fall");
+                assert!(
+                    (turn(ray, next) + sector).abs() < 0.25,
+                    "equal sectors; image angles fall"
+                );
                 let nearest = (0..N)
                     .map(|n| turn(ray, tilt - n as f64 * sector))
                     .min_by(|a, b| a.abs().total_cmp(&b.abs()));

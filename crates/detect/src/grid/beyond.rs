@@ -1,10 +1,9 @@
-//! Whether a pattern goes on where a grid ends.
+//! Tests whether a pattern continues beyond the end of a grid.
 //!
-//! A board ends: beyond its last squares lies paper, a table, or what covers it, and nothing of that keeps
-//! to the board's rows and columns. A screen of dots, a dither, a moiré or a field of random cells shows
-//! checkerboard corners only where its dots happen to meet; where they no longer do, dots and gaps go on
-//! at the same places. So two rows of squares are looked at beyond every end of a grid, and of those
-//! that are next to each other in a row it is counted how many are as different as black and white.
+//! A board ends: beyond its last squares lies paper, a table, or a cover, and none of these follows the board's rows
+//! and columns. A screen of dots, a dither, a moiré or a field of random cells shows checkerboard corners only where
+//! its dots happen to meet. Elsewhere its dots and gaps continue at the same pitch. The test reads two rows of squares
+//! beyond every end of a grid. It counts the pairs of neighbours in a row that differ like black and white.
 //!
 //! ```text
 //!     ░░ ██ ░░ ██        ·  ·  ·  ·         squares of a grid (left), and what is beyond
@@ -13,8 +12,8 @@
 //!     ░░ ██ ░░ ██        ░░ ██ ░░ ██
 //! ```
 //!
-//! Dots alternate everywhere, random cells half of the time, around boards a few in a hundred do. What
-//! lies beyond the picture, or where another grid begins, says nothing.
+//! Dots alternate everywhere, random cells half of the time, and the surroundings of boards in a few per cent of pairs.
+//! Squares outside the image, or where another grid begins, are ignored.
 
 use std::collections::BTreeMap;
 
@@ -27,27 +26,27 @@ use deltille_core::detection::Grid;
 use deltille_core::lattice::{GridKind, Vertex};
 use deltille_core::raster::Gray;
 
-/// Largest part of the pairs of squares beyond a board that differ as black and white do.
+/// Maximum fraction of pairs of squares beyond a board that differ like black and white.
 const MOST_DIFFERENT: f64 = 0.2;
 
-/// The same beyond rows of corners that are no area: in random cells they come about more easily.
+/// The same beyond rows of corners that are not an area, which random cells form more easily.
 const MOST_DIFFERENT_ROWS: f64 = 0.08;
 
-/// The same beyond the complete squares of a grid. Single corners that stand apart are what a cover leaves of
-/// a board, with more of it beyond that is not covered; or gaps between dots, which all alternate.
+/// The same beyond the complete squares of a grid. Single corners that stand apart may be the rest of a covered board,
+/// with more of it visible beyond. They may also be gaps between dots, which all alternate.
 const MOST_DIFFERENT_SQUARES: f64 = 0.6;
 
-/// Fewer pairs than this say nothing.
+/// Minimum number of pairs for a decision.
 const LEAST_PAIRS: usize = 6;
 
-/// Rows of squares that are looked at beyond an end.
+/// Number of rows of squares that are tested beyond an end.
 const ROWS: i32 = 2;
 
-/// A square this near to the corner of another grid, in edges, is one of that grid.
+/// Distance from a corner of another grid, in edges, within which a square belongs to that grid.
 const OTHER_GRID: f64 = 1.0;
 
-/// Tells of each grid of a picture, of which `image` is the finest level, whether its pattern goes on where
-/// it ends. Six sectors that alternate do not come by chance, so of deltille grids it tells nothing.
+/// Returns for each grid of an image whether its pattern continues beyond its end. `image` is the finest level. Returns
+/// false for deltille grids, because six alternating sectors do not occur by coincidence.
 pub(crate) fn go_on(image: &Gray<i16>, grids: &[&Grid]) -> Vec<bool> {
     let mut corners = Buckets::new(image.width(), image.height());
     let mut owners = Vec::new();
@@ -75,8 +74,8 @@ pub(crate) fn go_on(image: &Gray<i16>, grids: &[&Grid]) -> Vec<bool> {
 }
 
 impl CheckerTiles<'_> {
-    /// Whether more than some part of what is beyond alternates; `is_others` tells whether a corner of
-    /// another grid is within a distance of a place, px.
+    /// Returns whether more than a fraction `most` of the squares beyond alternates. `is_others` returns whether a
+    /// corner of another grid is within a distance of a position, px.
     fn goes_on(&self, is_others: impl Fn(Point, f64) -> bool, most: f64) -> bool {
         let Some([even, odd]) = self.levels() else {
             return false;
@@ -96,7 +95,7 @@ impl CheckerTiles<'_> {
         pairs >= LEAST_PAIRS && different as f64 >= most * pairs as f64
     }
 
-    /// Brightness of the squares beyond the ends in direction `k`, by their lowest, leftmost vertices.
+    /// Returns the brightness of the squares beyond the ends in direction `k`, by their lowest, leftmost vertices.
     fn values_beyond(
         &self,
         k: usize,
@@ -136,7 +135,7 @@ impl CheckerTiles<'_> {
         squares.into_iter().filter_map(value).collect()
     }
 
-    /// The edges at a corner behind which the grid ends in direction `k`: the one away from it, and one along
+    /// Returns the edges at a corner behind which the grid ends in direction `k`: the one away from it, and one along
     /// its end.
     fn end(&self, vertex: Vertex, corner: Point, k: usize) -> Option<[Point; 2]> {
         let at = |v: Vertex| self.corners.get(&v).copied();
@@ -155,7 +154,7 @@ impl CheckerTiles<'_> {
     }
 }
 
-/// The step along an end in direction `k`, up or to the right.
+/// Returns the step along an end in direction `k`, up or to the right.
 fn along_end(k: usize) -> Vertex {
     step::<CHECKER>((k + 1) % 2)
 }
@@ -171,7 +170,7 @@ mod tests {
 
     const EDGE_PX: f64 = 20.0;
 
-    /// A grid of 5 × 6 corners in the middle of a picture.
+    /// Creates a grid of 5 × 6 corners in the middle of an image.
     fn grid() -> Grid {
         let corner = |row: i32, col: i32| GridCorner {
             row,
@@ -192,7 +191,7 @@ mod tests {
         }
     }
 
-    /// Squares inside the grid's outermost ones, and something beyond.
+    /// Renders squares inside the grid's outermost ones, and `beyond` outside.
     fn picture(beyond: impl Fn(i32, i32) -> i16) -> Gray<i16> {
         Gray::from_fn(300, 300, |x, y| {
             let col = ((x as f64 - 100.0) / EDGE_PX).floor() as i32;

@@ -1,4 +1,4 @@
-//! The squares of a checkerboard as a picture shows them.
+//! The squares of a checkerboard in an image.
 
 use std::collections::BTreeMap;
 
@@ -10,35 +10,35 @@ use deltille_core::lattice::Vertex;
 use deltille_core::raster::ImageView;
 use deltille_core::statistics::median;
 
-/// Squares are sampled in the middle and at so many edges from it along rows and columns: on a dot that
-/// is much smaller than its square too.
+/// Offset of the samples from the centre of a square along rows and columns, in edges. It fits on a dot much smaller
+/// than its square, too.
 const AROUND: f64 = 0.12;
 
-/// A grid that has fewer whole squares than this part of those of a square board with as many corners
-/// consists of rows rather than areas.
+/// Minimum number of whole squares, relative to a square board with as many corners. A grid with fewer consists of rows
+/// rather than areas.
 const COMPACT: f64 = 2.0 / 3.0;
 
-/// A place in the image, px.
+/// A position in the image, px.
 pub(crate) type Point = DVec2;
 
-/// A square: its middle, and two of its edges.
+/// A square: its centre, and two of its edges.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Square {
     pub middle: Point,
     pub edges: [Point; 2],
 }
 
-/// A square of which all four corners are known.
+/// A square with four known corners.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct WholeSquare {
     /// Its lowest, leftmost vertex on the print.
     pub vertex: Vertex,
-    /// The corner there, the one to the right, the one above, and the one across.
+    /// The corner there, the one to the right, the one above, and the diagonal one.
     pub corners: [Point; 4],
 }
 
 impl WholeSquare {
-    /// The place at a part of the way to the right and a part of the way up.
+    /// Returns the position at a fraction to the right and a fraction up.
     pub(crate) fn place(&self, right: f64, up: f64) -> Point {
         let [a, b, c, d] = self.corners;
         let (low, high) = (a + right * (b - a), c + right * (d - c));
@@ -51,12 +51,12 @@ impl WholeSquare {
     }
 }
 
-/// 0 for a square of one colour, 1 for one of the other.
+/// Returns 0 for a square of one colour, 1 for one of the other.
 pub(crate) fn parity(vertex: Vertex) -> usize {
     (vertex.row + vertex.col).rem_euclid(2) as usize
 }
 
-/// The corners of a grid in a picture.
+/// The corners of a grid in an image.
 #[derive(Clone, Debug)]
 pub(crate) struct CheckerTiles<'a> {
     pub image: ImageView<'a>,
@@ -78,7 +78,7 @@ impl<'a> CheckerTiles<'a> {
         self.corners.get(&vertex).copied()
     }
 
-    /// The corners of whole squares.
+    /// Returns the corners of whole squares.
     pub(crate) fn without_loose_corners(&self) -> Self {
         let is_in_one = |&(&v, _): &(&Vertex, &Point)| {
             (0..CHECKER).any(|k| {
@@ -97,13 +97,13 @@ impl<'a> CheckerTiles<'a> {
         })
     }
 
-    /// Whether the whole squares are as many as in an area without holes; not so in rows of corners.
+    /// Returns whether there are as many whole squares as in an area without holes; false for rows of corners.
     pub(crate) fn is_compact(&self) -> bool {
         let square = (self.corners.len() as f64).sqrt() - 1.0;
         self.whole_squares().count() as f64 >= COMPACT * square * square
     }
 
-    /// Brightness of the middles of the whole squares of either parity.
+    /// Returns the brightness of the centres of the whole squares of either parity.
     pub(crate) fn levels(&self) -> Option<[f64; 2]> {
         let mut values = [Vec::new(), Vec::new()];
         for square in self.whole_squares() {
@@ -113,16 +113,16 @@ impl<'a> CheckerTiles<'a> {
         Some([even?, odd?])
     }
 
-    /// Brightness about the middle of a square; `None` where it lies outside the picture.
+    /// Returns the brightness about the centre of a square; `None` outside the image.
     pub(crate) fn value(&self, Square { middle, edges }: Square) -> Option<f64> {
-        /// In edges: the middle, and about it along rows and columns.
+        /// In edges: the centre, and points beside it along rows and columns.
         const PLACES: [[f64; 2]; 5] =
             [[0.0, 0.0], [AROUND, 0.0], [-AROUND, 0.0], [0.0, AROUND], [0.0, -AROUND]];
         let values = PLACES.map(|place| self.brightness(moved(middle, edges, place.into())));
         Some(values.into_iter().sum::<Option<f64>>()? / PLACES.len() as f64)
     }
 
-    /// Brightness of a place in the picture.
+    /// Returns the brightness of a position in the image.
     pub(crate) fn brightness(&self, DVec2 { x, y }: Point) -> Option<f64> {
         let (width, height) = (self.image.width() as f64, self.image.height() as f64);
         let inside = x >= 0.0 && y >= 0.0 && x + 1.0 < width && y + 1.0 < height;
@@ -130,7 +130,7 @@ impl<'a> CheckerTiles<'a> {
     }
 }
 
-/// A place moved by multiples of two edges.
+/// Returns a position moved by multiples of two edges.
 pub(crate) fn moved(place: Point, edges: [Point; 2], by: DVec2) -> Point {
     place + by.x * edges[0] + by.y * edges[1]
 }

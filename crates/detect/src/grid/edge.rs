@@ -1,4 +1,4 @@
-//! Whether two corners are joined by an edge of the tiling.
+//! Tests whether an edge of the tiling joins two corners.
 
 use glam::DVec2;
 
@@ -8,34 +8,34 @@ use crate::tiling::kind;
 use deltille_core::lattice::GridKind;
 use deltille_core::raster::Pyramid;
 
-/// Largest angle between the chord of an edge and the rays at its ends. Over one tile a fisheye
-/// bends an edge by up to 20°, half of it at either end; the rays add a few degrees of noise.
+/// Largest angle between the chord of an edge and the rays at its ends. Over one tile, a fisheye lens bends an edge by
+/// up to 20°, half of it at either end. The rays add a few degrees of noise.
 pub(crate) const MAX_CHORD_RAD: f64 = 18.0 * std::f64::consts::PI / 180.0;
 
-/// Places along the edge that are looked at.
+/// Number of sampled positions along the edge.
 const STATIONS: usize = 8;
 
-/// Part of the edge at either end that is left out: blur mixes the sectors there.
+/// Fraction of the edge at either end that is not sampled, because blur mixes the sectors there.
 const END: f64 = 0.15;
 
-/// Distance of the samples from the edge, as a part of the height of the tile on that side: well
-/// inside the border of a tag (0.16 at 1.5 bits of 25) and beyond the blur on all but tiny tiles.
+/// Distance of the samples from the edge, as a fraction of the height of the tile on that side. They lie well inside
+/// the border of a tag (0.16 at 1.5 bits of 25) and, on all but tiny tiles, beyond the blur.
 const SIDE: f64 = 0.08;
 
-/// The same for squares, as a part of the edge: a neighbouring square seen at the rim of a fisheye
-/// lens may be ten times as long as wide, and the samples stay on its near half.
+/// The same for squares, as a fraction of the edge. A neighbouring square near the edge of a fisheye image may be ten
+/// times as long as wide, and the samples stay on its near half.
 const SQUARE_SIDE: f64 = 0.04;
 
-/// The least distance of the samples from the edge, px of the level.
+/// Minimum distance of the samples from the edge, px of the level.
 const MIN_SIDE_PX: f64 = 1.2;
 
-/// Tiles whose next edges leave this one by less than this sine are not followed in their slant.
+/// Sine between this edge and the next edges of a tile below which the samples do not follow the slant of the tile.
 const LEAST_ACROSS: f64 = 0.1;
 
-/// A sample must leave the level by this part of the corners' amplitude.
+/// Minimum deviation of a sample from the level, relative to the amplitude of the corners.
 const MIN_DEVIATION: f64 = 0.25;
 
-/// Stations that may fail: a scratch or a highlight, not a gap.
+/// Number of sampled positions that may fail: a scratch or a highlight, not a gap.
 const ALLOWED_FAILURES: usize = 1;
 
 /// An end of an edge: a corner, and its ray along the edge.
@@ -48,23 +48,23 @@ pub(crate) struct End<'a, const N: usize> {
 }
 
 impl<'a, const N: usize> End<'a, N> {
-    /// The end at a corner whose ray has this index.
+    /// Creates the end at a corner whose ray has this index.
     #[inline]
     pub(crate) fn of(corner: &'a Saddle<N>, ray: usize) -> Self {
         Self { corner, ray }
     }
 }
 
-/// Follows the edge between two ends and tells whether its sides keep their colours.
+/// Follows the edge between two ends, and returns whether its sides keep their colours.
 ///
-/// The edge is taken as the cubic through both corners with the directions of both rays, which is
-/// the circular arc of the paper where the rays agree with one.
+/// The edge is modelled as the cubic through both corners with the directions of both rays. If the rays fit a circular
+/// arc, it is the arc of the paper.
 pub(crate) fn is_clean<const N: usize>(pyramid: &Pyramid, from: End<N>, to: End<N>) -> bool {
     is_clean_along(pyramid, from, to, |ends| ends)
 }
 
-/// [`is_clean`] of an edge that may also be the circular arc along one of the rays, or straight: of narrow
-/// sectors blur draws the rays apart.
+/// Tests an edge like [`is_clean`]. The edge may also be the circular arc along one of the rays, or straight, because
+/// blur spreads the rays of narrow sectors.
 pub(crate) fn is_clean_somehow<const N: usize>(
     pyramid: &Pyramid,
     from: End<N>,
@@ -78,7 +78,7 @@ pub(crate) fn is_clean_somehow<const N: usize>(
 /// Slopes of an edge against its chord at either end.
 type Slopes = [f64; 2];
 
-/// [`is_clean`] of an edge whose slopes follow from those of the rays.
+/// Tests an edge like [`is_clean`]. Its slopes follow from those of the rays.
 fn is_clean_along<const N: usize>(
     pyramid: &Pyramid,
     End { corner: a, ray: i }: End<N>,
@@ -96,8 +96,8 @@ fn is_clean_along<const N: usize>(
     let start = turn(chord, a.sectors.rays[i]).tan();
     let end = turn(chord + std::f64::consts::PI, b.sectors.rays[j]).tan();
     let [start, end] = shape([start, end]);
-    // Rays run to the left, counter-clockwise on the print, so the tile on the left lies between
-    // ray i and i + 1 here, between j and j − 1 there.
+    // Rays run to the left, counter-clockwise on the print. So the tile on the left lies between rays i and i + 1 here,
+    // and between j and j − 1 there.
     let side = |at_a: usize, at_b: usize| {
         let cot = |saddle: &Saddle<N>, p: usize, q: usize| {
             1.0 / turn(saddle.sectors.rays[p], saddle.sectors.rays[q]).abs().tan()
@@ -118,8 +118,8 @@ fn is_clean_along<const N: usize>(
     // Unit vectors along the chord and to its left on the print.
     let along = way / length;
     let left = -along.perp();
-    // How far along the edge the next edges of a tile lead for each step away from it. So the samples stay in
-    // a tile that is slanted.
+    // Displacement along the edge per step away from it, by the next edges of a tile. It keeps the samples within a
+    // slanted tile.
     let next_edges = |(at_a, at_b): (usize, usize)| {
         [a.sectors.rays[at_a], b.sectors.rays[at_b]].map(|ray| {
             let ray = DVec2::from_angle(ray);
@@ -192,7 +192,7 @@ mod tests {
     }
 
     #[test]
-    fn wrong_colours_and_flat_images_are_not() {
+    fn wrong_colours_and_flat_images_are_not_clean() {
         let (image, a, b) = scene(0.0);
         for image in [image.map(|v| 51200 - v), Gray::new(100, 100)] {
             let image = Pyramid::new(&image, 1, 8);

@@ -1,11 +1,11 @@
-//! How long a picture is looked at. Candidates and links take a time that grows with its pixels; what is sought
-//! around every grid, and between the grids, would take minutes in a picture made of nothing else.
+//! Budget for searches in an image. The time for candidates and links grows with the number of pixels. Searches around
+//! every grid and between grids would take minutes in an image made only of patterns.
 
-/// Looks that a picture is worth, at some microseconds each: some hundred times what photographs of boards take, and
-/// about a second.
+/// Maximum number of searches per image, some microseconds each: some hundred times as many as photographs of boards
+/// take, and about a second.
 const MOST_LOOKS: usize = 200_000;
 
-/// What is left of the looks that a picture is worth.
+/// Remaining searches for an image.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Effort(usize);
 
@@ -16,7 +16,7 @@ impl Default for Effort {
 }
 
 impl Effort {
-    /// Spends so many looks; whether there were as many.
+    /// Spends `looks` searches. Returns whether there were enough.
     pub(crate) fn spend(&mut self, looks: usize) -> bool {
         let is_worth = self.0 >= looks;
         self.0 = self.0.saturating_sub(looks);

@@ -1,8 +1,8 @@
-//! Boards seen at a grazing angle, looked for in pictures that are compressed along their tiles.
+//! Detects boards at a grazing angle in images that are compressed along their tiles.
 //!
-//! From 75° a tile is four times as wide as it is high, and its sectors are 15° wide: a circle around a
-//! corner that shows them leaves the tile. Compressed to half their width, along the direction nearest to
-//! theirs of a few, tiles look as from 60° or 65°.
+//! From 75° on, a tile is four times as wide as it is high, and its sectors are 15° wide. A circle around a corner that
+//! shows them leaves the tile. The image is compressed to half its width, along one of a few directions. In the
+//! direction nearest to that of the tiles, they look as at 60° or 65°.
 //!
 //! ```text
 //!     ╲▁▁▁▁▁▁╱▔▔▔▔▔▔╲▁▁▁▁▁▁╱        ╲▁▁╱▔▔╲▁▁╱
@@ -21,26 +21,27 @@ use crate::corners::saddles::{SaddleFinder, is_all_noise};
 use crate::levels::MIN_LEVEL_SIDE;
 use deltille_core::raster::{Gray, Pyramid};
 
-/// Directions in a half-turn: none is more than 15° from one of them, where half the width leaves tiles that are four
-/// times as wide as high as if they were 2.4 times.
+/// Number of directions in 180°. No direction is more than 15° from one of them. At 15°, half the width changes tiles
+/// from an aspect ratio of 4 to one of 2.4.
 const DIRECTIONS: usize = 6;
 
-/// Width of what is compressed.
+/// Factor of the compressed width.
 const WIDTH: f64 = 0.5;
 
-/// The finest level of a pyramid that has no more pixels than this is looked at: tiles of larger pictures are larger.
+/// Maximum number of pixels of the pyramid level that is used: tiles of larger images are larger.
 const MOST_PIXELS: usize = 2_500_000;
 
-/// Steps are rounded: within a row that adds up to less than a tenth of a pixel.
+/// Tolerance for rounded steps, px: within a row they add up to less than a tenth of a pixel.
 const SLACK_PX: f64 = 0.1;
 
-/// A row of a view with smaller steps than this, px, is level: it rises by less than the slack in a hundred million pixels.
+/// Step below which a row of a view counts as level, px. It rises by less than the tolerance in a hundred million
+/// pixels.
 const LEVEL_STEP: f64 = 1e-9;
 
-/// What is outside of a picture, of 1023: neither dark nor bright.
+/// Value outside the image, of 1023: neither dark nor bright.
 const OUTSIDE: i16 = 512;
 
-/// The grids of the direction in which the largest is seen, in px of level 0.
+/// Returns the grids of the direction in which the largest is seen, in px of level 0.
 pub(crate) fn foreshortened_grids<const N: usize>(
     finder: &SaddleFinder<N>,
     pyramid: &Pyramid,
@@ -64,15 +65,15 @@ pub(crate) fn foreshortened_grids<const N: usize>(
         found
     });
     let size = |grids: &Vec<SaddleGrid>| grids.first().map_or(0, |grid| grid.len());
-    // Of directions as good as each other the first.
+    // Of equally good directions, the first.
     let better = |a, b| if size(&b) > size(&a) { b } else { a };
     views.collect::<Vec<_>>().into_iter().reduce(better).unwrap_or_default()
 }
 
-/// A picture compressed in one direction.
+/// An image compressed in one direction.
 struct View {
     picture_from_view: Matrix2<f64>,
-    /// Where the view's middle is in the picture, and in the view.
+    /// Centre of the view, in the image and in the view.
     centres: [Vector2<f64>; 2],
     size: [usize; 2],
 }
@@ -98,10 +99,10 @@ impl View {
         DVec2::new(there.x, there.y)
     }
 
-    /// The picture as the view shows it, grey where it ends. (A pyramid's level is smooth enough to be
-    /// sampled at every second pixel.)
+    /// Renders the image as the view shows it, grey outside. (A pyramid level is smooth enough to be sampled at every
+    /// second pixel.)
     fn drawn(&self, image: &Gray<i16>) -> Gray<i16> {
-        // The last place has a pixel behind it.
+        // The last position has a pixel behind it.
         let last = [image.width(), image.height()].map(|side| side as f64 - (2.0 + SLACK_PX));
         let [width, height] = self.size;
         let step = DVec2::from_slice(self.picture_from_view.column(0).as_slice());
@@ -109,7 +110,7 @@ impl View {
         for (y, row) in drawn.pixels_mut().chunks_mut(width).enumerate() {
             row.fill(OUTSIDE);
             let first = self.in_picture(DVec2::new(0.0, y as f64));
-            // The part of the row that lies in the picture.
+            // The part of the row that lies in the image.
             let (mut from, mut to) = (0.0, width as f64);
             for i in 0..2 {
                 let ends = [(SLACK_PX - first[i]) / step[i], (last[i] - first[i]) / step[i]];
@@ -129,15 +130,16 @@ impl View {
     }
 }
 
-/// Bilinear samples along a line that lies inside of an image.
+/// Samples bilinearly along a line inside an image.
 fn sample(image: &Gray<i16>, first: DVec2, step: DVec2, out: &mut [i16]) {
-    /// Bits of a coordinate behind the point: rounded, a row of ten thousand steps is off by less than a tenth of a pixel.
+    /// Fractional bits of a coordinate. With this rounding, a row of ten thousand steps is off by less than a tenth of
+    /// a pixel.
     const FINE_BITS: u32 = 16;
     const FINE: f64 = (1u32 << FINE_BITS) as f64;
     /// Bits of a weight: two weights and a grey value of 10 bits fit into 32.
     const WEIGHT_BITS: u32 = 8;
     const WEIGHTS: i32 = 1 << WEIGHT_BITS;
-    /// Of the product of two weights.
+    /// Bits of the product of two weights.
     const SUM_BITS: u32 = 2 * WEIGHT_BITS;
     let (data, width) = (image.pixels(), image.width());
     let [mut x, mut y] = (first * FINE).round().as_i64vec2().to_array();

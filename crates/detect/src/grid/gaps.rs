@@ -1,4 +1,4 @@
-//! Corners that were not detected, at empty vertices of a grid and around it, where their neighbours predict them.
+//! Searches for missing corners at empty vertices of a grid and around it, where their neighbours predict them.
 
 use std::collections::BTreeSet;
 
@@ -16,15 +16,13 @@ use crate::tiling::{neighbours, step};
 use deltille_core::lattice::Vertex;
 use deltille_core::raster::Pyramid;
 
-/// Greatest distance of a missing corner from the position that its neighbours predict, as a fraction
-/// of the edge length there.
+/// Maximum distance of a missing corner from its predicted position, as a fraction of the edge length there.
 const MAX_SURPRISE: f64 = 0.2;
 
-/// Effort for a missing corner, which is sought in the picture and in several rectified views of it.
+/// Effort for a missing corner, which is searched in the image and in several rectified views of it.
 const LOOKS_FOR_CORNER: usize = 20;
 
-/// Seeks corners at empty vertices beside those of a grid, within it and around it, where neighbours
-/// predict them, until no more are found.
+/// Searches for corners at empty vertices beside those of a grid, within it and around it, until no more are found.
 pub(super) fn fill_gaps<const N: usize>(
     finder: &SaddleFinder<N>,
     pyramid: &Pyramid,
@@ -46,7 +44,7 @@ pub(super) fn fill_gaps<const N: usize>(
             if let Some(placed) = corner_near(finder, pyramid, grid, vertex, predicted, effort) {
                 grid.insert(vertex, placed);
                 grown = true;
-                // The vertices around it are predicted anew, so they are tried again.
+                // The vertices around it have new predictions, so they are tried again.
                 tried.retain(|v: &Vertex| !neighbours::<N>(vertex).contains(v));
             } else {
                 tried.insert(vertex);
@@ -58,7 +56,7 @@ pub(super) fn fill_gaps<const N: usize>(
     }
 }
 
-/// Where a missing corner is sought.
+/// Prediction of a missing corner.
 #[derive(Clone, Copy, Debug)]
 struct Predicted {
     /// Its position, px.
@@ -67,15 +65,16 @@ struct Predicted {
     edge_px: f64,
 }
 
-/// Where a missing corner is: the mean of what the rows through `vertex` predict. With the next three corners p, q, r of a row, the position is
+/// Predicts a missing corner as the mean of the predictions of the rows through `vertex`. If p, q, r are the next three
+/// corners of a row, the position is
 ///
 /// ```text
 ///     3 p − 3 q + r        a row that bends evenly (its second difference is constant)
 ///     2 p − q              where r is missing: a straight row with equal edges
 /// ```
 ///
-/// Where fewer than two rows predict it, a local map of the corners around does, if there are two
-/// neighbours; else the result is `None`.
+/// If fewer than two rows predict it, a local map of the corners around is used, provided that there are two
+/// neighbours. Otherwise returns `None`.
 fn predict<const N: usize>(grid: &Growing<N>, vertex: Vertex) -> Option<Predicted> {
     let at = |v: Vertex| grid.get(&v).map(|grown| grown.saddle.position);
     let mut sum = DVec2::ZERO;
@@ -104,8 +103,8 @@ fn predict<const N: usize>(grid: &Growing<N>, vertex: Vertex) -> Option<Predicte
     Some(Predicted { position: map.place, edge_px })
 }
 
-/// The corner at `vertex`, if one is found near where it is predicted: in the picture, or, where the
-/// board is seen at a steep angle, in a view that is rectified by the edges to its neighbours.
+/// Returns the corner at `vertex`, if one is found near its prediction. It is searched in the image, and for a board at
+/// a steep angle in a view rectified by the edges to its neighbours.
 fn corner_near<const N: usize>(
     finder: &SaddleFinder<N>,
     pyramid: &Pyramid,
@@ -119,7 +118,7 @@ fn corner_near<const N: usize>(
     }
     let reach = (MAX_SURPRISE * edge_px).max(1.0);
     let neighbours = neighbours::<N>(vertex);
-    // A blurred corner is found best on the pyramid level on which its neighbours were found.
+    // A blurred corner is found best on the pyramid level of its neighbours.
     let levels = neighbours.iter().filter_map(|v| Some(grid.get(v)?.saddle.level));
     let level = levels.max().unwrap_or(0);
     let at_place = |saddle| placed_at(pyramid, grid, vertex, saddle);
@@ -135,8 +134,8 @@ fn corner_near<const N: usize>(
     })
 }
 
-/// A saddle point as the corner at `vertex` of a grid, if it has clean edges to two neighbours at least
-/// that agree on its turn, and rays parallel to theirs.
+/// Returns a saddle point as the corner at `vertex` of a grid. It must have clean edges to at least two neighbours that
+/// agree on its turn, and rays parallel to theirs.
 fn placed_at<const N: usize>(
     pyramid: &Pyramid,
     grid: &Growing<N>,
@@ -161,8 +160,8 @@ fn placed_at<const N: usize>(
     (votes[turn] >= 2 && parallel_to_neighbours(grid, vertex, &grown)).then_some(grown)
 }
 
-/// Whether all rays of a corner are parallel to those of each neighbour, within the angle by which
-/// distortion and perspective may bend a tile.
+/// Returns whether all rays of a corner are parallel to those of each neighbour, within the angle by which distortion
+/// and perspective may bend a tile.
 fn parallel_to_neighbours<const N: usize>(
     grid: &Growing<N>,
     vertex: Vertex,

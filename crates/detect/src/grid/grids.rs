@@ -1,4 +1,4 @@
-//! All grids of a picture: grown, filled, joined, and each corner in one of them.
+//! Finds all grids of an image: grown, filled and joined, with each corner in one of them.
 
 use std::collections::BTreeMap;
 
@@ -17,13 +17,13 @@ use crate::tiling::tiles_from;
 use deltille_core::lattice::Vertex;
 use deltille_core::raster::Pyramid;
 
-/// Corners nearer to each other than this fraction of the distance to the nearest neighbour are the
-/// same one: under blur and motion a corner may be detected twice.
+/// Distance below which corners are the same, as a fraction of the distance to the nearest neighbour. Under blur and
+/// motion, a corner may be detected twice.
 const SAME_PART: f64 = 0.2;
 
-/// All grids among the saddle points, by lattice vertex, those with most corners first. There are none
-/// where there are more saddle points than any board has. Corners that were not detected are sought
-/// where a grid has gaps or goes on; not so in a grid that shows the `whole` board, if that is given.
+/// Returns all grids among the saddle points, by lattice vertex, the largest first. The result is empty if there are
+/// more saddle points than on any board. Missing corners are searched in gaps of a grid and around it. If a grid shows
+/// the `whole` board, they are not searched.
 pub(crate) fn grids<const N: usize>(
     finder: &SaddleFinder<N>,
     pyramid: &Pyramid,
@@ -55,8 +55,8 @@ pub(crate) fn grids<const N: usize>(
         if !whole.is_some_and(|whole| whole.is_shown_by(&grid)) {
             fill_gaps(finder, pyramid, &mut grid, &mut effort);
         }
-        // A corner that is found in a gap may be a known saddle point that was not linked: it is dropped
-        // if another grid has that, or if it is in this grid under another vertex.
+        // A corner found in a gap may be a known saddle point that was not linked. It is dropped if another grid has
+        // that point, or if it is in this grid under another vertex.
         grid.retain(|&vertex, grown| match same(&index, &grown.saddle) {
             Some(corner) if growth.taken[corner] => false,
             Some(corner) => *own.entry(corner).or_insert(vertex) == vertex,
@@ -81,19 +81,19 @@ pub(crate) fn grids<const N: usize>(
     grids
 }
 
-/// A corner without what only growing needs.
+/// Returns a corner without the data that only growing needs.
 fn plain<const N: usize>(grown: &GrownSaddle<N>) -> PlacedSaddle {
     PlacedSaddle { position: grown.saddle.position, amplitude: grown.saddle.sectors.amplitude }
 }
 
-/// Index of the nearest known saddle point that counts as the same as `saddle`.
+/// Returns the index of the nearest known saddle point that counts as the same as `saddle`.
 fn same<const N: usize>(places: &Buckets, saddle: &Saddle<N>) -> Option<usize> {
     let near = places.within(saddle.position, merge_px(saddle.level));
     near.min_by(|a, b| a.1.total_cmp(&b.1).then(a.0.cmp(&b.0))).map(|(i, _)| i)
 }
 
-/// Removes corners that also are in a larger grid, or under another vertex of the same grid. `places`
-/// is an empty index over the image, to which the positions that stay are added.
+/// Removes corners that also are in a larger grid, or under another vertex of the same grid. `places` is an empty index
+/// over the image, to which the remaining positions are added.
 fn each_once(grids: &mut Vec<SaddleGrid>, mut places: Buckets) {
     for grid in grids.iter_mut() {
         let whole = grid.clone();
@@ -114,8 +114,8 @@ fn each_once(grids: &mut Vec<SaddleGrid>, mut places: Buckets) {
     grids.retain(|grid| !grid.is_empty());
 }
 
-/// Drops every grid that lies within a single tile of a larger one: the cells of a tag form a tiling,
-/// too. `grids` are sorted with the largest first.
+/// Drops every grid that lies within a single tile of a larger one, because the cells of a tag form a tiling, too.
+/// `grids` are sorted with the largest first.
 fn without_tag_cells<const N: usize>(mut grids: Vec<SaddleGrid>) -> Vec<SaddleGrid> {
     if grids.len() < 2 {
         return grids;
@@ -139,8 +139,8 @@ fn without_tag_cells<const N: usize>(mut grids: Vec<SaddleGrid>) -> Vec<SaddleGr
         let Some(first) = grid.values().next() else {
             return false;
         };
-        // The larger grid may be dropped itself: its tile then lies in the tile of a third grid, which
-        // holds this one as well.
+        // The larger grid may be dropped itself. Its tile then lies in the tile of a third grid, which contains this
+        // one as well.
         !middles.within(first.position, reach_px).any(|(index, _)| {
             let (i, tile) = &tiles[index];
             Some(*i) < own && grid.values().all(|placed| is_inside(tile, placed.position))
@@ -149,15 +149,15 @@ fn without_tag_cells<const N: usize>(mut grids: Vec<SaddleGrid>) -> Vec<SaddleGr
     grids
 }
 
-/// Positions of the vertices, px, of every tile all of whose vertices are in a grid.
+/// Returns the vertex positions, px, of every complete tile of a grid.
 fn tiles_of<const N: usize>(grid: &SaddleGrid) -> impl Iterator<Item = Vec<DVec2>> {
     let place = |v: &Vertex| grid.get(v).map(|p| p.position);
     let tiles = grid.keys().flat_map(|&v| tiles_from::<N>(v));
     tiles.filter_map(move |tile| tile.iter().map(place).collect())
 }
 
-/// Whether a point lies within a tile, px. Vertices that are counter-clockwise on the print have a
-/// negative signed area in the image, where y runs down.
+/// Returns whether a point lies within a tile, px. Vertices that are counter-clockwise on the print have a negative
+/// signed area in the image, where y runs down.
 fn is_inside(tile: &[DVec2], p: DVec2) -> bool {
     (0..tile.len()).all(|i| {
         let (a, b) = (tile[i], tile[(i + 1) % tile.len()]);
@@ -171,7 +171,7 @@ mod tests {
     use crate::tiling::{CHECKER, DELTILLE};
     use deltille_core::lattice::GridKind;
 
-    /// A lattice of rows and columns about a place, with edges of this length, px.
+    /// Creates a lattice of rows and columns about a position, with edges of this length, px.
     fn lattice(kind: GridKind, side: i32, origin: [f64; 2], edge_px: f64) -> SaddleGrid {
         let corner = |row: i32, col: i32| {
             let place = kind.position(f64::from(row), f64::from(col));
@@ -181,12 +181,12 @@ mod tests {
         (0..side).flat_map(|row| (0..side).map(move |col| corner(row, col))).collect()
     }
 
-    /// Cells of a tag lie in one tile of a grid around them; what lies beside a grid, or across its edges, stays.
+    /// Cells of a tag lie in one tile of the grid around them. A grid beside another, or across its edges, stays.
     #[test]
     fn only_grids_within_one_tile_of_a_larger_grid_are_dropped() {
         fn check<const N: usize>(kind: GridKind) {
             let board = lattice(kind, 6, [100.0, 900.0], 100.0);
-            // The middle of a tile, of an edge, and of nothing.
+            // The centre of a tile, the midpoint of an edge, and a point outside.
             let [in_tile, on_edge, beside] = match kind {
                 GridKind::Deltille => [[245.0, 875.0], [250.0, 905.0], [1500.0, 500.0]],
                 GridKind::Checker => [[240.0, 870.0], [240.0, 905.0], [1500.0, 500.0]],

@@ -1,14 +1,13 @@
-//! Grids from linked corners: initial quads and breadth-first growth.
+//! Grows grids from linked corners: initial quads and breadth-first growth.
 //!
-//! A corner has N rays, six or four, along the edges that meet there, and is *linked* along a ray to
-//! the corner at the other end of the edge. In a grid it has a lattice vertex and a *turn*: its ray k
-//! points along step `k + turn` (mod N) of the lattice ([`step`]). Rays with even numbers begin dark
-//! sectors. On a deltille grid turns are therefore even, and the upright tiles are the dark ones,
-//! whatever the board's colours. On a checkerboard the turn is even where row + column is, and there
-//! the square up and right is dark.
+//! A corner has N rays, six or four, along the edges that meet there. It is *linked* along a ray to the corner at the
+//! other end of the edge. In a grid, it has a lattice vertex and a *turn*: its ray k points along step `k + turn` (mod
+//! N) of the lattice ([`step`]). Rays with even numbers begin dark sectors. On a deltille grid turns are therefore
+//! even, and the upright tiles are the dark ones for any colours of the board. On a checkerboard, the turn is even
+//! where row + column is, and the square up and right of such a corner is dark.
 //!
-//! Every grid has a lattice frame of its own, known up to a motion of the lattice;
-//! [`label`](crate::labels::placement) finds what it is on the target.
+//! Every grid has a lattice frame of its own, known up to a motion of the lattice. [`label`](crate::labels::placement)
+//! locates it on the target.
 
 use std::collections::{HashSet, VecDeque};
 
@@ -16,7 +15,7 @@ use super::links::{Link, Links};
 use crate::tiling::{kind, step};
 use deltille_core::lattice::{GridKind, Vertex};
 
-/// A corner's place in a grid.
+/// Position of a corner in a grid.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Place {
     /// Its lattice vertex.
@@ -25,19 +24,19 @@ pub(super) struct Place {
     pub(super) turn: usize,
 }
 
-/// A corner at a place of a grid.
+/// A corner at a position of a grid.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Placed {
     /// Index of the corner.
     pub(super) corner: usize,
-    /// Where it is.
+    /// Its position.
     pub(super) place: Place,
 }
 
 /// The four corners from which a grid grows.
 pub(super) type Seed = [Placed; 4];
 
-/// All seeds, those whose corners have most links first, as links are missing near what is wrong.
+/// Returns all seeds, those whose corners have most links first, because links are missing near errors.
 ///
 /// ```text
 ///     D ───── C          A at (0,0), B at (0,1), C at (1,0), D at (1,−1): the two tiles A B C and
@@ -46,8 +45,7 @@ pub(super) type Seed = [Placed; 4];
 ///        A ───── B       on a checkerboard C at (1,1) and D at (1,0): the one dark square A B C D
 /// ```
 ///
-/// All five edges of the two triangles, or four of the square, must be linked, which they are from both
-/// ends.
+/// All five edges of the two triangles, or four of the square, must be linked, which they are from both ends.
 pub(super) fn seeds<const N: usize>(links: &[Links<N>]) -> Vec<Seed> {
     let root = Place { vertex: Vertex::new(0, 0), turn: 0 };
     let mut seeds: Vec<(usize, Seed)> = Vec::new();
@@ -70,23 +68,23 @@ pub(super) fn seeds<const N: usize>(links: &[Links<N>]) -> Vec<Seed> {
     seeds.into_iter().map(|(_, seed)| seed).collect()
 }
 
-/// The corner that is linked to `from` along step `k` of the lattice.
+/// Returns the corner that is linked to `from` along step `k` of the lattice.
 fn follow<const N: usize>(links: &[Links<N>], from: Placed, k: usize) -> Option<Placed> {
     let link = links[from.corner][(k + N - from.place.turn) % N]?;
     Some(Placed { corner: link.corner, place: across::<N>(from.place, k, link) })
 }
 
-/// The corners of the square that steps `k` and `l` span at `a`, in order around it; `None` unless all
-/// four edges are linked.
+/// Returns the corners of the square that steps `k` and `l` span at `a`, in order around it; `None` unless all four
+/// edges are linked.
 fn square<const N: usize>(links: &[Links<N>], a: Placed, k: usize, l: usize) -> Option<Seed> {
     let (b, d) = (follow(links, a, k)?, follow(links, a, l)?);
     let c = follow(links, b, l)?;
     (follow(links, d, k) == Some(c)).then_some([a, b, c, d])
 }
 
-/// The place at the far end of the link that leaves `from` along step `k` of the lattice.
+/// Returns the position at the far end of the link that leaves `from` along step `k` of the lattice.
 fn across<const N: usize>(from: Place, k: usize, link: Link) -> Place {
-    // `link.ray` is the ray of the other corner that looks back, so it points along the opposite step.
+    // `link.ray` is the ray of the other corner that points back, so it points along the opposite step.
     Place { vertex: from.vertex + step::<N>(k), turn: (k + N / 2 + N - link.ray) % N }
 }
 
@@ -95,13 +93,13 @@ pub(super) struct Growth<'a, const N: usize> {
     links: &'a [Links<N>],
     /// For each corner, whether an earlier grid has it.
     pub(super) taken: Vec<bool>,
-    /// For each corner, its place in the grid that grows.
+    /// For each corner, its position in the growing grid.
     places: Vec<Option<Place>>,
-    /// The corners of the grid that grows, in the order in which they joined.
+    /// Corners of the growing grid, in the order in which they joined.
     members: Vec<usize>,
-    /// The vertices of these corners.
+    /// Vertices of these corners.
     occupied: HashSet<Vertex>,
-    /// Corners whose links are to be followed.
+    /// Corners whose links are still to be followed.
     queue: VecDeque<usize>,
 }
 
@@ -119,11 +117,11 @@ impl<'a, const N: usize> Growth<'a, N> {
         }
     }
 
-    /// Grows a grid from a seed, breadth first, and returns its corners with their places.
+    /// Grows a grid from a seed, breadth first, and returns its corners with their positions.
     ///
-    /// A corner joins when it closes a tile, as a single link may be wrong: it closes a triangle, or a
-    /// square in a re-entrant angle of the grid, when two corners of the grid agree on its place. On a
-    /// straight side of a checkerboard, a square is closed by two new corners at once.
+    /// A corner joins when it closes a tile, because a single link may be wrong. It closes a triangle, or a square in a
+    /// re-entrant angle of the grid, when two corners of the grid agree on its position. On a straight side of a
+    /// checkerboard, two new corners close a square together.
     pub(super) fn grow(&mut self, seed: &Seed) -> Vec<Placed> {
         self.occupied.clear();
         seed.iter().for_each(|&placed| self.add(placed));
@@ -158,15 +156,15 @@ impl<'a, const N: usize> Growth<'a, N> {
         self.queue.push_back(corner);
     }
 
-    /// Whether the corner belongs to no grid yet, and its vertex is not occupied in this one.
+    /// Returns whether the corner belongs to no grid yet, and its vertex is not occupied in this one.
     fn is_free(&self, Placed { corner, place }: Placed) -> bool {
         !self.taken[corner]
             && self.places[corner].is_none()
             && !self.occupied.contains(&place.vertex)
     }
 
-    /// Number of corners of the grid that are linked to `next` as its place requires; `None` where one
-    /// is linked to it as if it had another place.
+    /// Returns the number of corners of the grid that are linked to `next` as its position requires. Returns `None` if
+    /// a link implies another position.
     fn votes(&self, next: Placed) -> Option<usize> {
         let linked = (0..N).filter_map(|k| follow(self.links, next, k));
         let mut known = linked.filter_map(|next| Some(self.places[next.corner]? == next.place));
@@ -181,8 +179,8 @@ impl<'a, const N: usize> Growth<'a, N> {
         self.queue.extend(linked.filter(|&corner| self.places[corner].is_some()));
     }
 
-    /// Adds the corner that follows `at` along step `k` together with one beside it, where these two close
-    /// a square with an edge of the grid.
+    /// Adds the corner that follows `at` along step `k` together with one beside it, if these two close a square with
+    /// an edge of the grid.
     fn join_by_square(&mut self, at: Placed, k: usize) {
         for side in [k + 1, k + N - 1] {
             let Some([_, next, beside, known]) = square(self.links, at, k, side % N) else {
@@ -209,14 +207,15 @@ mod tests {
     use super::*;
     use crate::tiling::{CHECKER, DELTILLE};
 
-    /// A vertex turned about the origin by so many steps.
+    /// Returns a vertex rotated about the origin by `by` steps.
     fn turned<const N: usize>(vertex: Vertex, by: usize) -> Vertex {
         let [along, up] = [by, by + 1].map(step::<N>);
         let sum = |a: i32, b: i32| vertex.col * a + vertex.row * b;
         Vertex::new(sum(along.row, up.row), sum(along.col, up.col))
     }
 
-    /// Links between the corners of a lattice of which some are missing, each with its rays counted from anywhere.
+    /// Creates links between the corners of a lattice with missing ones; the rays of each are counted from an arbitrary
+    /// one.
     fn linked<const N: usize>(
         vertices: &[Vertex],
         turns: &[usize],
@@ -240,8 +239,8 @@ mod tests {
         links
     }
 
-    /// Grids are parts of the lattice, turned and shifted, in which no corner has two places and no place two corners;
-    /// without holes it is one grid of all corners.
+    /// Grids are parts of the lattice, rotated and shifted. No corner has two positions, and no position two corners.
+    /// Without holes there is one grid of all corners.
     fn grids_are_the_lattice<const N: usize>(holes: &[bool], lost: &[bool], seed: usize) {
         let mut vertices: Vec<Vertex> = (0..49)
             .map(|i| Vertex::new(i / 7, i % 7))

@@ -1,4 +1,4 @@
-//! Which corner follows which along each of the rays.
+//! Links each corner to the next corner along each of its rays.
 
 use glam::DVec2;
 
@@ -8,20 +8,21 @@ use crate::corners::saddles::Saddle;
 use crate::corners::sectors::turn;
 use deltille_core::raster::Pyramid;
 
-/// Nearest corners of like contrast looked at: up to six neighbours, the twelve behind them, and as many strangers.
+/// Number of nearest corners of similar contrast that are tested: up to six neighbours, the twelve behind them, and as
+/// many unrelated ones.
 const NEAREST: usize = 36;
 
-/// Below the squared cosine of [`MAX_CHORD_RAD`].
+/// Squared cosine below that of [`MAX_CHORD_RAD`].
 const LEAST_ALONG: f64 = 0.9;
 
-/// So many are looked at first; inside a board that is enough.
+/// Number of corners that are tested first; inside a board it is sufficient.
 const FIRST: usize = 12;
 
-/// Contrasts of neighbouring corners differ by less than this factor: light falls off slowly, and
-/// what is weaker is noise on the paper beside the board.
+/// Maximum ratio of the contrasts of neighbouring corners. Light falls off slowly, and weaker corners are noise on the
+/// paper beside the board.
 pub(crate) const MAX_CONTRAST_RATIO: f64 = 3.0;
 
-/// The far end of an edge: a corner, and which of its rays looks back.
+/// The far end of an edge: a corner, and its ray that points back.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Link {
     /// Index of the corner.
@@ -33,7 +34,7 @@ pub(crate) struct Link {
 /// The links of a corner along its rays.
 pub(crate) type Links<const N: usize> = [Option<Link>; N];
 
-/// For every corner the links along its N rays; links are mutual.
+/// Returns the links of every corner along its N rays; links are mutual.
 pub(crate) fn links<const N: usize>(pyramid: &Pyramid, saddles: &[Saddle<N>]) -> Vec<Links<N>> {
     let positions: Vec<DVec2> = saddles.iter().map(|saddle| saddle.position).collect();
     let places = Places::new(&positions);
@@ -42,8 +43,8 @@ pub(crate) fn links<const N: usize>(pyramid: &Pyramid, saddles: &[Saddle<N>]) ->
     let corners = Corners { pyramid, saddles, directions: &directions };
     let mut found: Vec<Links<N>> = vec![[None; N]; saddles.len()];
     for index in 0..saddles.len() {
-        // Between the corners of an enlarged picture its grain has hundreds of its own.
-        let alike = |other: usize| are_alike(&saddles[index], &saddles[other]);
+        // The grain of an enlarged image has hundreds of its own corners between those of a board.
+        let alike = |other: usize| have_similar_contrast(&saddles[index], &saddles[other]);
         let first = places.nearest(index, FIRST, alike);
         corners.link_to(&mut found, index, &first);
         if found[index].contains(&None) {
@@ -74,8 +75,8 @@ struct Corners<'a, const N: usize> {
 }
 
 impl<const N: usize> Corners<'_, N> {
-    /// Links a corner along its rays that have no link to those of `others`, nearest first, that they lead
-    /// to: the nearest corner along a ray counts.
+    /// Links the unlinked rays of a corner to `others`, sorted by distance. Each ray is linked to the nearest corner
+    /// along it.
     fn link_to(&self, found: &mut [Links<N>], index: usize, others: &[usize]) {
         let saddle = &self.saddles[index];
         let mut links = found[index];
@@ -91,7 +92,7 @@ impl<const N: usize> Corners<'_, N> {
                 let Some(ray) = ray_back(chord, i, other) else {
                     continue;
                 };
-                // What has been followed from the other end is clean.
+                // An edge that was followed from the other end is clean.
                 let back = Some(Link { corner: index, ray: i });
                 let is_known = corner < index && found[corner][ray] == back;
                 if is_known || is_clean(self.pyramid, End::of(saddle, i), End::of(other, ray)) {
@@ -105,7 +106,7 @@ impl<const N: usize> Corners<'_, N> {
         found[index] = links;
     }
 
-    /// Whether [`is_along`] may say that a place lies along a ray: without angles, and not too strictly.
+    /// Returns whether a position may pass [`is_along`]: a fast test without angles, and less strict.
     fn may_be_along(&self, index: usize, i: usize, place: DVec2) -> bool {
         let off = place - self.saddles[index].position;
         let along = off.dot(self.directions[index][i]);
@@ -113,22 +114,22 @@ impl<const N: usize> Corners<'_, N> {
     }
 }
 
-/// The ray of `b` that looks back along ray `i` of `a`; `None` when they do not face each other.
+/// Returns the ray of `b` that points back along ray `i` of `a`; `None` if they do not face each other.
 ///
-/// Opposite ends of an edge see its dark side on opposite hands, so the rays differ in parity, and
-/// their contrasts are alike.
+/// Opposite ends of an edge see its dark side on opposite hands, so the rays differ in parity. Their contrasts are
+/// similar.
 pub(crate) fn facing_ray<const N: usize>(a: &Saddle<N>, i: usize, b: &Saddle<N>) -> Option<usize> {
     let chord = chord_rad(a, b);
-    (are_alike(a, b) && is_along(a, i, chord)).then(|| ray_back(chord, i, b)).flatten()
+    (have_similar_contrast(a, b) && is_along(a, i, chord)).then(|| ray_back(chord, i, b)).flatten()
 }
 
-/// Whether the contrasts of two corners may be those of neighbours.
-fn are_alike<const N: usize>(a: &Saddle<N>, b: &Saddle<N>) -> bool {
+/// Returns whether the contrasts of two corners may be those of neighbours.
+fn have_similar_contrast<const N: usize>(a: &Saddle<N>, b: &Saddle<N>) -> bool {
     let (ours, theirs) = (a.sectors.amplitude, b.sectors.amplitude);
     ours.max(theirs) <= MAX_CONTRAST_RATIO * ours.min(theirs)
 }
 
-/// Image angle of the way from one corner to another.
+/// Returns the image angle of the direction from one corner to another.
 fn chord_rad<const N: usize>(a: &Saddle<N>, b: &Saddle<N>) -> f64 {
     (b.position - a.position).to_angle()
 }
@@ -137,7 +138,7 @@ fn is_along<const N: usize>(saddle: &Saddle<N>, i: usize, chord: f64) -> bool {
     turn(chord, saddle.sectors.rays[i]).abs() <= MAX_CHORD_RAD
 }
 
-/// The ray of a corner that looks back to where ray `i` of another comes from.
+/// Returns the ray of a corner that points back to the origin of ray `i` of another.
 fn ray_back<const N: usize>(chord: f64, i: usize, saddle: &Saddle<N>) -> Option<usize> {
     let back = chord + std::f64::consts::PI;
     let off = |j: usize| turn(back, saddle.sectors.rays[j]).abs();

@@ -1,16 +1,15 @@
-//! Where a vertex lies that is not seen, as the corners around it tell.
+//! Predicts the position of an unseen vertex from the corners around it.
 //!
-//! About the vertex at (0, 0) a view of a board is a smooth map of lattice coordinates p = (col, row):
+//! About the vertex at (0, 0), a view of a board is a smooth map of lattice coordinates p = (col, row):
 //!
 //! ```text
 //!     x(p) = x₀ + J p + ½ pᵀ H p + O(|p|³)
 //! ```
 //!
-//! fitted to the nearest corners. All lengths are in edges of the board as seen here. The second
-//! derivatives are as large as the grid shows them to be where it has three corners in a line ([`Bend`]),
-//! and corners count the less the more the third ones may draw them aside. So x₀ comes with the deviation
-//! by which it may be wrong, however many corners there are and wherever they lie; few of them on one
-//! side predict little, and say so.
+//! fitted to the nearest corners. All lengths are in edges of the board as seen here. Three corners in a line give the
+//! size of the second derivatives ([`Bend`]). The weight of a corner decreases with the displacement that third
+//! derivatives may cause. So x₀ has a standard deviation for any number and arrangement of corners. A few corners on
+//! one side predict little, and the standard deviation is large.
 
 use std::sync::LazyLock;
 
@@ -20,26 +19,26 @@ use nalgebra::{Matrix6, Vector6};
 use crate::tiling::kind;
 use deltille_core::lattice::{GridKind, Vertex};
 
-/// Second derivatives in edges of a grid that shows none: over one tile a steep view or a wide lens changes
-/// the next edge by so much, one deviation.
+/// Standard deviation of the second derivatives, in edges, of a grid that shows none. Over one tile, a steep view or a
+/// wide lens changes the next edge by this much (1σ).
 const USUAL_BEND: f64 = 0.1;
 
-/// So many lines of three corners tell as much as [`USUAL_BEND`] does.
+/// Weight of [`USUAL_BEND`] in lines of three corners.
 const USUAL_WEIGHT: f64 = 0.25;
 
-/// Information, in edges⁻², that is less than a billionth of what a corner tells.
+/// Information, in edges⁻², that is less than a billionth of that of a corner.
 const NO_PRIOR: f64 = 1e-9;
 
-/// Deviation of a corner from the smooth map, px of its level: fits wander by no more than that.
+/// Standard deviation of a corner from the smooth map, px of its level: fits are not less accurate.
 const PLACE_PX: f64 = 0.3;
 
-/// Corners that are fitted; more lie farther and count little.
+/// Maximum number of fitted corners. Further ones are farther away and contribute little.
 const MOST: usize = 20;
 
-/// Half the side of the square of vertices that is looked through.
+/// Half the side of the square of vertices that is searched.
 const REACH: i32 = 5;
 
-/// The steps to all vertices of that square with their lengths on the print, shortest first.
+/// Steps to all vertices of that square with their lengths on the print, shortest first.
 static STEPS: LazyLock<[Vec<(f64, Vertex)>; 2]> = LazyLock::new(|| {
     [GridKind::Deltille, GridKind::Checker].map(|kind| {
         let offsets = (-REACH..=REACH).flat_map(|r| (-REACH..=REACH).map(move |c| (r, c)));
@@ -51,28 +50,28 @@ static STEPS: LazyLock<[Vec<(f64, Vertex)>; 2]> = LazyLock::new(|| {
     })
 });
 
-/// Length of a step on the print, in edges.
+/// Returns the length of a step on the print, in edges.
 fn length(kind: GridKind, step: Vertex) -> f64 {
     let way = kind.position(step.row.into(), step.col.into());
     way.x.hypot(way.y)
 }
 
-/// How a grid is bent.
+/// Bend of a grid.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Bend {
-    /// Deviation of the second derivatives, in edges.
+    /// Standard deviation of the second derivatives, in edges.
     second: f64,
-    /// Deviation of a corner, px.
+    /// Standard deviation of a corner, px.
     place_px: f64,
 }
 
 impl Bend {
-    /// Of a grid of few corners.
+    /// Returns the bend of a grid of few corners.
     pub(crate) fn usual() -> Self {
         Self { second: USUAL_BEND, place_px: PLACE_PX }
     }
 
-    /// Of a grid of corners with N rays, of which `at` tells the places, found on levels up to this.
+    /// Returns the bend of a grid of corners with N rays. `at` returns their positions, found on levels up to `level`.
     pub(crate) fn of<const N: usize>(
         vertices: impl Iterator<Item = Vertex>,
         at: impl Fn(Vertex) -> Option<DVec2>,
@@ -99,17 +98,17 @@ impl Bend {
 /// The map about a vertex.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct LocalMap {
-    /// Where the vertex lies, px.
+    /// Position of the vertex, px.
     pub place: DVec2,
-    /// Derivatives of the place, px per step along a row and from row to row: columns.
+    /// Derivatives of the position, px per step along a row and from row to row: columns.
     pub jacobian: [DVec2; 2],
-    /// Deviation of the place, in edges.
+    /// Standard deviation of the position, in edges.
     pub sigma: f64,
 }
 
 impl LocalMap {
-    /// The map about `vertex`, of corners with N rays whose places `at` tells; `None` when they lie in
-    /// one line.
+    /// Returns the map about `vertex` of corners with N rays, whose positions `at` returns; `None` if they are
+    /// collinear.
     pub(crate) fn about<const N: usize>(
         vertex: Vertex,
         at: impl Fn(Vertex) -> Option<DVec2>,
@@ -122,8 +121,8 @@ impl LocalMap {
         let known = steps.iter().filter_map(|&(far, step)| Some((far, step, at(vertex + step)?)));
         let known: Vec<(f64, Vertex, DVec2)> = known.take(MOST).collect();
         let edge_px = edge_px(&known, |step| length(kind::<N>(), step))?;
-        // The prior of the second derivatives; next to none of the others, so that the equations of corners in one line
-        // have a solution.
+        // Prior of the second derivatives. The others have almost none, just enough to solve the equations of collinear
+        // corners.
         let mut normal = Matrix6::from_diagonal(&Vector6::from_fn(|i, _| match i {
             0..3 => NO_PRIOR,
             _ => bend.second.powi(-2),
@@ -143,7 +142,7 @@ impl LocalMap {
         }
         let solver = normal.cholesky()?;
         let [x, y] = right.map(|right| edge_px * solver.solve(&right));
-        // In one line nothing but the prior tells what lies beside it.
+        // For collinear corners, only the prior determines the map beside the line.
         let mut unit = Vector6::zeros();
         unit[0] = 1.0;
         let variance = solver.solve(&unit)[0];
@@ -159,13 +158,13 @@ impl LocalMap {
         })
     }
 
-    /// The direction of a lattice step, px.
+    /// Returns the direction of a lattice step, px.
     pub(crate) fn along(&self, step: Vertex) -> DVec2 {
         let [col, row] = self.jacobian;
         f64::from(step.col) * col + f64::from(step.row) * row
     }
 
-    /// Lattice coordinates (col, row) of a place, from the vertex; to first order.
+    /// Returns the lattice coordinates (col, row) of a position, relative to the vertex; to first order.
     pub(crate) fn steps_to(&self, place: DVec2) -> Option<DVec2> {
         let [col, row] = self.jacobian;
         let determinant = col.perp_dot(row);
@@ -173,7 +172,7 @@ impl LocalMap {
         (determinant != 0.0).then(|| DVec2::new(off.perp_dot(row), col.perp_dot(off)) / determinant)
     }
 
-    /// Distance of a place from the vertex in edges of the print; to first order.
+    /// Returns the distance of a position from the vertex in edges of the print; to first order.
     pub(crate) fn distance<const N: usize>(&self, place: DVec2) -> Option<f64> {
         let DVec2 { x: col, y: row } = self.steps_to(place)?;
         let way = kind::<N>().position(row, col);
@@ -181,7 +180,7 @@ impl LocalMap {
     }
 }
 
-/// The mean length of an edge among known corners, px.
+/// Returns the mean length of an edge among known corners, px.
 fn edge_px(known: &[(f64, Vertex, DVec2)], distance: impl Fn(Vertex) -> f64) -> Option<f64> {
     let (_, first, at) = *known.first()?;
     let others = || known.iter().skip(1);
@@ -214,7 +213,7 @@ mod tests {
             let map = LocalMap::about::<6>(vertex, known, bend(known)).unwrap();
             let off = map.distance::<6>(seen(vertex)).unwrap();
             assert!(off < 2.0 * map.sigma, "{off} at {beyond}, σ {}", map.sigma);
-            // What the bend is uncertain by grows with the square of the way.
+            // Uncertainty by the bend grows with the square of the distance.
             assert!(map.sigma < 0.06 * f64::from(beyond).powi(2), "σ {} at {beyond}", map.sigma);
         }
     }

@@ -1,15 +1,16 @@
-//! From corners to grids: which corner follows which, without labels.
+//! Grids: joins corners into lattices, without labels.
 //!
-//! Comes in: corners with their half-edges. Goes out: grids ([`saddle_grid::SaddleGrid`]), lattice coordinates up to a motion.
+//! Input: corners with their half-edges. Output: grids ([`saddle_grid::SaddleGrid`]) with lattice coordinates up to a
+//! motion.
 //!
-//! 1. `links` joins corners along clean edges (`edge`), by their neighbourhood (`neighbours`).
-//! 2. `grow` starts from four corners and grows tile by tile; `gaps` looks for what is missing, where tiles are narrow in the
-//!    frame of their neighbours (`rectified`), as often as an image of its size is worth (`effort`).
-//! 3. `parts` joins what a cover separates, where the map of a grid (`local_map`) continues.
-//! 4. `grids` runs these, and leaves out grids of the cells of tags and what was found twice.
+//! 1. `links` joins corners along clean edges (`edge`) in their neighbourhood (`neighbours`).
+//! 2. `grow` starts from four corners and grows tile by tile. `gaps` searches for missing corners; where tiles are
+//!    narrow, it searches in the frame of their neighbours (`rectified`). `effort` limits the searches per image.
+//! 3. `parts` joins parts on both sides of a cover, where the map of a grid (`local_map`) continues.
+//! 4. `grids` runs these, and removes duplicates and grids of the cells of tags.
 //! 5. `foreshortened` repeats all of it in images compressed along the tiles, for boards at a grazing angle.
-//! 6. `outline` fits a board that is seen whole; `beyond` refuses checkerboards without tags whose pattern continues where they
-//!    end, `tile_shape` those whose tiles (`checker_tiles`) are not squares.
+//! 6. `outline` fits a board that is seen whole. `beyond` rejects untagged checkerboards whose pattern continues beyond
+//!    their end, `tile_shape` those whose tiles (`checker_tiles`) are not squares.
 
 pub(crate) mod beyond;
 pub(crate) mod checker_tiles;

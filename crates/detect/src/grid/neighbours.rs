@@ -1,8 +1,8 @@
-//! Points by their neighbourhood: a square of buckets over all of them.
+//! A spatial index of points: a square of buckets over all of them.
 
 use glam::DVec2;
 
-/// Points in buckets about as many as they are, so that a bucket holds few.
+/// Points in buckets. There are about as many buckets as points, so a bucket contains few.
 #[derive(Clone, Debug)]
 pub(crate) struct Places<'a> {
     points: &'a [DVec2],
@@ -10,20 +10,20 @@ pub(crate) struct Places<'a> {
     side_px: f64,
     cols: usize,
     rows: usize,
-    /// Where the points of each bucket begin in `order`; one more than there are buckets.
+    /// Start of the points of each bucket in `order`; one more entry than buckets.
     starts: Vec<u32>,
     /// Indices of points, bucket by bucket.
     order: Vec<u32>,
 }
 
 impl<'a> Places<'a> {
-    /// An index of finite points.
+    /// Creates an index of finite points.
     pub(crate) fn new(points: &'a [DVec2]) -> Self {
         let bound = |pick: fn(DVec2, DVec2) -> DVec2| points.iter().copied().reduce(pick);
         let low = bound(DVec2::min).unwrap_or_default();
         let DVec2 { x: width, y: height } = bound(DVec2::max).unwrap_or_default() - low;
         let count = points.len().max(1) as f64;
-        // Of points in a line there are as many buckets as points.
+        // For collinear points there are as many buckets as points.
         let side_px = (width * height / count).sqrt().max(width.max(height) / count).max(1.0);
         let cells = |length: f64| (length / side_px) as usize + 1;
         let mut found = Self {
@@ -51,7 +51,7 @@ impl<'a> Places<'a> {
     }
 
     fn cell(&self, point: DVec2) -> [usize; 2] {
-        // Conversions saturate, so points outside fall to the border.
+        // Conversions saturate, so points outside are assigned to the border.
         let DVec2 { x, y } = (point - self.origin) / self.side_px;
         [(x as usize).min(self.cols - 1), (y as usize).min(self.rows - 1)]
     }
@@ -61,7 +61,7 @@ impl<'a> Places<'a> {
         row * self.cols + col
     }
 
-    /// The `count` points nearest to one of them, nearest first, without itself, of those that are `wanted`.
+    /// Returns the `count` points nearest to one of them, nearest first, without itself, among those that are `wanted`.
     pub(crate) fn nearest(
         &self,
         index: usize,
@@ -70,11 +70,11 @@ impl<'a> Places<'a> {
     ) -> Vec<usize> {
         let here = self.points[index];
         let [col, row] = self.cell(here).map(|c| c as isize);
-        // Rings hold more than is wanted; a longer list would grow.
+        // Rings contain more points than needed; a longer list would grow.
         let mut near: Vec<(f64, usize)> = Vec::with_capacity(4 * count);
         let reach = self.cols.max(self.rows) as isize;
         for ring in 0..=reach {
-            // What lies beyond the rings so far is farther away than this.
+            // Points beyond the rings so far are farther away than this.
             let complete_px = (ring - 1).max(0) as f64 * self.side_px;
             if near.iter().filter(|(d2, _)| *d2 <= complete_px * complete_px).count() >= count {
                 break;
@@ -120,7 +120,7 @@ mod tests {
         {
             let mut point =
                 || DVec2::new(random.random::<f64>() * width, random.random::<f64>() * height);
-            // Some of them crowded, and two in one place.
+            // Some of them crowded, and two in one position.
             let mut points: Vec<_> = (0..count).map(|_| point()).collect();
             points.extend((0..count / 2).map(|_| 0.05 * point()));
             points.push(points[0]);

@@ -7,7 +7,7 @@ use glam::DVec2;
 use super::saddle_grid::SaddleGrid;
 use deltille_core::lattice::{GridKind, LatticeMap, Vertex};
 
-/// All corners of the one board that is looked for.
+/// All corners of the only board to detect.
 #[derive(Clone, Debug)]
 pub(crate) struct WholeBoard {
     kind: GridKind,
@@ -15,17 +15,17 @@ pub(crate) struct WholeBoard {
 }
 
 impl WholeBoard {
-    /// A board with corners at these vertices.
+    /// Creates a board with corners at these vertices.
     pub(crate) fn new(kind: GridKind, vertices: impl IntoIterator<Item = Vertex>) -> Self {
         Self { kind, vertices: vertices.into_iter().collect() }
     }
 
-    /// How many corners it has.
+    /// Returns the number of corners.
     pub(crate) fn corners(&self) -> usize {
         self.vertices.len()
     }
 
-    /// Whether a grid has the board's corners and no others, however it is turned and shifted.
+    /// Returns whether a grid has exactly the board's corners, in any rotation and shift.
     pub(crate) fn is_shown_by<S>(&self, grid: &BTreeMap<Vertex, S>) -> bool {
         grid.len() == self.vertices.len()
             && (0..self.kind.steps().len() as i32).any(|turns| {
@@ -40,8 +40,8 @@ impl WholeBoard {
     }
 }
 
-/// The motion that puts a whole grid exactly onto an outline, if just one does. `inverted` boards
-/// show their upright tiles bright, so they lie half a turn round.
+/// Returns the motion that maps a whole grid exactly onto an outline, if exactly one does. `inverted` boards show their
+/// upright tiles bright, so they are rotated by 180°.
 pub(crate) fn fit_outline(
     grid: &SaddleGrid,
     outline: &BTreeSet<Vertex>,
@@ -63,12 +63,11 @@ pub(crate) fn fit_outline(
     fitting.next().is_none().then_some(map)
 }
 
-/// The motion that labels a grid that shows a whole checkerboard.
+/// Returns the motion that labels a grid of a whole checkerboard.
 ///
-/// A rectangle fits in two ways, a square in four. Row 0, column 0 is the lower left corner of the
-/// print when the print is turned so that the square at it, the one up and right of it, is dark;
-/// this tells the two ways apart where rows + columns is odd. Where it does not, they look the
-/// same, and the corner (0, 0) is the one that lies lowest in the image (then leftmost). On an
+/// A rectangle fits in two ways, a square in four. Row 0, column 0 is the lower left corner of the print, rotated so
+/// that the square up and right of this corner is dark. If rows + columns is odd, this determines the orientation.
+/// Otherwise both look the same, and (0, 0) is the corner that lies lowest in the image (then leftmost). On an
 /// `inverted` board that square is bright.
 pub(crate) fn fit_rectangle(
     grid: &SaddleGrid,
@@ -82,8 +81,8 @@ pub(crate) fn fit_rectangle(
     if grid.len() as i64 != i64::from(rows) * i64::from(cols) {
         return None;
     }
-    // Quarter turns of the labels against the grid's rows and columns: (0, 0) is then at the lower
-    // left, lower right, upper right or upper left of the grid.
+    // Quarter rotations of the labels against the grid's rows and columns: (0, 0) is then at the lower left, lower
+    // right, upper right or upper left of the grid.
     let fitting = (0..4u8)
         .filter(|turns| size == if turns.is_multiple_of(2) { (rows, cols) } else { (cols, rows) });
     let origin = move |turns: u8| {
@@ -113,7 +112,7 @@ mod tests {
     use super::*;
     use crate::grid::saddle_grid::PlacedSaddle;
 
-    /// A board seen upright: the lower left vertex of the print is `low`, one pixel a column.
+    /// An upright board: the lower left vertex of the print is `low`, with one pixel per column.
     fn board(rows: i32, cols: i32, low: Vertex, turns: u8) -> SaddleGrid {
         let vertices = (0..rows).flat_map(|r| (0..cols).map(move |c| (r, c)));
         vertices
@@ -144,7 +143,7 @@ mod tests {
             prop_assert_eq!(labels.len(), grid.len());
             prop_assert_eq!(labels.first(), Some(&Vertex::new(0, 0)));
             prop_assert_eq!(labels.last(), Some(&Vertex::new(rows - 1, cols - 1)));
-            // Unmirrored, and neighbours stay neighbours.
+            // Not mirrored, and neighbours stay neighbours.
             let at = |label: Vertex| {
                 let (_, placed) = grid.iter().find(|(v, _)| map(**v) == label).unwrap();
                 placed.position
@@ -152,7 +151,7 @@ mod tests {
             let (o, c, r) = (at(Vertex::new(0, 0)), at(Vertex::new(0, 1)), at(Vertex::new(1, 0)));
             let cross = (c[0] - o[0]) * (r[1] - o[1]) - (c[1] - o[1]) * (r[0] - o[0]);
             prop_assert_eq!(cross, -1.0);
-            // The square at (0, 0) is dark where a turn of the print can make it so.
+            // The square at (0, 0) is dark if a rotation of the print can make it so.
             let of_square = |label: Vertex| {
                 let corners = [(0, 0), (0, 1), (1, 0), (1, 1)].map(|(r, c)| label + Vertex::new(r, c));
                 let on_grid = grid.keys().filter(|v| corners.contains(&map(**v)));

@@ -1,10 +1,9 @@
-//! Joining of the parts of a partly covered board, through the local map of one part.
+//! Joins the parts of a partly covered board through the local map of one part.
 //!
-//! A finger over a board leaves grids that no link joins, and single corners without a completely
-//! visible tile. The local map of a grid ([`LocalMap`]) predicts where its lattice continues behind
-//! the finger. A corner there belongs to the board when it lies at a vertex and all its edges have
-//! the predicted directions, each with its dark side on the right hand; a grid belongs to the same
-//! board when all its corners that are near enough do.
+//! A finger over a board leaves grids that no link joins, and single corners without a completely visible tile. The
+//! local map of a grid ([`LocalMap`]) predicts where its lattice continues behind the finger. A corner there belongs to
+//! the board if it lies at a vertex and all its edges have the predicted directions, each with its dark side on the
+//! right. A grid belongs to the same board if all its corners that are near enough do.
 
 use std::collections::BTreeMap;
 
@@ -22,37 +21,35 @@ use crate::tiling::{kind, neighbours, step};
 use deltille_core::lattice::{GridKind, LatticeMap, Vertex};
 use deltille_core::raster::Pyramid;
 
-/// Greatest distance of a vertex from the corners of a grid, in edges of the map: farther away the
-/// map predicts next to nothing.
+/// Maximum distance of a vertex from the corners of a grid, in edges of the map. Farther away, the map predicts almost
+/// nothing.
 const MAX_REACH: f64 = 4.0;
 
-/// Beyond a grid that approaches the camera, edges are on average at most this many times as long
-/// as its longest.
+/// Mean length of edges beyond a grid that approaches the camera, at most, relative to the longest edge of the grid.
 const NEARER: f64 = 2.0;
 
-/// Largest standard deviations of a predicted position, in edges, in the order of trial: certain
-/// corners make the rest more certain. Within three of the largest a position is nearer to its
-/// vertex than anything else in a tile.
+/// Maximum standard deviations of a predicted position, in edges, in the order of trial: reliable corners improve the
+/// predictions of the rest. Within 3σ at the largest, a position is nearer to its vertex than to anything else in a
+/// tile.
 const SIGMAS: [f64; 3] = [0.02, 0.04, 0.08];
 
-/// Greatest distance of a corner from its predicted position, in standard deviations.
+/// Maximum distance of a corner from its predicted position, in standard deviations.
 const MAX_SIGMAS: f64 = 3.0;
 
 /// At least one in so many edges to neighbours must be visible.
 const MOST_COVERED: usize = 3;
 
-/// Least number of corners of a grid that predicts others: an initial quad has four.
+/// Minimum number of corners of a grid that predicts others; an initial quad has four.
 const LEAST: usize = 5;
 
-/// Number of corners that are compared in the time of one look into the picture, for the budget.
+/// Number of corners that are compared in the time of one search in the image, for the budget.
 const CORNERS_IN_A_LOOK: usize = 100;
 
-/// Where a saddle is in a set of grids.
+/// Grid and vertex of each saddle in a set of grids.
 type Owners = BTreeMap<usize, (usize, Vertex)>;
 
-/// Joins grids that are parts of one board, and lets them adopt single corners. `places` are those
-/// of all saddle points, `members` the indices of those in the grids. Returns which grids have
-/// grown.
+/// Joins grids that are parts of one board, and adds single corners to them. `places` are those of all saddle points,
+/// `members` the indices of those in the grids. Returns which grids have grown.
 pub(crate) fn join<const N: usize>(
     pyramid: &Pyramid,
     saddles: &[Saddle<N>],
@@ -76,7 +73,7 @@ pub(crate) fn join<const N: usize>(
             if !joining.effort.spend(joining.grids[base].len() + candidates.len()) {
                 break;
             }
-            // Nothing changes before something is adopted.
+            // Nothing changes until a corner is added.
             if !SIGMAS.into_iter().any(|sigma| joining.adopt(base, &candidates, bend, sigma)) {
                 break;
             }
@@ -89,18 +86,18 @@ pub(crate) fn join<const N: usize>(
 /// Grids that are being joined.
 struct Joining<'a, const N: usize> {
     pyramid: &'a Pyramid<'a>,
-    /// All saddle points, and where to find them.
+    /// All saddle points, and their spatial index.
     saddles: &'a [Saddle<N>],
     places: &'a Buckets,
     grids: Vec<Growing<N>>,
-    /// Which of the saddle points are in them.
+    /// Saddle points in the grids.
     owners: Owners,
     effort: &'a mut Effort,
 }
 
 impl<const N: usize> Joining<'_, N> {
-    /// Adds to a grid the candidates that its map confirms, with a standard deviation of the prediction
-    /// of at most `sigma` edges; returns whether there were any.
+    /// Adds to a grid the candidates that its map confirms. The standard deviation of the prediction may be at most
+    /// `sigma` edges. Returns whether any were added.
     fn adopt(
         &mut self,
         base: usize,
@@ -111,7 +108,7 @@ impl<const N: usize> Joining<'_, N> {
         let Self { pyramid, saddles, grids, owners, effort, .. } = self;
         let mut adopted = false;
         for &(index, vertex) in candidates {
-            // The nearest corner of the grid is sought among all.
+            // The nearest corner of the grid is searched among all.
             if !effort.spend(1 + grids[base].len() / CORNERS_IN_A_LOOK) {
                 break;
             }
@@ -152,7 +149,7 @@ impl<const N: usize> Joining<'_, N> {
         adopted
     }
 
-    /// Saddle points near a vertex without a corner, with that vertex, the nearest to the grid first.
+    /// Returns saddle points near a vertex without a corner, each with that vertex, the nearest to the grid first.
     fn candidates(&self, base: usize, bend: Bend) -> Vec<(usize, Vertex)> {
         let grid = &self.grids[base];
         let Some((middle, reach_px)) = surroundings(grid) else {
@@ -200,7 +197,7 @@ fn bend<const N: usize>(grid: &Growing<N>) -> Bend {
     Bend::of::<N>(grid.keys().copied(), at(grid), level)
 }
 
-/// A circle (centre and radius, px) around all places that a grid predicts.
+/// Returns a circle (centre and radius, px) around all positions that a grid predicts.
 fn surroundings<const N: usize>(grid: &Growing<N>) -> Option<(DVec2, f64)> {
     let places: Vec<DVec2> = grid.values().map(|grown| grown.saddle.position).collect();
     let edges_px = grid.iter().flat_map(|(&v, grown)| {
@@ -214,7 +211,7 @@ fn surroundings<const N: usize>(grid: &Growing<N>) -> Option<(DVec2, f64)> {
     Some((lower.midpoint(upper), reach_px))
 }
 
-/// The saddle point as a corner of a grid, if it lies at a vertex and has the predicted edges.
+/// Returns the saddle point as a corner of a grid, if it lies at a vertex and has the predicted edges.
 fn belongs<const N: usize>(
     grid: &Growing<N>,
     vertex: Vertex,
@@ -245,8 +242,8 @@ fn belongs<const N: usize>(
     (off(turn) <= MAX_CHORD_RAD).then_some(GrownSaddle { saddle: *saddle, turn })
 }
 
-/// Whether a corner is connected to its neighbours in a grid: some of the edges between them are
-/// visible, if there are neighbours. Between separate dots none is.
+/// Returns whether a corner is connected to its neighbours in a grid: some of the edges between them are visible, if
+/// there are neighbours. Between separate dots, none is.
 fn is_joined<const N: usize>(
     pyramid: &Pyramid,
     grid: &Growing<N>,
@@ -269,7 +266,7 @@ fn is_joined<const N: usize>(
     MOST_COVERED * clean >= beside
 }
 
-/// The contrast of the corner of a grid that is nearest to a vertex on the lattice.
+/// Returns the contrast of the corner of a grid that is nearest to a vertex on the lattice.
 fn contrast_near<const N: usize>(grid: &Growing<N>, vertex: Vertex) -> Option<f64> {
     let far = |v: &Vertex| {
         let step = *v - vertex;
@@ -280,8 +277,8 @@ fn contrast_near<const N: usize>(grid: &Growing<N>, vertex: Vertex) -> Option<f6
     Some(nearest.1.saddle.sectors.amplitude)
 }
 
-/// Whether a part, moved by a lattice map, continues a grid: no vertex is in both, and each of its
-/// corners is where the grid predicts it, as far as it does.
+/// Returns whether a part, moved by a lattice map, continues a grid: no vertex is in both, and each of its corners is
+/// at its predicted position, as far as there is a prediction.
 fn is_part<const N: usize>(
     grid: &Growing<N>,
     part: &Growing<N>,

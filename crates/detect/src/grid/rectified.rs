@@ -1,9 +1,8 @@
-//! A corner looked for in the frame of its neighbours.
+//! Finds a corner in the frame of its neighbours.
 //!
-//! Seen at the rim of a fisheye lens, tiles become strips a few pixels wide that meet at 15°. No
-//! circle around such a corner shows its sectors and nothing else. The two edges that its
-//! neighbours predict do: resampled so that these are as long and as far apart as on the print, the
-//! corner looks like any other.
+//! Near the edge of a fisheye image, tiles become strips a few pixels wide that meet at 15°. No circle around such a
+//! corner shows only its sectors. Its neighbours predict two edges. The image is resampled so that these have the
+//! lengths and the angle of the print. The corner then looks like any other.
 //!
 //! ```text
 //!      ╱░░╱██╱                          ░░│██
@@ -20,23 +19,22 @@ use crate::corners::saddles::{Saddle, SaddleFinder};
 use crate::corners::sectors::Sectors;
 use deltille_core::raster::{Gray, Pyramid};
 
-/// Lengths of an edge in the patch, px, in the order of trial: the widest fit of the finder reaches eight and
-/// stays within the tiles around the corner, and the usual one within what tags leave clear of a longer edge.
+/// Lengths of an edge in the patch, px, in the order of trial. The widest fit of the finder reaches 8 px and stays
+/// within the tiles around the corner. The usual fit stays within the area that tags leave clear on a longer edge.
 const EDGES_PX: [f64; 2] = [16.0, 28.0];
 
-/// Largest distance of a corner from where its neighbours predict it, as a part of an edge: where
-/// tiles shrink to a third from one to the next, rows continued evenly are off by as much, and still
-/// no other corner is nearer.
+/// Maximum distance of a corner from its predicted position, as a fraction of an edge. If tiles shrink to a third from
+/// one to the next, evenly continued rows are off by as much, and still no other corner is nearer.
 const MAX_WAY: f64 = 0.5;
 
 /// Reach of the widest fit, px.
 const FIT_REACH_PX: f64 = 9.0;
 
-/// A view whose axes differ by less than this factor shows nothing that the picture does not show as well:
-/// sectors seen at 45° are still 40° wide.
+/// Minimum ratio of the axes of a view. A smaller one shows nothing that the image does not show as well: sectors seen
+/// at 45° are still 40° wide.
 const LEAST_STRETCH: f64 = 1.5;
 
-/// An affine view of the surroundings of a place.
+/// An affine view of the surroundings of a position.
 pub(crate) struct Rectified {
     place: DVec2,
     edge_px: f64,
@@ -44,9 +42,9 @@ pub(crate) struct Rectified {
 }
 
 impl Rectified {
-    /// The views around `place` in which edge `k` of the lattice, seen along `edges[0]`, and the next
-    /// one counter-clockwise, along `edges[1]`, lie as on the print, smaller and larger. `None` when they are in
-    /// line.
+    /// Returns the views around `place`, smaller and larger, that set two edges as on the print. These are edge `k` of
+    /// the lattice, seen along `edges[0]`, and the next one counter-clockwise, along `edges[1]`. Returns `None` if they
+    /// are collinear.
     pub(crate) fn views<const N: usize>(
         place: DVec2,
         k: usize,
@@ -69,19 +67,19 @@ impl Rectified {
         let patch = Matrix2::from_columns(&[direction(k), direction(k + 1)]);
         let image = Matrix2::from_columns(&edges.map(|edge| edge.to_array().into()));
         let image_from_patch = image * patch.try_inverse()?;
-        // A mirrored view is no view of this print.
+        // A mirrored view is not a view of this print.
         (image_from_patch.determinant() > 0.0).then_some(Self { place, edge_px, image_from_patch })
     }
 
-    /// Whether the patch shows more than a level of the pyramid by itself: tiles that are narrow there, or
-    /// too small.
+    /// Returns whether the patch shows more than a level of the pyramid on its own: tiles that are narrow there, or too
+    /// small.
     fn shows_more(&self, level: usize) -> bool {
         let axes = self.image_from_patch.singular_values() / f64::from(1u32 << level);
         axes[1] < 1.0 || axes[0] > LEAST_STRETCH * axes[1]
     }
 
-    /// The nearest of the corners about the place that `accept` takes, as a level of the pyramid shows them, if
-    /// the patch shows more than that.
+    /// Returns the nearest accepted corner about the position, as a level of the pyramid shows it, if the patch shows
+    /// more than that level.
     pub(crate) fn find<const N: usize, S>(
         &self,
         finder: &SaddleFinder<N>,
@@ -93,7 +91,7 @@ impl Rectified {
             return None;
         }
         let image = &pyramid.levels()[level];
-        // That reach, and the way.
+        // That reach, and the displacement.
         let way_px = MAX_WAY * self.edge_px;
         let half_side = (FIT_REACH_PX + way_px) as usize + 1;
         let centre = DVec2::splat(half_side as f64);
@@ -123,7 +121,7 @@ impl Rectified {
         })
     }
 
-    /// A way in the patch as it is in the picture, px.
+    /// Converts a displacement in the patch to the image, px.
     fn way_in_image(&self, way: DVec2) -> DVec2 {
         let seen = self.image_from_patch * Vector2::new(way.x, way.y);
         DVec2::new(seen.x, seen.y)

@@ -1,4 +1,4 @@
-//! A grid of corners: while it grows, with the half-edges of each corner, and as later stages need it.
+//! Grids of corners: with the half-edges of each corner while they grow, and in the form that later stages need.
 
 use std::collections::BTreeMap;
 
@@ -19,18 +19,18 @@ pub(crate) struct PlacedSaddle {
 /// Corners by lattice vertex.
 pub(crate) type SaddleGrid = BTreeMap<Vertex, PlacedSaddle>;
 
-/// Where a vertex lies in the mirror: rows and columns are exchanged, which leaves upright tiles upright and
-/// dark squares dark.
+/// Returns the mirror image of a vertex: rows and columns are exchanged, which leaves upright tiles upright and dark
+/// squares dark.
 pub(crate) fn mirrored(vertex: Vertex) -> Vertex {
     Vertex::new(vertex.col, vertex.row)
 }
 
-/// A grid with the vertices that it has in a mirror: that of a flopped picture, turned the right way.
+/// Returns a grid with mirrored vertices: that of a flopped image, corrected.
 pub(crate) fn mirror_image(grid: &SaddleGrid) -> SaddleGrid {
     grid.iter().map(|(&vertex, &placed)| (mirrored(vertex), placed)).collect()
 }
 
-/// A corner in a grid while it grows.
+/// A corner in a growing grid.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct GrownSaddle<const N: usize> {
     /// The corner.
@@ -40,11 +40,11 @@ pub(crate) struct GrownSaddle<const N: usize> {
 }
 
 impl<const N: usize> GrownSaddle<N> {
-    /// Index of the ray along step `k` of the lattice.
+    /// Returns the index of the ray along step `k` of the lattice.
     pub(crate) fn ray(&self, k: usize) -> usize {
         (k + N - self.turn) % N
     }
 }
 
-/// A grid while it grows.
+/// A growing grid.
 pub(crate) type Growing<const N: usize> = BTreeMap<Vertex, GrownSaddle<N>>;

@@ -1,20 +1,18 @@
-//! Whether the tiles of a checkerboard without tags are squares.
+//! Tests whether the tiles of an untagged checkerboard are squares.
 //!
-//! With a and b from 0 to 1 along and across a square, a board shows the product of two profiles, whose
-//! waves are
+//! Let a and b run from 0 to 1 along and across a square. A board shows the product of two profiles, whose waves are
 //!
 //! ```text
 //!     f(a, b) = Σ F_jk sin(πja) sin(πkb),     j, k odd
 //! ```
 //!
-//! with F_jk = F_j F_k, and F_3 a third of F_1 that blur takes away from. A sum of two waves, however it is
-//! slanted, has corners like a blurred board, but F_3 is nothing along and across; a slanted board is blurred in
-//! one direction first. Dots that are round have waves along and across, but F_33 is negative, since they leave
-//! the corners of the squares.
+//! with F_jk = F_j F_k. F_3 is a third of F_1, reduced by blur. A sum of two waves of any slant has corners like a
+//! blurred board, but its F_3 vanishes along and across; in a slanted board, blur removes F_3 in one direction first.
+//! Round dots have waves along and across, but a negative F_33, because they leave the corners of the squares.
 //!
-//! Random cells and those of a dither are squares. But a few of them that happen to alternate are rows of
-//! corners rather than areas; and many of them alternate but for single ones among the others, while what covers
-//! a board seldom ends with a square on all four sides.
+//! Random cells and those of a dither are squares. A few of them that happen to alternate form rows of corners rather
+//! than areas. Many of them alternate except for isolated ones among the others, while a cover over a board seldom ends
+//! with a square on all four sides.
 
 use std::collections::BTreeSet;
 
@@ -23,35 +21,36 @@ use deltille_core::detection::Grid;
 use deltille_core::lattice::{GridKind, Vertex};
 use deltille_core::raster::ImageView;
 
-/// The least board, of 3 × 3 corners, has so many whole squares.
+/// Number of whole squares of the smallest board, of 3 × 3 corners.
 const LEAST_SQUARES: usize = 4;
 
-/// Blur of a quarter of an edge, which the model reads in a wave, leaves an F_3 of 0.028 of F_1; a wave has none.
+/// Minimum F_3, relative to F_1. The model reads a wave as a blur of a quarter of an edge. Such a blur leaves an F_3 of
+/// 0.028; a wave has none.
 const WAVE: f64 = 0.02;
 
-/// Of plain squares F_3 over F_1 is no more than this; tags have more.
+/// Maximum F_3 of plain squares, relative to F_1; tags have more.
 const PLAIN: f64 = 1.0 / 3.0;
 
-/// F_33 of squares is the product of F_3 along and across, and no less than this part of it.
+/// Minimum F_33 of squares, relative to its ideal value, the product of F_3 along and across.
 const LEAST_PRODUCT: f64 = 0.5;
 
-/// But for so many deviations, as waves tell that tiles of boards and dots do not have.
+/// Tolerance of these limits, in standard deviations, measured by waves that tiles of boards and dots do not have.
 const DEVIATIONS: f64 = 3.0;
 
-/// Fewer single squares of the wrong colour than this are dirt, however few the whole ones are.
+/// Number of isolated squares of the wrong colour below which they count as dirt, for any number of whole squares.
 const LEAST_WRONG: usize = 3;
 
-/// And so are fewer than this part of the whole ones.
+/// The same as a fraction of the whole squares.
 const WRONG_PART: f64 = 1.0 / 16.0;
 
-/// A square of the wrong colour is at least this near to it, as a part of the way from the right one.
+/// Minimum approach of a square to the wrong colour, as a fraction of the distance from the right one.
 const WRONG: f64 = 0.75;
 
-/// Samples along and across a square.
+/// Number of samples along and across a square.
 const SAMPLES: usize = 8;
 
-/// Whether a grid without tags is made of squares, with its corners refined. Of deltille grids it
-/// tells nothing.
+/// Returns whether an untagged grid consists of squares, after refinement of its corners. Returns true for deltille
+/// grids.
 pub(crate) fn is_of_squares(image: ImageView, grid: &Grid, may_have_tags: bool) -> bool {
     if grid.kind == GridKind::Deltille {
         return true;
@@ -63,19 +62,18 @@ pub(crate) fn is_of_squares(image: ImageView, grid: &Grid, may_have_tags: bool) 
         && Waves::of(&tiles).is_none_or(|waves| waves.are_of_squares(may_have_tags))
 }
 
-/// Parts of F_11 that other waves have.
+/// Amplitudes of other waves, relative to F_11.
 #[derive(Clone, Copy, Debug)]
 struct Waves {
     along: f64,
     across: f64,
     both: f64,
-    /// Deviation of each by noise and by the places of the corners: what waves have of which neither half is
-    /// like the other.
+    /// Standard deviation of each by noise and by the positions of the corners, from waves whose halves are not alike.
     noise: f64,
 }
 
 impl Waves {
-    /// Of the whole squares together.
+    /// Measures the whole squares together.
     fn of(tiles: &CheckerTiles) -> Option<Self> {
         let part = |i: usize| (i as f64 + 0.5) / SAMPLES as f64;
         let mut mean = [[0.0; SAMPLES]; SAMPLES];
@@ -83,7 +81,7 @@ impl Waves {
             let sign = [1.0, -1.0][parity(square.vertex)];
             for (i, row) in mean.iter_mut().enumerate() {
                 for (j, sum) in row.iter_mut().enumerate() {
-                    // At the border of the picture a part of a square tells nothing.
+                    // At the border of the image, a part of a square has no information.
                     let value = tiles.brightness(square.place(part(j), part(i)));
                     *sum += sign * value.unwrap_or(0.0);
                 }
@@ -116,7 +114,7 @@ impl Waves {
     }
 }
 
-/// Whether there are few single squares of the wrong colour among others.
+/// Returns whether there are few isolated squares of the wrong colour among others.
 fn has_few_wrong_squares(tiles: &CheckerTiles, whole: usize) -> bool {
     let Some(levels) = tiles.levels() else {
         return true;
@@ -133,14 +131,14 @@ fn has_few_wrong_squares(tiles: &CheckerTiles, whole: usize) -> bool {
     wrong < LEAST_WRONG || (wrong as f64) < WRONG_PART * whole as f64
 }
 
-/// The square at a vertex, if none of its corners is known and some are on each of its sides.
+/// Returns the square at a vertex, if none of its corners is known and some are on each of its sides.
 fn single(tiles: &CheckerTiles, vertex: Vertex) -> Option<Square> {
     let at = |row, col| tiles.at(vertex + Vertex::new(row, col));
     let own = [(0, 0), (0, 1), (1, 0), (1, 1)];
     if own.into_iter().any(|(row, col)| at(row, col).is_some()) {
         return None;
     }
-    // Places on opposite sides have the square's middle between them, three edges apart on the print.
+    // Positions on opposite sides have the square's centre between them, three edges apart on the print.
     let opposite = |from: Option<Point>, to: Option<Point>| Some((from?, to?));
     let below = opposite(at(-1, 0), at(2, 1)).or_else(|| opposite(at(-1, 1), at(2, 0)));
     let beside = opposite(at(0, -1), at(1, 2)).or_else(|| opposite(at(1, -1), at(0, 2)));

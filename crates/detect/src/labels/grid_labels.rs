@@ -151,7 +151,7 @@ impl Labels {
                     }
                     let why = match &evidence {
                         Some(evidence) => why::no_labels(evidence, grid, size),
-                        None if are_alike(panels, grid) => {
+                        None if have_equal_size(panels, grid) => {
                             Reason::new(ReasonKind::Ambiguous, [("corners", grid.len() as f64)])
                         }
                         None => why::no_outline(grid, largest(panels), size),
@@ -298,7 +298,7 @@ fn largest(panels: &[TargetPanel]) -> usize {
 
 /// Returns whether a grid has as many corners as several untagged panels, such as faces of a solid, that cannot be
 /// distinguished.
-fn are_alike(panels: &[TargetPanel], grid: &SaddleGrid) -> bool {
+fn have_equal_size(panels: &[TargetPanel], grid: &SaddleGrid) -> bool {
     let is_full = |panel: &&TargetPanel| !panel.tagged && panel.corner_ids.len() == grid.len();
     panels.iter().filter(is_full).count() > 1
 }
