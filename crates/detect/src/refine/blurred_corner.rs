@@ -1,22 +1,22 @@
 //! The brightness around an ideal corner under a Gaussian blur, and its derivatives.
 //!
-//! K straight edges meet in the corner; h₁ … h_K are the signed distances of a point from them, in
-//! units of the blur, for edge angles that rise within a half-turn. Bright is +1 and dark −1:
+//! K straight edges meet in the corner. h₁ … h_K are the signed distances of a point from them, in units of the blur,
+//! for edge angles that increase within 180°. Bright is +1 and dark −1:
 //!
 //! ```text
 //!     deltille    s₁ s₂ s₃ = s₁ − s₂ + s₃      f = erf(h₁/√2) − erf(h₂/√2) + erf(h₃/√2)
 //!     checker     s₁ s₂                        f = E[sign(h₁ + z₁) sign(h₂ + z₂)],  corr(z) = ρ
 //! ```
 //!
-//! where s = sign h and ρ = cos(θ₂ − θ₁) is the cosine between the edges' normals. With
-//! Drezner and Wesolowsky's integral for the orthant probability (1990, J. Stat. Comput. Simul. 35)
+//! where s = sign h, and ρ = cos(θ₂ − θ₁) is the cosine between the normals of the edges. With Drezner and Wesolowsky's
+//! integral for the orthant probability (1990, J. Stat. Comput. Simul. 35)
 //!
 //! ```text
 //!     f = erf(h₁/√2) erf(h₂/√2) + 2/π ∫₀^{asin ρ} exp(−(h₁² + h₂² − 2 h₁h₂ sin φ)/(2 cos² φ)) dφ
 //! ```
 //!
-//! Everything is straight-line single precision so that the compiler can work on several pixels at
-//! once. Errors are below 3·10⁻⁶ (tests).
+//! All computations are straight-line single precision, so that the compiler can vectorise over pixels. Errors are
+//! below 3·10⁻⁶ (tests).
 
 use std::f32::consts::{FRAC_1_SQRT_2, FRAC_2_PI, LN_2, LOG2_E};
 use std::f64::consts::PI;
@@ -24,7 +24,8 @@ use std::f64::consts::PI;
 /// √(2/π): the slope of erf(h/√2) at 0.
 const SLOPE: f32 = 0.797_884_6;
 
-/// Nodes and weights of the Gauss–Legendre rule of six points on −1 … 1, enough for 10⁻⁶ up to |ρ| = 0.9, edges 25° apart.
+/// Nodes and weights of the Gauss–Legendre rule of six points on −1 … 1. They suffice for 10⁻⁶ up to |ρ| = 0.9, edges
+/// 25° apart.
 const RULE_OF_SIX: [(f64, f64); 6] = [
     (0.238_619_186, 0.467_913_935),
     (-0.238_619_186, 0.467_913_935),
@@ -34,11 +35,11 @@ const RULE_OF_SIX: [(f64, f64); 6] = [
     (-0.932_469_514, 0.171_324_492),
 ];
 
-/// Of three points, enough for 2·10⁻⁵ up to [`FEW_NODES_RHO`].
+/// The rule of three points, which suffices for 2·10⁻⁵ up to [`FEW_NODES_RHO`].
 const RULE_OF_THREE: [(f64, f64); 3] =
     [(0.0, 0.888_888_889), (0.774_596_669, 0.555_555_556), (-0.774_596_669, 0.555_555_556)];
 
-/// Edges 46° apart.
+/// Largest ρ for the rule of three points: edges 46° apart.
 pub(crate) const FEW_NODES_RHO: f64 = 0.7;
 
 /// A value with its derivatives.
@@ -48,22 +49,22 @@ pub(crate) struct Shade<const K: usize> {
     pub f: f32,
     /// ∂f/∂h_k.
     pub slopes: [f32; K],
-    /// ∂f/∂ρ; 0 where edges do not interact.
+    /// ∂f/∂ρ; 0 if edges do not interact.
     pub correlation: f32,
-    /// ∂f/∂α, of the strength of a halo; 0 without one.
+    /// ∂f/∂α, with the strength α of a halo; 0 without one.
     pub halo: f32,
     /// Derivatives by the parameters of a triangle between the edges; 0 without one.
     pub triangle: [f32; TRIANGLE_PARAMS],
-    /// Derivatives by half of the way of a motion across each edge; 0 without one.
+    /// Derivatives by half of the motion across each edge; 0 without motion.
     pub way: [f32; K],
 }
 
 /// The brightness around a corner of K edges.
 ///
-/// A trait, since its methods are compiled for the processor of the loop that they are inlined into; closures
-/// that are called twice are not.
+/// A trait, because its methods are compiled for the processor of the loop into which they are inlined. Closures that
+/// are called twice are not.
 pub(crate) trait Pattern<const K: usize> {
-    /// The brightness at distances h from the edges.
+    /// Returns the brightness at distances h from the edges.
     fn at(&self, h: [f32; K]) -> Shade<K>;
 }
 
@@ -85,13 +86,13 @@ impl<const NODES: usize> Pattern<2> for Orthant<NODES> {
     }
 }
 
-/// The corner of a picture that was sharpened: (1 + α)·f(h) − α·f(h/w). A pattern of edges is linear in the
-/// point spread function, so this is exact where the mask is a Gaussian.
+/// The corner of a sharpened image: (1 + α)·f(h) − α·f(h/w). A pattern of edges is linear in the point spread function,
+/// so this is exact for a Gaussian mask.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Haloed<P> {
-    /// Without the halo.
+    /// The pattern without the halo.
     pub pattern: P,
-    /// As wide as the halo, at distances in its units: the same, but for a way in them.
+    /// The same pattern at the width of the halo, at distances in its units; only its motion differs.
     pub wide: P,
     /// α.
     pub strength: f32,
@@ -115,24 +116,24 @@ impl<const K: usize, P: Pattern<K>> Pattern<K> for Haloed<P> {
     }
 }
 
-/// The triangle between three edges that miss each other, since what is dark has grown or shrunk: the dark tiles
-/// overlap there, where the alternating sum has −3. Blurred, it is nearly a Gaussian with the triangle's area,
-/// centroid and variance.
+/// The triangle between three edges that do not meet in a point, because dark areas have grown or shrunk. The dark
+/// tiles overlap there, where the alternating sum is −3. Blurred, it is nearly a Gaussian with the area, centroid and
+/// variance of the triangle.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Overlap {
-    /// 1 where what is dark has grown, −1 where it has shrunk.
+    /// 1 if dark areas have grown, −1 if they have shrunk.
     sign: f64,
-    /// Logarithm of what it adds to f in its middle.
+    /// Logarithm of its contribution to f at its centre.
     ln_height: f64,
-    /// Its middle: distances from the first two edges in units of the blur.
+    /// Its centre: distances from the first two edges in units of the blur.
     middle: [f64; 2],
     /// Inverse of its covariance: xx, xy, yy.
     inverse: [f64; 3],
 }
 
 impl Overlap {
-    /// Between h₁ = 0, h₂ = 0 and h₃ = a·h₁ + b·h₂ + c = 0 under a blur of this covariance along the first two
-    /// normals.
+    /// Creates the triangle between h₁ = 0, h₂ = 0 and h₃ = a·h₁ + b·h₂ + c = 0, under a blur of this covariance along
+    /// the first two normals.
     pub(crate) fn between([a, b, c]: [f64; 3], [xx, xy, yy]: [f64; 3], sign: f64) -> Self {
         let [x, y] = [-c / a, -c / b];
         // The covariance of a triangle with the sides x and y along the axes: x²/18, −xy/36, y²/18.
@@ -149,8 +150,8 @@ impl Overlap {
         }
     }
 
-    /// Its relative derivative by what moves it to `other` in a step: coefficients of 1, x, y, x², xy and y², at
-    /// a distance (x, y) from the middle.
+    /// Returns its relative derivative along the change to `other` in a step. The coefficients are those of 1, x, y,
+    /// x², xy and y² at a distance (x, y) from the centre.
     fn towards(&self, other: &Self, step: f64) -> [f32; 6] {
         let by = |from: f64, to: f64| (to - from) / step;
         let [x, y] = [0, 1].map(|i| by(self.middle[i], other.middle[i]));
@@ -168,7 +169,7 @@ impl Overlap {
     }
 }
 
-/// Parameters that a triangle depends on, beside the distances from the edges.
+/// Number of parameters that a triangle depends on, beside the distances from the edges.
 pub(crate) const TRIANGLE_PARAMS: usize = 5;
 
 /// An [`Overlap`] with its derivatives, for many pixels.
@@ -181,7 +182,7 @@ pub(crate) struct Triangle {
 }
 
 impl Triangle {
-    /// With what becomes of it after a step in each parameter.
+    /// Creates it from the triangles after a step in each parameter.
     pub(crate) fn new(here: Overlap, there: [Overlap; TRIANGLE_PARAMS], step: f64) -> Self {
         Self {
             height: (here.sign * here.ln_height.exp()) as f32,
@@ -192,12 +193,12 @@ impl Triangle {
     }
 }
 
-/// Three edges that miss each other, with the triangle between them.
+/// Three edges that do not meet in a point, with the triangle between them.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Inked<P> {
     /// The edges.
     pub edges: P,
-    /// What lies between them.
+    /// The triangle between them.
     pub triangle: Triangle,
 }
 
@@ -219,28 +220,28 @@ impl<const K: usize, P: Pattern<K>> Pattern<K> for Inked<P> {
     }
 }
 
-/// Boxes shorter than this, to each side in units of the blur, are as long: it widens the blur by 0.2 %.
+/// Minimum length of a box to each side, in units of the blur. It widens the blur by 0.2 %.
 const LEAST_WAY: f32 = 0.1;
 
-/// Three edges in a picture that moved along a line at a constant speed, half of the way on each side of the middle. An
-/// edge's blur is then a box after a Gaussian.
+/// Three edges in an image that moved along a line at constant speed, half of the motion on each side of the centre.
+/// The blur of an edge is then a box after a Gaussian.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct SweptDeltille {
-    /// Half of the way across each edge, in units of the blur: its length, the inverse of its double, and its sign.
+    /// Half of the motion across each edge, in units of the blur: its length, the inverse of its double, and its sign.
     reach: [f32; 3],
     over_whole: [f32; 3],
     signs: [f32; 3],
 }
 
 impl SweptDeltille {
-    /// With half of the way across each edge, in units of the blur.
+    /// Creates it from half of the motion across each edge, in units of the blur.
     pub(crate) fn new(way: [f32; 3]) -> Self {
         let reach = way.map(|way| way.abs().max(LEAST_WAY));
         let over_whole = reach.map(|reach| 0.5 / reach);
         Self { reach, over_whole, signs: way.map(f32::signum) }
     }
 
-    /// An edge at this distance, its slope, and its derivative by the way.
+    /// Returns an edge at this distance, its slope, and its derivative by the motion.
     #[inline(always)]
     fn edge(&self, k: usize, h: f32) -> [f32; 3] {
         let [ahead, behind] = [h + self.reach[k], h - self.reach[k]];
@@ -270,22 +271,22 @@ impl Pattern<3> for SweptDeltille {
     }
 }
 
-/// Two edges alike. The box is made of four Gaussians, and what blur is left.
+/// Two edges in motion. The box consists of four Gaussians, and the rest is blur.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct SweptChecker<P> {
-    /// Standing still.
+    /// The pattern without motion.
     pub pattern: P,
-    /// Half of the way across both edges, in units of the blur.
+    /// Half of the motion across both edges, in units of the blur.
     pub way: [f32; 2],
 }
 
-/// Of the variance of a box, what the places of four equal parts of it make.
+/// Fraction of the variance of a box that the positions of its four equal parts have.
 pub(crate) const PLACES_OF_FOUR: f64 = 15.0 / 16.0;
 
 impl<P: Pattern<2>> Pattern<2> for SweptChecker<P> {
     #[inline(always)]
     fn at(&self, h: [f32; 2]) -> Shade<2> {
-        // The middles of four equal parts.
+        // The centres of four equal parts.
         let (outer, inner) = (self.pair(h, 0.75), self.pair(h, 0.25));
         Shade {
             f: 0.5 * (outer.f + inner.f),
@@ -298,7 +299,7 @@ impl<P: Pattern<2>> Pattern<2> for SweptChecker<P> {
 }
 
 impl<P: Pattern<2>> SweptChecker<P> {
-    /// The mean of two patterns at this part of half the way before and behind the middle.
+    /// Returns the mean of two patterns, at a fraction `part` of half the motion before and behind the centre.
     #[inline(always)]
     fn pair(&self, h: [f32; 2], part: f32) -> Shade<2> {
         let [x, y] = [part * self.way[0], part * self.way[1]];
@@ -334,7 +335,7 @@ fn deltille([h1, h2, h3]: [f32; 3]) -> Shade<3> {
     }
 }
 
-/// What the orthant integral needs of ρ: computed once for all pixels.
+/// Terms of the orthant integral that depend only on ρ, computed once for all pixels.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Orthant<const NODES: usize> {
     rho: f32,
@@ -347,14 +348,14 @@ pub(crate) struct Orthant<const NODES: usize> {
 }
 
 impl Orthant<6> {
-    /// For ρ = cos(angle between the edges), |ρ| < 1.
+    /// Creates the terms for ρ = cos(angle between the edges), |ρ| < 1.
     pub(crate) fn new(rho: f64) -> Self {
         Self::by(RULE_OF_SIX, rho)
     }
 }
 
 impl Orthant<3> {
-    /// For ρ up to [`FEW_NODES_RHO`].
+    /// Creates the terms for ρ up to [`FEW_NODES_RHO`].
     pub(crate) fn of_few_nodes(rho: f64) -> Self {
         Self::by(RULE_OF_THREE, rho)
     }
@@ -371,7 +372,7 @@ impl<const NODES: usize> Orthant<NODES> {
         Self { rho: rho as f32, sine, scale: FRAC_2_PI * half as f32, nodes }
     }
 
-    /// Two edges.
+    /// Returns the brightness of two edges.
     #[inline(always)]
     pub(crate) fn checker(&self, [h1, h2]: [f32; 2]) -> Shade<2> {
         let (squares, product) = (h1 * h1 + h2 * h2, h1 * h2);
@@ -411,8 +412,8 @@ pub(crate) fn erf_sqrt_half(h: f32) -> f32 {
     (1.0 - poly * bell(h)).copysign(h)
 }
 
-/// exp(x) for x ≤ 0, to 3·10⁻⁷ of its value; below 2⁻⁶⁰ it stays there, so that
-/// no product of two becomes a subnormal number, which processors handle slowly.
+/// exp(x) for x ≤ 0, with a relative error of 3·10⁻⁷. The result is limited to 2⁻⁶⁰, so that no product of two is a
+/// subnormal number, which processors handle slowly.
 #[inline(always)]
 fn exp_negative(x: f32) -> f32 {
     /// 1.5·2²³: adding it rounds to an integer, which then fills the low bits.
@@ -420,7 +421,7 @@ fn exp_negative(x: f32) -> f32 {
     let y = (x * LOG2_E).max(-60.0);
     let rounded = y + ROUND;
     let fraction = y - (rounded - ROUND);
-    /// Taylor's series of 2^x, |x| ≤ 1/2, from x⁶ down: (ln 2)^k / k!.
+    /// Taylor series of 2^x, |x| ≤ 1/2, from x⁶ down: (ln 2)^k / k!.
     const SERIES: [f32; 6] =
         [0.000_154_035_3, 0.001_333_355_8, 0.009_618_129, 0.055_504_11, 0.240_226_5, LN_2];
     let mut mantissa = 0.0;
@@ -428,7 +429,7 @@ fn exp_negative(x: f32) -> f32 {
         mantissa = (mantissa + coefficient) * fraction;
     }
     mantissa += 1.0;
-    // 2^x of the whole part: its bits, 127 added, above the 23 of the mantissa.
+    // 2^x of the integer part: its bits, plus 127, above the 23 of the mantissa.
     let exponent = rounded.to_bits().wrapping_sub(ROUND.to_bits()).wrapping_add(127) << 23;
     mantissa * f32::from_bits(exponent)
 }
@@ -449,7 +450,7 @@ mod tests {
         assert!(exp_negative(-1e9) < 1e-17);
     }
 
-    /// Every derivative against a difference quotient of f.
+    /// Compares every derivative with a difference quotient of f.
     #[test]
     fn slopes_are_derivatives() {
         let step = 0.01f32;
@@ -479,7 +480,7 @@ mod tests {
         }
     }
 
-    /// A swept corner is the mean of the corner along the way.
+    /// A corner in motion is the mean of the corner along the motion.
     #[test]
     fn a_box_is_a_mean_along_the_way() {
         const STEPS: i32 = 400;
@@ -493,7 +494,7 @@ mod tests {
             };
             let three = along(&|t| deltille([0, 1, 2].map(|k| h[k] + t * way[k])).f);
             let swept = |way: [f32; 3]| SweptDeltille::new(way).at(h);
-            // Of the shortest ways there is more blur.
+            // At the shortest motions, the minimum length adds blur.
             let error = swept(way).f - three;
             assert!(error.abs() < 3e-3, "{h:?} {way:?}: {error}");
             for k in (0..3).filter(|&k| way[k].abs() > 0.2) {
@@ -502,7 +503,7 @@ mod tests {
                 let quotient = (swept(moved(0.05)).f - swept(moved(-0.05)).f) / 0.1;
                 assert!((swept(way).way[k] - quotient).abs() < 2e-3, "{h:?} {way:?}");
             }
-            // Two edges: each of four parts is longer than the Gaussian that stands for it by less than it is wide.
+            // Two edges: each of four parts is longer than the Gaussian that represents it, by less than its width.
             let (h, way) = ([h[0], h[1]], [way[0] / 2.0, way[1] / 2.0]);
             let two = along(&|t| still.at([0, 1].map(|k| h[k] + t * way[k])).f);
             let cov = |k: usize, l: usize| way[k] * way[l] / 48.0;

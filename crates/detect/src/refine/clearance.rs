@@ -2,8 +2,8 @@
 //!
 //! ```text
 //!        2 ╱╲ 1        the tiles around a corner end at their far sides; in tiles with a tag the
-//!       ╱▒▒▒▒────╲      cells of the tag (▒) are cut out, and what lies between them and the edges
-//!    3 ╱ ▒▒ ·     ╲ 0   stays. From all of them the blur keeps its distance.
+//!       ╱▒▒▒▒────╲      cells of the tag (▒) are cut out, and the area between them and the edges
+//!    3 ╱ ▒▒ ·     ╲ 0   stays. A margin for the blur is kept from all of them.
 //!      ╲    ▒▒    ╱
 //!     4 ╲──▒▒▒▒──╱ 5
 //! ```
@@ -21,12 +21,12 @@ use deltille_core::family::Family;
 use deltille_core::lattice::{GridKind, Tile, Vertex};
 use deltille_core::targets::{Panel, TagsIn, Target};
 
-/// Distance to be kept from other edges, in standard deviations of the blur: beyond it, an edge
-/// changes grey values by less than 2.5 % of its contrast.
+/// Margin from other edges, in standard deviations of the blur. Beyond it, an edge changes grey values by less than 2.5
+/// % of its contrast.
 const BLUR_MARGIN_SIGMAS: f64 = 2.0;
 
-/// Greatest distance of a corner from the chord of its neighbours, relative to the distance to
-/// them: lenses bend an edge by less than 0.3 rad from one corner to the next.
+/// Maximum distance of a corner from the chord of its neighbours, relative to the distance to them. Lenses bend an edge
+/// by less than 0.3 rad from one corner to the next.
 const MOST_SAG: f64 = 0.15;
 
 /// Tiles by the id of their panel.
@@ -35,15 +35,15 @@ type TilesOfPanels = BTreeMap<u32, BTreeSet<Tile>>;
 /// The tiles of a target with tags, and the area of the tag in its tile.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct TagAreas {
-    /// Distance from the edges of a tile to what it shows of a tag, in edges along the other
-    /// edges; the smallest of all panels.
+    /// Distance from the edges of a tile to the visible tag, in edges along the other edges; the smallest of all
+    /// panels.
     inset: f64,
-    /// Tiles with a tag, by panel id, of each target by its name where there are several.
+    /// Tiles with a tag, by panel id, for each target; with its name if there are several.
     targets: Vec<(Option<String>, TilesOfPanels)>,
 }
 
 impl TagAreas {
-    /// The tag areas of `target` with the tags of this family.
+    /// Returns the tag areas of `target` with the tags of this family.
     pub(crate) fn of(target: &Target, family: &Family) -> Self {
         let tagged = || target.panels.iter().filter(|panel| !panel.tags.is_empty());
         let inset = |panel: &Panel| {
@@ -60,7 +60,7 @@ impl TagAreas {
         }
     }
 
-    /// The tag areas of several targets, by their names.
+    /// Returns the tag areas of several targets, by their names.
     pub(crate) fn of_scene(targets: impl IntoIterator<Item = (String, Self)>) -> Self {
         let mut all = Self { inset: f64::INFINITY, targets: Vec::new() };
         for (name, of_target) in targets {
@@ -71,13 +71,12 @@ impl TagAreas {
         all
     }
 
-    /// Whether no tile shows a tag.
+    /// Returns whether no tile shows a tag.
     pub(crate) fn is_empty(&self) -> bool {
         self.targets.iter().all(|(_, tiles)| tiles.is_empty())
     }
 
-    /// Whether a tile of a grid may show a tag: as its panel has them, or any that could where the
-    /// panel is not known.
+    /// Returns whether a tile of a grid may show a tag: as on its panel, or any suitable tile if the panel is unknown.
     fn has(&self, grid: &Grid, tile: Tile) -> bool {
         match grid.panel {
             Some(panel) => {
@@ -96,14 +95,14 @@ pub(crate) const NOTHING: [f64; 2] = [f64::INFINITY, f64::NEG_INFINITY];
 /// Signed distance from a line, px: a·u + b·v + c.
 type Line = [f64; 3];
 
-/// The surroundings of a corner, px from it.
+/// The surroundings of a corner, in px from it.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Surroundings {
     /// Far sides of the tiles, positive towards the corner.
     sides: Vec<Line>,
-    /// Tags: their sides, positive outside.
+    /// Sides of the tags, positive outside.
     tags: Vec<Vec<Line>>,
-    /// The edges through the corner by rising angle; empty where nothing is known.
+    /// Edges through the corner by increasing angle; empty if nothing is known.
     pub edges: Vec<Edge>,
     /// Whether all its neighbours are in the grid.
     pub is_inner: bool,
@@ -112,17 +111,16 @@ pub(crate) struct Surroundings {
 /// An edge through a corner.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Edge {
-    /// Direction within a half-turn, radians.
+    /// Direction within 180°, radians.
     pub angle_rad: f64,
-    /// Curvature to the left of that direction (to greater v of u), 1/px.
+    /// Curvature to the left of that direction (towards greater v of u), 1/px.
     pub bend: f64,
-    /// Distance in the picture, perpendicular to the edge, of something one edge length away on the
-    /// print, px.
+    /// Distance in the image, perpendicular to the edge, of a point one edge length away on the print, px.
     pub across_px: f64,
 }
 
 impl Surroundings {
-    /// Ends of the clear part of a row at distance `v` from the corner, px, between the far sides
+    /// Returns the ends of the clear part of a row at distance `v` from the corner, px. It lies between the far sides
     /// of the tiles under a blur of this standard deviation, px.
     pub(crate) fn span(&self, v: f64, blur_px: f64) -> [f64; 2] {
         if self.sides.is_empty() {
@@ -143,7 +141,7 @@ impl Surroundings {
         [first, last]
     }
 
-    /// A predicate for places, px from the corner, at which no tag is visible under a blur of this
+    /// Returns a predicate for positions, px from the corner: whether no tag is visible there under a blur of this
     /// standard deviation, px.
     pub(crate) fn off_tags(&self, blur_px: f64) -> impl Fn(DVec2) -> bool {
         let margin = BLUR_MARGIN_SIGMAS * blur_px;
@@ -151,21 +149,21 @@ impl Surroundings {
         move |place| place.length_squared() < circle2 || self.distance_of_tags(place) >= margin
     }
 
-    /// Half the side of the largest clear square around the corner, px, under a blur of this
-    /// standard deviation, px.
+    /// Returns half the side of the largest clear square around the corner, px, under a blur of this standard
+    /// deviation, px.
     pub(crate) fn clear_square_px(&self, blur_px: f64) -> f64 {
         let clear = self.distance(DVec2::ZERO) - BLUR_MARGIN_SIGMAS * blur_px;
         clear.max(0.0) * std::f64::consts::FRAC_1_SQRT_2
     }
 
-    /// Distance from a point to the nearest thing that is not the corner, or less, px.
+    /// Returns a lower bound of the distance from a point to the nearest object other than the corner, px.
     fn distance(&self, place: DVec2) -> f64 {
         let sides = self.sides.iter().map(|[a, b, c]| a * place.x + b * place.y + c);
         let nearest = sides.reduce(f64::min).unwrap_or(0.0);
         nearest.min(self.distance_of_tags(place))
     }
 
-    /// Distance from a point to the nearest tag, or less, px.
+    /// Returns a lower bound of the distance from a point to the nearest tag, px.
     fn distance_of_tags(&self, DVec2 { x: u, y: v }: DVec2) -> f64 {
         let from = |[a, b, c]: &Line| a * u + b * v + c;
         let outside = |tag: &Vec<Line>| tag.iter().map(from).fold(f64::NEG_INFINITY, f64::max);
@@ -173,14 +171,13 @@ impl Surroundings {
     }
 }
 
-/// The surroundings of every corner of a grid, in their order, in pixels of `scale` times the size
-/// of those of the grid. For a corner whose neighbours are collinear nothing is known, and nothing
-/// counts as clear.
+/// Returns the surroundings of every corner of a grid, in order, in pixels of `scale` times the size of the grid's
+/// pixels. If the neighbours of a corner are collinear, nothing is known of it, and no area counts as clear.
 pub(crate) fn surroundings(grid: &Grid, tags: &TagAreas, scale: f64) -> Vec<Surroundings> {
     surroundings_of(grid, tags, scale, 0..grid.corners.len())
 }
 
-/// The surroundings of some of the corners, by their index.
+/// Returns the surroundings of some of the corners, by index.
 pub(crate) fn surroundings_of(
     grid: &Grid,
     tags: &TagAreas,
@@ -194,8 +191,7 @@ pub(crate) fn surroundings_of(
         let here = places.get(vertex)?;
         let seen = |step: Vertex| places.get(vertex + step).map(|place| place - here);
         let near = affine(grid.kind.steps().iter().filter_map(|&s| Some((s, seen(s)?))));
-        // For a single corner the corners beyond its neighbours predict where missing neighbours
-        // would be.
+        // For a single corner, the corners beyond its neighbours predict the positions of missing neighbours.
         let map = match &near {
             Some(_) => None,
             None => Some(places.map_about(grid.kind, vertex, *bend)?),
@@ -226,9 +222,8 @@ pub(crate) fn surroundings_of(
     corners.map(|i| around(&grid.corners[i]).unwrap_or_default()).collect()
 }
 
-/// The crossing of the lines through the neighbours of a corner, px, if the corner is displaced
-/// from them. `None` where it lies as near to them as lens distortion permits, and with fewer than
-/// two lines.
+/// Returns the crossing of the lines through the neighbours of a corner, px, if the corner is displaced from them.
+/// Returns `None` if it lies as near to them as lens distortion permits, or if there are fewer than two lines.
 pub(crate) fn crossing(grid: &Grid, corner: &GridCorner) -> Option<DVec2> {
     let places = Places::of(grid, 1.0);
     let vertex = Vertex::new(corner.row, corner.col);
@@ -252,7 +247,7 @@ pub(crate) fn crossing(grid: &Grid, corner: &GridCorner) -> Option<DVec2> {
     (here.distance(crossing) > MOST_SAG * nearest_px).then_some(crossing)
 }
 
-/// The places of corners in the rectangle of rows and columns that they span.
+/// Positions of corners in the rectangle of rows and columns that they span.
 struct Places {
     first: Vertex,
     cols: usize,
@@ -303,8 +298,8 @@ impl Places {
     }
 }
 
-/// Where a vertex lies that is not seen, if the two opposite are: as far as the first of them, or
-/// nearer by as much as that is nearer than the second.
+/// Predicts an unseen vertex from the two opposite ones. Its distance is that of the first, reduced by as much as the
+/// first is nearer than the second.
 fn beyond(step: Vertex, seen: impl Fn(Vertex) -> Option<DVec2>) -> Option<DVec2> {
     let back = Vertex::new(-step.row, -step.col);
     let (first, second) = (seen(back)?, seen(back + back)?);
@@ -312,7 +307,7 @@ fn beyond(step: Vertex, seen: impl Fn(Vertex) -> Option<DVec2>) -> Option<DVec2>
     Some(-first * shrinks.min(1.0))
 }
 
-/// The affine map of lattice steps that fits these best; `None` where they lie in one line.
+/// Returns the affine map of lattice steps that fits best; `None` if they are collinear.
 fn affine(known: impl Iterator<Item = (Vertex, DVec2)>) -> Option<impl Fn(Vertex) -> DVec2> {
     let (mut normal, mut right) = (DMat2::ZERO, [DVec2::ZERO; 2]);
     for (step, place) in known {
@@ -327,7 +322,7 @@ fn affine(known: impl Iterator<Item = (Vertex, DVec2)>) -> Option<impl Fn(Vertex
     })
 }
 
-/// The edges through the corner at `vertex`, along the chords between its neighbours.
+/// Returns the edges through the corner at `vertex`, along the chords between its neighbours.
 fn edges(
     grid: &Grid,
     places: &Places,
@@ -339,8 +334,8 @@ fn edges(
     let bend_at = |v: Vertex, step: Vertex| Some(bend([at(v - step)?, at(v)?, at(v + step)?]));
     let edge = |&step: &Vertex| {
         let chord = place(step) - place(Vertex::new(0, 0) - step);
-        // Bends change slowly: three along a line tell more than one, and where the line is too short
-        // the next ones are bent like it.
+        // Bends change slowly. Three along a line are more accurate than one. If the line is too short, the next ones
+        // have a similar bend.
         let along = [vertex, vertex + step, vertex - step].into_iter();
         let bend = mean(along.filter_map(|v| bend_at(v, step)))
             .or_else(|| mean(grid.kind.neighbours(vertex).filter_map(|v| bend_at(v, step))))
@@ -349,7 +344,7 @@ fn edges(
         let off = steps.iter().map(|&other| along.perp_dot(place(other)).abs());
         let across_px = off.sum::<f64>() / rows_apart(grid.kind);
         let angle_rad = chord.to_angle();
-        // Turned by half, left is right.
+        // After a rotation by 180°, left is right.
         match angle_rad {
             ..0.0 => Edge { angle_rad: angle_rad + PI, bend: -bend, across_px },
             PI.. => Edge { angle_rad: angle_rad - PI, bend: -bend, across_px },
@@ -361,7 +356,7 @@ fn edges(
     edges
 }
 
-/// The sum of the distances of all neighbours from the line along one of them, in edges.
+/// Returns the sum of the distances of all neighbours from the line along one of them, in edges.
 fn rows_apart(kind: GridKind) -> f64 {
     match kind {
         // Four of six lie beside the line, by the height of a triangle.
@@ -375,7 +370,8 @@ fn mean(values: impl Iterator<Item = f64>) -> Option<f64> {
     (count > 0).then(|| sum / f64::from(count))
 }
 
-/// Curvature of the parabola through three points in the second, to the left of the way, 1/px.
+/// Returns the curvature at the second of three points of the parabola through them, to the left of the direction,
+/// 1/px.
 fn bend([a, b, c]: [DVec2; 3]) -> f64 {
     let along = (c - a).normalize_or_zero();
     let (before, after) = (b - a, c - b);
@@ -385,7 +381,7 @@ fn bend([a, b, c]: [DVec2; 3]) -> f64 {
     if bend.is_finite() { bend } else { 0.0 }
 }
 
-/// The sides of what a tile shows of a tag, positive outside.
+/// Returns the sides of the visible tag in a tile, positive outside.
 fn outline(tile: &[DVec2], inset: f64) -> Vec<Line> {
     let n = tile.len();
     // Every corner moves along both edges that meet there.
@@ -399,7 +395,7 @@ fn outline(tile: &[DVec2], inset: f64) -> Vec<Line> {
     sides.map(|side| side.map(|c| -c)).collect()
 }
 
-/// The line through two points, positive on the side of a third.
+/// Returns the line through two points, positive on the side of a third.
 fn line(a: DVec2, b: DVec2, inside: DVec2) -> Line {
     let way = b - a;
     let normal = way.perp() / way.x.hypot(way.y).max(f64::MIN_POSITIVE);
@@ -412,7 +408,7 @@ fn line(a: DVec2, b: DVec2, inside: DVec2) -> Line {
 mod tests {
     use super::*;
 
-    /// A grid of 5 × 5 corners in the picture.
+    /// Creates a grid of 5 × 5 corners in the image.
     fn grid(kind: GridKind, image: impl Fn(DVec2) -> DVec2) -> Grid {
         let corners = (0..25).map(|i| {
             let (row, col) = (i / 5, i % 5);

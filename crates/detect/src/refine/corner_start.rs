@@ -1,9 +1,9 @@
-//! Edges, contrast and blur around a position: where the model's fit begins.
+//! Edges, contrast and blur around a position: the start values of the model fit.
 //!
-//! In a grid the edges lead to the neighbours. Of a single corner circles tell them: a corner of three edges is odd under a half-turn and one of two edges even, so opposite samples
-//! are combined and half a circle remains. All ways to divide it into K + 1 runs of equal sign are
-//! tried and the one that separates dark from bright best is taken: unlike roots of a fitted
-//! polynomial it always exists and noise cannot hide an edge.
+//! In a grid, the edges lead to the neighbours. For a single corner, circles give them. A corner of three edges is odd
+//! under a rotation by 180°, and one of two edges is even. So opposite samples are combined, and half a circle remains.
+//! All ways to divide it into K + 1 runs of equal sign are tried, and the one that separates dark from bright best is
+//! used. Unlike the roots of a fitted polynomial it always exists, and noise cannot hide an edge.
 
 use std::f64::consts::PI;
 
@@ -16,31 +16,33 @@ use crate::lanes;
 use crate::lanes::LANES;
 use deltille_core::raster::ImageView;
 
-/// Directions on the half-circle: 7.5° apart, so that the 17° between edges at 75° hold two.
+/// Directions on the half-circle: 7.5° apart, so that the 17° between edges at 75° contain two.
 const DIRECTIONS: usize = 24;
 
 /// Shortest run between edges: two directions.
 const MIN_RUN: usize = 2;
 
-/// Edges start at least this far apart: blur lets narrow sectors fade, and edges that have met
-/// cannot be told apart again.
+/// Minimum angle between edges at the start. Blur lets narrow sectors fade, and edges that have merged cannot be
+/// separated again.
 const MIN_START_RAD: f64 = 15.0 * PI / 180.0;
 
-/// Circles, as parts of the window's radius.
+/// Radii of the circles, as fractions of the radius of the window.
 const CIRCLES: [f64; 3] = [0.5, 0.7, 0.9];
 
-/// The mean of them.
+/// Their mean.
 const MEAN_CIRCLE: f64 = CIRCLES[1];
 
-/// Least blur of a start, px. The fit finds the blur anew: from 0.15 to 2.4 errors differ by 3 % at most, but those of sharp
-/// squares in windows of 9 px are 15 % larger at 0.3 and 60 % at 1.2. Corners of a grid start from the grid's blur.
+/// Minimum start value of the blur, px. The fit refines the blur: from 0.15 to 2.4, errors differ by 3 % at most. On
+/// sharp squares in windows of 9 px they are 15 % larger at 0.3, and 60 % at 1.2. Corners of a grid start from the
+/// grid's blur.
 const MIN_START_BLUR_PX: f64 = 0.6;
 
-/// Largest blur of a start, as a part of the window's radius: of a larger one the window shows the middle alone.
+/// Maximum start value of the blur, as a fraction of the window's radius. With a larger one, the window shows only the
+/// centre.
 const MAX_START_BLUR: f64 = 0.5;
 
-/// The start of a corner whose edges have these directions, rising within a half-turn, under a blur of `blur_px`,
-/// from the pixels of a window; `None` when it shows one side of the edges alone.
+/// Returns the start for a corner from the pixels of a window. The edges have these directions, increasing within 180°,
+/// under a blur of `blur_px`. Returns `None` if the window shows only one side of the edges.
 pub(crate) fn start_along<const K: usize>(
     window: &Window,
     pixels: &[f32],
@@ -88,8 +90,8 @@ fn sums_of_three(
     sums::<3>(places, pixels, offset, directions)
 }
 
-/// Sum and number of the pixels where the pattern, the product of the signs of the distances from the edges, is
-/// positive, and where it is not.
+/// Returns sum and number of the pixels where the pattern is positive, and where it is not. The pattern is the product
+/// of the signs of the distances from the edges.
 #[inline(always)]
 fn sums<const K: usize>(
     [us, vs]: [&[f32]; 2],
@@ -116,7 +118,7 @@ fn sums<const K: usize>(
     [[sum, count], [lanes::sum(&all) - sum, n as f32 - count]]
 }
 
-/// The start around `position`, from circles; `None` when the circles leave the image or show no contrast.
+/// Returns the start around `position`, from circles; `None` if the circles leave the image or show no contrast.
 pub(crate) fn start<const K: usize>(
     image: ImageView,
     position: DVec2,
@@ -147,7 +149,7 @@ pub(crate) fn start<const K: usize>(
     let profile = profile.map(|v| v * scale);
     let mean = total * scale / DIRECTIONS as f64;
     let runs = best_runs::<K>(&profile, odd)?;
-    // Half-way between bright and dark, as the profile shows it.
+    // Half-way between bright and dark in the profile.
     let middle = if odd { 0.0 } else { (runs.inner + runs.outer) / 2.0 };
     let signed = (runs.inner - runs.outer) / 2.0;
     let mut slope = 0.0;
@@ -162,7 +164,7 @@ pub(crate) fn start<const K: usize>(
         angles[k - 1] -= lack / 2.0;
         angles[k] += lack / 2.0;
     }
-    // The slope of erf(h/√2s) in its middle is √(2/π)/s; the profile's step is an arc.
+    // The slope of erf(h/√2s) at its centre is √(2/π)/s; the step of the profile is an arc.
     let arc = MEAN_CIRCLE * radius_px * PI / DIRECTIONS as f64;
     let steepness = slope / (K as f64 * signed.abs());
     let blur = (2.0 / PI).sqrt() * arc / steepness;
@@ -184,7 +186,7 @@ fn direction(index: f64) -> f64 {
     index * PI / DIRECTIONS as f64
 }
 
-/// The profile at an index that may lie one before the first.
+/// Returns the profile at an index that may lie one before the first.
 fn neighbour(profile: &[f64; DIRECTIONS], index: isize, odd: bool) -> f64 {
     match usize::try_from(index) {
         Ok(index) => profile[index],
@@ -195,15 +197,15 @@ fn neighbour(profile: &[f64; DIRECTIONS], index: isize, odd: bool) -> f64 {
 
 /// A division of the half-circle.
 struct Runs<const K: usize> {
-    /// First index of each run after an edge, rising.
+    /// First index of each run after an edge, increasing.
     edges: [isize; K],
-    /// Mean of the profile between the first and second edge, and runs of the same sign.
+    /// Mean of the profile between the first and second edge, and in runs of the same sign.
     inner: f64,
     /// Mean of the others.
     outer: f64,
 }
 
-/// The division with the largest variance between its two classes (Otsu's criterion).
+/// Returns the division with the largest variance between its two classes (Otsu's criterion).
 fn best_runs<const K: usize>(profile: &[f64; DIRECTIONS], odd: bool) -> Option<Runs<K>> {
     let mut sums = [0.0; DIRECTIONS + 1];
     for (i, &value) in profile.iter().enumerate() {
@@ -221,8 +223,8 @@ fn best_runs<const K: usize>(profile: &[f64; DIRECTIONS], odd: bool) -> Option<R
         for b in a + MIN_RUN..DIRECTIONS {
             let (count, sum) = ((b - a) as f64, sums[b] - sums[a]);
             if odd {
-                // Beyond the third edge the profile is as between the first two, negated before
-                // the first: + on a..b and c.., − on ..a and b..c.
+                // Beyond the third edge the profile is as between the first two; before the first it is negated. It is
+                // + on a..b and c.., − on ..a and b..c.
                 for c in b + MIN_RUN..DIRECTIONS.min(DIRECTIONS + a - MIN_RUN + 1) {
                     let alternating = sum - sums[a] - (sums[c] - sums[b]) + whole - sums[c];
                     let mut edges = [0; K];

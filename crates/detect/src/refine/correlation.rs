@@ -1,31 +1,31 @@
-//! How far the noise of a picture is from white, and what that does to positions.
+//! Corrects the covariances of positions for noise that is not white.
 //!
-//! Demosaicing, JPEG and enlargement leave residuals r that depend on their neighbours, and where a model
-//! holds only nearly they are larger at the edges, which is where a position comes from. With c the
-//! influence of the pixels on a position (δx = Σ c r), ρ the residuals' correlation at a lag and R the noise's
-//! covariance, the variance of x is cᵀRc instead of σ² cᵀc:
+//! Demosaicing, JPEG and enlargement correlate neighbouring residuals r. If a model fits only approximately, residuals
+//! are also larger at the edges, which determine the position. Let c be the influence of the pixels on a position (δx =
+//! Σ c r), ρ the correlation of the residuals at a lag, and R the covariance of the noise. The variance of x is cᵀRc
+//! instead of σ² cᵀc:
 //!
 //! ```text
 //!     factor = Σ c² r²/(1 − H) / (σ² Σ c²) · (1 + Σ_lags ρ(lag) Σ c(p) c(p + lag) / Σ c²)
 //! ```
 //!
-//! pooled over corners of a picture. What is even about a corner (the same at opposite pixels) and what is odd have
-//! factors of their own: where the blur is not quite that of the model, after motion say, the residuals of a
-//! corner of three edges are odd, and so do not move it, since its influence is nearly even; of two edges it is the other
-//! way round. A fit takes out of its residuals what looks like its parameters:
-//! E[r rᵀ] = σ² (1 − H) with the hat matrix H of white noise, which is added again.
+//! pooled over corners of an image. The even part about a corner (equal at opposite pixels) and the odd part have
+//! separate factors. Consider a blur that differs from that of the model, for example after motion. The residuals of a
+//! corner of three edges are then odd. They do not move it, because its influence is nearly even. For two edges it is
+//! the other way round. A fit removes from its residuals the components that resemble its parameters: E[r rᵀ] = σ² (1 −
+//! H) with the hat matrix H of white noise, so the division by 1 − H restores them.
 
 use multiversion::multiversion;
 
 use crate::lanes;
 use crate::lanes::LANES;
 
-/// Residuals of a corner, and how its parameters answer to its pixels.
+/// Residuals of a corner, and the response of its parameters to its pixels.
 #[derive(Clone, Debug)]
 pub(crate) struct Influence {
-    /// Pixels, counted from any.
+    /// Pixels, relative to any origin.
     pub places: Vec<[i32; 2]>,
-    /// The place of the corner among them, twice.
+    /// Position of the corner among them, times two.
     pub twice_middle: [i32; 2],
     /// Pixels minus model.
     pub residuals: Vec<f32>,
@@ -37,31 +37,31 @@ pub(crate) struct Influence {
     pub noise: f64,
 }
 
-/// Largest lags, px: of sensors and JPEG, and of enlarged pictures, whose grain is wider.
+/// Largest lags, px: for sensors and JPEG, and for enlarged images, whose grain is wider.
 const LAGS_PX: [i32; 2] = [2, 6];
 
-/// Mean correlation at the largest lag above which larger ones are looked at.
+/// Mean correlation at the largest lag above which larger lags are used.
 const WIDE: f64 = 0.05;
 
-/// Factors that are believed: where motion is ten times the blur the noise is a tenth of the residuals, and enlarging by
+/// Range of plausible factors. If motion is ten times the blur, the noise is a tenth of the residuals. Enlargement by
 /// six gives 36.
 const FACTORS: [f64; 2] = [0.02, 40.0];
 
-/// Least part of a pixel's noise that a fit leaves in its residual. What a fit follows more closely has a residual that tells
-/// nothing of its noise. Nearly all pixels leave more: from 0.01 to 0.2 no covariance changes.
+/// Minimum fraction of a pixel's noise that a fit leaves in its residual. If a fit follows a pixel more closely, its
+/// residual contains no information on its noise. Nearly all pixels leave more: from 0.01 to 0.2 no covariance changes.
 const LEAST_LEFT: f32 = 0.1;
 
-/// Corners from which correlations are told; the sums of ten vary by some per cent.
+/// Number of corners that determine correlations; the sums of ten vary by some per cent.
 pub(crate) const CORNERS: usize = 10;
 
-/// Of so many one tells what fits take out of residuals, which depends on the windows alone and is nearly
-/// the same for all.
+/// One column in so many determines the part that fits remove from residuals. That part depends only on the windows and
+/// is nearly the same for all.
 const HAT_EVERY: usize = 4;
 
 impl Influence {
-    /// Pairs of opposite pixels, each of which is the first of one.
+    /// Returns the pairs of opposite pixels, each once.
     fn pairs(&self) -> Vec<(usize, usize)> {
-        // Where each pixel of the square around the corner is among them.
+        // Index of each pixel of the square around the corner.
         let reach =
             self.places.iter().flatten().map(|c| c.unsigned_abs() as i32).max().unwrap_or(0);
         let side = (2 * reach + 1) as usize;
@@ -81,8 +81,8 @@ impl Influence {
         self.places.iter().enumerate().filter_map(pair).collect()
     }
 
-    /// What is the same at opposite pixels, and what is of opposite sign, of those that have both; with the columns of
-    /// the hat matrix where they are asked for.
+    /// Returns the even and the odd part of the pixels that have an opposite one, with the columns of the hat matrix on
+    /// request.
     fn parts(&self, with_hat: bool) -> [Part; 2] {
         let pairs = self.pairs();
         let mut squares = [1.0, -1.0].map(|_| vec![0.0; pairs.len()]);
@@ -112,7 +112,7 @@ impl Influence {
     }
 }
 
-/// What is even, or odd, about a corner.
+/// The even or odd part about a corner.
 #[derive(Clone, Debug)]
 struct Part {
     places: Vec<[i32; 2]>,
@@ -120,19 +120,19 @@ struct Part {
     on_position: [Vec<f32>; 2],
     /// The diagonal of H.
     diagonal: Vec<f32>,
-    /// The columns of Q, of one in [`HAT_EVERY`].
+    /// The columns of Q, one in [`HAT_EVERY`].
     hat: Vec<Vec<f32>>,
     noise: f64,
 }
 
 impl Part {
-    /// Sum of the squares of the influence.
+    /// Returns the sum of the squares of the influence.
     fn strength(&self) -> f64 {
         self.on_position.iter().flatten().map(|c| f64::from(c * c)).sum()
     }
 }
 
-/// Factor of the covariances of positions against those under white noise.
+/// Returns the factor of the covariances of positions, relative to white noise.
 pub(crate) fn inflation(corners: &[Influence]) -> f64 {
     let corners = &corners[..corners.len().min(CORNERS)];
     if corners.is_empty() {
@@ -150,14 +150,14 @@ pub(crate) fn inflation(corners: &[Influence]) -> f64 {
     if factor.is_finite() { factor.clamp(FACTORS[0], FACTORS[1]) } else { 1.0 }
 }
 
-/// The factor of what is even, or odd.
+/// Returns the factor of the even or the odd part.
 fn factor_of(parts: &[Part]) -> f64 {
     let (narrow, rim) = lagged(parts, LAGS_PX[0]);
     let lags = if rim > WIDE { lagged(parts, LAGS_PX[1]).0 } else { narrow };
     uneven(parts) * lags
 }
 
-/// What the even and the odd part have in common: noise of another strength in black than in white.
+/// Returns the common factor of the even and the odd part: noise of different strength in black and white.
 fn both(even: &[Part], odd: &[Part]) -> f64 {
     let common = |(even, odd): (&Part, &Part)| {
         let at = |i: usize| {
@@ -169,7 +169,7 @@ fn both(even: &[Part], odd: &[Part]) -> f64 {
     even.iter().zip(odd).map(common).sum()
 }
 
-/// How much larger residuals are where positions come from.
+/// Returns the factor by which residuals are larger at the pixels that determine positions.
 fn uneven(corners: &[Part]) -> f64 {
     let (mut seen, mut white) = (0.0, 0.0);
     for corner in corners {
@@ -184,7 +184,7 @@ fn uneven(corners: &[Part]) -> f64 {
     seen / white
 }
 
-/// The part of the lags, and the mean correlation at the largest.
+/// Returns the factor of the lags, and the mean correlation at the largest lag.
 fn lagged(corners: &[Part], reach: i32) -> (f64, f64) {
     let lags: Vec<[i32; 2]> = (0..=reach)
         .flat_map(|v| (-reach..=reach).map(move |u| [u, v]))
@@ -228,11 +228,11 @@ fn lagged(corners: &[Part], reach: i32) -> (f64, f64) {
     (1.0 + part, rim.iter().sum::<f64>() / rim.len() as f64)
 }
 
-/// A rectangle of pixels with room for lags at its sides.
+/// A rectangle of pixels with space for lags at its sides.
 struct Field {
     first: [i32; 2],
     width: usize,
-    /// Pixels, in whole vectors, and with zeros behind them for the largest lag.
+    /// Number of pixels, in whole vectors, followed by zeros for the largest lag.
     pixels: usize,
     room: usize,
     places: Vec<usize>,
@@ -262,7 +262,7 @@ impl Field {
         (v * self.width as i32 + u) as usize
     }
 
-    /// Values of the corner's pixels, one rectangle behind the other.
+    /// Arranges values of the corner's pixels, one rectangle after the other.
     fn spread<'a>(&self, all: impl IntoIterator<Item = &'a [f32]>) -> Vec<f32> {
         let mut fields = Vec::new();
         for values in all {
@@ -274,7 +274,7 @@ impl Field {
         fields
     }
 
-    /// Sum over such rectangles of the products of all values with those `offset` further.
+    /// Returns the sum over such rectangles of the products of all values with those at `offset`.
     fn product(&self, fields: &[f32], offset: usize) -> f64 {
         lagged_product(fields, [self.pixels, self.room], offset)
     }

@@ -1,4 +1,4 @@
-//! The joint fit of corners and the parameters that they share, by damped least squares: the corners' blocks of the normal
+//! The joint fit of corners and their shared parameters by damped least squares. The corners' blocks of the normal
 //! equations are eliminated.
 
 use nalgebra::{DMatrix, DVector, SMatrix, SVector};
@@ -16,50 +16,49 @@ use deltille_core::detection::{InkEstimate, TONE_PARAMS};
 use deltille_core::raster::ImageView;
 use deltille_core::statistics::median;
 
-/// The least strength of a halo: blur with wide tails. Beyond it the tails are no more than a wider
-/// blur.
+/// Minimum strength of a halo: blur with wide tails. Below it, the tails are equivalent to a wider blur.
 const LEAST_HALO: f64 = -0.45;
 
-/// Prior standard deviations of the parameters: gamma 2.6 has (1.6, 0, 0), smooth steps have −0.5
-/// at both ends, halos of 0.5 are strong, a blur twice as wide in one direction has an astigmatism
-/// of 0.6, and ink that spreads by 2 % of an edge covers a fifth of the bits of a tag.
+/// Prior standard deviations of the parameters. Gamma 2.6 has (1.6, 0, 0), and smooth steps have −0.5 at both ends.
+/// Halos of 0.5 are strong. A blur twice as wide in one direction has an astigmatism of 0.6. Ink that spreads by 2 % of
+/// an edge covers a fifth of the bits of a tag.
 const PRIOR: [f64; PARAMS] = [2.0, 1.0, 1.0, 0.3, 0.3, 0.5, 2.0];
 
-/// Largest step of the parameters.
+/// Maximum step of the parameters.
 const MAX_STEP: f64 = 2.0;
 
-/// Most iterations; four are usual.
+/// Maximum number of iterations; four are usual.
 const MAX_ITERATIONS: usize = 10;
 
-/// The least damping after a step that raised the cost. Steps before are whole: the equations of a few common parameters
-/// are nearly linear.
+/// Minimum damping after a step that raised the cost. Earlier steps are undamped, because the equations of a few common
+/// parameters are nearly linear.
 const FIRST_DAMPING: f64 = 0.01;
 
-/// The iteration ends where it lacks less than this fraction of the standard deviations of the parameters,
-/// as a series of steps that go on to shrink as the last one did would. A first step may be twice as long, as no step is
-/// half as long as the one before.
+/// Remaining distance at which the iteration has converged, in standard deviations of the parameters. It is the sum of
+/// a series of further steps that shrink like the last one. A first step may be twice as long, because no step is half
+/// as long as the previous one.
 const CONVERGED: f64 = 0.25;
 
-/// It ends earlier where it only decides which groups are significant.
+/// The same where the fit only decides which groups are significant.
 const ROUGHLY_CONVERGED: f64 = 0.5;
 
-/// Corners whose residuals exceed this many times the median have no weight: they show something
+/// Maximum residual of a corner, relative to the median. Corners above it have no weight, because they show something
 /// else.
 const MAX_RESIDUAL_RATIO: f64 = 3.0;
 
-/// A corner that takes part in the joint fit, in picture coordinates.
+/// A corner in the joint fit, in image coordinates.
 #[derive(Clone, Debug)]
 pub(crate) struct Sample {
     /// The pixels that show only this corner.
     pub patch: Patch,
-    /// Its estimate by itself.
+    /// Its separate estimate.
     pub corner: Corner<3>,
-    /// Its residual, over half the contrast.
+    /// Its residual, relative to half the contrast.
     pub residual: f64,
 }
 
 impl Optics {
-    /// A parameter, for the corners' equations.
+    /// Returns a parameter for the equations of the corners.
     pub(super) fn common(&self, parameter: usize) -> Common {
         match parameter {
             0..TONE_PARAMS => Common::Tone { parameter, moved: Box::new(self.moved(parameter)) },
@@ -90,7 +89,7 @@ pub(super) struct Problem<'a, const K: usize> {
     pub(super) members: Vec<Member<K>>,
     /// Median black and white of the corners.
     pub(super) greys: [f64; 2],
-    /// The parameters that may be estimated, and those of them that are.
+    /// Parameters that may be estimated, and those that are.
     pub(super) all: Vec<usize>,
     pub(super) active: Vec<usize>,
 }
@@ -106,13 +105,13 @@ pub(super) struct Linearised<const K: usize> {
 pub(super) struct Adjusted<const K: usize> {
     pub(super) optics: Optics,
     pub(super) cov: DMatrix<f64>,
-    /// What the last step lacks, in standard deviations, as the steps before it say.
+    /// Remaining distance after the last step, in standard deviations, extrapolated from the steps before it.
     pub(super) lack: f64,
     pub(super) at: Linearised<K>,
     pub(super) reduced: Reduced,
 }
 
-/// The equations of the common parameters, the corners' eliminated.
+/// The equations of the common parameters, after elimination of the corners.
 pub(super) struct Reduced {
     matrix: DMatrix<f64>,
     gradient: DVector<f64>,
@@ -123,8 +122,8 @@ pub(super) struct Reduced {
 }
 
 impl Reduced {
-    /// The covariance of corner positions, xx, xy, yy, px², that follows from this covariance of
-    /// the common parameters: the mean over corners with weight.
+    /// Returns the covariance of corner positions, xx, xy, yy, px², caused by this covariance of the common parameters:
+    /// the mean over corners with weight.
     fn shift(&self, cov: &DMatrix<f64>, weights: &[f64]) -> [f64; 3] {
         let counting = self.own.iter().zip(weights).filter(|(_, weight)| **weight > 0.0);
         let mut sum = DMatrix::zeros(2, 2);
@@ -139,8 +138,8 @@ impl Reduced {
 }
 
 impl<const K: usize> Problem<'_, K> {
-    /// The estimate after a first step, with the covariance of the noise alone, and the covariance
-    /// with the scatter of gradients.
+    /// Returns the estimate after a first step with the covariance of the noise alone, and the covariance with the
+    /// scatter of gradients.
     pub(super) fn first_step(
         &self,
         optics: &Optics,
@@ -158,8 +157,8 @@ impl<const K: usize> Problem<'_, K> {
         (estimate, covariance(reduced).unwrap_or(unknown))
     }
 
-    /// The estimate with these values of the parameters, near these optics, given the covariance of
-    /// the active ones.
+    /// Returns the estimate with these values of the parameters, near these optics, given the covariance of the active
+    /// ones.
     pub(super) fn estimate(
         &self,
         optics: &Optics,
@@ -174,7 +173,7 @@ impl<const K: usize> Problem<'_, K> {
         Estimate { vector, active, information, kappa_slopes, pixels }
     }
 
-    /// The estimated ink spread; `None` where it was not estimated.
+    /// Returns the estimated ink spread; `None` if it was not estimated.
     pub(super) fn ink(
         &self,
         optics: &Optics,
@@ -186,12 +185,12 @@ impl<const K: usize> Problem<'_, K> {
         Some(InkEstimate::new(INK_UNIT * optics.ink, deviation, used))
     }
 
-    /// The optics that fit the corners best up to a part of their deviations.
+    /// Returns the optics that fit the corners best, up to a fraction of their standard deviations.
     fn adjusted(&mut self, mut at: Linearised<K>, converged: f64) -> Adjusted<K> {
         let mut optics = at.optics.clone();
         let mut damping = Damping::NONE.at_least(0.0, FIRST_DAMPING);
         let (mut before, mut lack) = (None, f64::INFINITY);
-        // By the noise that is left so far: of a curve that is not yet known it is many times what it will be.
+        // Weights by the current residual noise. With an unknown tone curve, it is many times the final noise.
         let mut weights = weights_of(&at.equations);
         let mut reduced = self.reduced(&at, &weights);
         for _ in 0..MAX_ITERATIONS {
@@ -220,7 +219,7 @@ impl<const K: usize> Problem<'_, K> {
             } else {
                 self.put_back(&at.corners);
                 if length < 2.0 * ROUGHLY_CONVERGED {
-                    // What it would gain is no more than sums of single precision tell.
+                    // The gain would be within the rounding of single-precision sums.
                     break;
                 }
                 before = None;
@@ -233,15 +232,15 @@ impl<const K: usize> Problem<'_, K> {
         Adjusted { optics, cov, lack, at, reduced }
     }
 
-    /// The optics that fit the corners best, without the groups that then differ from nothing by no more than
-    /// chance.
+    /// Returns the optics that fit the corners best, without the groups that are then not significant.
     pub(super) fn settled(&mut self, start: Linearised<K>) -> Adjusted<K> {
         let mut found = self.adjusted(start, ROUGHLY_CONVERGED);
         let vector = found.optics.vector();
         let supported = self.estimate(&found.optics, vector, &found.cov).supported(1.0);
         let is_less = supported.active.len() < self.active.len();
         if is_less {
-            // Where the others then fit best, which the scatter, by which they are judged, does not tell.
+            // Start at the best fit of the other groups by the noise alone. The scatter decides significance, but does
+            // not give this optimum.
             let (step, _) = self.first_step(&found.at.optics, &found.reduced);
             let rest = step.only(&supported.active);
             found.optics = self.stepped(&found.at, &found.reduced, &rest.vector);
@@ -257,7 +256,7 @@ impl<const K: usize> Problem<'_, K> {
         found
     }
 
-    /// The optics if the picture moved along a line, where that fits the corners better than a Gaussian does.
+    /// Returns the optics of an image that moved along a line, if they fit the corners better than a Gaussian does.
     fn moved(&mut self, still: &Optics) -> Option<Adjusted<K>> {
         let before = self.linearised(still.clone());
         let weights = weights_of(&before.equations);
@@ -270,7 +269,7 @@ impl<const K: usize> Problem<'_, K> {
         None
     }
 
-    /// The optics with these values of the active parameters, with the corners moved along as their equations say.
+    /// Returns the optics with these values of the active parameters. Moves the corners along by their equations.
     pub(super) fn stepped(
         &mut self,
         at: &Linearised<K>,
@@ -291,17 +290,18 @@ impl<const K: usize> Problem<'_, K> {
         there
     }
 
-    /// The members' corners.
+    /// Returns the corners of the members.
     fn corners(&self) -> Vec<Corner<K>> {
         self.members.iter().map(|member| member.corner).collect()
     }
 
-    /// Gives the members these corners again.
+    /// Restores these corners of the members.
     fn put_back(&mut self, corners: &[Corner<K>]) {
         self.members.iter_mut().zip(corners).for_each(|(member, corner)| member.corner = *corner);
     }
 
-    /// The next step of the active parameters: none further than [`MAX_STEP`], and the halo not beyond its end.
+    /// Returns the next step of the active parameters: none longer than [`MAX_STEP`], and the halo not below its
+    /// minimum.
     fn step(&self, reduced: &Reduced, optics: &Optics, damping: Damping) -> Option<DVector<f64>> {
         let mut damped = reduced.matrix.clone();
         for i in 0..damped.nrows() {
@@ -323,14 +323,14 @@ impl<const K: usize> Problem<'_, K> {
         Some(if length > MAX_STEP { step * (MAX_STEP / length) } else { step })
     }
 
-    /// Factor of the covariances: what the noise is more than white.
+    /// Returns the factor of the covariances for noise that is not white.
     pub(super) fn inflation(&mut self, optics: &Optics) -> f64 {
         let Self { fitter, image, members, .. } = self;
         if members.len() < correlation::CORNERS / 2 {
-            // Too few to tell correlations.
+            // Too few to determine correlations.
             return 1.0;
         }
-        // Those of the least noise: what others show beside the corner counts in their own residuals.
+        // Those of the least noise: other objects beside a corner affect its own residuals.
         let mut found: Vec<Influence> = members
             .iter()
             .filter_map(|member| fitter.influence(*image, &member.patch, &member.corner, optics))
@@ -339,7 +339,7 @@ impl<const K: usize> Problem<'_, K> {
         correlation::inflation(&found)
     }
 
-    /// The equations of all parameters at the members' corners.
+    /// Returns the equations of all parameters at the members' corners.
     pub(super) fn linearised(&mut self, optics: Optics) -> Linearised<K> {
         let corners = self.corners();
         let Self { fitter, image, members, all, .. } = self;
@@ -351,7 +351,7 @@ impl<const K: usize> Problem<'_, K> {
         Linearised { optics, corners, equations }
     }
 
-    /// The equations of the active parameters.
+    /// Returns the equations of the active parameters.
     pub(super) fn reduced(&self, at: &Linearised<K>, weights: &[f64]) -> Reduced {
         let places = self.active.iter().filter_map(|p| self.all.iter().position(|a| a == p));
         let places: Vec<usize> = places.map(|place| OWN + place).collect();
@@ -407,7 +407,7 @@ impl<const K: usize> Problem<'_, K> {
     }
 }
 
-/// Weights of corners: the inverse of their noise, but not above that of the median corner.
+/// Returns the weights of corners: the inverse of their noise, limited to that of the median corner.
 pub(super) fn weights_of(equations: &[Option<Joint>]) -> Vec<f64> {
     let noises = equations.iter().flatten().map(|joint| joint.noise).collect();
     let middle = median(noises).unwrap_or(1.0);
@@ -431,18 +431,18 @@ fn cost<const K: usize>(at: &Linearised<K>, weights: &[f64]) -> f64 {
     prior + costs.map(of).sum::<f64>()
 }
 
-/// The larger of the covariances by the noise and by the scatter of the gradients.
+/// Returns the larger of the covariances by the noise and by the scatter of the gradients.
 fn covariance(reduced: &Reduced) -> Option<DMatrix<f64>> {
     let inverse = reduced.matrix.clone().cholesky()?.inverse();
     let members = reduced.own.iter().flatten().count();
     let count = reduced.gradient.len();
     if members <= 2 * count {
-        // The scatter of so few is as uncertain as what it is to correct.
+        // With so few corners, the scatter is as uncertain as the noise that it corrects.
         return Some(inverse);
     }
     let correction = members as f64 / (members - count) as f64;
     let sandwich = &inverse * &reduced.scatter * &inverse * correction;
-    // Along each parameter the larger; correlations as the noise has them.
+    // Along each parameter the larger one; correlations are those of the noise.
     let scale: Vec<f64> =
         (0..count).map(|i| (sandwich[(i, i)] / inverse[(i, i)]).max(1.0).sqrt()).collect();
     Some(DMatrix::from_fn(count, count, |i, j| inverse[(i, j)] * scale[i] * scale[j]))

@@ -1,35 +1,35 @@
-//! What all corners of an image share: tone curve, halo and astigmatism of the point spread function, and the spread of
-//! ink on the print.
+//! Parameters that all corners of an image share: tone curve, halo and astigmatism of the point spread function, and
+//! the ink spread of the print.
 
 use super::blurred_corner::PLACES_OF_FOUR;
 use deltille_core::detection::InkEstimate;
 use deltille_core::detection::{Curve, Piece, TONE_PARAMS, Tone, ToneEstimate};
 
-/// The number of parameters: three of the tone curve, two of the astigmatism, the halo, and the ink.
+/// Number of parameters: three of the tone curve, two of the astigmatism, the halo, and the ink.
 pub(super) const PARAMS: usize = TONE_PARAMS + 4;
-/// The place of the halo among them.
+/// Index of the halo.
 pub(super) const HALO: usize = PARAMS - 2;
-/// The place of the ink.
+/// Index of the ink.
 pub(super) const INK: usize = PARAMS - 1;
 
-/// Step of difference quotients by a parameter of the tone curve, whose terms have seven digits: some four are left of the
-/// difference.
+/// Step of difference quotients by a parameter of the tone curve. Its terms have seven digits, of which some four
+/// remain in the difference.
 pub(super) const STEP: f64 = 0.01;
 
-/// Width of a halo over that of the blur: masks of 1 to 2 px on pictures of 0.7 to 1 px of blur.
+/// Width of a halo relative to the blur: masks of 1 to 2 px on images with 0.7 to 1 px of blur.
 const HALO_WIDTH: f64 = 2.5;
 
-/// Least blur of the pattern without its halo, relative to a blur whose edges are as steep.
+/// Minimum blur of the pattern without its halo, relative to a blur whose edges have the same slope.
 const LEAST_CORE: f64 = 0.3;
 
-/// The unit of the ink, in edges.
+/// Unit of the ink, in edges.
 pub(crate) const INK_UNIT: f64 = 0.01;
 
-/// Greatest astigmatism: the part of the squared blur that may lie in one direction, over the mean
-/// of both.
+/// Maximum astigmatism: the difference of the squared blur in one direction from the mean of both, relative to that
+/// mean.
 const MAX_ASTIGMATISM: f64 = 0.98;
 
-/// The parameters that the corners of a picture share.
+/// The parameters that the corners of an image share.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Optics {
     /// Whether the tone curve is unknown.
@@ -38,8 +38,7 @@ pub(crate) struct Optics {
     pub(super) is_ink_open: bool,
     pub(super) curve: Option<Curve>,
     pub(super) params: [f64; TONE_PARAMS],
-    /// Range of grey values, from the blackest to the whitest corner, for which a tone curve is
-    /// estimated.
+    /// Range of grey values, from the blackest to the whitest corner, for which a tone curve is estimated.
     pub(super) range: [f64; 2],
     /// Astigmatism: e₁, e₂ of the shape M = (1 + e₁, e₂; e₂, 1 − e₁) of the squared blur.
     pub astigmatism: [f64; 2],
@@ -82,28 +81,25 @@ impl Default for Optics {
     }
 }
 
-/// Least stretch of the blur that can be motion: below it, motion changes the kurtosis by less than
-/// a fifth.
+/// Minimum stretch of the blur that can be motion. Below it, motion changes the kurtosis by less than a fifth.
 pub(super) const LEAST_MOTION: f64 = 0.25;
 
-/// Distribution of the blur over directions: M, of trace 2, or what remains of it without motion
-/// along a line.
+/// Distribution of the blur over directions: M, of trace 2, or its remainder without motion along a line.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Spread {
     astigmatism: [f64; 2],
-    /// The part of the astigmatism that the motion takes, and the length of the astigmatism.
+    /// Fraction of the astigmatism that the motion explains, and magnitude of the astigmatism.
     part: f64,
     length: f64,
     /// Whether there is motion blur.
     pub is_swept: bool,
-    /// Half of the motion vector, in units of the blur, and its derivatives by both parameters of
-    /// astigmatism.
+    /// Half of the motion vector, in units of the blur, and its derivatives by both parameters of astigmatism.
     pub way: [f64; 2],
     pub way_by_astigmatism: [[f64; 2]; 2],
 }
 
 impl Spread {
-    /// The bilinear form aᵀ M b.
+    /// Returns the bilinear form aᵀ M b.
     pub(crate) fn product(&self, a: [f64; 2], b: [f64; 2]) -> f64 {
         let [along, across] = parts(a, b);
         let [e1, e2] = self.astigmatism;
@@ -111,7 +107,7 @@ impl Spread {
             + (1.0 - self.part) * (e1 * along + e2 * across)
     }
 
-    /// Derivatives of [`Self::product`] by both parameters of astigmatism.
+    /// Returns the derivatives of [`Self::product`] by both parameters of astigmatism.
     pub(crate) fn by_astigmatism(&self, a: [f64; 2], b: [f64; 2]) -> [f64; 2] {
         let parts = parts(a, b);
         let round = self.part * (a[0] * b[0] + a[1] * b[1]);
@@ -122,28 +118,28 @@ impl Spread {
     }
 }
 
-/// The coefficients of both parameters of astigmatism in aᵀ M b.
+/// Returns the coefficients of both parameters of astigmatism in aᵀ M b.
 fn parts(a: [f64; 2], b: [f64; 2]) -> [f64; 2] {
     [a[0] * b[0] - a[1] * b[1], a[0] * b[1] + a[1] * b[0]]
 }
 
 impl Optics {
-    /// Optics with a given tone curve, and nothing else known.
+    /// Returns optics with a given tone curve, and nothing else known.
     pub(crate) fn of(tone: Tone) -> Self {
         Self { is_open: tone == Tone::Auto, curve: Curve::of(tone), ..Self::default() }
     }
 
-    /// The same optics for a print with this ink spread, in edges; `None` where it is not known.
+    /// Returns these optics for a print with this ink spread, in edges; `None` if it is unknown.
     pub(crate) fn with_ink(self, ink: Option<f64>) -> Self {
         Self { is_ink_open: ink.is_none(), ink: ink.unwrap_or(0.0) / INK_UNIT, ..self }
     }
 
-    /// The same optics with the ink spread taken for known: an unknown one counts as none.
+    /// Returns these optics with the ink spread treated as known; an unknown one counts as none.
     pub(crate) fn with_ink_as_known(self) -> Self {
         Self { is_ink_open: false, ..self }
     }
 
-    /// The distribution of the blur over directions, for corners with this number of edges.
+    /// Returns the distribution of the blur over directions, for corners with this number of edges.
     pub(crate) fn spread(&self, edges: usize) -> Spread {
         let ([e1, e2], length) = (self.astigmatism, self.stretch());
         let is_swept = self.is_motion && length > 0.0;
@@ -158,8 +154,8 @@ impl Optics {
         if !is_swept {
             return still;
         }
-        // A box of half the length has a third of its square as variance, which is what the blur along the way has more than
-        // across it: 2 · length, as M has the trace 2.
+        // The variance of a box is a third of the square of half its length. It is the excess of the blur along the
+        // motion over that across it: 2 · length, because M has the trace 2.
         let (far, turn) = ((6.0 * length).sqrt(), e2.atan2(e1) / 2.0);
         let way = [far * turn.cos(), far * turn.sin()];
         let square = 2.0 * length * length;
@@ -171,36 +167,36 @@ impl Optics {
         Spread { part, way, way_by_astigmatism, ..still }
     }
 
-    /// Difference of the squared blur along both principal axes, over their sum.
+    /// Returns the difference of the squared blur along both principal axes, relative to their sum.
     pub(super) fn stretch(&self) -> f64 {
         let [e1, e2] = self.astigmatism;
         e1.hypot(e2)
     }
 
-    /// Least blur over all directions, relative to the mean blur.
+    /// Returns the smallest blur over all directions, relative to the mean blur.
     pub(crate) fn narrowest(&self) -> f64 {
         (1.0 - self.stretch()).sqrt()
     }
 
-    /// Blur of the pattern without halo, relative to the blur of a pattern whose edges are as steep
-    /// without one: (1 + α)/s − α/(w·s) is the same for all α. So the blur of a corner is nearly
-    /// the same with and without a halo.
+    /// Returns the blur of the pattern without halo, relative to the blur of a pattern without halo whose edges have
+    /// the same slope: (1 + α)/s − α/(w·s) is the same for all α. So the blur of a corner is nearly the same with and
+    /// without a halo.
     pub(crate) fn core(&self) -> f64 {
         let [strength, width] = self.halo;
         (1.0 + strength * (1.0 - 1.0 / width)).max(LEAST_CORE)
     }
 
-    /// Derivative of the logarithm of [`Self::core`] by the strength of the halo.
+    /// Returns the derivative of the logarithm of [`Self::core`] by the strength of the halo.
     pub(crate) fn ln_core_by_halo(&self) -> f64 {
         (1.0 - 1.0 / self.halo[1]) / self.core()
     }
 
-    /// Whether there is a tone curve.
+    /// Returns whether there is a tone curve.
     pub(crate) fn is_toned(&self) -> bool {
         self.curve.is_some()
     }
 
-    /// The tone curve between the black and white of a corner.
+    /// Returns the tone curve between the black and white of a corner.
     pub(crate) fn piece(&self, level: f64, amplitude: f64) -> Piece {
         match &self.curve {
             Some(curve) => curve.piece(level, amplitude),
@@ -208,7 +204,7 @@ impl Optics {
         }
     }
 
-    /// The optics with one parameter a [`STEP`] further.
+    /// Returns the optics with one parameter increased by a [`STEP`].
     pub(super) fn moved(&self, parameter: usize) -> Self {
         let mut params = self.vector();
         params[parameter] += STEP;
@@ -239,13 +235,13 @@ impl Optics {
         }
     }
 
-    /// κ₀ and κ₁ between black and white.
+    /// Returns κ₀ and κ₁ between black and white.
     pub(super) fn kappas(&self, [black, white]: [f64; 2]) -> [f64; 2] {
         let piece = self.piece((white + black) / 2.0, (white - black) / 2.0);
         [0, 1].map(|i| f64::from(piece.terms[i]))
     }
 
-    /// The derivative of κ₀ by a parameter.
+    /// Returns the derivative of κ₀ by a parameter.
     pub(super) fn kappa_slope(&self, greys: [f64; 2], parameter: usize) -> f64 {
         match parameter {
             0..TONE_PARAMS => {

@@ -1,12 +1,10 @@
 //! Subpixel refinement of all corners of a grid, each from all pixels that show only this corner.
 //!
-//! The blur determines how far neighbouring edges reach into a window; it is estimated from a few
-//! corners, on coarser levels of the pyramid where the finest shows too little of it. The curvature
-//! of edges by lens distortion follows from the corners, which are then fitted again. Something
-//! that covers a part of the board may still lie beside a corner; then the residual of the model is
-//! larger than elsewhere in the grid, and smaller windows are tried. A corner at the end of the
-//! visible part of the board is dropped when no window shows it cleanly, since its position is
-//! biased by the cover.
+//! The blur determines how far neighbouring edges reach into a window. It is estimated from a few corners, on coarser
+//! levels of the pyramid if the finest shows too little of it. The curvature of edges by lens distortion follows from
+//! the corners, which are then fitted again. A cover may still lie beside a corner. The residual of the model is then
+//! larger than elsewhere in the grid, and smaller windows are tried. A corner at the end of the visible part of the
+//! board is dropped if no window shows it cleanly, because the cover biases its position.
 
 use std::collections::BTreeMap;
 
@@ -30,62 +28,61 @@ use deltille_core::statistics::median;
 /// Number of corners from which the blur is estimated, those with the most room.
 const BLUR_CORNERS: usize = 15;
 
-/// Of so many times as many, from all over the grid: among four some lie clear of tags and of the rim.
+/// Factor of the corners from which they are selected, all over the grid. Among four, some are clear of tags and of the
+/// border.
 const LOOKED_AT: usize = 4;
 
 /// Blur that is assumed before it is estimated, px: that of a good photograph.
 const USUAL_BLUR_PX: f64 = 1.0;
 
-/// Largest blur as a fraction of the radius of the largest window; a larger one is estimated again
-/// on a coarser level, because the window shows little but the middle of the edges.
+/// Largest blur as a fraction of the radius of the largest window. A larger one is estimated again on a coarser level,
+/// because the window shows little but the centre of the edges.
 const MAX_BLUR: f64 = 0.5;
 
-/// Residuals above this many times the median of the grid show something else than the corner; the
-/// noise of a 7×7 window varies by a tenth.
+/// Maximum residual, relative to the median of the grid. A larger one shows an object other than the corner; the noise
+/// of a 7×7 window varies by a tenth.
 const MAX_RESIDUAL_RATIO: f64 = 3.0;
 
-/// Residuals below this fraction of the amplitude are no reason to doubt a corner: in a clean image
-/// the median is close to zero.
+/// Residual below which a corner is not questioned, as a fraction of the amplitude. In a clean image the median is
+/// close to zero.
 const MIN_RESIDUAL: f64 = 0.05;
 
-/// Residuals above this many times the median show something beside noise, whose scatter in a window is a tenth.
+/// Residual, relative to the median, above which there is more than noise; the scatter of noise in a window is a tenth.
 const UNUSUAL: f64 = 1.3;
 
-/// Greatest correlation of neighbouring residuals that is distinguished: from there on they are one
-/// shape all over the window.
+/// Maximum correlation of neighbouring residuals that is distinguished. Above it, they form one shape over the window.
 const MOST_CORRELATED: f64 = 0.9;
 
-/// Blur of which a picture loses nothing when it is sampled once a pixel, px: its spectrum falls to a
-/// ten-thousandth at the highest frequency.
+/// Blur at which sampling once per pixel loses nothing, px: the spectrum falls to 1/10 000 at the highest frequency.
 const SHARP_PX: f64 = 1.4;
 
-/// Least number of corners for a task on a thread of its own.
+/// Minimum number of corners for a task on a separate thread.
 const PART: usize = 128;
 
-/// A corner whose blur exceeds that of its neighbours by more than this factor is the rim of a
-/// cover: at the rims of fisheye pictures blur doubles from one corner to the next.
+/// Maximum ratio of the blur of a corner to that of its neighbours. A larger one is the edge of a cover; near the edge
+/// of fisheye images, blur doubles from one corner to the next.
 const MAX_BLUR_RATIO: f64 = 3.0;
 
-/// Positions with a larger standard deviation than this, px, including the shape of the residuals,
-/// are dropped: the grid predicts as well.
+/// Maximum standard deviation of a position, px, including the shape of the residuals. Positions above it are dropped:
+/// the grid predicts as well.
 const WORST_SIGMA_PX: f64 = 3.0;
 
-/// A window is followed by one that is smaller by this factor.
+/// Ratio of successive windows.
 const NEXT_WINDOW: f64 = 0.7;
 
-/// A level of a picture's pyramid, or the picture itself in place of the finest one.
+/// A pyramid level of an image, or the image itself in place of the finest one.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Level<'a> {
-    /// What is seen on it.
+    /// Image of this level.
     pub image: ImageView<'a>,
-    /// How many finer levels there are.
+    /// Number of finer levels.
     pub number: usize,
     /// The coarser levels, finest first.
     pub coarser: &'a [Gray<i16>],
 }
 
 impl Refiner {
-    /// The blur of each grid in px, where the model can tell it.
+    /// Returns the blur of each grid, px, if the model can measure it.
     pub(crate) fn blurs(
         &self,
         fitter: &mut CornerFitter,
@@ -96,8 +93,7 @@ impl Refiner {
         grids.iter().map(|grid| self.blur_of_grid(fitter, level, grid, tags)).collect()
     }
 
-    /// The optics that the grids of a picture share, given their blurs, as one level of the pyramid
-    /// shows them.
+    /// Returns the optics that the grids of an image share, given their blurs, from one level of the pyramid.
     pub(crate) fn optics(
         &self,
         fitter: &mut CornerFitter,
@@ -111,7 +107,7 @@ impl Refiner {
             return known;
         }
         if number > 0 {
-            // The blur of an enlarged picture is no Gaussian, which ink would explain.
+            // The blur of an enlarged image is not Gaussian, which an ink spread would explain.
             known = known.with_ink_as_known();
         }
         let all: usize = grids.iter().map(|grid| grid.corners.len()).sum();
@@ -129,7 +125,7 @@ impl Refiner {
         }
         places.retain(|(_, clear_px, ..)| *clear_px >= MIN_MODEL_RADIUS as f64);
         places.sort_by(|a, b| b.1.total_cmp(&a.1));
-        // Those with the most room lie where the board is nearest; light differs from there to elsewhere.
+        // Those with the most room lie where the board is nearest, and the light may differ elsewhere.
         places.truncate(SAMPLES.max(places.len() / 2));
         places.sort_by_key(|(order, ..)| *order);
         let count = places.len();
@@ -147,8 +143,7 @@ impl Refiner {
         self.joint_optics(fitter, image, samples, &known)
     }
 
-    /// Refines the corners of a grid in place, given its blur in px, and drops corners that are
-    /// spoilt.
+    /// Refines the corners of a grid in place, given its blur in px, and drops corrupted corners.
     pub(crate) fn refine_grid(
         &self,
         fitter: &mut CornerFitter,
@@ -169,7 +164,7 @@ impl Refiner {
         let residuals: Vec<f64> =
             refined.iter().filter_map(|(_, fit)| Some((*fit)?.residual)).collect();
         let judged = is_judge(&refined);
-        // What the picture has in common takes away what it leaves at most corners, not at all.
+        // The shared optics reduce the residuals of most corners, but not of all.
         let usual = median(residuals).unwrap_or(0.0).max(optics.plain_residual);
         let limit = (MAX_RESIDUAL_RATIO * usual).max(MIN_RESIDUAL);
         let (mut kept, mut fits) = (Vec::new(), Vec::new());
@@ -184,7 +179,7 @@ impl Refiner {
             let (refined, fit) = if clean || !judged || !modelled() {
                 (Some(refined), fit.filter(|_| clean))
             } else {
-                // Where the model finds nothing, as at the rim of a cover, nothing is known of the position.
+                // If the model finds nothing, as at the edge of a cover, the position is unknown.
                 let smaller = self.clean_fit(fitter, image, corner, room, limit);
                 let found = smaller.or(fit.filter(|_| around[i].is_inner));
                 (found.map(Refined::from), found)
@@ -198,8 +193,8 @@ impl Refiner {
         self.follow_bends(image, grid, tags, &fits, limit, sharpness);
     }
 
-    /// Fits the corners again with the curvature of the edges, which follows from their positions;
-    /// fits with a residual above `limit` do not count.
+    /// Fits the corners again with the curvature of the edges, which follows from their positions. Fits with a residual
+    /// above `limit` do not count.
     fn follow_bends(
         &self,
         image: ImageView,
@@ -239,12 +234,12 @@ impl Refiner {
         grid.corners = grid.corners.iter().zip(&fits).filter_map(settled).collect();
     }
 
-    /// Whether the clear area around a corner suffices for the model.
+    /// Returns whether the clear area around a corner suffices for the model.
     fn has_room(&self, image: ImageView, corner: &GridCorner, room: Room) -> bool {
         self.window(image, corner.position(), room).count() >= MIN_PIXELS
     }
 
-    /// Refines all corners of a grid, each by itself.
+    /// Refines all corners of a grid, each on its own.
     fn refine_each(
         &self,
         image: ImageView,
@@ -258,9 +253,9 @@ impl Refiner {
         })
     }
 
-    /// Moves corners at which the model fails, although it fits most others, to the crossing of the
-    /// lines of their neighbours, if that is outside the range of the model: a cell of a tag was
-    /// taken for them. Returns which corners were moved.
+    /// Moves corners to the crossing of the lines of their neighbours, if the model fits most others but not these, and
+    /// if the crossing is outside the range of the model. In that case, a cell of a tag was mistaken for the corner.
+    /// Returns which corners were moved.
     fn put_back(&self, grid: &mut Grid, refined: &[(Refined, Option<ModelFit>)]) -> Vec<bool> {
         let judged = is_judge(refined);
         let place = |(corner, (_, fit)): (&GridCorner, &(_, Option<ModelFit>))| {
@@ -275,20 +270,20 @@ impl Refiner {
         places.iter().map(Option::is_some).collect()
     }
 
-    /// All of the clear area around a corner, in the largest window.
+    /// Returns all of the clear area around a corner, in the largest window.
     fn whole<'a>(&self, around: &'a Surroundings, sharpness: Sharpness<'a>) -> Room<'a> {
         let Sharpness { blur_px, optics } = sharpness;
         Room { around, blur_px, reach_px: self.largest_radius(), optics }
     }
 
-    /// The immediate surroundings of a corner, from which the edges are initialised.
+    /// Returns the immediate surroundings of a corner, from which the edges are initialised.
     fn near<'a>(&self, around: &'a Surroundings, sharpness: Sharpness<'a>) -> Room<'a> {
         let reach_px = REACH_PX.max(REACH_SIGMAS * sharpness.blur_px);
         let reach_px = reach_px.round().min(self.largest_radius());
         Room { reach_px, ..self.whole(around, sharpness) }
     }
 
-    /// The blur of a grid, px: as the finest level of the pyramid shows it that shows enough of it.
+    /// Returns the blur of a grid, px, from the finest level of the pyramid that shows enough of it.
     fn blur_of_grid(
         &self,
         fitter: &mut CornerFitter,
@@ -296,7 +291,7 @@ impl Refiner {
         grid: &Grid,
         tags: &TagAreas,
     ) -> Option<f64> {
-        // In a grid without tags nothing indicates that its tiles are not plain.
+        // In a grid without tags, nothing indicates that its tiles are not plain.
         let plain = TagAreas::default();
         let shown = if grid.tags.is_empty() { &plain } else { tags };
         let most_px = MAX_BLUR * self.largest_radius();
@@ -310,8 +305,8 @@ impl Refiner {
         known
     }
 
-    /// The blur of a grid as `image`, a level of its pyramid, shows it, px of level 0: the median over
-    /// the corners with the most room.
+    /// Returns the blur of a grid in `image`, a level of its pyramid, in px of level 0: the median over the corners
+    /// with the most room.
     fn blur(
         &self,
         fitter: &mut CornerFitter,
@@ -331,7 +326,7 @@ impl Refiner {
         places.sort_by(|a, b| b.0.total_cmp(&a.0));
         let fits = places.iter().take(BLUR_CORNERS).filter_map(|(clear_px, corner, around)| {
             let place = Pyramid::from_level_0(level, corner.position());
-            // What is a wave shows in the middle of the tiles.
+            // A wave is visible in the middle of the tiles.
             let reach_px = clear_px.max(MIN_MODEL_RADIUS as f64).floor();
             let room = Room { around, blur_px: USUAL_BLUR_PX, reach_px, optics: &self.known };
             self.model(fitter, image, place, room, None).map(|fit| scale * fit.blur_px())
@@ -339,7 +334,7 @@ impl Refiner {
         median(fits.collect())
     }
 
-    /// The model in the largest window smaller than that of `room` that leaves no more than `limit`.
+    /// Returns the fit in the largest window smaller than that of `room` whose residual is at most `limit`.
     fn clean_fit(
         &self,
         fitter: &mut CornerFitter,
@@ -361,31 +356,30 @@ impl Refiner {
     }
 }
 
-/// The results of `work` for corners 0 to `count` − 1, in order, on the threads of the current
-/// pool.
+/// Returns the results of `work` for corners 0 to `count` − 1, in order, on the threads of the current pool.
 fn each<F: Send>(count: usize, work: impl Fn(&mut CornerFitter, usize) -> F + Sync) -> Vec<F> {
     let parts = (0..count).into_par_iter().with_min_len(PART);
     parts.map_init(CornerFitter::default, |fitter, i| work(fitter, i)).collect()
 }
 
-/// The level of the pyramid, of `levels`, on which a picture is refined: the coarsest on which its
-/// sharpest grid is no sharper than [`SHARP_PX`]. On the finest level an enlarged picture shows
-/// little but the middle of the edges, and noise is correlated over all pixels of the window.
+/// Returns the level of the pyramid, of `levels`, on which an image is refined: the coarsest on which its sharpest grid
+/// is no sharper than [`SHARP_PX`]. On the finest level, an enlarged image shows little but the centre of the edges,
+/// and noise is correlated over all pixels of the window.
 pub(crate) fn sharp_level(blurs: &[Option<f64>], levels: usize) -> usize {
     let is_sampled_on = |&level: &usize| is_sampled(blurs, 1.0 / f64::from(1u32 << level));
     (1..levels).rfind(is_sampled_on).unwrap_or(0)
 }
 
-/// Whether the sharpest grid is no sharper than [`SHARP_PX`] where its blur is `part` of the whole.
+/// Returns whether the sharpest grid, with its blur multiplied by `part`, is no sharper than [`SHARP_PX`].
 pub(crate) fn is_sampled(blurs: &[Option<f64>], part: f64) -> bool {
     let sharpest = blurs.iter().copied().flatten().reduce(f64::min);
     sharpest.is_some_and(|blur_px| part * blur_px >= SHARP_PX)
 }
 
-/// Factor of the covariance of a corner for systematic residuals: those beyond the usual noise of
-/// the grid show something in the picture, such as glare or the rim of a cover, and neighbouring
-/// pixels then are not independent. Residuals with the correlation r between neighbours, in rows
-/// and in columns, count as ((1 + r)/(1 − r))² times their variance.
+/// Returns the factor of the covariance of a corner for systematic residuals. Residuals beyond the usual noise of the
+/// grid show an object in the image, such as glare or the edge of a cover. Neighbouring pixels then are not
+/// independent. Residuals with the correlation r between neighbours, in rows and in columns, count as ((1 + r)/(1 −
+/// r))² times their variance.
 fn shape_of_residuals(fit: &ModelFit, usual_noise: f64) -> f64 {
     let share = 1.0 - (UNUSUAL * usual_noise / fit.noise()).powi(2);
     let correlation = (1.0 - fit.whiteness).clamp(0.0, MOST_CORRELATED);
@@ -393,8 +387,8 @@ fn shape_of_residuals(fit: &ModelFit, usual_noise: f64) -> f64 {
     1.0 + share.max(0.0) * (together - 1.0)
 }
 
-/// Whether the model fits most corners of a grid. It cannot fit edges as sharp as pixels, and must
-/// not judge corners then.
+/// Returns whether the model fits most corners of a grid. It cannot fit edges as sharp as pixels, and must not judge
+/// corners then.
 fn is_judge(refined: &[(Refined, Option<ModelFit>)]) -> bool {
     let fitted = refined.iter().filter(|(_, fit)| fit.is_some()).count();
     2 * fitted > refined.len()

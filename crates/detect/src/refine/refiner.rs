@@ -1,7 +1,7 @@
-//! The last word on a corner's position, from the raw pixels.
+//! Final refinement of a corner's position, from the raw pixels.
 //!
-//! The paper's polynomial walks to the corner; the model ([`super::model`]) starts there
-//! and adds a covariance. Where the model does not hold, the polynomial's result stays.
+//! The polynomial of the paper converges to the corner. The model ([`super::model`]) starts there and adds a
+//! covariance. If the model does not fit, the result of the polynomial is kept.
 //!
 //! ```
 //! use deltille_detect::{Refinement, Refiner};
@@ -33,40 +33,40 @@ use deltille_core::detection::Tone;
 use deltille_core::lattice::GridKind;
 use deltille_core::raster::ImageView;
 
-/// Smallest radius in which the model is fitted: 49 pixels for ten unknowns.
+/// Minimum radius of the window of the model, px: 49 pixels for ten unknowns.
 pub(crate) const MIN_MODEL_RADIUS: usize = 3;
 
-/// Fewest pixels to which the model is fitted: three for each unknown, so that the noise shows.
+/// Minimum number of pixels for the model: three for each unknown, so that the noise is measurable.
 pub(crate) const MIN_PIXELS: usize = 30;
 
-/// Half the side of the square around a corner that must be clear for the polynomial, px: a third of
-/// what its usual window reads, where nearly all of its weight lies.
+/// Minimum half side of the clear square around a corner for the polynomial, px. It is a third of its usual window,
+/// where nearly all of its weight lies.
 const MIN_POLYNOMIAL_CLEAR_PX: f64 = 2.0;
 
-/// Smallest side of a window, px: what the smallest polynomial reads, 4r + 1 with r = 2.
+/// Smallest side of a window, px: 4r + 1 pixels of the smallest polynomial, with r = 2.
 const MIN_WINDOW_PX: usize = 9;
 
 /// Largest side of a window, px.
 pub const MAX_WINDOW_PX: usize = 2 * MAX_RADIUS + 1;
 
-/// How positions are refined.
+/// Method that refines positions.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Refinement {
-    /// The umbilic point of a fitted cubic surface, as in the paper, or the saddle of a quadric.
+    /// The umbilic point of a fitted cubic surface, as in the paper, or the saddle point of a quadric.
     Polynomial,
-    /// A blurred corner fitted to the pixels, from the polynomial's result.
+    /// A blurred corner fitted to the pixels, from the result of the polynomial.
     #[default]
     Model,
 }
 
-/// Which method gave a refined position.
+/// Method that gave a refined position.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum RefineStatus {
-    /// The method that was asked for.
+    /// The requested method.
     Ok,
-    /// The model does not hold here; the position is the polynomial's.
+    /// The polynomial, because the model does not fit here.
     Polynomial,
-    /// None, as there is no corner: the position is the start.
+    /// None, because there is no corner: the position is the start.
     Failed,
 }
 
@@ -76,37 +76,37 @@ pub enum RefineStatus {
 pub struct Refined {
     /// Position, px; pixel centres at integers.
     pub position: DVec2,
-    /// Covariance xx, xy, yy of the position, px²; `None` where the method gives none.
+    /// Covariance xx, xy, yy of the position, px²; `None` if the method gives none.
     pub cov: Option<[f64; 3]>,
-    /// Which method found it.
+    /// Method that gave the position.
     pub status: RefineStatus,
 }
 
-/// What the model found, of either kind of corner.
+/// Result of the model, for either kind of corner.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct ModelFit {
-    /// The corner; of two edges the last angle means nothing.
+    /// The corner; with two edges, the last angle has no meaning.
     pub corner: Corner<3>,
     /// Covariance xx, xy, yy of its position, px².
     pub cov: [f64; 3],
-    /// Standard deviation of what is left, over half the contrast.
+    /// Standard deviation of the residuals, relative to half the contrast.
     pub residual: f64,
-    /// Mean squared difference of neighbouring residuals over that of white noise.
+    /// Mean squared difference of neighbouring residuals, relative to white noise.
     pub whiteness: f64,
 }
 
 impl ModelFit {
-    /// Position, px.
+    /// Returns the position, px.
     pub(crate) fn position(&self) -> DVec2 {
         self.corner.position
     }
 
-    /// Standard deviation of what is left, of full scale.
+    /// Returns the standard deviation of the residuals, of full scale.
     pub(crate) fn noise(&self) -> f64 {
         self.residual * self.corner.amplitude.abs()
     }
 
-    /// Standard deviation of the blur with the pixel's box in it, px.
+    /// Returns the standard deviation of the blur including the pixel's box, px.
     pub(crate) fn blur_px(&self) -> f64 {
         self.corner.blur_px
     }
@@ -125,30 +125,30 @@ impl From<ModelFit> for Refined {
     }
 }
 
-/// How a picture shows the corners of a grid.
+/// Sharpness of the corners of a grid.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Sharpness<'a> {
     /// Standard deviation of the blur, px.
     pub blur_px: f64,
-    /// What all corners of the picture share.
+    /// Parameters that all corners of the image share.
     pub optics: &'a Optics,
 }
 
-/// What is known of the surroundings of a corner.
+/// Clear area around a corner.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Room<'a> {
-    /// What lies there.
+    /// Surroundings of the corner.
     pub around: &'a Surroundings,
-    /// Deviation of the blur, px.
+    /// Standard deviation of the blur, px.
     pub blur_px: f64,
-    /// Nothing beyond this in either coordinate is looked at, px.
+    /// Maximum distance of the pixels used, in either coordinate, px.
     pub reach_px: f64,
-    /// What is common to all corners of the picture.
+    /// Parameters that all corners of the image share.
     pub optics: &'a Optics,
 }
 
 impl Room<'_> {
-    /// The pixels of the image that show nothing but the corner at `position`, within a radius.
+    /// Returns the pixels of the image that show only the corner at `position`, within a radius.
     fn window(&self, image: ImageView, position: DVec2, radius: usize) -> Window {
         let [right, bottom] = [image.width(), image.height()].map(|side| side as f64 - 1.0);
         let pixel = position.round();
@@ -164,16 +164,16 @@ impl Room<'_> {
         Window::within(radius, span, |place| is_off_tags(place + off))
     }
 
-    /// Half the side of the largest square that shows nothing else, px.
+    /// Returns half the side of the largest clear square, px.
     pub(crate) fn clear_square_px(&self) -> f64 {
         self.around.clear_square_px(self.blur_px).min(self.reach_px)
     }
 }
 
-/// What the model found, and the pixels that it was fitted to.
+/// The result of the model, and the fitted pixels.
 type Fit = (Patch, ModelFit);
 
-/// Refines corners of one kind.
+/// Refines corners of one tiling.
 #[derive(Clone, Debug)]
 pub struct Refiner {
     polynomial: Polynomial,
@@ -182,19 +182,19 @@ pub struct Refiner {
     /// Windows of the model by radius, from [`MIN_MODEL_RADIUS`].
     windows: Vec<Window>,
     tone: Tone,
-    /// What is known before any picture is seen.
+    /// Optics known before any image.
     pub(crate) known: Optics,
 }
 
 impl Refiner {
-    /// A refiner that reads at most `window_px` × `window_px` pixels, an odd number from 9 to
-    /// [`MAX_WINDOW_PX`]; the polynomial reads 4r + 1 pixels for a whole r, the largest that fits.
+    /// Creates a refiner that reads at most `window_px` × `window_px` pixels, an odd number from 9 to
+    /// [`MAX_WINDOW_PX`]. The polynomial reads 4r + 1 pixels, with the largest integer r that fits.
     pub fn new(kind: GridKind, method: Refinement, window_px: usize) -> Self {
         let window_px = window_px.clamp(MIN_WINDOW_PX, MAX_WINDOW_PX);
         Self::with_radii(kind, method, (window_px - 1) / 4, (window_px - 1) / 2)
     }
 
-    /// A refiner with a polynomial of radius r and a model of at most `model_radius`.
+    /// Creates a refiner with a polynomial of radius r and a model of at most `model_radius`.
     pub(crate) fn with_radii(
         kind: GridKind,
         method: Refinement,
@@ -214,29 +214,29 @@ impl Refiner {
         }
     }
 
-    /// The same refiner with another number of iterations of the polynomial.
+    /// Sets the number of iterations of the polynomial.
     pub fn with_iterations(self, iterations: usize) -> Self {
         Self { iterations, ..self }
     }
 
-    /// The same refiner for a camera with this tone curve; without it grey values are linear in light.
+    /// Sets the tone curve of the camera; by default, grey values are linear in light.
     pub fn with_tone(self, tone: Tone) -> Self {
         Self { tone, known: Optics::of(tone), ..self }
     }
 
-    /// The same refiner for a print whose ink has spread so far, in edges of a tile; `None` where it is not known.
+    /// Sets the ink spread of the print, in edges of a tile; `None` if it is unknown.
     pub fn with_ink(self, ink: Option<f64>) -> Self {
         Self { known: self.known.with_ink(ink), ..self }
     }
 
-    /// The corner near `start`, in the whole window.
+    /// Refines the corner near `start`, in the whole window.
     ///
-    /// An unknown tone curve is estimated from this corner; [`Self::refine_all`] asks all of a picture.
+    /// An unknown tone curve is estimated from this corner; [`Self::refine_all`] uses all corners of an image.
     pub fn refine<'a>(&self, image: impl Into<ImageView<'a>>, start: DVec2) -> Refined {
         self.refine_all(image, &[start])[0]
     }
 
-    /// The corners of a picture near `starts`, each in the whole window.
+    /// Refines the corners of an image near `starts`, each in the whole window.
     pub fn refine_all<'a>(
         &self,
         image: impl Into<ImageView<'a>>,
@@ -245,7 +245,7 @@ impl Refiner {
         self.refine_view(image.into(), starts)
     }
 
-    /// [`Self::refine_all`], compiled here and not in every crate that uses it.
+    /// Implements [`Self::refine_all`], compiled here instead of in every crate that uses it.
     fn refine_view(&self, image: ImageView, starts: &[DVec2]) -> Vec<Refined> {
         let mut fitter = CornerFitter::default();
         let mut fit = |start: &DVec2| self.refine_with(&mut fitter, image, *start, &self.known);
@@ -267,7 +267,7 @@ impl Refiner {
         first.into_iter().enumerate().map(again).collect()
     }
 
-    /// The optics of a picture that these corners show, of which so much is known.
+    /// Returns the optics of an image from these corners, given the known ones.
     pub(crate) fn joint_optics(
         &self,
         fitter: &mut CornerFitter,
@@ -303,8 +303,8 @@ impl Refiner {
         }
     }
 
-    /// A corner of a grid near `start`, from pixels that show nothing else. Beside it what the model
-    /// found.
+    /// Refines a corner of a grid near `start`, from pixels that show only this corner. Also returns the result of the
+    /// model.
     pub(crate) fn refine_within(
         &self,
         fitter: &mut CornerFitter,
@@ -319,8 +319,7 @@ impl Refiner {
         if let Some(fit) = model(start) {
             return (fit.into(), Some(fit));
         }
-        // Where other edges are this near, they would draw the polynomial away from a start that the
-        // finder has taken care of.
+        // Other edges this near would draw the polynomial away from a start that the finder has already checked.
         let found = (room.clear_square_px() >= MIN_POLYNOMIAL_CLEAR_PX)
             .then(|| self.polynomial.refine(image, start, self.iterations))
             .flatten()
@@ -340,7 +339,7 @@ impl Refiner {
         Refined { position: polynomial.unwrap_or(start), cov: None, status }
     }
 
-    /// The model of a single corner, in the largest window that lies in the image.
+    /// Fits the model to a single corner, in the largest window that lies in the image.
     fn alone<const K: usize>(
         &self,
         fitter: &mut CornerFitter,
@@ -354,8 +353,8 @@ impl Refiner {
         Some((window, fitter.fit(image, window, &first, optics, Accuracy::Full)?.into()))
     }
 
-    /// The model of a corner of a grid, in all of its room that is clear and lies in the image, with
-    /// the bends that the grid shows: as good as the noise allows from a fit `before`, and such a fit without.
+    /// Fits the model to a corner of a grid, in all of its clear area in the image, with the bends of the grid. The fit
+    /// is accurate to the noise if it starts from a fit `before`; otherwise it is a rough one.
     pub(crate) fn model(
         &self,
         fitter: &mut CornerFitter,
@@ -394,14 +393,14 @@ impl Refiner {
         let bends = edges.map(|edge| edge.bend);
         let across_px = edges.map(|edge| edge.across_px);
         let first = Corner { bends, across_px, ..first };
-        // What a picture has in common may not be common to its rim.
+        // The shared optics may not apply near the border of an image.
         let fit = fitter
             .fit(image, window, &first, room.optics, accuracy)
             .or_else(|| fitter.fit(image, window, &first, &self.known, accuracy))?;
         Some(fit.into())
     }
 
-    /// The pixels of a corner's room.
+    /// Returns the pixels of a corner's clear area.
     pub(crate) fn window(&self, image: ImageView, position: DVec2, room: Room) -> Cow<'_, Window> {
         let radius = room.reach_px.min(self.largest_radius());
         let is_whole = radius <= room.clear_square_px().min(distance_to_rim(image, position));
@@ -416,14 +415,14 @@ impl Refiner {
         self.method
     }
 
-    /// Radius of the largest window of the model, px.
+    /// Returns the radius of the largest window of the model, px.
     pub(crate) fn largest_radius(&self) -> f64 {
         self.windows.last().map_or(0.0, |window| window.radius() as f64)
     }
 }
 
-/// The edge nearest to a direction, turned by half where it points the other way: edges near a half-turn may have
-/// become the first since the fit.
+/// Returns the edge nearest to a direction, rotated by 180° if it points the other way. Edges near 180° may have become
+/// the first since the fit.
 fn edge_along(edges: &[Edge], angle_rad: f64) -> Edge {
     let off = |edge: &Edge| (edge.angle_rad - angle_rad).sin().abs();
     let nearest = edges.iter().copied().min_by(|a, b| off(a).total_cmp(&off(b)));
@@ -432,7 +431,7 @@ fn edge_along(edges: &[Edge], angle_rad: f64) -> Edge {
     Edge { bend: if is_opposite { -edge.bend } else { edge.bend }, ..edge }
 }
 
-/// Pixels between a position and the nearest side of the image, where bilinear samples end.
+/// Returns the number of pixels between a position and the nearest side of the image, where bilinear samples end.
 fn distance_to_rim(image: ImageView, DVec2 { x, y }: DVec2) -> f64 {
     let [right, bottom] = [image.width(), image.height()].map(|side| side as f64 - 2.0);
     [x - 1.0, y - 1.0, right - x, bottom - y].into_iter().fold(f64::INFINITY, f64::min)
@@ -448,10 +447,10 @@ mod tests {
     use deltille_core::raster::Gray;
     use deltille_layout::synth::SimulatedCorner;
 
-    /// Side of the square in which each corner of a picture lies, px.
+    /// Side of the square of each corner in an image, px.
     const SIDE: usize = 41;
 
-    /// A picture of 5 × 5 corners seen from 45°, their light falling to a third, and their places.
+    /// Renders an image of 5 × 5 corners seen from 45°, with light falling to a third. Also returns their positions.
     fn picture(lines: usize, grey: impl Fn(f64) -> f64, noise: f64) -> (Gray<f32>, Vec<DVec2>) {
         let mut rng = ChaCha8Rng::seed_from_u64(5);
         let normal = Normal::new(0.0, noise).unwrap();
@@ -478,7 +477,7 @@ mod tests {
         (image, places)
     }
 
-    /// Rms of the errors per coordinate, px, and of what the covariances make of them.
+    /// Returns the RMS of the errors per coordinate, px, and normalised by the covariances.
     fn errors(refined: &[Refined], places: &[DVec2]) -> (f64, f64) {
         let (mut square, mut normalised) = (0.0, 0.0);
         for (refined, place) in refined.iter().zip(places) {
@@ -504,13 +503,13 @@ mod tests {
                 let refiner = Refiner::new(kind, Refinement::Model, 21).with_tone(Tone::Auto);
                 let (rms, normalised) = errors(&refiner.refine_all(&image, &starts), &places);
                 assert!(rms < 0.015, "{lines} edges, {name}: {rms}");
-                // 50 degrees of freedom: 0.2 standard deviation.
+                // 50 degrees of freedom: a standard deviation of 0.2.
                 assert!((0.4..1.8).contains(&normalised), "{lines} edges, {name}: {normalised}");
             }
         }
     }
 
-    /// What is brighter than white is white: an edge that is fitted to it seems to move.
+    /// Pixels brighter than white are clipped to white, which seems to move an edge that is fitted to them.
     #[test]
     fn clipped_pixels_do_not_move_corners() {
         let (image, places) = picture(3, |y| (2.0 * y).min(1.0), 0.0);

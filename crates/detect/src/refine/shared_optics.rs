@@ -1,12 +1,11 @@
-//! Joint estimation of the parameters that all corners of a picture share: tone curve, halo and
-//! astigmatism of the point spread function, and the ink spread of the print.
+//! Joint estimation of the parameters that all corners of an image share: tone curve, halo and astigmatism of the point
+//! spread function, and the ink spread of the print.
 //!
-//! Corners from all over the picture are fitted together by damped least squares, each with its own
-//! position, edges, blur and light, and with the common parameters: the normal equations have a
-//! block for each corner, which is eliminated (Schur complement). Afterwards the common parameters
-//! are fixed, so that they add no unknowns to single corners. Groups of parameters that are not
-//! significant are omitted; significance is judged by the scatter of the gradients of the corners,
-//! so that correlated pixels, or a model that holds only approximately, are not taken for evidence.
+//! Corners from all over the image are fitted together by damped least squares. Each has its own position, edges, blur
+//! and light, and all share the common parameters. The normal equations have a block for each corner, which is
+//! eliminated (Schur complement). Afterwards the common parameters are fixed, so that they add no unknowns to single
+//! corners. Groups of parameters that are not significant are omitted. The scatter of the gradients of the corners
+//! decides significance, so that correlated pixels, or an approximate model, do not count as evidence.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -17,22 +16,20 @@ use deltille_core::detection::{InkEstimate, TONE_PARAMS, ToneEstimate};
 use deltille_core::raster::ImageView;
 use deltille_core::statistics::median;
 
-/// Number of corners that are fitted together; more would determine the curve better than single
-/// corners can use it.
+/// Number of corners that are fitted together. More would determine the curve better than single corners can use it.
 pub(crate) const SAMPLES: usize = 16;
 
-/// Radius of the windows of these corners, px: the common parameters show at the edges, and near the corner.
+/// Radius of the windows of these corners, px. The common parameters show at the edges, and near the corner.
 pub(crate) const REACH_PX: f64 = 7.0;
 
-/// Where the picture is blurred the radius is so many standard deviations of the blur instead.
+/// The same for a blurred image, in standard deviations of the blur.
 pub(crate) const REACH_SIGMAS: f64 = 5.0;
 
-/// A group is estimated where the first step, from a straight curve, promises this fraction of its
-/// threshold.
+/// Fraction of its threshold that the first step, from a straight curve, must predict for a group to be estimated.
 const WORTH_A_LOOK: f64 = 0.5;
 
 impl Optics {
-    /// Estimates the optics from the corners of a picture; a tone curve that is known is kept.
+    /// Estimates the optics from the corners of an image; a known tone curve is kept.
     pub(crate) fn estimate<const K: usize>(
         fitter: &mut CornerFitter,
         image: ImageView,
@@ -71,9 +68,10 @@ impl Optics {
         let mut optics = known.clone();
         let mut at = problem.linearised(known);
         let (mut used, mut found) = (Vec::new(), Reported::default());
-        // A first step tells what is worth looking for. What the model lacks there scatters the gradients: that is
-        // no reason to look away, but the deviation that is reported. From a straight curve it tells little of what
-        // is weak beside the curve, and from a Gaussian little of what a motion leaves: all is asked once more.
+        // The first step selects the groups to estimate. Errors of the model there scatter the gradients. They do not
+        // exclude a group, but enter the reported standard deviation. A step from a straight curve reveals little of
+        // effects that are weak beside the curve, and one from a Gaussian little of the effects of motion. So all
+        // groups are tested once more.
         for is_first in [true, false] {
             problem.active.clone_from(&problem.all);
             let reduced = problem.reduced(&at, &weights_of(&at.equations));
@@ -101,8 +99,8 @@ impl Optics {
         Self { tone: found.tone, ink_found: found.ink, inflation, ..optics }
     }
 
-    /// The tone curve between black and white, given the covariance of the active parameters;
-    /// `None` where it was not estimated.
+    /// Returns the tone curve between black and white, given the covariance of the active parameters; `None` if it was
+    /// not estimated.
     fn tone_between(
         &self,
         greys: [f64; 2],
@@ -122,7 +120,7 @@ impl Optics {
     }
 }
 
-/// What is reported to the user about the optics.
+/// Estimates that are reported to the user.
 #[derive(Default)]
 struct Reported {
     tone: Option<ToneEstimate>,
@@ -130,7 +128,7 @@ struct Reported {
 }
 
 impl Reported {
-    /// What is used, and what `unused` says of the rest.
+    /// Returns the estimates that are used, and those of `unused` for the rest.
     fn or(self, unused: Self) -> Self {
         Self {
             tone: self.tone.filter(|tone| tone.used).or(unused.tone),
@@ -165,8 +163,8 @@ mod tests {
     const EDGE_PX: f64 = 40.0;
     const COUNT: usize = 5;
 
-    /// A picture of corners seen from 55°, all sides of which ink has moved, and the corners. Every point is dark
-    /// that lies in a dark sector or nearer to one than the ink, on the paper.
+    /// Renders an image of corners seen from 55° in which ink has moved all sides, and returns the corners. Points in a
+    /// dark sector, or nearer to one on the paper than the ink spread, are dark.
     fn picture(ink: f64, grey: impl Fn(f64) -> f64) -> (Gray<f32>, Vec<Corner<3>>) {
         let mut rng = ChaCha8Rng::seed_from_u64(3);
         let shrink = 55f64.to_radians().cos();
@@ -203,7 +201,7 @@ mod tests {
                 (along.to_angle(), EDGE_PX * off)
             };
             let mut edges: Vec<(f64, f64)> = lines.iter().map(edge).collect();
-            // What is before a line lies behind the same line the other way.
+            // A point before a line lies behind the same line in the opposite direction.
             let turned = edges.iter().filter(|(angle, _)| *angle < 0.0).count();
             edges.iter_mut().for_each(|(angle, _)| *angle = angle.rem_euclid(PI));
             edges.sort_by(|a, b| a.0.total_cmp(&b.0));
@@ -227,7 +225,7 @@ mod tests {
         (picture, corners)
     }
 
-    /// A fine square under a Gaussian blur and the mean over each pixel.
+    /// Applies a Gaussian blur to a fine square and returns the mean over each pixel.
     fn blurred_and_sampled(fine: &[f64]) -> Vec<f64> {
         let side = COUNT * SIDE * FINE;
         let reach = (4.0 * BLUR_PX * FINE as f64) as isize;
@@ -257,7 +255,7 @@ mod tests {
         pass(&pass(fine, side), COUNT * SIDE)
     }
 
-    /// The pixels around a corner.
+    /// Returns the pixels around a corner.
     fn around<const K: usize>(corner: &Corner<K>) -> Patch {
         Patch { window: Window::new(9), centre: corner.position.round() }
     }
@@ -272,7 +270,7 @@ mod tests {
         fitter.fit(image.into(), &Window::new(9), &start, optics, Accuracy::Full).unwrap()
     }
 
-    /// Of all parameters, a corner's own and the common ones, under a halo, ink, a motion and a curve.
+    /// Checks all parameters, a corner's own and the common ones, under a halo, ink, motion and a curve.
     #[test]
     fn gradients_of_the_joint_equations_are_those_of_the_cost() {
         let (image, corners) = picture(0.004, |light| Tone::Srgb.grey(light));
@@ -287,7 +285,7 @@ mod tests {
     }
 
     fn compare_gradients<const K: usize>(image: &Gray<f32>, corner: &Corner<K>, optics: &Optics) {
-        /// A corner's black and white, between which a piece of the curve is held.
+        /// Black and white of a corner, between which a piece of the curve is fixed.
         const LIGHT: [usize; 2] = [3, 4];
         let patch = around(corner);
         let common: Vec<Common> = (0..PARAMS).map(|p| optics.common(p)).collect();

@@ -1,4 +1,4 @@
-//! Which groups of parameters differ from nothing by more than chance.
+//! Significance of groups of parameters.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -8,15 +8,15 @@ use deltille_core::detection::TONE_PARAMS;
 /// Groups of parameters that are used together.
 const GROUPS: [&[usize]; 4] = [&[0, 1, 2], &[3, 4], &[HALO], &[INK]];
 
-/// A group is used when its probability by chance is below 1 : 1000: χ² of three, two and one
-/// degrees of freedom. Astigmatism is used from 1 : 10 on, because every picture is blurred a
-/// little more in one direction, and from a grazing angle that resembles a tone curve.
+/// χ² thresholds of three, two and one degrees of freedom: a group is used if noise exceeds its threshold with a
+/// probability below 1 : 1000. Astigmatism is used from 1 : 10 on, because every image is blurred a little more in one
+/// direction, and from a grazing angle that resembles a tone curve.
 const CHI2: [f64; 4] = [16.3, 4.6, 10.8, 10.8];
 
-/// The threshold of one degree of freedom, 1 : 1000.
+/// Threshold of one degree of freedom, 1 : 1000.
 const CHI2_OF_ONE: f64 = 10.8;
 
-/// A curve that displaces no corner is used where it explains this fraction of the noise.
+/// Fraction of the noise from which a curve that displaces no corner is used.
 const NOTICED: f64 = 0.05;
 
 /// Values of all parameters, with the information on the active ones.
@@ -27,7 +27,7 @@ pub(super) struct Estimate {
     pub(super) information: DMatrix<f64>,
     /// Derivatives of κ₀ by the parameters of the curve.
     pub(super) kappa_slopes: [f64; TONE_PARAMS],
-    /// Number of corners from which they come.
+    /// Number of pixels in the windows of the corners.
     pub(super) pixels: usize,
 }
 
@@ -36,8 +36,8 @@ impl Estimate {
         DVector::from_iterator(self.active.len(), self.active.iter().map(|&p| self.vector[p]))
     }
 
-    /// The estimate without the groups whose evidence is below this fraction of the threshold,
-    /// removed one by one from the weakest on, since one group may explain another.
+    /// Returns the estimate without the groups whose evidence is below this fraction of the threshold. They are removed
+    /// one by one from the weakest on, because one group may explain another.
     pub(super) fn supported(mut self, part: f64) -> Self {
         loop {
             let present =
@@ -50,10 +50,10 @@ impl Estimate {
         }
     }
 
-    /// Evidence against a group being zero, in squared standard deviations.
+    /// Returns the evidence against a group being zero, in squared standard deviations.
     ///
-    /// The part of a curve besides κ₀ displaces no corner, and occurs in every picture whose blur
-    /// differs a little from the model. It counts where it is more than a twentieth of the noise.
+    /// The part of a curve besides κ₀ displaces no corner. It occurs in every image whose blur differs a little from
+    /// the model. It counts if it is more than a twentieth of the noise.
     fn evidence(&self, group: &[usize]) -> f64 {
         let places = |inside: bool| -> Vec<usize> {
             let all = 0..self.active.len();
@@ -79,7 +79,7 @@ impl Estimate {
         CHI2[0] * (of_kappa / CHI2_OF_ONE).max(of_noise)
     }
 
-    /// The most likely values of these parameters if those of all other groups are zero.
+    /// Returns the most likely values of these parameters if those of all other groups are zero.
     pub(super) fn only(self, active: &[usize]) -> Self {
         let others = GROUPS.iter().filter(|group| !active.contains(&group[0]));
         let present = |all: &Self, group: &[usize]| all.active.contains(&group[0]);
@@ -89,7 +89,7 @@ impl Estimate {
         )
     }
 
-    /// The most likely values of the other parameters if a group is zero.
+    /// Returns the most likely values of the other parameters if a group is zero.
     fn without(&self, group: &[usize]) -> Self {
         let kept: Vec<usize> =
             (0..self.active.len()).filter(|&i| !group.contains(&self.active[i])).collect();

@@ -1,20 +1,21 @@
-//! Small symmetric systems of equations, solved with their sizes known to the compiler.
+//! Solves small symmetric systems of equations whose sizes the compiler knows.
 //!
-//! A picture takes some thousand of them, of ten unknowns; as loops over arrays of fixed size they work on whole rows
-//! at once.
+//! An image needs some thousands of them, with ten unknowns. Loops over arrays of fixed size process whole rows at
+//! once.
 
 #![allow(clippy::needless_range_loop, reason = "one index for two rows, so that vectors show")]
 
 use multiversion::multiversion;
 
-/// Rows (A | B) of N equations A X = B with a positive definite A become (· | X); `None` where A is not that.
+/// Solves N equations A X = B with a positive definite A. Rows (A | B) become (· | X). Returns `None` if A is not
+/// positive definite.
 #[multiversion(targets("x86_64+avx2"))]
 pub fn solved<const N: usize, const W: usize>(mut rows: [[f64; W]; N]) -> Option<[[f64; W]; N]> {
     let mut inverses = [0.0; N];
     for i in 0..N {
         let (above, below) = rows.split_at_mut(i + 1);
         let first = &above[i];
-        // Not a number is not positive either.
+        // NaN is not positive either.
         if first[i] > 0.0 {
             inverses[i] = 1.0 / first[i];
         } else {

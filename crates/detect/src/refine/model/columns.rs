@@ -1,4 +1,4 @@
-//! What the model shows at every pixel of a window, its derivatives, and what it leaves of the picture.
+//! The model at every pixel of a window, its derivatives, and its residuals.
 
 use multiversion::multiversion;
 
@@ -10,7 +10,7 @@ use crate::refine::blurred_corner::{
 };
 use deltille_core::detection::TONE_PARAMS;
 
-/// What all corners have in common is told by further rows, behind the residual: amplitude · (1 − S²).
+/// First of the rows behind the residual, for the parameters that all corners share: amplitude · (1 − S²).
 pub(super) const RISE: usize = PARAMS + 1;
 /// S.
 pub(super) const SHADE: usize = PARAMS + 2;
@@ -23,14 +23,14 @@ pub(super) const INK: usize = PARAMS + 6;
 /// Derivatives by the parameters of the tone curve.
 pub(super) const TONE: usize = PARAMS + 7;
 
-/// All of them, in blocks of four.
+/// Number of rows, in blocks of four.
 pub(super) const ALL: usize = (TONE + TONE_PARAMS).next_multiple_of(4);
 
-/// One row a parameter, then the residual; a column a pixel.
+/// One row for each parameter, then the residual; one column for each pixel.
 pub(super) type Columns = [[f32; MAX_PIXELS]; ALL];
 
-/// Fills the columns of a corner in window coordinates; those of what corners have in common where it is
-/// `JOINT`ly fitted.
+/// Fills the columns of a corner in window coordinates. Includes those of the shared parameters if it is fitted
+/// `JOINT`ly.
 pub(super) fn fill_columns<const K: usize, const JOINT: bool>(
     columns: &mut Columns,
     pixels: &[f32; MAX_PIXELS],
@@ -38,7 +38,7 @@ pub(super) fn fill_columns<const K: usize, const JOINT: bool>(
     corner: &Corner<K>,
     look: &Look<K>,
 ) {
-    // By constants first: what they rule out is not compiled.
+    // By constants first: branches that they exclude are not compiled.
     if K == 2 {
         let is_square = look.rho.abs() <= FEW_NODES_RHO;
         match (look.way, is_square) {

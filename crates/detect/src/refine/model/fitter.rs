@@ -1,4 +1,4 @@
-//! A corner fitted by itself, by Levenberg–Marquardt.
+//! Fits a single corner by Levenberg–Marquardt.
 
 use glam::DVec2;
 use nalgebra::{SMatrix, SVector};
@@ -14,77 +14,78 @@ use deltille_core::damping::Damping;
 use deltille_core::detection::Piece;
 use deltille_core::raster::ImageView;
 
-/// Columns that are multiplied with each other: parameters, residual, and what fills blocks of four.
+/// Columns that are multiplied with each other: parameters, residual, and padding to blocks of four.
 const BLOCKED: usize = (PARAMS + 1usize).next_multiple_of(4);
 
-/// Prior standard deviation of the illumination's relative slope, 1/px: 10 % across 200 px.
-/// Light that falls to a tenth across 1600 px has 0.0014, which a window of 21 px still tells.
+/// Prior standard deviation of the relative slope of the illumination, 1/px: 10 % across 200 px. Light that falls to a
+/// tenth across 1600 px has 0.0014, which a window of 21 px can still measure.
 pub const SLOPE_PRIOR: f64 = 0.0005;
 
-/// Most evaluations of the model; five are usual.
+/// Maximum number of evaluations of the model; five are usual.
 const MAX_EVALUATIONS: usize = 25;
 
 /// Damping of the first step, which starts from a fit to grey values without blur.
 const DAMPING: f64 = 1e-3;
 
-/// The least damping later on: less than that changes no digit of a step.
+/// Minimum damping later on; a smaller one changes no digit of a step.
 const LEAST_DAMPING: f64 = 1e-6;
 
-/// With less damping than this a small step says that the minimum is near, and not that steps are kept short.
+/// Damping below which a small step means that the minimum is near, not that the damping shortens steps.
 const HARDLY_DAMPED: f64 = 0.1;
 
-/// The iteration ends with a step whose squared length, in standard deviations of the estimate, is
-/// below this; the next would be smaller by orders of magnitude.
+/// Squared length of a step, in standard deviations of the estimate, below which the fit has converged. The next step
+/// would be smaller by orders of magnitude.
 const CONVERGED: f64 = 0.25;
 
-/// Or with one as short as this, in px, the logarithm of the blur and three times the angles: what it neglects is of the
-/// order of its square, a fiftieth of a deviation in photographs.
+/// Alternative limit of the step in position (px), logarithm of the blur, and three times the angles. The remaining
+/// error is of the order of its square, σ/50 in photographs.
 const FINE: f64 = 0.03;
 
-/// A rough fit ends with a step below this, in px and the logarithm of the blur; what is neglected is of the order of
-/// its square.
+/// Limit of the step for a rough fit, in px and the logarithm of the blur. The remaining error is of the order of its
+/// square.
 const ROUGH: f64 = 0.15;
 
-/// Black and white that differ by less than this part of the contrast have the same piece of a tone curve:
-/// its curvature, at most a third, changes by as small a part of itself.
+/// Change of black and white, relative to the contrast, within which the piece of a tone curve is kept. Its curvature,
+/// at most a third, then changes by the same fraction of itself.
 const SAME_LIGHT: f64 = 0.01;
 
-/// The same for a start, whose light another fit finds anew.
+/// The same for a start, whose light another fit refines.
 const ROUGHLY_SAME_LIGHT: f64 = 0.1;
 
-/// An angle moves its edge as much as the position does at this distance from the corner, px: where the smallest window ends.
+/// Distance from the corner at which a rotation moves an edge as much as the position does, px: the end of the smallest
+/// window.
 const ARM_PX: f64 = 3.0;
 
-/// Noise assumed at least, of the amplitude, so that noiseless images converge too.
+/// Minimum assumed noise, relative to the amplitude, so that noiseless images converge too.
 pub(super) const MIN_NOISE: f64 = 2e-5;
 
-/// A corner may not leave its start by more than this, px: the start is the polynomial's result.
+/// Maximum distance of a corner from its start, px; the start is the result of the polynomial.
 pub(crate) const MAX_WAY_PX: f64 = 1.5;
 
-/// Residuals larger than this part of the amplitude: the window shows something else, unless they differ from
-/// pixel to pixel as much as noise does.
+/// Maximum residual, relative to the amplitude. With a larger one the window shows something else, unless the residuals
+/// vary from pixel to pixel like noise.
 const MAX_RESIDUAL: f64 = 0.35;
 
-/// Mean squared difference of neighbouring residuals over that of white noise, von Neumann's ratio, above which they
-/// are noise; of what has a shape it is a fraction.
+/// Mean squared difference of neighbouring residuals, relative to white noise (von Neumann's ratio), above which they
+/// are noise. For residuals with a shape it is a fraction.
 const MIN_WHITENESS: f64 = 0.7;
 
-/// A position less certain than this is none, px.
+/// Maximum standard deviation of a valid position, px.
 const MAX_SIGMA_PX: f64 = 1.0;
 
-/// Limits of a sensor that nothing reaches.
+/// Sensor limits that no pixel reaches.
 const UNLIMITED: [f32; 2] = [f32::NEG_INFINITY, f32::INFINITY];
 
-/// How far a fit goes.
+/// Accuracy of a fit.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Accuracy {
-    /// To some hundredths of a pixel: a start for another fit.
+    /// Some hundredths of a pixel: a start for another fit.
     Rough,
-    /// As far as the noise allows.
+    /// Limited by the noise.
     Full,
 }
 
-/// A fitted corner and what is known about its errors.
+/// A fitted corner and its uncertainty.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Fitted<const K: usize> {
     /// The corner.
@@ -93,18 +94,18 @@ pub(crate) struct Fitted<const K: usize> {
     pub cov: [f64; 3],
     /// Standard deviation of the noise, of full scale.
     pub noise: f64,
-    /// Mean squared difference of neighbouring residuals over that of white noise: less where they have a shape.
+    /// Mean squared difference of neighbouring residuals, relative to white noise: less if they have a shape.
     pub whiteness: f64,
 }
 
-/// Fits corners; holds the work space, so one fitter serves one thread.
+/// Fits corners. Contains the work space, so one fitter serves one thread.
 #[derive(Clone, Debug)]
 pub(crate) struct CornerFitter {
     /// Pixels of full scale 1.
     pub(super) pixels: Box<[f32; MAX_PIXELS]>,
     /// Derivatives by the parameters, then the residual.
     pub(super) columns: Box<Columns>,
-    /// Black and white that pixels have reached, or beyond all.
+    /// Black and white that pixels have reached, or values beyond all.
     pub(super) limits: [f32; 2],
 }
 
@@ -118,10 +119,10 @@ impl Default for CornerFitter {
     }
 }
 
-/// The normal equations at one place.
+/// The normal equations at one position.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Normal {
-    /// JᵀJ, with ones for parameters that are not there.
+    /// JᵀJ, with ones for missing parameters.
     pub(super) matrix: SMatrix<f64, PARAMS, PARAMS>,
     /// Jᵀr.
     pub(super) gradient: SVector<f64, PARAMS>,
@@ -130,7 +131,7 @@ pub(super) struct Normal {
 }
 
 impl CornerFitter {
-    /// The corner near `start`; `None` when the window leaves the image or the fit is no corner.
+    /// Fits the corner near `start`. Returns `None` if the window leaves the image or the fit is not a corner.
     pub(crate) fn fit<const K: usize>(
         &mut self,
         image: ImageView,
@@ -143,7 +144,7 @@ impl CornerFitter {
         let start = Corner { position: start.position - centre, ..*start };
         let mut fitted = self.descend(window, &start, optics, accuracy);
         if fitted.is_none() && self.limits != UNLIMITED {
-            // Black and white may lie just there: a drawn page has no others, and nothing but them.
+            // Black and white may equal the limits: a rendered page contains only these two values.
             self.limits = UNLIMITED;
             fitted = self.descend(window, &start, optics, accuracy);
         }
@@ -153,7 +154,7 @@ impl CornerFitter {
         })
     }
 
-    /// [`Self::fit`] to the pixels that are loaded, in window coordinates.
+    /// Fits like [`Self::fit`] to the loaded pixels, in window coordinates.
     fn descend<const K: usize>(
         &mut self,
         window: &Window,
@@ -165,8 +166,8 @@ impl CornerFitter {
         let freedom = (window.count - (ANGLE + K)) as f64;
         let mut corner = start;
         let mut damping = Damping::from(DAMPING).at_least(LEAST_DAMPING, 0.0);
-        // The curve's piece is held, so that steps know all that they change, and made anew after the first
-        // step, which finds the light, and for what came of them all.
+        // The piece of the curve is fixed, so that steps account for all that they change. It is renewed after the
+        // first step, which finds the light, and after the last.
         let mut toned = start;
         let mut piece = optics.piece(toned.level, toned.amplitude);
         let mut normal = self.normal(window, &corner, optics, piece);
@@ -175,7 +176,7 @@ impl CornerFitter {
             let noise = noise(&normal, &corner, freedom);
             let (mut matrix, mut gradient) = with_prior(&normal, &corner, noise);
             if corner.blur_px <= MIN_BLUR_PX && gradient[LN_BLUR] < 0.0 {
-                // No sharper than that.
+                // The blur is at its minimum.
                 (0..PARAMS).for_each(|i| (matrix[(i, LN_BLUR)], matrix[(LN_BLUR, i)]) = (0.0, 0.0));
                 (matrix[(LN_BLUR, LN_BLUR)], gradient[LN_BLUR]) = (1.0, 0.0);
             }
@@ -255,7 +256,7 @@ impl CornerFitter {
         })
     }
 
-    /// Takes the pixels around a position; the centre of the window, or `None` outside the image.
+    /// Loads the pixels around a position. Returns the centre of the window, or `None` outside the image.
     pub(super) fn load(
         &mut self,
         image: ImageView,
@@ -272,7 +273,7 @@ impl CornerFitter {
         Some(centre)
     }
 
-    /// The pixels around a position, full scale 1; `None` where one lies outside the image.
+    /// Returns the pixels around a position, full scale 1; `None` if one lies outside the image.
     pub(crate) fn pixels(
         &mut self,
         image: ImageView,
@@ -283,7 +284,7 @@ impl CornerFitter {
         Some(&self.pixels[..window.count])
     }
 
-    /// Von Neumann's ratio of the residuals along the rows: 1 for white noise.
+    /// Returns von Neumann's ratio of the residuals along the rows: 1 for white noise.
     fn whiteness(&self, window: &Window) -> f64 {
         let mut rest = &self.columns[PARAMS][..window.count];
         let (mut sum, mut of_steps, mut steps) = (0.0, 0.0, 0);
@@ -298,7 +299,7 @@ impl CornerFitter {
         of_steps / (2 * steps) as f64 / (sum / window.count as f64)
     }
 
-    /// The normal equations of the pixels at a corner in window coordinates.
+    /// Returns the normal equations of the pixels at a corner in window coordinates.
     pub(super) fn normal<const K: usize>(
         &mut self,
         window: &Window,
@@ -323,7 +324,7 @@ impl CornerFitter {
         normal
     }
 
-    /// [`fill_columns`] of a corner in window coordinates.
+    /// Calls [`fill_columns`] for a corner in window coordinates.
     pub(super) fn fill<const K: usize, const JOINT: bool>(
         &mut self,
         window: &Window,
@@ -336,20 +337,20 @@ impl CornerFitter {
     }
 }
 
-/// Whether a step in position, px, and blur, by its logarithm, is shorter than this, and what one in angles moves at
-/// [`ARM_PX`].
+/// Returns whether a step is shorter than `limit`, in position (px), in the logarithm of the blur, and in the
+/// displacement by rotation at [`ARM_PX`].
 fn is_within(step: &SVector<f64, PARAMS>, limit: f64) -> bool {
     step[X].hypot(step[Y]) < limit
         && step[LN_BLUR].abs() < limit
         && step.iter().skip(ANGLE).all(|turn| turn.abs() < limit / ARM_PX)
 }
 
-/// The noise that the residuals show.
+/// Returns the noise of the residuals.
 pub(super) fn noise<const K: usize>(normal: &Normal, corner: &Corner<K>, freedom: f64) -> f64 {
     (normal.cost / freedom).sqrt().max(MIN_NOISE * corner.amplitude.abs())
 }
 
-/// The normal equations with the prior on the slopes.
+/// Returns the normal equations with the prior on the slopes.
 pub(super) fn with_prior<const K: usize>(
     normal: &Normal,
     corner: &Corner<K>,
@@ -369,7 +370,7 @@ mod tests {
     use super::*;
     use deltille_core::raster::Gray;
 
-    /// A corner aside of its window's centre, in slanting light, whose edges are bent.
+    /// A corner off the centre of its window, in slanting light, with bent edges.
     fn corner<const K: usize>(amplitude: f64) -> Corner<K> {
         Corner {
             position: DVec2::new(0.3, -0.2),
@@ -383,14 +384,14 @@ mod tests {
         }
     }
 
-    /// A picture as it is, and one that is blurred unevenly, with a halo and ink.
+    /// A plain image, and one with uneven blur, a halo and ink.
     fn optics() -> [Optics; 2] {
         let mut all = Optics::default();
         (all.astigmatism, all.halo, all.ink) = ([0.2, -0.15], [0.3, 2.5], 0.4);
         [Optics::default(), all]
     }
 
-    /// What the model shows of a corner at the pixels of a window.
+    /// Returns the pixels of a window as the model predicts them for a corner.
     fn shown<const K: usize>(window: &Window, corner: &Corner<K>, optics: &Optics) -> Vec<f32> {
         let mut fitter = CornerFitter::default();
         let piece = optics.piece(corner.level, corner.amplitude);
@@ -417,7 +418,7 @@ mod tests {
                 for ((by, after), before) in column.iter().zip(after).zip(before) {
                     let quotient = (after - before) / (2.0 * size as f32);
                     let off = (by - quotient).abs() / scale;
-                    // What ink leaves between three edges is told by difference quotients itself.
+                    // The triangle that ink leaves between three edges uses difference quotients itself.
                     let most = if optics.ink == 0.0 { 1e-3 } else { 2e-2 };
                     assert!(off < most, "{K} edges, parameter {parameter}: {by} {quotient}");
                 }
@@ -429,7 +430,7 @@ mod tests {
         }
     }
 
-    /// Of what the model shows the fit leaves nothing, and finds every parameter, from a start beside it.
+    /// From a start beside the corner, the fit of a rendered model finds every parameter and leaves no residual.
     #[test]
     fn a_corner_is_found_in_its_own_picture() {
         fn check<const K: usize>(truth: &Corner<K>, optics: &Optics) {

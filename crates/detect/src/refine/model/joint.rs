@@ -1,4 +1,4 @@
-//! The equations of a corner together with what all corners of a picture share.
+//! The equations of a corner together with the parameters that all corners of an image share.
 
 use nalgebra::{SMatrix, SVector};
 
@@ -12,31 +12,31 @@ use crate::refine::optics::{Optics, PARAMS as COMMON_PARAMS, STEP};
 use deltille_core::detection::Piece;
 use deltille_core::raster::ImageView;
 
-/// A parameter that all corners of a picture have in common.
+/// A parameter that all corners of an image share.
 #[derive(Clone, Debug)]
 pub(crate) enum Common {
-    /// One of the tone curve, and the optics with it a [`STEP`] further.
+    /// A parameter of the tone curve, and the optics with it increased by a [`STEP`].
     Tone { parameter: usize, moved: Box<Optics> },
-    /// The first or second of astigmatism.
+    /// The first or second parameter of astigmatism.
     Astigmatism(usize),
     /// The strength of the halo.
     Halo,
-    /// How far what is dark has grown on the print.
+    /// The growth of dark areas on the print.
     Ink,
 }
 
-/// Those of the optics, behind them.
+/// Number of parameters of the optics, behind the corner's own.
 pub(crate) const COMMON: usize = COMMON_PARAMS;
 
-/// All of them.
+/// Number of all parameters.
 const UNKNOWNS: usize = OWN + COMMON;
 
 /// The normal equations of a corner and the optics.
 #[derive(Clone, Debug)]
 pub(crate) struct Joint {
-    /// JᵀJ with the prior on the slopes, and ones for parameters of the corner that are not there.
+    /// JᵀJ with the prior on the slopes, and ones for missing parameters of the corner.
     pub matrix: SMatrix<f64, UNKNOWNS, UNKNOWNS>,
-    /// Jᵀr alike.
+    /// Jᵀr, likewise.
     pub gradient: SVector<f64, UNKNOWNS>,
     /// rᵀr.
     pub cost: f64,
@@ -45,8 +45,8 @@ pub(crate) struct Joint {
 }
 
 impl CornerFitter {
-    /// The normal equations at a corner in picture coordinates, from the pixels of a patch, with the parameters of
-    /// the optics behind its own; `None` outside the image.
+    /// Returns the normal equations at a corner in image coordinates, from the pixels of a patch. The parameters of the
+    /// optics follow the corner's own. Returns `None` outside the image.
     pub(crate) fn joint<const K: usize>(
         &mut self,
         image: ImageView,
@@ -108,8 +108,8 @@ impl CornerFitter {
         Some(Joint { matrix, gradient, cost, noise })
     }
 
-    /// What the pixels of a fitted corner do to its position, and what is left of them; the corner as for
-    /// [`Self::joint`].
+    /// Returns the influence of the pixels of a fitted corner on its position, and their residuals. The corner is as
+    /// for [`Self::joint`].
     pub(crate) fn influence<const K: usize>(
         &mut self,
         image: ImageView,
@@ -130,7 +130,7 @@ impl CornerFitter {
         let column = |weights: [f32; PARAMS]| -> Vec<f32> {
             let mut sums = vec![0.0; window.count];
             let columns = weights.iter().zip(&self.columns[..ANGLE + K]);
-            // Half of those of a triangle are nothing.
+            // Half of the entries of a triangle are zero.
             for (weight, column) in columns.filter(|(weight, _)| **weight != 0.0) {
                 sums.iter_mut().zip(column).for_each(|(sum, value)| *sum += weight * value);
             }

@@ -1,11 +1,11 @@
-//! What the optics make of a corner: the same for all of its pixels, and computed once.
+//! Effect of the optics on a corner: the same for all of its pixels, and computed once.
 
 use super::corner::Corner;
 use crate::refine::blurred_corner::{Haloed, Overlap, Triangle};
 use crate::refine::optics::{INK_UNIT, Optics, Spread};
 use deltille_core::detection::Piece;
 
-/// What the optics make of a corner with K edges.
+/// Effect of the optics on a corner with K edges.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Look<const K: usize> {
     /// Sines and cosines of the angles.
@@ -20,22 +20,23 @@ pub(super) struct Look<const K: usize> {
     /// ∂ ln s_k/∂e and ∂ρ/∂e of both parameters of astigmatism.
     pub(super) by_astigmatism: [[f64; K]; 2],
     pub(super) rho_by_astigmatism: [f64; 2],
-    /// Curve between black and white.
+    /// Tone curve between black and white.
     pub(super) piece: Piece,
-    /// Strength of the halo, and its width over that of the blur.
+    /// Strength of the halo, and its width relative to the blur.
     pub(super) halo: [f32; 2],
-    /// ∂ ln s/∂α of the blur that the pattern has, at one steepness of the edges.
+    /// ∂ ln s/∂α of the blur of the pattern, at a constant slope of the edges.
     pub(super) core_by_halo: f32,
-    /// Half of the picture's way across the edges while it was taken, in units of the blur, where it moved, and
-    /// its derivatives by the angles and by both parameters of astigmatism.
+    /// Half of the motion across the edges during exposure, in units of the blur, if there is motion. Also its
+    /// derivatives by the angles and by both parameters of astigmatism.
     pub(super) way: Option<[f32; K]>,
     pub(super) way_by_turn: [f64; K],
     pub(super) way_by_astigmatism: [[f64; K]; 2],
-    /// How far ink displaces the edges, in units of the blur, its derivatives by the ink, and what is between.
+    /// Displacement of the edges by ink, in units of the blur, its derivatives by the ink, and the triangle between
+    /// them.
     pub(super) displaced: [f64; K],
     pub(super) by_ink: [f64; K],
     pub(super) triangle: Option<Triangle>,
-    /// The darkest and the brightest that is seen.
+    /// The darkest and the brightest value that the sensor can show.
     pub(super) limits: [f32; 2],
 }
 
@@ -100,7 +101,7 @@ impl<const K: usize> Look<K> {
         }
     }
 
-    /// Whether there is a halo.
+    /// Returns whether there is a halo.
     pub(super) fn has_halo(&self) -> bool {
         self.halo[0] != 0.0
     }
@@ -109,7 +110,7 @@ impl<const K: usize> Look<K> {
         self.haloed_of(|_| pattern)
     }
 
-    /// The same of a pattern that has lengths of its own, which are to be multiplied by a number.
+    /// Returns the haloed pattern for a pattern with lengths of its own, which are multiplied by a number.
     pub(super) fn haloed_of<P>(&self, pattern: impl Fn(f32) -> P) -> Haloed<P> {
         let [strength, width] = self.halo;
         Haloed {
@@ -121,10 +122,10 @@ impl<const K: usize> Look<K> {
     }
 }
 
-/// How far an ink of 1 displaces the edges, in units of the blur.
+/// Returns the displacement of the edges by an ink of 1, in units of the blur.
 ///
-/// What is dark lies on the right of the first and the third edge where the contrast is positive, and on the
-/// left of the second. Of two edges each half moves its own way, and the corner stays.
+/// If the contrast is positive, dark areas lie on the right of the first and the third edge, and on the left of the
+/// second. With two edges, the halves move in opposite directions, and the corner stays.
 fn by_ink<const K: usize>(corner: &Corner<K>, sharpness: [f64; K]) -> [f64; K] {
     std::array::from_fn(|k| match (K, k) {
         (3, 1) => -INK_UNIT * corner.amplitude.signum() * corner.across_px[k] * sharpness[k],
@@ -133,15 +134,15 @@ fn by_ink<const K: usize>(corner: &Corner<K>, sharpness: [f64; K]) -> [f64; K] {
     })
 }
 
-/// The triangle between three edges that ink displaces, with its derivatives by ln s, the angles and the ink; beside
-/// the corner the sines and cosines of its angles.
+/// Returns the triangle between three edges displaced by ink, with its derivatives by ln s, the angles and the ink. The
+/// sines and cosines of the corner's angles are passed with it.
 fn triangle<const K: usize>(
     corner: &Corner<K>,
     turns: [(f64, f64); K],
     optics: &Optics,
     spread: &Spread,
 ) -> Triangle {
-    /// Of the logarithm of the blur, radians and units of ink: a quotient neglects some ten-thousandth.
+    /// Step in the logarithm of the blur, radians and units of ink: the quotient is accurate to some 1/10 000.
     const STEP: f64 = 1e-4;
     let core = optics.core();
     let overlap = |blur_px: f64, turns: [(f64, f64); K], ink: f64| {
@@ -159,7 +160,7 @@ fn triangle<const K: usize>(
         let c = a * displaced[0] + b * displaced[1] - displaced[2];
         let [x, y] = [0, 1]
             .map(|k| (spread.way[0] * normals[k][0] + spread.way[1] * normals[k][1]) / lengths[k]);
-        // A box of half the length x has the variance x²/3.
+        // A box of half length x has the variance x²/3.
         let cov = [1.0 + x * x / 3.0, rho + x * y / 3.0, 1.0 + y * y / 3.0];
         Overlap::between([a, b, c], cov, displaced[0].signum())
     };

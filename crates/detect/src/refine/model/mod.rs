@@ -7,33 +7,33 @@
 //!     s_k²   = s² · nᵀ M n,      n = (−sin θ_k, cos θ_k)
 //! ```
 //!
-//! Where ink has spread on the print, what is dark has grown: every line of a corner of three edges lies aside,
-//! both halves the same way, by ink times the image of an edge across it, and the three miss each other. The
-//! position is where they would meet on a print without. Of two edges the halves move against each other, and the corner stays.
+//! Ink spread on the print makes dark areas grow. It displaces every line of a corner of three edges, both halves to
+//! the same side, by ink times the image of an edge across it. The three lines then do not meet. The position is where
+//! they would meet on a print without ink spread. With two edges, the halves move in opposite directions, and the
+//! corner stays.
 //!
-//! T is the camera's tone curve between the corner's black and white, r the sum of their light over
-//! its difference ([`deltille_core::detection::tone`]); of a linear camera T(S) = S and I = (level + amplitude·f)·g.
-//! M, of trace 2, tells in which direction the picture is blurred more; where it moved, by a box. Both, and
-//! halos in f, are the same all over a picture and given: [`crate::refine::optics`]. What is brighter than white or
-//! darker than black is seen as these; where pixels are, the model ends there too, so that they only count
-//! where it does not.
+//! T is the tone curve of the camera between the corner's black and white. r is the sum of their light over its
+//! difference ([`deltille_core::detection::tone`]). For a linear camera T(S) = S and I = (level + amplitude·f)·g. M, of
+//! trace 2, gives the direction of stronger blur; for motion the blur is a box. Both, and halos in f, are the same over
+//! the whole image and given: [`crate::refine::optics`]. Values brighter than white or darker than black are clipped.
+//! Where pixels are clipped, the model is clipped too, so that they count only where the model is within the limits.
 //!
-//! Edges have curvatures κ where a lens bends them, which are given: a window is too small to tell
-//! them from the position. (u, v) are pixels from the window's centre, f is the blurred corner of
-//! [`crate::refine::blurred_corner`]. The blur s includes the pixel's own box as a variance of 1/12. From
-//! 0.5 px of blur on, the model reaches the bound of exact integration (docs/benchmarks.md, Corner accuracy).
-//! The slopes g are drawn to 0 by a weak prior, all else is free.
+//! The curvatures κ of the edges by lens distortion are given, because a window is too small to distinguish them from
+//! the position. (u, v) are pixels from the window's centre. f is the blurred corner of
+//! [`crate::refine::blurred_corner`]. The blur s contains the pixel's own box as a variance of 1/12. Compared with
+//! exact integration, this causes no measurable error from 0.5 px of blur upwards (docs/benchmarks). A weak prior
+//! pulls the slopes g to 0; all other parameters are free.
 //!
-//! The covariance is σ² (JᵀJ + prior)⁻¹ with the noise σ estimated from the residuals. It is honest
-//! where the noise is white and the window shows nothing but the corner; JPEG's noise is not white.
+//! The covariance is σ² (JᵀJ + prior)⁻¹ with the noise σ estimated from the residuals. It is accurate if the noise is
+//! white and the window shows only the corner; JPEG noise is not white.
 //!
-//! Comes in: the pixels around a corner, and where it is about. Goes out: the corner with its covariance, or the equations
-//! of a corner with what it shares with others.
+//! Input: the pixels around a corner, and its approximate position. Output: the corner with its covariance, or the
+//! equations of a corner and the parameters that it shares with others.
 //!
-//! 1. `window` is which pixels are read.
-//! 2. `corner` has the parameters; `look` is what the optics make of them.
-//! 3. `columns` has the model and its derivatives pixel by pixel, `sums` the normal equations.
-//! 4. `fitter` descends to the minimum; `joint` gives the equations for all corners of a picture together.
+//! 1. `window` contains the pixels that are read.
+//! 2. `corner` contains the parameters; `look` the effect of the optics on them.
+//! 3. `columns` contains the model and its derivatives for each pixel, `sums` the normal equations.
+//! 4. `fitter` descends to the minimum; `joint` gives the equations for all corners of an image together.
 
 pub(crate) mod columns;
 pub(crate) mod corner;

@@ -1,4 +1,4 @@
-//! Sums over the pixels of a window, as many of them at once as a processor can.
+//! Vectorised sums over the pixels of a window.
 
 use multiversion::multiversion;
 
@@ -6,7 +6,7 @@ use super::columns::Columns;
 use super::window::MAX_PIXELS;
 use crate::lanes::LANES;
 
-/// Products of each two of the first N columns, over `count` pixels; only the upper half is filled.
+/// Returns the products of every two of the first N columns, over `count` pixels. Only the upper half is filled.
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
 pub(super) fn products<const N: usize>(columns: &mut Columns, count: usize) -> [[f64; N]; N] {
     let padded = count.next_multiple_of(LANES).min(MAX_PIXELS);
@@ -33,11 +33,11 @@ pub(super) fn products<const N: usize>(columns: &mut Columns, count: usize) -> [
     products
 }
 
-/// Lanes of a sum of products: so many of eight sums stay in registers.
+/// Lanes of a sum of products: so many of eight sums fit into registers.
 const HALF: usize = LANES / 2;
 
-/// Products of two columns with four others: eight sums that do not wait for each other. They are named one by one so
-/// that each is a vector.
+/// Returns the products of two columns with four others: eight independent sums. They are named one by one so that each
+/// is a vector.
 #[inline(always)]
 fn products_of_blocks(
     two: &[[f32; MAX_PIXELS]],
@@ -68,7 +68,7 @@ fn products_of_blocks(
     *sums = [ac, ad, ae, af, bc, bd, be, bf];
 }
 
-/// Their sum, by halves.
+/// Returns their sum, by halves.
 #[inline(always)]
 fn sum_of_eight(lanes: &[f32; HALF]) -> f32 {
     let mut four = [0.0; HALF / 2];
@@ -78,10 +78,10 @@ fn sum_of_eight(lanes: &[f32; HALF]) -> f32 {
     (four[0] + four[2]) + (four[1] + four[3])
 }
 
-/// Sums of the squares of the values, and of the differences between those that follow each other.
+/// Returns the sums of the squares of the values, and of the differences between successive ones.
 #[multiversion(targets("x86_64+avx2"))]
 pub(super) fn squares(values: &[f32]) -> [f32; 2] {
-    /// Of two sums, each in one vector of the processors that this is compiled for.
+    /// Lanes of each of the two sums: one vector of the processors that this is compiled for.
     const WIDTH: usize = LANES / 2;
     let (mut sums, mut sums_of_steps) = ([0.0f32; WIDTH], [0.0f32; WIDTH]);
     let count = values.len().saturating_sub(1) / WIDTH;
@@ -106,12 +106,12 @@ pub(super) fn squares(values: &[f32]) -> [f32; 2] {
     [sum, sum_of_steps]
 }
 
-/// The least and the greatest.
+/// Returns the minimum and the maximum.
 #[multiversion(targets("x86_64+avx2"))]
 pub(super) fn ends(values: &[f32]) -> (f32, f32) {
     let (chunks, rest) = values.as_chunks::<LANES>();
     let (mut low, mut high) = ([f32::INFINITY; LANES], [f32::NEG_INFINITY; LANES]);
-    // Comparisons, as the least of two numbers asks for more where one may be none.
+    // Comparisons, because `f32::min` also handles NaN, which costs more.
     for chunk in chunks {
         for k in 0..LANES {
             low[k] = if chunk[k] < low[k] { chunk[k] } else { low[k] };

@@ -8,35 +8,35 @@ use deltille_core::raster::ImageView;
 /// Largest radius of a window, px.
 pub(crate) const MAX_RADIUS: usize = 15;
 
-/// Pixels of the largest window, rounded up to whole vectors.
+/// Number of pixels of the largest window, rounded up to whole vectors.
 pub(super) const MAX_PIXELS: usize =
     ((2 * MAX_RADIUS + 1) * (2 * MAX_RADIUS + 1)).next_multiple_of(LANES);
 
-/// Pixels around a corner, by their distance from the pixel in the middle.
+/// Pixels around a corner, relative to the centre pixel.
 #[derive(Clone, Debug)]
 pub(crate) struct Window {
     pub(super) radius: usize,
     pub(super) count: usize,
     /// Columns, padded with zeros to whole vectors.
     pub(super) u: Vec<f32>,
-    /// Rows alike.
+    /// Rows, likewise.
     pub(super) v: Vec<f32>,
-    /// Pixels beside each other: the first, and how many.
+    /// Runs of adjacent pixels: the first, and their number.
     pub(super) runs: Vec<([i32; 2], usize)>,
 }
 
 impl Window {
-    /// The window of (2 · radius + 1)² pixels; radii above [`MAX_RADIUS`] are cut to it.
+    /// Creates the window of (2 · radius + 1)² pixels; radii above [`MAX_RADIUS`] are limited to it.
     pub(crate) fn new(radius: usize) -> Self {
         Self::of(radius, |_| true)
     }
 
-    /// Those pixels (u, v) of such a window that are `seen`.
+    /// Creates a window of those pixels (u, v) that are `seen`.
     pub(crate) fn of(radius: usize, seen: impl Fn(DVec2) -> bool) -> Self {
         Self::within(radius, |_| [f64::NEG_INFINITY, f64::INFINITY], seen)
     }
 
-    /// Those of each row v that lie in its `span` and are `seen`.
+    /// Creates a window of those pixels of each row v that lie in its `span` and are `seen`.
     pub(crate) fn within(
         radius: usize,
         span: impl Fn(f64) -> [f64; 2],
@@ -73,22 +73,22 @@ impl Window {
         window
     }
 
-    /// Half the side, px.
+    /// Returns half the side, px.
     pub(crate) fn radius(&self) -> usize {
         self.radius
     }
 
-    /// How many pixels.
+    /// Returns the number of pixels.
     pub(crate) fn count(&self) -> usize {
         self.count
     }
 
-    /// Columns and rows of the pixels.
+    /// Returns columns and rows of the pixels.
     pub(crate) fn places(&self) -> [&[f32]; 2] {
         [&self.u[..self.count], &self.v[..self.count]]
     }
 
-    /// Takes the pixels around `centre`, full scale 1; `None` where one lies outside the image.
+    /// Reads the pixels around `centre`, full scale 1. Returns `None` if one lies outside the image.
     pub(super) fn read(
         &self,
         image: ImageView,
@@ -107,11 +107,11 @@ impl Window {
     }
 }
 
-/// The pixels of a window about a pixel of a picture.
+/// The pixels of a window about a pixel of an image.
 #[derive(Clone, Debug)]
 pub(crate) struct Patch {
     /// The window.
     pub window: Window,
-    /// The pixel in its middle.
+    /// The pixel at its centre.
     pub centre: DVec2,
 }
