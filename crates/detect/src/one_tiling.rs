@@ -286,7 +286,7 @@ impl OneTiling {
         let refined = refined.into_iter().zip(reasons).zip(are_waves);
         let mut grids: Judged = refined
             .filter(|((grid, _), is_wave)| {
-                is_vouched_for(grid) || grid.corners.len() >= least && !is_wave
+                is_confirmed(grid) || grid.corners.len() >= least && !is_wave
             })
             .map(|(grid, _)| grid)
             .collect();
@@ -332,8 +332,8 @@ impl OneTiling {
                 None
             };
             let is_plausible = is_large && why.is_none();
-            refused = refused.take().or(why.filter(|_| is_large && !is_vouched_for(grid)));
-            is_vouched_for(grid) || is_plausible
+            refused = refused.take().or(why.filter(|_| is_large && !is_confirmed(grid)));
+            is_confirmed(grid) || is_plausible
         });
         left_out.extend(refused);
         refuse_patterns(frame.pyramid, &mut grids);
@@ -341,7 +341,7 @@ impl OneTiling {
         let (count, mut corners) = (grids.len(), 0);
         grids.retain(|(grid, _)| {
             corners += grid.corners.len();
-            is_vouched_for(grid) || corners <= MOST_CORNERS
+            is_confirmed(grid) || corners <= MOST_CORNERS
         });
         left_out.extend((grids.len() < count).then(|| Reason::new(ReasonKind::TooManyGrids, [])));
         // Labelled grids by panel, then the others; a stable sort keeps the largest first.
@@ -409,13 +409,13 @@ fn shortest_edge_px<const N: usize>(grid: &SaddleGrid) -> f64 {
 }
 
 /// Returns whether tags, or the outline of a mirrored board, confirm a grid.
-fn is_vouched_for(grid: &Grid) -> bool {
+fn is_confirmed(grid: &Grid) -> bool {
     !grid.tags.is_empty() || grid.mirrored
 }
 
 /// Returns whether a grid is confirmed by tags or as a whole board.
 fn is_labelled(grid: &Grid) -> bool {
-    is_vouched_for(grid) || grid.panel.is_some()
+    is_confirmed(grid) || grid.panel.is_some()
 }
 
 /// Removes unconfirmed grids whose pattern continues beyond their border.

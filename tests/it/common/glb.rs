@@ -1,4 +1,4 @@
-/// The JSON and the binary part of a glTF in one file.
+/// The JSON and the binary part of a glTF file.
 pub struct Parts {
     pub json: Vec<u8>,
     pub binary: Vec<u8>,

@@ -1,4 +1,4 @@
-//! What several tests share.
+//! Helpers shared by several tests.
 
 pub mod command;
 pub mod folder;
@@ -14,7 +14,8 @@ use std::path::{Path, PathBuf};
 /// The folder of the repository.
 pub const REPOSITORY: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../..");
 
-/// A folder of the photographs and published artifacts. Tests that use it are ignored where `build.rs` has not found it.
+/// Returns a folder of the photographs and published artifacts. Tests that use it are ignored if `build.rs` has not
+/// found it.
 pub fn data(folder: &str) -> PathBuf {
     let beside = || Path::new(REPOSITORY).join("../shared/data");
     std::env::var_os("DELTILLE_DATA").map_or_else(beside, PathBuf::from).join(folder)

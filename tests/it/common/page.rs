@@ -1,28 +1,28 @@
-//! What commands print, word by word: a page for each command in `tests/snapshots`, to be read as a user would read
-//! it. `INSTA_UPDATE=always cargo test --release --test it` makes all of them anew.
+//! Output of commands, verbatim: one page per command in `tests/snapshots`, as a user would read it.
+//! `INSTA_UPDATE=always cargo test --release --test it` updates all of them.
 
 use std::collections::BTreeMap;
 use std::path::Path;
 use std::process::{Command, Output};
 use std::time::SystemTime;
 
-/// Commands, each with what it printed on both outputs and its exit code.
+/// Commands, each with its output on both streams and its exit code.
 #[derive(Default)]
 pub struct Page(String);
 
 impl Page {
-    /// What the commands that follow have in common.
+    /// Adds a title for the commands that follow.
     pub fn title(&mut self, title: &str) {
         self.0 += &format!("\n# {title}\n");
     }
 
-    /// Runs a command, between whose words there are blanks, in a folder; `''` is an empty word.
+    /// Runs a command in a folder. Spaces separate its words; `''` is an empty word.
     #[track_caller]
     pub fn run(&mut self, folder: &Path, command: &str) -> Output {
         self.write(folder, command, |output| vec![&output.stdout, &output.stderr])
     }
 
-    /// The same without what is on standard output.
+    /// The same without standard output.
     #[track_caller]
     pub fn warned(&mut self, folder: &Path, command: &str) -> Output {
         self.write(folder, command, |output| vec![&output.stderr])
@@ -60,18 +60,18 @@ impl Page {
         output
     }
 
-    /// A line, or more, by itself.
+    /// Adds one or more lines.
     pub fn line(&mut self, said: &str) {
         said.lines().for_each(|line| self.0 += &(same_everywhere(line) + "\n"));
     }
 
-    /// What was said otherwise than by a command that is run here.
+    /// Adds output that does not come from a command run here.
     pub fn said(&mut self, what: &str, said: &str) {
         self.title(what);
         self.line(said);
     }
 
-    /// Runs what has to be refused: in one line, with exit code 2, and without a trace in the folder.
+    /// Runs a command that must fail: with one line, exit code 2, and no change in the folder.
     #[track_caller]
     pub fn refused(&mut self, folder: &Path, command: &str) {
         let before = files(folder);
@@ -93,7 +93,8 @@ impl Page {
     }
 }
 
-/// A line without what depends on the system; figures whose last digits do are rounded, or held against the others.
+/// Returns a line without system-dependent parts. Figures whose last digits depend on the system are rounded, or
+/// compared with the others.
 fn same_everywhere(line: &str) -> String {
     let line =
         if cfg!(windows) { line.replace('\\', "/").replace(".exe", "") } else { line.to_owned() };
@@ -106,7 +107,7 @@ fn same_everywhere(line: &str) -> String {
         });
     }
     if let Some((before, after)) = line.split_once("the lens is good up to ") {
-        // Where hardly determined numbers have a pole.
+        // Poles of weakly determined numbers.
         let figures = after.split(" px").take(3).map(|to| to.rsplit(' ').next().unwrap());
         let figures: Vec<f64> = figures.map(|figure| figure.parse().unwrap()).collect();
         let [steady, outermost, farthest] = figures[..] else { panic!("{line}") };
@@ -120,13 +121,13 @@ fn same_everywhere(line: &str) -> String {
     line[..begin].to_owned() + "[what the system says]"
 }
 
-/// How exact what was verified is: places in lists, drawings and bodies as exactly as they are written, corners in
-/// pictures to a hundredth of a millimetre, or as many as a coarse texture takes.
+/// Returns the accuracy of a verification. Positions in lists, drawings and bodies are as accurate as they are written.
+/// Corners in images are accurate to 0.01 mm, or to the limit of a coarse texture.
 fn within(mm: f64) -> String {
     if mm < 0.0004 { "0.0004".to_owned() } else { format!("{:.2}", (100.0 * mm).ceil() / 100.0) }
 }
 
-/// All files below a folder with their sizes and times.
+/// Returns all files below a folder with their sizes and times.
 fn files(folder: &Path) -> BTreeMap<std::path::PathBuf, (u64, Option<SystemTime>)> {
     let mut all = BTreeMap::new();
     for entry in std::fs::read_dir(folder).unwrap() {

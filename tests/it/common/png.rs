@@ -1,4 +1,4 @@
-/// A chunk of a PNG with its check sum.
+/// Returns a chunk of a PNG with its check sum.
 pub fn chunk(name: &[u8; 4], data: &[u8]) -> Vec<u8> {
     let mut sum = flate2::Crc::new();
     sum.update(name);

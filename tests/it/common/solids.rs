@@ -1,4 +1,4 @@
-//! Solids with faces of several shapes, as the texts of OBJ files.
+//! Solids with faces of several shapes, as OBJ text.
 
 use glam::DVec3;
 
@@ -15,13 +15,13 @@ pub fn truncated_tetrahedron(edge: f64) -> String {
     obj(&vertices, edge / 8f64.sqrt(), &turned([1.0, 1.0, 1.0]))
 }
 
-/// Twelve rhombs.
+/// Twelve rhombi.
 pub fn rhombic_dodecahedron(edge: f64) -> String {
     let vertices = [turned([1.0, 1.0, 1.0]), turned([2.0, 0.0, 0.0])].concat();
     obj(&vertices, edge / 3f64.sqrt(), &turned([1.0, 1.0, 0.0]))
 }
 
-/// A vector with all signs and orders of its numbers.
+/// Returns a vector with all signs and orders of its coordinates.
 fn turned([a, b, c]: [f64; 3]) -> Vec<DVec3> {
     let orders = [[a, b, c], [b, c, a], [c, a, b], [a, c, b], [c, b, a], [b, a, c]];
     let signs = (0..8).map(|bits| DVec3::from_array([0, 1, 2].map(|k| [1.0, -1.0][bits >> k & 1])));
@@ -32,7 +32,7 @@ fn turned([a, b, c]: [f64; 3]) -> Vec<DVec3> {
     all
 }
 
-/// A convex solid, of whose vertices those farthest along a normal are a face.
+/// Returns a convex solid. The vertices farthest along a normal form a face.
 fn obj(vertices: &[DVec3], scale: f64, normals: &[DVec3]) -> String {
     let mut text: String = vertices
         .iter()

@@ -12,14 +12,14 @@ pub fn assert_found<const N: usize>(verdict: &Verdict, expected: [Value; N]) {
     }
 }
 
-/// All findings, of the file, of its pages and of its faces.
+/// Returns all findings, of the file, of its pages and of its faces.
 pub fn findings(verdict: &Verdict) -> impl Iterator<Item = &Finding> {
     let sheets = verdict.sheets.iter().flat_map(|sheet| &sheet.findings);
     let faces = verdict.faces.iter().flat_map(|face| &face.findings);
     verdict.findings.iter().chain(sheets).chain(faces)
 }
 
-/// Whether a value is as expected; objects may have more fields.
+/// Returns whether a value is as expected; objects may have more fields.
 fn has(found: &Value, expected: &Value) -> bool {
     match (found, expected) {
         (Value::Object(found), Value::Object(fields)) => fields

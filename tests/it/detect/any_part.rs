@@ -1,4 +1,4 @@
-//! Grids are found however large their pixels are, and whatever is laid over them.
+//! Grids are found at any magnification, and under any cover.
 
 use std::f64::consts::TAU;
 
@@ -13,8 +13,8 @@ const WIDTH: usize = 400;
 const HEIGHT: usize = 300;
 const EDGE_PX: f64 = 26.0;
 
-/// A photograph of a tiling in a frame, turned by a tenth, under 1 px of blur and 1 % of noise; `cover`
-/// tells the brightness of what lies over it.
+/// Renders a photograph of a tiling in a frame, rotated by 0.1 rad, under 1 px of blur and 1 % of noise. `cover`
+/// returns the brightness of a covering object.
 fn photograph(kind: GridKind, cover: impl Fn(f64, f64) -> Option<f32>) -> Gray<f32> {
     let (sin, cos) = 0.1f64.sin_cos();
     let sharp = Gray::from_fn(3 * WIDTH, 3 * HEIGHT, |x, y| {
@@ -49,7 +49,7 @@ fn photograph(kind: GridKind, cover: impl Fn(f64, f64) -> Option<f32>) -> Gray<f
     })
 }
 
-/// The picture with pixels `scale` times as small, bilinear, as 8 bits.
+/// Returns the image with pixels `scale` times as small, bilinear, as 8 bits.
 fn enlarged(image: &Gray<f32>, scale: usize) -> Gray<u8> {
     let to = |v: usize| (v as f64 + 0.5) / scale as f64 - 0.5;
     Gray::from_fn(scale * image.width(), scale * image.height(), |x, y| {
@@ -62,7 +62,7 @@ fn detected(kind: GridKind, image: &Gray<u8>) -> Detection {
 }
 
 #[test]
-fn an_enlarged_picture_shows_the_same_corners() {
+fn an_enlarged_image_shows_the_same_corners() {
     for kind in [GridKind::Deltille, GridKind::Checker] {
         let picture = photograph(kind, |_, _| None);
         let plain = detected(kind, &enlarged(&picture, 1));
@@ -86,8 +86,8 @@ fn an_enlarged_picture_shows_the_same_corners() {
 }
 
 #[test]
-fn parts_beside_a_cover_are_one_grid_and_nothing_is_under_it() {
-    // A cross of two bars of a tile and more.
+fn parts_beside_a_cover_form_one_grid_without_corners_under_it() {
+    // A cross of two bars, more than a tile wide.
     let bars =
         |x: f64, y: f64| (x + 0.4 * y - 250.0).abs() < 17.0 || (y - 0.3 * x - 80.0).abs() < 15.0;
     for kind in [GridKind::Deltille, GridKind::Checker] {
@@ -97,7 +97,7 @@ fn parts_beside_a_cover_are_one_grid_and_nothing_is_under_it() {
         assert_eq!(found.grids.len(), 1, "{kind:?}");
         let corners = &found.grids[0].corners;
         assert!(corners.iter().all(|c| !bars(c.x, c.y)), "{kind:?}");
-        // What a circle of 7 px around it shows.
+        // Whether a circle of 7 px around a corner is uncovered.
         let free = |x: f64, y: f64| {
             let circle = (0..12).map(|k| (f64::from(k) * TAU / 12.0).sin_cos());
             !circle.into_iter().any(|(s, c)| bars(x + 7.0 * c, y + 7.0 * s))

@@ -1,4 +1,4 @@
-//! Plain checkerboards on synthetic photographs, where the truth is exact.
+//! Plain checkerboards on synthetic photographs, for which the truth is exact.
 
 use std::collections::BTreeMap;
 
@@ -21,8 +21,8 @@ fn rectangle([left, lower, right, upper]: [f64; 4]) -> Vec<DVec2> {
     [(left, lower), (right, lower), (right, upper), (left, upper)].map(DVec2::from).to_vec()
 }
 
-/// A board of 6 × 9 corners whose corner (0, 0) is at the origin. The square up and right of it is
-/// dark, or bright on an inverted board, which lies on a dark field.
+/// A board of 6 × 9 corners whose corner (0, 0) is at the origin. The square up and right of it is dark. On an inverted
+/// board it is bright, and the board lies on a dark field.
 fn board(inverted: bool) -> Scene {
     let mut black_mm = Vec::new();
     for row in -1..ROWS {
@@ -57,11 +57,11 @@ fn board(inverted: bool) -> Scene {
     Scene { surfaces: vec![surface] }
 }
 
-/// A sheet of paper lies so far above the board.
+/// Height of a sheet of paper above the board.
 const COVER_MM: f64 = 5.0;
 
-/// Nearer than this to a cover the smallest circles that show a corner's edges show the cover too, px,
-/// and the edges of the squares end at it.
+/// Distance to a cover, px, within which corners need not be found. The smallest circles that show a corner's edges
+/// show the cover too, and the edges of the squares end at it.
 const NEAR_COVER_PX: f64 = 12.0;
 
 /// The board with a sheet of grey paper above it, up to `right_mm`.
@@ -93,12 +93,12 @@ fn detect(image: &Gray<f32>, kind: GridKind, size: Option<(u32, u32)>) -> Detect
 
 const SIZE: Option<(u32, u32)> = Some((ROWS as u32, COLS as u32));
 
-/// Distance of each corner of a wholly labelled board from the truth; panics on a wrong label.
+/// Returns the distance of each corner of a completely labelled board from the truth; panics on a wrong label.
 fn errors(grid: &Grid, truth: &Truth, inverted: bool) -> Vec<f64> {
     let at: BTreeMap<(i32, i32), DVec2> =
         truth.corners.iter().map(|c| ((c.row, c.col), DVec2::new(c.x, c.y))).collect();
     let distance = |c: &deltille::detect::GridCorner| {
-        // Row 0, column 0 has a dark square: on the inverted board that is half a turn round.
+        // Row 0, column 0 has a dark square: on the inverted board it is rotated by 180°.
         let label = if inverted { (ROWS - 1 - c.row, COLS - 1 - c.col) } else { (c.row, c.col) };
         let error = c.position().distance(at[&label]);
         assert!(error < 2.0, "corner {label:?} is {error} px off: a wrong label");
@@ -161,7 +161,7 @@ fn a_fisheye_lens_bends_the_rows_but_not_the_labels() {
 }
 
 #[test]
-fn all_that_is_seen_of_a_covered_board_is_found_where_it_is() {
+fn visible_corners_of_a_covered_board_are_found_in_position() {
     let camera = Camera::pinhole(1280, 960, 0.9);
     let mut rng = ChaCha8Rng::seed_from_u64(3);
     for view in 0..20u32 {
@@ -192,14 +192,14 @@ fn all_that_is_seen_of_a_covered_board_is_found_where_it_is() {
         };
         let labels: BTreeMap<(i32, i32), (i32, i32)> =
             corners.iter().map(|c| ((c.row, c.col), nearest(c.x, c.y))).collect();
-        // Steps along rows and columns of the grid are turned by the same quarter turns everywhere.
+        // Steps along rows and columns of the grid are rotated by the same multiple of 90° everywhere.
         let mut steps = std::collections::BTreeSet::new();
         for (&(row, col), &(r, c)) in &labels {
             if let Some(&(r1, c1)) = labels.get(&(row, col + 1)) {
                 steps.insert((r1 - r, c1 - c));
             }
             if let Some(&(r1, c1)) = labels.get(&(row + 1, col)) {
-                // A quarter turn counter-clockwise of the step along the row.
+                // The step along the row, rotated by 90° counter-clockwise.
                 steps.insert((-(c1 - c), r1 - r));
             }
         }

@@ -1,4 +1,4 @@
-//! `deltille detect`: results in every format, overlays, and images that cannot be read.
+//! `deltille detect`: results in every format, overlays, and unreadable images.
 
 use std::path::Path;
 
@@ -20,7 +20,7 @@ fn board() -> tempfile::TempDir {
     folder
 }
 
-/// Where a corner of the target lies in the image of its sheet, px.
+/// Returns the position of a corner of the target in the image of its sheet, px.
 fn image_of(target: &Printing, corner: usize, dpi: f64) -> [f64; 2] {
     let (placement, sheet) = (&target.sheets[0].placements[0], &target.sheets[0]);
     let place = placement.origin_mm + target.target.panels[0].corners[corner].panel_mm;
@@ -95,10 +95,10 @@ fn a_plain_checkerboard_is_found_and_numbered_by_rows() {
     assert!(orpc.lines().nth(16).unwrap().starts_with("-1,11,0,"), "{orpc}");
 }
 
-/// Flopped sheets of a tagged and of an untagged target, and of an untagged board of known size: told, and
-/// labelled as on the print where that is asked for.
+/// Flopped sheets of a tagged and of an untagged target, and of an untagged board of known size. They are reported, and
+/// on request labelled as on the print.
 #[test]
-fn mirrored_boards_are_told_and_labelled_where_that_is_allowed() {
+fn mirrored_boards_are_reported_and_labelled_on_request() {
     let folder = board();
     deltille(folder.path(), "board --rows 6 --cols 7 --untagged --png --dpi 200 -o plain")
         .success();
@@ -121,8 +121,8 @@ fn mirrored_boards_are_told_and_labelled_where_that_is_allowed() {
             detection::read(&json.unwrap()).unwrap()
         };
         let found = detected("");
-        let is_told = found.reasons.iter().any(|reason| reason.kind == ReasonKind::Mirrored);
-        assert!(is_told, "{what}: {:?}", found.reasons);
+        let is_reported = found.reasons.iter().any(|reason| reason.kind == ReasonKind::Mirrored);
+        assert!(is_reported, "{what}: {:?}", found.reasons);
         assert!(found.grids[0].mirrored && found.grids[0].panel.is_none(), "{what}");
         assert!(found.grids[0].corners.iter().all(|corner| corner.id.is_none()), "{what}");
 
@@ -142,7 +142,7 @@ fn mirrored_boards_are_told_and_labelled_where_that_is_allowed() {
 }
 
 #[test]
-fn folders_patterns_and_lists_are_taken_in_order_and_what_is_done_is_skipped() {
+fn folders_patterns_and_lists_run_in_order_and_finished_images_are_skipped() {
     let folder = board();
     let path = |name: &str| folder.path().join(name);
     std::fs::create_dir(path("day")).unwrap();
@@ -169,11 +169,11 @@ fn folders_patterns_and_lists_are_taken_in_order_and_what_is_done_is_skipped() {
     let found: Vec<_> = lines.lines().map(|line| detection::read(line).unwrap()).collect();
     assert_eq!(found.iter().map(|f| f.image.as_str()).collect::<Vec<_>>(), ["c.png", "b.png"]);
     assert!(found.iter().all(|f| f.grids[0].corners.len() == 42));
-    assert!(!path("c.json").exists(), "a stream writes no files by itself");
+    assert!(!path("c.json").exists(), "a stream writes no files");
 }
 
 #[test]
-fn a_benchmark_tells_every_stage() {
+fn a_benchmark_reports_every_stage() {
     let folder = board();
     let result = deltille(folder.path(), "bench detect --target board.json sheet --repeat 2");
     let said = String::from_utf8(result.success().get_output().stdout.clone()).unwrap();
@@ -189,7 +189,7 @@ fn a_benchmark_tells_every_stage() {
 }
 
 #[test]
-fn what_detect_says() {
+fn messages_of_detect() {
     let folder = board();
     let at = folder.path();
     let sheet = std::fs::read(at.join("sheet/board.png")).unwrap();
@@ -213,7 +213,7 @@ fn what_detect_says() {
     image::GrayImage::from_pixel(300, 200, image::Luma([128])).save(at.join("grey.png")).unwrap();
 
     let mut page = Page::default();
-    page.title("What is found, and what is not");
+    page.title("Images with and without the target");
     for images in [
         "sheet/board.png",
         "two.png",
@@ -225,13 +225,13 @@ fn what_detect_says() {
         page.run(at, &format!("deltille detect --target board.json {images} -o out"));
     }
     page.run(at, "deltille detect --grid deltille two.png flopped.png -o out --skip-existing");
-    page.title("Pictures that cannot be read");
+    page.title("Unreadable images");
     page.run(
         at,
         "deltille detect --grid deltille cut.png empty.png sheet/board.png missing.png -o left",
     );
     assert_eq!(crate::common::folder::names(&at.join("left")), ["board.json"]);
-    page.title("What cannot be done");
+    page.title("Invalid options");
     for args in [
         "sheet/board.png",
         "--target board.json",
@@ -261,9 +261,9 @@ fn what_detect_says() {
     page.is("detect");
 }
 
-/// A stream prints each picture before it has seen the others, so their ink is not that of all.
+/// A stream prints each image before it has read the others, so it does not use the ink estimate of all.
 #[test]
-fn a_stream_says_that_files_would_have_other_corners() {
+fn a_stream_notes_that_files_would_have_other_corners() {
     let folder = tempfile::tempdir().unwrap();
     let root = Path::new(crate::common::REPOSITORY);
     for name in ["a.png", "b.png", "c.png"] {
@@ -276,10 +276,10 @@ fn a_stream_says_that_files_would_have_other_corners() {
         let text = |bytes: &[u8]| String::from_utf8_lossy(bytes).into_owned();
         (text(&result.get_output().stdout), text(&result.get_output().stderr))
     };
-    let (lines, told) = detect("*.png", "--stream");
+    let (lines, notes) = detect("*.png", "--stream");
     assert!(
-        told.contains("note: --stream located the corners of each image with the ink"),
-        "{told}"
+        notes.contains("note: --stream located the corners of each image with the ink"),
+        "{notes}"
     );
     assert!(lines.lines().all(|line| line.contains("\"pictures\": 1}")));
     assert!(!detect("a.png", "--stream").1.contains("note:"));

@@ -1,5 +1,5 @@
-//! Boards that are not the one looked for get no label: other ids, other families, mirrored, random tiles and other
-//! spacings, in views that spoil their tags.
+//! Boards other than the target get no label: other ids, other families, mirrored, random tiles and other spacings, in
+//! views that degrade their tags.
 //!
 //! Ten thousand of them: `cargo test --release --test it detect::control_boards -- --ignored --nocapture`.
 
@@ -18,10 +18,10 @@ use rand_chacha::ChaCha8Rng;
 
 const EDGE_MM: f64 = 20.0;
 
-/// Families of a board that is looked for.
+/// Families of the target.
 const FAMILIES: [&str; 6] = ["delTag25h7", "d16h5", "d25h7", "d36h9", "d36h11", "delTag36h11"];
 
-/// What is seen instead.
+/// Boards shown instead of the target.
 const CONTROLS: [&str; 5] =
     ["other ids", "another family", "mirrored", "random tiles", "another spacing"];
 
@@ -47,10 +47,10 @@ fn board(family: &Family, first_id: u32, spacing: u32, cols: u32) -> Board {
     Board { target: target.target, scene, centre_mm, bit_mm: EDGE_MM / bits_across }
 }
 
-/// A family of as many bits whose codes are coin tosses.
+/// A family with the same number of bits, and random codes.
 fn random_family(like: &Family, rng: &mut ChaCha8Rng) -> Family {
     let mask = like.dimension().mask();
-    // Of few bits some are now and then the same, perhaps turned: no family.
+    // With few bits, some codes are equal now and then, perhaps after a rotation. Such codes are not a family.
     loop {
         let codes = (0..60).map(|_| rng.random::<u64>() & mask).collect();
         let (rules, construction) = (like.rules().clone(), like.construction().clone());
@@ -66,7 +66,7 @@ fn flopped(image: &Gray<f32>) -> Gray<f32> {
     Gray::from_fn(width, image.height(), |x, y| image.at(width - 1 - x, y))
 }
 
-/// Labels of control boards, a line each.
+/// Labels of control boards, one per line.
 fn labelled(boards: u64) -> Vec<String> {
     let mut rng = ChaCha8Rng::seed_from_u64(12);
     let mut lines = Vec::new();

@@ -1,4 +1,4 @@
-//! Pictures without a target: no grid and no tag is reported.
+//! Images without a target: no grid and no tag is reported.
 
 use std::f64::consts::TAU;
 use std::sync::LazyLock;
@@ -20,10 +20,10 @@ use rand_distr::{Distribution, StandardNormal};
 const WIDTH: usize = 400;
 const HEIGHT: usize = 300;
 
-/// Angles of patterns, degrees: upright, a rosette's, and none that pixels share.
+/// Angles of patterns, degrees: upright, that of a rosette, and one that does not fit the pixels.
 const ANGLES_DEG: [f64; 4] = [0.0, 15.0, 37.0, 45.0];
 
-/// One detector for each thing that may be asked for, by name.
+/// One detector for each type of target, by name.
 static DETECTORS: LazyLock<Vec<(&str, Detector)>> = LazyLock::new(|| {
     let family = Family::shipped(&TagSpec::default().family).unwrap();
     let spec = TargetSpec::Board(BoardSpec::new(GridKind::Deltille, 10, 11, 20.0));
@@ -40,7 +40,7 @@ static DETECTORS: LazyLock<Vec<(&str, Detector)>> = LazyLock::new(|| {
     ]
 });
 
-/// What detectors whose names `asked` accepts find in an image, a line each.
+/// Returns the results in an image, one per line, of the detectors whose names `asked` accepts.
 fn found(name: &str, image: &Gray<u8>, asked: impl Fn(&str) -> bool) -> Vec<String> {
     let detectors = DETECTORS.iter().filter(|(what, _)| asked(what));
     let lines = detectors.flat_map(|(what, detector)| {
@@ -59,10 +59,9 @@ fn nothing_in(images: impl IntoIterator<Item = (String, Gray<u8>)>) {
     assert!(lines.is_empty(), "{}", lines.join("\n"));
 }
 
-/// A photograph of what has the brightness `shade` (0 to 1) at every point (px): 0.8 px of blur,
-/// 1 % of noise.
+/// Renders a photograph whose brightness at every point (px) is `shade` (0 to 1): 0.8 px of blur, 1 % of noise.
 fn photograph(shade: impl Fn(f64, f64) -> f64) -> Gray<u8> {
-    // The mean over 3 × 3 points stands for that over a pixel.
+    // The mean over 3 × 3 points represents that over a pixel.
     let third = [-1.0 / 3.0, 0.0, 1.0 / 3.0];
     taken(&Gray::from_fn(WIDTH, HEIGHT, |x, y| {
         let points = third.iter().flat_map(|v| third.iter().map(move |u| (u, v)));
@@ -81,13 +80,13 @@ fn taken(sharp: &Gray<f32>) -> Gray<u8> {
     image.map(|v| (v * 255.0 + 0.5) as u8)
 }
 
-/// Coordinates turned by an angle, in units of `pitch_px`.
+/// Returns coordinates rotated by an angle, in units of `pitch_px`.
 fn turned(angle_deg: f64, pitch_px: f64, [x, y]: [f64; 2]) -> [f64; 2] {
     let (sin, cos) = angle_deg.to_radians().sin_cos();
     [(x * cos + y * sin) / pitch_px, (y * cos - x * sin) / pitch_px]
 }
 
-/// Whether patterns are looked at at every angle with every pitch, or each angle with every second one.
+/// Whether patterns are tested at every angle with every pitch, or at each angle with every second pitch.
 static IS_EVERY_PAIR: AtomicBool = AtomicBool::new(false);
 
 /// A pattern at all angles and several pitches.
@@ -109,7 +108,7 @@ fn everywhere(
     images
 }
 
-/// 1 within a stripe along a whole number, as wide as a part of the pitch.
+/// 1 within a stripe along an integer, of a width relative to the pitch.
 fn stripe(u: f64, width: f64) -> f64 {
     f64::from((u - u.round()).abs() < width / 2.0)
 }
@@ -149,11 +148,11 @@ fn halftones_of_dots_that_do_not_meet() {
     }
 }
 
-/// Where a screen comes to 50 % its dots meet as squares of a checkerboard do, whatever is asked for.
+/// Where a screen reaches 50 %, its dots meet like squares of a checkerboard, for any target.
 #[test]
 fn halftones_and_dithers_of_gradients() {
     for (period_px, angle) in [(10.0, 45.0), (14.0, 20.0), (20.0, 70.0)] {
-        // From white to black across the picture, once or in three bands.
+        // From white to black across the image, once or in three bands.
         let images = [1.0, 3.0].map(|bands| {
             let tone = |x: f64| 2.0 * (bands * x / WIDTH as f64).fract() - 1.0;
             photograph(|x, y| spots(turned(angle, period_px, [x, y]), 2.0 * tone(x + 0.3 * y)))
@@ -177,7 +176,7 @@ fn halftones_and_dithers_of_gradients() {
     }
 }
 
-/// What is asked for here is any checkerboard, which tells least.
+/// Asserts that nothing is found as any checkerboard, the least specific target.
 fn no_checkerboard_in(images: impl IntoIterator<Item = (String, Gray<u8>)>) {
     let asked = |what: &str| what == "checker";
     let lines: Vec<String> =
@@ -185,7 +184,7 @@ fn no_checkerboard_in(images: impl IntoIterator<Item = (String, Gray<u8>)>) {
     assert!(lines.is_empty(), "{}", lines.join("\n"));
 }
 
-/// A sum of two waves at a slant is a slanted checkerboard, blurred. It has no waves of a third of the length.
+/// A sum of two waves at a slant is a slanted, blurred checkerboard. It has no waves of a third of the length.
 #[test]
 fn two_waves_at_a_slant() {
     let waves = [(0.0, 8.0, 40.0, 14.0), (20.0, 9.0, 75.0, 31.0), (80.0, 24.0, 110.0, 17.0)];
@@ -211,7 +210,7 @@ fn fine_halftones() {
     }
 }
 
-/// Here and there a few of them alternate like squares of a board.
+/// Some of them alternate like squares of a board.
 #[test]
 fn fields_of_random_cells() {
     let mut rng = ChaCha8Rng::seed_from_u64(3);
@@ -228,7 +227,7 @@ fn fields_of_random_cells() {
     }
 }
 
-/// Where dots of one screen lie between those of another they seem to be squares.
+/// Where dots of one screen lie between those of another, they look like squares.
 #[test]
 fn screens_slightly_turned() {
     for (pitch, turn, ratio) in
@@ -245,7 +244,7 @@ fn screens_slightly_turned() {
     }
 }
 
-/// Ordered dithers with a matrix of 8 × 8: from one tone to the next a few more cells change their colour.
+/// Ordered dithers with a matrix of 8 × 8: from one tone to the next, a few more cells change their colour.
 #[test]
 fn fine_dithers() {
     let level = |x: usize, y: usize| {
@@ -265,11 +264,11 @@ fn fine_dithers() {
     }
 }
 
-/// At 50 % cos u + cos v is a checkerboard, exactly, three waves are a deltille grid, and round dots
-/// are joined by blur where the gaps are small. Without a size there is nothing to tell them from a
-/// part of a board; with one there is: they do not end.
+/// At 50 %, cos u + cos v is exactly a checkerboard, three waves are a deltille grid, and blur joins round dots with
+/// small gaps. Without a size, they cannot be distinguished from a part of a board. With a size they can, because they
+/// do not end.
 #[test]
-fn halftones_of_dots_that_meet_are_no_board_of_a_known_size() {
+fn halftones_of_dots_that_meet_are_not_boards_of_a_known_size() {
     let known = |what: &str| what.contains("of") || what == "target";
     for pitch in [12.0, 16.0, 20.0] {
         for angle in ANGLES_DEG {
@@ -288,8 +287,8 @@ fn halftones_of_dots_that_meet_are_no_board_of_a_known_size() {
     }
 }
 
-/// Waves have the symmetry of boards and no edges: their brightness is that of a board blurred by
-/// a fifth of a tile and more.
+/// Waves have the symmetry of boards but no edges: their brightness is that of a board blurred by at least a fifth of a
+/// tile.
 #[test]
 fn smooth_waves() {
     let pitches = [12.0, 16.0, 24.0, 40.0, 70.0];
@@ -409,7 +408,7 @@ fn pages_of_text() {
     }
 }
 
-/// Adds the polygons of a path; holes run the other way round.
+/// Adds the polygons of a path; holes have the opposite orientation.
 fn add(ink: &mut Coverage, path: &kurbo::BezPath) {
     let mut polygon = Vec::new();
     kurbo::flatten(path, 0.05, |element| match element {
@@ -420,9 +419,9 @@ fn add(ink: &mut Coverage, path: &kurbo::BezPath) {
     });
 }
 
-/// Squares and triangles that meet as on a board, in pieces too small to be sure of.
+/// Squares and triangles that meet as on a board, in pieces too small to be identified.
 #[test]
-fn pieces_of_boards_too_small_to_tell() {
+fn pieces_of_boards_too_small_to_identify() {
     for pitch in [15.0, 30.0] {
         for angle in ANGLES_DEG {
             // 2 × 4 corners in pieces of 3 × 5 squares.
@@ -432,7 +431,7 @@ fn pieces_of_boards_too_small_to_tell() {
                 let white = u >= 5.0 || v >= 3.0 || (u.floor() + v.floor()) % 2.0 == 1.0;
                 f64::from(white)
             });
-            // Three corners, in a triangle of six tiles a side less its tips.
+            // Three corners, in a triangle of six tiles a side without its tips.
             let triangles = photograph(|x, y| {
                 let [u, v] = turned(angle, pitch, [x, y]);
                 let v = v / 0.75f64.sqrt();

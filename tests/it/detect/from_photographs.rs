@@ -1,4 +1,4 @@
-//! From synthetic photographs to a camera: the whole way, with the truth at its end.
+//! From synthetic photographs to a calibrated camera: the whole pipeline, compared with the truth.
 
 use crate::common::view::tilted;
 use deltille::calibrate::{Calibration, Model, Reference, views};
@@ -12,10 +12,10 @@ use deltille::targets::{BoardSpec, TagSpec, TargetSpec};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 
-/// Corners that are a hundredth of a pixel off all in the same way, as where the bend of the edges is
-/// not followed, put these parameters ten deviations off.
+/// If all corners are off by 0.01 px in the same way, for example because the bend of the edges is ignored, these
+/// parameters are off by 10σ.
 #[test]
-fn lenses_that_bend_edges_are_found_within_their_deviations() {
+fn lenses_that_bend_edges_are_calibrated_within_4_sigma() {
     let family = Family::shipped(&TagSpec::default().family).unwrap();
     let spec = TargetSpec::Board(BoardSpec::new(GridKind::Deltille, 8, 9, 18.0));
     let paper = PaperSpec::default();
@@ -47,11 +47,11 @@ fn lenses_that_bend_edges_are_found_within_their_deviations() {
         assert!(found.rms_px < 0.006, "{model}: {} px", found.rms_px);
         assert!(found.frames.len() >= 13, "{model}: {} views", found.frames.len());
         for (parameter, truth) in found.cameras[0].parameters.iter().zip(camera.parameters()) {
-            // Views of the middle do not tell the last terms of a fisheye.
+            // Views of the image centre do not determine the last terms of a fisheye.
             let Some(sd) = parameter.sd else { continue };
             let off = (parameter.value - truth) / sd;
-            println!("{model}: {} {off:.1} deviations off", parameter.name);
-            assert!(off.abs() < 4.0, "{model}: {} is {off:.1} deviations off", parameter.name);
+            println!("{model}: {} off by {off:.1}σ", parameter.name);
+            assert!(off.abs() < 4.0, "{model}: {} is off by {off:.1}σ", parameter.name);
         }
     }
 }

@@ -1,4 +1,4 @@
-//! Tagged boards under what spoils photographs: small tags, covers, light, motion, compression.
+//! Tagged boards under degradations of photographs: small tags, covers, light, motion, compression.
 //!
 //! Rates over many seeds: `cargo test --release --test it detect::hard -- --ignored --nocapture`.
 
@@ -45,14 +45,14 @@ impl Board {
         Self { target: target.target, scene, centre_mm, detector, bit_mm: EDGE_MM / bits_across }
     }
 
-    /// Seen with `bit_px` pixels to a tag bit in the middle, before the tilt shortens it.
+    /// Returns a view with `bit_px` pixels per tag bit in the centre, before the tilt shortens it.
     fn view(&self, rng: &mut ChaCha8Rng, bit_px: f64, tilt_rad: f64) -> (Camera, Pose) {
         let camera = Camera::pinhole(640, 480, 0.5);
         let distance_mm = camera.focal_px.x * self.bit_mm / bit_px;
         (camera, tilted(rng, self.centre_mm, distance_mm, tilt_rad))
     }
 
-    /// What is found of a view through `spoil`.
+    /// Returns the result for a view degraded by `spoil`.
     fn seen(
         &self,
         (camera, pose): (Camera, Pose),
@@ -70,15 +70,15 @@ fn eight_bits(image: Gray<f32>) -> Gray<u8> {
     image.map(|v| (v.clamp(0.0, 1.0) * 255.0 + 0.5) as u8)
 }
 
-/// What was found of a board, of what there was to find.
+/// Detected and expected corners of a board.
 #[derive(Debug, Default)]
 struct Seen {
-    /// Corners with the right label, and those to be found.
+    /// Corners with the right label, and those expected.
     corners: [usize; 2],
     /// Corners with a wrong label.
     wrong: usize,
     tags: usize,
-    /// Largest distance of a corner from its place, px.
+    /// Largest distance of a corner from the truth, px.
     worst_px: f64,
 }
 
@@ -102,13 +102,14 @@ impl Seen {
         seen
     }
 
-    /// Whether all corners are there with their labels.
+    /// Returns whether all corners are found with their labels.
     fn whole(&self) -> bool {
         self.wrong == 0 && self.corners[0] >= self.corners[1]
     }
 }
 
-/// Views at which tags decode and all corners are labelled, and tags read of those printed.
+/// Returns the number of views in which tags decode and all corners are labelled, and the fraction of printed tags
+/// read.
 fn small_tags(views: u64, bit_px: f64) -> (u64, f64) {
     let board = Board::new(false);
     let mut rng = ChaCha8Rng::seed_from_u64(1);
@@ -125,7 +126,7 @@ fn small_tags(views: u64, bit_px: f64) -> (u64, f64) {
     (whole, tags as f64 / printed)
 }
 
-/// Bits of 2 px where they are seen shortest: 2.83 px before a tilt of 45°.
+/// Bits of 2 px in the direction of strongest foreshortening: 2.83 px before a tilt of 45°.
 #[test]
 fn tags_of_two_pixels_a_bit_decode_at_45_degrees() {
     let (whole, tags) = small_tags(10, 2.0 / 45f64.to_radians().cos());
@@ -170,13 +171,13 @@ fn covered_boards_keep_absolute_labels() {
     for seed in 0..8 {
         let view = board.view(&mut rng, 5.0, 0.5);
         let seen = board.seen(view, &Light::default().seed(seed), eight_bits);
-        // The sheet's own edge may spoil the corners beside it.
+        // The edge of the sheet may degrade the corners beside it.
         assert!(seen.wrong == 0 && seen.tags >= 1, "view {seed}: {seen:?}");
         assert!(seen.corners[0] * 10 >= seen.corners[1] * 7, "view {seed}: {seen:?}");
     }
 }
 
-/// Every corner, with the right label, through each way to spoil an image.
+/// Asserts that every corner is found with the right label, through a degradation of the image.
 fn whole_through(inverted: bool, light: &Light, spoil: impl Fn(Gray<f32>) -> Gray<u8>) {
     let board = Board::new(inverted);
     let mut rng = ChaCha8Rng::seed_from_u64(3);

@@ -1,5 +1,4 @@
-//! A panel has an id, on the print and in the target's file. Nothing that people see or read counts panels
-//! in another way.
+//! A panel has an id, on the print and in the target's file. All output identifies panels by this id.
 
 use std::path::Path;
 
@@ -20,10 +19,10 @@ const CAMERA: &str = "width: 1600\nheight: 1200\nfocal_px: [1500, 1500]\ncentre_
 /// The ids of an icosahedron with `--board-id 40`.
 const IDS: std::ops::Range<u64> = 40..60;
 
-/// The panel whose print is said to lie in another place than it does.
+/// The panel whose recorded position differs from that of its print.
 const MISPLACED: u32 = 47;
 
-/// What a camera sees of the panels that turn to it.
+/// Returns the detection of the panels that face a camera.
 fn seen(target: &Target, camera: &Camera, camera_from_target: &Pose, view: u32) -> Detection {
     let mut random = ChaCha8Rng::seed_from_u64(view.into());
     let grid = |panel: &Panel| {
@@ -60,7 +59,7 @@ fn seen(target: &Target, camera: &Camera, camera_from_target: &Pose, view: u32) 
     Detection::new(format!("{view:02}.png"), [camera.width, camera.height], grids)
 }
 
-/// Every panel that a JSON file names.
+/// Adds every panel that a JSON file names.
 fn panels(value: &Value, found: &mut Vec<u64>) {
     match value {
         Value::Array(values) => values.iter().for_each(|value| panels(value, found)),
@@ -76,7 +75,7 @@ fn panels(value: &Value, found: &mut Vec<u64>) {
     }
 }
 
-/// Every panel, or board, that a text names by a number.
+/// Returns every panel, or board, that a text names by a number.
 fn named(text: &str) -> Vec<u64> {
     let text = text.to_lowercase();
     let words: Vec<&str> =
@@ -91,7 +90,7 @@ fn of_json(path: &Path) -> Vec<u64> {
     found
 }
 
-/// What a command says, on both streams.
+/// Returns the output of a command on both streams.
 fn said(at: &Path, args: &str) -> String {
     let mut command = Command::cargo_bin("deltille").unwrap();
     let output = command.current_dir(at).args(args.split_whitespace()).output().unwrap();
@@ -101,7 +100,7 @@ fn said(at: &Path, args: &str) -> String {
 }
 
 #[test]
-fn only_ids_are_seen() {
+fn panels_are_identified_only_by_id() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
     std::fs::write(at.join("known.yaml"), CAMERA).unwrap();
@@ -113,7 +112,7 @@ fn only_ids_are_seen() {
         assert!(!ids.is_empty() && ids.iter().all(|id| IDS.contains(id)), "{what}: {ids:?}");
     };
 
-    // A picture, with its truth and what is found in it.
+    // An image, with its truth and its detection.
     said(at, "render ico.json --camera known.yaml --eye 150,-400,200 -o picture.png");
     is_id(&of_json(&at.join("picture.json")), "truth");
     said(at, "detect --target ico.json picture.png --format json,csv -o found");
@@ -136,7 +135,7 @@ fn only_ids_are_seen() {
         for (name, pose) in [("left", left), ("right", right_from_left.after(&left))] {
             let mut found = seen(&target, &camera, &pose, index);
             if (name, index) == ("left", 5) {
-                // A grid that is wrong in itself is named as well.
+                // An inconsistent grid is named as well.
                 let corners = found.grids[0].corners.iter_mut();
                 corners.for_each(|corner| (corner.row, corner.col) = (corner.col, corner.row));
             }

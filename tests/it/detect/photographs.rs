@@ -1,5 +1,5 @@
 //! Real photographs: one of each set in `tests/photographs`, the sets and published artifacts in `../shared/data` or
-//! where `DELTILLE_DATA` says.
+//! where `DELTILLE_DATA` points.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -13,7 +13,7 @@ use deltille::raster::Gray;
 use deltille::verify::Document;
 use image::imageops::{self, FilterType};
 
-/// The photographs of a set: that in the repository, and all others where they are there.
+/// Returns the photographs of a set: the one in the repository, and all others if they are available.
 fn images(set: &str) -> Vec<PathBuf> {
     let here = Path::new(crate::common::REPOSITORY).join("tests/photographs");
     let in_folder = |folder: &Path| {
@@ -28,14 +28,14 @@ fn images(set: &str) -> Vec<PathBuf> {
     images
 }
 
-/// Whether the next corner of a row and of a column, where they are there, lie as on the print.
+/// Returns whether the next corners of a row and of a column, if present, lie as on the print.
 fn is_unmirrored(p: &[f64; 2], along: Option<&[f64; 2]>, up: Option<&[f64; 2]>) -> bool {
     along
         .zip(up)
         .is_none_or(|(q, r)| (q[0] - p[0]) * (r[1] - p[1]) - (q[1] - p[1]) * (r[0] - p[0]) < 0.0)
 }
 
-/// A grid is a lattice seen through a lens: every corner lies near the middle of its opposite
+/// Returns whether a grid is a lattice seen through a lens. Every corner lies near the midpoint of its opposite
 /// neighbours, and all small triangles have the same, unmirrored handedness.
 fn topology_is_consistent(grid: &Grid) -> bool {
     let at: BTreeMap<(i32, i32), [f64; 2]> =
@@ -70,11 +70,11 @@ fn all_110_corners_of_the_robot_hand_photographs() {
     assert_eq!(complete, images.len());
 }
 
-/// What looks like a tone curve in these pictures is the print's: every one of them says the same, from whatever side
+/// The apparent tone curve in these images is the ink spread of the print: every image gives the same, from any side
 /// and distance.
 #[test]
 #[cfg_attr(not(has_data), ignore = "no photographs: set DELTILLE_DATA to their folder")]
-fn all_pictures_of_one_print_have_the_same_ink() {
+fn all_images_of_one_print_have_the_same_ink() {
     let images = images("robot-hand");
     let detector = Detector::for_grid(GridKind::Deltille, None, DetectorConfig::default());
     let ink = |path: &PathBuf| detector.detect(&photograph::read(path).unwrap(), "photograph").ink;
@@ -89,7 +89,7 @@ fn all_pictures_of_one_print_have_the_same_ink() {
 }
 
 #[test]
-fn checkerboards_and_lamps_are_no_deltille_grids() {
+fn checkerboards_and_lamps_are_not_deltille_grids() {
     let images = images("fisheye");
     let detector = Detector::for_grid(GridKind::Deltille, None, DetectorConfig::default());
     for path in images.iter().step_by(4) {
@@ -98,12 +98,12 @@ fn checkerboards_and_lamps_are_no_deltille_grids() {
     }
 }
 
-/// Largest ratio of an edge to the next. Seen by an equidistant lens at x edges from the foot of the
-/// camera on the plane and at a height of one edge, it is ((x + 1)² + 1)/(x² + 1), at most the golden
-/// ratio squared; a camera this wide cannot be nearer than that and see the board.
+/// Largest ratio of successive edges. An equidistant lens sees it at x edges from the foot of the camera on the plane,
+/// at a height of one edge. It is ((x + 1)² + 1)/(x² + 1), at most the golden ratio squared. A camera this wide cannot
+/// be nearer and see the board.
 const MAX_RATIO: f64 = 2.618;
 
-/// Rows and columns of a checkerboard are straight for a few squares, and unmirrored.
+/// Returns whether rows and columns of a checkerboard are straight for a few squares, and unmirrored.
 fn squares_are_consistent(grid: &Grid) -> bool {
     let at: BTreeMap<(i32, i32), [f64; 2]> =
         grid.corners.iter().map(|c| ((c.row, c.col), [c.x, c.y])).collect();
@@ -114,7 +114,7 @@ fn squares_are_consistent(grid: &Grid) -> bool {
             let (a, b) = ([q[0] - p[0], q[1] - p[1]], [p[0] - r[0], p[1] - r[1]]);
             let cos = (a[0] * b[0] + a[1] * b[1]) / (a[0].hypot(a[1]) * b[0].hypot(b[1]));
             let ratio = a[0].hypot(a[1]) / b[0].hypot(b[1]);
-            // A row turns by less than 45° at a corner.
+            // A row bends by less than 45° at a corner.
             cos > 0.7 && (1.0 / MAX_RATIO..MAX_RATIO).contains(&ratio)
         });
         straight && is_unmirrored(p, near(0, 1), near(1, 0))
@@ -149,8 +149,8 @@ fn corners_of_the_fisheye_photographs() {
     assert!(found * 1000 >= all * 999, "{found} of {all} corners");
 }
 
-/// Enlarged to 48 megapixels a photograph shows its corners where it did before: among the grain, which is as large
-/// as they are and far more, and with ink that has spread over pixels.
+/// Enlarged to 48 megapixels, a photograph shows its corners where it did before. They lie among grain, which is as
+/// large and far more frequent, and ink spread covers several pixels.
 #[test]
 fn enlarged_photographs_show_the_same_corners() {
     for (folder, kind, size) in
@@ -184,7 +184,7 @@ fn enlarged_photographs_show_the_same_corners() {
 }
 
 #[test]
-fn deltille_boards_are_no_checkerboards() {
+fn deltille_boards_are_not_checkerboards() {
     let images = images("robot-hand");
     let detector = Detector::for_grid(GridKind::Checker, None, DetectorConfig::default());
     for path in images.iter().step_by(4) {

@@ -1,4 +1,4 @@
-//! A picture without labels says why, and what would help.
+//! An image without labels reports a reason, and a remedy.
 
 use deltille::camera::{Camera, Pose};
 use deltille::detect::{Detection, Detector, DetectorConfig, ReasonKind};
@@ -29,7 +29,7 @@ fn board(grid: GridKind, change: impl Fn(&mut BoardSpec)) -> Board {
 }
 
 impl Board {
-    /// A photograph of 800 × 600 from so far, mm, a little from the side.
+    /// Renders a photograph of 800 × 600 px from a distance of `mm`, slightly from the side.
     fn photograph(&self, mm: f64, light: &Light) -> Gray<u8> {
         let eye = self.centre_mm + mm * DVec3::new(0.1, -0.2, 0.97);
         let pose = Pose::looking_at(eye, self.centre_mm, DVec3::Y);
@@ -37,7 +37,7 @@ impl Board {
         image.map(|v| (v * 255.0 + 0.5) as u8)
     }
 
-    /// The kinds of the reasons for which this board is not seen in a picture.
+    /// Returns the kinds of the reasons for which this board is not found in an image.
     fn not_seen_in(&self, image: &Gray<u8>) -> Vec<ReasonKind> {
         let Detection { grids, reasons, .. } = self.detector.detect(image, "view");
         assert!(grids.iter().all(|grid| grid.panel.is_none()), "it is seen");
@@ -57,7 +57,7 @@ fn tags(change: impl Fn(&mut TagSpec)) -> Option<TagSpec> {
 }
 
 #[test]
-fn nothing_is_seen_in_bad_light_and_focus_and_from_too_far() {
+fn bad_light_bad_focus_and_long_distance_are_reported() {
     for kind in [GridKind::Deltille, GridKind::Checker] {
         let board = board(kind, |_| {});
         let why = |mm: f64, light: Light| board.not_seen_in(&board.photograph(mm, &light));
@@ -75,7 +75,7 @@ fn nothing_is_seen_in_bad_light_and_focus_and_from_too_far() {
 }
 
 #[test]
-fn what_is_seen_is_another_board() {
+fn another_board_is_reported() {
     let wanted = board(GridKind::Deltille, |_| {});
     let why = |other: Board| wanted.not_seen_in(&other.photograph(400.0, &light()));
     assert_eq!(why(board(GridKind::Checker, |_| {})), [ReasonKind::OtherTiling]);
@@ -89,9 +89,9 @@ fn what_is_seen_is_another_board() {
     assert_eq!(wanted.not_seen_in(&mirrored), [ReasonKind::Mirrored]);
 }
 
-/// Blur that leaves corners, and of tags too little; never "no tag is seen".
+/// Blur that leaves corners, but too little of the tags. The reason is never "no tag is seen".
 #[test]
-fn tags_that_cannot_be_read_are_no_missing_tags() {
+fn unreadable_tags_are_not_reported_as_missing() {
     let board = board(GridKind::Deltille, |_| {});
     let mut unread = 0;
     for mm in [400.0, 600.0, 900.0] {

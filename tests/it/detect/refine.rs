@@ -1,4 +1,4 @@
-//! `deltille refine`: a table of refined positions, and clear words on bad input.
+//! `deltille refine`: a table of refined positions, and clear errors for bad input.
 
 use crate::common::page::Page;
 use assert_cmd::Command;
@@ -50,7 +50,7 @@ fn seeds_are_refined_by_either_method() {
 }
 
 #[test]
-fn bad_input_is_named_in_one_line() {
+fn bad_input_gives_a_one_line_error() {
     let folder = folder();
     let mut page = Page::default();
     for args in [

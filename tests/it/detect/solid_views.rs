@@ -1,4 +1,4 @@
-//! Synthetic photographs of solids: their exactness, and what the detector makes of them.
+//! Synthetic photographs of solids: their accuracy, and their detection.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -24,7 +24,7 @@ fn eight_bits(image: &Gray<f32>) -> Gray<u8> {
     image.map(|v| (v * 255.0 + 0.5) as u8)
 }
 
-/// Area of the part of a polygon with a·x ≤ b, cut edge by edge (Sutherland and Hodgman 1974).
+/// Returns the part of a polygon with a·x ≤ b, cut edge by edge (Sutherland and Hodgman 1974).
 fn clip(polygon: &[DVec2], a: DVec2, b: f64) -> Vec<DVec2> {
     let mut cut = Vec::new();
     for (i, &p) in polygon.iter().enumerate() {
@@ -48,10 +48,10 @@ fn area_in_pixel(triangle: [DVec2; 3], x: f64, y: f64) -> f64 {
     (0..n).map(|i| cut[i].perp_dot(cut[(i + 1) % n])).sum::<f64>().abs() / 2.0
 }
 
-/// An edge that is off by e px changes the pixels along it by e times the contrast: around a
-/// corner the picture agrees with the closed form to less than 0.002 px.
+/// An edge that is off by e px changes the pixels along it by e times the contrast. Around a corner, the image agrees
+/// with the closed form to less than 0.002 px.
 #[test]
-fn corners_are_where_the_truth_says_to_a_five_hundredth_of_a_pixel() {
+fn corners_match_the_truth_to_a_five_hundredth_of_a_pixel() {
     let (target, scene) = solid(SolidShape::Octahedron, 0, 0);
     let camera = Camera::pinhole(1200, 1000, 0.6);
     let light = Light::default().blur_px(0.0).noise(0.0);
@@ -94,9 +94,9 @@ fn corners_are_where_the_truth_says_to_a_five_hundredth_of_a_pixel() {
     assert!(checked > 500, "{checked}");
 }
 
-/// Two objects in one picture, with other ids, are told apart.
+/// Two objects in one image, with different ids, are distinguished.
 #[test]
-fn two_solids_in_one_picture_are_told_apart() {
+fn two_solids_in_one_image_are_distinguished() {
     let (a, scene_a) = solid(SolidShape::Icosahedron, 0, 0);
     let (b, mut scene_b) = solid(SolidShape::Icosahedron, 120, 20);
     assert!(a.check_beside(&b).is_ok());
@@ -133,7 +133,7 @@ fn spikes() -> ClosedMesh {
     ClosedMesh::new(&vertices, &faces).unwrap().0
 }
 
-/// Where a ray meets a triangle from its front, in lengths of the ray.
+/// Returns the distance at which a ray meets a triangle from its front, in lengths of the ray.
 fn meet(triangle: [DVec3; 3], eye: DVec3, ray: DVec3) -> Option<f64> {
     let [a, b, c] = triangle;
     let normal = (b - a).cross(c - a);
@@ -144,7 +144,7 @@ fn meet(triangle: [DVec3; 3], eye: DVec3, ray: DVec3) -> Option<f64> {
     (normal.dot(ray) < 0.0 && t > 0.0 && inside).then_some(t)
 }
 
-/// What a concave solid hides of itself is neither drawn nor in the truth: rays say the same.
+/// Parts of a concave solid that it hides itself are neither drawn nor in the truth; ray casting confirms it.
 #[test]
 fn hidden_parts_of_a_concave_solid_are_hidden() {
     let shape = SolidShape::Mesh(spikes());
@@ -178,7 +178,7 @@ fn hidden_parts_of_a_concave_solid_are_hidden() {
         let back = pose.inverse().rotation;
         for _ in 0..4000 {
             let [x, y]: [i32; 2] = [0; 2].map(|_| rng.random_range(10..890));
-            // Level and place of a pixel's corner; `None` on a tag.
+            // Level and position of a pixel's corner; `None` on a tag.
             let level = |dx: f64, dy: f64| {
                 let pixel = DVec2::new(f64::from(x) + dx, f64::from(y) + dy);
                 let ray = back * ((pixel - camera.centre_px) / camera.focal_px).extend(1.0);
@@ -211,10 +211,10 @@ fn hidden_parts_of_a_concave_solid_are_hidden() {
     assert!(hidden > 50 && compared > 500, "{hidden} {compared}");
 }
 
-/// Corners beside tags and on steep faces, too, have a position to a few hundredths of a pixel and a
-/// covariance that says so, through a lens that bends the edges as through one that does not.
+/// Corners beside tags and on steep faces, too, are accurate to a few hundredths of a pixel and have a matching
+/// covariance, with and without a lens that bends the edges.
 #[test]
-fn every_corner_has_an_honest_covariance() {
+fn every_corner_has_a_consistent_covariance() {
     let (target, scene) = solid(SolidShape::Icosahedron, 0, 0);
     let detector = Detector::for_target(&target, DetectorConfig::default()).unwrap();
     let fisheye = Lens::KannalaBrandt(KannalaBrandt { k: vec![-0.02, 0.003, 0.0, 0.0] });
@@ -251,8 +251,8 @@ fn every_corner_has_an_honest_covariance() {
     }
 }
 
-/// Largest angle between a face's normal and its lines of sight, and the least edge of a tag's bit
-/// in the picture, px; `None` where a part of the face is outside.
+/// Returns the largest angle between a face's normal and its lines of sight, and the smallest edge of a tag's bit in
+/// the image, px; `None` if a part of the face is outside.
 fn how_seen(panel: &Panel, camera: &Camera, pose: &Pose, bits: f64) -> Option<(f64, f64)> {
     let eye = pose.inverse().translation;
     let r = panel.pose.rotation;
@@ -279,8 +279,8 @@ fn how_seen(panel: &Panel, camera: &Camera, pose: &Pose, bits: f64) -> Option<(f
     Some((angle, least))
 }
 
-/// 300 views between 20° and 120° of field of view: every face seen at less than 60° with bits of
-/// 3 px is labelled, and no label is wrong.
+/// 300 views between 20° and 120° of field of view. Every face seen at less than 60° with bits of 3 px is labelled, and
+/// no label is wrong.
 #[test]
 #[ignore = "takes minutes; prints the figures"]
 fn three_hundred_views_of_an_icosahedron() {
@@ -344,7 +344,7 @@ fn three_hundred_views_of_an_icosahedron() {
                     }
                     continue;
                 }
-                // A place that is off, or another corner's label?
+                // A wrong position, or the label of another corner?
                 let distance = |t: &TruthCorner| (corner.x - t.x).hypot(corner.y - t.y);
                 let nearest = truth.values().min_by(|a, b| distance(a).total_cmp(&distance(b)));
                 if nearest.map(|t| t.id) == corner.id {
@@ -366,7 +366,7 @@ fn three_hundred_views_of_an_icosahedron() {
     assert!(rms < 0.05);
 }
 
-/// Faces with white tiles are labelled in a picture; bare ones are found, and not named.
+/// Faces with white tiles are labelled in an image; untagged ones are found, but not named.
 #[test]
 fn inverted_faces_are_labelled_and_bare_ones_are_not() {
     for (tags, inverted) in [(true, true), (false, false)] {

@@ -1,4 +1,4 @@
-//! Labels and positions on synthetic photographs, where the truth is exact.
+//! Labels and positions on synthetic photographs, for which the truth is exact.
 
 use std::collections::BTreeMap;
 
@@ -44,7 +44,7 @@ fn eight_bits(image: &Gray<f32>) -> Gray<u8> {
     image.map(|v| (v * 255.0 + 0.5) as u8)
 }
 
-/// Distance of every detected corner from the corner with the same id; panics on a wrong label.
+/// Returns the distance of every detected corner from the corner with the same id; panics on a wrong label.
 fn errors(detection: &Detection, truth: &Truth) -> Vec<f64> {
     let by_id: BTreeMap<u32, _> = truth.corners.iter().map(|c| (c.id, c)).collect();
     detection
@@ -132,9 +132,9 @@ fn an_untagged_board_seen_whole_is_labelled_by_its_outline() {
     assert_eq!(found.len(), 72);
 }
 
-/// A board of known size is sought on coarser levels first; one of unknown size on all.
+/// A board of known size is searched on coarser levels first, one of unknown size on all levels.
 #[test]
-fn what_a_coarser_level_shows_whole_is_where_the_finest_shows_it() {
+fn whole_boards_have_the_same_positions_on_coarser_levels() {
     let camera = Camera::pinhole(1280, 960, 0.9);
     for kind in [GridKind::Deltille, GridKind::Checker] {
         let board = BoardSpec { tags: None, ..BoardSpec::new(kind, 8, 9, 18.0) };

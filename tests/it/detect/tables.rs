@@ -1,5 +1,5 @@
-//! Detections as tables in Parquet: the same camera comes of them as of JSON, runs go on with them, and no file
-//! harms their reader.
+//! Detections as tables in Parquet. They give the same camera as JSON, runs can be resumed with them, and no file harms
+//! their reader.
 
 use std::path::Path;
 
@@ -75,7 +75,7 @@ fn detections(target: &Target) -> Vec<Detection> {
     (0..12).map(view).collect()
 }
 
-/// Both tables of pictures.
+/// Returns both tables of images.
 fn written(pictures: &[Picture], target: &Target) -> [Vec<u8>; 2] {
     let mut writer = Writer::new(Vec::new(), Vec::new(), std::slice::from_ref(target)).unwrap();
     pictures.iter().for_each(|picture| writer.push(picture).unwrap());
@@ -110,7 +110,7 @@ fn a_camera_is_the_same_to_the_last_bit_from_tables_and_from_json() {
     // As a cluster writes them: in parts, in any order.
     save(&all[5..], ["many/corners/1.parquet", "many/pictures/1.parquet"]);
     save(&all[..5], ["many/corners/2.parquet", "many/pictures/2.parquet"]);
-    // A part whose pictures were not written.
+    // A part whose images were not written.
     save(&all[..3], ["many/corners/3.parquet", "left.parquet"]);
 
     let camera = |from: &str| {
@@ -129,7 +129,7 @@ fn a_camera_is_the_same_to_the_last_bit_from_tables_and_from_json() {
 }
 
 #[test]
-fn pictures_come_back_whole() {
+fn images_survive_a_round_trip() {
     let target = board();
     let pictures = pictures(&target);
     let mut reader = Reader::new(Limits::default());
@@ -140,7 +140,7 @@ fn pictures_come_back_whole() {
 }
 
 #[test]
-fn tables_that_contradict_themselves_are_refused() {
+fn inconsistent_tables_are_rejected() {
     let target = board();
     let all = pictures(&target);
     let [corners, rows] = written(&all, &target);
@@ -160,7 +160,7 @@ fn tables_that_contradict_themselves_are_refused() {
         "{twice}"
     );
 
-    // Corners that were left out on purpose.
+    // Corners that were omitted on purpose.
     let [few, _] = written(&all[..4], &target);
     let mut reader = Reader::new(Limits::default());
     reader.add(few).unwrap();
@@ -182,7 +182,7 @@ fn no_table_takes_more_than_its_limit_or_makes_its_reader_panic() {
     for round in 0..600 {
         let mut changed = good.clone();
         let table = &mut changed[round % 2];
-        // What describes the table stands at its end.
+        // The metadata of the table is at its end.
         let first = if round % 3 == 0 { table.len() - 2000 } else { 0 };
         for _ in 0..random.random_range(1..4) {
             let at = random.random_range(first..table.len());
@@ -216,7 +216,7 @@ fn no_table_takes_more_than_its_limit_or_makes_its_reader_panic() {
 }
 
 #[test]
-fn a_run_goes_on_with_its_tables_and_keeps_what_cannot_be_read() {
+fn a_resumed_run_extends_its_tables_and_keeps_unreadable_ones() {
     let folder = tempfile::tempdir().unwrap();
     let at = |name: &str| folder.path().join(name);
     let run = |args: &str| deltille(folder.path(), args);
@@ -237,7 +237,7 @@ fn a_run_goes_on_with_its_tables_and_keeps_what_cannot_be_read() {
         "{first:?}"
     );
 
-    // The first is there; the second is tried again, and the third is new.
+    // The first is complete; the second is tried again, and the third is new.
     std::fs::copy(at("made/b.png"), at("shots/2.png")).unwrap();
     std::fs::copy(at("made/b.png"), at("shots/3.png")).unwrap();
     let said = run(&format!("{detect} --skip-existing")).success();
@@ -248,7 +248,7 @@ fn a_run_goes_on_with_its_tables_and_keeps_what_cannot_be_read() {
     assert!(second.contains(&first[0]));
     assert!(second.iter().all(|picture| picture.found.is_ok()));
 
-    // What another program wrote under that name stays.
+    // A file that another program wrote under that name is kept.
     std::fs::write(at("out/pictures.parquet"), b"PAR1 of somebody PAR1").unwrap();
     let said = run(detect).code(2);
     let said = String::from_utf8_lossy(&said.get_output().stderr).into_owned();

@@ -482,7 +482,7 @@ mod tests {
 
     /// A corner in motion is the mean of the corner along the motion.
     #[test]
-    fn a_box_is_a_mean_along_the_way() {
+    fn motion_is_a_mean_along_the_path() {
         const STEPS: i32 = 400;
         let still = Orthant::new(0.3);
         for i in 0..400 {

@@ -461,7 +461,7 @@ mod tests {
     }
 
     #[test]
-    fn tags_and_far_sides_are_not_clear_and_what_lies_between_is() {
+    fn only_the_area_between_tags_and_far_sides_is_clear() {
         let grid = grid(GridKind::Checker, |place| {
             DVec2::new(100.0 + 40.0 * place.x, 300.0 - 40.0 * place.y)
         });

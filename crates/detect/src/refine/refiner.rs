@@ -491,7 +491,7 @@ mod tests {
     }
 
     #[test]
-    fn corners_of_a_picture_tell_its_tone_curve() {
+    fn corners_of_an_image_determine_its_tone_curve() {
         let smooth = |y: f64| y * y * (3.0 - 2.0 * y);
         let srgb = |y: f64| Tone::Srgb.grey(y);
         let curves: [(&str, &dyn Fn(f64) -> f64); 3] =

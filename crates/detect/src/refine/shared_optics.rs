@@ -26,7 +26,7 @@ pub(crate) const REACH_PX: f64 = 7.0;
 pub(crate) const REACH_SIGMAS: f64 = 5.0;
 
 /// Fraction of its threshold that the first step, from a straight curve, must predict for a group to be estimated.
-const WORTH_A_LOOK: f64 = 0.5;
+const WORTH_ESTIMATING: f64 = 0.5;
 
 impl Optics {
     /// Estimates the optics from the corners of an image; a known tone curve is kept.
@@ -78,7 +78,7 @@ impl Optics {
             let (step, scattered) = problem.first_step(&at.optics, &reduced);
             let unused = reported(&problem, &at.optics.with(&step.vector), &scattered, false);
             let worth = match is_first {
-                true => step.supported(WORTH_A_LOOK),
+                true => step.supported(WORTH_ESTIMATING),
                 false => problem.estimate(&at.optics, step.vector, &scattered).supported(1.0),
             };
             if worth.active == used {
@@ -318,7 +318,7 @@ mod tests {
     }
 
     #[test]
-    fn ink_is_told_from_tone_and_does_not_move_corners() {
+    fn ink_is_distinguished_from_tone_and_does_not_move_corners() {
         let srgb = |light: f64| Tone::Srgb.grey(light);
         let curves: [(&str, &dyn Fn(f64) -> f64); 2] = [("line", &|light| light), ("sRGB", &srgb)];
         for (ink, (name, curve)) in

@@ -69,7 +69,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_not_positive_definite_has_no_solution() {
+    fn indefinite_matrices_have_no_solution() {
         assert_eq!(solved([[1.0, 2.0, 1.0], [2.0, 1.0, 1.0]]), None);
         assert_eq!(solved([[f64::NAN, 0.0, 1.0], [0.0, 1.0, 1.0]]), None);
     }

@@ -31,7 +31,7 @@ const DAMPING: f64 = 1e-3;
 const LEAST_DAMPING: f64 = 1e-6;
 
 /// Damping below which a small step means that the minimum is near, not that the damping shortens steps.
-const HARDLY_DAMPED: f64 = 0.1;
+const NEARLY_UNDAMPED: f64 = 0.1;
 
 /// Squared length of a step, in standard deviations of the estimate, below which the fit has converged. The next step
 /// would be smaller by orders of magnitude.
@@ -202,7 +202,7 @@ impl CornerFitter {
                 }
                 Accuracy::Rough => (is_within(&step, ROUGH), ROUGHLY_SAME_LIGHT),
             };
-            if is_last && damping.part() < HARDLY_DAMPED {
+            if is_last && damping.part() < NEARLY_UNDAMPED {
                 converged = true;
                 corner = moved;
                 if !is_toned_anew(tolerance) {
@@ -400,7 +400,7 @@ mod tests {
     }
 
     #[test]
-    fn derivatives_are_those_of_what_is_shown() {
+    fn derivatives_match_difference_quotients() {
         fn check<const K: usize>(corner: &Corner<K>, optics: &Optics) {
             let window = Window::new(8);
             let mut fitter = CornerFitter::default();
@@ -432,7 +432,7 @@ mod tests {
 
     /// From a start beside the corner, the fit of a rendered model finds every parameter and leaves no residual.
     #[test]
-    fn a_corner_is_found_in_its_own_picture() {
+    fn a_corner_is_recovered_from_its_own_image() {
         fn check<const K: usize>(truth: &Corner<K>, optics: &Optics) {
             const MIDDLE: usize = 12;
             let window = Window::new(9);
