@@ -18,7 +18,7 @@ pub struct DetectorConfig {
     /// family.
     pub max_bit_errors: Option<u32>,
     /// Whether mirrored grids are labelled too. Their labels are those of the print, and no camera that looks at the
-    /// print directly can see it so. Use them only to find out what mirrored the image.
+    /// print directly shows them. Use them only to find out what mirrored the image.
     pub allow_mirrored: bool,
     /// Method that refines the positions of the corners.
     pub refinement: Refinement,

@@ -68,7 +68,7 @@ struct Waves {
     along: f64,
     across: f64,
     both: f64,
-    /// Standard deviation of each by noise and by the positions of the corners, from waves whose halves are not alike.
+    /// Standard deviation of each by noise and by the positions of the corners, from waves whose two halves differ.
     noise: f64,
 }
 

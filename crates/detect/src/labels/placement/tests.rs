@@ -285,7 +285,7 @@ fn patches_of_dense_boards_tell_their_place() {
     let codes: BTreeMap<Tile, u64> =
         panel.tags.iter().map(|tag| (panel.tag_tile(tag), family.code(tag.id).unwrap())).collect();
     let cells = family.cells();
-    let (mut labelled, mut looked) = (0, 0);
+    let (mut labelled, mut tried) = (0, 0);
     for trial in 0..300 {
         let anchor = panel.tags[rng.random_range(0..panel.tags.len())];
         let anchor = Vertex::new(anchor.row, anchor.col);
@@ -297,7 +297,7 @@ fn patches_of_dense_boards_tell_their_place() {
         if shown.len() < 12 {
             continue;
         }
-        looked += 1;
+        tried += 1;
         let readings: Vec<Reading> = shown
             .iter()
             .map(|tile| {
@@ -327,8 +327,8 @@ fn patches_of_dense_boards_tell_their_place() {
             assert_eq!(found[0].mirrored, flopped, "trial {trial}");
         }
     }
-    println!("{labelled} of {looked} patches were labelled");
-    assert!(labelled * 10 > looked * 9, "{labelled} of {looked}");
+    println!("{labelled} of {tried} patches were labelled");
+    assert!(labelled * 10 > tried * 9, "{labelled} of {tried}");
 }
 
 /// Statistics of reading single tags of d36h11, 4 px per bit, under noise.
