@@ -27,7 +27,7 @@ use deltille_core::lattice::GridKind;
 use deltille_core::raster::{ImageView, Pyramid};
 use deltille_core::targets::least_untagged_corners;
 
-/// Largest blur of an untagged grid, as a fraction of the edge length. At this blur, the second wave has less than a
+/// Largest blur of an untagged grid, as a fraction of the edge length. At this blur, the next wave has less than a
 /// tenth of the amplitude of the fundamental wave. From the fundamental wave alone the model reads a blur of 0.25 of the
 /// edge, from three waves 0.155.
 const fn max_untagged_blur(kind: GridKind) -> f64 {

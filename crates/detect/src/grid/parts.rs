@@ -2,8 +2,8 @@
 //!
 //! A finger over a board leaves grids that no link joins, and single corners without a completely visible tile. The
 //! local map of a grid ([`LocalMap`]) predicts where its lattice continues behind the finger. A corner there belongs to
-//! the board if it lies at a vertex and all its edges have the predicted directions, each with its dark side on the
-//! right. A grid belongs to the same board if all its corners that are near enough do.
+//! the board if it lies at a vertex and all its edges have the predicted directions and dark sides. A grid belongs to
+//! the same board if all its corners that are near enough do.
 
 use std::collections::BTreeMap;
 

@@ -295,7 +295,7 @@ impl<const K: usize> Problem<'_, K> {
         self.members.iter().map(|member| member.corner).collect()
     }
 
-    /// Restores these corners of the members.
+    /// Resets the members to these corners.
     fn put_back(&mut self, corners: &[Corner<K>]) {
         self.members.iter_mut().zip(corners).for_each(|(member, corner)| member.corner = *corner);
     }

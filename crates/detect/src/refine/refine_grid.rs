@@ -30,7 +30,7 @@ const BLUR_CORNERS: usize = 15;
 
 /// Factor of the corners from which they are selected, all over the grid. Among four, some are clear of tags and of the
 /// border.
-const LOOKED_AT: usize = 4;
+const OVERSAMPLING: usize = 4;
 
 /// Blur that is assumed before it is estimated, px: that of a good photograph.
 const USUAL_BLUR_PX: f64 = 1.0;
@@ -111,14 +111,14 @@ impl Refiner {
             known = known.with_ink_as_known();
         }
         let all: usize = grids.iter().map(|grid| grid.corners.len()).sum();
-        let every = all.div_ceil(2 * LOOKED_AT * SAMPLES).max(1);
+        let every = all.div_ceil(2 * OVERSAMPLING * SAMPLES).max(1);
         let mut places = Vec::new();
         for (grid, blur) in grids.iter().zip(blurs) {
             let Some(blur_px) = blur.filter(|px| *px <= MAX_BLUR * self.largest_radius()) else {
                 continue;
             };
-            let looked_at = (0..grid.corners.len()).step_by(every);
-            for (i, around) in looked_at.clone().zip(surroundings_of(grid, tags, 1.0, looked_at)) {
+            let sampled = (0..grid.corners.len()).step_by(every);
+            for (i, around) in sampled.clone().zip(surroundings_of(grid, tags, 1.0, sampled)) {
                 let (order, clear_px) = (places.len(), around.clear_square_px(blur_px));
                 places.push((order, clear_px, blur_px, grid.corners[i], around));
             }
@@ -253,8 +253,8 @@ impl Refiner {
         })
     }
 
-    /// Moves corners to the crossing of the lines of their neighbours, if the model fits most others but not these, and
-    /// if the crossing is outside the range of the model. In that case, a cell of a tag was mistaken for the corner.
+    /// Moves corners at which the model fails, although it fits most others, to the crossing of the lines of their neighbours.
+    /// The crossing must be outside the range of the model: a cell of a tag was mistaken for the corner.
     /// Returns which corners were moved.
     fn put_back(&self, grid: &mut Grid, refined: &[(Refined, Option<ModelFit>)]) -> Vec<bool> {
         let judged = is_judge(refined);
@@ -316,10 +316,10 @@ impl Refiner {
         tags: &TagAreas,
     ) -> Option<f64> {
         let scale = f64::from(1u32 << level);
-        let every = grid.corners.len().div_ceil(LOOKED_AT * BLUR_CORNERS).max(1);
-        let looked_at = (0..grid.corners.len()).step_by(every);
-        let around = surroundings_of(grid, tags, scale, looked_at.clone()).into_iter();
-        let mut places: Vec<(f64, GridCorner, Surroundings)> = looked_at
+        let every = grid.corners.len().div_ceil(OVERSAMPLING * BLUR_CORNERS).max(1);
+        let sampled = (0..grid.corners.len()).step_by(every);
+        let around = surroundings_of(grid, tags, scale, sampled.clone()).into_iter();
+        let mut places: Vec<(f64, GridCorner, Surroundings)> = sampled
             .zip(around)
             .map(|(i, around)| (around.clear_square_px(USUAL_BLUR_PX), grid.corners[i], around))
             .collect();

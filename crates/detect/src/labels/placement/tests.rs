@@ -147,8 +147,8 @@ fn boards_of_the_same_ids_in_other_positions_get_no_labels() {
     assert!(contradicted > 20, "only {contradicted} boards are contradicted by other tiles");
 }
 
-/// Boards of the same ids with other rows and columns are labelled only if all of their tags and corners are in the
-/// same positions, as if the rest of the target were hidden. A single tag of 16 cells is not sufficient evidence.
+/// Boards of the same ids with other rows and columns are labelled only if all of their tags and corners are in the same
+/// positions. The rest of the target then counts as hidden. A single tag of 16 cells is not sufficient evidence.
 #[test]
 fn boards_of_other_rows_and_columns_get_no_labels() {
     let sizes = (5..12).flat_map(|rows| (6..13).map(move |cols| (rows, cols)));
