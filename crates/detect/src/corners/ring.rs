@@ -153,7 +153,7 @@ fn odd_row(
     let (responses, rest) = out.as_chunks_mut::<BLOCK>();
     for b in 0..whole {
         let pixels = block(&blocks, b);
-        if flags[b] && (threshold.odd < 0 || odd_is_no_edge(pixels, threshold)) {
+        if flags[b] && (threshold.odd < 0 || odd_is_not_edge(pixels, threshold)) {
             responses[b] = odd_block(pixels);
             states[b] = state(&responses[b], threshold.response);
         } else if states[b] != Block::Weak {
@@ -189,7 +189,7 @@ fn odd_may_reach(pixels: Pixels, threshold: Threshold) -> bool {
 
 /// Returns whether the bound passes the threshold at a pixel where no edge makes R negative.
 #[inline(always)]
-fn odd_is_no_edge(pixels: Pixels, threshold: Threshold) -> bool {
+fn odd_is_not_edge(pixels: Pixels, threshold: Threshold) -> bool {
     let mut may_reach = false;
     for i in 0..BLOCK {
         let mut odd = [0i16; 6];
@@ -242,7 +242,7 @@ fn even_row(
     let (responses, rest) = out.as_chunks_mut::<BLOCK>();
     for b in 0..whole {
         let pixels = block(&blocks, b);
-        if flags[b] && (threshold.even < 0 || even_is_no_edge(pixels, &centres[b], threshold)) {
+        if flags[b] && (threshold.even < 0 || even_is_not_edge(pixels, &centres[b], threshold)) {
             responses[b] = even_block(pixels, &centres[b]);
             states[b] = state(&responses[b], threshold.response);
         } else if states[b] != Block::Weak {
@@ -280,7 +280,7 @@ fn even_may_reach(pixels: Pixels, threshold: Threshold) -> bool {
 
 /// Returns whether the bound passes the threshold at a pixel where neither an edge nor a bar makes R negative.
 #[inline(always)]
-fn even_is_no_edge(pixels: Pixels, centres: &[i16; BLOCK], threshold: Threshold) -> bool {
+fn even_is_not_edge(pixels: Pixels, centres: &[i16; BLOCK], threshold: Threshold) -> bool {
     let mut may_reach = false;
     for i in 0..BLOCK {
         let (mut even, mut differences) = ([0i16; 6], 0i16);
@@ -291,8 +291,8 @@ fn even_is_no_edge(pixels: Pixels, centres: &[i16; BLOCK], threshold: Threshold)
         let (e14, e52) = (even[1] - even[4], even[5] - even[2]);
         let s2 = (e14 - e52).abs();
         let alpha = octagon(2 * (even[0] - even[3]) + e14 + e52, 2 * s2 - (s2 >> 2));
-        // V is at least a sixth of the square of `differences`, so R < 0 where they are 0.6124 of 12α. For 12(c − m), R < 0
-        // where it is 0.7071 of 12α.
+        // V is at least a sixth of the square of `differences`, so R < 0 where they are 0.6124 of 12α. For 12(c − m),
+        // R < 0 where it is 0.7071 of 12α.
         let sum = even[0] + even[1] + even[2] + even[3] + even[4] + even[5];
         let off = (12 * centres[i] - sum).abs();
         let is_edge = (differences > (alpha >> 1) + (alpha >> 3) + 2)

@@ -283,7 +283,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn what_grows_is_the_lattice(
+        fn grown_grids_are_the_lattice(
             holes in vec(weighted(0.15), 49), lost in vec(weighted(0.05), 100), seed in 0..1000usize,
         ) {
             let none = [false; 49];

@@ -253,8 +253,8 @@ impl Refiner {
         })
     }
 
-    /// Moves corners at which the model fails, although it fits most others, to the crossing of the lines of their neighbours.
-    /// The crossing must be outside the range of the model: a cell of a tag was mistaken for the corner.
+    /// Moves corners at which the model fails, although it fits most others, to the crossing of the lines of their
+    /// neighbours. The crossing must be outside the range of the model: a cell of a tag was mistaken for the corner.
     /// Returns which corners were moved.
     fn put_back(&self, grid: &mut Grid, refined: &[(Refined, Option<ModelFit>)]) -> Vec<bool> {
         let judged = is_judge(refined);
