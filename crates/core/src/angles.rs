@@ -1,25 +1,25 @@
-//! Functions of angles whose last digit is the same on every system, in a browser too: files must not depend on the library
-//! that a system brings along.
+//! Trigonometric functions with bit-identical results on every system, including browsers: files must not depend on
+//! the system's math library.
 
 use glam::DVec2;
 
-/// The unit vector that a turn from the x axis leads to.
+/// Returns the unit vector at an angle from the x axis.
 pub fn direction(angle_rad: f64) -> DVec2 {
     let (sin, cos) = libm::sincos(angle_rad);
     DVec2::new(cos, sin)
 }
 
-/// The tangent.
+/// Returns the tangent.
 pub fn tangent(angle_rad: f64) -> f64 {
     libm::tan(angle_rad)
 }
 
-/// The angle between two directions, from their sine and cosine times anything.
+/// Returns the angle with this sine and cosine, both scaled by any positive factor.
 pub fn angle(sin: f64, cos: f64) -> f64 {
     libm::atan2(sin, cos)
 }
 
-/// The turn from the x axis to a direction.
+/// Returns the angle from the x axis to a direction.
 pub fn turn_of(direction: DVec2) -> f64 {
     angle(direction.y, direction.x)
 }
@@ -29,7 +29,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn they_are_what_they_are_called() {
+    fn functions_match_the_standard_library() {
         for degrees in [-150f64, -30.0, 0.0, 41.8, 90.0, 180.0] {
             let at = degrees.to_radians();
             assert!(direction(at).distance(DVec2::from_angle(at)) < 1e-15);

@@ -1,6 +1,6 @@
-//! Time, which the caller brings: the core has no clock of its own.
+//! Time. The core has no clock of its own; the caller supplies one.
 
 use std::time::Duration;
 
-/// A monotonic clock: the time since a moment that stays the same, whichever it is.
+/// A monotonic clock: the time since an arbitrary fixed moment.
 pub type Clock = fn() -> Duration;

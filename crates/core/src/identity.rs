@@ -1,4 +1,4 @@
-//! The identity of a target, by which results name it.
+//! The identity of a target, which results use to name it.
 
 use std::fmt;
 use std::str::FromStr;
@@ -19,7 +19,7 @@ impl Fingerprint {
         format!("{:08x}", self.0 >> 32)
     }
 
-    /// The one with these bits.
+    /// Creates a fingerprint from its bits.
     pub fn from_bits(bits: u64) -> Self {
         Self(bits)
     }
@@ -58,11 +58,11 @@ impl From<Fingerprint> for String {
     }
 }
 
-/// Names a target wherever results refer to it, so that results of different targets cannot be mixed up unnoticed.
+/// Identifies a target in results, so that results of different targets cannot be mixed up unnoticed.
 ///
-/// Two targets with the same tags in the same tiles have the same [`labels`](Self::labels); the same
-/// [`fingerprint`](Self::fingerprint) have only those whose corners are also at the same positions. The name and the sizes are for
-/// messages, which give the first half of the fingerprint, as sheets do.
+/// Two targets with the same tags in the same tiles have the same [`labels`](Self::labels). The
+/// [`fingerprint`](Self::fingerprint) is the same only if the corners also have the same positions. The name and the
+/// sizes are for messages, which show the first half of the fingerprint, as sheets do.
 ///
 /// ```
 /// use deltille_core::targets::{BoardSpec, Target};
@@ -82,10 +82,10 @@ pub struct TargetIdentity {
     pub name: Name,
     /// Hash of panel ids, tilings, corners (mm, in the target frame) and tags.
     pub fingerprint: Fingerprint,
-    /// Fingerprint of the target as it was printed, where this one has measured corners or refined panels.
+    /// Fingerprint of the target as printed, if this one has measured corners or refined panels.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub plan: Option<Fingerprint>,
-    /// Hash of panel ids, tilings, rows and columns of corners, and tags: of all that detection can tell apart.
+    /// Hash of panel ids, tilings, rows and columns of corners, and tags: everything that detection can distinguish.
     pub labels: Fingerprint,
     /// Number of panels.
     pub panels: u32,
@@ -97,28 +97,28 @@ pub struct TargetIdentity {
 }
 
 impl TargetIdentity {
-    /// Fingerprint of the target as it was printed.
+    /// Returns the fingerprint of the target as printed.
     pub fn of_print(&self) -> Fingerprint {
         self.plan.unwrap_or(self.fingerprint)
     }
 
-    /// Whether both are the same print, whatever was measured of it.
+    /// Returns whether both are the same print, regardless of later measurements of it.
     pub fn is_same_print(&self, other: &Self) -> bool {
         self.of_print() == other.of_print()
     }
 
-    /// Whether labels cannot tell the other target from this one, although its corners were printed elsewhere.
+    /// Returns whether both targets have the same labels although their corners were printed at different positions.
     pub fn is_confusable(&self, other: &Self) -> bool {
         self.labels == other.labels && !self.is_same_print(other)
     }
 }
 
-/// Refuses to use results of two targets together where their tags are the same and the positions of their corners are not:
-/// one of the descriptions is then not that of the board.
+/// Checks that results of two targets can be used together. They cannot if the tags are the same and the corner
+/// positions differ: then one of the descriptions is wrong for the board.
 ///
 /// # Errors
-/// Which results were made with which target; `first` and `second` say what they are, such as `the camera`. The caller adds
-/// what to do.
+/// Returns an error that names both results and their targets. `first` and `second` name the results, for example
+/// `the camera`. The caller adds the advice.
 pub fn check_same_board(
     [first, second]: [&str; 2],
     [of_first, of_second]: [&[TargetIdentity]; 2],
@@ -126,16 +126,16 @@ pub fn check_same_board(
     let mut pairs = of_first.iter().flat_map(|one| of_second.iter().map(move |other| (one, other)));
     match pairs.find(|(one, other)| one.is_confusable(other)) {
         Some((one, other)) => Err(format!(
-            "{first} was made with {one}, {second} with {other}: rows, columns and tags are the same, the positions of the corners are not, so that at most one of them is the board that was photographed"
+            "{first} was made with {one}, {second} with {other}: rows, columns and tags match, but the corner positions differ, so at least one description is not that of the photographed board"
         )),
         None => Ok(()),
     }
 }
 
-/// Refuses a result of other targets than those given. A result that names no target may be of any.
+/// Checks that a result was made with one of the given targets. A result that names no target passes.
 ///
 /// # Errors
-/// Which target the result is of, and which one is given.
+/// Returns an error that names the target of the result and the given one.
 pub fn check_result_of(
     of_result: &[TargetIdentity],
     given: &[TargetIdentity],
@@ -143,13 +143,14 @@ pub fn check_result_of(
     let is_given = |one: &TargetIdentity| given.iter().any(|other| one.is_same_print(other));
     match (of_result.first(), given.first()) {
         (Some(one), Some(other)) if !of_result.iter().any(is_given) => Err(format!(
-            "it was calibrated with {one}, and the target given is {other}: give the description of that target"
+            "it was calibrated with {one}, but the given target is {other}: pass the target it was calibrated with"
         )),
         _ => Ok(()),
     }
 }
 
-/// The name, the first half of the fingerprint and the size, such as `desk (84457e08, 110 corners, edges of 20 mm)`.
+/// Writes the name, the first half of the fingerprint and the size, for example `desk (84457e08, 110 corners, edges
+/// of 20 mm)`.
 impl fmt::Display for TargetIdentity {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
         let corners = counted(self.corners as usize, "corner");
@@ -165,7 +166,7 @@ impl fmt::Display for TargetIdentity {
     }
 }
 
-/// A length to a ten-thousandth of a millimetre, as precise as a fingerprint, without trailing zeros.
+/// Formats a length to 0.0001 mm, the precision of a fingerprint, without trailing zeros.
 fn short(mm: f64) -> String {
     let text = format!("{mm:.4}");
     text.trim_end_matches('0').trim_end_matches('.').to_owned()

@@ -1,4 +1,4 @@
-//! JSON text that people can read: one record per line.
+//! Readable JSON text: one record per line.
 
 use std::io;
 
@@ -8,7 +8,7 @@ use serde_json::ser::{CompactFormatter, Formatter, PrettyFormatter};
 use crate::reading::in_words;
 use crate::words::cut;
 
-/// Serialises plain data, indented down to `depth` levels; what lies deeper stays on one line.
+/// Serialises plain data, indented down to `depth` levels; deeper values stay on one line.
 pub fn to_text<T: Serialize>(value: &T, depth: usize) -> String {
     let mut text = Vec::new();
     let layout = Layout { pretty: PrettyFormatter::new(), depth, level: 0 };
@@ -18,23 +18,23 @@ pub fn to_text<T: Serialize>(value: &T, depth: usize) -> String {
     String::from_utf8(text).expect("JSON is UTF-8")
 }
 
-/// Why a JSON text is not what it should be.
+/// Why a JSON text could not be read.
 pub enum ReadError {
     /// Not JSON, or not an object of this kind at all.
     Json(serde_json::Error),
-    /// A field is missing, unknown, or holds what it must not.
+    /// A field is missing, unknown or invalid.
     Field {
-        /// Where: `panels[2].corners`.
+        /// Path of the field, for example `panels[2].corners`.
         field: String,
-        /// What is wrong with it.
+        /// The problem with the field.
         problem: String,
     },
 }
 
-/// Parses JSON. An error names the field where the text is JSON at all.
+/// Parses JSON. The error names the field if the text is valid JSON.
 ///
 /// # Errors
-/// Where it is no JSON, or a field is missing, unknown, or holds what it must not.
+/// Returns an error if the text is not JSON, or a field is missing, unknown or invalid.
 pub fn read<T: serde::de::DeserializeOwned>(json: &str) -> Result<T, ReadError> {
     check_object(json.as_bytes()).map_err(ReadError::Json)?;
     let mut deserializer = serde_json::Deserializer::from_str(json);
@@ -51,11 +51,11 @@ pub fn read<T: serde::de::DeserializeOwned>(json: &str) -> Result<T, ReadError> 
     Ok(value)
 }
 
-/// The schema that a JSON text names, such as `deltille/target/1`, in short where it is that of nobody; `None` where it names
-/// none, an error where it is no JSON object.
+/// Reads the schema that a JSON text names, for example `deltille/target/1`, shortened if it is very long. Returns
+/// `None` if it names none.
 ///
 /// # Errors
-/// Where it is no JSON object.
+/// Returns an error if the text is not a JSON object.
 pub fn schema(text: &[u8]) -> serde_json::Result<Option<String>> {
     #[derive(Deserialize)]
     struct Head {
@@ -65,11 +65,11 @@ pub fn schema(text: &[u8]) -> serde_json::Result<Option<String>> {
     serde_json::from_slice::<Head>(text).map(|head| head.schema.map(|schema| cut(&schema).into()))
 }
 
-/// The schema that a JSON text must name, likewise. It is read before all else, so that a file of another kind or version is
-/// reported as such.
+/// Reads the schema that a JSON text must name. Callers read it first, so that a file of another kind or version is
+/// reported as one.
 ///
 /// # Errors
-/// Where it is no JSON, or names no schema.
+/// Returns an error if the text is not JSON or names no schema.
 pub fn named_schema(json: &str) -> Result<String, ReadError> {
     #[derive(Deserialize)]
     struct Head {
@@ -78,24 +78,24 @@ pub fn named_schema(json: &str) -> Result<String, ReadError> {
     read::<Head>(json).map(|head| cut(&head.schema).into())
 }
 
-/// Refuses a list, whose values would be taken for the fields in their order.
+/// Rejects a list: serde would assign its values to the fields in order.
 fn check_object(text: &[u8]) -> serde_json::Result<()> {
     match text.trim_ascii_start().first() {
-        Some(b'[') => Err(serde::de::Error::custom("a list, where an object belongs")),
+        Some(b'[') => Err(serde::de::Error::custom("expected an object, found a list")),
         _ => Ok(()),
     }
 }
 
-/// The kind of a schema, such as `deltille/target` of `deltille/target/1`.
+/// Returns the kind of a schema, for example `deltille/target` for `deltille/target/1`.
 pub fn kind(schema: &str) -> &str {
     schema.rsplit_once('/').map_or(schema, |(kind, _)| kind)
 }
 
-/// The pretty layout above `depth`, the compact one below.
+/// Pretty layout above `depth`, compact layout below it.
 struct Layout {
     pretty: PrettyFormatter<'static>,
     depth: usize,
-    /// Number of arrays and objects around the current position.
+    /// Number of arrays and objects that enclose the current position.
     level: usize,
 }
 
@@ -115,7 +115,7 @@ impl Layout {
     }
 }
 
-/// A separator inside a line is followed by a space.
+/// Writes a separator inside a line, followed by a space.
 fn comma<W: ?Sized + io::Write>(writer: &mut W, first: bool) -> io::Result<()> {
     if first { Ok(()) } else { writer.write_all(b", ") }
 }
@@ -195,9 +195,9 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_list_is_no_object() {
+    fn a_list_is_rejected() {
         let said = schema(b" [\"deltille/target/1\"]").unwrap_err();
-        assert_eq!(said.to_string(), "a list, where an object belongs");
+        assert_eq!(said.to_string(), "expected an object, found a list");
         assert_eq!(schema(b"{\"schema\": \"x/1\"}").unwrap().as_deref(), Some("x/1"));
     }
 

@@ -5,48 +5,48 @@ use std::ops::Deref;
 
 use serde::{Deserialize, Serialize};
 
-/// Longest name, characters: it is part of the label and of file names.
+/// Longest name in characters: the name is part of the label and of file names.
 const LONGEST: usize = 64;
 
-/// The name of a target or a camera, which is the stem of its files and part of labels: ASCII letters, digits, `-`, `_` and
-/// `.`, the first of them a letter, a digit or `_`, and none of the names that Windows gives to devices. So it never names
-/// another folder, and the label's font has all of it.
+/// The name of a target or camera: the stem of its files and part of labels. It consists of ASCII letters, digits,
+/// `-`, `_` and `.`; it starts with a letter, a digit or `_`; and it is not a Windows device name. So it cannot name
+/// another folder, and the label font contains all its characters.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 #[serde(try_from = "String", into = "String")]
 pub struct Name(String);
 
 impl Name {
-    /// A name of this text, if it is one.
+    /// Creates a name from a text.
     ///
     /// # Errors
-    /// What is wrong with it.
+    /// Returns an error that describes what makes the text invalid.
     pub fn new(name: &str) -> Result<Self, String> {
         if name.is_empty() || name.len() > LONGEST {
             return Err(format!("{name:?} must have 1 to {LONGEST} characters"));
         }
         if !name.chars().all(is_plain) || name.starts_with(['.', '-']) {
             return Err(format!(
-                "{name:?} may hold only ASCII letters (A-Z, a-z), digits, -, _ and ., and not start with . or -"
+                "{name:?} may contain only ASCII letters (A-Z, a-z), digits, -, _ and ., and not start with . or -"
             ));
         }
         if is_reserved(name) || name.ends_with('.') {
-            return Err(format!("{name:?} is no name of a file on every system"));
+            return Err(format!("{name:?} is not a valid file name on every system"));
         }
         Ok(Self(name.to_owned()))
     }
 
-    /// This name, if it has no dots either, as names of families have none: they stand before other endings.
+    /// Creates a name without dots. Names of families have none, because other file endings follow them.
     ///
     /// # Errors
-    /// What is wrong with it.
+    /// Returns an error that describes what makes the text invalid.
     pub fn without_dots(name: &str) -> Result<Self, String> {
         if name.contains('.') {
-            return Err(format!("{name:?} may hold only ASCII letters, digits, - and _"));
+            return Err(format!("{name:?} may contain only ASCII letters, digits, - and _"));
         }
         Self::new(name)
     }
 
-    /// The name most like a text: with `-` for what a name cannot hold.
+    /// Makes a valid name from any text; `-` replaces invalid characters.
     pub fn like(text: &str) -> Self {
         let plain = text.trim_start_matches(['.', '-', '/', '\\']).chars().take(LONGEST);
         let name: String = plain.map(|c| if is_plain(c) { c } else { '-' }).collect();
@@ -55,22 +55,22 @@ impl Name {
     }
 }
 
-/// Whether a path that a file names leads into the folder that it is looked for in, on any system.
+/// Returns whether a path from a file stays within its folder, on any system.
 pub fn is_within(path: &str) -> bool {
     let is_drive = |part: &str| part.as_bytes().get(1) == Some(&b':');
     path.split(SEPARATORS).all(|part| !matches!(part, "" | "." | "..") && !is_drive(part))
 }
 
-/// A path that leads into its folder: this one, or what it ends with.
+/// Returns a path that stays within its folder: the path itself, or its last component.
 pub fn within(path: &str) -> &str {
     let end = path.rsplit(SEPARATORS).find(|part| is_within(part));
     if is_within(path) { path } else { end.unwrap_or("picture") }
 }
 
-/// What separates folders, here or elsewhere.
+/// Path separators, here or on other systems.
 const SEPARATORS: [char; 2] = ['/', '\\'];
 
-/// Whether Windows takes a file of this name for a device.
+/// Returns whether Windows treats a file of this name as a device.
 fn is_reserved(name: &str) -> bool {
     let stem = name.split('.').next().unwrap_or_default().to_ascii_lowercase();
     let numbered = |kind| {
@@ -117,7 +117,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn paths_lead_into_their_folder() {
+    fn paths_stay_within_their_folder() {
         for path in ["a.png", "left/a.png", "12:30.png", "..a/b..c"] {
             assert_eq!(within(path), path);
         }
@@ -137,7 +137,7 @@ mod tests {
     }
 
     #[test]
-    fn names_are_stems_of_files() {
+    fn names_are_valid_file_stems() {
         for name in ["board", "2026-11-22_desk.v2", "_A"] {
             assert_eq!(&*Name::new(name).unwrap(), name);
             assert_eq!(&*Name::like(name), name);

@@ -1,8 +1,8 @@
-//! Polygons of the plane, as lists of corners without the first again.
+//! Polygons in the plane, as lists of corners; the first corner is not repeated at the end.
 
 use glam::DVec2;
 
-/// Area, positive where the corners run counterclockwise with y up.
+/// Returns the area, positive if the corners run counterclockwise with y up.
 ///
 /// ```
 /// use glam::DVec2;
@@ -15,12 +15,14 @@ pub fn area(polygon: &[DVec2]) -> f64 {
     0.5 * polygon.iter().zip(next).map(|(p, &q)| p.perp_dot(q)).sum::<f64>()
 }
 
-/// A rectangle by its left, lower, right and upper end, counterclockwise with y up from the lower left corner.
+/// Returns the rectangle with the given left, lower, right and upper ends, counterclockwise with y up from the lower
+/// left corner.
 pub fn rectangle([left, lower, right, upper]: [f64; 4]) -> [DVec2; 4] {
     [(left, lower), (right, lower), (right, upper), (left, upper)].map(DVec2::from)
 }
 
-/// The convex hull of points, counterclockwise with y up (Andrew's monotone chain); of fewer than three, these.
+/// Computes the convex hull, counterclockwise with y up (Andrew's monotone chain). Returns fewer than three points
+/// unchanged.
 pub fn hull(mut points: Vec<DVec2>) -> Vec<DVec2> {
     points.sort_by(|a, b| a.x.total_cmp(&b.x).then(a.y.total_cmp(&b.y)));
     points.dedup();
@@ -45,7 +47,7 @@ pub fn hull(mut points: Vec<DVec2>) -> Vec<DVec2> {
     [lower, upper].concat()
 }
 
-/// A convex polygon, counterclockwise with y up, whose sides are moved outwards.
+/// Moves all sides of a convex polygon outwards by `by`; corners run counterclockwise with y up.
 pub fn grown(polygon: &[DVec2], by: f64) -> Vec<DVec2> {
     let count = polygon.len();
     let outwards = |i: usize| -(polygon[(i + 1) % count] - polygon[i]).perp().normalize_or_zero();
@@ -56,8 +58,8 @@ pub fn grown(polygon: &[DVec2], by: f64) -> Vec<DVec2> {
     (0..count).map(corner).collect()
 }
 
-/// The part of a polygon where a linear function is positive (Sutherland and Hodgman 1974). Where the polygon is not
-/// convex, parts stay joined along the line, where they enclose nothing.
+/// Returns the part of a polygon where a linear function is positive (Sutherland and Hodgman 1974). Parts of a
+/// non-convex polygon stay joined along the line; the joining strip has no area.
 pub fn clip(polygon: &[DVec2], at: impl Fn(DVec2) -> f64) -> Vec<DVec2> {
     let mut kept = Vec::with_capacity(polygon.len() + 2);
     for (i, &p) in polygon.iter().enumerate() {

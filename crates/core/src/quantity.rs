@@ -1,10 +1,10 @@
-//! Numbers from files: each is of a quantity, and within its range.
+//! Numbers in files: each belongs to a quantity and lies within its range.
 //!
-//! A number that is finite may still be none: 1e308 mm overflows as soon as it is squared, a variance of
-//! 1e-308 px² as soon as it is inverted. The ranges here hold whatever is made or measured with room to
-//! spare, and no arithmetic on what lies in them leaves the finite numbers.
+//! Being finite is not enough: 1e308 mm overflows when squared, and a variance of 1e-308 px² when inverted. The
+//! ranges here cover everything that is made or measured, with room to spare. Arithmetic on values within them stays
+//! finite.
 //!
-//! Fields of files name theirs, so that a number outside it is refused with the name of the field:
+//! Fields of files name their quantity, so that a value outside the range is rejected with the name of the field:
 //!
 //! ```text
 //! #[serde(deserialize_with = "quantity::place_mm::de")]
@@ -20,15 +20,15 @@ use serde::{Deserialize, Deserializer, de::Error};
 /// The range of a quantity, both ends included.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Range {
-    /// The smallest number it may be.
+    /// Smallest allowed value.
     pub least: f64,
-    /// The largest number it may be.
+    /// Largest allowed value.
     pub most: f64,
-    /// Its unit; empty where it has none.
+    /// Unit; empty for dimensionless quantities.
     pub unit: &'static str,
 }
 
-/// A number that is not in its range.
+/// A value outside its range.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct OutOfRange {
     value: f64,
@@ -52,7 +52,7 @@ impl fmt::Display for Range {
     }
 }
 
-/// A number in few characters.
+/// A number formatted in few characters.
 struct Short(f64);
 
 impl fmt::Display for Short {
@@ -65,22 +65,22 @@ impl fmt::Display for Short {
 }
 
 impl Range {
-    /// This number, if it is in the range; one that is no number is not.
+    /// Returns the value if it is in the range; NaN is not.
     ///
     /// # Errors
-    /// The number and the range.
+    /// Returns an error with the value and the range.
     pub fn check(self, value: f64) -> Result<f64, OutOfRange> {
         let inside = (self.least..=self.most).contains(&value);
         inside.then_some(value).ok_or(OutOfRange { value, range: self })
     }
 
-    /// Reads a number of this range.
+    /// Parses a number of this range.
     ///
     /// # Errors
-    /// What is wrong with it, and the range.
+    /// Returns an error that states the range.
     pub fn parse(self, text: &str) -> Result<f64, String> {
         let value: Option<f64> = text.trim().parse().ok();
-        value.and_then(|value| self.check(value).ok()).ok_or_else(|| format!("it must be {self}"))
+        value.and_then(|value| self.check(value).ok()).ok_or_else(|| format!("must be {self}"))
     }
 
     fn deserialize<'de, D, T>(self, deserializer: D) -> Result<T, D::Error>
@@ -94,12 +94,12 @@ impl Range {
     }
 }
 
-/// A value that is made of numbers, such as a list or a vector.
+/// A value made of numbers, for example a list or a vector.
 pub trait Numbers {
-    /// Goes through them until one does not pass.
+    /// Applies `pass` to each number until one fails.
     ///
     /// # Errors
-    /// The first that does not pass.
+    /// Returns the first error of `pass`.
     fn all(&self, pass: &mut dyn FnMut(f64) -> Result<(), OutOfRange>) -> Result<(), OutOfRange>;
 }
 
@@ -163,16 +163,16 @@ macro_rules! quantities {
         pub mod $name {
             use super::{Deserialize, Deserializer, Numbers};
 
-            #[allow(dead_code, reason = "one of the two is used where the file is no JSON")]
-            /// Its range.
+            #[allow(dead_code, reason = "fields of formats other than JSON use one of the two")]
+            /// Range of the quantity.
             pub const RANGE: super::Range =
                 super::Range { least: $least, most: $most, unit: $unit };
 
-            #[allow(dead_code, reason = "one of the two is used where the file is no JSON")]
-            /// Reads a number, or lists of them, within the range.
+            #[allow(dead_code, reason = "fields of formats other than JSON use one of the two")]
+            /// Deserialises a number, or lists of numbers, within the range.
             ///
             /// # Errors
-            /// Where it is no number, or not in the range.
+            /// Returns an error if a value is not a number or not in the range.
             pub fn de<'de, D, T>(deserializer: D) -> Result<T, D::Error>
             where
                 D: Deserializer<'de>,
@@ -187,23 +187,23 @@ macro_rules! quantities {
 quantities! {
     /// A coordinate in space or on paper.
     place_mm: -1e6 to 1e6 "mm";
-    /// A length that may be nothing.
+    /// A length that may be zero.
     length_mm: 0.0 to 1e6 "mm";
     /// An edge of a tile.
     edge_mm: 1e-3 to 1e5 "mm";
-    /// A turn, of some rounds at most.
+    /// An angle of a few full rotations at most.
     angle_rad: -100.0 to 100.0 "rad";
     /// An entry of a rotation matrix.
     cosine: -1.001 to 1.001 "";
     /// An entry of the covariance of a pose, rad² to mm².
     pose_covariance: -1e12 to 1e12 "";
-    /// A variance of a pose: from a billionth of a radian or millimetre on.
+    /// A variance of a pose, at least (1e-9 rad)² or (1e-9 mm)².
     pose_variance: 1e-18 to 1e12 "";
-    /// A coordinate in an image. That of a corner may lie outside of it.
+    /// A coordinate in an image. Corners may lie outside the image.
     place_px: -1e6 to 1e6 "px";
     /// A side of an image.
     side_px: 1.0 to 50_000.0 "";
-    /// A variance of a place in an image: pictures without noise leave next to nothing.
+    /// A variance of a position in an image; it is close to zero for images without noise.
     variance_px2: 1e-20 to 1e8 "px²";
     /// A focal length.
     focal_px: 0.1 to 1e8 "px";
@@ -213,11 +213,11 @@ quantities! {
     alpha: 0.0 to 1.0 "";
     /// β of eucm.
     beta: 1e-6 to 1e6 "";
-    /// ξ of double-sphere, whose size is less than 1.
+    /// ξ of double-sphere, with |ξ| < 1.
     xi: -0.999999 to 0.999999 "";
-    /// A row or column of a lattice; both may be negative where the origin is anywhere.
+    /// A row or column of a lattice; negative where the origin is arbitrary.
     place_in_lattice: -100_000.0 to 100_000.0 "";
-    /// The columns or rows of a matrix of corners.
+    /// Number of columns or rows of a matrix of corners.
     side_of_matrix: 0.0 to 10_000.0 "";
     /// A border of a tag.
     border_bits: 0.0 to 100.0 "bit-widths";
@@ -225,25 +225,25 @@ quantities! {
     rim_mm: 1e-3 to 1e5 "mm";
     /// The width of a gap between tags, in tags.
     gap_edges: 0.01 to 1.0 "edges";
-    /// Standard deviation of the corners of a board from its description: a board that is worse is of no use.
+    /// Standard deviation of the board's corners from its description. Boards with a larger one are useless.
     board_accuracy_mm: 0.0 to 10.0 "mm";
-    /// A measured length over the stated one.
+    /// A measured length divided by the nominal one.
     print_scale: 0.5 to 2.0 "";
     /// A resolution.
     dots_per_inch: 1.0 to 1e6 "dpi";
     /// Millimetres in the unit of a mesh.
     unit_mm: 1e-6 to 1e6 "mm";
-    /// How far a point is at which projections are looked at.
+    /// Distance of a point at which the projection uncertainty is evaluated.
     distance_mm: 1.0 to 1e6 "mm";
-    /// The blur of a synthetic picture.
+    /// Blur of a synthetic image.
     blur_px: 0.0 to 100.0 "px";
-    /// A grey value, or noise, of full scale.
+    /// A grey value or noise level, relative to full scale.
     of_full_scale: 0.0 to 1.0 "of full scale";
-    /// The relative change of the light across a synthetic picture.
+    /// Relative change of the light across a synthetic image.
     light_gradient: -2.0 to 2.0 "";
-    /// Anything else that was measured.
+    /// Any other measured quantity.
     figure: -1e15 to 1e15 "";
-    /// A standard deviation of that.
+    /// Standard deviation of any other measured quantity.
     deviation: 0.0 to 1e15 "";
 }
 
@@ -258,7 +258,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_out_of_range_is_named_with_the_range() {
+    fn errors_name_the_value_and_its_range() {
         let read = |text: &str| serde_json::from_str::<File>(text);
         assert_eq!(read(r#"{"cov": [1, 2e-20]}"#).unwrap().cov, Some([1.0, 2e-20]));
         assert!(read("{}").unwrap().cov.is_none());
@@ -267,7 +267,7 @@ mod tests {
         for bad in ["nan", "inf", "-1e308", "x", ""] {
             assert_eq!(
                 place_mm::RANGE.parse(bad).unwrap_err(),
-                "it must be between -1000000 and 1000000 mm"
+                "must be between -1000000 and 1000000 mm"
             );
         }
     }

@@ -1,18 +1,18 @@
-//! What readers of JSON, YAML and TOML say of a text, in words for whoever wrote it.
+//! Readable messages for errors of JSON, YAML and TOML parsers.
 
 use std::fmt::Display;
 
 use crate::words::{cut, with_short_quotes};
 
-/// What the message of a reader says, without the names of Rust's types.
+/// Rewrites the message of a parser without names of Rust types.
 ///
 /// ```
 /// use deltille_core::reading::in_words;
 ///
 /// let said = in_words("focal_px: invalid length 0, expected a sequence of 2 f64 values at line 3 column 10");
-/// assert_eq!(said, "focal_px: there are 0 values where a list of 2 numbers belongs (line 3)");
+/// assert_eq!(said, "focal_px: expected a list of 2 numbers, found 0 values (line 3)");
 /// let said = in_words("EOF while parsing an object at line 7 column 1");
-/// assert_eq!(said, "the text ends within an object, as if it was cut off (line 7)");
+/// assert_eq!(said, "the text ends inside an object and may be truncated (line 7)");
 /// ```
 pub fn in_words(message: impl Display) -> String {
     let message = message.to_string();
@@ -31,28 +31,28 @@ pub fn in_words(message: impl Display) -> String {
     }
 }
 
-/// What is told of the rest of a message; `None` where that is not as readers put it.
+/// Rewrites the rest of a message; `None` if it does not have the parser's usual form.
 type Telling = fn(&str) -> Option<String>;
 
-/// How messages begin, and what is told of the rest.
+/// Beginnings of messages, and how the rest is rewritten.
 const KNOWN: &[(&str, Telling)] = &[
     ("EOF while parsing ", |what| {
-        Some(format!("the text ends within {what}, as if it was cut off"))
+        Some(format!("the text ends inside {what} and may be truncated"))
     }),
-    ("missing field ", |field| Some(format!("field {field} is missing"))),
-    ("duplicate field ", |field| Some(format!("field {field} is there twice"))),
+    ("missing field ", |field| Some(format!("missing field {field}"))),
+    ("duplicate field ", |field| Some(format!("field {field} appears twice"))),
     ("unknown field ", |rest| unknown("field ", rest)),
-    ("unknown variant ", |rest| unknown("", rest)),
+    ("unknown variant ", |rest| unknown("value ", rest)),
     ("invalid type: ", in_place_of),
     ("invalid value: ", in_place_of),
     ("invalid length ", |rest| {
         let (count, wanted) = rest.split_once(", expected ")?;
-        let (verb, s) = if count == "1" { ("is", "") } else { ("are", "s") };
-        Some(format!("there {verb} {count} value{s} where {} belongs", expected(wanted)))
+        let s = if count == "1" { "" } else { "s" };
+        Some(format!("expected {}, found {count} value{s}", expected(wanted)))
     }),
 ];
 
-/// The message before the place that it ends with, and the line of that.
+/// Splits the position from the end of a message; returns the message and the line number.
 fn without_place(message: &str) -> (&str, Option<&str>) {
     let parts = message.rsplit_once(" at line ").and_then(|(before, place)| {
         let (line, column) = place.split_once(" column ")?;
@@ -62,7 +62,7 @@ fn without_place(message: &str) -> (&str, Option<&str>) {
     parts.unwrap_or((message, None))
 }
 
-/// Where a message begins like this: at once, or after the field that it is about.
+/// Finds where a message starts with `start`: at the beginning, or after the name of the field.
 fn starts_at(message: &str, start: &str) -> Option<usize> {
     if message.starts_with(start) {
         return Some(0);
@@ -71,17 +71,17 @@ fn starts_at(message: &str, start: &str) -> Option<usize> {
 }
 
 fn unknown(what: &str, rest: &str) -> Option<String> {
-    // The name is the file's, and may hold anything.
+    // The name comes from the file and may contain anything.
     let (name, known) = rest.rsplit_once(", expected ").unwrap_or((rest, ""));
     let name = cut_name(name.strip_suffix(", there are no fields").unwrap_or(name));
     let known = known.strip_prefix("one of ").unwrap_or(known);
     Some(match known {
-        "" => format!("{what}{name} is not known"),
-        known => format!("{what}{name} is not known; there are {known}"),
+        "" => format!("unknown {what}{name}"),
+        known => format!("unknown {what}{name} (known: {known})"),
     })
 }
 
-/// A name between backquotes, in short.
+/// Shortens a name between backquotes.
 fn cut_name(name: &str) -> String {
     match name.strip_prefix('`').and_then(|name| name.strip_suffix('`')) {
         Some(name) => format!("`{}`", cut(name)),
@@ -91,7 +91,7 @@ fn cut_name(name: &str) -> String {
 
 fn in_place_of(rest: &str) -> Option<String> {
     let (there, wanted) = rest.rsplit_once(", expected ")?;
-    Some(format!("{} stands where {} belongs", found(there), expected(wanted)))
+    Some(format!("expected {}, found {}", expected(wanted), found(there)))
 }
 
 fn found(what: &str) -> String {
@@ -102,11 +102,11 @@ fn found(what: &str) -> String {
     match what {
         "sequence" => "a list".to_owned(),
         "map" => "an object".to_owned(),
-        "unit value" | "null" | "Option value" => "nothing".to_owned(),
+        "unit value" | "null" | "Option value" => "no value".to_owned(),
         _ => match what.strip_prefix("string ") {
             Some(text) => {
                 let inside = text.strip_prefix('"').and_then(|text| text.strip_suffix('"'));
-                format!("the text \"{}\"", cut(inside.unwrap_or(text)))
+                format!("the string \"{}\"", cut(inside.unwrap_or(text)))
             }
             None => cut(what).into_owned(),
         },
@@ -123,9 +123,9 @@ fn expected(what: &str) -> String {
     }
     let plain = match what {
         "f64" | "f32" | "float" => "a number",
-        "u8" | "u16" | "u32" | "u64" | "usize" => "a whole number, 0 or more,",
-        "i8" | "i16" | "i32" | "i64" | "isize" => "a whole number",
-        "a string" | "a borrowed string" => "a text",
+        "u8" | "u16" | "u32" | "u64" | "usize" => "a non-negative integer",
+        "i8" | "i16" | "i32" | "i64" | "isize" => "an integer",
+        "a string" | "a borrowed string" => "a string",
         "a sequence" => "a list",
         "a boolean" => "true or false",
         "a map" => "an object",
@@ -163,21 +163,21 @@ mod tests {
     }
 
     #[test]
-    fn readers_are_understood() {
+    fn parser_messages_are_rewritten() {
         for (text, told) in [
             ("", "the text is empty"),
-            ("{\"count\": 1", "the text ends within an object, as if it was cut off (line 1)"),
-            ("\n[", "the text ends within a list, as if it was cut off (line 2)"),
-            ("{\"count\": -1}", "`-1` stands where a whole number, 0 or more, belongs (line 1)"),
+            ("{\"count\": 1", "the text ends inside an object and may be truncated (line 1)"),
+            ("\n[", "the text ends inside a list and may be truncated (line 2)"),
+            ("{\"count\": -1}", "expected a non-negative integer, found `-1` (line 1)"),
             (
                 "{\"count\": \"a, b\"}",
-                "the text \"a, b\" stands where a whole number, 0 or more, belongs (line 1)",
+                "expected a non-negative integer, found the string \"a, b\" (line 1)",
             ),
-            ("{\"count\": 1, \"count\": 2}", "field `count` is there twice (line 1)"),
-            ("{\"count\": 1}", "field `place` is missing (line 1)"),
-            ("{\"a\": 1}", "field `a` is not known; there are `count`, `place`, `kind` (line 1)"),
-            ("{\"place\":\n[1]}", "there is 1 value where a list of 2 values belongs (line 2)"),
-            ("{\"kind\": \"x\"}", "`x` is not known; there are `here` or `there` (line 1)"),
+            ("{\"count\": 1, \"count\": 2}", "field `count` appears twice (line 1)"),
+            ("{\"count\": 1}", "missing field `place` (line 1)"),
+            ("{\"a\": 1}", "unknown field `a` (known: `count`, `place`, `kind`) (line 1)"),
+            ("{\"place\":\n[1]}", "expected a list of 2 values, found 1 value (line 2)"),
+            ("{\"kind\": \"x\"}", "unknown value `x` (known: `here` or `there`) (line 1)"),
             ("{\"count\": 1 x", "expected `,` or `}` (line 1)"),
         ] {
             let said = in_words(serde_json::from_str::<File>(text).unwrap_err());
@@ -186,8 +186,8 @@ mod tests {
     }
 
     #[test]
-    fn what_a_file_has_is_repeated_in_short() {
-        // Quotation marks and commas in it change nothing.
+    fn quotes_from_a_file_are_short() {
+        // Quotation marks and commas in the file do not matter.
         for word in ["x", "`, `", "\\\"a\\\", ", ", expected one of `"] {
             let long = word.repeat(3000);
             for text in [

@@ -1,13 +1,13 @@
-//! The settings that messages name, and what they are called.
+//! The settings that messages name, and their display names.
 
 use std::fmt;
 use std::sync::{PoisonError, RwLock};
 
-/// Makes the enum of names and their paths.
+/// Defines the enum of settings and their paths.
 macro_rules! settings {
     ($($name:ident = $path:literal,)*) => {
-        /// What a message tells its reader to look at or to change. It is displayed in the words of whoever reads, see
-        /// [`speak`]. Another one is a breaking change: a front end without a word for it must not compile.
+        /// A setting that a message refers to. [`speak`] sets how it is displayed. Adding a variant is a breaking
+        /// change: a front end that does not name it must not compile.
         #[derive(Clone, Copy, Debug, PartialEq, Eq)]
         pub enum Setting {
             $(
@@ -17,10 +17,10 @@ macro_rules! settings {
         }
 
         impl Setting {
-            /// All of them.
+            /// All settings.
             pub const ALL: &[Self] = &[$(Self::$name,)*];
 
-            /// A field, a choice or a function of the library, such as `BoardSpec::rows`.
+            /// Returns the path of a field, choice or function of the library, for example `BoardSpec::rows`.
             pub fn path(self) -> &'static str {
                 match self {
                     $(Self::$name => $path,)*
@@ -121,18 +121,18 @@ settings! {
     UntaggedGridSize = "UntaggedGrid::size",
 }
 
-/// What settings are called.
+/// Function that names settings in messages.
 static WORDS: RwLock<fn(Setting) -> String> = RwLock::new(in_backquotes);
 
 fn in_backquotes(setting: Setting) -> String {
     format!("`{}`", setting.path())
 }
 
-/// Says what settings are called in all messages made from now on. At first it is their path in the library, between
-/// backquotes.
+/// Sets how settings are named in all later messages. The default is the library path between backquotes.
 ///
-/// Like a panic hook it holds for the whole process, as one front end speaks to its user there: messages are made deep
-/// in the library, on any thread, and kept as text in results and files, where nobody can tell whose words they need.
+/// The choice is global to the process, like a panic hook, because a process has one front end. Messages are made
+/// deep in the library, on any thread, and stored as text in results and files, without a record of the front end
+/// they are for.
 pub fn speak(words: fn(Setting) -> String) {
     *WORDS.write().unwrap_or_else(PoisonError::into_inner) = words;
 }

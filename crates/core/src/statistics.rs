@@ -1,6 +1,7 @@
-//! Medians, quantiles, and how often chance makes a sum of squares.
+//! Medians, quantiles, and tail probabilities of sums of squares.
 
-/// The middle value, of an even number the upper of two; `None` of none. What is no number counts as large.
+/// Returns the median, the upper of the two middle values for an even count; `None` if there are no values. NaN sorts
+/// as the largest value.
 ///
 /// ```
 /// assert_eq!(deltille_core::statistics::median(vec![3.0, f64::NAN, 1.0]), Some(3.0));
@@ -10,15 +11,15 @@ pub fn median(mut values: Vec<f64>) -> Option<f64> {
     (!values.is_empty()).then(|| *values.select_nth_unstable_by(middle, f64::total_cmp).1)
 }
 
-/// The quantile of some values at `part`, from 0 to 1: the least value below which at least that part of them lies, or the
-/// greatest of all; `None` of no values. The values are sorted by it.
+/// Returns the quantile of `values` at `part`, from 0 to 1: the smallest value with at least that fraction of the
+/// values below it, or the largest value. Returns `None` for no values. Sorts the values.
 pub fn quantile(values: &mut [f64], part: f64) -> Option<f64> {
     values.sort_by(f64::total_cmp);
     let last = values.len().checked_sub(1)?;
     Some(values[((part * values.len() as f64) as usize).min(last)])
 }
 
-/// How often the sum of so many squared normal numbers of variance 1 is larger than this.
+/// Returns the upper tail probability of the χ² distribution with `freedom` degrees of freedom.
 ///
 /// ```
 /// let chance = deltille_core::statistics::chi_squared_chance(11.07, 5);
@@ -46,8 +47,7 @@ pub fn chi_squared_chance(sum: f64, freedom: usize) -> f64 {
     chance.min(1.0)
 }
 
-/// How often the ratio of two mean squares of normal numbers of one variance, of so many above and of so many below, is
-/// larger than this.
+/// Returns the upper tail probability of the F distribution with `above` and `below` degrees of freedom.
 ///
 /// ```
 /// let chance = deltille_core::statistics::f_chance(3.326, 5.0, 10.0);
@@ -74,12 +74,12 @@ fn beta_part(x: f64, a: f64, b: f64) -> f64 {
             _ => -(a + half) * (a + b + half) * x / ((a + m - 1.0) * (a + m)),
         }
     };
-    // From behind.
+    // Evaluates the fraction from its last term.
     let fraction = (1..=FRACTIONS).rev().fold(1.0, |rest, m| 1.0 + term(m) / rest);
     (front / fraction).clamp(0.0, 1.0)
 }
 
-/// Terms of a continued fraction; thousands of degrees of freedom take fewer.
+/// Terms of the continued fraction; thousands of degrees of freedom need fewer.
 const FRACTIONS: u32 = 400;
 
 #[cfg(test)]
@@ -88,9 +88,9 @@ mod tests {
 
     use super::*;
 
-    /// Values of SciPy 1.17.1, `scipy.stats.f.sf` and `chi2.sf`.
+    /// Reference values from SciPy 1.17.1, `scipy.stats.f.sf` and `chi2.sf`.
     #[test]
-    fn chances_are_those_of_tables() {
+    fn tail_probabilities_match_scipy() {
         let of_ratios = [
             (1.0, 9.0, 19.0, 4.725595768e-01),
             (6.0, 9.0, 19.0, 5.181127378e-04),

@@ -1,8 +1,8 @@
-//! Numbers in sentences, and texts of others on a terminal.
+//! Formatting of numbers in sentences, and of foreign text on a terminal.
 
 use std::borrow::Cow;
 
-/// A number of things, in the right number.
+/// Formats a count with its noun in singular or plural.
 ///
 /// ```
 /// use deltille_core::words::counted;
@@ -13,7 +13,7 @@ pub fn counted(count: usize, thing: &str) -> String {
     format!("{count} {thing}{}", if count == 1 { "" } else { "s" })
 }
 
-/// A p-value as tests give it: never rounded to zero, nor across the level of 0.01.
+/// Formats a p-value; it never rounds to zero or across the level of 0.01.
 ///
 /// ```
 /// use deltille_core::words::p_value;
@@ -29,11 +29,10 @@ pub fn p_value(probability: f64) -> String {
     }
 }
 
-/// Most characters of a text of others that a message repeats.
+/// Maximum number of characters of foreign text that a message quotes.
 pub const MOST_QUOTED: usize = 80;
 
-/// A text of others in a message: all of it, or the beginning of one that may be a whole file, in
-/// at most [`MOST_QUOTED`] characters.
+/// Shortens foreign text for a message to at most [`MOST_QUOTED`] characters. The text may be a whole file.
 ///
 /// ```
 /// use deltille_core::words::cut;
@@ -48,7 +47,7 @@ pub fn cut(text: &str) -> Cow<'_, str> {
     Cow::Owned(text.chars().take(MOST_QUOTED - 1).chain(['…']).collect())
 }
 
-/// A [`cut`] text between backquotes.
+/// Formats a [`cut`] text between backquotes.
 ///
 /// ```
 /// use deltille_core::words::quoted;
@@ -59,14 +58,14 @@ pub fn quoted(text: &str) -> String {
     format!("`{}`", cut(text))
 }
 
-/// A message in which everything between backquotes, or between quotation marks, is [`cut`].
+/// [Cuts](cut) all text between backquotes or quotation marks in a message.
 ///
 /// ```
 /// use deltille_core::words::with_short_quotes;
 ///
 /// assert_eq!(with_short_quotes("`a` and \"b\""), "`a` and \"b\"");
-/// let message = format!("family `{}` is not known", "x".repeat(5000));
-/// assert_eq!(with_short_quotes(&message).chars().count(), 80 + "family `` is not known".len());
+/// let message = format!("family `{}` is unknown", "x".repeat(5000));
+/// assert_eq!(with_short_quotes(&message).chars().count(), 80 + "family `` is unknown".len());
 /// ```
 pub fn with_short_quotes(message: &str) -> Cow<'_, str> {
     if message.char_indices().nth(MOST_QUOTED).is_none() {
@@ -84,7 +83,7 @@ pub fn with_short_quotes(message: &str) -> Cow<'_, str> {
     Cow::Owned(short + rest)
 }
 
-/// How many places two digits of a standard deviation need, and so the value that it belongs to.
+/// Returns the number of decimal places that shows two digits of a standard deviation, for it and its value.
 ///
 /// ```
 /// use deltille_core::words::places;
@@ -95,8 +94,8 @@ pub fn places(deviation: f64) -> usize {
     (1.0 - deviation.log10().floor()).clamp(0.0, 12.0) as usize
 }
 
-/// A line with words that may come from a file or its name, as it is shown: what would end the line, move the cursor,
-/// change colours or turn the direction of writing is escaped; tabs stay.
+/// Escapes a line for display that may contain words from a file or its name. Escapes characters that end the line,
+/// move the cursor, change colours or reverse the writing direction; keeps tabs.
 pub fn shown(text: &str) -> Cow<'_, str> {
     let is_harmful = |c: char| {
         let turns = matches!(c, '\u{200e}' | '\u{200f}' | '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}');
@@ -116,7 +115,7 @@ mod tests {
     use super::shown;
 
     #[test]
-    fn texts_of_others_do_nothing_to_a_terminal() {
+    fn foreign_text_cannot_control_a_terminal() {
         assert_eq!(shown("a\tb µ Ω 板"), "a\tb µ Ω 板");
         assert_eq!(shown("\u{1b}[2Jx\r\n\u{202e}"), r"\u{1b}[2Jx\r\n\u{202e}");
     }

@@ -3,22 +3,22 @@ use glam::{DVec2, DVec3};
 use super::law::{Imaged, LensLaw, Ray};
 use super::reach::{product, sign_changes, slope_times_q};
 
-/// Points nearer to the image plane than this part of their distance are not projected: beyond
-/// 89.9° from the axis perspective loses its meaning.
+/// Smallest depth of a projected point, relative to its distance. Beyond 89.9° from the axis, a perspective
+/// projection is meaningless.
 const MIN_FORWARD: f64 = 0.002;
 
-/// Steps of the radius in which the way back from the image looks for the undistorted point, in
-/// focal lengths: far less than the length over which any usable polynomial folds back.
+/// Steps of the radius in the search for the undistorted point, in focal lengths. They are far smaller than the
+/// distance over which any usable polynomial folds back.
 const RADIUS_STEP: f64 = 0.02;
 
-/// No polynomial here makes the image grow with more than the seventh power of r; where a lens does,
-/// its denominator runs to zero.
+/// Largest exponent of image growth. No polynomial here grows with more than the seventh power of r; a lens does only
+/// where its denominator approaches zero.
 const STEEPEST: f64 = 7.0;
 
-/// Newton's iterations from a start within [`RADIUS_STEP`]; five reach the last bit.
+/// Newton iterations from a start within [`RADIUS_STEP`]; five reach the last bit.
 const ITERATIONS: usize = 20;
 
-/// Perspective with radial, tangential and thin-prism distortion (Brown 1966, Conrady 1919), as in
+/// Perspective with radial, tangential and thin-prism distortion (Brown 1966, Conrady 1919), as in OpenCV:
 /// OpenCV:
 ///
 /// ```text
@@ -28,12 +28,11 @@ const ITERATIONS: usize = 20;
 ///     y' = y ρ + p1 (r² + 2y²) + 2 p2 xy + s3 r² + s4 r⁴
 /// ```
 ///
-/// Valid less than 89.9° from the axis, where ρ is positive and r ρ grows with r. Parameters in
-/// OpenCV's order: k1 k2 p1 p2 k3 k4 k5 k6 s1 s2 s3 s4.
+/// Valid less than 89.9° from the axis, if ρ is positive and r ρ increases with r. Parameters are in OpenCV's order:
+/// k1 k2 p1 p2 k3 k4 k5 k6 s1 s2 s3 s4.
 ///
-/// A denominator has more freedom than lenses need: a calibration commonly ends with a zero of it
-/// within the image, and one of the numerator so close by that they cancel but for a ring far
-/// narrower than a pixel. Only the ring is not valid.
+/// A denominator has more freedom than lenses need. A calibration often gives it a zero within the image, with a zero
+/// of the numerator so close that they cancel except in a ring far narrower than a pixel. Only the ring is invalid.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct BrownConrady {
     /// Radial coefficients k1, k2, k3 of the numerator.
@@ -46,15 +45,15 @@ pub struct BrownConrady {
     pub prism: [f64; 4],
 }
 
-/// The radial factor at r² = q.
+/// Radial factor at r² = q.
 struct Radial {
-    /// ρ.
+    /// Factor ρ.
     rho: f64,
-    /// ∂ρ/∂q.
+    /// Derivative ∂ρ/∂q.
     slope: f64,
-    /// Its denominator.
+    /// Denominator of ρ.
     below: f64,
-    /// Whether ρ is positive and r ρ grows.
+    /// Whether ρ is positive and r ρ increases.
     valid: bool,
 }
 
@@ -71,7 +70,7 @@ impl BrownConrady {
         Radial { rho, slope, below, valid: rho > 0.0 && rho + 2.0 * q * slope > 0.0 }
     }
 
-    /// x', y' and ∂(x', y')/∂(x, y).
+    /// Returns x', y' and ∂(x', y')/∂(x, y).
     fn distort(&self, DVec2 { x, y }: DVec2, radial: &Radial) -> (DVec2, [[f64; 2]; 2]) {
         let q = x * x + y * y;
         let Radial { rho, slope, .. } = *radial;
@@ -95,7 +94,7 @@ impl BrownConrady {
         (at, by_plane)
     }
 
-    /// The radius r with r ρ(r) = `distorted`, to within a step.
+    /// Returns the radius r with r ρ(r) = `distorted`, to within a step.
     fn undistorted_radius(&self, distorted: f64) -> Option<f64> {
         let farthest = 1.0 / MIN_FORWARD;
         let (mut last, mut reached, mut r) = (0.0, 0.0, 0.0);
@@ -115,7 +114,7 @@ impl BrownConrady {
         None
     }
 
-    /// Whether its domain may have gaps.
+    /// Returns whether the domain may have gaps.
     fn is_rational(&self) -> bool {
         self.denominator != [0.0; 3]
     }
@@ -204,13 +203,13 @@ impl LensLaw for BrownConrady {
         Ray::central(plane.extend(1.0)).filter(|_| valid)
     }
 
-    /// With ρ = A/B and q = r² the image grows with the power
+    /// With ρ = A/B and q = r², the image grows with the power
     ///
     /// ```text
     ///     ∂ ln(r ρ)/∂ ln r = 1 + 2 q (A'/A − B'/B)
     /// ```
     ///
-    /// of r, which is to stay between 0, where it folds, and [`STEEPEST`].
+    /// of r. It must stay between 0, where the image folds, and [`STEEPEST`].
     fn steady_radius(&self) -> Option<f64> {
         let with_one = |[a, b, c]: [f64; 3]| [1.0, a, b, c];
         let (above, below) = (with_one(self.radial), with_one(self.denominator));
@@ -230,7 +229,7 @@ impl LensLaw for BrownConrady {
     }
 }
 
-/// The solution of two linear equations.
+/// Solves two linear equations.
 pub(super) fn solve([[a, b], [c, d]]: [[f64; 2]; 2], right: DVec2) -> Option<DVec2> {
     let DVec2 { x: u, y: v } = right;
     let determinant = a * d - b * c;

@@ -12,18 +12,18 @@ use crate::quantity::{self, Range};
 ///     (x', y') = (X, Y)/h
 /// ```
 ///
-/// Valid for 0 ≤ α ≤ 1 and |ξ| < 1, where Z > −w2 d1 with w2 = (w + ξ)/√(2 w ξ + ξ² + 1) and
-/// w = α/(1 − α) up to α = ½, (1 − α)/α above.
+/// Valid for 0 ≤ α ≤ 1 and |ξ| < 1, where Z > −w2 d1 with w2 = (w + ξ)/√(2 w ξ + ξ² + 1). Here w = α/(1 − α) for α ≤
+/// ½, and (1 − α)/α otherwise.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct DoubleSphere {
-    /// Distance ξ of the centres of the two spheres, in radii.
+    /// Distance ξ between the centres of the two spheres, in radii.
     pub xi: f64,
     /// Weight α of the second projection, 0 to 1.
     pub alpha: f64,
 }
 
 impl Default for DoubleSphere {
-    /// The stereographic lens, from which fisheyes of all kinds are a small way.
+    /// Returns the stereographic lens, which is close to fisheyes of all kinds.
     fn default() -> Self {
         Self { xi: 0.0, alpha: 0.5 }
     }

@@ -1,5 +1,5 @@
-//! What the equidistant models share: an odd polynomial of the angle from the axis, and the image
-//! of a point at that angle.
+//! Functions shared by the equidistant models: an odd polynomial of the angle from the axis, and the image of a point
+//! at that angle.
 
 use std::f64::consts::PI;
 
@@ -8,14 +8,14 @@ use glam::{DVec2, DVec3};
 use super::law::Imaged;
 use super::reach::sign_changes;
 
-/// Steps of the angle in which the way back looks for a root, rad: polynomials of the few terms
-/// in use do not turn twice within it.
+/// Steps of the angle in the search for a root, rad. Polynomials with the few terms in use do not have two extrema
+/// within a step.
 const ANGLE_STEP: f64 = 0.02;
 
-/// Newton's iterations from a start within [`ANGLE_STEP`].
+/// Newton iterations from a start within [`ANGLE_STEP`].
 const ITERATIONS: usize = 8;
 
-/// r = θ (1 + k1 θ² + k2 θ⁴ + …) and ∂r/∂θ.
+/// Returns r = θ (1 + k1 θ² + k2 θ⁴ + …) and ∂r/∂θ.
 pub(super) fn radius(k: &[f64], theta: f64) -> (f64, f64) {
     let t2 = theta * theta;
     let (mut sum, mut slope) = (0.0, 0.0);
@@ -26,7 +26,7 @@ pub(super) fn radius(k: &[f64], theta: f64) -> (f64, f64) {
     (theta * (1.0 + sum), 1.0 + slope)
 }
 
-/// The least θ up to π with r(θ) = `wanted`, while the polynomial grows.
+/// Returns the smallest θ up to π with r(θ) = `wanted`, in the range where the polynomial increases.
 pub(super) fn angle(k: &[f64], wanted: f64) -> Option<f64> {
     let mut low = 0.0;
     loop {
@@ -48,32 +48,32 @@ pub(super) fn angle(k: &[f64], wanted: f64) -> Option<f64> {
     (0.0..=PI).contains(&theta).then_some(theta)
 }
 
-/// r at the least θ up to π where the polynomial stops growing.
+/// Returns r at the smallest θ up to π where the polynomial stops increasing.
 pub(super) fn steady_radius(k: &[f64]) -> Option<f64> {
-    // ∂r/∂θ as a polynomial of θ².
+    // ∂r/∂θ as a polynomial in θ².
     let mut slope = vec![1.0];
     slope.extend(k.iter().enumerate().map(|(i, k)| (2 * i + 3) as f64 * k));
     let turn = sign_changes(&slope, PI * PI).first().copied()?;
     Some(radius(k, turn.sqrt()).0)
 }
 
-/// How the angle of a point changes with its place.
+/// Angle of a point and its derivatives by position.
 pub(super) struct Angle {
     pub theta: f64,
-    /// ∂θ/∂R, with R = ‖(X, Y)‖.
+    /// Derivative ∂θ/∂R, with R = ‖(X, Y)‖.
     pub by_radius: f64,
-    /// ∂θ/∂Z.
+    /// Derivative ∂θ/∂Z.
     pub by_z: f64,
 }
 
-/// The image (u, v) = r(θ) · (X, Y)/R of a point; `None` where r does not grow with θ.
+/// Returns the image (u, v) = r(θ) · (X, Y)/R of a point; `None` if r does not increase with θ.
 pub(super) fn image(k: &[f64], point: DVec3, angle: &Angle) -> Option<Imaged> {
     let (r, slope) = radius(k, angle.theta);
     if slope <= 0.0 {
         return None;
     }
     let big_r = point.x.hypot(point.y);
-    // On the axis r/R takes its limit, which is the slope there.
+    // On the axis, r/R has a limit: the slope there.
     let (cos, sin) = direction(point);
     let across = if big_r > 0.0 { r / big_r } else { angle.by_radius };
     let along = slope * angle.by_radius;
@@ -88,7 +88,7 @@ pub(super) fn image(k: &[f64], point: DVec3, angle: &Angle) -> Option<Imaged> {
     })
 }
 
-/// cos φ and sin φ of a point's direction around the axis.
+/// Returns cos φ and sin φ of a point's direction around the axis.
 pub(super) fn direction(point: DVec3) -> (f64, f64) {
     let big_r = point.x.hypot(point.y);
     if big_r > 0.0 { (point.x / big_r, point.y / big_r) } else { (1.0, 0.0) }

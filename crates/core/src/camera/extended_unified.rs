@@ -10,17 +10,17 @@ use crate::quantity::{self, Range};
 ///     (x', y') = (X, Y)/h
 /// ```
 ///
-/// Valid for 0 ≤ α ≤ 1 and β > 0, where Z > −w d with w = α/(1 − α) up to α = ½, (1 − α)/α above.
+/// Valid for 0 ≤ α ≤ 1 and β > 0, where Z > −w d. Here w = α/(1 − α) for α ≤ ½, and (1 − α)/α otherwise.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ExtendedUnified {
     /// Weight α of the distance from the centre, 0 to 1; 0 is a pinhole camera.
     pub alpha: f64,
-    /// Form β of the surface that points are projected to; 1 is a sphere.
+    /// Shape β of the surface that points are projected onto; 1 is a sphere.
     pub beta: f64,
 }
 
 impl Default for ExtendedUnified {
-    /// The stereographic lens, from which fisheyes of all kinds are a small way.
+    /// Returns the stereographic lens, which is close to fisheyes of all kinds.
     fn default() -> Self {
         Self { alpha: 0.5, beta: 1.0 }
     }
@@ -71,12 +71,12 @@ impl LensLaw for ExtendedUnified {
     }
 }
 
-/// w: beyond it two points of a ray's line would have one image.
+/// Returns w: beyond it, two points on the line of a ray would have one image.
 pub(super) fn limit(alpha: f64) -> f64 {
     if alpha <= 0.5 { alpha / (1.0 - alpha) } else { (1.0 - alpha) / alpha }
 }
 
-/// (X, Y)/h with its derivatives, from those of h.
+/// Returns (X, Y)/h with its derivatives, from those of h.
 pub(super) fn quotient(point: DVec3, h: f64, h_point: [f64; 3]) -> Option<Imaged> {
     let at = point.truncate() / h;
     let mut by_point = [at.x, at.y].map(|v| h_point.map(|h_i| -v * h_i / h));
@@ -85,7 +85,7 @@ pub(super) fn quotient(point: DVec3, h: f64, h_point: [f64; 3]) -> Option<Imaged
     (h > 0.0).then_some(Imaged { at, by_point })
 }
 
-/// The derivatives of (X, Y)/h by a parameter, from that of h.
+/// Returns the derivatives of (X, Y)/h by a parameter, from that of h.
 pub(super) fn by_height(point: DVec3, h: f64, h_parameter: f64) -> [f64; 2] {
     [-point.x * h_parameter / (h * h), -point.y * h_parameter / (h * h)]
 }

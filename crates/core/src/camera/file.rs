@@ -1,5 +1,5 @@
-//! Camera files: the project's own YAML (or JSON), which carries every model, and those of ROS and
-//! OpenCV, which are read.
+//! Camera files: the project's own YAML (or JSON), which supports every model, and those of ROS and OpenCV, which can
+//! be read.
 //!
 //! ```
 //! let text = "
@@ -16,15 +16,19 @@
 //! # Ok::<(), deltille_core::camera::CameraFileError>(())
 //! ```
 //!
-//! `model` is the name of a [`LensKind`], `distortion` the parameters of the lens in their order. Of `pinhole` and `fisheye`
-//! what is left out at the end is zero; beside those of `spline` there is `spline` with `degree`, `columns`, `rows` and
-//! `fov_x_deg`.
+//! | `model` | `distortion` |
+//! |---|---|
+//! | `pinhole` | k1 k2 p1 p2 k3 k4 k5 k6 s1 s2 s3 s4; omitted ones at the end are zero |
+//! | `fisheye` | k1 k2 k3 k4 or more; omitted ones are zero |
+//! | `eucm` | α β |
+//! | `double-sphere` | ξ α |
+//! | `pupil` | k1 k2 k3 k4 k5 p1 p2 e1 e2 e3 |
+//! | `spline` | dx dy of each knot, row by row; `spline` has `degree`, `columns`, `rows`, `fov_x_deg` |
 //!
-//! A ROS or OpenCV file has `image_width`, `image_height`, `camera_matrix`, `distortion_model`
-//! (`plumb_bob`, `rational_polynomial`, `equidistant`; OpenCV names none) and
-//! `distortion_coefficients` instead.
+//! ROS and OpenCV files have `image_width`, `image_height`, `camera_matrix`, `distortion_model` (`plumb_bob`,
+//! `rational_polynomial`, `equidistant`; OpenCV omits it) and `distortion_coefficients` instead.
 //!
-//! Limits: the tilted sensor of OpenCV is refused unless its angles are zero.
+//! Limits: OpenCV's tilted sensor is rejected unless its angles are zero.
 
 use glam::DVec2;
 use serde::{Deserialize, Serialize};
@@ -36,31 +40,31 @@ use crate::reading::in_words;
 use super::kannala_brandt::LEAST_TERMS;
 use super::{Camera, Lens, LensKind, MAX_LENS_PARAMETERS, SplineGrid};
 
-/// Most bytes of a camera file. A hundredth of it is more than most have, and readers of YAML take time with the square
-/// of it.
+/// Maximum size of a camera file in bytes. Most have less than a hundredth of it. YAML parsers take time with the
+/// square of the size.
 const MAX_BYTES: usize = 50_000;
 
-/// Most lists and maps within each other; a camera has two.
+/// Maximum nesting of lists and maps; a camera has two levels.
 const MAX_DEPTH: usize = 16;
 
 /// What is wrong with a camera file.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum CameraFileError {
-    /// Not YAML, or not with these keys.
+    /// The text is not YAML, or does not have these keys.
     #[error("not a camera file: {0}")]
     Yaml(String),
-    /// A key holds what it must not.
+    /// The value of a key is invalid.
     #[error("key `{key}`: {problem}")]
     Key {
         /// The key.
         key: &'static str,
-        /// What is wrong.
+        /// The problem.
         problem: String,
     },
 }
 
-/// What the first line of a file ends with whose last line is [`END`].
+/// End of the first line of a file whose last line is [`END`].
 const COMPLETE: &str = "camera, ends with ...";
 
 /// The end of a YAML document.
@@ -86,14 +90,14 @@ struct Own {
     failed: Option<String>,
 }
 
-/// The content of the project's own camera file.
+/// Content of the project's own camera file.
 #[derive(Clone, Debug, PartialEq)]
 pub struct CameraFile {
     /// The camera.
     pub camera: Camera,
-    /// Identities of the targets that it was calibrated with; empty where they are not known.
+    /// Identities of the targets used for the calibration; empty if unknown.
     pub calibrated_with: Vec<TargetIdentity>,
-    /// Why the calibration failed, so that the camera is not to be used; `None` where it did not.
+    /// Why the calibration failed; the camera must then not be used. `None` if it did not fail.
     pub failed: Option<String>,
 }
 
@@ -117,12 +121,12 @@ struct Matrix {
 }
 
 impl Matrix {
-    /// What is wrong with its size, as far as that is stated.
+    /// Checks the size of the matrix, as far as it is stated.
     fn check(&self) -> Result<(), String> {
         let stated = self.rows.zip(self.cols).map(|(rows, cols)| rows.saturating_mul(cols));
         match (stated, self.data.len()) {
             (Some(stated), found) if found != stated => {
-                Err(format!("it has {found} numbers, and {stated} by its rows and cols"))
+                Err(format!("it has {found} numbers, but its rows and cols require {stated}"))
             }
             _ => Ok(()),
         }
@@ -137,31 +141,32 @@ impl Camera {
     /// Reads the camera of a camera file, see [`CameraFile::from_yaml`].
     ///
     /// # Errors
-    /// The same.
+    /// As [`CameraFile::from_yaml`].
     pub fn from_yaml(text: &str) -> Result<Camera, CameraFileError> {
         CameraFile::from_yaml(text).map(|file| file.camera)
     }
 
-    /// The text of the project's own camera file, with every digit, without the targets that it was calibrated with.
+    /// Writes the text of the project's own camera file, with all digits, without the targets used for the
+    /// calibration.
     pub fn to_yaml(&self) -> String {
         CameraFile { camera: self.clone(), calibrated_with: Vec::new(), failed: None }.to_yaml()
     }
 }
 
 impl CameraFile {
-    /// Reads the text of a camera file.
+    /// Parses the text of a camera file.
     ///
     /// # Errors
-    /// Where it is no YAML, a field is missing or out of its range, or the model is none of those here.
+    /// Returns an error if the text is not YAML, a field is missing or out of range, or the model is unknown.
     pub fn from_yaml(text: &str) -> Result<Self, CameraFileError> {
         check_size(text).map_err(CameraFileError::Yaml)?;
-        // A file cut off at the end of a line is a camera of fewer terms.
+        // Without this check, a file truncated at the end of a line would be a camera with fewer terms.
         let is_marked = text.lines().next().is_some_and(|first| first.ends_with(COMPLETE));
         if is_marked && text.lines().next_back() != Some(END) {
-            let what = format!("its last line is not `{END}`: the file was cut off");
+            let what = format!("the file is truncated: its last line is not `{END}`");
             return Err(CameraFileError::Yaml(what));
         }
-        // OpenCV writes a version directive and a tag that no other reader of YAML knows.
+        // OpenCV writes a version directive and a tag that other YAML parsers do not know.
         let foreign = text.contains("camera_matrix");
         let own = if foreign { from_foreign(text)? } else { parse(text)? };
         let Own { width, height, focal_px, centre_px, model, spline, mut distortion, .. } = own;
@@ -199,7 +204,8 @@ impl CameraFile {
             || distortion.len() < count && lens.least_coefficients().is_none()
         {
             let names = lens.names().join(" ");
-            let problem = format!("there are {} numbers, the model has {names}", distortion.len());
+            let problem =
+                format!("there are {} numbers, but the model has {names}", distortion.len());
             return Err(key("distortion", problem));
         }
         distortion.resize(count, 0.0);
@@ -212,7 +218,7 @@ impl CameraFile {
         Ok(Self { camera, calibrated_with, failed })
     }
 
-    /// The text of the file, with every digit.
+    /// Writes the text of the file, with all digits.
     pub fn to_yaml(&self) -> String {
         let Camera { width, height, focal_px, centre_px, lens } = &self.camera;
         let mut distortion = lens.parameters();
@@ -241,10 +247,10 @@ impl CameraFile {
     }
 }
 
-/// Refuses what no camera file has, and what takes a reader of YAML time with its square.
+/// Rejects content that no camera file has and that would take a YAML parser quadratic time.
 fn check_size(text: &str) -> Result<(), String> {
     if text.len() > MAX_BYTES {
-        return Err(format!("more than {MAX_BYTES} bytes, which no camera has"));
+        return Err(format!("the text has more than {MAX_BYTES} bytes"));
     }
     let mut depth = 0usize;
     for byte in text.bytes() {
@@ -254,7 +260,7 @@ fn check_size(text: &str) -> Result<(), String> {
             _ => {}
         }
         if depth > MAX_DEPTH {
-            return Err(format!("lists more than {MAX_DEPTH} deep, which no camera has"));
+            return Err(format!("lists are nested more than {MAX_DEPTH} levels deep"));
         }
     }
     Ok(())
@@ -272,10 +278,11 @@ fn from_foreign(text: &str) -> Result<Own, CameraFileError> {
     let coefficients = file.distortion_coefficients;
     coefficients.check().map_err(|problem| key("distortion_coefficients", problem))?;
     let m: [f64; 9] = file.camera_matrix.data.try_into().map_err(|data: Vec<f64>| {
-        key("camera_matrix", format!("it has {} numbers instead of 9", data.len()))
+        key("camera_matrix", format!("it has {} numbers, but needs 9", data.len()))
     })?;
     if [m[1], m[3], m[6], m[7], m[8]] != [0.0, 0.0, 0.0, 0.0, 1.0] {
-        let problem = "it is not `fx, 0, cx, 0, fy, cy, 0, 0, 1`, row by row".to_owned();
+        let problem =
+            "it is not of the form `fx, 0, cx, 0, fy, cy, 0, 0, 1`, row by row".to_owned();
         return Err(key("camera_matrix", problem));
     }
     let model = match file.distortion_model.as_deref() {
@@ -301,7 +308,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_file_that_was_cut_off_is_refused() {
+    fn truncated_files_are_rejected() {
         let text = Camera::pinhole(640, 480, 1.0).to_yaml();
         assert!(Camera::from_yaml(&text).is_ok());
         let lines: Vec<&str> = text.lines().collect();
@@ -336,7 +343,7 @@ mod tests {
     }
 
     #[test]
-    fn three_ways_to_say_the_same() {
+    fn all_formats_give_the_same_camera() {
         let own = "width: 640\nheight: 480\nfocal_px: [500, 501]\ncentre_px: [320, 240]\n\
                    distortion: [-0.1, 0.01, 0.001, 0.002, 0]\n";
         let ros = "image_width: 640\nimage_height: 480\ncamera_name: left\n\
@@ -354,7 +361,7 @@ mod tests {
         let said = Camera::from_yaml(&own.replace("500, 501", "0, 501")).unwrap_err().to_string();
         assert!(said.contains("focal_px"), "{said}");
         assert!(Camera::from_yaml(&own.replace("width", "wdith")).is_err());
-        // Transposed, skewed, scaled, and of another size.
+        // Transposed, skewed, scaled, and with a different size.
         for (from, to) in [
             ("500, 0, 320, 0, 501, 240, 0, 0, 1", "500, 0, 0, 0, 501, 0, 320, 240, 1"),
             ("500, 0, 320", "500, 5, 320"),

@@ -14,7 +14,7 @@ pub(super) const LEAST_TERMS: usize = 4;
 ///     (x', y') = r · (X, Y)/‖(X, Y)‖
 /// ```
 ///
-/// Valid up to θ = π, where r still grows with θ.
+/// Valid up to θ = π, as long as r increases with θ.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct KannalaBrandt {
     /// Coefficients k1, k2, … of θ³, θ⁵, …, at most [`MAX_LENS_PARAMETERS`](super::MAX_LENS_PARAMETERS).

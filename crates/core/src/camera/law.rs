@@ -1,4 +1,4 @@
-//! What a lens model says about itself, and what it says of points.
+//! The interface of lens models.
 
 use glam::{DVec2, DVec3};
 
@@ -7,9 +7,9 @@ use crate::quantity::Range;
 /// A half-line in the camera frame, along which a pixel looks.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Ray {
-    /// Where it starts, mm: zero unless the lens is not central.
+    /// Start point, mm: zero unless the lens is not central.
     pub origin: DVec3,
-    /// Its direction, a unit vector of the camera frame.
+    /// Direction, a unit vector of the camera frame.
     pub direction: DVec3,
 }
 
@@ -20,25 +20,25 @@ impl Ray {
     }
 }
 
-/// A point of the normalised image plane with its derivatives by the point of the camera frame:
-/// rows x', y'; columns X, Y, Z.
+/// A point of the normalised image plane with its derivatives by the point in the camera frame: rows x', y'; columns
+/// X, Y, Z.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Imaged {
-    /// The point (x', y'), without unit.
+    /// Point (x', y'), dimensionless.
     pub at: DVec2,
-    /// ∂(x', y')/∂(X, Y, Z), 1/mm; a row for each of x', y'.
+    /// Derivatives ∂(x', y')/∂(X, Y, Z), 1/mm, with one row each for x' and y'.
     pub by_point: [[f64; 3]; 2],
 }
 
-/// What each model says about itself. Parameters are in the order of their names, everywhere.
+/// Functions that each model implements. Parameters are always in the order of their names.
 pub(super) trait LensLaw {
-    /// The parameters' names, such as `k1`.
+    /// Returns the names of the parameters, for example `k1`.
     fn names(&self) -> Vec<String>;
 
-    /// Their values.
+    /// Returns the values of the parameters.
     fn parameters(&self) -> Vec<f64>;
 
-    /// Takes other values, as many as there are names.
+    /// Sets the parameters; `values` has one entry per name.
     fn set_parameters(&mut self, values: &[f64]);
 
     /// The ranges of its parameters, from the first; those without one have that of coefficients.
@@ -56,16 +56,16 @@ pub(super) trait LensLaw {
     /// `None` where the formula has no value that a search may pass through.
     fn image(&self, point: DVec3, by_parameters: &mut [[f64; 2]]) -> Option<Imaged>;
 
-    /// Whether a point that has an image lies in the domain of the model.
+    /// Returns whether a point that has an image lies in the domain of the model.
     fn covers(&self, _point: DVec3) -> bool {
         true
     }
 
-    /// The ray that is imaged at a point of the normalised plane; `None` where there is none.
+    /// Returns the ray that is imaged at a point of the normalised plane, if there is one.
     fn ray(&self, at: DVec2) -> Option<Ray>;
 
-    /// Radius on the normalised plane up to which it grows steadily with the angle, without fold or
-    /// pole; `None` where it does so as far as the model sees.
+    /// Returns the radius on the normalised plane up to which it increases steadily with the angle, without fold or
+    /// pole; `None` if it does so over the whole field of view.
     fn steady_radius(&self) -> Option<f64> {
         None
     }

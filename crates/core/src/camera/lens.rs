@@ -7,7 +7,7 @@ use super::{
 };
 use crate::quantity::Range;
 
-/// Most parameters that a lens has which all matter everywhere: of a spline only some do.
+/// Largest number of parameters of a lens whose parameters all affect every point; those of a spline act locally.
 pub const MAX_LENS_PARAMETERS: usize = 12;
 
 /// The enum of lenses, from a line for each: its type, the name of its model in camera files, what messages call it, and
@@ -104,31 +104,31 @@ impl Lens {
         self.law().least_coefficients()
     }
 
-    /// The names of its parameters, such as `k1`, in the order of [`Self::parameters`].
+    /// Returns the names of the parameters, for example `k1`, in the order of [`Self::parameters`].
     pub fn names(&self) -> Vec<String> {
         self.law().names()
     }
 
-    /// The values of its parameters, in the order of [`Self::names`].
+    /// Returns the values of the parameters, in the order of [`Self::names`].
     pub fn parameters(&self) -> Vec<f64> {
         self.law().parameters()
     }
 
-    /// The same lens with other values of its parameters; `values` are as many as it has.
+    /// Returns the lens with other parameter values; `values` has one entry per parameter.
     pub fn with_parameters(&self, values: &[f64]) -> Self {
         let mut lens = self.clone();
         lens.law_mut().set_parameters(values);
         lens
     }
 
-    /// The image of a point of the camera frame with all derivatives; `by_parameters` takes one
-    /// pair for each parameter, of a spline none: see [`Self::knots`]. `None` where the formula has no value that a search may pass through;
-    /// rational lenses have one beyond their domain too.
+    /// Returns the image of a point in the camera frame with all derivatives. `by_parameters` receives one pair per
+    /// parameter; a spline has none there, see [`Self::knots`]. Returns `None` if the formula has no value there that
+    /// an optimiser may use. Rational lenses have a value beyond their domain too.
     pub fn image(&self, point: DVec3, by_parameters: &mut [[f64; 2]]) -> Option<Imaged> {
         self.law().image(point, by_parameters)
     }
 
-    /// The knots on which the image of a point depends, of a spline; other lenses have their derivatives from
+    /// Returns the knots of a spline that affect the image of a point. Other lenses have their derivatives from
     /// [`Self::image`].
     pub fn knots(&self, point: DVec3) -> Option<Knots> {
         match self {
@@ -137,23 +137,23 @@ impl Lens {
         }
     }
 
-    /// Whether a point that has an image lies in the domain of the model.
+    /// Returns whether a point that has an image lies in the domain of the model.
     pub fn covers(&self, point: DVec3) -> bool {
         self.law().covers(point)
     }
 
-    /// The ray that is imaged at a point of the normalised plane; `None` where there is none.
+    /// Returns the ray that is imaged at a point of the normalised plane, if there is one.
     pub fn ray(&self, at: DVec2) -> Option<Ray> {
         self.law().ray(at)
     }
 
-    /// Radius on the normalised plane up to which it grows steadily with the angle, without fold or
-    /// pole; `None` where it does so as far as the model sees.
+    /// Returns the radius on the normalised plane up to which it increases steadily with the angle, without fold or
+    /// pole; `None` if it does so over the whole field of view.
     pub fn steady_radius(&self) -> Option<f64> {
         self.law().steady_radius()
     }
 
-    /// Whether it is perspective, and so sees all of the image.
+    /// Returns whether the lens is perspective, so that it covers the whole image.
     pub fn is_perspective(&self) -> bool {
         matches!(self, Self::BrownConrady(_))
     }

@@ -1,18 +1,16 @@
-//! Camera models and poses: where a point of the world appears in an image, and along which ray a
-//! pixel looks.
+//! Camera models and poses: the projection of points into an image, and the lines of sight of pixels.
 //!
-//! The camera frame is right-handed: x right, y down, z forward, the origin at the centre of
-//! projection (of a lens that is not central, where its pupil is on the axis). Pixel centres lie at
-//! integer coordinates.
+//! The camera frame is right-handed: x right, y down, z forward. Its origin is the centre of projection; for a lens
+//! that is not central, the position of its pupil for rays along the axis. Pixel centres are at integer coordinates.
 //!
-//! 1. `law` is the trait that each lens model implements, in a file of its own; `lens` is the enum of models;
+//! 1. `law` is the trait that each lens model implements; `lens` is the enum of models;
 //! 2. `pose`: a rotation and a translation;
-//! 3. `reach`: up to which angle a lens is valid;
-//! 4. `undistortion`, `rectification`: which pixel of a corrected picture is where;
+//! 3. `reach`: the largest angle at which a lens is valid;
+//! 4. `undistortion`, `rectification`: positions of the pixels of corrected images;
 //! 5. `file`: camera files.
 //!
-//! Each model has a file of its own with its formula and its derivatives; which of its
-//! parameters a calibration finds, and from where it starts, is in `deltille_calibrate::Model`.
+//! Each model has its own file with its formula and derivatives. `deltille_calibrate::Model` defines which of its
+//! parameters a calibration estimates, and their initial values.
 
 mod brown_conrady;
 mod double_sphere;
@@ -48,13 +46,13 @@ pub use spline::{Knots, Spline, SplineGrid, SplineGridError};
 pub use spline::{MOST_TOUCHED, direction as stereographic_direction};
 pub use undistortion::{Field, PixelMap, Undistortion, UndistortionError};
 
-/// The parameters that every camera has, before those of its lens.
+/// The parameters that every camera has, in front of those of its lens.
 pub const PROJECTION_PARAMETERS: [&str; 4] = ["fx", "fy", "cx", "cy"];
 
-/// Most parameters of a camera whose lens is no spline.
+/// Largest number of parameters of a camera whose lens is not a spline.
 pub const MAX_PARAMETERS: usize = PROJECTION_PARAMETERS.len() + MAX_LENS_PARAMETERS;
 
-/// A camera: image size, focal lengths, principal point, and the law of its lens.
+/// A camera: image size, focal lengths, principal point, and lens.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Camera {
     /// Image width, px.
@@ -65,35 +63,34 @@ pub struct Camera {
     pub focal_px: DVec2,
     /// Principal point cx, cy, px; the centre of the upper left pixel is (0, 0).
     pub centre_px: DVec2,
-    /// Distortion: how directions become points of the normalised image plane.
+    /// Lens distortion: the projection of directions onto the normalised image plane.
     pub lens: Lens,
 }
 
-/// A pixel position with all its derivatives: rows are the pixel's x, y.
+/// A pixel position with all its derivatives; rows are x and y of the pixel.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Projection {
     /// Position in the image, px.
     pub pixel: DVec2,
     /// Derivatives by the coordinates X, Y, Z of the point in the camera frame, px/mm.
     pub by_point: [[f64; 3]; 2],
-    /// Derivatives of x and y by each parameter, in the order of [`Camera::parameter_names`]; entries beyond the
-    /// parameters that the camera has are not filled. Of a spline only the first four are there: see
-    /// [`Self::by_parameter`].
+    /// Derivatives of x and y by each parameter, in the order of [`Camera::parameter_names`]. Entries beyond the
+    /// number of parameters are not filled. For a spline, only the first four are: see [`Self::by_parameter`].
     pub by_parameters: [[f64; 2]; MAX_PARAMETERS],
-    /// The knots of a spline that it depends on.
+    /// Knots of a spline that affect the position.
     pub knots: Option<Knots>,
-    /// Focal lengths, px: by how much the pixel moves with the image.
+    /// Focal lengths, px: derivatives of the pixel by the normalised image.
     focal_px: DVec2,
 }
 
 impl Projection {
-    /// By how much a coordinate of the pixel moves with that of the image.
+    /// Returns the derivative of a pixel coordinate by the same coordinate of the normalised image.
     #[doc(hidden)]
     pub fn by_image(&self, coordinate: usize) -> f64 {
         self.focal_px[coordinate]
     }
 
-    /// Derivatives of x and y by a parameter of the camera, whatever its lens.
+    /// Returns the derivatives of x and y by a parameter of the camera, for any lens.
     pub fn by_parameter(&self, index: usize) -> [f64; 2] {
         let of_lens = index.checked_sub(PROJECTION_PARAMETERS.len());
         match (self.knots, of_lens) {
@@ -110,14 +107,14 @@ impl Projection {
 }
 
 impl Camera {
-    /// An ideal pinhole camera with the principal point in the middle and a horizontal field of
-    /// view of `hfov_rad`.
+    /// Creates an ideal pinhole camera with the principal point in the centre and a horizontal field of view of
+    /// `hfov_rad`.
     pub fn pinhole(width: u32, height: u32, hfov_rad: f64) -> Self {
         let focal = f64::from(width) / 2.0 / (hfov_rad / 2.0).tan();
         Self::centred(width, height, focal, Lens::BrownConrady(BrownConrady::default()))
     }
 
-    /// A camera with square pixels and the principal point in the middle.
+    /// Creates a camera with square pixels and the principal point in the centre.
     pub fn centred(width: u32, height: u32, focal_px: f64, lens: Lens) -> Self {
         Self {
             width,
@@ -128,13 +125,13 @@ impl Camera {
         }
     }
 
-    /// The names of all parameters: fx, fy, cx, cy, then those of the lens.
+    /// Returns the names of all parameters: fx, fy, cx, cy, then those of the lens.
     pub fn parameter_names(&self) -> Vec<String> {
         let projection = PROJECTION_PARAMETERS.map(str::to_owned).into_iter();
         projection.chain(self.lens.names()).collect()
     }
 
-    /// The values of all parameters, in the order of [`Self::parameter_names`].
+    /// Returns the values of all parameters, in the order of [`Self::parameter_names`].
     pub fn parameters(&self) -> Vec<f64> {
         let (focal, centre) = (self.focal_px, self.centre_px);
         let mut values = vec![focal.x, focal.y, centre.x, centre.y];
@@ -142,7 +139,7 @@ impl Camera {
         values
     }
 
-    /// The same camera with other values of its parameters; `values` are as many as it has.
+    /// Returns the camera with other parameter values; `values` has one entry per parameter.
     pub fn with_parameters(&self, values: &[f64]) -> Self {
         Self {
             width: self.width,
@@ -153,15 +150,15 @@ impl Camera {
         }
     }
 
-    /// Pixel position of a point of the camera frame; `None` where the model does not reach.
-    /// The position may lie outside the image.
+    /// Projects a point of the camera frame to a pixel position, which may lie outside the image. Returns `None`
+    /// outside the domain of the model.
     ///
     /// ```
     /// use deltille_core::camera::Camera;
     /// use glam::{DVec2, DVec3};
     ///
     /// let camera = Camera::pinhole(640, 480, std::f64::consts::FRAC_PI_2);
-    /// // Half a field of 90° to the right is the middle of the right edge of the image.
+    /// Half of a field of view of 90° to the right is the middle of the right image edge.
     /// let pixel = camera.project(DVec3::new(200.0, 0.0, 200.0)).unwrap();
     /// assert!(pixel.abs_diff_eq(DVec2::new(639.5, 239.5), 1e-9));
     /// let ray = camera.unproject(pixel).unwrap();
@@ -172,8 +169,8 @@ impl Camera {
         self.lens.covers(point).then_some(projection.pixel)
     }
 
-    /// Pixel position with the derivatives by the point and by every parameter. Unlike
-    /// [`Self::project`] it passes the gaps in the domain of a rational lens, as a search must.
+    /// Projects a point with the derivatives by the point and by every parameter. Unlike [`Self::project`], it
+    /// ignores gaps in the domain of a rational lens, because an optimiser must cross them.
     pub fn project_with_derivatives(&self, point: DVec3) -> Option<Projection> {
         let focal = self.focal_px;
         let mut by_parameters = [[0.0; 2]; MAX_PARAMETERS];
@@ -189,12 +186,12 @@ impl Camera {
         pixel.is_finite().then_some(found)
     }
 
-    /// The ray along which a pixel looks; `None` where the model does not reach.
+    /// Returns the line of sight of a pixel; `None` outside the domain of the model.
     pub fn unproject(&self, pixel: DVec2) -> Option<Ray> {
         self.lens.ray((pixel - self.centre_px) / self.focal_px)
     }
 
-    /// Whether a pixel position lies in the image, `margin` pixels inside its border.
+    /// Returns whether a pixel position lies in the image, at least `margin` pixels inside its border.
     pub fn sees(&self, DVec2 { x, y }: DVec2, margin: f64) -> bool {
         let low = margin - 0.5;
         x >= low

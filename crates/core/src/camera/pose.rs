@@ -1,7 +1,7 @@
 use glam::{DMat3, DQuat, DVec3};
 
-/// A rigid motion `y = R·x + t` between two frames, named after both, as in
-/// `camera_from_target`. Translations in millimetres.
+/// A rigid motion `y = R·x + t` between two frames, named after both, for example `camera_from_target`. Translations
+/// are in millimetres.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Pose {
     /// The rotation R, a unit quaternion.
@@ -11,21 +11,21 @@ pub struct Pose {
 }
 
 impl Pose {
-    /// The motion that leaves every point where it is.
+    /// The identity motion.
     pub const IDENTITY: Pose = Pose { rotation: DQuat::IDENTITY, translation: DVec3::ZERO };
 
-    /// The point R·x + t of the second frame, mm, for a point x of the first.
+    /// Maps a point x of the first frame to R·x + t in the second frame, mm.
     pub fn apply(&self, point: DVec3) -> DVec3 {
         self.rotation * point + self.translation
     }
 
-    /// The inverse motion: `target_from_camera` of `camera_from_target`.
+    /// Returns the inverse motion, for example `target_from_camera` for `camera_from_target`.
     pub fn inverse(&self) -> Self {
         let rotation = self.rotation.conjugate();
         Self { rotation, translation: -(rotation * self.translation) }
     }
 
-    /// The composition of this motion after `first`: `a_from_c` of `a_from_b` and `b_from_c`.
+    /// Returns the composition of this motion after `first`, for example `a_from_c` for `a_from_b` and `b_from_c`.
     ///
     /// ```
     /// use deltille_core::camera::Pose;
@@ -33,8 +33,8 @@ impl Pose {
     ///
     /// let camera_from_target = Pose::looking_at(DVec3::new(0.0, 0.0, 500.0), DVec3::ZERO, DVec3::Y);
     /// let target_from_camera = camera_from_target.inverse();
-    /// let [turn, step] = target_from_camera.after(&camera_from_target).off(&Pose::IDENTITY);
-    /// assert!(turn.length() < 1e-12 && step.length() < 1e-9);
+    /// let [rotation, shift] = target_from_camera.after(&camera_from_target).off(&Pose::IDENTITY);
+    /// assert!(rotation.length() < 1e-12 && shift.length() < 1e-9);
     /// assert_eq!(camera_from_target.apply(DVec3::ZERO).z, 500.0);
     /// ```
     pub fn after(&self, first: &Pose) -> Self {
@@ -44,17 +44,17 @@ impl Pose {
         }
     }
 
-    /// How far this pose is from another between the same frames: the turn exp(ω) after the other's
-    /// rotation, rad, at most half a turn, and the move τ, mm.
+    /// Returns the difference of this pose from another one between the same frames: the rotation exp(ω) after the
+    /// other's rotation, rad, at most 180°, and the translation τ, mm.
     pub fn off(&self, other: &Pose) -> [DVec3; 2] {
         let turn = self.rotation * other.rotation.conjugate();
-        // A quaternion and its negative are the same turn; one of them goes the long way round.
+        // A quaternion and its negative are the same rotation; one of them represents an angle above 180°.
         let turn = if turn.w < 0.0 { -turn } else { turn };
         [turn.to_scaled_axis(), self.translation - other.translation]
     }
 
-    /// [`Self::looking_at`] with what is usually up: z, or y where the camera looks along z. `None` where `up` is
-    /// parallel to the line of sight, or there is none.
+    /// Like [`Self::looking_at`], with a default for up: z, or y if the camera looks along z. Returns `None` if `up`
+    /// is parallel to the line of sight, or `eye` and `centre` coincide.
     pub fn viewing(eye: DVec3, centre: DVec3, up: Option<DVec3>) -> Option<Self> {
         let sight = (centre - eye).normalize_or_zero();
         let upright = if sight.cross(DVec3::Z).length() < 1e-6 { DVec3::Y } else { DVec3::Z };
@@ -63,8 +63,8 @@ impl Pose {
         is_clear.then(|| Self::looking_at(eye, centre, up))
     }
 
-    /// The camera_from_target pose of a camera that stands at `eye`, looks at `centre`, and has
-    /// `up` upwards in its image; `up` must not be parallel to the line of sight.
+    /// Returns the pose camera_from_target of a camera at `eye` that looks at `centre`, with `up` upwards in its
+    /// image. `up` must not be parallel to the line of sight.
     pub fn looking_at(eye: DVec3, centre: DVec3, up: DVec3) -> Self {
         let forward = (centre - eye).normalize();
         let right = forward.cross(up).normalize();
@@ -74,10 +74,11 @@ impl Pose {
     }
 }
 
-/// How far the rotation of a pose may be from orthonormal: what six written digits leave.
+/// Tolerance for the orthonormality of a rotation: the rounding of six written digits.
 const ROTATION_SLACK: f64 = 1e-5;
 
-/// Whether a matrix, row by row, is a rotation: orthonormal and not a mirror image, up to what written digits leave.
+/// Returns whether a row-major matrix is a rotation: orthonormal and not a reflection, up to rounding of written
+/// digits.
 pub fn is_rotation(rows: &[f64; 9]) -> bool {
     let matrix = DMat3::from_cols_array(rows);
     let off = matrix * matrix.transpose() - DMat3::IDENTITY;
@@ -90,7 +91,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_camera_sees_what_it_looks_at_in_the_middle_and_up_is_up() {
+    fn looking_at_centres_the_point_and_keeps_up() {
         let eye = DVec3::new(100.0, -50.0, 400.0);
         let centre = DVec3::new(30.0, 20.0, 0.0);
         let pose = Pose::looking_at(eye, centre, DVec3::Y);
@@ -101,7 +102,7 @@ mod tests {
         let back = pose.inverse().after(&pose);
         assert!((back.apply(centre) - centre).length() < 1e-9);
         let twice = Pose { rotation: -pose.rotation, ..pose };
-        assert!(twice.off(&pose)[0].length() < 1e-9, "one turn in two ways");
+        assert!(twice.off(&pose)[0].length() < 1e-9, "one rotation in two forms");
         assert!((pose.inverse().apply(DVec3::ZERO) - eye).length() < 1e-9);
     }
 }

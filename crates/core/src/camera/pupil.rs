@@ -6,15 +6,15 @@ use super::brown_conrady::solve;
 use super::equidistant::{self, Angle};
 use super::law::{Imaged, LensLaw, Ray};
 
-/// Newton's iterations for the angle and for the tangential terms; from starts that are off by the
-/// small parts that pupil and tilt have, five reach the last bit.
+/// Newton iterations for the angle and for the tangential terms. The start differs only by the small effects of pupil
+/// and tilt; five iterations reach the last bit.
 const ITERATIONS: usize = 30;
 
-/// Newton's steps end below this, rad: what rounding leaves of an angle.
+/// Convergence threshold of Newton steps, rad: the rounding error of an angle.
 const CONVERGED_RAD: f64 = 1e-14;
 
-/// A fisheye whose entrance pupil moves along the axis with the angle of the ray, so that rays do
-/// not meet in one point:
+/// A fisheye lens whose entrance pupil moves along the axis with the angle of the ray, so that rays do not meet in
+/// one point:
 ///
 /// ```text
 ///     E(θ) = e1 θ² + e2 θ⁴ + e3 θ⁶                          mm along the axis
@@ -24,8 +24,8 @@ const CONVERGED_RAD: f64 = 1e-14;
 ///     y' = v + p1 (r² + 2v²) + 2 p2 uv
 /// ```
 ///
-/// Valid up to θ = π, where r grows with θ and the ray through a point is the only one near.
-/// Parameters in the order k1 … k5, p1, p2, e1, e2, e3.
+/// Valid up to θ = π, as long as r increases with θ and no other ray near by passes through the point. Parameters are
+/// in the order k1 … k5, p1, p2, e1, e2, e3.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Pupil {
     /// Coefficients k1 … k5 of the polynomial in θ.
@@ -37,14 +37,14 @@ pub struct Pupil {
 }
 
 impl Pupil {
-    /// E and ∂E/∂θ, mm.
+    /// Returns E and ∂E/∂θ, mm.
     fn shift(&self, theta: f64) -> (f64, f64) {
         let [e1, e2, e3] = self.shift_mm;
         let t2 = theta * theta;
         (t2 * (e1 + t2 * (e2 + t2 * e3)), theta * (2.0 * e1 + t2 * (4.0 * e2 + t2 * 6.0 * e3)))
     }
 
-    /// The angle of the ray through a point. With g = R cos θ − (Z − E) sin θ, ∂θ/∂a = −g_a / g_θ.
+    /// Returns the angle of the ray through a point. With g = R cos θ − (Z − E) sin θ, ∂θ/∂a = −g_a / g_θ.
     fn angle(&self, point: DVec3) -> Option<(Angle, f64)> {
         let radius = point.x.hypot(point.y);
         let mut theta = radius.atan2(point.z);
@@ -53,7 +53,7 @@ impl Pupil {
             let (shift, shift_slope) = self.shift(theta);
             let g = radius * cos - (point.z - shift) * sin;
             let g_theta = -radius * sin - (point.z - shift) * cos + shift_slope * sin;
-            // Where the slope is not negative several rays pass the point.
+            // If the slope is not negative, several rays pass through the point.
             if g_theta >= 0.0 {
                 return None;
             }
@@ -67,7 +67,7 @@ impl Pupil {
         None
     }
 
-    /// x', y' and ∂(x', y')/∂(u, v).
+    /// Returns x', y' and ∂(x', y')/∂(u, v).
     fn tilt(&self, DVec2 { x: u, y: v }: DVec2) -> (DVec2, [[f64; 2]; 2]) {
         let [p1, p2] = self.tangential;
         let r2 = u * u + v * v;

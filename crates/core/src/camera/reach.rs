@@ -1,22 +1,21 @@
-//! How far from the axis a lens is what its formula promises: up to the radius at which its curve
-//! turns back (a fold) or runs away (a pole).
+//! The valid range of a lens: the distance from the axis up to which its curve has no fold (reversal) or pole
+//! (divergence).
 
 use glam::DVec2;
 
 use super::Camera;
 
-/// Halvings of an interval; they reach the last bit.
+/// Number of bisections of an interval; they reach the last bit.
 const HALVINGS: usize = 100;
 
 impl Camera {
-    /// Radius from the principal point, px, up to which the image grows steadily with the angle;
-    /// `None` where it does so as far as the model sees. Tangential terms, which move it by little,
-    /// are left out.
+    /// Returns the radius from the principal point, px, up to which the image grows steadily with the angle; `None`
+    /// if it does so over the whole field of view. Ignores tangential terms, which change the radius only slightly.
     ///
     /// ```
     /// use deltille_core::camera::{BrownConrady, Camera, Lens};
     ///
-    /// // r (1 − r²/3) turns back at r = 1, where it is 2/3.
+    /// r (1 − r²/3) folds back at r = 1, where its value is 2/3.
     /// let lens = BrownConrady { radial: [-1.0 / 3.0, 0.0, 0.0], ..BrownConrady::default() };
     /// let camera = Camera::centred(1600, 1200, 900.0, Lens::BrownConrady(lens));
     /// assert!((camera.steady_px().unwrap() - 600.0).abs() < 1e-6);
@@ -25,30 +24,30 @@ impl Camera {
         self.lens.steady_radius().map(|radius| radius * self.focal_px.min_element())
     }
 
-    /// Distance of a pixel position from the principal point, px.
+    /// Returns the distance of a pixel position from the principal point, px.
     pub fn radius_px(&self, pixel: DVec2) -> f64 {
         let from_centre = pixel - self.centre_px;
         from_centre.x.hypot(from_centre.y)
     }
 
-    /// Distance of the image's farthest corner from the principal point, px.
+    /// Returns the distance of the farthest image corner from the principal point, px.
     pub fn farthest_px(&self) -> f64 {
         self.corners_px().map(|corner| self.radius_px(corner)).into_iter().fold(0.0, f64::max)
     }
 
-    /// The centres of the four corner pixels of the image, px.
+    /// Returns the centres of the four corner pixels of the image, px.
     pub fn corners_px(&self) -> [DVec2; 4] {
         let [right, low] = [self.width, self.height].map(|side| f64::from(side) - 0.5);
         [[-0.5, -0.5], [right, -0.5], [-0.5, low], [right, low]].map(DVec2::from)
     }
 }
 
-/// c₀ + c₁ q + c₂ q² + …
+/// Evaluates c₀ + c₁ q + c₂ q² + …
 pub(super) fn value(polynomial: &[f64], q: f64) -> f64 {
     polynomial.iter().rev().fold(0.0, |sum, c| sum * q + c)
 }
 
-/// The product of two polynomials.
+/// Returns the product of two polynomials.
 pub(super) fn product(a: &[f64], b: &[f64]) -> Vec<f64> {
     let mut product = vec![0.0; a.len() + b.len() - 1];
     for (i, a) in a.iter().enumerate() {
@@ -59,13 +58,13 @@ pub(super) fn product(a: &[f64], b: &[f64]) -> Vec<f64> {
     product
 }
 
-/// q times the derivative of a polynomial.
+/// Returns q times the derivative of a polynomial.
 pub(super) fn slope_times_q(polynomial: &[f64]) -> Vec<f64> {
     polynomial.iter().enumerate().map(|(power, c)| power as f64 * c).collect()
 }
 
-/// The places between 0 and `end` where a polynomial changes its sign, in their order: between two of
-/// its extrema, which are those places of the derivative, there is at most one.
+/// Returns the positions between 0 and `end` where a polynomial changes its sign, in order. Between two of its
+/// extrema, which are the sign changes of the derivative, there is at most one.
 pub(super) fn sign_changes(polynomial: &[f64], end: f64) -> Vec<f64> {
     if polynomial.len() < 2 {
         return Vec::new();
@@ -111,11 +110,11 @@ mod tests {
     }
 
     #[test]
-    fn folds_and_narrow_poles_are_found_and_harmless_lenses_left_alone() {
+    fn folds_and_narrow_poles_are_found() {
         let lens = |radial, denominator| {
             Lens::BrownConrady(BrownConrady { radial, denominator, ..BrownConrady::default() })
         };
-        // A pole at r² = 0.25 with a zero of the numerator beside it, on either side.
+        // A pole at r² = 0.25 with a zero of the numerator next to it, on either side.
         for zero in [0.25 + 1e-7, 0.25 - 1e-7] {
             let found = steady(lens([-1.0 / zero, 0.0, 0.0], [-4.0, 0.0, 0.0])).unwrap();
             assert!((found - 500.0).abs() < 2.0, "{found}");
@@ -123,7 +122,7 @@ mod tests {
         assert_eq!(steady(lens([-0.1, 0.02, 0.0], [0.0; 3])), None);
         assert_eq!(steady(lens([0.3, 0.1, 0.2], [0.0; 3])), None);
         assert_eq!(steady(lens([0.4, 0.1, 0.0], [0.7, 0.05, 0.0])), None);
-        // r = θ (1 − θ²/3) turns back at 1 rad.
+        // r = θ (1 − θ²/3) folds back at 1 rad.
         let fisheye = |k: f64| Lens::KannalaBrandt(KannalaBrandt { k: vec![k, 0.0, 0.0, 0.0] });
         assert!((steady(fisheye(-1.0 / 3.0)).unwrap() - 2000.0 / 3.0).abs() < 1e-6);
         assert_eq!(steady(fisheye(-0.02)), None);

@@ -1,56 +1,56 @@
-//! Two cameras of a rig seen as if they stood side by side, with parallel axes: a point then lies in the same row of both
-//! pictures, or in the same column where one camera is above the other. Both pictures are as upright as that of the first
-//! camera, also where the second is mounted upside down or on its side.
+//! Rectification of two cameras of a rig to side-by-side views with parallel axes. A point then has the same row in
+//! both images, or the same column if one camera is above the other. Both images have the orientation of the first
+//! camera, even if the second one is mounted upside down or on its side.
 
 use glam::{DMat3, DMat4, DQuat, DVec3};
 
 use super::undistortion::{Field, Undistortion, UndistortionError};
 use super::{Camera, Pose};
 
-/// Two cameras whose baseline is within this angle of their axes, rad, see no common picture from the side.
+/// Smallest angle between the baseline and the axes, rad. Below it, there is no common side-by-side view.
 const LEAST_ANGLE_RAD: f64 = 0.1;
 
-/// Why two cameras cannot be rectified. Messages say what to do about it.
+/// Why two cameras cannot be rectified. Messages contain the remedy.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum RectificationError {
-    /// No baseline.
-    #[error("both cameras are at the same place")]
+    /// The cameras have no baseline.
+    #[error("both cameras are at the same position")]
     SamePlace,
-    /// Cameras that look apart.
+    /// The cameras look in too different directions.
     #[error(
-        "the cameras look in directions {degrees:.0}° apart: no common view shows what both see"
+        "the viewing directions differ by {degrees:.0}°, so no rectified view covers what both cameras see"
     )]
     Apart {
-        /// The angle between their axes, degrees.
+        /// Angle between the axes, degrees.
         degrees: f64,
     },
-    /// Cameras one behind the other.
-    #[error("one camera is in front of the other: no common view has them side by side")]
+    /// The cameras are one behind the other.
+    #[error("one camera is in front of the other, so no rectified view has them side by side")]
     Behind,
-    /// A view that does not exist.
+    /// The view does not exist.
     #[error(transparent)]
     View(#[from] UndistortionError),
 }
 
-/// Rectified views of two cameras, which have the same size and focal length.
+/// Rectified views of two cameras, with the same size and focal length.
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct Rectification {
     /// The view of each camera.
     pub views: [Undistortion; 2],
-    /// Where the second view's camera is in the frame of the first one's, mm: along x, or along y where one is above the
-    /// other.
+    /// Position of the second view's camera in the frame of the first view, mm: along x, or along y if one camera is
+    /// above the other.
     pub baseline_mm: DVec3,
 }
 
 impl Rectification {
-    /// Rectifies two cameras with their poses, camera_from_rig. Of the four rotations about the optical axis that put rows
-    /// or columns along the baseline, both views have the one that is nearest to the first camera's orientation. OpenCV's
-    /// `stereoRectify` takes the middle between both cameras, and rotates both pictures by 90° where one is upside down.
+    /// Rectifies two cameras with poses camera_from_rig. Four rotations about the optical axis align rows or columns
+    /// with the baseline. Both views use the one closest to the first camera's orientation. OpenCV's `stereoRectify`
+    /// uses the middle between both cameras, and rotates both images by 90° if one is upside down.
     ///
     /// # Errors
-    /// Where they have no common view from the side.
+    /// Returns an error if there is no common side-by-side view.
     ///
     /// ```
     /// use deltille_core::camera::{Camera, Field, Pose, Rectification};
@@ -76,7 +76,7 @@ impl Rectification {
         };
         let [first, second] = cameras;
         let focal = [view(first, field)?, view(second, field)?].map(|v| v.view().focal_px.x);
-        // What is inside for both, or all of both.
+        // The part inside both images, or all of both.
         let common = match field {
             Field::Whole => focal[0].min(focal[1]),
             _ => focal[0].max(focal[1]),
@@ -85,8 +85,9 @@ impl Rectification {
         Ok(Self { views: [view(first, field)?, view(second, field)?], baseline_mm })
     }
 
-    /// The matrix Q that takes x, y, disparity, 1 (px, in the first view; the disparity is x of the first view less x of the
-    /// second, or y) to a point in the frame of the first view: X, Y, Z, W, to be divided by W, mm.
+    /// Returns the matrix Q that maps x, y, disparity, 1 (px, in the first view) to a point X, Y, Z, W in the frame
+    /// of the first view, to be divided by W, mm. The disparity is x of the first view minus x of the second, or the
+    /// same with y.
     pub fn depth_matrix(&self) -> DMat4 {
         let view = self.views[0].view();
         let (focal, centre) = (view.focal_px.x, view.centre_px);
@@ -101,8 +102,8 @@ impl Rectification {
     }
 }
 
-/// The frame in which both cameras look forward side by side, from that of the rig, and where the second is in it from
-/// the first.
+/// Returns the frame in which both cameras look forward side by side, from that of the rig, and the position of the
+/// second camera relative to the first.
 fn common_frame(poses: [Pose; 2]) -> Result<(DQuat, DVec3), RectificationError> {
     let [from, to] = poses.map(|pose| pose.inverse().translation);
     let rotations = poses.map(|pose| pose.rotation.conjugate());
@@ -112,7 +113,7 @@ fn common_frame(poses: [Pose; 2]) -> Result<(DQuat, DVec3), RectificationError> 
         return Err(RectificationError::Apart { degrees: angle.to_degrees() });
     }
     let forward = (axes[0] + axes[1]).normalize();
-    // The first camera, turned on the shortest way to look there. The second may be upside down.
+    // The first camera, rotated by the smallest angle to look forward. The second may be upside down.
     let upright = DQuat::from_rotation_arc(axes[0], forward) * rotations[0];
     let [right, down] = [DVec3::X, DVec3::Y].map(|axis| upright * axis);
     let apart = to - from;
@@ -134,7 +135,7 @@ fn common_frame(poses: [Pose; 2]) -> Result<(DQuat, DVec3), RectificationError> 
     let rig_from_view = DMat3::from_cols(x, y, z);
     let view_from_rig = DQuat::from_mat3(&rig_from_view).normalize().conjugate();
     let mut baseline_mm = view_from_rig * apart;
-    // Exactly along an axis.
+    // Aligned exactly with an axis.
     baseline_mm = if is_beside { baseline_mm * DVec3::X } else { baseline_mm * DVec3::Y };
     Ok((view_from_rig, baseline_mm))
 }
@@ -147,7 +148,7 @@ mod tests {
     use crate::camera::{BrownConrady, KannalaBrandt, Lens};
 
     #[test]
-    fn a_point_is_in_one_row_of_both_views_and_its_depth_follows() {
+    fn points_share_a_row_and_the_depth_is_correct() {
         let radial = [-0.2, 0.05, 0.0];
         let lens = Lens::BrownConrady(BrownConrady { radial, ..BrownConrady::default() });
         let left = Camera::centred(800, 600, 600.0, lens);
@@ -172,7 +173,7 @@ mod tests {
                 assert!(same.abs() < 1e-9, "{off}");
                 let found = made.depth_matrix() * DVec4::new(a.x, a.y, disparity, 1.0);
                 assert!((found.truncate() / found.w).distance(first) < 1e-6);
-                // The maps lead to where the cameras themselves see the point.
+                // The maps lead to the positions where the cameras themselves see the point.
                 for (index, (camera, pose), pixel) in [(0, cameras[0], a), (1, cameras[1], b)] {
                     let seen = camera.project(pose.apply(point)).unwrap();
                     assert!(made.views[index].place(pixel).unwrap().distance(seen) < 1e-6);
@@ -199,7 +200,7 @@ mod tests {
     }
 
     #[test]
-    fn cameras_without_a_common_view_are_refused() {
+    fn cameras_without_a_common_view_are_rejected() {
         let camera = Camera::pinhole(640, 480, 1.0);
         let made = |rotation: DQuat, translation: DVec3| {
             let second = Pose { rotation, translation };

@@ -3,33 +3,33 @@ use serde::{Deserialize, Serialize};
 
 use super::law::{Imaged, LensLaw, Ray};
 
-/// Knots along a side at least, a patch of the cubic spline, and at most: what no calibration determines.
+/// Range of knots along a side: at least one patch of the cubic spline, and at most more than any calibration
+/// determines.
 const KNOTS: std::ops::RangeInclusive<usize> = 4..=40;
 
-/// The field of view that a grid covers, degrees; at 360° the plane has no end.
+/// Range of the field of view that a grid covers, degrees; at 360° the plane is infinite.
 const FOV_X_DEG: std::ops::RangeInclusive<u32> = 1..=350;
 
-/// Points nearer to the direction opposite of the axis than this, as a part of their distance, have no place on the plane.
+/// Relative distance from the direction opposite to the axis below which points have no position on the plane.
 const BEHIND: f64 = 1e-6;
 
-/// Newton's iterations for the way back; from a start within half a knot's distance six reach the last bit.
+/// Newton iterations of the inverse; from a start within half a knot spacing, six reach the last bit.
 const ITERATIONS: usize = 50;
 
-/// Halvings of a step that does not come nearer.
+/// Number of halvings of a step that increases the residual.
 const HALVINGS: usize = 20;
 
-/// Newton's steps end below this, without unit.
+/// Convergence threshold of Newton steps, dimensionless.
 const CONVERGED: f64 = 1e-14;
 
-/// Directions in which a fold is looked for, and steps between two knots.
+/// Number of directions in the search for a fold, and of steps per knot spacing.
 const DIRECTIONS: usize = 64;
 const STEPS_A_KNOT: f64 = 4.0;
 
-/// Knots of a spline over the stereographic plane.
+/// Grid of spline knots over the stereographic plane.
 ///
-/// They lie in the middle of the plane at equal distances h, the same along both axes, so that the spline is
-/// determined over `fov_x_deg` across: for degree 3 up to a whole distance, for degree 2 up to half of one within the
-/// outermost knots.
+/// The grid is centred on the plane with equal distances h along both axes. The spline is determined over `fov_x_deg`
+/// across: up to a whole knot spacing within the outermost knots for degree 3, half of one for degree 2.
 ///
 /// ```text
 ///     (columns − 3) h = 4 tan(fov_x/4)   degree 3        (columns − 2) h = 4 tan(fov_x/4)   degree 2
@@ -39,20 +39,20 @@ const STEPS_A_KNOT: f64 = 4.0;
 pub struct SplineGrid {
     /// Degree of the polynomials, 2 or 3.
     pub degree: usize,
-    /// Knots along x.
+    /// Number of knots along x.
     pub columns: usize,
-    /// Knots along y.
+    /// Number of knots along y.
     pub rows: usize,
-    /// The field of view along x over which the spline is determined, whole degrees.
+    /// Field of view along x over which the spline is determined, whole degrees.
     pub fov_x_deg: u32,
 }
 
-/// A grid that no spline has.
+/// An invalid grid.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("{0}")]
 pub struct SplineGridError(String);
 
-/// A lens that is anything smooth: the stereographic projection with a correction from two tensor-product B-splines.
+/// A lens of arbitrary smooth shape: the stereographic projection with a correction by two tensor-product B-splines.
 ///
 /// ```text
 ///     θ = ∠(point, axis),  u = 2 tan(θ/2) · (X, Y)/‖(X, Y)‖ = 2 (X, Y)/(‖(X, Y, Z)‖ + Z)
@@ -60,49 +60,50 @@ pub struct SplineGridError(String);
 ///     (x', y') = u + Σ B(i − a) B(j − b) d_ab                   a: column, b: row
 /// ```
 ///
-/// with B the uniform B-spline of the degree, so that a point depends on the (degree + 1)² knots around it. Beyond
-/// the grid the outermost polynomials go on, and nothing is valid; within, what keeps its sense
-/// (∂(x', y')/∂u has a positive determinant). Parameters are dx, dy of the knots, row by row.
+/// with B the uniform B-spline of the degree, so a point depends on the (degree + 1)² knots around it. Beyond the
+/// grid the outermost polynomials continue, but points there are invalid. Within the grid, points are valid where
+/// orientation is preserved (∂(x', y')/∂u has a positive determinant). Parameters are dx, dy of the knots, row by
+/// row.
 ///
-/// Formula, order of the parameters, and grid are those of mrcal's `LENSMODEL_SPLINED_STEREOGRAPHIC`
-/// (<https://mrcal.secretsauce.net/lensmodels.html>). fx, fy, cx, cy are redundant with the knots: a
-/// calibration keeps them.
+/// Formula, parameter order and grid are those of mrcal's `LENSMODEL_SPLINED_STEREOGRAPHIC`
+/// (<https://mrcal.secretsauce.net/lensmodels.html>). fx, fy, cx, cy are redundant with the knots, so a calibration
+/// keeps them fixed.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Spline {
     grid: SplineGrid,
-    /// d_ab, row by row.
+    /// Corrections d_ab, row by row.
     knots: Vec<DVec2>,
 }
 
-/// The knots on which the image of a point depends, with the part that each has in it.
+/// The knots that affect the image of a point, with their weights.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Knots {
-    /// Column and row of the first.
+    /// Column and row of the first knot.
     first: [usize; 2],
-    /// Columns of the grid.
+    /// Number of columns of the grid.
     columns: usize,
     /// Degree + 1.
     order: usize,
-    /// B along columns and rows.
+    /// Values of B along columns and rows.
     along: [[f64; MOST_ORDER]; 2],
 }
 
-/// Knots on which a point depends along one axis, at most.
+/// Largest number of knots along one axis that affect a point.
 const MOST_ORDER: usize = 4;
 
-/// Parameters on which the image of a point depends, at most.
+/// Largest number of parameters that affect the image of a point.
 #[doc(hidden)]
 pub const MOST_TOUCHED: usize = 2 * MOST_ORDER * MOST_ORDER;
 
 impl Knots {
-    /// Their indices, row by row, with their parts.
+    /// Returns the indices, row by row, with their weights.
     pub fn iter(&self) -> impl Iterator<Item = (usize, f64)> + use<> {
         let Self { first: [column, row], columns, order, along } = *self;
         let pairs = (0..order).flat_map(move |b| (0..order).map(move |a| (a, b)));
         pairs.map(move |(a, b)| ((row + b) * columns + column + a, along[0][a] * along[1][b]))
     }
 
-    /// The part of a knot; none of one that is far off.
+    /// Returns the weight of a knot; zero for distant ones.
     pub fn part(&self, knot: usize) -> f64 {
         let Self { first: [column, row], columns, order, along } = *self;
         let a = (knot % columns).wrapping_sub(column);
@@ -112,39 +113,40 @@ impl Knots {
 }
 
 impl SplineGrid {
-    /// A grid.
+    /// Creates a grid.
     ///
     /// # Errors
-    /// Where a number is out of its range.
+    /// Returns an error if a number is out of its range.
     pub fn new(
         degree: usize,
         [columns, rows]: [usize; 2],
         fov_x_deg: u32,
     ) -> Result<Self, SplineGridError> {
         let problem = match () {
-            () if !(2..=3).contains(&degree) => format!("degree {degree} is neither 2 nor 3"),
+            () if !(2..=3).contains(&degree) => format!("degree {degree} is not 2 or 3"),
             () if ![columns, rows].iter().all(|knots| KNOTS.contains(knots)) => {
                 let (least, most) = (KNOTS.start(), KNOTS.end());
-                format!("{columns} × {rows} knots are not {least} to {most} along each side")
+                format!("{columns} × {rows} knots: each side must have {least} to {most}")
             }
             () if !FOV_X_DEG.contains(&fov_x_deg) => {
                 let (least, most) = (FOV_X_DEG.start(), FOV_X_DEG.end());
-                format!("a field of view of {fov_x_deg}° is not {least}° to {most}°")
+                format!("a field of view of {fov_x_deg}° is not between {least}° and {most}°")
             }
             () => return Ok(Self { degree, columns, rows, fov_x_deg }),
         };
         Err(SplineGridError(problem))
     }
 
-    /// The same numbers if they are a grid, as read from a file.
+    /// Checks a grid read from a file.
     ///
     /// # Errors
-    /// Where a number is out of its range.
+    /// Returns an error if a number is out of its range.
     pub fn checked(self) -> Result<Self, SplineGridError> {
         Self::new(self.degree, [self.columns, self.rows], self.fov_x_deg)
     }
 
-    /// The grid of knots at most so far apart, as long as it has few enough, that is determined over |u| up to `reach`.
+    /// Returns the grid with knots at most `distance` apart, unless there would be too many, that is determined over
+    /// |u| up to `reach`.
     pub fn dense(degree: usize, distance: f64, reach: DVec2) -> Self {
         let (least, most) = (*KNOTS.start() as f64, *KNOTS.end() as f64);
         let knots = (2.0 * reach / distance).ceil() + degree as f64;
@@ -152,7 +154,7 @@ impl SplineGrid {
         Self::over(degree, knots, reach)
     }
 
-    /// The narrowest grid that is determined over |u| up to `reach`.
+    /// Returns the narrowest grid that is determined over |u| up to `reach`.
     pub fn over(degree: usize, [columns, rows]: [usize; 2], reach: DVec2) -> Self {
         let intervals = |knots: usize| (knots - degree) as f64;
         let h = (2.0 * reach.x / intervals(columns)).max(2.0 * reach.y / intervals(rows));
@@ -162,24 +164,24 @@ impl SplineGrid {
         Self { degree, columns, rows, fov_x_deg }
     }
 
-    /// How many knots it has.
+    /// Returns the number of knots.
     pub fn count(&self) -> usize {
         self.columns * self.rows
     }
 
-    /// The distance h of neighbouring knots on the plane.
+    /// Returns the distance h of neighbouring knots on the plane.
     pub fn distance(&self) -> f64 {
         4.0 * (f64::from(self.fov_x_deg).to_radians() / 4.0).tan()
             / (self.columns - self.degree) as f64
     }
 
-    /// The largest |u| along both axes where the spline is determined.
+    /// Returns the largest |u| along both axes where the spline is determined.
     pub fn reach(&self) -> DVec2 {
         let intervals = [self.columns, self.rows].map(|knots| (knots - self.degree) as f64);
         DVec2::from(intervals) * self.distance() / 2.0
     }
 
-    /// The knots of a place u, and how their parts change along u, 1/h.
+    /// Returns the knots at a point u, and the derivatives of their weights along u, 1/h.
     fn at(&self, u: DVec2) -> (Knots, [[f64; MOST_ORDER]; 2]) {
         let middle = DVec2::new((self.columns - 1) as f64, (self.rows - 1) as f64) / 2.0;
         let place = (u / self.distance() + middle).to_array();
@@ -191,22 +193,22 @@ impl SplineGrid {
     }
 }
 
-/// The B-splines that are not zero at a place.
+/// The nonzero B-splines at a point.
 struct Basis {
-    /// Index of the first.
+    /// Index of the first one.
     first: usize,
     value: [f64; MOST_ORDER],
-    /// Derivative by the place.
+    /// Derivatives by the coordinate.
     slope: [f64; MOST_ORDER],
 }
 
-/// Degree 3, t from the knot before, 0 to 1:
+/// Degree 3, with t from the previous knot, 0 to 1:
 ///
 /// ```text
 ///     (1 − t)³/6,  (3t³ − 6t² + 4)/6,  (−3t³ + 3t² + 3t + 1)/6,  t³/6
 /// ```
 ///
-/// Degree 2, t from the nearest knot, −½ to ½:
+/// Degree 2, with t from the nearest knot, −½ to ½:
 ///
 /// ```text
 ///     (½ − t)²/2,  ¾ − t²,  (½ + t)²/2
@@ -237,13 +239,13 @@ fn basis(degree: usize, place: f64, count: usize) -> Basis {
     }
 }
 
-/// The place u of a direction; `None` next to the opposite of the axis.
+/// Maps a direction to the point u; `None` close to the opposite of the axis.
 fn flattened(point: DVec3) -> Option<DVec2> {
     let (length, sum) = (point.length(), point.length() + point.z);
     (sum > BEHIND * length).then(|| 2.0 * point.truncate() / sum)
 }
 
-/// The direction of a place u.
+/// Maps a point u to its direction.
 #[doc(hidden)]
 pub fn direction(u: DVec2) -> DVec3 {
     let q = u.length_squared();
@@ -251,40 +253,40 @@ pub fn direction(u: DVec2) -> DVec3 {
 }
 
 impl Spline {
-    /// The stereographic lens, with a grid.
+    /// Creates the stereographic lens with a grid.
     pub fn new(grid: SplineGrid) -> Self {
         Self { grid, knots: vec![DVec2::ZERO; grid.count()] }
     }
 
-    /// The same with other knots, as many as it has, row by row.
+    /// Returns the lens with other knots, row by row; their number stays the same.
     #[must_use]
     pub fn with_knots(self, knots: Vec<DVec2>) -> Self {
         debug_assert_eq!(knots.len(), self.grid.count());
         Self { knots, ..self }
     }
 
-    /// Its grid.
+    /// Returns the grid.
     pub fn grid(&self) -> SplineGrid {
         self.grid
     }
 
-    /// d_ab, row by row.
+    /// Returns the corrections d_ab, row by row.
     pub fn knots(&self) -> &[DVec2] {
         &self.knots
     }
 
-    /// The knots of a place u.
+    /// Returns the knots at a point u.
     #[doc(hidden)]
     pub fn knots_at(&self, u: DVec2) -> Knots {
         self.grid.at(u).0
     }
 
-    /// The knots on which the image of a point depends.
+    /// Returns the knots that affect the image of a point.
     pub(super) fn knots_of(&self, point: DVec3) -> Option<Knots> {
         Some(self.knots_at(flattened(point)?))
     }
 
-    /// (x', y') and ∂(x', y')/∂u, by columns.
+    /// Returns (x', y') and ∂(x', y')/∂u, by columns.
     fn bent(&self, u: DVec2) -> (DVec2, DMat2) {
         let (Knots { first: [column, row], columns, order, along }, slopes) = self.grid.at(u);
         let (mut at, mut by) = (DVec2::ZERO, [DVec2::ZERO; 2]);
@@ -303,13 +305,13 @@ impl Spline {
         (u + at, DMat2::from_cols(DVec2::X + x, DVec2::Y + y))
     }
 
-    /// Whether a place is where the spline is determined and keeps its sense.
+    /// Returns whether the spline is determined at a point and preserves orientation there.
     fn is_valid(&self, u: DVec2) -> bool {
         let is_within = u.abs().cmple(self.grid.reach() * (1.0 + 1e-12)).all();
         is_within && self.bent(u).1.determinant() > 0.0
     }
 
-    /// Where the way back begins: of the middles between knots that which is imaged nearest.
+    /// Returns the start of the inverse: the midpoint between knots whose image is closest.
     fn nearest(&self, at: DVec2) -> Option<DVec2> {
         let (h, reach) = (self.grid.distance(), self.grid.reach());
         let [columns, rows] = [self.grid.columns, self.grid.rows].map(|n| n - self.grid.degree);
@@ -340,7 +342,7 @@ impl LensLaw for Spline {
         }
     }
 
-    /// Derivatives by parameters are those of [`Spline::knots_of`].
+    /// [`Spline::knots_of`] provides the derivatives by parameters.
     fn image(&self, point: DVec3, _: &mut [[f64; 2]]) -> Option<Imaged> {
         let u = flattened(point)?;
         let (at, by_u) = self.bent(u);
@@ -359,7 +361,7 @@ impl LensLaw for Spline {
         flattened(point).is_some_and(|u| self.is_valid(u))
     }
 
-    /// Newton's method from the nearest middle between knots, with steps halved until they come nearer.
+    /// Uses Newton's method from the closest midpoint between knots; halves steps until the residual decreases.
     fn ray(&self, at: DVec2) -> Option<Ray> {
         let mut u = self.nearest(at)?;
         for _ in 0..ITERATIONS {
@@ -385,7 +387,7 @@ impl LensLaw for Spline {
         (is_found && self.is_valid(u)).then(|| direction(u)).and_then(Ray::central)
     }
 
-    /// The least radius at which the spline folds, over all directions in which it is determined.
+    /// Returns the smallest radius at which the spline folds, over all directions in which it is determined.
     fn steady_radius(&self) -> Option<f64> {
         let (reach, step) = (self.grid.reach(), self.grid.distance() / STEPS_A_KNOT);
         let fold = |direction: usize| {

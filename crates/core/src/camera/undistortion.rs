@@ -1,58 +1,60 @@
-//! A pinhole view of what a camera sees, and where its pixels lie in the camera's picture.
+//! A pinhole view of a camera's image, and the positions of its pixels in that image.
 
 use glam::{DQuat, DVec2, DVec3};
 use rayon::prelude::*;
 
 use super::Camera;
 
-/// The widest pinhole view that is chosen without being asked for: half of it is 75°, where a pixel
-/// covers a fifteenth of the angle that one in the middle does.
+/// Widest pinhole view that is chosen by default. At its border, 75° from the axis, a pixel covers a fifteenth of the
+/// angle of a central one.
 const WIDEST_RAD: f64 = 150.0 / 180.0 * std::f64::consts::PI;
 
-/// No pinhole sees more than half the world, and hardly anything at its border.
+/// Widest possible pinhole view: a pinhole sees less than 180°, and resolves almost nothing at its border.
 const MOST_RAD: f64 = 179.0 / 180.0 * std::f64::consts::PI;
 
-/// Halvings of the ratio of two focal lengths.
+/// Number of bisections of the ratio of two focal lengths.
 const HALVINGS: usize = 60;
 
-/// Pixels along each side of a picture that are looked at.
+/// Number of pixels sampled along each side of an image.
 const ALONG: usize = 128;
 
-/// The view of the camera that is narrower by this factor than its widest is hardly more than a pixel.
+/// Ratio of the widest view to the narrowest, which shows little more than a pixel.
 const NARROWEST: f64 = 1e3;
 
-/// Part of the radius at which a lens turns back up to which it is taken: the angle grows with the root of what is left.
+/// Fraction of the fold radius of a lens that is used: the angle grows with the root of the rest.
 const STEADY_PART: f64 = 1.0 - 1e-6;
 
-/// How much a pinhole view shows.
+/// Field of view of a pinhole view.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Field {
-    /// As much as leaves no pixel without a place in the camera's picture.
+    /// The largest view in which every pixel has a position in the camera's image.
     Inside,
-    /// All that the camera's picture shows.
+    /// The whole image of the camera.
     Whole,
-    /// What a focal length makes of it, px.
+    /// The view with this focal length, px.
     Focal(f64),
-    /// A horizontal field of view, rad.
+    /// The view with this horizontal field of view, rad.
     Horizontal(f64),
 }
 
-/// Why there is no such view. Messages say what to do about it.
+/// Why a view does not exist. Messages contain the remedy.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum UndistortionError {
-    /// A field of view that no pinhole has.
-    #[error("a pinhole sees less than 180°, and {degrees:.1}° are asked for: ask for less")]
+    /// A pinhole cannot have this field of view.
+    #[error(
+        "a field of view of {degrees:.1}° is too wide: a pinhole view must be narrower than 180°"
+    )]
     TooWide {
-        /// What was asked for.
+        /// Requested field of view, degrees.
         degrees: f64,
     },
-    /// The camera sees nothing where the view looks.
+    /// The camera does not see the direction of the view.
     #[error("the camera sees nothing along the axis of the view")]
     Nothing,
 }
 
-/// A pinhole view of what a camera sees, of square pixels, with the principal point in the middle.
+/// A pinhole view of a camera's image, with square pixels and the principal point in the centre.
 ///
 /// ```
 /// use deltille_core::camera::{BrownConrady, Camera, Field, Lens, Undistortion};
@@ -67,23 +69,23 @@ pub enum UndistortionError {
 /// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct Undistortion {
-    /// The camera.
+    /// Camera of the image.
     camera: Camera,
-    /// The pinhole.
+    /// Pinhole camera of the view.
     view: Camera,
-    /// From the frame of the camera to that of the view.
+    /// Rotation from the frame of the camera to that of the view.
     view_from_camera: DQuat,
-    /// How far points are, mm; matters for lenses that are not central.
+    /// Distance of points, mm; it matters for lenses that are not central.
     distance_mm: f64,
-    /// Rays farther from the axis, rad, are beyond where the lens turns back.
+    /// Largest valid angle of rays from the axis, rad; the lens folds beyond it.
     steady_rad: f64,
 }
 
 impl Undistortion {
-    /// A view of a width and height, px, that looks where the camera does.
+    /// Creates a view of a width and height, px, that looks along the camera's axis.
     ///
     /// # Errors
-    /// Where no pinhole shows that.
+    /// Returns an error if no pinhole shows the field.
     pub fn new(
         camera: &Camera,
         size_px: [u32; 2],
@@ -92,10 +94,11 @@ impl Undistortion {
         Self::turned(camera, DQuat::IDENTITY, size_px, field)
     }
 
-    /// A view that looks elsewhere: `view_from_camera` takes directions of the camera frame to its own.
+    /// Creates a view in another direction: `view_from_camera` rotates directions of the camera frame to that of the
+    /// view.
     ///
     /// # Errors
-    /// Where no pinhole shows that.
+    /// Returns an error if no pinhole shows the field.
     pub fn turned(
         camera: &Camera,
         view_from_camera: DQuat,
@@ -121,31 +124,31 @@ impl Undistortion {
         Ok(widest.with_focal(focal))
     }
 
-    /// The same of points at a distance, mm, from the camera, of which only lenses that are not central see another
-    /// picture than of points far away.
+    /// Returns the view of points at a distance from the camera, mm. Only for lenses that are not central does it
+    /// differ from that of distant points.
     #[must_use]
     pub fn at_distance(self, distance_mm: f64) -> Self {
         Self { distance_mm, ..self }
     }
 
-    /// The same with another focal length, px.
+    /// Returns the view with another focal length, px.
     #[must_use]
     pub fn with_focal(self, focal_px: f64) -> Self {
         let view = Camera { focal_px: DVec2::splat(focal_px), ..self.view };
         Self { view, ..self }
     }
 
-    /// The pinhole camera of the view.
+    /// Returns the pinhole camera of the view.
     pub fn view(&self) -> &Camera {
         &self.view
     }
 
-    /// From the frame of the camera to that of the view.
+    /// Returns the rotation from the frame of the camera to that of the view.
     pub fn view_from_camera(&self) -> DQuat {
         self.view_from_camera
     }
 
-    /// Where a pixel of the view lies in the camera's picture, px; `None` where it does not.
+    /// Returns the position of a view pixel in the camera's image, px; `None` if it has none.
     pub fn place(&self, pixel: DVec2) -> Option<DVec2> {
         let flat = (pixel - self.view.centre_px) / self.view.focal_px;
         let direction = self.view_from_camera.conjugate() * flat.extend(1.0).normalize();
@@ -153,11 +156,11 @@ impl Undistortion {
             return None;
         }
         let place = self.camera.project(self.distance_mm * direction)?;
-        // Between the centres of pixels all is known, beyond the last nothing.
+        // Values are known between pixel centres, but not beyond the outermost ones.
         self.camera.sees(place, 0.5 - 1e-9).then_some(place)
     }
 
-    /// The places of all pixels.
+    /// Returns the positions of all pixels.
     pub fn map(&self) -> PixelMap {
         let [width, height] = [self.view.width, self.view.height].map(|side| side as usize);
         let place = |at: usize| {
@@ -167,7 +170,8 @@ impl Undistortion {
         PixelMap { width, height, places: (0..width * height).into_par_iter().map(place).collect() }
     }
 
-    /// The shortest focal length with which all pixels have a place, no shorter than that of the widest view.
+    /// Returns the shortest focal length at which all pixels have a position, but not shorter than that of the widest
+    /// view.
     fn focal_inside(&self) -> Result<f64, UndistortionError> {
         let is_inside = |focal: f64| {
             let view = self.clone().with_focal(focal);
@@ -188,7 +192,8 @@ impl Undistortion {
         Ok(high)
     }
 
-    /// The longest focal length with which all that the camera sees is shown, no shorter than that of the widest view.
+    /// Returns the longest focal length that shows everything the camera sees, but not shorter than that of the
+    /// widest view.
     fn focal_whole(&self) -> Result<f64, UndistortionError> {
         let half = [self.view.width, self.view.height].map(|side| (f64::from(side) - 1.0) / 2.0);
         let seen = self.camera.border(ALONG).filter_map(|pixel| {
@@ -206,7 +211,7 @@ impl Undistortion {
         let needed = needed.fold(f64::INFINITY, f64::min);
         match needed.is_finite() {
             true => Ok(needed.max(widest)),
-            // The lens ends within the picture: as wide as it is good.
+            // The valid range of the lens ends within the image; the view extends to its limit.
             false => {
                 let half_rad = self.steady_rad.min(WIDEST_RAD / 2.0);
                 Ok((half[0].min(half[1]) / half_rad.tan()).max(widest))
@@ -215,7 +220,7 @@ impl Undistortion {
     }
 }
 
-/// The angle from the axis at which a lens turns back, rad; π where it does not.
+/// Returns the angle from the axis at which a lens folds back, rad; π if it does not.
 fn steady_rad(camera: &Camera) -> f64 {
     let Some(radius) = camera.lens.steady_radius() else { return std::f64::consts::PI };
     let around = (0..32).map(|i| DVec2::from_angle(f64::from(i) / 32.0 * std::f64::consts::TAU));
@@ -225,7 +230,7 @@ fn steady_rad(camera: &Camera) -> f64 {
 }
 
 impl Camera {
-    /// So many steps of pixels along each border of the image.
+    /// Returns pixel positions along the image border, `along` steps per side.
     #[doc(hidden)]
     pub fn border(&self, along: usize) -> impl Iterator<Item = DVec2> {
         let last = DVec2::new(f64::from(self.width) - 1.0, f64::from(self.height) - 1.0);
@@ -237,7 +242,7 @@ impl Camera {
     }
 }
 
-/// Where the pixels of a picture lie in another one.
+/// Positions of the pixels of an image in another image.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PixelMap {
     width: usize,
@@ -246,28 +251,29 @@ pub struct PixelMap {
 }
 
 impl PixelMap {
-    /// Width of the new picture, px.
+    /// Returns the width of the new image, px.
     pub fn width(&self) -> usize {
         self.width
     }
 
-    /// Height of the new picture, px.
+    /// Returns the height of the new image, px.
     pub fn height(&self) -> usize {
         self.height
     }
 
-    /// The place x, y, px, of each pixel, row by row; NaN where it has none.
+    /// Returns the position x, y, px, of each pixel, row by row; NaN if it has none.
     pub fn places(&self) -> &[[f32; 2]] {
         &self.places
     }
 
-    /// The part of the pixels that have a place.
+    /// Returns the fraction of pixels that have a position.
     pub fn covered(&self) -> f64 {
         let count = self.places.iter().filter(|place| !place[0].is_nan()).count();
         count as f64 / self.places.len().max(1) as f64
     }
 
-    /// The largest rectangle, x, y, width, height in px, in which all pixels have a place; empty where none has.
+    /// Returns the largest rectangle, x, y, width, height in px, in which all pixels have a position; empty if there
+    /// is none.
     pub fn whole_rectangle(&self) -> [usize; 4] {
         let mut best = [0; 4];
         let mut heights = vec![0; self.width + 1];
@@ -275,7 +281,7 @@ impl PixelMap {
             for (height, place) in heights.iter_mut().zip(places) {
                 *height = if place[0].is_nan() { 0 } else { *height + 1 };
             }
-            // The largest rectangle below a skyline, by the columns that still may grow.
+            // Finds the largest rectangle below a skyline from the columns that can still grow.
             let mut open: Vec<(usize, usize)> = Vec::new();
             for (column, &height) in heights.iter().enumerate() {
                 let mut first = column;
@@ -310,7 +316,7 @@ mod tests {
     }
 
     #[test]
-    fn pixels_look_along_the_rays_of_their_places() {
+    fn pixels_match_the_rays_of_their_positions() {
         for lens in lenses() {
             let camera = Camera::centred(800, 600, 420.0, lens);
             let turn = DQuat::from_euler(glam::EulerRot::XYZ, 0.1, -0.2, 0.05);
@@ -334,13 +340,13 @@ mod tests {
     }
 
     #[test]
-    fn inside_has_every_pixel_and_whole_the_border_of_the_picture() {
+    fn inside_is_complete_and_whole_shows_the_border() {
         for lens in lenses() {
             let camera = Camera::centred(800, 600, 420.0, lens);
             let inside = Undistortion::new(&camera, [800, 600], Field::Inside).unwrap();
             let map = inside.map();
             assert_eq!(map.whole_rectangle(), [0, 0, 800, 600]);
-            // A little wider is too wide.
+            // A slightly wider view is too wide.
             let wider = inside.clone().with_focal(0.995 * inside.view.focal_px.x).map();
             assert!(wider.covered() < 1.0);
             let whole = Undistortion::new(&camera, [800, 600], Field::Whole).unwrap();
@@ -354,8 +360,8 @@ mod tests {
     }
 
     #[test]
-    fn what_a_lens_shows_twice_is_shown_once() {
-        // r (1 − 0.5 r²) turns back at r = 0.816, 39°.
+    fn folded_image_parts_are_shown_once() {
+        // r (1 − 0.5 r²) folds back at r = 0.816, 39°.
         let lens = BrownConrady { radial: [-0.5, 0.0, 0.0], ..BrownConrady::default() };
         let camera = Camera::centred(1200, 900, 600.0, Lens::BrownConrady(lens));
         let wide = Undistortion::new(&camera, [1200, 900], Field::Horizontal(2.0)).unwrap();

@@ -1,7 +1,7 @@
-//! Ink that has spread on a print: what is dark has grown.
+//! Ink spread (dot gain) of a print: dark areas have grown.
 //!
-//! It belongs to the print, not to the picture, and displaces on the paper what tone curves displace in the
-//! picture: their shares are told apart by the places where lines cross, and by tilt.
+//! Ink spread belongs to the print, not to the image. It displaces corners on the paper as tone curves displace them
+//! in the image. Line crossings and tilt separate the two effects.
 
 use serde::{Deserialize, Serialize};
 
@@ -9,17 +9,17 @@ use crate::quantity;
 use crate::statistics::median;
 use crate::words::places;
 
-/// How far ink has spread on the print, as far as it is known: dark areas have grown by it on every side.
+/// Ink spread of the print, as far as it is known: the growth of dark areas on every side.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub enum Ink {
-    /// Estimated from the corners of each picture.
+    /// Estimated from the corners of each image.
     #[default]
     Auto,
-    /// Known: by so much on every side, µm; less than 0 where dark areas have shrunk.
+    /// Known growth on every side, µm; negative where dark areas have shrunk.
     Um(f64),
 }
 
-/// Most that ink is said to spread, µm: more fills the space between the bits of tags.
+/// Largest accepted ink spread, µm: more fills the space between the bits of tags.
 const MOST_UM: f64 = 1000.0;
 
 impl std::str::FromStr for Ink {
@@ -30,63 +30,64 @@ impl std::str::FromStr for Ink {
             ("auto", _) => Ok(Self::Auto),
             ("none", _) => Ok(Self::Um(0.0)),
             (_, Ok(um)) if (-MOST_UM..=MOST_UM).contains(&um) => Ok(Self::Um(um)),
-            _ => Err(format!("not auto, none, or µm from -{MOST_UM} to {MOST_UM}")),
+            _ => Err(format!("expected auto, none, or µm from -{MOST_UM} to {MOST_UM}")),
         }
     }
 }
 
-/// The spread of ink that was found in a picture: how far dark areas have grown on every side.
+/// The estimated ink spread of a print: the growth of dark areas on every side.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 #[non_exhaustive]
 pub struct InkEstimate {
-    /// The spread, in edge lengths of a tile; less than 0 where dark areas have shrunk.
+    /// Spread in edge lengths of a tile; negative where dark areas have shrunk.
     #[serde(deserialize_with = "quantity::figure::de")]
     pub edges: f64,
     /// Standard deviation of the spread, in edge lengths of a tile.
     #[serde(deserialize_with = "quantity::deviation::de")]
     pub edges_deviation: f64,
-    /// In µm of the print, where the target is known.
+    /// Spread in µm on the print, if the target is known.
     #[serde(
         default,
         skip_serializing_if = "Option::is_none",
         deserialize_with = "quantity::figure::de"
     )]
     pub um: Option<f64>,
-    /// Its standard deviation.
+    /// Standard deviation of the spread in µm.
     #[serde(
         default,
         skip_serializing_if = "Option::is_none",
         deserialize_with = "quantity::deviation::de"
     )]
     pub um_deviation: Option<f64>,
-    /// Whether the spread differs significantly from zero; only then corners were located with it.
+    /// Whether the spread differs significantly from zero. Only then was it used to locate corners.
     pub used: bool,
-    /// From how many pictures it was estimated.
+    /// Number of images it was estimated from.
     pub pictures: u32,
 }
 
-/// χ² of one degree of freedom that chance exceeds once in a thousand.
+/// χ² with one degree of freedom that noise exceeds once in a thousand cases.
 const CHI2: f64 = 10.8;
 
-/// Standard deviation over median distance from the middle, and over that of the mean for the median, of a
-/// normal distribution.
+/// Ratios for a normal distribution: standard deviation to median absolute deviation, and standard deviation of the
+/// median to that of the mean.
 const OVER_MEDIAN_DISTANCE: f64 = 1.4826;
 const OVER_THAT_OF_THE_MEAN: f64 = 1.2533;
 
-/// No picture tells more precisely than this, in edges.
+/// Lower limit for the standard deviation of one image, in edge lengths.
 const LEAST_DEVIATION: f64 = 1e-9;
 
 impl InkEstimate {
-    /// The spread in one picture, in edge lengths of a tile, with its standard deviation.
+    /// Creates the estimate of one image, in edge lengths of a tile, with its standard deviation.
     pub fn new(edges: f64, edges_deviation: f64, used: bool) -> Self {
         Self { edges, edges_deviation, um: None, um_deviation: None, used, pictures: 1 }
     }
 
-    /// What pictures of one print say together: the weighted median, so that a picture of something else does
-    /// not count; from none nothing. Its deviation is what theirs make, or what their scatter says if that is more.
+    /// Combines estimates from images of one print by their weighted median, so that an image of something else has
+    /// no influence. Returns `None` for no estimates. The standard deviation follows from those of the images, or
+    /// from their scatter if that is larger.
     pub fn of_all(pictures: &[Self]) -> Option<Self> {
-        // Pictures that were looked at with what all say have it already.
+        // Estimates that already combine all images are equal; they count once.
         let mut pictures = pictures.to_vec();
         pictures.sort_by(|a, b| a.edges.total_cmp(&b.edges));
         pictures.dedup_by(|a, b| a.pictures > 1 && *a == *b);
@@ -117,7 +118,7 @@ impl InkEstimate {
         })
     }
 
-    /// The same with the spread in µm, of a print whose tiles have edges of `edge_mm`.
+    /// Adds the spread in µm for a print whose tiles have edges of `edge_mm`.
     pub fn on_print(self, edge_mm: f64) -> Self {
         let um = |edges: f64| Some(1e3 * edge_mm * edges);
         Self { um: um(self.edges), um_deviation: um(self.edges_deviation), ..self }
@@ -134,7 +135,7 @@ impl std::fmt::Display for InkEstimate {
         let places = places(deviation);
         write!(
             f,
-            "what is dark has {grown} by {by:.places$} ± {deviation:.places$} {unit} on every side"
+            "dark areas have {grown} by {by:.places$} ± {deviation:.places$} {unit} on every side"
         )
     }
 }
@@ -157,7 +158,7 @@ mod tests {
     }
 
     #[test]
-    fn pictures_of_one_print_agree_whatever_one_of_them_shows() {
+    fn combined_estimate_ignores_an_outlier() {
         let pictures = [0.0031, 0.0029, 0.0030, 0.0032, 0.0028, 0.0300].map(|e| seen(e, 1e-4));
         let all = InkEstimate::of_all(&pictures).unwrap();
         assert!((all.edges - 0.0030).abs() < 1.5e-4 && all.pictures == 6 && all.used, "{all:?}");
@@ -169,11 +170,11 @@ mod tests {
     }
 
     #[test]
-    fn ink_is_told_in_words_that_a_printer_understands() {
+    fn display_states_growth_or_shrinkage() {
         let text = seen(-0.00305, 2e-5).to_string();
-        assert_eq!(text, "what is dark has shrunk by 61.00 ± 0.40 µm on every side");
+        assert_eq!(text, "dark areas have shrunk by 61.00 ± 0.40 µm on every side");
         let edges = InkEstimate { um: None, ..seen(0.00305, 2e-6) }.to_string();
-        assert_eq!(edges, "what is dark has grown by 0.30500 ± 0.00020 % of an edge on every side");
+        assert_eq!(edges, "dark areas have grown by 0.30500 ± 0.00020 % of an edge on every side");
         assert!(
             "none".parse::<Ink>() == Ok(Ink::Um(0.0)) && "-20".parse::<Ink>() == Ok(Ink::Um(-20.0))
         );

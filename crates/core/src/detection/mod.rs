@@ -1,8 +1,8 @@
-//! What detection finds, as values; the detector is the crate `deltille-detect`.
+//! Detection results as values; the crate `deltille-detect` contains the detector.
 //!
 //! 1. `values`: a [`Detection`] of an image, with its grids, corners and tags;
 //! 2. `reason`: why labels are missing;
-//! 3. `tone`, `ink`: what was estimated of the camera's tone curve, and of the ink on the print;
+//! 3. `tone`, `ink`: the estimated tone curve of the camera and ink spread of the print;
 //! 4. `watch`: which images of a stream are worth keeping.
 
 mod ink;
@@ -17,6 +17,6 @@ pub use tone::{Curve, Piece, TERMS, TONE_PARAMS, Tone, ToneEstimate};
 pub use values::{DecodedTag, Detection, Grid, GridCorner};
 pub use watch::{Glance, Watch};
 
-/// The median edge of a grid that no tag vouches for is no shorter than this, px. Blur leaves nothing
-/// of smaller tiles but their fundamental wave, and that is the same for squares, dots and threads.
+/// Shortest median edge of an accepted grid without a confirming tag, px. In smaller tiles blur leaves only the
+/// fundamental wave, which is the same for squares, dots and threads.
 pub const MIN_UNTAGGED_EDGE_PX: f64 = 7.0;

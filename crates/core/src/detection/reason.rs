@@ -1,4 +1,4 @@
-//! Why a picture, or a grid in it, has no labels: as data, and as a sentence.
+//! Why an image, or a grid in it, has no labels: as data, and as a sentence.
 
 use std::collections::BTreeMap;
 use std::fmt;
@@ -8,17 +8,17 @@ use serde::{Deserialize, Serialize};
 use crate::quantity;
 use crate::words::counted;
 
-/// Why a picture, or a grid in it, has no labels. It is displayed as a sentence.
+/// Why an image, or a grid in it, has no labels. Its display form is a sentence.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 #[non_exhaustive]
 pub struct Reason {
     /// The kind of reason.
     pub kind: ReasonKind,
-    /// Index of the grid that it is about; `None` for the whole picture.
+    /// Index of the grid concerned; `None` for the whole image.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub grid: Option<usize>,
-    /// What was measured, by names with units, such as `bit_px`.
+    /// Measured values, by names with units, for example `bit_px`.
     #[serde(
         default,
         skip_serializing_if = "BTreeMap::is_empty",
@@ -32,52 +32,52 @@ pub struct Reason {
 #[serde(rename_all = "snake_case")]
 #[non_exhaustive]
 pub enum ReasonKind {
-    /// Nothing in the picture looks like a corner, and nothing tells why: `corners`.
+    /// The image contains no candidate corners and no known cause: `corners`.
     NoCorners,
-    /// The brightest pixels are dark: `brightest`, a part of full scale.
+    /// The brightest pixels are dark: `brightest`, a fraction of full scale.
     TooDark,
-    /// Most of the picture is saturated: `saturated`, a part of its pixels.
+    /// Most of the image is saturated: `saturated`, a fraction of its pixels.
     Overexposed,
-    /// Edges are wider than corners could be found with: `blur_px`.
+    /// Edges are too wide for corner detection: `blur_px`.
     TooBlurred,
-    /// Corners are there, but in no grid that could be told from chance: `corners`.
+    /// Corners were found, but no grid that is distinguishable from noise: `corners`.
     NoGrid,
-    /// Tiles are too small to be sure of them: `edge_px`, `needed_edge_px`.
+    /// Tiles are too small for a certain grid: `edge_px`, `needed_edge_px`.
     TooSmall,
-    /// The corners are those of the other tiling: `corners`.
+    /// The corners belong to the other tiling: `corners`.
     OtherTiling,
-    /// Cells of tags are too small or too blurred to be read: `bit_px`, `blur_px`, `needed_bit_px`; without the
-    /// last they do not stand out of the noise.
+    /// Tag cells are too small or too blurred to be read: `bit_px`, `blur_px`, `needed_bit_px`. Without the last,
+    /// their contrast is too low for the noise.
     UnreadableTags,
-    /// No tile is seen whole that could carry a tag: `corners`.
+    /// No complete tile that could carry a tag is visible: `corners`.
     NoTiles,
-    /// Tiles were read, and show no code: `tiles`.
+    /// Tiles were read and contain no code: `tiles`.
     NoTags,
-    /// Clear codes of the family, but of ids that the target does not have: `tags`, `id`, one of them.
+    /// Clear codes of the family, but with ids that the target does not have: `tags`, `id` of one of them.
     OtherIds,
-    /// Tags of the target, but tiles around them that are not as on the target: `agreeing`, `disagreeing` tiles.
+    /// Tags of the target, but surrounding tiles that contradict it: `agreeing`, `disagreeing` tiles.
     OtherLayout,
-    /// Clear cells that are no code of the family: `tiles`.
+    /// Clear cells that are not a code of the family: `tiles`.
     OtherFamily,
-    /// The grid is seen as in a mirror: `corners`.
+    /// The grid is mirrored: `corners`.
     Mirrored,
-    /// The grid could lie in more than one way: `corners`.
+    /// The grid fits the target in more than one position: `corners`.
     Ambiguous,
-    /// The grid is less, or more, than the whole board whose outline would label it: `corners`, `expected`.
+    /// The grid is smaller or larger than the board whose outline would label it: `corners`, `expected`.
     NotWhole,
-    /// The grid is larger than any board, and no certain one is looked for: `corners`, `expected` at most.
+    /// The grid is larger than any board, so it was not searched for one: `corners`, and `expected` at most.
     TooManyCorners,
-    /// The same as [`NotWhole`](Self::NotWhole), and it ends at the border of the picture: `corners`, and `expected`
-    /// where there are no tags.
+    /// Like [`NotWhole`](Self::NotWhole), but the grid ends at the border of the image: `corners`, and `expected` for
+    /// boards without tags.
     CutByBorder,
-    /// Corners of a panel that is seen elsewhere in the picture too, and are left out: `corners`.
+    /// Corners of a panel that also appears elsewhere in the image; they were left out: `corners`.
     SeenTwice,
-    /// The picture holds more grids than are worth the time.
+    /// The image contains too many grids to process in reasonable time.
     TooManyGrids,
 }
 
 impl ReasonKind {
-    /// Whether tags were read, and belong elsewhere.
+    /// Returns whether tags were read that do not fit the target.
     #[doc(hidden)]
     pub fn is_of_tags_read(self) -> bool {
         matches!(self, Self::OtherIds | Self::OtherLayout | Self::OtherFamily)
@@ -85,13 +85,13 @@ impl ReasonKind {
 }
 
 impl Reason {
-    /// A reason with what was measured.
+    /// Creates a reason with measured values.
     #[doc(hidden)]
     pub fn new<const N: usize>(kind: ReasonKind, figures: [(&str, f64); N]) -> Self {
         Self::of(kind, figures)
     }
 
-    /// The same of any number of figures.
+    /// Creates a reason with any number of measured values.
     #[doc(hidden)]
     pub fn of<'a>(kind: ReasonKind, figures: impl IntoIterator<Item = (&'a str, f64)>) -> Self {
         let owned = |(name, figure): (&str, f64)| (name.to_owned(), figure);
@@ -104,50 +104,54 @@ impl Reason {
 }
 
 impl fmt::Display for Reason {
-    /// A sentence without its full stop.
+    /// Writes a sentence without its full stop.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let figure = |name| self.figure(name);
         let count = |name, thing| counted(figure(name) as usize, thing);
         match self.kind {
-            ReasonKind::NoCorners => write!(f, "nothing in the picture looks like a corner"),
+            ReasonKind::NoCorners => write!(f, "no corners found in the image"),
             ReasonKind::TooDark => write!(
                 f,
-                "too dark: the brightest pixels are at {:.1} % of full scale; expose longer",
+                "too dark: the brightest pixels are at {:.1} % of full scale; use a longer exposure",
                 100.0 * figure("brightest")
             ),
             ReasonKind::Overexposed => write!(
                 f,
-                "overexposed: {:.0} % of the picture is saturated; expose shorter",
+                "overexposed: {:.0} % of the image is saturated; use a shorter exposure",
                 100.0 * figure("saturated")
             ),
             ReasonKind::TooBlurred => write!(
                 f,
-                "too blurred: the sharpest edges are {:.1} px wide; focus, or hold still",
+                "too blurred: the sharpest edges are {:.1} px wide; focus, or hold the camera still",
                 figure("blur_px")
             ),
             ReasonKind::NoGrid => {
-                write!(f, "{}, but no grid of them", count("corners", "corner"))
+                write!(f, "found {}, but they form no grid", count("corners", "corner"))
             }
             ReasonKind::TooSmall => write!(
                 f,
-                "tiles of {:.1} px are too small; go nearer, until they have {:.0} px",
+                "tiles are too small ({:.1} px); move closer until their edges are {:.0} px long",
                 figure("edge_px"),
                 figure("needed_edge_px")
             ),
             ReasonKind::OtherTiling => {
-                write!(f, "{} of the other tiling", count("corners", "corner"))
+                write!(
+                    f,
+                    "{} belong to the other tiling (triangles or squares)",
+                    count("corners", "corner")
+                )
             }
             ReasonKind::UnreadableTags if !self.figures.contains_key("needed_bit_px") => write!(
                 f,
-                "a tag's cells have {:.1} px under a blur of {:.1} px, and do not stand out of the noise; more light \
-                 or contrast would help",
+                "tag cells are {:.1} px wide with a blur of {:.1} px, and their contrast is too low for the noise; use more light \
+             or contrast",
                 figure("bit_px"),
                 figure("blur_px")
             ),
             ReasonKind::UnreadableTags => write!(
                 f,
-                "a tag's cells have {:.1} px under a blur of {:.1} px; they could be read from {:.1} px on, \
-                 nearer or sharper",
+                "tag cells are {:.1} px wide with a blur of {:.1} px; reading them needs {:.1} px: move closer or focus \
+             better",
                 figure("bit_px"),
                 figure("blur_px"),
                 figure("needed_bit_px")
@@ -155,67 +159,69 @@ impl fmt::Display for Reason {
             ReasonKind::NoTiles => {
                 write!(
                     f,
-                    "among {} no tile that could carry a tag is whole",
+                    "found {}, but no complete tile that could carry a tag; show more of the board",
                     count("corners", "corner")
                 )
             }
             ReasonKind::NoTags => {
-                write!(f, "no tag is seen in {} that could carry one", count("tiles", "tile"))
+                write!(f, "no tag found in {} that could carry one", count("tiles", "tile"))
             }
             ReasonKind::OtherIds => write!(
                 f,
-                "{} whose id the target does not have, such as {}: is it another target?",
+                "{} with ids that the target does not have, for example {}; is this another target?",
                 count("tags", "tag"),
                 figure("id")
             ),
             ReasonKind::OtherLayout => write!(
                 f,
-                "tags of the target, but tiles around them are not those of the target, {} of {}: is it another target?",
+                "tags fit the target, but {} of {} surrounding tiles contradict it; is this another target?",
                 figure("disagreeing"),
                 figure("agreeing") + figure("disagreeing")
             ),
             ReasonKind::OtherFamily => write!(
                 f,
-                "in {} read without doubt there is no tag of the target's family",
+                "none of {} read with certainty shows a tag of the target's family; is the family right?",
                 count("tiles", "tile")
             ),
             ReasonKind::Mirrored => write!(
                 f,
-                "a grid of {} is seen as in a mirror; flip the picture, or allow mirrored labels",
+                "a grid of {} is mirrored; flip the image, or allow mirrored labels",
                 count("corners", "corner")
             ),
             ReasonKind::Ambiguous => {
-                write!(f, "a grid of {} could lie in more than one way", count("corners", "corner"))
+                write!(
+                    f,
+                    "a grid of {} fits the target in more than one position",
+                    count("corners", "corner")
+                )
             }
             ReasonKind::NotWhole if figure("corners") == figure("expected") => write!(
                 f,
-                "a grid of {} has other rows and columns than the board: are they exchanged?",
+                "a grid of {} has different rows and columns than the board; are they swapped?",
                 count("corners", "corner")
             ),
             ReasonKind::NotWhole => write!(
                 f,
-                "a grid of {} is not the whole board of {}",
+                "a grid of {} is not the complete board of {}",
                 count("corners", "corner"),
                 figure("expected")
             ),
             ReasonKind::TooManyCorners => write!(
                 f,
-                "a grid of {} is larger than any board, which has at most {}",
+                "a grid of {} is larger than any board; boards have at most {}",
                 count("corners", "corner"),
                 figure("expected")
             ),
-            ReasonKind::CutByBorder => write!(
-                f,
-                "a grid of {} is cut by the border of the picture",
-                count("corners", "corner")
-            ),
+            ReasonKind::CutByBorder => {
+                write!(f, "a grid of {} is cut off by the image border", count("corners", "corner"))
+            }
             ReasonKind::SeenTwice => write!(
                 f,
-                "{} left out: they show what is seen elsewhere in the picture too; is there a second copy of the target?",
+                "{} left out, because the same panel appears elsewhere in the image; is there a second copy of the target?",
                 count("corners", "corner")
             ),
             ReasonKind::TooManyGrids => {
-                write!(f, "the picture holds more grids, or corners, than are worth the time")
+                write!(f, "the image contains too many grids or corners to process")
             }
         }
     }
@@ -226,12 +232,12 @@ mod tests {
     use super::*;
 
     #[test]
-    fn reasons_come_back_from_json() {
+    fn reasons_survive_json() {
         let figures = [("bit_px", 1.0), ("blur_px", 3.5), ("needed_bit_px", 2.5)];
         let reason = Reason::new(ReasonKind::UnreadableTags, figures);
         let text = serde_json::to_string(&reason).unwrap();
         assert!(text.contains(r#""kind":"unreadable_tags""#), "{text}");
         assert_eq!(serde_json::from_str::<Reason>(&text).unwrap(), reason);
-        assert!(reason.to_string().contains("1.0 px under a blur of 3.5 px"));
+        assert!(reason.to_string().contains("1.0 px wide with a blur of 3.5 px"));
     }
 }

@@ -1,22 +1,22 @@
-//! Tone curves: what a camera makes of light.
+//! Tone curves: the grey values that a camera assigns to light.
 //!
-//! A curve is kept as its inverse, the light q(y) of a grey value y, which is smooth where the curve itself
-//! is steep: near black. Where it is not known its slope follows powers of the distances from black and white,
-//! which hold gammas (p₁ = γ − 1), sRGB and s-curves (p₁ and p₃),
+//! A curve is stored as its inverse, the light q(y) of a grey value y. The inverse is smooth near black, where the
+//! curve itself is steep. The slope of an unknown curve follows powers of the distances from black and white. They
+//! cover gammas (p₁ = γ − 1), sRGB and s-curves (p₁ and p₃),
 //!
 //! ```text
 //!     ln q'(y) = p₁ ln(y + δ) + p₂ t + p₃ ln(1 − y + δ) + const,      t = (y − middle)/half
 //! ```
 //!
-//! so that it rises whatever the p are; 0 is a linear camera. A corner sees the piece between its own
-//! black (S = −1) and white (S = 1), in its own units:
+//! so that q rises for all values of p; p = 0 is a linear camera. A corner covers the part of the curve between its
+//! own black (S = −1) and white (S = 1), in its own units:
 //!
 //! ```text
 //!     T(S) = S + (1 − S²)·(κ₀ + κ₁ S + … + κ₅ S⁵)
 //! ```
 //!
-//! through the curve at eight places. Between a twentieth of the light and all of it that is within 0.3 % of
-//! gamma 2.6. The constant κ₀ displaces corners, see `docs/formulation.md`, “Measured corners”.
+//! It passes through the curve at eight points. Between 5 % and 100 % of the light, it is within 0.3 % of gamma 2.6.
+//! The constant κ₀ displaces corners, see `docs/formulation.md`, “Measured corners”.
 
 use std::sync::LazyLock;
 
@@ -28,22 +28,22 @@ use crate::quantity;
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[non_exhaustive]
 pub enum Tone {
-    /// Estimated from the corners of each picture.
+    /// Estimated from the corners of each image.
     #[default]
     Auto,
     /// Grey values are linear in light.
     Linear,
-    /// That of sRGB (IEC 61966-2-1).
+    /// The curve of sRGB (IEC 61966-2-1).
     Srgb,
     /// Grey = light^(1/γ).
     Gamma(f64),
 }
 
-/// Gammas that cameras have; outside, the curve's ends are steeper than grey values tell.
+/// Range of gammas of real cameras. Beyond it the ends of the curve are too steep for the resolution of grey values.
 const GAMMAS: std::ops::RangeInclusive<f64> = 0.3..=4.0;
 
 impl Tone {
-    /// The grey value of a light, both of full scale; linear where the curve is not known.
+    /// Returns the grey value of a light, both relative to full scale; linear if the curve is unknown.
     pub fn grey(self, light: f64) -> f64 {
         match self {
             Self::Auto | Self::Linear => light,
@@ -64,25 +64,25 @@ impl std::str::FromStr for Tone {
             "srgb" => Ok(Self::Srgb),
             _ => match text.parse() {
                 Ok(gamma) if GAMMAS.contains(&gamma) => Ok(Self::Gamma(gamma)),
-                _ => Err("not auto, linear, srgb or a gamma from 0.3 to 4".to_owned()),
+                _ => Err("expected auto, linear, srgb or a gamma from 0.3 to 4".to_owned()),
             },
         }
     }
 }
 
-/// The tone curve that was found in a picture, over the median black and white of its corners.
+/// The tone curve estimated in an image, between the median black and white of its corners.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 #[non_exhaustive]
 pub struct ToneEstimate {
-    /// Median black of the corners, of full scale.
+    /// Median black of the corners, relative to full scale.
     #[serde(deserialize_with = "quantity::figure::de")]
     pub black: f64,
-    /// Median white of the corners, of full scale.
+    /// Median white of the corners, relative to full scale.
     #[serde(deserialize_with = "quantity::figure::de")]
     pub white: f64,
-    /// Curvature κ₀ between them: grey = middle + half·(S + (1 − S²)(κ₀ + κ₁ S + …)); 0 is linear,
-    /// positive brightens.
+    /// Curvature κ₀ between black and white: grey = middle + half·(S + (1 − S²)(κ₀ + κ₁ S + …)); 0 is linear,
+    /// positive values brighten.
     #[serde(deserialize_with = "quantity::figure::de")]
     pub kappa: f64,
     /// Standard deviation of κ₀.
@@ -91,77 +91,78 @@ pub struct ToneEstimate {
     /// The next coefficient of the curve, κ₁.
     #[serde(deserialize_with = "quantity::figure::de")]
     pub kappa_odd: f64,
-    /// Whether the curve differs significantly from a line; only then corners were located with it.
+    /// Whether the curve differs significantly from a line. Only then was it used to locate corners.
     pub used: bool,
 }
 
 impl ToneEstimate {
-    /// A curve between black and white, of full scale, with its curvature κ₀ and the standard deviation of that. It is not
-    /// used, and κ₁ is 0.
+    /// Creates a curve between black and white, relative to full scale, from its curvature κ₀ and the standard
+    /// deviation of κ₀. It is marked as not used, and κ₁ is 0.
     pub fn new([black, white]: [f64; 2], kappa: f64, kappa_deviation: f64) -> Self {
         Self { black, white, kappa, kappa_deviation, kappa_odd: 0.0, used: false }
     }
 }
 
-/// Parameters of a curve that is not known.
+/// Number of parameters of an unknown curve.
 pub const TONE_PARAMS: usize = 3;
 
-/// Terms of a corner's piece of a curve.
+/// Number of terms of a corner's part of a curve.
 pub const TERMS: usize = 6;
 
-/// Grey values that are tabulated; beyond full scale for corners whose white is clipped.
+/// Grid of tabulated grey values; it extends beyond full scale for corners with clipped white.
 const LOWEST: f64 = -0.5;
 const STEP: f64 = 1.0 / 64.0;
 const NODES: usize = 193;
 
-/// Slopes are known at the nodes and half-way between them.
+/// Number of slope samples: at the nodes and half-way between them.
 const PLACES_OF_SLOPES: usize = 2 * NODES - 1;
 
-/// Logarithms of the distances of these places from black and white.
+/// Logarithms of the distances of the slope samples from black and white.
 static TO_ENDS: LazyLock<Vec<[f64; 2]>> =
     LazyLock::new(|| (0..PLACES_OF_SLOPES).map(|i| to_ends(place(i))).collect());
 
-/// Distance δ from black and white below which the slope of an estimated curve no longer rises or falls: grey
-/// values nearer than that are few, and sRGB has twice as much.
+/// Distance δ from black and white below which the slope of an estimated curve is constant. Few grey values are
+/// closer, and that of sRGB is twice as large.
 const END: f64 = 0.03;
 
-/// Where a power has its toe, of full scale: half of sRGB's. Below it is a line.
+/// Toe of a power curve, relative to full scale, half that of sRGB. Below it the curve is a line.
 const TOE: f64 = 0.02;
 
-/// The slope is constant this far beyond the grey values it was made for.
+/// Reach of an estimated curve, in half ranges of the grey values it was estimated from. The slope is constant beyond
+/// it.
 const REACH: f64 = 1.25;
 
-/// Largest sum of light over difference of light that slopes of the light are scaled by.
+/// Upper limit of the sum of lights divided by their difference, which scales slopes of the light.
 const MAX_RATIO: f64 = 20.0;
 
-/// The light of grey values, tabulated with its slope.
+/// Light as a function of the grey value, tabulated with its slope.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Curve {
     light: Vec<f64>,
     slope: Vec<f64>,
 }
 
-/// The piece of a curve between a corner's black and white.
+/// The part of a curve between a corner's black and white.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Piece {
-    /// κ₀ … κ₅.
+    /// Coefficients κ₀ … κ₅.
     pub terms: [f32; TERMS],
-    /// Mean of the light of both over half the difference.
+    /// Mean of the light of black and white, divided by half their difference.
     pub ratio: f32,
 }
 
-/// The grey value of a place where the slope is known.
+/// Returns the grey value of a slope sample.
 fn place(i: usize) -> f64 {
     LOWEST + 0.5 * STEP * i as f64
 }
 
-/// Logarithms of a grey value's distances from black and white.
+/// Returns the logarithms of a grey value's distances from black and white.
 fn to_ends(y: f64) -> [f64; 2] {
     [y, 1.0 - y].map(|d| (d.max(0.0) + END).ln())
 }
 
 impl Curve {
-    /// The curve that is known by name; `None` where it is a line, or not known.
+    /// Returns the curve of a known tone; `None` if it is linear or unknown.
     pub fn of(tone: Tone) -> Option<Self> {
         match tone {
             Tone::Auto | Tone::Linear => None,
@@ -176,7 +177,7 @@ impl Curve {
         }
     }
 
-    /// The curve with these parameters over grey values from `range[0]` to `range[1]`.
+    /// Creates the curve with these parameters, estimated from grey values between `low` and `high`.
     pub fn estimated(params: [f64; TONE_PARAMS], [low, high]: [f64; 2]) -> Self {
         let (middle, half) = ((low + high) / 2.0, ((high - low) / 2.0).max(1e-6));
         let [p1, p2, p3] = params;
@@ -204,7 +205,7 @@ impl Curve {
         Self::with_slopes(&(0..PLACES_OF_SLOPES).map(|i| slope(place(i))).collect::<Vec<f64>>())
     }
 
-    /// The curve with these slopes of the light at the nodes and half-way between them.
+    /// Creates the curve with these slopes of the light at the nodes and half-way between them.
     fn with_slopes(slopes: &[f64]) -> Self {
         let mut light = Vec::with_capacity(NODES);
         let mut sum = 0.0;
@@ -219,7 +220,7 @@ impl Curve {
         Self { light, slope: slopes.iter().copied().step_by(2).collect() }
     }
 
-    /// The light of a grey value.
+    /// Returns the light of a grey value.
     fn light(&self, grey: f64) -> f64 {
         let place = (grey - LOWEST) / STEP;
         let i = (place.max(0.0) as usize).min(NODES - 2);
@@ -228,14 +229,14 @@ impl Curve {
             let end = if t < 0.0 { 0 } else { NODES - 1 };
             return self.light[end] + (place - end as f64) * STEP * self.slope[end];
         }
-        // Hermite's cubic.
+        // Cubic Hermite interpolation.
         let [q0, q1] = [self.light[i], self.light[i + 1]];
         let [d0, d1] = [self.slope[i] * STEP, self.slope[i + 1] * STEP];
         let rise = q1 - q0;
         q0 + t * (d0 + t * ((3.0 * rise - 2.0 * d0 - d1) + t * (d0 + d1 - 2.0 * rise)))
     }
 
-    /// The grey value of a light.
+    /// Returns the grey value of a light.
     fn grey(&self, light: f64) -> f64 {
         let i = self.light.partition_point(|&q| q < light).clamp(1, NODES - 1) - 1;
         let [q0, q1] = [self.light[i], self.light[i + 1]];
@@ -248,7 +249,7 @@ impl Curve {
         grey
     }
 
-    /// The piece of a corner of this level and amplitude, grey values.
+    /// Returns the part of the curve for a corner with this level and amplitude, both grey values.
     pub fn piece(&self, level: f64, amplitude: f64) -> Piece {
         let [dark, bright] = [level - amplitude, level + amplitude].map(|y| self.light(y));
         let (middle, half) = ((bright + dark) / 2.0, (bright - dark) / 2.0);
@@ -265,13 +266,13 @@ impl Curve {
 }
 
 impl Piece {
-    /// That of a linear camera.
+    /// Creates the part of a linear curve.
     pub fn line(level: f64, amplitude: f64) -> Self {
         let ratio = (level / amplitude).clamp(-MAX_RATIO, MAX_RATIO);
         Self { terms: [0.0; TERMS], ratio: if ratio.is_finite() { ratio as f32 } else { 0.0 } }
     }
 
-    /// T(S) and its derivative.
+    /// Returns T(S) and its derivative.
     #[inline(always)]
     pub fn at(&self, s: f32) -> (f32, f32) {
         let (mut sum, mut slope) = (0.0, 0.0);
@@ -283,14 +284,14 @@ impl Piece {
         (s + rest * sum, 1.0 - 2.0 * s * sum + rest * slope)
     }
 
-    /// (T(S) − S)/(1 − S²).
+    /// Returns (T(S) − S)/(1 − S²).
     #[inline(always)]
     pub fn bulge(&self, s: f32) -> f32 {
         self.terms.iter().rev().fold(0.0, |sum, term| sum * s + term)
     }
 }
 
-/// Chebyshev's places between −1 and 1: cos(kπ/7).
+/// Chebyshev nodes between −1 and 1: cos(kπ/7).
 const PLACES: [f64; TERMS] = [
     0.900_968_867_902_419_1,
     0.623_489_801_858_733_5,
@@ -300,7 +301,7 @@ const PLACES: [f64; TERMS] = [
     -0.900_968_867_902_419_1,
 ];
 
-/// Coefficients of the polynomial with these values at [`PLACES`]: Newton's divided differences.
+/// Computes the coefficients of the polynomial with these values at [`PLACES`], by Newton's divided differences.
 fn interpolated(values: [f64; TERMS]) -> [f64; TERMS] {
     let mut divided = values;
     for order in 1..TERMS {
@@ -323,7 +324,7 @@ fn interpolated(values: [f64; TERMS]) -> [f64; TERMS] {
 mod tests {
     use super::*;
 
-    /// A corner's piece against the curve itself.
+    /// Compares the part of a corner with the curve itself.
     #[test]
     fn pieces_follow_their_curves() {
         for tone in [Tone::Gamma(1.6), Tone::Gamma(2.6), Tone::Srgb] {
@@ -347,14 +348,14 @@ mod tests {
     }
 
     #[test]
-    fn no_parameters_are_a_line() {
+    fn zero_parameters_give_a_line() {
         let piece = Curve::estimated([0.0; 3], [0.1, 0.8]).piece(0.4, -0.3);
         assert!(piece.terms.iter().all(|k| k.abs() < 1e-6));
         assert!((piece.ratio + 4.0 / 3.0).abs() < 1e-6);
     }
 
     #[test]
-    fn names_of_tones() {
+    fn tones_parse_from_text() {
         assert_eq!("2.2".parse(), Ok(Tone::Gamma(2.2)));
         assert_eq!("srgb".parse(), Ok(Tone::Srgb));
         assert!("7".parse::<Tone>().is_err() && "log".parse::<Tone>().is_err());

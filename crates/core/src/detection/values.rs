@@ -12,7 +12,7 @@ use crate::raster::{FileNotes, Pyramid};
 use crate::statistics::median;
 use crate::targets::TargetIdentity;
 
-/// What was found in one image.
+/// The detection result of one image.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[non_exhaustive]
 pub struct Detection {
@@ -22,36 +22,37 @@ pub struct Detection {
     pub width: u32,
     /// Height of the image, px.
     pub height: u32,
-    /// What the image's file says beside its pixels.
+    /// Metadata from the image file.
     #[serde(default, skip_serializing_if = "FileNotes::is_empty")]
     pub file: FileNotes,
-    /// The targets that were looked for; empty where the corners are of no known target, or of an unknown one.
+    /// The targets searched for; empty if the corners belong to no target or an unknown one.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub targets: Vec<TargetIdentity>,
-    /// The grids that were found: labelled ones by the id of their panel, then the others, largest first.
+    /// The grids found: labelled grids by panel id, then the others, largest first.
     pub grids: Vec<Grid>,
-    /// What was found of the camera's tone curve, where it was looked for.
+    /// The estimated tone curve of the camera, if requested.
     pub tone: Option<ToneEstimate>,
-    /// What was found of the spread of ink, where it was looked for.
+    /// The estimated ink spread of the print, if requested.
     pub ink: Option<InkEstimate>,
-    /// Why there are no labels, where labels were looked for and no grid has any; and why there are no grids.
+    /// Why there are no labels although they were requested, or why there are no grids.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub reasons: Vec<Reason>,
-    /// Duration of each stage by its name, ms, where the detector has a clock; written only where it is asked for, as no two runs take the same.
+    /// Duration of each stage by its name, ms, if the detector has a clock. Files contain it only on request, because
+    /// it differs between runs.
     #[serde(default)]
     pub timing_ms: BTreeMap<String, f64>,
 }
 
 impl Detection {
-    /// What was found in an image of a width and height, px, by whatever found it.
+    /// Creates the result for an image of a width and height, px, from any detector.
     pub fn new(image: impl Into<String>, [width, height]: [u32; 2], grids: Vec<Grid>) -> Self {
         Self { image: image.into(), width, height, grids, ..Self::default() }
     }
 
-    /// Takes its labels for those of the targets that are given, whatever targets it names, so that it is accepted with them:
-    /// each target that it names is replaced by the one with the same tags, or, where it names one alone, by the one that is
-    /// given. Without any given, as for an untagged grid, it names none afterwards. Returns the targets that were replaced, each
-    /// with the one that is assumed.
+    /// Treats the labels as those of the given targets, so that calibration accepts the detection with them. Each
+    /// target that the detection names is replaced by the given one with the same tags. If the detection and `given`
+    /// name one target each, that one is replaced even if its tags differ. If `given` is empty, as for an untagged
+    /// grid, the detection names no targets afterwards. Returns each replaced target with its replacement.
     pub fn assume_targets(&mut self, given: &[TargetIdentity]) -> Vec<[TargetIdentity; 2]> {
         if given.is_empty() {
             self.targets.clear();
@@ -62,7 +63,7 @@ impl Detection {
             let same = given.iter().find(|other| other.is_confusable(own)).or(only);
             if let Some(same) = same.filter(|_| !given.iter().any(|other| other.is_same_print(own)))
             {
-                // Grids refer to it by its name.
+                // Grids refer to the target by its name.
                 replaced.push([own.clone(), same.clone()]);
                 *own = TargetIdentity { name: own.name.clone(), ..same.clone() };
             }
@@ -70,7 +71,7 @@ impl Detection {
         replaced
     }
 
-    /// Identity of the target that a grid belongs to; `None` where the detection does not name it.
+    /// Returns the identity of the target that a grid belongs to; `None` if the detection does not name it.
     pub fn target_of(&self, grid: &Grid) -> Option<&TargetIdentity> {
         match (&grid.target, self.targets.as_slice()) {
             (None, [only]) => Some(only),
@@ -82,18 +83,18 @@ impl Detection {
 
 /// A connected piece of a tiling.
 ///
-/// On a grid with `panel: None` rows and columns are relative: a right-handed lattice with its
-/// own origin, correct up to a motion of the lattice.
+/// Rows and columns of a grid with `panel: None` are relative. They form a right-handed lattice with its own origin,
+/// known up to a symmetry and shift of the lattice.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Grid {
     /// The tiling: triangles or squares.
     pub kind: GridKind,
-    /// Name of the target that it belongs to, where several were looked for.
+    /// Name of the target the grid belongs to, if several were searched for.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub target: Option<String>,
-    /// Id of the panel of the target; `None` where the grid has no labels.
+    /// Id of the panel of the target; `None` if the grid has no labels.
     pub panel: Option<u32>,
-    /// Whether it is seen as in a mirror. Its labels, if any, are those of the print.
+    /// Whether the grid is mirrored in the image. Its labels, if any, are those of the print.
     #[serde(default, skip_serializing_if = "is_false")]
     pub mirrored: bool,
     /// The corners, ordered by row, then column.
@@ -103,8 +104,8 @@ pub struct Grid {
 }
 
 impl Grid {
-    /// Median distance of corners that follow each other in a row or column, px; `None` where there
-    /// are none such.
+    /// Returns the median distance of adjacent corners in a row or column, px; `None` if there are no adjacent
+    /// corners.
     pub fn edge_px(&self) -> Option<f64> {
         let places: BTreeMap<(i32, i32), DVec2> =
             self.corners.iter().map(|c| ((c.row, c.col), c.position())).collect();
@@ -116,7 +117,7 @@ impl Grid {
         median(edges.collect())
     }
 
-    /// Expresses positions in px of a level of the pyramid.
+    /// Converts positions to pixels of a pyramid level.
     #[doc(hidden)]
     pub fn moved_to_level(&mut self, level: usize) {
         for corner in &mut self.corners {
@@ -124,7 +125,7 @@ impl Grid {
         }
     }
 
-    /// Undoes [`Self::moved_to_level`], for covariances too.
+    /// Reverses [`Self::moved_to_level`], and scales the covariances.
     #[doc(hidden)]
     pub fn moved_from_level(&mut self, level: usize) {
         let area = 4f64.powi(level as i32);
@@ -142,13 +143,13 @@ fn is_false(value: &bool) -> bool {
 /// A corner in the image.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct GridCorner {
-    /// Lattice row: on the panel, or relative where the grid has no labels.
+    /// Lattice row: on the panel, or relative if the grid has no labels.
     #[serde(deserialize_with = "quantity::place_in_lattice::de")]
     pub row: i32,
-    /// Lattice column, alike.
+    /// Lattice column, with the same meaning as `row`.
     #[serde(deserialize_with = "quantity::place_in_lattice::de")]
     pub col: i32,
-    /// Id of the corner in the target; `None` where the grid has no labels.
+    /// Id of the corner in the target; `None` if the grid has no labels.
     pub id: Option<u32>,
     /// Horizontal position, px, to the right; pixel centres at integers.
     #[serde(deserialize_with = "quantity::place_px::de")]
@@ -156,24 +157,24 @@ pub struct GridCorner {
     /// Vertical position, px, downwards; pixel centres at integers.
     #[serde(deserialize_with = "quantity::place_px::de")]
     pub y: f64,
-    /// Covariance xx, xy, yy of the position, px²; `None` where the method gives none.
+    /// Covariance xx, xy, yy of the position, px²; `None` if the method provides none.
     pub cov: Option<[f64; 3]>,
 }
 
 impl GridCorner {
-    /// Position, px; x right, y down, pixel centres at integers.
+    /// Returns the position, px; x right, y down, pixel centres at integers.
     pub fn position(&self) -> DVec2 {
         DVec2::new(self.x, self.y)
     }
 
-    /// Changes the position, px.
+    /// Sets the position, px.
     #[doc(hidden)]
     pub fn move_to(&mut self, position: DVec2) {
         (self.x, self.y) = position.into();
     }
 }
 
-/// A tag read in the image.
+/// A decoded tag in the image.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct DecodedTag {
     /// Id of the tag: the index of its code in the family.
@@ -186,7 +187,7 @@ pub struct DecodedTag {
     /// Column of the tile's lower-left vertex.
     #[serde(deserialize_with = "quantity::place_in_lattice::de")]
     pub col: i32,
-    /// Number of bits that were misread and corrected.
+    /// Number of corrected bit errors.
     pub errors: u32,
 }
 

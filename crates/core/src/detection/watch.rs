@@ -1,4 +1,4 @@
-//! Which pictures of a stream are worth keeping: those in which the target is held still, somewhere new.
+//! Selection of images from a stream: those in which the target is still and in a new position.
 
 use std::collections::BTreeMap;
 
@@ -6,17 +6,18 @@ use glam::DVec2;
 
 use crate::detection::Detection;
 
-/// Corners that moved by less than this part of the picture's width since the picture before are still: less than a
-/// blur of two pixels while a frame of 1280 pixels is exposed for half of the time.
+/// Movement since the previous image below which corners are still, as a fraction of the image width. It keeps blur
+/// under two pixels in an image 1280 px wide that is exposed for half of the frame interval.
 const STILL: f64 = 0.004;
 
-/// Corners that are further than this part of the width from where they were in any picture kept are somewhere new.
+/// Distance from the position in every kept image above which corners are in a new position, as a fraction of the
+/// image width.
 const ELSEWHERE: f64 = 0.08;
 
-/// Fewest labelled corners of a picture that is kept: a homography and some to spare.
+/// Fewest labelled corners of a kept image: enough for a homography with redundancy.
 const FEWEST_CORNERS: usize = 12;
 
-/// Looks at pictures one after the other.
+/// Watches a sequence of images.
 ///
 /// ```
 /// use deltille_core::detection::{Detection, Watch};
@@ -31,30 +32,30 @@ pub struct Watch {
     kept: Vec<Places>,
 }
 
-/// Labelled corners by panel and id, in widths of the picture.
+/// Labelled corners by panel and id, in image widths.
 type Places = BTreeMap<(u32, u32), DVec2>;
 
-/// What a picture shows, after those before it.
+/// Assessment of an image in a stream.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub struct Glance {
-    /// Labelled corners.
+    /// Number of labelled corners.
     pub corners: usize,
-    /// Whether they are where they were a picture ago.
+    /// Whether the corners have not moved since the previous image.
     pub is_still: bool,
-    /// Whether they are elsewhere than in all pictures that were kept.
+    /// Whether the corners are in a different position than in every kept image.
     pub is_new: bool,
 }
 
 impl Glance {
-    /// Whether the picture is worth keeping.
+    /// Returns whether the image is worth keeping.
     pub fn is_worth_keeping(self) -> bool {
         self.corners >= FEWEST_CORNERS && self.is_still && self.is_new
     }
 }
 
 impl Watch {
-    /// What the next picture shows; where it is worth keeping, those to come are compared with it.
+    /// Assesses the next image. If it is worth keeping, later images are compared with it.
     pub fn look(&mut self, found: &Detection) -> Glance {
         let labelled = found.grids.iter().filter_map(|grid| Some((grid.panel?, grid)));
         let places: Places = labelled
@@ -78,7 +79,7 @@ impl Watch {
     }
 }
 
-/// The mean way of corners that both have; infinite where there are none.
+/// Returns the mean displacement of common corners; infinite if there are none.
 fn moved(one: &Places, other: &Places) -> f64 {
     let ways = one.iter().filter_map(|(id, at)| Some(at.distance(*other.get(id)?)));
     let (count, sum) = ways.fold((0, 0.0), |(count, sum), way| (count + 1, sum + way));
@@ -91,7 +92,7 @@ mod tests {
     use crate::detection::{Grid, GridCorner};
     use crate::lattice::GridKind;
 
-    /// A picture of 1000 px with so many corners of a panel, shifted.
+    /// Creates an image 1000 px wide with `corners` corners of a panel, shifted to the right.
     fn picture(corners: u32, shift: f64, panel: Option<u32>) -> Detection {
         let corner = |id: u32| GridCorner {
             row: id as i32,
@@ -113,15 +114,15 @@ mod tests {
     }
 
     #[test]
-    fn pictures_are_kept_once_where_the_target_is_still() {
+    fn images_are_kept_once_per_still_position() {
         let mut watch = Watch::default();
         let mut keeps =
             |corners, shift, panel| watch.look(&picture(corners, shift, panel)).is_worth_keeping();
-        // The first has none before it, the third is where the second was.
+        // The first image has no predecessor; the third repeats the position of the second.
         let shifts = [0.0, 1.0, 2.0, 200.0, 230.0, 231.0, 120.0, 121.0];
         let kept = shifts.map(|shift| keeps(30, shift, Some(0)));
         assert_eq!(kept, [false, true, false, false, false, true, false, true]);
-        // Too few corners, or none with a label.
+        // Too few corners, or no labels.
         assert_eq!([500.0, 501.0].map(|shift| keeps(11, shift, Some(0))), [false; 2]);
         assert_eq!([500.0, 501.0].map(|shift| keeps(30, shift, None)), [false; 2]);
     }

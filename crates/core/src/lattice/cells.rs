@@ -5,24 +5,24 @@ use glam::DVec2;
 
 use super::GridKind;
 
-/// Tag dimension d: a tag has d rows of cells and d² bits. From 3 (9 bits) to 8 (64 bits,
-/// which a word of the machine just holds).
+/// Tag dimension d: a tag has d rows of cells and d² bits. d is 3 (9 bits) to 8 (64 bits, the size of a machine
+/// word).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct Dimension(NonZeroU8);
 
-/// The rows that there may be.
+/// Range of the number of rows.
 const DIMENSIONS: RangeInclusive<u8> = 3..=8;
 
-/// A number of bits that no tag has.
+/// An invalid number of tag bits.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("a tag has 9, 16, 25, 36, 49 or 64 bits, not {0}")]
 pub struct DimensionError(pub u32);
 
 impl Dimension {
-    /// The dimension of a tag with `bits` = 9, 16, 25, 36, 49 or 64 bits.
+    /// Returns the dimension of a tag with `bits` = 9, 16, 25, 36, 49 or 64 bits.
     ///
     /// # Errors
-    /// Where no tag has so many bits.
+    /// Returns an error for any other number of bits.
     pub fn from_bits(bits: u32) -> Result<Self, DimensionError> {
         let d = bits.isqrt();
         match NonZeroU8::new(d as u8) {
@@ -33,28 +33,28 @@ impl Dimension {
         }
     }
 
-    /// All dimensions, smallest first.
+    /// Returns all dimensions, smallest first.
     pub fn all() -> impl Iterator<Item = Dimension> {
         DIMENSIONS.filter_map(NonZeroU8::new).map(Dimension)
     }
 
-    /// Rows of cells, d.
+    /// Returns the number of rows of cells, d.
     pub fn rows(self) -> u32 {
         u32::from(self.0.get())
     }
 
-    /// Bits of a tag, d².
+    /// Returns the number of bits of a tag, d².
     pub fn bits(self) -> u32 {
         self.rows() * self.rows()
     }
 
-    /// A word with all bits of the tag set.
+    /// Returns a word with all bits of the tag set.
     pub fn mask(self) -> u64 {
         u64::MAX >> (u64::BITS - self.bits())
     }
 }
 
-/// One small triangle, or square, of a tag.
+/// One small triangle or square of a tag.
 ///
 /// ```text
 ///               ╱╲
@@ -70,8 +70,8 @@ impl Dimension {
 ///    A ────────────────────  B
 /// ```
 ///
-/// A square tag is an AprilTag: its cells are read like a page, row by row from the upper left, the
-/// first of them the most significant bit.
+/// A square tag is an AprilTag: its cells are read like a page, row by row from the upper left; the first one is the
+/// most significant bit.
 ///
 /// ```text
 ///      C ───────────────
@@ -85,8 +85,7 @@ impl Dimension {
 pub struct Cell {
     /// Row from the base, 0 to d − 1.
     pub row: u32,
-    /// Column from the left; of a triangle that of the rhombus that holds it: k = 2·col, or
-    /// 2·col + 1.
+    /// Column from the left. For a triangle it is the column of the enclosing rhombus: k = 2·col or 2·col + 1.
     pub col: u32,
     /// Whether the cell points up, as all squares do.
     pub upright: bool,
@@ -99,19 +98,19 @@ pub struct TagCells {
     dimension: Dimension,
     /// Cell of each bit, index = bit.
     cells: Vec<Cell>,
-    /// Bit whose cell lands on bit i's cell when the tag is turned counter-clockwise.
+    /// For bit i, the bit whose cell moves to bit i's cell when the tag is rotated counterclockwise.
     source: Vec<u8>,
     /// Pairs of bits whose cells share an edge.
     neighbours: Vec<[u8; 2]>,
 }
 
 impl TagCells {
-    /// The cells of a triangular tag, a DelTag, of dimension `d`.
+    /// Creates the cells of a triangular tag, a DelTag, of dimension `d`.
     pub fn new(dimension: Dimension) -> Self {
         Self::of(GridKind::Deltille, dimension)
     }
 
-    /// The cells of a tag that fills a tile of `kind`.
+    /// Creates the cells of a tag that fills a tile of `kind`.
     pub fn of(kind: GridKind, dimension: Dimension) -> Self {
         let d = dimension.rows();
         let cells: Vec<Cell> = {
@@ -135,7 +134,7 @@ impl TagCells {
         let neighbours = cells.iter().flat_map(|&cell| {
             let Cell { row, col, upright } = cell;
             let beside: &[(u32, u32)] = match kind {
-                // The cell's own rhombus, the one to the right, and the one above share an edge.
+                // The other cell of the same rhombus, the one to the right, and the one above share an edge with it.
                 GridKind::Deltille if !upright => &[(row, col), (row, col + 1), (row + 1, col)],
                 GridKind::Deltille => &[],
                 GridKind::Checker => &[(row, col + 1), (row + 1, col)],
@@ -151,33 +150,32 @@ impl TagCells {
         Self { kind, dimension, cells, source, neighbours }
     }
 
-    /// The tiling whose tiles the tag fills.
+    /// Returns the tiling whose tiles the tag fills.
     pub fn kind(&self) -> GridKind {
         self.kind
     }
 
-    /// The dimension d of the tag.
+    /// Returns the dimension d of the tag.
     pub fn dimension(&self) -> Dimension {
         self.dimension
     }
 
-    /// The cell that carries each bit: index 0 is the least significant bit.
+    /// Returns the cell that carries each bit: index 0 is the least significant bit.
     pub fn cells(&self) -> &[Cell] {
         &self.cells
     }
 
-    /// Pairs of bits whose cells share an edge: 3·d·(d−1)/2 of them, in a square tag 2·d·(d−1).
+    /// Returns the pairs of bits whose cells share an edge: 3·d·(d−1)/2 pairs, or 2·d·(d−1) in a square tag.
     pub fn neighbours(&self) -> &[[u8; 2]] {
         &self.neighbours
     }
 
-    /// For each bit the bit whose content it receives when the tag turns counter-clockwise, by 120°
-    /// or 90°.
+    /// Returns, for each bit, the bit whose content it receives when the tag rotates counterclockwise by 120° or 90°.
     pub fn rotation(&self) -> &[u8] {
         &self.source
     }
 
-    /// The word read off the same cells after the tag was turned counter-clockwise, by 120° or 90°.
+    /// Returns the word read from the same cells after the tag was rotated counterclockwise by 120° or 90°.
     pub fn rotate(&self, word: u64) -> u64 {
         self.source
             .iter()
@@ -185,7 +183,8 @@ impl TagCells {
             .fold(0, |turned, (to, &from)| turned | ((word >> from & 1) << to))
     }
 
-    /// For each bit that whose cell takes its place in a mirror, where rows and columns are exchanged.
+    /// Returns, for each bit, the bit whose cell moves to its position in a mirror image with rows and columns
+    /// exchanged.
     pub fn mirror(&self) -> Vec<u8> {
         let of = |cell: &Cell| {
             let mirrored = Cell { row: cell.col, col: cell.row, upright: cell.upright };
@@ -194,19 +193,19 @@ impl TagCells {
         self.cells.iter().map(of).collect()
     }
 
-    /// Length of the tile's edge in bit-widths, for cells that begin `inset` bit-widths, measured
-    /// along the edge, from each side: the border of the tag and what is around it.
+    /// Returns the length of the tile's edge in bit-widths, for cells that start `inset` bit-widths from each side,
+    /// measured along the edge. The inset is the border of the tag and the margin around it.
     pub fn width(&self, inset: f64) -> f64 {
         f64::from(self.dimension.rows()) + self.kind.insets() * inset
     }
 
-    /// Centre of a bit's cell in tile coordinates (u along A→B, v along A→C, both 0..1).
+    /// Returns the centre of a bit's cell in tile coordinates (u along A→B, v along A→C, both 0..1).
     pub fn centre(&self, bit: u32, inset: f64) -> DVec2 {
         let corners = self.corners(bit, inset);
         corners.iter().sum::<DVec2>() / corners.len() as f64
     }
 
-    /// The corners of a bit's cell in tile coordinates, counter-clockwise on the print.
+    /// Returns the corners of a bit's cell in tile coordinates, counterclockwise on the print.
     pub fn corners(&self, bit: u32, inset: f64) -> Vec<DVec2> {
         let width = self.width(inset);
         let Cell { row, col, upright } = self.cells[bit as usize];
@@ -220,7 +219,7 @@ impl TagCells {
     }
 }
 
-/// Bit carried by a cell: d² − 1 − (d−1−r)² − k, in a square tag r·d + d − 1 − k.
+/// Returns the bit of a cell: d² − 1 − (d−1−r)² − k, or r·d + d − 1 − k in a square tag.
 fn bit_of(kind: GridKind, d: u32, cell: Cell) -> u32 {
     if kind == GridKind::Checker {
         return cell.row * d + d - 1 - cell.col;
@@ -230,11 +229,11 @@ fn bit_of(kind: GridKind, d: u32, cell: Cell) -> u32 {
     d * d - 1 - above * above - k
 }
 
-/// The cell that a counter-clockwise turn moves onto `cell`.
+/// Returns the cell that a counterclockwise rotation moves onto `cell`.
 ///
-/// In barycentric cell coordinates (towards B, C, A) = (col, row, rest) a turn by 120° sends
-/// (b, c, a) to (a, b, c), so the cell at (col, row, rest) came from (row, rest, col). A quarter
-/// turn sends column c, row r to column d − 1 − r, row c.
+/// In barycentric cell coordinates (towards B, C, A) = (col, row, rest), a rotation by 120° maps (b, c, a) to (a, b,
+/// c), so the cell at (col, row, rest) came from (row, rest, col). A rotation by 90° maps column c, row r to column d
+/// − 1 − r, row c.
 fn source_of(kind: GridKind, d: u32, cell: Cell) -> Cell {
     if kind == GridKind::Checker {
         return Cell { row: d - 1 - cell.col, col: cell.row, upright: true };
@@ -256,9 +255,9 @@ mod tests {
         Dimension::all().map(|dimension| TagCells::of(GridKind::Checker, dimension))
     }
 
-    /// The quarter turn as a motion of the plane: A→B→D→C sends (u, v) to (1−v, u).
+    /// The 90° rotation as a motion of the plane: A→B→D→C maps (u, v) to (1−v, u).
     #[test]
-    fn four_quarter_turns_of_a_square_tag_are_none_and_agree_with_geometry() {
+    fn four_rotations_of_a_square_tag_are_the_identity() {
         for tag in squares() {
             for (to, &from) in tag.rotation().iter().enumerate() {
                 let DVec2 { x: u, y: v } = tag.centre(u32::from(from), 1.5);
@@ -286,7 +285,7 @@ mod tests {
     }
 
     #[test]
-    fn three_turns_are_none_and_only_a_central_cell_stays() {
+    fn three_rotations_are_the_identity_and_fix_only_a_central_cell() {
         for tag in all() {
             let fixed =
                 tag.rotation().iter().enumerate().filter(|&(i, &s)| i == s as usize).count();
@@ -297,7 +296,7 @@ mod tests {
         }
     }
 
-    /// The turn as a motion of the plane: A→B→C→A sends (u, v) to (1−u−v, u).
+    /// The 120° rotation as a motion of the plane: A→B→C→A maps (u, v) to (1−u−v, u).
     #[test]
     fn rotation_agrees_with_geometry() {
         for tag in all() {
@@ -309,9 +308,9 @@ mod tests {
         }
     }
 
-    /// Two mirrors are none, and a mirror turns turns round.
+    /// Two reflections are the identity, and a reflection inverts rotations.
     #[test]
-    fn mirrors_and_turns_are_the_symmetries_of_a_tag() {
+    fn reflections_and_rotations_are_the_symmetries_of_a_tag() {
         for tag in all().chain(squares()) {
             let (mirror, turn) = (tag.mirror(), tag.rotation().to_vec());
             let then = |first: &[u8], next: &[u8]| -> Vec<u8> {
@@ -342,7 +341,7 @@ mod tests {
     }
 
     #[test]
-    fn other_bit_counts_are_refused() {
+    fn other_bit_counts_are_rejected() {
         assert_eq!(Dimension::from_bits(24).unwrap_err(), DimensionError(24));
         assert!(Dimension::from_bits(4).is_err() && Dimension::from_bits(81).is_err());
     }

@@ -1,11 +1,11 @@
 use super::{GridKind, Orientation, Tile, Vertex};
 
-/// A proper motion of a lattice onto itself: a turn by a multiple of 60°, on the square lattice of
-/// 90°, then a shift.
+/// A proper motion of a lattice onto itself: a rotation by a multiple of 60°, or 90° on the square lattice, then a
+/// shift.
 ///
-/// Turns by 120° keep upright tiles upright; odd multiples of 60° exchange the two colours. On a
-/// checkerboard colours are exchanged where turns + row + column of the shift are odd.
-/// Reflections are left out on purpose: a mirrored board is an error, never a view.
+/// Rotations by 120° keep upright tiles upright; odd multiples of 60° exchange the two colours. On a checkerboard,
+/// colours are exchanged if turns + row + column of the shift are odd. Reflections are excluded on purpose: a
+/// mirrored board is an error, never a view.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct LatticeMap {
     kind: GridKind,
@@ -14,24 +14,24 @@ pub struct LatticeMap {
 }
 
 impl LatticeMap {
-    /// A counter-clockwise turn about vertex (0,0) by `turns` times 60° or 90°, then a shift.
+    /// Creates a counterclockwise rotation about vertex (0,0) by `turns` times 60° or 90°, followed by a shift.
     pub fn new(kind: GridKind, turns: i32, shift: Vertex) -> Self {
         let full = kind.steps().len() as i32;
         Self { kind, turns: turns.rem_euclid(full) as u8, shift }
     }
 
-    /// The map with `turns` times 60° or 90° that takes `from` to `to`.
+    /// Creates the map with a rotation of `turns` times 60° or 90° that maps `from` to `to`.
     pub fn taking(kind: GridKind, from: Vertex, to: Vertex, turns: i32) -> Self {
         let turned = Self::new(kind, turns, Vertex::new(0, 0)).apply(from);
         Self::new(kind, turns, to - turned)
     }
 
-    /// Number of counter-clockwise turns by 60° or 90°.
+    /// Returns the number of counterclockwise rotations by 60° or 90°.
     pub fn turns(self) -> u8 {
         self.turns
     }
 
-    /// Whether dark tiles go to dark tiles.
+    /// Returns whether dark tiles map to dark tiles.
     pub fn keeps_colours(self) -> bool {
         let Vertex { row, col } = self.shift;
         let shift = match self.kind {
@@ -41,26 +41,26 @@ impl LatticeMap {
         (i32::from(self.turns) + shift) % 2 == 0
     }
 
-    /// The rotation of the plane that belongs to it, counter-clockwise, rad.
+    /// Returns the corresponding rotation of the plane, counterclockwise, rad.
     pub fn angle_rad(self) -> f64 {
         std::f64::consts::TAU * f64::from(self.turns) / self.kind.steps().len() as f64
     }
 
-    /// Where `v` goes.
+    /// Maps the vertex `v`.
     pub fn apply(self, v: Vertex) -> Vertex {
         let (mut row, mut col) = (v.row, v.col);
         for _ in 0..self.turns {
             (row, col) = match self.kind {
-                // One turn sends the column step to the row step, and the row step to row − column.
+                // One rotation maps the column step to the row step, and the row step to row − column.
                 GridKind::Deltille => (row + col, -row),
-                // Here the row step to the column step backwards.
+                // Here it maps the row step to the negative column step.
                 GridKind::Checker => (col, -row),
             };
         }
         Vertex::new(row, col) + self.shift
     }
 
-    /// Where `tile` goes.
+    /// Maps `tile`.
     pub fn apply_tile(self, tile: Tile) -> Tile {
         let [a, b, c] = tile.frame().map(|v| self.apply(v));
         let row = a.row.min(b.row).min(c.row);
@@ -73,14 +73,14 @@ impl LatticeMap {
         Tile { anchor: Vertex::new(row, col), orientation }
     }
 
-    /// The map that undoes this one.
+    /// Returns the inverse map.
     pub fn inverse(self) -> Self {
         let back = Self::new(self.kind, -i32::from(self.turns), Vertex::new(0, 0));
         let shift = back.apply(self.shift);
         Self { shift: Vertex::new(-shift.row, -shift.col), ..back }
     }
 
-    /// This map after `first`, on the same lattice.
+    /// Returns the composition of this map after `first`, on the same lattice.
     pub fn after(self, first: LatticeMap) -> Self {
         let turns = i32::from(self.turns) + i32::from(first.turns);
         Self::new(self.kind, turns, self.apply(first.shift))
@@ -140,7 +140,7 @@ mod tests {
         }
 
         #[test]
-        fn taking_takes(kind in kind(), from in vertex(), to in vertex(), turns in -9..9) {
+        fn taking_maps_from_to_to(kind in kind(), from in vertex(), to in vertex(), turns in -9..9) {
             prop_assert_eq!(LatticeMap::taking(kind, from, to, turns).apply(from), to);
         }
     }

@@ -1,5 +1,5 @@
-//! The lattices: where their vertices (`vertex`) and tiles (`tile`) are, how they map onto themselves (`map`), and how the
-//! cells (`cells`) of a tag lie inside a tile. Everything else takes bit layout and rotation from here.
+//! The lattices: positions of their vertices (`vertex`) and tiles (`tile`), their maps onto themselves (`map`), and
+//! the arrangement of a tag's cells (`cells`) inside a tile. All other code takes bit layout and rotation from here.
 //!
 //! ```text
 //!        row 2      ·───────·───────·
@@ -15,8 +15,8 @@
 //! With edge length `s` the vertex (row `r`, column `c`) lies at `x = (c + r/2)·s`,
 //! `y = r·s·√3/2`: columns run along the lower edge, rows lean to the right by 60°.
 //!
-//! The square lattice of checkerboards has the same vertices at `x = c·s`, `y = r·s`; its tiles are
-//! squares, of which those with even r + c are black. [`GridKind`] says what differs.
+//! The square lattice of checkerboards has the same vertices at `x = c·s`, `y = r·s`. Its tiles are squares; those
+//! with even r + c are black. [`GridKind`] defines the differences.
 
 mod cells;
 mod map;
@@ -28,5 +28,5 @@ pub use map::LatticeMap;
 pub use tile::{GridKind, Orientation, Tile};
 pub use vertex::Vertex;
 
-/// Height of an equilateral triangle over its edge, √3/2.
+/// Ratio of the height of an equilateral triangle to its edge, √3/2.
 pub const ROW_HEIGHT: f64 = 0.866_025_403_784_438_6;

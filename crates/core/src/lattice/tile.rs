@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 
 use super::{ROW_HEIGHT, Vertex};
 
-/// Which tiling a grid is, and what follows from that.
+/// The tiling of a grid, and the properties that depend on it.
 #[derive(
     Clone, Copy, Debug, Default, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize,
 )]
@@ -23,8 +23,7 @@ const SQUARE_STEPS: [Vertex; 4] =
     [Vertex::new(0, 1), Vertex::new(1, 0), Vertex::new(0, -1), Vertex::new(-1, 0)];
 
 impl GridKind {
-    /// The steps to the neighbours of a vertex, counter-clockwise on the print, starting along the
-    /// row.
+    /// Returns the steps to the neighbours of a vertex, counterclockwise on the print, starting along the row.
     pub const fn steps(self) -> &'static [Vertex] {
         match self {
             Self::Deltille => &Vertex::STEPS,
@@ -32,12 +31,12 @@ impl GridKind {
         }
     }
 
-    /// The neighbours of a vertex, counter-clockwise.
+    /// Returns the neighbours of a vertex, counterclockwise.
     pub fn neighbours(self, vertex: Vertex) -> impl Iterator<Item = Vertex> {
         self.steps().iter().map(move |&step| vertex + step)
     }
 
-    /// How many turns take a tile onto itself, which is also the number of its vertices.
+    /// Returns the number of rotations that map a tile onto itself, which is also the number of its vertices.
     pub const fn turns(self) -> u8 {
         match self {
             Self::Deltille => 3,
@@ -45,8 +44,8 @@ impl GridKind {
         }
     }
 
-    /// How many edge lengths, of 1 along an edge, are lost when all edges of a tile move inside by a
-    /// part of it (in tile coordinates, see [`Tile::frame`]): 1 − insets · part is left.
+    /// Returns the relative loss of edge length when all edges of a tile move inwards by a fraction `part` of it (in
+    /// tile coordinates, see [`Tile::frame`]): 1 − insets · part remains.
     pub const fn insets(self) -> f64 {
         match self {
             Self::Deltille => 3.0,
@@ -54,12 +53,12 @@ impl GridKind {
         }
     }
 
-    /// The middle of a tile in tile coordinates.
+    /// Returns the centre of a tile in tile coordinates.
     pub const fn middle(self) -> DVec2 {
         DVec2::splat(1.0 / self.insets())
     }
 
-    /// Position in the plane of a vertex, or of a place between vertices, in edges: x right, y up.
+    /// Returns the position in the plane of a vertex, or of a point between vertices, in edges: x right, y up.
     ///
     /// `x = col + row/2, y = row·√3/2` on a deltille grid, `x = col, y = row` on a checkerboard.
     pub fn position(self, row: f64, col: f64) -> DVec2 {
@@ -69,7 +68,7 @@ impl GridKind {
         }
     }
 
-    /// The tile at a position in the plane, in edges.
+    /// Returns the tile at a position in the plane, in edges.
     pub fn tile_at(self, DVec2 { x, y }: DVec2) -> Tile {
         let row = if self == Self::Deltille { y / ROW_HEIGHT } else { y };
         let col = if self == Self::Deltille { x - row / 2.0 } else { x };
@@ -81,7 +80,7 @@ impl GridKind {
         }
     }
 
-    /// The tile that carries the tag whose place is `anchor`.
+    /// Returns the tile that carries the tag at `anchor`.
     pub fn tag_tile(self, anchor: Vertex) -> Tile {
         match self {
             Self::Deltille => Tile::upright(anchor),
@@ -89,27 +88,27 @@ impl GridKind {
         }
     }
 
-    /// The tiles whose anchor is `vertex`: two triangles, or one square.
+    /// Returns the tiles whose anchor is `vertex`: two triangles, or one square.
     pub fn tiles_at(self, vertex: Vertex) -> impl Iterator<Item = Tile> {
         let second = (self == Self::Deltille).then_some(Tile::inverted(vertex));
         std::iter::once(self.tag_tile(vertex)).chain(second)
     }
 
-    /// The tiles that meet at `vertex`: three upright and three inverted ones, or four squares.
+    /// Returns the tiles that meet at `vertex`: three upright and three inverted ones, or four squares.
     pub fn tiles_around(self, vertex: Vertex) -> impl Iterator<Item = Tile> {
         let anchors = [(0, 0), (0, -1), (-1, 0), (-1, -1)].map(|(r, c)| vertex + Vertex::new(r, c));
         let tiles = anchors.into_iter().flat_map(move |anchor| self.tiles_at(anchor));
         tiles.filter(move |tile| tile.vertices().any(|v| v == vertex))
     }
 
-    /// The tiles whose first vertex is `vertex`. Of a set of vertices they are all tiles that have none but these, each
-    /// once; the anchor of an inverted triangle is none of its vertices.
+    /// Returns the tiles whose first vertex is `vertex`. For a set of vertices, these are all tiles with no other
+    /// vertices, each once. The anchor of an inverted triangle is not one of its vertices.
     pub fn tiles_from(self, vertex: Vertex) -> impl Iterator<Item = Tile> {
         self.tiles_around(vertex).filter(move |tile| tile.vertices().next() == Some(vertex))
     }
 }
 
-/// Which tile of those with the same anchor.
+/// The orientation of a tile among those with the same anchor.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Orientation {
@@ -131,32 +130,32 @@ pub enum Orientation {
 ///    (r,c) ·───────· (r,c+1)                       (r,c) ·───────· (r,c+1)
 /// ```
 ///
-/// The anchor of a triangle is the lower-left vertex of the rhombus that holds it.
+/// The anchor of a triangle is the lower-left vertex of the enclosing rhombus.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
 pub struct Tile {
-    /// The lower-left vertex of the square, or of the rhombus that holds the triangle.
+    /// Lower-left vertex of the square, or of the rhombus that encloses the triangle.
     pub anchor: Vertex,
-    /// Square, or which half of the rhombus.
+    /// Square, or the half of the rhombus.
     pub orientation: Orientation,
 }
 
 impl Tile {
-    /// The upright tile whose lower-left vertex is `anchor`.
+    /// Returns the upright tile whose lower-left vertex is `anchor`.
     pub const fn upright(anchor: Vertex) -> Self {
         Self { anchor, orientation: Orientation::Upright }
     }
 
-    /// The inverted tile of the rhombus at `anchor`.
+    /// Returns the inverted tile of the rhombus at `anchor`.
     pub const fn inverted(anchor: Vertex) -> Self {
         Self { anchor, orientation: Orientation::Inverted }
     }
 
-    /// The square whose lower-left vertex is `anchor`.
+    /// Returns the square whose lower-left vertex is `anchor`.
     pub const fn square(anchor: Vertex) -> Self {
         Self { anchor, orientation: Orientation::Square }
     }
 
-    /// The tiling that it is of.
+    /// Returns the tiling of the tile.
     pub fn kind(self) -> GridKind {
         match self.orientation {
             Orientation::Upright | Orientation::Inverted => GridKind::Deltille,
@@ -164,7 +163,7 @@ impl Tile {
         }
     }
 
-    /// Whether the tile is black on a board that is not inverted.
+    /// Returns whether the tile is black on a board that is not inverted.
     pub fn is_dark(self) -> bool {
         match self.orientation {
             Orientation::Upright => true,
@@ -173,7 +172,7 @@ impl Tile {
         }
     }
 
-    /// The corners A, B, C of a tag in the tile: a point has the tile coordinates (u, v) of
+    /// Returns the corners A, B, C of a tag in the tile: a point has the tile coordinates (u, v) of
     /// A + u·(B − A) + v·(C − A).
     ///
     /// An upright tile starts at its lower-left vertex, then lower right, then apex; an inverted
@@ -191,7 +190,7 @@ impl Tile {
         }
     }
 
-    /// The vertices, counter-clockwise on the print, from A on.
+    /// Returns the vertices, counterclockwise on the print, starting with A.
     pub fn vertices(self) -> impl Iterator<Item = Vertex> + Clone {
         let [a, b, c] = self.frame();
         let opposite = (self.orientation == Orientation::Square).then_some(b + c - a);
@@ -209,7 +208,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn each_tile_comes_from_one_of_its_vertices(row in -9..9, col in -9..9) {
+        fn each_tile_has_one_first_vertex(row in -9..9, col in -9..9) {
             for kind in KINDS {
                 for tile in kind.tiles_around(Vertex::new(row, col)) {
                     let from = tile.vertices().flat_map(|v| kind.tiles_from(v));

@@ -13,7 +13,7 @@ pub struct Vertex {
 }
 
 impl Vertex {
-    /// The steps to the six neighbours, counter-clockwise on the print, starting along the row.
+    /// Steps to the six neighbours, counterclockwise on the print, starting along the row.
     pub const STEPS: [Vertex; 6] = [
         Vertex::new(0, 1),
         Vertex::new(1, 0),
@@ -23,18 +23,18 @@ impl Vertex {
         Vertex::new(-1, 1),
     ];
 
-    /// The vertex at `row`, `col`.
+    /// Creates the vertex at `row`, `col`.
     pub const fn new(row: i32, col: i32) -> Self {
         Self { row, col }
     }
 
-    /// Position in the plane, in units of the edge length: x right, y up.
+    /// Returns the position in the plane, in units of the edge length: x right, y up.
     pub fn position(self) -> DVec2 {
         let (row, col) = (f64::from(self.row), f64::from(self.col));
         DVec2::new(col + 0.5 * row, row * ROW_HEIGHT)
     }
 
-    /// The six neighbours, counter-clockwise, starting along the row.
+    /// Returns the six neighbours, counterclockwise, starting along the row.
     pub fn neighbours(self) -> [Vertex; 6] {
         Self::STEPS.map(|step| self + step)
     }

@@ -1,29 +1,29 @@
-//! A picture as a file holds it: either depth, and what the file says beside its pixels.
+//! An image as stored in a file: its pixels in either depth, and its metadata.
 
 use serde::{Deserialize, Serialize};
 
 use super::Gray;
 
-/// What the file of a photograph says beside its pixels.
+/// Metadata of a photograph's file.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct FileNotes {
-    /// How EXIF says that the pixels are to be turned for a viewer, from 2 to 8; `None` if not at all.
+    /// EXIF orientation, from 2 to 8: how a viewer rotates or flips the pixels; `None` if they are shown unchanged.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub exif_orientation: Option<u8>,
-    /// Why some pixels do not come from the file.
+    /// Why some pixels do not come from the file, if it is damaged.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub damage: Option<String>,
 }
 
 impl FileNotes {
-    /// Whether there is nothing to say.
+    /// Returns whether there are no notes.
     pub fn is_empty(&self) -> bool {
         *self == Self::default()
     }
 }
 
-/// A grey image in the depth of its file.
+/// A grey image in the bit depth of its file.
 #[derive(Clone, Debug, PartialEq)]
 pub enum AnyGray {
     /// 8 bits.
@@ -33,7 +33,7 @@ pub enum AnyGray {
 }
 
 impl AnyGray {
-    /// Width in pixels.
+    /// Returns the width in pixels.
     pub fn width(&self) -> usize {
         match self {
             Self::U8(image) => image.width(),
@@ -41,7 +41,7 @@ impl AnyGray {
         }
     }
 
-    /// Height in pixels.
+    /// Returns the height in pixels.
     pub fn height(&self) -> usize {
         match self {
             Self::U8(image) => image.height(),

@@ -1,22 +1,22 @@
-//! Work on an image in bands of rows, which run side by side where there are threads.
+//! Processing of an image in bands of rows, in parallel if threads are available.
 //!
-//! How an image is divided depends on its size alone, never on the number of threads, so results
-//! are the same on any machine. Threads are those of the pool at hand (`rayon`).
+//! The bands depend only on the size of the image, never on the number of threads, so results are the same on any
+//! machine. The threads belong to the current `rayon` pool.
 
 use std::ops::Range;
 
 use rayon::prelude::*;
 
-/// Pixels of a band: milliseconds of work, against which handing it over is nothing. Pictures of up
-/// to so many are left whole: there usually are many of them to share between threads.
+/// Pixels per band: work of some milliseconds, compared with which scheduling costs nothing. Smaller images are not
+/// divided; usually there are many of them to share between threads.
 const BAND_PX: usize = 1 << 22;
 
-/// Rows of a band in an image of this width.
+/// Returns the number of rows of a band for an image of this width.
 fn band_rows(width: usize) -> usize {
     BAND_PX.div_ceil(width.max(1))
 }
 
-/// What `work` finds in bands of some rows of an image, in their order.
+/// Applies `work` to bands of rows and returns the results in order.
 pub fn bands<T: Send>(
     rows: Range<usize>,
     width: usize,
@@ -35,7 +35,7 @@ pub fn bands<T: Send>(
     found.into_iter().flatten().collect()
 }
 
-/// Lets `work` fill bands of an image's pixels; it is told the first row of each.
+/// Fills bands of an image's pixels with `work`, which receives the first row of each band.
 pub fn fill_bands<T: Send>(pixels: &mut [T], width: usize, work: impl Fn(usize, &mut [T]) + Sync) {
     let height = band_rows(width);
     if pixels.len() <= height * width {
@@ -50,7 +50,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn bands_hold_every_row_once_and_in_order() {
+    fn bands_cover_every_row_once_in_order() {
         for (rows, width) in [(3..3, 10), (0..5, 0), (2..2000, 1000), (0..5, 2 * BAND_PX)] {
             assert_eq!(bands(rows.clone(), width, |band| band.collect()), rows.collect::<Vec<_>>());
         }

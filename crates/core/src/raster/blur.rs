@@ -1,9 +1,9 @@
 use super::Gray;
 
-/// The kernel reaches this many standard deviations; beyond, a step of full scale leaves 6·10⁻⁵.
+/// Half-width of the kernel in standard deviations; beyond it, a step of full scale contributes 6·10⁻⁵.
 const REACH_SIGMAS: f64 = 4.0;
 
-/// Gaussian blur with standard deviation `sigma_px`, borders repeated; 0 leaves the image as it is.
+/// Applies a Gaussian blur with standard deviation `sigma_px` and repeated borders; 0 leaves the image unchanged.
 pub fn gaussian(image: &Gray<f32>, sigma_px: f64) -> Gray<f32> {
     let (width, height) = (image.width(), image.height());
     if sigma_px <= 0.0 || width == 0 || height == 0 {
@@ -58,7 +58,7 @@ mod tests {
     }
 
     #[test]
-    fn no_blur_and_no_image_are_fine() {
+    fn zero_blur_and_empty_images_are_accepted() {
         let image = Gray::from_fn(3, 3, |x, y| (x + y) as f32);
         assert_eq!(gaussian(&image, 0.0), image);
         assert_eq!(gaussian(&Gray::new(0, 0), 1.0), Gray::new(0, 0));

@@ -2,27 +2,27 @@ use glam::DVec2;
 
 use super::Gray;
 
-/// Sums polygons into an image by the exact area that each pixel shares with them.
+/// Accumulates polygons in an image by the exact area that each pixel shares with them.
 ///
-/// Every polygon edge adds its signed area to the pixels it crosses and, through the running sum
-/// along the row, to all pixels to its right; the result of [`Self::finish`] is exact up to
-/// rounding. Pixels are unit squares around integer coordinates. Polygons may leave the image.
+/// Every polygon edge adds its signed area to the pixels it crosses. A running sum along the row adds it to all
+/// pixels to its right. The result of [`Self::finish`] is exact up to rounding. Pixels are unit squares around
+/// integer coordinates. Polygons may extend beyond the image.
 #[derive(Clone, Debug)]
 pub struct Coverage {
     width: usize,
     height: usize,
-    /// Differences along the rows: one extra column takes what falls off to the right.
+    /// Differences along the rows; an extra column collects the contribution beyond the right border.
     steps: Vec<f32>,
 }
 
 impl Coverage {
-    /// An empty image.
+    /// Creates an empty image.
     pub fn new(width: usize, height: usize) -> Self {
         Self { width, height, steps: vec![0.0; (width + 1) * height] }
     }
 
-    /// Adds `value` times the area of a closed polygon; area counts positive where the outline
-    /// runs clockwise on the screen (y down), so holes run the other way.
+    /// Adds `value` times the area of a closed polygon. The area is positive if the outline runs clockwise on the
+    /// screen (y down), so holes run counterclockwise.
     pub fn add(&mut self, polygon: &[DVec2], value: f64) {
         for (i, &from) in polygon.iter().enumerate() {
             self.add_edge(from, polygon[(i + 1) % polygon.len()], value);
@@ -31,9 +31,9 @@ impl Coverage {
 
     /// Adds the area to the right of an edge.
     fn add_edge(&mut self, from: DVec2, to: DVec2, value: f64) {
-        // From here on pixel (i, j) is the square from (i, j) to (i+1, j+1).
+        // From here on, pixel (i, j) is the square from (i, j) to (i+1, j+1).
         let (from, to) = (from + 0.5, to + 0.5);
-        // Going up the screen with the inside on the right is positive for a clockwise outline.
+        // An upward edge with the inside on its right is positive for a clockwise outline.
         let (sign, upper, lower) = if from.y > to.y { (1.0, to, from) } else { (-1.0, from, to) };
         if upper.y == lower.y {
             return;
@@ -52,8 +52,7 @@ impl Coverage {
         }
     }
 
-    /// Adds the area to the right of an edge within one row, where it runs between two abscissas;
-    /// `weight` is value times height.
+    /// Adds the area to the right of an edge within one row, between two abscissas; `weight` is value times height.
     fn add_in_row(&mut self, row: usize, [a, b]: [f64; 2], weight: f64) {
         let width = self.width as f64;
         let (left, right) = (a.min(b), a.max(b));
@@ -67,14 +66,14 @@ impl Coverage {
         }
         let length = right - left;
         if left.max(0.0).floor() == right.min(width).floor() && left >= 0.0 && right < width {
-            // Within one pixel: the mean abscissa decides.
+            // Within one pixel, the mean abscissa determines the area.
             let column = left as usize;
             let inside = (column + 1) as f64 - 0.5 * (left + right);
             steps[column] += (weight * inside) as f32;
             steps[column + 1] += (weight * (1.0 - inside)) as f32;
             return;
         }
-        // Cut into pieces within pixels; what lies left of the image counts in full from column 0.
+        // Split at pixel boundaries. The part left of the image counts in full from column 0.
         if left < 0.0 {
             steps[0] += (weight * (-left / length)) as f32;
         }
@@ -91,7 +90,7 @@ impl Coverage {
         }
     }
 
-    /// The image: in every pixel the sum of values times areas.
+    /// Returns the image: the sum of values times areas in every pixel.
     pub fn finish(self) -> Gray<f32> {
         let Self { width, height, steps } = self;
         let mut image = Gray::new(width, height);
@@ -129,7 +128,7 @@ mod tests {
             prop_assert!((total - area(&[a, b, c])).abs() < 1e-4);
         }
 
-        /// A triangle that leaves the image shows the same part as on a larger canvas.
+        /// A triangle that extends beyond the image gives the same part as on a larger canvas.
         #[test]
         fn clipping_changes_nothing_inside(a in point(30.0), b in point(30.0), c in point(30.0)) {
             let mut small = Coverage::new(17, 17);
@@ -146,7 +145,7 @@ mod tests {
     }
 
     #[test]
-    fn a_square_covers_its_pixels_by_parts() {
+    fn a_square_covers_fractions_of_its_pixels() {
         let mut coverage = Coverage::new(4, 3);
         let square = [(0.75, 0.5), (2.5, 0.5), (2.5, 1.5), (0.75, 1.5)].map(DVec2::from);
         coverage.add(&square, 2.0);

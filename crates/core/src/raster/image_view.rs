@@ -1,15 +1,15 @@
-//! Images of any depth that somebody else holds.
+//! Borrowed images of any depth.
 
 use multiversion::multiversion;
 
 use super::{AnyGray, Gray, Intensity, View};
 
-/// A grey image of any depth that somebody else holds: what detectors and refiners take.
+/// A borrowed grey image of any depth: the input of detectors and refiners.
 ///
 /// ```
 /// use deltille_core::raster::{ImageView, View};
 ///
-/// // The left half of a picture of 640 × 480 pixels, without a copy.
+/// The left half of an image of 640 × 480 pixels, without a copy.
 /// let pixels = vec![0u8; 640 * 480];
 /// let half = ImageView::from(View::new(320, 480, 640, &pixels).expect("enough pixels"));
 /// assert_eq!((half.width(), half.height()), (320, 480));
@@ -26,7 +26,7 @@ pub enum ImageView<'a> {
     F32(View<'a, f32>),
 }
 
-/// What holds for a view of any depth.
+/// Applies an expression to a view of any depth.
 #[doc(hidden)]
 #[macro_export]
 macro_rules! of_any {
@@ -42,19 +42,19 @@ macro_rules! of_any {
 pub use of_any;
 
 impl ImageView<'_> {
-    /// Width in pixels.
+    /// Returns the width in pixels.
     #[inline]
     pub fn width(&self) -> usize {
         of_any!(self, view => view.width())
     }
 
-    /// Height in pixels.
+    /// Returns the height in pixels.
     #[inline]
     pub fn height(&self) -> usize {
         of_any!(self, view => view.height())
     }
 
-    /// The value of white.
+    /// Returns the value of white.
     pub fn full_scale(&self) -> f32 {
         fn of<T: Intensity>(_: &View<T>) -> f32 {
             T::FULL_SCALE
@@ -62,19 +62,19 @@ impl ImageView<'_> {
         of_any!(self, view => of(view))
     }
 
-    /// Bilinear interpolation at (x, y); positions outside take the nearest border value. An empty image reads 0.
+    /// Interpolates bilinearly at (x, y); positions outside get the nearest border value. An empty image gives 0.
     #[inline]
     pub fn bilinear(&self, x: f64, y: f64) -> f32 {
         of_any!(self, view => view.bilinear(x, y))
     }
 
-    /// [`Self::bilinear`] of a place that is known to lie in the image, less its last row and column.
+    /// [`Self::bilinear`] for a position known to lie in the image, excluding its last row and column.
     #[inline]
     pub fn bilinear_inside(&self, x: f64, y: f64) -> f64 {
         of_any!(self, view => view.bilinear_inside(x, y))
     }
 
-    /// Takes pixels of row `y` from `x` on, white being 1; `None` where they do not lie in the image.
+    /// Reads pixels of row `y` from `x` on, scaled so that white is 1; `None` if they exceed the image.
     pub fn read_row(&self, x: usize, y: usize, out: &mut [f32]) -> Option<()> {
         fn read<T: Intensity>(view: &View<T>, x: usize, y: usize, out: &mut [f32]) -> Option<()> {
             let shown = (y < view.height()).then(|| view.row(y).get(x..x + out.len()))??;
@@ -85,7 +85,7 @@ impl ImageView<'_> {
     }
 }
 
-/// Pixels as floats, white being 1.
+/// Converts pixels to floats, scaled so that white is 1.
 #[multiversion(targets("x86_64+avx2"))]
 fn to_white_as_one<T: Intensity>(pixels: &[T], out: &mut [f32]) {
     let to_one = 1.0 / T::FULL_SCALE;
@@ -126,7 +126,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn rows_may_lie_apart_but_not_overlap_or_end_early() {
+    fn views_need_disjoint_complete_rows() {
         let pixels: Vec<u8> = (0..20).collect();
         let view = View::new(3, 3, 7, &pixels).unwrap();
         assert_eq!(view.row(2), [14, 15, 16]);

@@ -1,17 +1,17 @@
 //! Pixel types.
 
-/// Full scale of a pyramid's pixels: 10 bits leave room for sums of a dozen in 16-bit arithmetic.
+/// Full scale of a pyramid's pixels: 10 bits leave room for sums of a dozen values in 16-bit arithmetic.
 pub const PYRAMID_FULL_SCALE: f32 = 1023.0;
 
 /// A pixel type: 8 or 16 bits, signed for intermediate results, or a float.
 pub trait Intensity: Copy + Default + Send + Sync + PartialOrd + 'static {
-    /// The value of white: 255, 65535, of a pyramid's levels 1023, or 1.
+    /// Value of white: 255, 65535, 1023 for pyramid levels, or 1.
     const FULL_SCALE: f32;
 
-    /// The value as a float, in the type's own units.
+    /// Returns the value as a float, in units of the type.
     fn to_f32(self) -> f32;
 
-    /// Pixels as bytes, if that is what they are: what works on bytes is faster.
+    /// Returns the pixels as bytes if they are bytes, for faster algorithms.
     fn as_bytes(_pixels: &[Self]) -> Option<&[u8]> {
         None
     }

@@ -5,11 +5,12 @@ use super::Gray;
 /// Weights of red, green and blue (Rec. 709), in ten-thousandths.
 const WEIGHTS: [u32; 3] = [2126, 7152, 722];
 
-/// Their sum.
+/// Sum of the weights.
 const WHOLE: u32 = 10_000;
 
-/// Grey values of pixels of so many bytes, whose first three are red, green and blue, as of a video: those that a photograph of
-/// these colours has, to one of the 256. `None` where these are not as many bytes as width and height say.
+/// Converts colours to grey values. Each pixel has `BYTES` bytes, of which the first three are red, green and blue,
+/// for example of a video. The values equal those of a photograph with these colours, within 1 of 256 levels. Returns
+/// `None` if the number of bytes does not match the width and height.
 ///
 /// ```
 /// use deltille_core::raster::grey_of_colours;

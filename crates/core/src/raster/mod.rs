@@ -1,8 +1,8 @@
 //! Grey images: pixel types, views, pyramids, blur and exact area coverage.
 //!
-//! 1. `intensity`: pixel types; `gray`: an image of one, `any_gray`: of 8 or 16 bits, as files have it;
-//! 2. `view`: pixels that somebody else holds, `image_view`: of any type; `luma`: grey values of colours;
-//! 3. `pyramid`: smaller copies; `blur`; `bands`: work on rows in parallel;
+//! 1. `intensity`: pixel types; `gray`: an image of one type, `any_gray`: of 8 or 16 bits, as in files;
+//! 2. `view`: borrowed pixels, `image_view`: of any type; `luma`: grey values of colours;
+//! 3. `pyramid`: smaller copies; `blur`; `bands`: parallel processing of rows;
 //! 4. `coverage`: the exact area of outlines in every pixel.
 //!
 //! Row-major, y down, pixel centres at integer coordinates.

@@ -5,17 +5,17 @@ use multiversion::multiversion;
 
 use super::{Gray, ImageView, Intensity, PYRAMID_FULL_SCALE, View, fill_bands, of_any};
 
-/// Smoothed copies of an image, each half the size of the one before.
+/// Smoothed copies of an image, each half the size of the previous one.
 ///
-/// Level 0 is the image under a 3×3 binomial, level n+1 the 2×2 mean of level n; all in 10 bits.
-/// Pixel x of level n+1 covers pixels 2x and 2x+1, so `x_n = 2·x_{n+1} + 0.5`.
+/// Level 0 is the image filtered with a 3×3 binomial; level n+1 is the 2×2 mean of level n. All have 10 bits. Pixel x
+/// of level n+1 covers pixels 2x and 2x+1, so `x_n = 2·x_{n+1} + 0.5`.
 #[derive(Clone, Debug)]
 pub struct Pyramid<'a> {
     levels: Cow<'a, [Gray<i16>]>,
 }
 
 impl Pyramid<'_> {
-    /// At most `count` levels; stops before a side would fall under `min_side` pixels.
+    /// Computes at most `count` levels; stops before a side falls below `min_side` pixels.
     pub fn new<'a>(
         image: impl Into<ImageView<'a>>,
         count: usize,
@@ -33,30 +33,30 @@ impl Pyramid<'_> {
         Pyramid { levels: Cow::Owned(levels) }
     }
 
-    /// The levels from one on, which becomes level 0 of it; the coarsest is always there.
+    /// Returns a pyramid that starts at `level`, which becomes its level 0. It contains at least the coarsest level.
     pub fn from_level(&self, level: usize) -> Pyramid<'_> {
         Pyramid { levels: Cow::Borrowed(&self.levels[level.min(self.levels.len() - 1)..]) }
     }
 
-    /// The levels, finest first; never empty.
+    /// Returns the levels, finest first; never empty.
     pub fn levels(&self) -> &[Gray<i16>] {
         &self.levels
     }
 
-    /// Position in level 0 of a position in `level`, px.
+    /// Converts a position in `level` to level 0, px.
     pub fn to_level_0(level: usize, place: DVec2) -> DVec2 {
         let scale = f64::from(1u32 << level);
         (place + 0.5) * scale - 0.5
     }
 
-    /// Position in `level` of a position in level 0, px.
+    /// Converts a position in level 0 to `level`, px.
     pub fn from_level_0(level: usize, place: DVec2) -> DVec2 {
         let scale = f64::from(1u32 << level);
         (place + 0.5) / scale - 0.5
     }
 }
 
-/// The 3×3 binomial (1 2 1)ᵀ(1 2 1)/16, borders repeated, in 10 bits.
+/// Filters with the 3×3 binomial (1 2 1)ᵀ(1 2 1)/16 with repeated borders; the result has 10 bits.
 fn binomial<T: Intensity>(image: View<T>) -> Gray<i16> {
     let (width, height) = (image.width(), image.height());
     let mut out = Gray::new(width, height);
@@ -79,7 +79,7 @@ fn binomial<T: Intensity>(image: View<T>) -> Gray<i16> {
     out
 }
 
-/// The binomial of a row of bytes, by additions alone. Of a sum S, at most 16 · 255,
+/// Filters a row of bytes with the binomial, by additions alone. For a sum S of at most 16 · 255,
 ///
 /// ```text
 ///     1023/4080 S = (S + S/340) / 4        S/340 = 771 (S + 1)/2¹⁸ for whole numbers
@@ -100,14 +100,14 @@ fn binomial_row_of_bytes(rows: [&[u8]; 3], columns: &mut [u16], out: &mut [i16])
     }
 }
 
-/// Such a sum in 10 bits, rounded.
+/// Converts such a sum to 10 bits, rounded.
 #[inline(always)]
 fn bytes_to_10_bits(sum: u16) -> i16 {
     let part = ((u32::from(sum + 1) * 771) >> 16) as u16 >> 2;
     ((sum + part + 2) >> 2) as i16
 }
 
-/// 1.5·2²³: a float of this size has no bits behind the point.
+/// 1.5·2²³: floats of this size have no fractional bits.
 const ROUND: f32 = 12_582_912.0;
 
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
@@ -124,12 +124,13 @@ fn binomial_row<T: Intensity>(rows: [&[T]; 3], columns: &mut [f32], out: &mut [i
     let [left, centre, right] = [0, 1, 2].map(|shift| &columns[shift..shift + width]);
     for x in 0..width {
         let sum = left[x] + 2.0 * centre[x] + right[x];
-        // Rounded to the low bits of the sum: cheaper than a conversion that looks for NaN.
+        // Takes the rounded integer from the low bits of the sum, which is cheaper than a conversion that checks for
+        // NaN.
         out[x] = (sum * to_10_bits + ROUND).to_bits() as i16;
     }
 }
 
-/// The mean of each 2×2 block; an odd last row or column is dropped.
+/// Computes the mean of each 2×2 block; drops an odd last row or column.
 fn half(image: &Gray<i16>) -> Gray<i16> {
     let (width, height) = (image.width() / 2, image.height() / 2);
     let mut out = Gray::new(width, height);
@@ -170,7 +171,7 @@ mod tests {
             let exact = (2 * u32::from(sum) * 1023 + 4080) / (2 * 4080);
             assert_eq!(bytes_to_10_bits(sum) as u32, exact);
         }
-        // The same picture in 16 bits, rounded to even numbers where the sum lies half-way.
+        // The same image in 16 bits, with ties rounded to even.
         let bytes = Gray::from_fn(67, 41, |x, y| ((x * x * 31 + y * y * 17 + x * y) % 256) as u8);
         let words = bytes.map(|v| 257 * u16::from(v));
         let (fast, general) = (binomial(bytes.view()), binomial(words.view()));
@@ -180,7 +181,7 @@ mod tests {
     }
 
     #[test]
-    fn a_ramp_keeps_its_place() {
+    fn a_ramp_keeps_its_position() {
         let ramp = Gray::from_fn(64, 64, |x, _| (4 * x) as u8);
         let pyramid = Pyramid::new(&ramp, 3, 8);
         for (n, level) in pyramid.levels().iter().enumerate() {

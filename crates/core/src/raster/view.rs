@@ -1,8 +1,8 @@
-//! Images that somebody else holds.
+//! Borrowed images.
 
 use super::Intensity;
 
-/// A part of memory as a grey image, row-major: rows of `width` pixels that begin `stride` pixels apart.
+/// A part of memory as a grey image, row-major: rows of `width` pixels that start `stride` pixels apart.
 #[derive(Clone, Copy, Debug)]
 pub struct View<'a, T> {
     width: usize,
@@ -12,8 +12,8 @@ pub struct View<'a, T> {
 }
 
 impl<'a, T: Intensity> View<'a, T> {
-    /// `height` rows of `width` pixels, which begin `stride` pixels apart; `None` where these are not so many, or rows
-    /// overlap.
+    /// Creates a view of `height` rows of `width` pixels that start `stride` pixels apart. Returns `None` if there
+    /// are too few pixels or rows overlap.
     pub fn new(width: usize, height: usize, stride: usize, pixels: &'a [T]) -> Option<Self> {
         let before = height.saturating_sub(1).checked_mul(stride)?;
         let needed = if height == 0 { 0 } else { before.checked_add(width)? };
@@ -21,40 +21,40 @@ impl<'a, T: Intensity> View<'a, T> {
         fits.then_some(Self { width, height, stride, pixels })
     }
 
-    /// An image, all of whose pixels are there, without a gap between the rows.
+    /// Creates a view of an image with all pixels and no gap between the rows.
     #[inline]
     pub(super) fn of(width: usize, height: usize, pixels: &'a [T]) -> Self {
         debug_assert_eq!(pixels.len(), width * height);
         Self { width, height, stride: width, pixels }
     }
 
-    /// Width in pixels.
+    /// Returns the width in pixels.
     #[inline]
     pub fn width(&self) -> usize {
         self.width
     }
 
-    /// Height in pixels.
+    /// Returns the height in pixels.
     #[inline]
     pub fn height(&self) -> usize {
         self.height
     }
 
-    /// One row.
+    /// Returns one row.
     #[inline]
     pub fn row(&self, y: usize) -> &'a [T] {
         &self.pixels[y * self.stride..y * self.stride + self.width]
     }
 
-    /// The pixel at (x, y), which must lie in the image.
+    /// Returns the pixel at (x, y), which must lie in the image.
     #[inline]
     pub fn at(&self, x: usize, y: usize) -> T {
         self.pixels[y * self.stride + x]
     }
 
-    /// Bilinear interpolation at (x, y); positions outside take the nearest border value.
+    /// Interpolates bilinearly at (x, y); positions outside get the nearest border value.
     ///
-    /// An empty image reads 0.
+    /// An empty image gives 0.
     #[inline]
     pub fn bilinear(&self, x: f64, y: f64) -> f32 {
         let inside =
@@ -81,10 +81,10 @@ impl<'a, T: Intensity> View<'a, T> {
         upper * (1.0 - fy) + lower * fy
     }
 
-    /// [`Self::bilinear`] of a place that is known to lie in the image, less its last row and column.
+    /// [`Self::bilinear`] for a position known to lie in the image, excluding its last row and column.
     #[inline(always)]
     pub fn bilinear_inside(&self, x: f64, y: f64) -> f64 {
-        // By way of signed numbers, which processors convert at once.
+        // Processors convert signed numbers directly, unlike unsigned ones.
         let (left, top) = (x as i32, y as i32);
         let (fx, fy) = ((x - f64::from(left)) as f32, (y - f64::from(top)) as f32);
         let first = top as usize * self.stride + left as usize;

@@ -1,7 +1,7 @@
-//! Whether a target file says the same twice: its specification is enough to make its panels, and these stand beside it.
+//! Consistency of a target file: its specification determines its panels, and the file also contains the panels.
 //!
-//! What follows from nothing else in the file is left to the comparison with what was made: sheets, what is printed on them,
-//! the finish, and of a solid the walls of its skeleton. A spacing of tags may be another one that has the same tags.
+//! Other contents are checked against the made target: the sheets, the content printed on them, the finish, and the
+//! skeleton walls of a solid. The spacing of tags may differ if it gives the same tags.
 
 use super::error::{Problem, problem};
 use super::identity::fingerprint;
@@ -12,28 +12,28 @@ use crate::targets::{
     Corner, FamilyRef, Fingerprint, Panel, PanelPose, TagPlacement, Target, TargetSpec,
 };
 
-/// How far an edge may be from that of the spec, mm: what written digits leave.
+/// Tolerance of an edge, mm: the rounding of written digits.
 const SPEC_SLACK_MM: f64 = 1e-6;
 
-/// How far a corner or a panel may be from its place in the plan, mm: what three written digits leave, and a twentieth of
-/// what is noticed in print.
+/// Tolerance of the position of a corner or panel, mm: the rounding of three written digits, and a twentieth of the
+/// smallest noticeable print error.
 const PLACE_SLACK_MM: f64 = 1e-3;
 
-/// How far the rotation of a panel may be from that in the plan: what six written digits leave.
+/// Tolerance of the rotation of a panel: the rounding of six written digits.
 const ROTATION_SLACK: f64 = 1e-6;
 
-/// Compares the panels with those that the spec makes: a file in which one of them was changed
-/// contradicts itself. Poses may differ once some were measured, and so may measured positions.
+/// Compares the panels with those of the spec: a file in which one of them was changed contradicts itself. Poses and
+/// corner positions may differ if some were measured.
 ///
 /// # Errors
-/// The field at fault, and what is wrong with it.
+/// Returns the invalid field and its problem.
 pub(super) fn check(target: &Target) -> Result<(), Problem> {
     let Some((made, tagged)) = made(&target.spec)? else { return Ok(()) };
     check_families(target)?;
-    // Those that were held where the plan has them have no covariance beside others that have.
+    // Panels that were fixed at their planned pose have no covariance, although refined ones have.
     let is_refined = target.panels.iter().any(|panel| panel.pose.covariance.is_some());
     let differs = |field: String, found: &dyn std::fmt::Display, made: &dyn std::fmt::Display| {
-        problem(field, format!("it is {found}, but that of `spec` has {made}"))
+        problem(field, format!("it is {found}, but `spec` gives {made}"))
     };
     let near = |a: Option<f64>, b: Option<f64>| match (a, b) {
         (Some(a), Some(b)) => (a - b).abs() <= SPEC_SLACK_MM,
@@ -43,7 +43,7 @@ pub(super) fn check(target: &Target) -> Result<(), Problem> {
         return differs("panels.length".to_owned(), &target.panels.len(), &made.len());
     }
     if target.family.is_some() != tagged {
-        return problem("family", "it must be there if, and only if, `spec.tags` is");
+        return problem("family", "it must be present if, and only if, `spec.tags` is");
     }
     for (p, (panel, made)) in target.panels.iter().zip(&made).enumerate() {
         let field = |key: &str| format!("panels[{p}].{key}");
@@ -67,10 +67,11 @@ pub(super) fn check(target: &Target) -> Result<(), Problem> {
             ("matrix", panel.matrix == made.matrix),
         ];
         if let Some((key, _)) = plain.iter().find(|(_, same)| !same) {
-            return problem(field(key), "it is not that of `spec`");
+            return problem(field(key), "it does not match `spec`");
         }
         if !is_refined && !is_same_place(&panel.pose, &made.pose) {
-            let what = "it is not that of `spec`, and none was measured: there is no `covariance`";
+            let what =
+                "it does not match `spec`, and no pose was measured (there is no `covariance`)";
             return problem(field("pose"), what);
         }
         if panel.corners.len() != made.corners.len() {
@@ -110,8 +111,8 @@ pub(super) fn check(target: &Target) -> Result<(), Problem> {
     Ok(())
 }
 
-/// Whether this may be the fingerprint of the print of which the target was measured or refined: that of its own panels
-/// without what was measured, or that of its spec.
+/// Returns whether `plan` may be the fingerprint of the print that was measured or refined: that of the target's
+/// panels without the measured values, or that of its spec.
 pub(super) fn may_be_of_print(target: &Target, plan: Fingerprint) -> Result<bool, Problem> {
     let mut panels = target.panels.clone();
     for corner in panels.iter_mut().flat_map(|panel| &mut panel.corners) {
@@ -123,7 +124,7 @@ pub(super) fn may_be_of_print(target: &Target, plan: Fingerprint) -> Result<bool
     Ok(fingerprint(&panels, family) == plan || of_spec.map_or(is_refined, |own| own == plan))
 }
 
-/// The panels that a spec makes, and whether they have tags; `None` where it lists what a file of another program has.
+/// Makes the panels of a spec, and whether they have tags; `None` if the spec is a list from another program.
 fn made(spec: &TargetSpec) -> Result<Option<(Vec<Panel>, bool)>, Problem> {
     let (made, tagged) = match spec {
         TargetSpec::Board(spec) => {
@@ -140,14 +141,14 @@ fn made(spec: &TargetSpec) -> Result<Option<(Vec<Panel>, bool)>, Problem> {
     Ok(Some((made, tagged)))
 }
 
-/// Whether a panel is where it is in the plan.
+/// Returns whether a panel has its planned pose.
 fn is_same_place(found: &PanelPose, made: &PanelPose) -> bool {
     let turned = found.rotation.iter().zip(&made.rotation).map(|(a, b)| (a - b).abs());
     found.translation_mm.distance(made.translation_mm) <= PLACE_SLACK_MM
         && turned.fold(0.0, f64::max) <= ROTATION_SLACK
 }
 
-/// Compares the families with those that the spec names. It may name a file, which says nothing of the family in it.
+/// Compares the families with those in the spec. If the spec names a file, the family in it is unknown.
 fn check_families(target: &Target) -> Result<(), Problem> {
     let families = match &target.spec {
         TargetSpec::Board(spec) => spec.tags.as_ref().map(|tags| ("tags.family", &tags.family)),
@@ -182,7 +183,7 @@ mod tests {
     use crate::family::Family;
     use crate::targets::{BoardSpec, SolidShape, SolidSpec};
 
-    /// What is said of a file in which something of a target was changed.
+    /// Returns the error of a target file after a change of the target.
     fn said<S: Into<TargetSpec>>(spec: S, change: impl Fn(&mut Target)) -> Option<String> {
         let spec = spec.into();
         let family = Family::shipped("delTag25h7").unwrap();
@@ -192,7 +193,7 @@ mod tests {
     }
 
     #[test]
-    fn a_file_that_contradicts_its_spec_is_refused() {
+    fn files_contradicting_their_spec_are_rejected() {
         let edit = |change: fn(&mut Target)| said(BoardSpec::deltille(4, 4, 20.0), change).unwrap();
         fn spec(target: &mut Target) -> &mut BoardSpec {
             let TargetSpec::Board(spec) = &mut target.spec else { panic!("a board") };
@@ -221,7 +222,7 @@ mod tests {
     }
 
     #[test]
-    fn panels_are_where_the_spec_has_them_unless_some_were_measured() {
+    fn unmeasured_panels_must_match_their_spec() {
         let two = BoardSpec { two_sided_mm: Some(3.0), ..BoardSpec::deltille(4, 4, 20.0) };
         let thicker = |target: &mut Target| match &mut target.spec {
             TargetSpec::Board(spec) => spec.two_sided_mm = Some(3.002),
@@ -251,7 +252,7 @@ mod tests {
     }
 
     #[test]
-    fn written_digits_are_not_noticed() {
+    fn rounding_of_written_digits_is_accepted() {
         let rounded = |target: &mut Target| {
             for corner in target.panels.iter_mut().flat_map(|panel| &mut panel.corners) {
                 corner.panel_mm = (corner.panel_mm * 1e3).round() / 1e3;

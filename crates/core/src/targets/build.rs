@@ -10,10 +10,11 @@ use crate::targets::{
 };
 
 impl Target {
-    /// Makes what `spec` asks for with a family that is shipped.
+    /// Makes a target from `spec` with a shipped family.
     ///
     /// # Errors
-    /// Where the name is no file name, a number is out of its range, or the family is not shipped or has too few codes.
+    /// Returns an error if the name is not a file name, a number is out of its range, or the family is not shipped or
+    /// has too few codes.
     ///
     /// ```
     /// use deltille_core::targets::{BoardSpec, Target};
@@ -27,10 +28,11 @@ impl Target {
         Self::build(name, &spec, shipped_family(&spec)?.as_ref())
     }
 
-    /// Makes what `spec` asks for. `family` holds the codes of the tags; an untagged target needs none.
+    /// Makes a target from `spec`. `family` contains the codes of the tags; an untagged target needs none.
     ///
     /// # Errors
-    /// Where a number is out of its range, or the family is another one or has too few codes.
+    /// Returns an error if a number is out of its range, or `family` is not the one that `spec` names or has too few
+    /// codes.
     pub fn build(
         name: &str,
         spec: &TargetSpec,
@@ -64,10 +66,10 @@ impl Target {
         Ok(Target { name, spec: spec.clone(), family, panels, plan: None, codes })
     }
 
-    /// A target of which only the corners are known, from a list of them.
+    /// Makes a target of which only the corners are known, from a list of them.
     ///
     /// # Errors
-    /// The field at fault, and what is wrong with it.
+    /// Returns the invalid field and its problem.
     #[doc(hidden)]
     pub fn listed(
         name: Name,
@@ -82,11 +84,11 @@ impl Target {
         Ok(target)
     }
 
-    /// Checks that this target can be used together with another one: no tag of the same family
-    /// and no board has the same id.
+    /// Checks that this target can be used together with another one: no two tags of the same family and no two
+    /// boards have the same id.
     ///
     /// # Errors
-    /// The ids that both have, and the first that is free.
+    /// Returns an error with the shared ids and the first free one.
     pub fn check_beside(&self, other: &Target) -> Result<(), TargetError> {
         let overlap = |setting, what, own: &[u32], others: &[u32]| {
             let (Some([first, last]), Some([_, high])) = (range(own), range(others)) else {
@@ -103,7 +105,7 @@ impl Target {
             if let (Some((family, ids)), Some((same, others))) =
                 (self.tags_of_tiling(kind), other.tags_of_tiling(kind))
                 && family.name == same.name
-                // Place codes follow from the ids of boards.
+                // The codes of a place family follow from the ids of boards.
                 && family.name != places::NAME
             {
                 let settings = TagSettings::of(kind, self.tilings().count() > 1);
@@ -118,10 +120,10 @@ impl Target {
     }
 }
 
-/// The shipped family that a spec names; `None` without tags.
+/// Returns the shipped family that a spec names; `None` without tags.
 ///
 /// # Errors
-/// Where a family that it names is not shipped.
+/// Returns an error if the named family is not shipped.
 pub fn shipped_family(spec: &TargetSpec) -> Result<Option<Family>, TargetError> {
     let shipped = |name: Option<&str>| name.map(Family::shipped).transpose();
     let family = shipped(spec.family())
@@ -129,14 +131,16 @@ pub fn shipped_family(spec: &TargetSpec) -> Result<Option<Family>, TargetError> 
     family.map_err(|error| TargetError::UnknownFamily(error.to_string()))
 }
 
-/// The family of tags that are asked for.
+/// Returns the family of the requested tags.
 fn needed<'a>(family: Option<&'a Family>, wanted: &str) -> Result<&'a Family, TargetError> {
-    let none =
-        || TargetError::Family { wanted: wanted.to_owned(), given: "none is given".to_owned() };
+    let none = || TargetError::Family {
+        wanted: wanted.to_owned(),
+        given: "but no family was given".to_owned(),
+    };
     family.ok_or_else(none)
 }
 
-/// Lowest and highest of some ids.
+/// Returns the lowest and highest id.
 fn range(ids: &[u32]) -> Option<[u32; 2]> {
     Some([*ids.iter().min()?, *ids.iter().max()?])
 }

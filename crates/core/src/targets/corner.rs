@@ -1,4 +1,4 @@
-//! A corner of a panel, and where it was measured.
+//! A corner of a panel and its measured position.
 
 use glam::{DVec2, DVec3};
 use serde::{Deserialize, Serialize};
@@ -23,29 +23,28 @@ pub struct Corner {
     /// Position in the target frame, mm.
     #[serde(deserialize_with = "quantity::place_mm::de")]
     pub target_mm: DVec3,
-    /// Where it is on the target that was made, where that was measured. The positions above are those of
-    /// the plan.
+    /// Measured position on the physical target, if available. The positions above are the planned ones.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub measured: Option<MeasuredPlace>,
 }
 
 impl Corner {
-    /// How far from its place in the plan it is, in the panel frame, mm; zero where that was not measured.
+    /// Returns the measured offset from the planned position in the panel frame, mm; zero if not measured.
     pub fn offset_mm(&self) -> DVec3 {
         self.measured.map_or(DVec3::ZERO, |place| place.offset_mm)
     }
 }
 
-/// Where a corner of a target that was made is, as the views of a calibration have it.
+/// Measured position of a corner of a physical target, estimated from the views of a calibration.
 ///
-/// Offsets are relative to the plan where it fits the corners best, in any place and turn and at any scale.
+/// Offsets are relative to the plan after it was fitted to the corners by position, rotation and scale.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct MeasuredPlace {
     /// Offset from the plan, along the axes of the panel frame, mm.
     #[serde(deserialize_with = "quantity::place_mm::de")]
     pub offset_mm: DVec3,
-    /// Covariance of that, mm²: xx, xy, xz, yy, yz, zz.
+    /// Covariance of the offset, mm²: xx, xy, xz, yy, yz, zz.
     #[serde(deserialize_with = "quantity::figure::de")]
     pub covariance_mm2: [f64; 6],
 }

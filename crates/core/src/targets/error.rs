@@ -3,41 +3,41 @@ use crate::setting::Setting::{
     self, BoardCols, BoardEdgeMm, BoardRows, PaperMarginMm, PaperPoster, PaperSize, TagFamily,
 };
 
-/// Why a target cannot be made. Messages name the setting to change, such as `BoardSpec::rows`.
+/// Why a target cannot be made. Messages name the setting to change, for example `BoardSpec::rows`.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum TargetError {
-    /// A family that is not shipped, and which are.
+    /// The family is not shipped; the message lists those that are.
     #[error("{0}")]
     UnknownFamily(String),
-    /// The codes of a target's tags are not known.
+    /// The codes of the target's tags are unknown.
     #[error(transparent)]
     UnknownCodes(#[from] UnknownCodes),
-    /// A target that is known by its corners only has nothing to be made from.
-    #[error("a listed target is read from its list, it cannot be made anew")]
+    /// The target is known by its corners only, so it cannot be made from a specification.
+    #[error("this target comes from a list of corners, so it cannot be generated again")]
     Listed,
-    /// A value that is no use by itself.
+    /// A single value is invalid.
     #[error("{setting}: {problem}")]
     Invalid {
-        /// The field or variant, such as `BoardSpec::rows`.
+        /// The field or variant, for example `BoardSpec::rows`.
         setting: Setting,
-        /// What is wrong and what would do.
+        /// The problem and its remedy.
         problem: String,
     },
-    /// Tags are asked for and no family was given, or another one.
-    #[error("{TagFamily}: the target carries tags of {wanted}, {given}")]
+    /// The spec has tags, but no family or another family was given.
+    #[error("{TagFamily}: the target has tags of {wanted}, {given}")]
     Family {
-        /// The family asked for.
+        /// The family that the spec names.
         wanted: String,
-        /// What was given instead.
+        /// Description of what was given instead.
         given: String,
     },
-    /// More tags than codes.
+    /// The family has too few codes.
     #[error(
-        "{setting}: tags {first} to {last} are needed, but family {family} ends at {end}: {instead}"
+        "{setting}: tags {first} to {last} are needed, but family {family} ends at {end}; {instead}"
     )]
     IdsRunOut {
-        /// The field to change, such as `TagSpec::first_id`.
+        /// The field to change, for example `TagSpec::first_id`.
         setting: Setting,
         /// First id needed.
         first: u32,
@@ -45,17 +45,17 @@ pub enum TargetError {
         last: u64,
         /// Name of the family.
         family: String,
-        /// Last id that the family has.
+        /// Last id of the family.
         end: u64,
-        /// What would do: a lower first id, fewer tags, a larger family.
+        /// The remedy: a lower first id, fewer tags or a larger family.
         instead: String,
     },
-    /// Targets to be used together share ids.
-    #[error("{setting}: {what} {first} to {last} overlap those of `{other}`: start at {free}")]
+    /// Targets that are to be used together share ids.
+    #[error("{setting}: {what} {first} to {last} overlap those of `{other}`; start at {free}")]
     Overlap {
-        /// The field to change, such as `TagSpec::first_id`.
+        /// The field to change, for example `TagSpec::first_id`.
         setting: Setting,
-        /// Ids of what.
+        /// Kind of the ids.
         what: &'static str,
         /// Lowest id.
         first: u32,
@@ -68,9 +68,9 @@ pub enum TargetError {
     },
     /// The board is too large for the paper.
     #[error(
-        "{PaperSize}: {rows} × {cols} corners with {edge} edges and what is printed around them do \
-         not fit {paper}: take larger paper, {}fewer {BoardRows} or {BoardCols}, or {}",
-        if *packed { String::new() } else { format!("several pages by {PaperPoster}, ") },
+        "{PaperSize}: {rows} × {cols} corners with {edge} edges and the marks around them do \
+         not fit {paper}; use larger paper, {}fewer {BoardRows} or {BoardCols}, or {}",
+        if *packed { String::new() } else { format!("several pages ({PaperPoster}), ") },
         match fitting_edge_mm {
             Some(mm) => format!("{BoardEdgeMm} of at most {mm} mm"),
             None => format!("a smaller {PaperMarginMm}"),
@@ -79,31 +79,31 @@ pub enum TargetError {
     DoesNotFit {
         /// Rows of corners.
         rows: u32,
-        /// Corners in each row.
+        /// Number of corners in each row.
         cols: u32,
-        /// The edge, such as `20 mm`.
+        /// The edge, for example `20 mm`.
         edge: String,
-        /// The paper, such as `A4`.
+        /// The paper, for example `A4`.
         paper: String,
-        /// Whether there are to be several boards on a sheet.
+        /// Whether several boards share a sheet.
         packed: bool,
-        /// Largest edge in whole millimetres that fits.
+        /// Largest edge that fits, in whole millimetres.
         fitting_edge_mm: Option<u32>,
     },
 }
 
 impl TargetError {
-    /// A setting that is refused.
+    /// Creates the error of an invalid setting.
     #[doc(hidden)]
     pub fn invalid(setting: Setting, problem: impl Into<String>) -> Self {
         Self::Invalid { setting, problem: problem.into() }
     }
 }
 
-/// A field, and what is wrong with it.
+/// A field and its problem.
 pub type Problem = (String, String);
 
-/// The error of a field.
+/// Returns the error of a field.
 ///
 /// # Errors
 /// Always.

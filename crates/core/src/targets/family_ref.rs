@@ -1,4 +1,4 @@
-//! The family of a target's tags: its name and fingerprint, and its codes where they are known.
+//! Reference to the family of a target's tags: its name, its fingerprint, and its codes if they are known.
 
 use std::sync::{Arc, OnceLock};
 
@@ -8,22 +8,22 @@ use crate::family::Family;
 use crate::lattice::GridKind;
 use crate::setting::Setting::TargetSetFamily;
 
-/// Names a family so that a changed code table cannot go unnoticed.
+/// Names a family with its fingerprint, so that a changed code table is noticed.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct FamilyRef {
-    /// The family's name, such as `delTag25h7`.
+    /// The family's name, for example `delTag25h7`.
     pub name: String,
-    /// Its fingerprint, see [`crate::family::Family::fingerprint`]; empty where a file from
-    /// elsewhere names a family whose codes this crate does not have.
+    /// The family's fingerprint, see [`crate::family::Family::fingerprint`]. It is empty if a file from another
+    /// program names a family whose codes this crate does not have.
     pub fingerprint: String,
-    /// The family of its squares, where a target has faces of both tilings.
+    /// The family of the square tags, if a target has faces of both tilings.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub squares: Option<Box<FamilyRef>>,
 }
 
 impl FamilyRef {
-    /// The family of tags in tiles of a kind, of a target that has such.
+    /// Returns the family of the tags in tiles of a kind; the target must have such tags.
     pub fn of_tiling(&self, kind: GridKind) -> &Self {
         match (kind, &self.squares) {
             (GridKind::Checker, Some(squares)) => squares,
@@ -31,15 +31,15 @@ impl FamilyRef {
         }
     }
 
-    /// The name and fingerprint of a family.
+    /// Creates the reference to a family.
     pub fn of(family: &Family) -> Self {
         let (name, fingerprint) = (family.name().to_owned(), family.fingerprint().to_owned());
         Self { name, fingerprint, squares: None }
     }
 }
 
-/// The codes of a target's tags, where they were given or looked up. The target names them by their fingerprint, so targets
-/// are equal with and without them.
+/// The codes of a target's tags, if they were given or looked up. The target identifies them by their fingerprint, so
+/// targets compare equal with and without them.
 #[derive(Clone, Debug, Default)]
 pub(in crate::targets) struct Codes(OnceLock<Arc<Family>>);
 
@@ -52,7 +52,7 @@ impl Codes {
         self.0.get().map(Arc::as_ref)
     }
 
-    /// The codes that are known, else those that `found` is.
+    /// Returns the known codes, or else `found`, which it stores.
     pub(in crate::targets) fn or(&self, found: Family) -> &Family {
         self.0.get_or_init(|| Arc::new(found))
     }
@@ -64,10 +64,10 @@ impl PartialEq for Codes {
     }
 }
 
-/// The codes of a target's tags are not known.
+/// The codes of a target's tags are unknown.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error(
-    "{target} has tags of {family}, and no family with its codes is shipped: set the family with {TargetSetFamily}"
+    "{target} has tags of {family}, which is not a shipped family: set the family with {TargetSetFamily}"
 )]
 pub struct UnknownCodes {
     /// Name of the target.
@@ -76,25 +76,25 @@ pub struct UnknownCodes {
     pub family: String,
 }
 
-/// Why a family is not that of a target's tags.
+/// Why a family does not match a target's tags.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum OtherFamily {
     /// The target has no tags.
     #[error("has no tags")]
     NoTags,
-    /// It has other codes.
-    #[error("was made with fingerprint {wanted} of {name}, this one is {found}")]
+    /// The codes differ.
+    #[error("was made with {name} of fingerprint {wanted}, but this one has fingerprint {found}")]
     Codes {
         /// The family's name in the target.
         name: String,
         /// Fingerprint of the family that the target was made with.
         wanted: String,
-        /// That of the family which is there.
+        /// Fingerprint of the given family.
         found: String,
     },
-    /// The family has grown since, and the target has a tag that it did not have then.
-    #[error("has a tag {id}, but {name} of fingerprint {wanted} had only {codes} codes")]
+    /// The family has grown since, and the target has a tag that the family did not have before.
+    #[error("has tag {id}, but {name} of fingerprint {wanted} has only {codes} codes")]
     Id {
         /// The family's name in the target.
         name: String,
@@ -102,15 +102,15 @@ pub enum OtherFamily {
         wanted: String,
         /// The tag.
         id: u32,
-        /// How many codes the family had.
+        /// Number of codes of that family.
         codes: usize,
     },
-    /// The target has holes where the family needs the cells.
+    /// The target has holes where the family has cells.
     #[error("has holes of {hole_mm} mm in its tags, but {problem}")]
     Hole {
-        /// Their diameter, mm.
+        /// Diameter of the holes, mm.
         hole_mm: f64,
-        /// Why they cannot be there.
+        /// Why they are not possible.
         problem: String,
     },
 }

@@ -1,4 +1,4 @@
-//! What makes a target the one it is: its corners in space and its tags, whatever it is called and printed on.
+//! The identity of a target: its corners in space and its tags. The name and the print layout do not count.
 
 use sha2::{Digest, Sha256};
 
@@ -6,18 +6,18 @@ use crate::identity::{Fingerprint, TargetIdentity};
 use crate::lattice::GridKind;
 use crate::targets::{FamilyRef, Panel, Target};
 
-/// Corners closer than this, mm, count as the same point: a hundredth of what printers resolve, and a thousand times what
-/// any file format of a target rounds off.
+/// Grid of corner positions, mm: closer corners count as the same point. It is a hundredth of a printer's resolution,
+/// and a thousand times the rounding of any target file format.
 const QUANTUM_MM: f64 = 1e-4;
 
-/// Position of the rounding boundary between two multiples of [`QUANTUM_MM`], in quanta. Lengths that people choose have few
-/// decimals, and so have their halves and quarters: none of them lies near this fraction, so that the last digit of a
-/// coordinate cannot change the fingerprint.
+/// Position of the rounding boundary between two multiples of [`QUANTUM_MM`], in quanta. Lengths that people choose
+/// have few decimals, and so have their halves and quarters. None of them is near this fraction, so the last digit of
+/// a coordinate cannot change the fingerprint.
 const BOUNDARY: f64 = 0.382;
 
 impl Target {
-    /// Identity of this target. Measured corners and refined panels are at other positions than planned, so that a measured
-    /// target has another fingerprint than its plan, which its identity names.
+    /// Returns the identity of this target. Measured corners and refined panels change the positions, so a measured
+    /// target has a different fingerprint than its plan. Its identity names the plan.
     pub fn identity(&self) -> TargetIdentity {
         let panels = &self.panels;
         let edges = panels.iter().map(|panel| panel.edge_mm);
@@ -33,22 +33,22 @@ impl Target {
         }
     }
 
-    /// Whether its description serves for prints of the other target too: both have the same panels and tags, or were measured
-    /// of the same print.
+    /// Returns whether this description also fits prints of the other target: both have the same panels and tags, or
+    /// were measured from the same print.
     pub fn has_prints_of(&self, other: &Self) -> bool {
         let are_both_measured = self.plan.is_some() && other.plan.is_some();
         (self.panels == other.panels && self.family == other.family)
             || (are_both_measured && self.identity().is_same_print(&other.identity()))
     }
 
-    /// Identity of the target as it was printed: of the one from which this target was measured or refined, or its own.
+    /// Returns the identity of the target as printed: that of the plan it was measured or refined from, or its own.
     #[doc(hidden)]
     pub fn printed(&self) -> TargetIdentity {
         self.plan.clone().unwrap_or_else(|| self.identity())
     }
 }
 
-/// Fingerprint of the target with these panels.
+/// Computes the fingerprint of the target with these panels.
 pub fn fingerprint(panels: &[Panel], family: Option<&FamilyRef>) -> Fingerprint {
     hash(panels, family, true)
 }
@@ -70,7 +70,7 @@ fn hash(panels: &[Panel], family: Option<&FamilyRef>, with_positions: bool) -> F
             }
             hash.update("\n");
         }
-        // By its name: a family may grow, which leaves its earlier codes as they are.
+        // The family counts by name only: it may grow, which leaves its earlier codes unchanged.
         if let (Some(family), false) = (family, panel.tags.is_empty()) {
             hash.update(format!("family {}\n", family.of_tiling(panel.kind).name));
         }
@@ -82,7 +82,7 @@ fn hash(panels: &[Panel], family: Option<&FamilyRef>, with_positions: bool) -> F
     Fingerprint::from_bits(u64::from_be_bytes(bytes[..8].try_into().expect("a hash has 32 bytes")))
 }
 
-/// A coordinate as a whole number of [`QUANTUM_MM`].
+/// Rounds a coordinate to a whole number of [`QUANTUM_MM`].
 fn quanta(mm: f64) -> i64 {
     (mm / QUANTUM_MM + BOUNDARY).floor() as i64
 }
@@ -115,7 +115,7 @@ mod tests {
             assert_ne!(desk.fingerprint, other.identity().fingerprint);
         }
         let confusable = others.iter().filter(|other| desk.is_confusable(&other.identity()));
-        assert_eq!(confusable.count(), 1, "only the size cannot be told from labels");
+        assert_eq!(confusable.count(), 1, "labels distinguish everything but the size");
     }
 
     #[test]

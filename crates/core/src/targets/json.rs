@@ -1,4 +1,4 @@
-//! The target file (`docs/formats.md`, “Target”): reading with every field checked, and writing.
+//! The target file (`docs/formats.md`, “Target”): reading with checks of every field, and writing.
 
 use std::collections::BTreeSet;
 
@@ -16,68 +16,67 @@ use crate::reading::in_words;
 use crate::setting::Setting::TargetToJson;
 use crate::targets::{FamilyRef, Fingerprint, Name, Panel, Target, TargetIdentity, TargetSpec};
 
-/// Schema and version that this crate writes and reads.
+/// Schema and version that this crate reads and writes.
 pub const SCHEMA: &str = "deltille/target/1";
 
-/// How far a corner may lie from its place in the lattice, in edges. Measured positions differ by far
-/// less; another unit or another corner's position differs by more.
+/// Largest distance of a corner from its position in the lattice, in edges. Measured positions differ by far less; a
+/// wrong unit or another corner's position differs by more.
 const SLACK_EDGES: f64 = 0.01;
 
-/// How far the corner of a target that was made may lie from its place in the plan, in edges: farther off it
-/// would be nearer to another one.
+/// Largest distance of a measured corner from its planned position, in edges. Beyond it, the corner would be closer
+/// to another one.
 const MEASURED_SLACK_EDGES: f64 = 0.5;
 
-/// How far its target position may be from that by its panel's pose, in edges: what six written digits of a
-/// rotation leave on a panel of a thousand edges.
+/// Largest difference between a target position and the one from its panel's pose, in edges: the rounding of a
+/// rotation written with six digits, on a panel of a thousand edges.
 const POSE_SLACK_EDGES: f64 = 0.001;
 
-/// How far the correlations of a covariance may be from symmetric, and from positive semidefinite: what
-/// rounding leaves.
+/// Tolerance for the symmetry and positive semidefiniteness of a covariance's correlations: the effect of rounding.
 const COVARIANCE_SLACK: f64 = 1e-6;
 
-/// What is wrong with a target file.
+/// The problem with a target file.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum TargetFileError {
-    /// Not JSON, or cut off.
-    #[error("not a target file: {}; make it anew with {TargetToJson}", in_words(.0))]
+    /// The text is not JSON or is truncated.
+    #[error("not a target file: {}; make it again with {TargetToJson}", in_words(.0))]
     Json(serde_json::Error),
-    /// A file of something else.
+    /// The file is of another kind.
     #[error(
-        "this is a {found} file, not a target: give the .json that was written with the target"
+        "this is a {found} file, not a target: pass the .json that was written with the target"
     )]
     Kind {
         /// The schema that the file names.
         found: String,
     },
-    /// Another schema, or another version of it.
-    #[error("field `schema` is `{found}`, this version reads `{SCHEMA}`: make the file anew")]
+    /// The schema or its version is not supported.
+    #[error("field `schema` is `{found}`, but this version reads `{SCHEMA}`: make the file again")]
     Schema {
         /// The schema that the file names.
         found: String,
     },
-    /// A field is missing, unknown, or holds what it must not.
+    /// A field is missing, unknown or invalid.
     #[error("field `{field}`: {problem}")]
     Field {
-        /// The field, such as `panels[0].corners[3].row`.
+        /// The field, for example `panels[0].corners[3].row`.
         field: String,
-        /// What is wrong.
+        /// The problem.
         problem: String,
     },
 }
 
 impl Target {
-    /// Reads the text of a target file.
+    /// Parses the text of a target file.
     ///
     /// # Errors
-    /// Where it is no target file, of another version, or a field is wrong. The sheets are not looked at, see
-    /// `Printing::from_json` of `deltille-layout`.
+    /// Returns an error if the text is not a target file, has another version, or a field is invalid. It does not
+    /// check the sheets; see `Printing::from_json` of `deltille-layout`.
     pub fn from_json(text: &str) -> Result<Target, TargetFileError> {
         let (target, _) = read::<IgnoredAny, IgnoredAny, IgnoredAny>(text)?;
         Ok(target)
     }
 
-    /// The text of the target file, a corner a line.
+    /// Writes the text of the target file, one corner per line.
     ///
     /// ```
     /// use deltille_core::targets::{SolidShape, SolidSpec, Target};
@@ -91,14 +90,14 @@ impl Target {
     }
 }
 
-/// What a target file says of the print: sheets `S`, a finish `F` and a logo `L`.
+/// Print information of a target file: sheets `S`, a finish `F` and a logo `L`.
 #[doc(hidden)]
 pub struct Printed<S, F, L> {
     /// Sheets in the order of printing.
     pub sheets: Vec<S>,
-    /// `None` where it is plain.
+    /// Finish; `None` for a plain print.
     pub finish: Option<F>,
-    /// `None` where there is none.
+    /// Logo, if any.
     pub logo: Option<L>,
 }
 
@@ -107,7 +106,7 @@ pub struct Printed<S, F, L> {
 struct TargetFile<S, F, L> {
     schema: String,
     name: Name,
-    /// Absent in files of earlier versions.
+    /// Missing in files of earlier versions.
     fingerprint: Option<Fingerprint>,
     #[serde(skip_serializing_if = "Option::is_none")]
     plan: Option<TargetIdentity>,
@@ -121,10 +120,10 @@ struct TargetFile<S, F, L> {
     logo: Option<L>,
 }
 
-/// Reads a target, and what its file says of the print.
+/// Reads a target and the print information of its file.
 ///
 /// # Errors
-/// Where the text is no target file, or describes an invalid target.
+/// Returns an error if the text is not a target file, or describes an invalid target.
 #[doc(hidden)]
 pub fn read<S, F, L>(text: &str) -> Result<(Target, Printed<S, F, L>), TargetFileError>
 where
@@ -147,7 +146,7 @@ where
     Ok((target, Printed { sheets: sheets.unwrap_or_default(), finish, logo }))
 }
 
-/// The text of a target and its print.
+/// Writes the text of a target and its print information.
 #[doc(hidden)]
 pub fn write<S: Serialize, F: Serialize, L: Serialize>(
     target: &Target,
@@ -177,25 +176,28 @@ impl From<ReadError> for TargetFileError {
     }
 }
 
-/// Checks what the types do not say; returns the field at fault and what is wrong with it.
+/// Checks the constraints that the types do not express.
 ///
 /// # Errors
-/// The field at fault, and what is wrong with it.
+/// Returns the invalid field and its problem.
 pub fn check(target: &Target) -> Result<(), Problem> {
     if target.panels.is_empty() {
-        return problem("panels", "there is none");
+        return problem("panels", "the list is empty");
     }
-    // A family is looked for by its name, which must not lead to a file.
+    // The family is looked up by name, so the name must not lead to a file.
     let named = |family: &FamilyRef| Name::new(&family.name).map(|_| ());
     let family = target.family.as_ref();
     family.map_or(Ok(()), named).or_else(|wrong| problem("family.name", wrong))?;
     let squares = family.and_then(|family| family.squares.as_deref());
     squares.map_or(Ok(()), named).or_else(|wrong| problem("family.squares.name", wrong))?;
     if squares.is_some_and(|family| family.squares.is_some()) {
-        return problem("family.squares.squares", "a family of squares has none");
+        return problem(
+            "family.squares.squares",
+            "a family of squares cannot name another family of squares",
+        );
     }
     if squares.is_some() != target.spec.square_family().is_some() {
-        let what = "it must be there if, and only if, `spec.square_tags` is";
+        let what = "it must be present if, and only if, `spec.square_tags` is";
         return problem("family.squares", what);
     }
     let may_differ = squares.is_some();
@@ -203,7 +205,7 @@ pub fn check(target: &Target) -> Result<(), Problem> {
     for (p, panel) in target.panels.iter().enumerate() {
         let field = format!("panels[{p}]");
         if panels.last().is_some_and(|&last| last >= panel.id) {
-            return problem(format!("{field}.id"), "ids must ascend from panel to panel");
+            return problem(format!("{field}.id"), "ids must increase from panel to panel");
         }
         panels.insert(panel.id);
         if panel.kind != target.panels[0].kind && !may_differ {
@@ -212,42 +214,42 @@ pub fn check(target: &Target) -> Result<(), Problem> {
         check_panel(panel, &field)?;
         for (i, corner) in panel.corners.iter().enumerate() {
             if !corners.insert(corner.id) {
-                let what = format!("{} is the id of another corner too", corner.id);
+                let what = format!("id {} is also used by another corner", corner.id);
                 return problem(format!("{field}.corners[{i}].id"), what);
             }
         }
         for (i, tag) in panel.tags.iter().enumerate() {
             if !tags.insert((panel.kind == GridKind::Checker, tag.id)) {
-                let what = format!("{} is the id of another tag too", tag.id);
+                let what = format!("id {} is also used by another tag", tag.id);
                 return problem(format!("{field}.tags[{i}].id"), what);
             }
         }
         if !panel.tags.is_empty() && target.family.is_none() {
-            return problem("family", "there are tags, so there must be a family");
+            return problem("family", "the target has tags, so it needs a family");
         }
     }
     against_spec::check(target)
 }
 
-/// Checks that the corners and tags are those of the stated fingerprint, and that a plan has the same labels.
+/// Checks that the corners and tags match the stated fingerprint, and that a plan has the same labels.
 fn check_identity(target: &Target, stated: Option<Fingerprint>) -> Result<(), Problem> {
     let found = target.identity();
     if let Some(stated) = stated
         && stated != found.fingerprint
     {
         let what = format!(
-            "it is {stated}, but the corners and tags have {}: the file was edited; remove the field to make it the \
-             description of another target",
+            "it is {stated}, but the corners and tags have fingerprint {}: the file was edited; remove the field to turn it into \
+             the description of another target",
             found.fingerprint
         );
         return problem("fingerprint", what);
     }
     match &target.plan {
         Some(plan) if plan.labels != found.labels => {
-            problem("plan.labels", "the corners or tags are not those of the plan")
+            problem("plan.labels", "the corners or tags differ from the plan")
         }
         Some(plan) if !against_spec::may_be_of_print(target, plan.of_print())? => {
-            let what = format!("it is {}, which is not that of `spec`", plan.of_print());
+            let what = format!("it is {}, which does not match `spec`", plan.of_print());
             problem("plan.fingerprint", what)
         }
         _ => Ok(()),
@@ -256,10 +258,10 @@ fn check_identity(target: &Target, stated: Option<Fingerprint>) -> Result<(), Pr
 
 fn check_panel(panel: &Panel, field: &str) -> Result<(), Problem> {
     if panel.border_bits.is_none() && !panel.tags.is_empty() {
-        return problem(format!("{field}.border_bits"), "there are tags, so there must be one");
+        return problem(format!("{field}.border_bits"), "the panel has tags, so it needs a border");
     }
     if panel.corners.is_empty() {
-        return problem(format!("{field}.corners"), "there is none");
+        return problem(format!("{field}.corners"), "the list is empty");
     }
     check_rotation(&panel.pose.rotation, field)?;
     if let Some(covariance) = &panel.pose.covariance {
@@ -280,27 +282,28 @@ fn check_panel(panel: &Panel, field: &str) -> Result<(), Problem> {
         if !inside(corner.row, rows) || !inside(corner.col, cols) {
             let Vertex { row, col } = vertex;
             let what = format!(
-                "row {row}, column {col} is outside the matrix of {rows} rows, {cols} columns"
+                "row {row}, column {col} is outside the matrix of {rows} rows and {cols} columns"
             );
             return problem(field("row"), what);
         }
         if corner.panel_mm.distance(panel.lattice_mm(vertex)) > slack {
-            let what = "it is more than 1 % of an edge away from its place in the lattice";
+            let what = "it is more than 1 % of an edge away from its position in the lattice";
             return problem(field("panel_mm"), what);
         }
         if let Some(place) = &corner.measured {
             if corner.offset_mm().length() > MEASURED_SLACK_EDGES * panel.edge_mm {
-                let what = "it is more than half an edge, so that another corner were nearer";
+                let what = "it is more than half an edge, so another corner would be closer";
                 return problem(field("measured.offset_mm"), what);
             }
             if !is_covariance(&place.covariance_mm2) {
-                let what = "it is no covariance: some variance in it is negative";
+                let what = "it is not a covariance: it has a negative variance";
                 return problem(field("measured.covariance_mm2"), what);
             }
         }
         let expected = panel.pose.target_from_panel(corner.panel_mm);
         if corner.target_mm.distance(expected) > POSE_SLACK_EDGES * panel.edge_mm {
-            let what = "it is more than 0.1 % of an edge away from rotation · panel + translation";
+            let what =
+                "it differs by more than 0.1 % of an edge from rotation · panel + translation";
             return problem(field("target_mm"), what);
         }
     }
@@ -313,11 +316,11 @@ fn check_panel(panel: &Panel, field: &str) -> Result<(), Problem> {
         }
         previous = Some(vertex);
         let corner = |v: &Vertex| panel.corner_at(*v).is_some();
-        // Other programs put tags into the outermost squares as well.
+        // Other programs also put tags into the outermost squares.
         let complete =
             panel.kind == GridKind::Checker || panel.tag_tile(tag).vertices().all(|v| corner(&v));
         if !complete {
-            let what = "its tile does not lie between three corners";
+            let what = "its tile is not enclosed by three corners";
             return problem(format!("{field}.tags[{i}].row"), what);
         }
     }
@@ -331,14 +334,14 @@ fn check_rotation(rotation: &[f64; 9], field: &str) -> Result<(), Problem> {
     Ok(())
 }
 
-/// Checks that it is the covariance of something.
+/// Checks that the matrix is a valid covariance.
 fn check_covariance(covariance: &[[f64; 6]; 6]) -> Result<(), String> {
     let c = nalgebra::Matrix6::from_fn(|i, j| covariance[i][j]);
     for i in 0..6 {
         let in_range = quantity::pose_variance::RANGE.check(c[(i, i)]);
         in_range.map_err(|what| format!("a variance, {what}"))?;
     }
-    // Turns and moves have different units.
+    // Rotations and translations have different units.
     let correlations =
         nalgebra::Matrix6::from_fn(|i, j| c[(i, j)] / (c[(i, i)] * c[(j, j)]).sqrt());
     let uneven = (correlations - correlations.transpose()).amax();
@@ -347,12 +350,12 @@ fn check_covariance(covariance: &[[f64; 6]; 6]) -> Result<(), String> {
     }
     let least = correlations.symmetric_eigenvalues().min();
     if least < -COVARIANCE_SLACK {
-        return Err("it is no covariance: some variance in it is negative".to_owned());
+        return Err("it is not a covariance: it has a negative variance".to_owned());
     }
     Ok(())
 }
 
-/// Whether the upper triangle xx, xy, xz, yy, yz, zz is that of a covariance.
+/// Returns whether the upper triangle xx, xy, xz, yy, yz, zz belongs to a valid covariance.
 fn is_covariance(&[xx, xy, xz, yy, yz, zz]: &[f64; 6]) -> bool {
     let matrix = nalgebra::Matrix3::new(xx, xy, xz, xy, yy, yz, xz, yz, zz);
     matrix.symmetric_eigenvalues().min() >= -COVARIANCE_SLACK * matrix.amax()

@@ -1,16 +1,16 @@
 use glam::DVec3;
 
-/// Units and their millimetres; longer names first, so that `m` does not take the end of `mm`.
+/// Units in millimetres. Longer names come first, so that `m` does not match the end of `mm`.
 const UNITS: [(&str, f64); 5] =
     [("mm", 1.0), ("cm", 10.0), ("in", 25.4), ("pt", 25.4 / 72.0), ("m", 1000.0)];
 
-/// A text that is no length.
+/// A text that is not a length.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("`{0}` is not a length such as 20mm, 2cm, 0.02m, 0.79in or 57pt")]
+#[error("`{0}` is not a length (examples: 20mm, 2cm, 0.02m, 0.79in, 57pt)")]
 pub struct LengthError(pub String);
 
-/// Reads a length with its unit, such as `20mm`, `2 cm`, `0.02m`, `0.79in`, `57pt`; a bare number
-/// is millimetres. The result is finite, and may be zero or negative.
+/// Parses a length with its unit, for example `20mm`, `2 cm`, `0.02m`, `0.79in` or `57pt`. A bare number is in
+/// millimetres. The result is finite; it may be zero or negative.
 ///
 /// ```
 /// assert_eq!(deltille_core::targets::parse_length_mm("2.5 cm"), Ok(25.0));
@@ -18,7 +18,7 @@ pub struct LengthError(pub String);
 /// ```
 ///
 /// # Errors
-/// Where it is no number with a known unit.
+/// Returns an error if the text is not a number with a known unit.
 pub fn parse_length_mm(text: &str) -> Result<f64, LengthError> {
     let trimmed = text.trim();
     let (number, unit_mm) = UNITS
@@ -31,8 +31,8 @@ pub fn parse_length_mm(text: &str) -> Result<f64, LengthError> {
     }
 }
 
-/// Reads the three sides of a box, such as `200x150x100mm`, `20 × 15 × 10 cm` or `200mm x 15cm x 0.1m`: a
-/// side without a unit has that of the last.
+/// Parses the three sides of a box, for example `200x150x100mm`, `20 × 15 × 10 cm` or `200mm x 15cm x 0.1m`. A side
+/// without a unit has the unit of the last side.
 ///
 /// ```
 /// let sides = deltille_core::targets::parse_box_mm("20x15x10 cm");
@@ -40,7 +40,7 @@ pub fn parse_length_mm(text: &str) -> Result<f64, LengthError> {
 /// ```
 ///
 /// # Errors
-/// Where it is not three lengths.
+/// Returns an error if the text is not three lengths.
 pub fn parse_box_mm(text: &str) -> Result<DVec3, BoxError> {
     let unknown = || BoxError(text.to_owned());
     let sides: Vec<&str> = text.split(['x', 'X', '×']).map(str::trim).collect();
@@ -56,17 +56,17 @@ pub fn parse_box_mm(text: &str) -> Result<DVec3, BoxError> {
     }
 }
 
-/// A text that is not three sides.
+/// A text that does not contain three sides.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("`{0}` is not three sides such as 200x150x100mm")]
+#[error("`{0}` is not a box of three sides (example: 200x150x100mm)")]
 pub struct BoxError(pub String);
 
-/// The shortest way to write a length in millimetres, with its unit: `20 mm`, `12.5 mm`.
+/// Formats a length in millimetres as briefly as possible, with its unit: `20 mm`, `12.5 mm`.
 pub fn format_mm(mm: f64) -> String {
     if mm.abs() > 1e9 {
         return format!("{mm:e} mm");
     }
-    // A nanometre is finer than any print; rounding there hides the noise of unit conversion.
+    // A nanometre is finer than any print. Rounding to it hides the noise of unit conversion.
     format!("{} mm", (mm * 1e6).round() / 1e6)
 }
 
@@ -77,21 +77,21 @@ mod tests {
     use super::*;
 
     #[test]
-    fn every_unit_is_understood() {
+    fn every_unit_is_parsed() {
         for text in ["25.4mm", "2.54cm", "0.0254 m", "1in", "72pt", " 25.4 ", "2.54e1mm"] {
             assert!((parse_length_mm(text).unwrap() - 25.4).abs() < 1e-9, "{text}");
         }
     }
 
     #[test]
-    fn what_is_no_finite_number_is_refused() {
+    fn nonfinite_numbers_are_rejected() {
         for text in ["", "mm", "NaN", "nanmm", "inf", "1e999mm", "20 km", "2,5cm", "20mm mm"] {
             assert_eq!(parse_length_mm(text), Err(LengthError(text.to_owned())));
         }
     }
 
     #[test]
-    fn sides_of_a_box_have_the_unit_of_the_last() {
+    fn box_sides_inherit_the_last_unit() {
         for text in ["200x150x100mm", "20 × 15 X 10 cm", "0.2mx15cmx100", " 200 x 150 x 100 "] {
             assert_eq!(parse_box_mm(text), Ok(DVec3::new(200.0, 150.0, 100.0)), "{text}");
         }

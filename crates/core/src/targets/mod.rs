@@ -1,13 +1,17 @@
-//! What exists in the world: panels with a pose, their corners and tags, in millimetres.
+//! Physical targets: panels with a pose, their corners and tags, in millimetres.
 //!
-//! In comes a [`TargetSpec`], which says what is asked for; out goes a [`Target`], which says what that is, corner by corner.
-//! The JSON file of a target (FORMAT `deltille/target/1`) holds both, so that a sheet printed today can be detected, verified
-//! and made again from that one file. In the order in which a target comes to be:
+//! A [`TargetSpec`] specifies a target; a [`Target`] is the result, corner by corner. The JSON file of a target
+//! (FORMAT `deltille/target/1`) contains both, so that a sheet printed today can be detected, verified and made again
+//! from that one file. In the order in which a target is made:
 //!
-//! 1. `spec`: what is asked for; `boards` and `solids` each hold the specifications of their kind and make panels of them;
-//! 2. `build`: from a specification and a family to a target; `error`: why there is none; `family_ref`: which family it has;
-//! 3. `target`, `panel`, `corner`, `pose`: the values; `symmetry`: rotations after which a panel looks the same; `length`: numbers in mm;
-//! 4. `identity`: the fingerprint of a target; `json`: its file, which `against_spec` compares with what the spec makes.
+//! 1. `spec`: the specification; `boards` and `solids` each contain the specifications of their kind and make panels
+//!    of them;
+//! 2. `build`: from a specification and a family to a target; `error`: why that fails; `family_ref`: the family of a
+//!    target;
+//! 3. `target`, `panel`, `corner`, `pose`: the values; `symmetry`: rotations that leave a panel unchanged; `length`:
+//!    lengths in mm;
+//! 4. `identity`: the fingerprint of a target; `json`: its file, which `against_spec` compares with its
+//!    specification.
 //!
 //! Frames: a *panel* frame has its origin on the panel's lattice vertex (0,0), x along the rows, y
 //! up on the print, z towards the viewer; `target = rotation · panel + translation`.
@@ -48,7 +52,7 @@ pub use solids::{
 pub use spec::{ListFormat, ListedSpec, TargetSpec};
 pub use target::Target;
 
-// For the crates above, which lay targets out and detect them.
+// For the crates above, which lay out and detect targets.
 #[doc(hidden)]
 pub use {
     boards::{size_mm, tagged_tiles, untied_panels},

@@ -11,22 +11,21 @@ use crate::polygon::{grown, hull, rectangle};
 use crate::quantity;
 use crate::targets::{Corner, PanelPose};
 
-/// How far the tiles of a panel reach beyond its corners.
+/// The tiles of a panel that are drawn beyond its corners.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Outline {
     /// The black tiles that touch a corner.
     #[default]
     Touching,
-    /// The same and one tile more at the right end of the lowest row, so that every row of a
-    /// zigzag board has as many tiles as the next.
+    /// The touching tiles and one more at the right end of the lowest row, so that all rows of a zigzag board have
+    /// the same number of tiles.
     Zigzag,
-    /// The same and one tile more at each end of a triangle of corners, so that the tiles fill a
-    /// triangle.
+    /// The touching tiles and one more at each end of a triangle of corners, so that the tiles fill a triangle.
     Triangle,
 }
 
-/// Which tiles carry tags, by their colour on a board that is not inverted.
+/// The tiles that carry tags, by their colour on a board that is not inverted.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum TagsIn {
@@ -38,7 +37,7 @@ pub enum TagsIn {
 }
 
 impl TagsIn {
-    /// Whether it is what goes without saying in files.
+    /// Returns whether this is the default, which files omit.
     pub fn is_black(&self) -> bool {
         *self == Self::Black
     }
@@ -61,56 +60,56 @@ pub struct Panel {
     /// Which squares of a checkerboard carry its tags.
     #[serde(default, skip_serializing_if = "TagsIn::is_black")]
     pub tags_in: TagsIn,
-    /// Blank between a tile and the border of the tag in it, bit-widths, where it is not the usual one.
+    /// Margin between a tile and the border of its tag, bit-widths, if it is not the usual one.
     #[serde(
         default,
         skip_serializing_if = "Option::is_none",
         deserialize_with = "quantity::border_bits::de"
     )]
     pub tag_margin_bits: Option<f64>,
-    /// Width of every second row and column of tiles of a checkerboard, in edges, where these are gaps between
-    /// tags: those of which the lower left vertex has an odd row, or an odd column.
+    /// Width of every second row and column of a checkerboard's tiles, in edges, if these are gaps between tags: the
+    /// tiles whose lower left vertex has an odd row or an odd column.
     #[serde(
         default,
         skip_serializing_if = "Option::is_none",
         deserialize_with = "quantity::gap_edges::de"
     )]
     pub gap_edges: Option<f64>,
-    /// Diameter of the discs that are drawn about the corners instead of tiles, mm.
+    /// Diameter of the discs that are drawn around the corners instead of tiles, mm.
     #[serde(
         default,
         skip_serializing_if = "Option::is_none",
         deserialize_with = "quantity::edge_mm::de"
     )]
     pub discs_mm: Option<f64>,
-    /// Diameter of the hole in the middle of each tag, mm.
+    /// Diameter of the hole in the centre of each tag, mm.
     #[serde(
         default,
         skip_serializing_if = "Option::is_none",
         deserialize_with = "quantity::edge_mm::de"
     )]
     pub hole_mm: Option<f64>,
-    /// Whether the colours are exchanged: white upright tiles, or squares, on a black field.
+    /// Whether the colours are inverted: white upright tiles, or squares, on a black field.
     pub inverted: bool,
-    /// Width of the black around the tiles, mm, where that follows their outline: on an inverted face of a solid.
+    /// Width of the black rim around the tiles, mm, if it follows their outline: on an inverted face of a solid.
     #[serde(
         default,
         skip_serializing_if = "Option::is_none",
         deserialize_with = "quantity::rim_mm::de"
     )]
     pub rim_mm: Option<f64>,
-    /// Which tiles are drawn around the corners.
+    /// The tiles that are drawn around the corners.
     #[serde(default)]
     pub outline: Outline,
-    /// Columns and rows of the matrix in which `.dsc` and `.orpc` files number the corners
-    /// (`docs/formats.md`, “.dsc target descriptions”); it holds every corner.
+    /// Columns and rows of the matrix in which `.dsc` and `.orpc` files number the corners (`docs/formats.md`, “.dsc
+    /// target descriptions”); it contains every corner.
     #[serde(deserialize_with = "quantity::side_of_matrix::de")]
     pub matrix: [u32; 2],
     /// Pose of the panel: from the panel frame to the target frame.
     pub pose: PanelPose,
     /// Saddle points, ordered by row, then column.
     pub corners: Vec<Corner>,
-    /// Tags, ordered like the corners.
+    /// Tags, in the same order as the corners.
     pub tags: Vec<TagPlacement>,
 }
 
@@ -128,26 +127,25 @@ pub struct TagPlacement {
     pub col: i32,
 }
 
-/// White left around the tiles of a panel, in edges. All six tiles of every corner lie inside the
-/// tiles' bounding box, so that nothing is measured beyond it; the quiet zone only has to keep
-/// foreign marks from touching the outermost tiles in a blurred image, and a quarter of an edge is
-/// more than the blur at which the corners themselves are lost.
+/// White margin around the tiles of a panel, in edges. All six tiles of every corner lie inside the bounding box of
+/// the tiles, so nothing is measured beyond it. The quiet zone only keeps other marks from touching the outermost
+/// tiles in a blurred image. A quarter of an edge is more than the blur at which the corners themselves are lost.
 const QUIET_EDGES: f64 = 0.25;
 
-/// The least quiet zone, mm: on fine boards text stays clear of the tiles for the eye as well.
+/// Minimum quiet zone, mm: on fine boards it also separates text from the tiles for the eye.
 const QUIET_MIN_MM: f64 = 5.0;
 
-/// Panels lie in one plane where their normals differ by less than 3° (the cosine of it) and their middles by less than
-/// this part of an edge: listed places have rounding errors alone.
+/// Panels are coplanar if their normals differ by less than 3° (this is the cosine) and their centres by less than
+/// this fraction of an edge. Listed positions have rounding errors only.
 const SAME_WAY: f64 = 0.9986;
 const IN_PLANE_EDGES: f64 = 0.05;
 
-/// White between a white square and the border of the tag in it, bit-widths: readers of AprilTags ask
-/// for one, the corners of the square for as much clear of the tag as in a black one.
+/// White margin between a white square and the border of its tag, bit-widths. Readers of AprilTags require one. The
+/// corners of the square need as much distance from the tag as in a black square.
 const TAG_MARGIN_BITS: f64 = 2.0;
 
 impl TagsIn {
-    /// Blank between the edges of a tile and the border of the tag in it, bit-widths.
+    /// Returns the margin between the edges of a tile and the border of its tag, bit-widths.
     pub fn margin_bits(self) -> f64 {
         match self {
             Self::Black => 0.0,
@@ -157,13 +155,13 @@ impl TagsIn {
 }
 
 impl Panel {
-    /// Whether it is a single tag, with no corner of the lattice around it.
+    /// Returns whether the panel is a single tag without lattice corners around it.
     pub fn is_tag_alone(&self) -> bool {
         self.corners.is_empty() && self.tags.len() == 1
     }
 
-    /// Whether another panel faces the same way in the same plane, and a corner of one lies on a tile between corners of
-    /// the other: one would hide the other.
+    /// Returns whether another panel has the same orientation in the same plane, and a corner of one lies on a tile
+    /// between corners of the other. One would then hide the other.
     pub(crate) fn overlaps(&self, other: &Panel) -> bool {
         let normal = |panel: &Panel| panel.pose.matrix().z_axis;
         let apart_mm = (other.middle_mm() - self.middle_mm()).dot(normal(self)).abs();
@@ -181,24 +179,24 @@ impl Panel {
         })
     }
 
-    /// The mean of its corners in the target frame, mm.
+    /// Returns the mean of the corners in the target frame, mm.
     pub fn middle_mm(&self) -> DVec3 {
         let sum: DVec3 = self.corners.iter().map(|corner| corner.target_mm).sum();
         sum / self.corners.len() as f64
     }
 
-    /// The corner at a vertex.
+    /// Returns the corner at a vertex.
     pub fn corner_at(&self, vertex: Vertex) -> Option<&Corner> {
         let found = self.corners.binary_search_by_key(&vertex, |c| Vertex::new(c.row, c.col));
         found.ok().map(|index| &self.corners[index])
     }
 
-    /// Where a vertex of the panel's lattice lies in the panel frame, mm.
+    /// Returns the position of a lattice vertex in the panel frame, mm.
     pub fn lattice_mm(&self, vertex: Vertex) -> DVec2 {
         self.position(vertex) * self.edge_mm
     }
 
-    /// Where a vertex of the panel's lattice lies in the panel frame, in edges.
+    /// Returns the position of a lattice vertex in the panel frame, in edges.
     pub fn position(&self, Vertex { row, col }: Vertex) -> DVec2 {
         let Some(gap) = self.gap_edges else { return self.kind.position(row.into(), col.into()) };
         let along = |index: i32| {
@@ -207,7 +205,7 @@ impl Panel {
         DVec2::new(along(col), along(row))
     }
 
-    /// A place in the panel frame, in edges, from coordinates of a tile: see [`Tile::frame`].
+    /// Converts coordinates of a tile to a position in the panel frame, in edges: see [`Tile::frame`].
     pub fn place_in_tile(&self, tile: Tile, DVec2 { x: u, y: v }: DVec2) -> DVec2 {
         if self.gap_edges.is_none() {
             let (row, col) = (f64::from(tile.anchor.row), f64::from(tile.anchor.col));
@@ -217,7 +215,7 @@ impl Panel {
         a + u * (b - a) + v * (c - a)
     }
 
-    /// The tile at a place in the panel frame, in edges.
+    /// Returns the tile at a position in the panel frame, in edges.
     pub fn tile_at(&self, place: DVec2) -> Tile {
         let Some(gap) = self.gap_edges else { return self.kind.tile_at(place) };
         let index = |along: f64| {
@@ -227,17 +225,17 @@ impl Panel {
         self.kind.tag_tile(Vertex::new(index(place.y), index(place.x)))
     }
 
-    /// Where a corner is in the target frame, mm: where it was measured, else as planned.
+    /// Returns the position of a corner in the target frame, mm: the measured one, or else the planned one.
     pub fn place_mm(&self, corner: &Corner) -> DVec3 {
         corner.target_mm + self.pose.matrix() * corner.offset_mm()
     }
 
-    /// The middle of a tag in the target frame, mm.
+    /// Returns the centre of a tag in the target frame, mm.
     pub fn tag_centre_mm(&self, tag: &TagPlacement) -> DVec3 {
         self.pose.target_from_panel(self.tag_middle_mm(tag))
     }
 
-    /// The same in the panel frame, mm.
+    /// Returns the centre of a tag in the panel frame, mm.
     #[doc(hidden)]
     pub fn tag_middle_mm(&self, tag: &TagPlacement) -> DVec2 {
         let vertices = self.tag_tile(tag).vertices();
@@ -245,28 +243,28 @@ impl Panel {
         vertices.map(|vertex| self.lattice_mm(vertex)).sum::<DVec2>() / count
     }
 
-    /// The tile of a tag.
+    /// Returns the tile of a tag.
     pub fn tag_tile(&self, tag: &TagPlacement) -> Tile {
         self.kind.tag_tile(Vertex::new(tag.row, tag.col))
     }
 
-    /// Blank between the edges of a tile and the border of the tag in it, bit-widths.
+    /// Returns the margin between the edges of a tile and the border of its tag, bit-widths.
     pub fn tag_margin_bits(&self) -> f64 {
         self.tag_margin_bits.unwrap_or(self.tags_in.margin_bits())
     }
 
-    /// Distance from the edges of a tile to the cells of the tag in it, bit-widths along the edge.
+    /// Returns the distance from the edges of a tile to the cells of its tag, bit-widths along the edge.
     pub fn tag_inset_bits(&self) -> f64 {
         self.tag_margin_bits() + self.border_bits.unwrap_or_default()
     }
 
-    /// The tiles that meet at corners, of either colour.
+    /// Returns the tiles of both colours that meet at corners.
     fn tiles_around_corners(&self) -> impl Iterator<Item = Tile> {
         let corners = self.corners.iter().map(|corner| Vertex::new(corner.row, corner.col));
         corners.flat_map(|vertex| self.kind.tiles_around(vertex))
     }
 
-    /// The drawn tiles, and all tiles of the other colour that touch a corner.
+    /// Returns the drawn tiles, and all tiles of the other colour that touch a corner.
     pub fn tiles(&self) -> BTreeSet<Tile> {
         if self.discs_mm.is_some() {
             return BTreeSet::new();
@@ -274,8 +272,8 @@ impl Panel {
         self.dark_tiles().into_iter().chain(self.tiles_around_corners()).collect()
     }
 
-    /// The dark tiles that are drawn, ordered by row, then column: black ones on white, or, on an
-    /// inverted panel, white ones on black.
+    /// Returns the dark tiles that are drawn, ordered by row, then column. They are black on white, or white on black
+    /// on an inverted panel.
     pub fn dark_tiles(&self) -> Vec<Tile> {
         if self.discs_mm.is_some() {
             return Vec::new();
@@ -294,13 +292,13 @@ impl Panel {
             let ends = [(-1, -1), (-1, top + 1), (top + 1, -1)];
             anchors.extend(ends.map(|(row, col)| Vertex::new(row, col)));
         }
-        // A tag has a tile, also where it stands alone.
+        // A tag has a tile even if it stands alone.
         let tagged = self.tags.iter().map(|tag| self.tag_tile(tag)).filter(|tile| tile.is_dark());
         anchors.extend(tagged.map(|tile| tile.anchor));
         anchors.into_iter().map(|anchor| self.kind.tag_tile(anchor)).collect()
     }
 
-    /// Bounding box of the drawn tiles, or discs, in the panel frame, mm: left, lower, right and upper end.
+    /// Returns the bounding box of the drawn tiles or discs in the panel frame, mm: left, lower, right and upper end.
     pub fn bounds_mm(&self) -> [f64; 4] {
         let (mut least, mut most) = (DVec2::INFINITY, DVec2::NEG_INFINITY);
         for vertex in self.dark_tiles().iter().flat_map(|tile| tile.vertices()) {
@@ -316,21 +314,21 @@ impl Panel {
         [least.x, least.y, most.x, most.y]
     }
 
-    /// Width of the quiet zone around [`Self::bounds_mm`], mm. Nothing else is printed in it; on
-    /// an inverted panel it is black.
+    /// Returns the width of the quiet zone around [`Self::bounds_mm`], mm. Nothing else is printed in it; on an
+    /// inverted panel it is black.
     pub fn quiet_zone_mm(&self) -> f64 {
         Self::quiet_zone_at_mm(self.edge_mm)
     }
 
-    /// The bounding box with its quiet zone, mm: on an inverted panel, the black field.
+    /// Returns the bounding box with its quiet zone, mm; on an inverted panel this is the black field.
     pub fn field_mm(&self) -> [f64; 4] {
         let quiet = self.quiet_zone_mm();
         let [left, lower, right, upper] = self.bounds_mm();
         [left - quiet, lower - quiet, right + quiet, upper + quiet]
     }
 
-    /// Outline of the field, mm, counter-clockwise: the rectangle of [`Self::field_mm`], or what lies around the tiles of
-    /// an inverted face.
+    /// Returns the outline of the field, mm, counterclockwise: the rectangle of [`Self::field_mm`], or the outline
+    /// around the tiles of an inverted face.
     pub fn field_outline_mm(&self) -> Vec<DVec2> {
         match self.rim_mm {
             Some(rim_mm) => self.outline_around_mm(rim_mm),
@@ -338,16 +336,17 @@ impl Panel {
         }
     }
 
-    /// The convex outline of the drawn tiles and those that touch a corner, so far away from them, mm, counter-clockwise.
+    /// Returns the convex outline at a distance from the drawn tiles and those that touch a corner, mm,
+    /// counterclockwise.
     pub fn outline_around_mm(&self, away_mm: f64) -> Vec<DVec2> {
-        // Among whole numbers, so that what is straight has no corners.
+        // Integer coordinates keep straight lines free of extra corners.
         let at = |vertex: Vertex| DVec2::new(vertex.col.into(), vertex.row.into());
         let around = hull(self.tiles().iter().flat_map(|tile| tile.vertices()).map(at).collect());
         let place = |at: DVec2| self.lattice_mm(Vertex::new(at.y as i32, at.x as i32));
         grown(&around.into_iter().map(place).collect::<Vec<_>>(), away_mm)
     }
 
-    /// Width of the quiet zone around tiles of a given edge, mm.
+    /// Returns the width of the quiet zone around tiles of a given edge, mm.
     #[doc(hidden)]
     pub fn quiet_zone_at_mm(edge_mm: f64) -> f64 {
         (QUIET_EDGES * edge_mm).max(QUIET_MIN_MM)

@@ -9,7 +9,7 @@ use crate::camera::Pose;
 use crate::quantity;
 use crate::targets::Corner;
 
-/// `target = rotation · panel + translation`.
+/// Pose of a panel: `target = rotation · panel + translation`.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct PanelPose {
@@ -19,8 +19,7 @@ pub struct PanelPose {
     /// Translation, mm.
     #[serde(deserialize_with = "quantity::place_mm::de")]
     pub translation_mm: DVec3,
-    /// Covariance of a small turn (rad) and move (mm) along the target's axes, where the pose was
-    /// measured.
+    /// Covariance of a small rotation (rad) and translation (mm) along the target's axes, if the pose was measured.
     #[serde(
         default,
         skip_serializing_if = "Option::is_none",
@@ -29,56 +28,56 @@ pub struct PanelPose {
     pub covariance: Option<[[f64; 6]; 6]>,
 }
 
-/// Corners within this of their places count as unrotated, in parts of the panel's extent: the
-/// written digits of a flat target.
+/// Tolerance within which corners count as unrotated, relative to the panel's extent: the rounding of a flat target's
+/// written digits.
 const FLAT: f64 = 1e-9;
 
-/// The second singular value of a set of points on one line, relative to the first.
+/// Second singular value, relative to the first, below which points count as collinear.
 const LINE: f64 = 1e-9;
 
 impl PanelPose {
-    /// The panel frame is the target frame.
+    /// The identity: the panel frame is the target frame.
     pub const IDENTITY: PanelPose = PanelPose {
         rotation: [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0],
         translation_mm: DVec3::ZERO,
         covariance: None,
     };
 
-    /// A pose that was not measured.
+    /// Creates a pose that was not measured.
     pub fn new(rotation: DMat3, translation_mm: DVec3) -> Self {
         let rotation = rotation.transpose().to_cols_array();
         Self { rotation, translation_mm, covariance: None }
     }
 
-    /// A pose target_from_panel with its covariance, where it was measured.
+    /// Creates a pose from target_from_panel, with its covariance if it was measured.
     pub fn from_pose(pose: &Pose, covariance: Option<[[f64; 6]; 6]>) -> Self {
         Self { covariance, ..Self::new(DMat3::from_quat(pose.rotation), pose.translation) }
     }
 
-    /// target_from_panel.
+    /// Returns target_from_panel.
     pub fn to_pose(&self) -> Pose {
         let rotation = DQuat::from_mat3(&self.matrix()).normalize();
         Pose { rotation, translation: self.translation_mm }
     }
 
-    /// The rotation matrix.
+    /// Returns the rotation matrix.
     pub fn matrix(&self) -> DMat3 {
         DMat3::from_cols_array(&self.rotation).transpose()
     }
 
-    /// The panel position of a point of the target, mm.
+    /// Converts a point of the target to the panel frame, mm.
     pub fn panel_from_target(&self, point: DVec3) -> DVec3 {
         self.matrix().transpose() * (point - self.translation_mm)
     }
 
-    /// The target position of a point of the panel's plane, mm.
+    /// Converts a point of the panel's plane to the target frame, mm.
     pub fn target_from_panel(&self, point: DVec2) -> DVec3 {
         let rotation = self.matrix();
         rotation.x_axis * point.x + rotation.y_axis * point.y + self.translation_mm
     }
 
-    /// The pose that takes panel positions to target positions with the least sum of squares;
-    /// `None` when the corners lie on one line.
+    /// Fits the pose that maps panel positions to target positions by least squares. Returns `None` if the corners
+    /// are collinear.
     ///
     /// With centred p and q, H = Σ q pᵀ = U S Vᵀ and R = U diag(1, 1, det U Vᵀ) Vᵀ (Kabsch 1976).
     pub fn fit(corners: &[Corner]) -> Option<PanelPose> {
@@ -100,7 +99,7 @@ impl PanelPose {
         if sizes[1] <= LINE * sizes[2] {
             return None;
         }
-        // The smallest singular value belongs to the normal of the panel: it takes the sign.
+        // The smallest singular value belongs to the normal of the panel, so the sign goes there.
         let normal = svd.singular_values.imin();
         let mut signs = Vector3::repeat(1.0);
         signs[normal] = (u * v_t).determinant().signum();

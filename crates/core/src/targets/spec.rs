@@ -1,10 +1,10 @@
-//! What is asked for of a target: that of a board, of a solid, or of a target for another detector.
+//! Specifications of targets: boards, solids, and targets for other detectors.
 
 use serde::{Deserialize, Serialize};
 
 use crate::targets::{AprilGridSpec, BoardSpec, CharucoSpec, CirclesSpec, SolidSpec, TagSheetSpec};
 
-/// The specification of a target: enough to make it again.
+/// The specification of a target: enough to make the target again.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "kind", rename_all = "lowercase")]
 pub enum TargetSpec {
@@ -12,7 +12,7 @@ pub enum TargetSpec {
     Board(BoardSpec),
     /// A solid with a board on each face.
     Solid(SolidSpec),
-    /// Single tags, in rows.
+    /// Single tags in rows.
     Tags(TagSheetSpec),
     /// A ChArUco board.
     Charuco(CharucoSpec),
@@ -20,11 +20,11 @@ pub enum TargetSpec {
     AprilGrid(AprilGridSpec),
     /// A grid of circles.
     Circles(CirclesSpec),
-    /// Known only by its corners and tags, as another program listed them.
+    /// A target known only by its corners and tags, as another program listed them.
     Listed(ListedSpec),
 }
 
-/// Where a listed target comes from.
+/// Origin of a listed target.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ListedSpec {
@@ -80,8 +80,8 @@ impl From<CharucoSpec> for TargetSpec {
 }
 
 impl TargetSpec {
-    /// Whether its panels are fixed to each other: the faces of a solid, the sides of a board, what a list names together.
-    /// Others are sheets that lie about, each for itself.
+    /// Returns whether the panels are fixed to each other: faces of a solid, sides of a board, or boards listed
+    /// together. Otherwise they are separate loose sheets.
     pub fn is_rigid(&self) -> bool {
         match self {
             Self::Solid(_) | Self::Listed(_) => true,
@@ -90,7 +90,7 @@ impl TargetSpec {
         }
     }
 
-    /// The distance between the sides of a board that has two, mm.
+    /// Returns the distance between the sides of a two-sided board, mm.
     pub fn two_sided_mm(&self) -> Option<f64> {
         match self {
             Self::Board(board) => board.two_sided_mm,
@@ -98,13 +98,12 @@ impl TargetSpec {
         }
     }
 
-    /// Whether each of its panels can be the front of a plate: boards whose corners are detected.
+    /// Returns whether each panel can be the front of a plate: boards whose corners are detected.
     pub fn is_on_plate(&self) -> bool {
         matches!(self, Self::Board(_) | Self::Charuco(_) | Self::AprilGrid(_))
     }
 
-    /// The family that its tags are of, by name or path; `None` for an untagged target, and for a listed
-    /// one.
+    /// Returns the family of the tags, by name or path; `None` for an untagged or listed target.
     pub fn family(&self) -> Option<&str> {
         match self {
             Self::Board(board) => board.tags.as_ref().map(|tags| tags.family.as_str()),
@@ -116,7 +115,7 @@ impl TargetSpec {
         }
     }
 
-    /// The family of its square tags, where others are triangular: by name or path.
+    /// Returns the family of the square tags if other tags are triangular, by name or path.
     pub fn square_family(&self) -> Option<&str> {
         match self {
             Self::Solid(solid) => solid.square_tags.as_ref().map(|tags| tags.family.as_str()),

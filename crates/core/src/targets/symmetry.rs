@@ -1,4 +1,4 @@
-//! Rotations after which a panel without tags looks the same.
+//! Rotations that leave a panel without tags unchanged.
 
 use std::collections::BTreeSet;
 
@@ -6,12 +6,12 @@ use crate::lattice::{GridKind, LatticeMap, Vertex};
 use crate::targets::Panel;
 
 impl Panel {
-    /// The rotations, other than none, that take the corners of a panel without tags to its corners and its dark tiles
-    /// to dark tiles: no picture tells such labels from one another.
+    /// Returns the rotations, other than the identity, that map the corners of a panel without tags to its corners
+    /// and its dark tiles to dark tiles. An image cannot distinguish such labels.
     ///
-    /// A checkerboard of r × c corners has the half turn where r + c is even, and a square one of an even number of
-    /// rows the quarter turns too. A deltille has 120° rotations only where its outline has them, as a triangle does;
-    /// rectangular ones have none. Of a panel with tags, or with discs, there are none.
+    /// A checkerboard of r × c corners has a 180° rotation if r + c is even. A square one with an even number of rows
+    /// also has 90° rotations. A deltille has 120° rotations only if its outline has them, like a triangle;
+    /// rectangular ones have none. Panels with tags or discs have none.
     ///
     /// ```
     /// use deltille_core::targets::{BoardSpec, Target};
@@ -31,7 +31,7 @@ impl Panel {
     }
 }
 
-/// The same of corners at these vertices.
+/// Returns the symmetries of corners at these vertices.
 pub fn symmetries(kind: GridKind, vertices: impl IntoIterator<Item = Vertex>) -> Vec<LatticeMap> {
     let vertices: BTreeSet<Vertex> = vertices.into_iter().collect();
     let of_turns = |turns: i32| {

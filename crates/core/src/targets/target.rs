@@ -1,4 +1,4 @@
-//! A target: what exists in the world.
+//! A physical target.
 
 use crate::family::Family;
 use crate::lattice::GridKind;
@@ -9,25 +9,24 @@ use crate::targets::{
     UnknownCodes,
 };
 
-/// A target: its panels with their corners and tags, whatever they are printed on.
+/// A target: its panels with their corners and tags, independent of the paper.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Target {
-    /// Name of the target, which is the stem of the names of its files.
+    /// Name of the target, the stem of its file names.
     pub name: Name,
     /// The specification that the target was made from.
     pub spec: TargetSpec,
-    /// The family of its tags; `None` on an untagged target.
+    /// The family of the tags; `None` for an untagged target.
     pub family: Option<FamilyRef>,
-    /// Planar pieces, by ascending id.
+    /// Planar pieces, by increasing id.
     pub panels: Vec<Panel>,
-    /// Identity of the target as printed, where this one has measured corners or refined panels.
+    /// Identity of the target as printed, if this one has measured corners or refined panels.
     pub plan: Option<TargetIdentity>,
     pub(in crate::targets) codes: Codes,
 }
 
 impl Target {
-    /// The same target with its panels in other places, as they were measured; `poses` are as many
-    /// as it has panels.
+    /// Returns the target with measured panel poses; `poses` contains one per panel.
     pub fn with_poses(&self, poses: &[PanelPose]) -> Self {
         let mut target = self.clone();
         for (panel, pose) in target.panels.iter_mut().zip(poses) {
@@ -39,13 +38,13 @@ impl Target {
         target
     }
 
-    /// Whether its panels are sheets that lie about, each for itself; also boards of a list that has no poses of them.
+    /// Returns whether the panels are separate loose sheets. This includes listed boards without poses.
     pub fn is_loose(&self) -> bool {
         self.panels.len() > 1 && (!self.spec.is_rigid() || self.overlapping_boards().is_some())
     }
 
-    /// Ids of two boards of a list that would be in one place: each is listed in a plane of its own, and the list has no
-    /// poses of the boards.
+    /// Returns the ids of two listed boards that would overlap. Such lists describe each board in its own plane and
+    /// contain no poses of the boards.
     pub fn overlapping_boards(&self) -> Option<[u32; 2]> {
         let is_list = matches!(self.spec, TargetSpec::Listed(_));
         let panels: &[Panel] = if is_list { &self.panels } else { &[] };
@@ -55,26 +54,27 @@ impl Target {
         pairs.next().map(|(a, b)| [a.id, b.id])
     }
 
-    /// Whether its panels have places in one scene, as far as is known: a list tells nothing of what is around several.
+    /// Returns whether the panels have known poses in one scene. A list of several boards contains no information
+    /// about their surroundings.
     pub fn is_one_scene(&self) -> bool {
         let is_list = matches!(self.spec, TargetSpec::Listed(_));
         self.panels.len() <= 1 || !(self.is_loose() || is_list)
     }
 
-    /// The tilings of its panels.
+    /// Returns the tilings of the panels.
     pub fn tilings(&self) -> impl Iterator<Item = GridKind> {
         let has = |kind: &GridKind| self.panels.iter().any(|panel| panel.kind == *kind);
         [GridKind::Deltille, GridKind::Checker].into_iter().filter(has)
     }
 
-    /// Its panels of a tiling alone.
+    /// Returns the target reduced to its panels of one tiling.
     #[doc(hidden)]
     pub fn of_tiling(&self, kind: GridKind) -> Self {
         let panels = self.panels.iter().filter(|panel| panel.kind == kind).cloned().collect();
         Self { panels, ..self.clone() }
     }
 
-    /// The ids of its tags in tiles of a kind, and their family.
+    /// Returns the ids of the tags in tiles of a kind, and their family.
     #[doc(hidden)]
     pub fn tags_of_tiling(&self, kind: GridKind) -> Option<(&FamilyRef, Vec<u32>)> {
         let own = self.panels.iter().filter(|panel| panel.kind == kind);
@@ -82,11 +82,11 @@ impl Target {
         Some((self.family.as_ref()?.of_tiling(kind), ids))
     }
 
-    /// The family of its tags: the one that it was made with or given, else the shipped one of that name. `None` on an
-    /// untagged target.
+    /// Returns the family of the tags: the one it was made with or given, or the shipped one of that name. Returns
+    /// `None` for an untagged target.
     ///
     /// # Errors
-    /// Where none was given, and no shipped one has its codes.
+    /// Returns an error if no family was given and no shipped one has its codes.
     pub fn family(&self) -> Result<Option<&Family>, UnknownCodes> {
         let Some(named) = &self.family else { return Ok(None) };
         if let Some(codes) = self.codes.get() {
@@ -104,18 +104,18 @@ impl Target {
         found.map(|family| Some(self.codes.or(family))).ok_or_else(unknown)
     }
 
-    /// Sets the family of its tags, which a target that was read from a file needs where that is not shipped. A target of
+    /// Sets the family of the tags. A target read from a file needs this if its family is not shipped. A target of
     /// both tilings needs a family with squares, see [`Family::with_squares`].
     ///
     /// # Errors
-    /// Where this is not the family that the target names.
+    /// Returns an error if the family is not the one that the target names.
     pub fn set_family(&mut self, family: &Family) -> Result<(), OtherFamily> {
         self.check_families(family)?;
         self.codes = Codes::of(Some(family));
         Ok(())
     }
 
-    /// [`Self::check_family`] of each tiling.
+    /// Calls [`Self::check_family`] for each tiling.
     fn check_families(&self, family: &Family) -> Result<(), OtherFamily> {
         let named = self.family.as_ref().ok_or(OtherFamily::NoTags)?;
         self.tilings().try_for_each(|kind| {
@@ -124,11 +124,11 @@ impl Target {
         })
     }
 
-    /// Whether a family is one that the target names: it has the fingerprint, or had it before it grew, and all tags
-    /// of the target then.
+    /// Checks that a family is one that the target names: it has the same fingerprint, or had it before it grew and
+    /// then already had all tags of the target.
     ///
     /// # Errors
-    /// Why it is not.
+    /// Returns why it is not.
     #[doc(hidden)]
     pub fn check_family(&self, named: &FamilyRef, family: &Family) -> Result<(), OtherFamily> {
         let of_family = self.panels.iter().filter(|panel| panel.kind == family.kind());
@@ -142,7 +142,7 @@ impl Target {
                 return Err(OtherFamily::Hole { hole_mm, problem });
             }
         }
-        // A file from elsewhere names a family without a fingerprint.
+        // A file from another program names a family without a fingerprint.
         if named.fingerprint.is_empty() || family.fingerprint() == named.fingerprint {
             return Ok(());
         }
@@ -161,13 +161,13 @@ impl Target {
         }
     }
 
-    /// Whether places of its corners were measured.
+    /// Returns whether any corner positions were measured.
     pub fn is_measured(&self) -> bool {
         self.panels.iter().flat_map(|panel| &panel.corners).any(|corner| corner.measured.is_some())
     }
 
-    /// How well the measured places of its corners are known: standard deviation of a coordinate, root mean
-    /// square over the corners that were measured, mm. `None` where none was.
+    /// Returns the uncertainty of the measured corner positions: standard deviation of a coordinate (1σ), RMS over
+    /// the measured corners, mm. Returns `None` if none was measured.
     pub fn measured_sd_mm(&self) -> Option<f64> {
         let corners = self.panels.iter().flat_map(|panel| &panel.corners);
         let places = corners.filter_map(|corner| corner.measured);
@@ -186,9 +186,9 @@ mod tests {
     use crate::family::{Construction, Rules};
     use crate::targets::{BoardSpec, TagSpec};
 
-    /// A target that was made before its family grew is still one of it, as long as it has only tags of then.
+    /// A target made before its family grew stays valid if it has only earlier tags.
     #[test]
-    fn families_that_grew_are_those_of_older_targets() {
+    fn grown_families_match_older_targets() {
         let codes = Family::shipped("delTag16h5").unwrap().codes().to_vec();
         let dimension = crate::lattice::Dimension::from_bits(16).unwrap();
         let of = |codes: &[u64]| {
@@ -211,16 +211,16 @@ mod tests {
         assert!(matches!(why, OtherFamily::Id { id: 20, codes: 20, .. }), "{why}");
     }
 
-    /// Of one's own families a file has the name and the fingerprint; the codes are set, and no others can be.
+    /// The file contains the name and fingerprint of a custom family; only a family with the same codes can be set.
     #[test]
-    fn a_target_that_was_read_needs_its_own_family() {
+    fn targets_from_files_need_their_own_family() {
         let shipped = Family::shipped("delTag16h5").unwrap();
         let of = |name: &str, codes: &[u64]| {
             let source = Construction::Imported { source: "a test".to_owned() };
             let dimension = shipped.dimension();
             Family::new(name, dimension, 5, codes.to_vec(), Rules::NONE, source).unwrap()
         };
-        // Whatever it is called: one that is shipped has that name, too.
+        // The name does not matter, even if it is that of a shipped family.
         for name in ["own", "delTag16h5"] {
             let own = of(name, &shipped.codes()[1..]);
             let tags = TagSpec { family: name.to_owned(), ..TagSpec::default() };

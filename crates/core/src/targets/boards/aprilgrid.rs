@@ -1,4 +1,4 @@
-//! AprilGrids, as Kalibr defines and numbers them: tags in rows, with small black squares between their corners.
+//! AprilGrids as defined and numbered by Kalibr: tags in rows, with small black squares between their corners.
 //!
 //! ```text
 //!     ▪   ▪   ▪      The lattice is that of a checkerboard of which every second row and column is a gap, so
@@ -23,34 +23,34 @@ use crate::targets::{
     Corner, FamilyRef, Outline, Panel, PanelPose, TagPlacement, TagsIn, TargetError,
 };
 
-/// Range of tags along a side: fewer corners than those of four tags may be texture.
+/// Range of the number of tags along a side. With fewer than four tags, random texture could pass for the grid.
 const SIDES: std::ops::RangeInclusive<u32> = 2..=100;
 
 /// Range of a tag's side, mm.
 const TAG_MM: std::ops::RangeInclusive<f64> = 2.0..=1000.0;
 
-/// Range of the gap between tags, in tags: a narrower one leaves no corner to be located, in a wider one the small squares
-/// would be as large as the tags.
+/// Range of the gap between tags, in tags. A smaller gap leaves no corners to locate; a larger one makes the small
+/// squares as large as the tags.
 const GAP: std::ops::RangeInclusive<f64> = 0.1..=0.9;
 
 /// An AprilGrid.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct AprilGridSpec {
-    /// Number of tags in each row, and of rows, 2 to 100, Kalibr's `tagCols` and `tagRows`.
+    /// Number of tags in each row and number of rows, 2 to 100; Kalibr's `tagCols` and `tagRows`.
     pub tags: [u32; 2],
-    /// Length of a tag's side with its black border, mm, Kalibr's `tagSize`.
+    /// Length of a tag's side with its black border, mm; Kalibr's `tagSize`.
     #[serde(deserialize_with = "quantity::length_mm::de")]
     pub tag_mm: f64,
-    /// Width of the gaps between tags, in tags, Kalibr's `tagSpacing`.
+    /// Width of the gaps between tags, in tags; Kalibr's `tagSpacing`.
     #[serde(deserialize_with = "quantity::length_mm::de")]
     pub gap: f64,
-    /// Family name, or path of a family file. Kalibr reads aprilTag36h11 only.
+    /// Family name, or path of a family file. Kalibr only reads aprilTag36h11.
     pub family: String,
     /// Id of the first tag; the others follow.
     #[serde(default)]
     pub first_id: u32,
-    /// Width of a tag's border, bit-widths. Kalibr reads a border of 2 only.
+    /// Width of a tag's border, bit-widths. Kalibr only reads a border of 2.
     #[serde(deserialize_with = "quantity::border_bits::de")]
     pub border_bits: f64,
     /// Id of the board.
@@ -59,19 +59,19 @@ pub struct AprilGridSpec {
 }
 
 impl AprilGridSpec {
-    /// A grid as Kalibr makes it: of aprilTag36h11 with a border of 2 bits, and gaps of 0.3 tags.
+    /// Creates a grid with Kalibr's defaults: aprilTag36h11 with a border of 2 bits, and gaps of 0.3 tags.
     pub fn new(tags: [u32; 2], tag_mm: f64) -> Self {
         let family = "aprilTag36h11".to_owned();
         Self { tags, tag_mm, gap: 0.3, family, first_id: 0, border_bits: 2.0, board_id: 0 }
     }
 
-    /// Number of its tags.
+    /// Returns the number of tags.
     pub fn count(&self) -> u32 {
         self.tags[0] * self.tags[1]
     }
 
-    /// The target file of Kalibr, if that reads the grid: it has no place for the family and the border, which must be those
-    /// of [`Self::new`].
+    /// Returns the target file of Kalibr; `None` if Kalibr cannot read the grid. The file does not contain the family
+    /// and the border, which must be those of [`Self::new`].
     pub fn to_kalibr_yaml(&self) -> Option<String> {
         let Self { tags: [columns, rows], tag_mm, gap, first_id, .. } = self;
         let known = Self::new(self.tags, self.tag_mm);
@@ -107,13 +107,14 @@ impl AprilGridSpec {
             return Err(TargetError::invalid(TagBorderBits, problem));
         }
         if self.board_id == u32::MAX {
-            let problem = format!("{} leaves no id for a board after it", self.board_id);
+            let problem =
+                format!("{} is too large: it leaves no id for a following board", self.board_id);
             return Err(TargetError::invalid(BoardBoardId, problem));
         }
         Ok(())
     }
 
-    /// The panel of a checked spec.
+    /// Returns the panel of a checked spec.
     #[doc(hidden)]
     pub fn panel(&self) -> Panel {
         let [columns, rows] = self.tags;
@@ -153,24 +154,24 @@ impl AprilGridSpec {
     }
 }
 
-/// The panels that a spec asks for, whether or not its family has so many tags.
+/// Returns the panels of a spec, regardless of the size of its family.
 pub(in crate::targets) fn untied_panels(spec: &AprilGridSpec) -> Result<Vec<Panel>, TargetError> {
     spec.check()?;
     Ok(vec![spec.panel()])
 }
 
-/// The panel of a grid, and its family.
+/// Returns the panel of a grid and its family.
 pub(in crate::targets) fn tagged(
     spec: &AprilGridSpec,
     family: &Family,
 ) -> Result<(Vec<Panel>, FamilyRef), TargetError> {
     let panels = untied_panels(spec)?;
     if family.kind() != GridKind::Checker {
-        let problem = format!("{} has triangular tags, not square ones", family.name());
+        let problem = format!("{} has triangular tags, but square ones are needed", family.name());
         return Err(TargetError::invalid(TagFamily, problem));
     }
     let family = check_ids(TagSettings::TAGS, spec.first_id, spec.count().into(), family, || {
-        format!("make fewer {AprilGridTags}")
+        format!("use fewer {AprilGridTags}")
     })?;
     Ok((panels, family))
 }
@@ -184,9 +185,10 @@ mod tests {
     use crate::targets::Target;
 
     proptest! {
-        /// Kalibr: corner c of row r is at (c div 2 · (1 + spacing) + c mod 2) · size along x, and so for r along y.
+        /// Kalibr: corner c of row r is at (c div 2 · (1 + spacing) + c mod 2) · size along x; the same holds for r
+        /// along y.
         #[test]
-        fn corners_are_those_of_kalibr(
+        fn corners_match_kalibr(
             columns in 2u32..8, rows in 2u32..8, tag_mm in 10.0..99.0f64, gap in 0.1..0.9f64,
         ) {
             let spec = AprilGridSpec { gap, ..AprilGridSpec::new([columns, rows], tag_mm) };
@@ -214,7 +216,7 @@ mod tests {
     }
 
     #[test]
-    fn kalibr_reads_what_is_written() {
+    fn written_files_match_kalibr() {
         let yaml = AprilGridSpec::new([6, 5], 88.0).to_kalibr_yaml().unwrap();
         let lines: Vec<&str> = yaml.lines().collect();
         assert_eq!(lines[..3], ["target_type: 'aprilgrid'", "tagCols: 6", "tagRows: 5"]);

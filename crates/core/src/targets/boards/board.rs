@@ -1,4 +1,4 @@
-//! Boards: where their corners and tags are.
+//! Boards: positions of their corners and tags.
 
 use std::collections::BTreeMap;
 
@@ -12,9 +12,8 @@ use crate::targets::{
     BoardSpec, Corner, FamilyRef, Outline, Panel, PanelPose, TagSpec, TagsIn, TargetError,
 };
 
-/// The corners of a zigzag board of `rows × cols` corners, by row, then column: every second row
-/// starts one column further left, so that odd rows lie half an edge to the right of even ones;
-/// the smallest column is 0.
+/// Returns the corners of a zigzag board of `rows × cols` corners, by row, then column. Every second row starts one
+/// column further left, so that odd rows are half an edge to the right of even ones. The smallest column is 0.
 ///
 /// ```text
 ///   row 3     ·   ·   ·        columns 0 1 2
@@ -30,16 +29,16 @@ pub fn zigzag_vertices(rows: u32, cols: u32) -> impl Iterator<Item = Vertex> {
     })
 }
 
-/// The corners of a checkerboard, by row, then column.
+/// Returns the corners of a checkerboard, by row, then column.
 ///
-/// Row 0, column 0 is the lower left one; the square up and right of it is black, as are all whose
+/// Row 0, column 0 is the lower left corner. The square above and to the right of it is black, like all squares whose
 /// lower left vertex has an even sum of row and column.
 fn rectangle_vertices(rows: u32, cols: u32) -> impl Iterator<Item = Vertex> {
     let (rows, cols) = (rows as i32, cols as i32);
     (0..rows).flat_map(move |row| (0..cols).map(move |col| Vertex::new(row, col)))
 }
 
-/// The corners of a board of a tiling, by row, then column.
+/// Returns the corners of a board of a tiling, by row, then column.
 pub fn board_vertices(kind: GridKind, rows: u32, cols: u32) -> Vec<Vertex> {
     match kind {
         GridKind::Deltille => zigzag_vertices(rows, cols).collect(),
@@ -47,7 +46,7 @@ pub fn board_vertices(kind: GridKind, rows: u32, cols: u32) -> Vec<Vertex> {
     }
 }
 
-/// Width and height of the drawn tiles, mm; what [`Panel::bounds_mm`] finds without a panel at hand.
+/// Returns the width and height of the drawn tiles, mm, like [`Panel::bounds_mm`] but without a panel.
 pub fn size_mm(spec: &BoardSpec) -> DVec2 {
     let (rows, cols) = (f64::from(spec.rows), f64::from(spec.cols));
     let edges = match spec.grid {
@@ -57,12 +56,12 @@ pub fn size_mm(spec: &BoardSpec) -> DVec2 {
     edges * spec.edge_mm
 }
 
-/// The tiles that carry tags, ordered by row, then column.
+/// Returns the tiles that carry tags, ordered by row, then column.
 ///
-/// A tag needs the corners of its tile to be read, so these are corners of the board, in every
-/// `spacing`-th row and column; on a checkerboard in the squares among them that have the right
-/// colour. Of the possible starts the one with most tags is taken, and of those the one whose tags
-/// lie most evenly about the centre of the board.
+/// Reading a tag needs the corners of its tile, so these are corners of the board, in every `spacing`-th row and
+/// column. On a checkerboard, the squares must also have the right colour. Of the possible starts, the one with the
+/// most tags is used; among equal ones, the one whose tags are most evenly distributed around the centre of the
+/// board.
 pub fn tagged_tiles(
     kind: GridKind,
     corners: &[Vertex],
@@ -86,7 +85,7 @@ pub fn tagged_tiles(
     let off_centre = |tiles: &[Vertex]| {
         let vertices = tiles.iter().flat_map(|&v| kind.tag_tile(v).vertices()).map(position);
         let off = mean(&vertices.collect::<Vec<_>>()) - centre;
-        // Rounded, so that noise in the last digit does not decide between equal starts.
+        // Rounding keeps noise in the last digit from deciding between equal starts.
         (off.length() * 1e6).round() as i64
     };
     by_start
@@ -95,7 +94,7 @@ pub fn tagged_tiles(
         .unwrap_or_default()
 }
 
-/// The panels of a checked spec, and the family of its tags.
+/// Returns the panels of a checked spec and the family of their tags.
 pub(crate) fn panels(
     spec: &BoardSpec,
     family: Option<&Family>,
@@ -110,7 +109,7 @@ pub(crate) fn panels(
         let wider = wider_spacing(tags, available, |spacing| boards * on_each(spacing));
         let fewer = available / on_each(tags.spacing).max(1);
         let fewer =
-            (fewer > 0 && spec.boards > 1).then(|| format!("make at most {fewer} {BoardBoards}"));
+            (fewer > 0 && spec.boards > 1).then(|| format!("use at most {fewer} {BoardBoards}"));
         wider.into_iter().chain(fewer).collect()
     };
     let needed = boards * on_each(tags.spacing);
@@ -119,7 +118,7 @@ pub(crate) fn panels(
     Ok((panels, Some(family)))
 }
 
-/// The panels of a checked spec, whether or not its family has so many tags.
+/// Returns the panels of a checked spec, regardless of the size of its family.
 pub fn untied_panels(spec: &BoardSpec) -> Vec<Panel> {
     let vertices = board_vertices(spec.grid, spec.rows, spec.cols);
     let tagged = |tags: &TagSpec| tagged_tiles(spec.grid, &vertices, tags.spacing, tags.tags_in);
@@ -165,13 +164,13 @@ pub fn untied_panels(spec: &BoardSpec) -> Vec<Panel> {
     panels
 }
 
-/// The pose of what is seen from behind: turned about the upright axis half as far right as `across`, at a depth.
+/// Returns the pose of the rear panel: rotated about the vertical axis at half of `across`, at a depth.
 fn behind(across: f64, thickness_mm: f64) -> PanelPose {
     let turn = DMat3::from_diagonal(DVec3::new(-1.0, 1.0, -1.0));
     PanelPose::new(turn, DVec3::new(across, 0.0, -thickness_mm))
 }
 
-/// Puts a panel somewhere else.
+/// Moves a panel to a pose.
 fn put(panel: &mut Panel, pose: &PanelPose) {
     panel.pose = *pose;
     for corner in &mut panel.corners {
@@ -198,7 +197,7 @@ mod tests {
 
     /// The published print has 11 rows of 12 tiles, 250 mm × 11 · 10√3 mm.
     #[test]
-    fn the_board_of_the_paper() {
+    fn default_board_has_the_published_size() {
         let panel = panel(&spec(10, 11, 3));
         assert_eq!(panel.corners.len(), 110);
         assert_eq!(panel.dark_tiles().len(), 11 * 12);
@@ -209,7 +208,7 @@ mod tests {
     }
 
     #[test]
-    fn tags_of_the_default_board_lie_in_three_rows_about_the_centre() {
+    fn default_tags_form_three_centred_rows() {
         let board = spec(10, 11, 3);
         let corners: Vec<Vertex> = zigzag_vertices(board.rows, board.cols).collect();
         let tiles = tagged_tiles(GridKind::Deltille, &corners, 3, TagsIn::Black);
@@ -218,9 +217,9 @@ mod tests {
         assert!(tiles.len() >= 10, "{}", tiles.len());
     }
 
-    /// And smaller ones.
+    /// Also covers smaller boards.
     #[test]
-    fn places_of_boards_of_256_rows_and_columns_are_different() {
+    fn place_codes_are_unique_up_to_256_rows_and_columns() {
         use crate::family::places::{are_different, id};
         for (rows, cols) in
             [(256, 256), (256, 30), (30, 257), (257, 257), (300, 40), (20, 258), (500, 500)]
@@ -254,7 +253,7 @@ mod tests {
         }
 
         #[test]
-        fn tags_keep_their_spacing_and_lie_between_corners(
+        fn tags_keep_their_spacing_between_corners(
             rows in 2u32..20, cols in 2u32..20, spacing in 1u32..8, checker: bool, white: bool,
         ) {
             let board = spec(rows, cols, spacing);
@@ -264,7 +263,7 @@ mod tests {
             let corners = board_vertices(board.grid, board.rows, board.cols);
             let tags_in = if checker { tags_in } else { TagsIn::Black };
             let tiles = tagged_tiles(grid, &corners, spacing, tags_in);
-            // A board of 2 × 2 corners has one square, a black one.
+            // A board of 2 × 2 corners has a single square, which is black.
             prop_assert!(!tiles.is_empty() || (rows, cols, tags_in) == (2, 2, TagsIn::White));
             prop_assert!(tiles.is_sorted());
             for tile in &tiles {

@@ -1,4 +1,4 @@
-//! What is asked for of a board.
+//! The specification of a board.
 
 use serde::{Deserialize, Serialize};
 
@@ -11,15 +11,15 @@ use crate::setting::Setting::{
 use crate::targets::length::format_mm;
 use crate::targets::{TagSpec, TagsIn, TargetError};
 
-/// Range of rows and of columns: two rows of two corners have a tile between them.
+/// Range of rows and of columns: two rows of two corners enclose one tile.
 pub const SIDES: std::ops::RangeInclusive<u32> = 2..=MOST_ROWS;
 
-/// Most corners of all boards together: their description takes 100 MB of text.
+/// Maximum number of corners of all boards together: their description takes 100 MB of text.
 const MOST_CORNERS: u64 = 1_000_000;
 
-/// Fewest corners of an untagged board: what the detector asks for where no tag vouches for a grid.
-/// A hexagon of triangles, or four squares: a quad or two of random texture may pass for tiles,
-/// twelve clean edges between so few corners do not.
+/// Returns the fewest corners of an untagged board, as the detector requires of grids without a confirming tag. They
+/// form a hexagon of triangles, or four squares. Random texture may contain one or two quads that pass for tiles, but
+/// not twelve clean edges between so few corners.
 pub const fn least_untagged_corners(kind: GridKind) -> u32 {
     match kind {
         GridKind::Deltille => 7,
@@ -27,13 +27,13 @@ pub const fn least_untagged_corners(kind: GridKind) -> u32 {
     }
 }
 
-/// Range of the thickness of a plate with a board on either side, mm.
+/// Range of the thickness of a two-sided plate, mm.
 const TWO_SIDED_MM: std::ops::RangeInclusive<f64> = 0.1..=1000.0;
 
 /// Range of a tile's edge, mm.
 pub(crate) const EDGE_MM: std::ops::RangeInclusive<f64> = 1.0..=1000.0;
 
-/// Boards of `rows × cols` corners, all alike but for their ids.
+/// Boards of `rows × cols` corners that differ only in their ids.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct BoardSpec {
@@ -46,18 +46,18 @@ pub struct BoardSpec {
     pub cols: u32,
     /// Length of a tile's edge, mm.
     pub edge_mm: f64,
-    /// Number of boards. Each has a sheet of its own; they are loose, so that each lies in the
-    /// origin of the target frame.
+    /// Number of boards. Each has its own sheet. They are loose, so each of them is at the origin of the target
+    /// frame.
     #[serde(default = "one")]
     pub boards: u32,
     /// Id of the first board; the others follow.
     pub board_id: u32,
     /// Tags; `None` for an untagged board.
     pub tags: Option<TagSpec>,
-    /// Whether black and white are exchanged: white tiles on a black field.
+    /// Whether black and white are inverted: white tiles on a black field.
     pub inverted: bool,
-    /// Thickness of the plate that carries a board on its back, too, mm; `None` for boards with one side. The back, whose
-    /// id follows, is turned about the upright axis through the middle of the plate.
+    /// Thickness of a plate with a second board on its back, mm; `None` for one-sided boards. The back has the next
+    /// id and is rotated about the vertical axis through the centre of the plate.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub two_sided_mm: Option<f64>,
 }
@@ -71,20 +71,20 @@ fn is_deltille(kind: &GridKind) -> bool {
 }
 
 impl BoardSpec {
-    /// Edge of the tiles of the published board, mm, which fits A4 with 10 × 11 corners.
+    /// Tile edge of the published board, mm; it fits A4 with 10 × 11 corners.
     pub const USUAL_EDGE_MM: f64 = 20.0;
 
-    /// One deltille board with tags, of so many rows and columns of corners.
+    /// Creates one deltille board with tags and the given numbers of rows and columns of corners.
     pub fn deltille(rows: u32, cols: u32, edge_mm: f64) -> Self {
         Self::new(GridKind::Deltille, rows, cols, edge_mm)
     }
 
-    /// One checkerboard with AprilTags, of so many rows and columns of corners.
+    /// Creates one checkerboard with AprilTags and the given numbers of rows and columns of corners.
     pub fn checkerboard(rows: u32, cols: u32, edge_mm: f64) -> Self {
         Self::new(GridKind::Checker, rows, cols, edge_mm)
     }
 
-    /// One board with tags.
+    /// Creates one board with tags.
     pub fn new(grid: GridKind, rows: u32, cols: u32, edge_mm: f64) -> Self {
         let tags = Some(match grid {
             GridKind::Deltille => TagSpec::default(),
@@ -94,12 +94,12 @@ impl BoardSpec {
         Self { grid, rows, cols, edge_mm, boards, board_id, tags, inverted, two_sided_mm }
     }
 
-    /// How many panels they are: one for each side.
+    /// Returns the number of panels: one per side.
     pub(crate) fn panel_count(&self) -> u32 {
         self.boards * if self.two_sided_mm.is_some() { 2 } else { 1 }
     }
 
-    /// Checks what two sides need.
+    /// Checks the requirements of two-sided boards.
     fn check_sides(&self) -> Result<(), TargetError> {
         let refused = |problem: String| Err(TargetError::invalid(BoardTwoSidedMm, problem));
         match self.two_sided_mm {
@@ -108,23 +108,23 @@ impl BoardSpec {
                 refused(format!("{} is not between 0.1 mm and 1000 mm", format_mm(mm)))
             }
             Some(_) if self.boards > 1 => refused(
-                "the two sides of one board are described together: make one board at a time"
+                "a two-sided board must be the only board of its target: make one board at a time"
                     .to_owned(),
             ),
             Some(_) if self.tags.is_none() => {
-                refused("untagged sides cannot be told apart: give them tags".to_owned())
+                refused("untagged sides cannot be distinguished: add tags".to_owned())
             }
             Some(_) if self.tags.as_ref().is_some_and(|tags| tags.hole_mm.is_some()) => {
                 refused(format!(
-                    "a hole through a tag of one side would be in a tile of the other: leave out {TagHoleMm}, or \
-                 make one side"
+                    "a hole through a tag of one side would cut into a tile of the other: leave out {TagHoleMm}, or \
+             make one side",
                 ))
             }
             Some(_) => Ok(()),
         }
     }
 
-    /// Checks every number by itself.
+    /// Checks each number on its own.
     pub(crate) fn check(&self) -> Result<(), TargetError> {
         self.check_sides()?;
         for (setting, value) in [(BoardRows, self.rows), (BoardCols, self.cols)] {
@@ -144,18 +144,22 @@ impl BoardSpec {
         let corners =
             [self.rows, self.cols, self.panel_count()].into_iter().map(u64::from).product::<u64>();
         if corners > MOST_CORNERS {
-            let problem = format!("{corners} corners are more than {MOST_CORNERS} in one target");
+            let problem =
+                format!("{corners} corners exceed the maximum of {MOST_CORNERS} per target");
             return Err(TargetError::invalid(BoardBoards, problem));
         }
         if self.board_id.checked_add(self.panel_count()).is_none() {
-            let problem = format!("{} leaves no ids for the boards after it", self.board_id);
+            let problem = format!(
+                "{} is too large: it leaves no ids for the following boards",
+                self.board_id
+            );
             return Err(TargetError::invalid(BoardBoardId, problem));
         }
         let least = least_untagged_corners(self.grid);
         if self.tags.is_none() && self.rows * self.cols < least {
             let problem = format!(
-                "{} × {} corners without tags are too few to be told from texture: take at least \
-                 {least} corners, or tags",
+                "{} × {} corners without tags are too few to distinguish from texture: use at least \
+             {least} corners, or add tags",
                 self.rows, self.cols
             );
             let setting = match self.grid {
@@ -170,7 +174,7 @@ impl BoardSpec {
                 if (self.grid, self.rows, self.cols, tags.tags_in)
                     == (GridKind::Checker, 2, 2, TagsIn::White)
                 {
-                    let problem = "the one square between 2 × 2 corners is black";
+                    let problem = "a board of 2 × 2 corners has only one square, which is black";
                     return Err(TargetError::invalid(TagTagsIn, problem));
                 }
                 if tags.is_dense() && self.grid == GridKind::Deltille {
@@ -178,8 +182,8 @@ impl BoardSpec {
                     let (rows, cols) = (self.rows, self.cols);
                     if (rows - 1) * (cols - 1) < LEAST_DENSE_TILES {
                         let problem = format!(
-                            "{rows} × {cols} corners have fewer than {LEAST_DENSE_TILES} tiles between them, too few to \
-                             tell a place: take more, or tags of another {TagFamily}"
+                            "{rows} × {cols} corners enclose fewer than {LEAST_DENSE_TILES} tiles, too few to \
+                identify a position: use more corners, or tags of another {TagFamily}"
                         );
                         return Err(TargetError::invalid(BoardRows, problem));
                     }
@@ -188,7 +192,8 @@ impl BoardSpec {
                 Ok(())
             }
             None if self.boards > 1 => {
-                let problem = "untagged boards cannot be told apart: give them tags, or make one";
+                let problem =
+                    "untagged boards cannot be distinguished: add tags, or make one board";
                 Err(TargetError::invalid(BoardBoards, problem))
             }
             None => Ok(()),

@@ -1,4 +1,4 @@
-//! What to do where a family has too few codes for a target.
+//! Remedies for families with too few codes for a target.
 
 use crate::family::{Family, smallest_shipped};
 use crate::lattice::GridKind;
@@ -8,10 +8,10 @@ use crate::setting::Setting::{
 };
 use crate::targets::{FamilyRef, TagSpec, TargetError};
 
-/// Spacings beyond this are not proposed: a tag in twenty tiles is easily hidden.
+/// Largest spacing that messages propose: a single tag among twenty tiles is easily hidden.
 const SPARSEST: u32 = 20;
 
-/// What sets the family and the ids of tags.
+/// The settings of the family and ids of tags.
 #[derive(Clone, Copy)]
 pub(in crate::targets) struct TagSettings {
     family: Setting,
@@ -19,25 +19,25 @@ pub(in crate::targets) struct TagSettings {
 }
 
 impl TagSettings {
-    /// Of all tags of a target.
+    /// Settings for all tags of a target.
     pub(crate) const TAGS: Self = Self { family: TagFamily, first_id: TagFirstId };
 
-    /// Of square tags beside others.
+    /// Settings for square tags beside triangular ones.
     pub(crate) const SQUARE_TAGS: Self =
         Self { family: SolidSquareTagsFamily, first_id: SolidSquareTagsFirstId };
 
-    /// Of the tags in tiles of a kind on a target of one or two tilings.
+    /// Returns the settings for tags in tiles of a kind, on a target of one or two tilings.
     pub(crate) fn of(kind: GridKind, has_both: bool) -> Self {
         if has_both && kind == GridKind::Checker { Self::SQUARE_TAGS } else { Self::TAGS }
     }
 
-    /// What sets the first id.
+    /// Returns the setting of the first id.
     pub(crate) fn first_id(self) -> Setting {
         self.first_id
     }
 }
 
-/// Checks that a family has `count` codes from the first id on; `instead` says what else to change.
+/// Checks that a family has `count` codes from the first id on; `instead` names other remedies.
 pub(in crate::targets) fn check_ids(
     settings: TagSettings,
     first: u32,
@@ -59,9 +59,8 @@ pub(in crate::targets) fn check_ids(
     })
 }
 
-/// Checks that the family is there, for tiles of this kind, and has `needed` codes from the first
-/// id on; `instead` lists
-/// what other than ids and family to change, given how many codes there are from the first id on.
+/// Checks that the family exists, fits tiles of this kind, and has `needed` codes from the first id on. `instead`
+/// lists remedies other than ids and family, given the number of codes from the first id on.
 pub(in crate::targets) fn check_family(
     kind: GridKind,
     tags: &TagSpec,
@@ -72,17 +71,17 @@ pub(in crate::targets) fn check_family(
     instead: impl FnOnce(u64) -> Vec<String>,
 ) -> Result<FamilyRef, TargetError> {
     let Some(family) = family else {
-        let given = "and no family was given".to_owned();
+        let given = "but no family was given".to_owned();
         return Err(TargetError::Family { wanted: tags.family.clone(), given });
     };
     let family = family.of_tiling(kind).unwrap_or(family);
     if family.kind() != kind {
         let problem = match kind {
             GridKind::Deltille => format!(
-                "has square tags, deltille tiles need triangular ones: take one of {FamilyShippedNames}"
+                "has square tags, but deltille tiles need triangular ones: use one of {FamilyShippedNames}"
             ),
             GridKind::Checker => {
-                "has triangular tags, squares need one of aprilTag36h11, aprilTag25h9, aprilTag16h5"
+                "has triangular tags, but squares need square ones: use aprilTag36h11, aprilTag25h9 or aprilTag16h5"
                     .to_owned()
             }
         };
@@ -102,22 +101,23 @@ pub(in crate::targets) fn check_family(
         proposals.extend(instead(there.saturating_sub(first)));
         if let Some(larger) = smallest_shipped(kind, first + needed, 0) {
             let (name, codes) = (larger.name, larger.codes);
-            proposals.push(format!("take {} {name} with its {codes} codes", settings.family));
+            proposals.push(format!("use {} {name} with its {codes} codes", settings.family));
         }
         if proposals.is_empty() {
             proposals.push(
-                "make a smaller target, or a larger family by `deltag gen-family`".to_owned(),
+                "make a smaller target, or generate a larger family with `deltag gen-family`"
+                    .to_owned(),
             );
         }
         proposals.join(", or ")
     })
 }
 
-/// Part of the free cells that a hole may take: around it there is a ring of black, so that its edge is seen, and a drill may
-/// be a little off.
+/// Usable fraction of the free cells for a hole: a ring of black around it keeps its edge visible and tolerates an
+/// inaccurate drill.
 const HOLE_PART: f64 = 0.9;
 
-/// Why there is no room for a hole in tags of a family on tiles of a size.
+/// Returns why a hole does not fit the tags of a family on tiles of a size; `None` if it fits.
 pub(in crate::targets) fn no_room_for_hole(
     family: &Family,
     edge_mm: f64,
@@ -127,18 +127,18 @@ pub(in crate::targets) fn no_room_for_hole(
     let name = family.name();
     let Some(free) = family.rules().free else {
         return Some(format!(
-            "the codes of {name} use the cells in the middle: make a family without them by `deltag gen-family --free centre`"
+            "the codes of {name} use the central cells: generate a family that leaves them free with `deltag gen-family --free centre`"
         ));
     };
     let bit_mm = edge_mm / family.cells().width(border_bits);
     let most = 2.0 * HOLE_PART * bit_mm * free.radius_bits(family.dimension());
     (hole_mm > most).then(|| {
         let most = (most * 100.0).floor() / 100.0;
-        format!("the cells that {name} leaves free have room for a hole of at most {most} mm: larger tiles have more")
+        format!("the free cells of {name} fit a hole of at most {most} mm; larger tiles fit a larger hole")
     })
 }
 
-/// The closest spacing above that of `tags` with which `count` tags are enough, as a proposal.
+/// Proposes the smallest spacing above that of `tags` that needs at most `count` tags.
 pub(in crate::targets) fn wider_spacing(
     tags: &TagSpec,
     available: u64,

@@ -1,4 +1,4 @@
-//! ChArUco boards: checkerboards with a marker in every white square, as OpenCV defines and numbers them.
+//! ChArUco boards: checkerboards with a marker in every white square, as defined and numbered by OpenCV.
 //!
 //! ```text
 //!       x →
@@ -8,8 +8,8 @@
 //!     ▼ ■ 5 ■ 6 ■          The panel frame is that of every checkerboard: y up, z towards the viewer.
 //! ```
 //!
-//! Since OpenCV 4.6 the upper left square is black. Before, the lower left one was: with an even number of rows
-//! that is another pattern, OpenCV's `setLegacyPattern(true)`.
+//! Since OpenCV 4.6 the upper left square is black. Before, it was the lower left one. With an even number of rows
+//! that is a different pattern, OpenCV's `setLegacyPattern(true)`.
 
 use glam::{DMat3, DVec3};
 use serde::{Deserialize, Serialize};
@@ -26,24 +26,24 @@ use crate::targets::{
     Corner, FamilyRef, Outline, Panel, PanelPose, TagPlacement, TagsIn, TargetError,
 };
 
-/// Range of squares along a side: with three there is a row of two corners.
+/// Range of squares along a side: three squares give a row of two corners.
 const SIDES: std::ops::RangeInclusive<u32> = 3..=200;
 
 /// Range of a square's edge, mm.
 const SQUARE_MM: std::ops::RangeInclusive<f64> = 1.0..=1000.0;
 
-/// Range of a marker's side, in squares: OpenCV finds markers that are as large as this without trouble, and finer
-/// ones waste the square.
+/// Range of a marker's side, in squares. OpenCV finds markers up to the largest reliably; smaller ones waste the
+/// square.
 const MARKER_SQUARES: std::ops::RangeInclusive<f64> = 0.3..=0.9;
 
-/// The border of a marker, bit-widths: the default of OpenCV, and of everybody.
+/// Border of a marker, bit-widths: OpenCV's default, which everybody uses.
 const BORDER_BITS: f64 = 1.0;
 
 /// A ChArUco board.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct CharucoSpec {
-    /// Number of squares in each row, and of rows of squares, 3 to 200.
+    /// Number of squares in each row and number of rows of squares, 3 to 200.
     pub squares: [u32; 2],
     /// Length of a square's edge, mm.
     #[serde(deserialize_with = "quantity::length_mm::de")]
@@ -51,7 +51,7 @@ pub struct CharucoSpec {
     /// Length of a marker's side with its black border, mm.
     #[serde(deserialize_with = "quantity::length_mm::de")]
     pub marker_mm: f64,
-    /// Name of the dictionary of OpenCV, such as `DICT_5X5_100`.
+    /// Name of the OpenCV dictionary, for example `DICT_5X5_100`.
     pub dictionary: String,
     /// Id of the first marker; the others follow.
     #[serde(default)]
@@ -59,30 +59,30 @@ pub struct CharucoSpec {
     /// Id of the board.
     #[serde(default)]
     pub board_id: u32,
-    /// Whether the pattern is that of OpenCV before 4.6.
+    /// Whether the pattern is that of OpenCV before version 4.6.
     #[serde(default)]
     pub legacy: bool,
 }
 
 impl CharucoSpec {
-    /// A board of the present pattern, with markers of 0.75 squares.
+    /// Creates a board of the current pattern, with markers of 0.75 squares.
     pub fn new(squares: [u32; 2], square_mm: f64, dictionary: &str) -> Self {
         let (marker_mm, dictionary) = (0.75 * square_mm, dictionary.to_owned());
         Self { squares, square_mm, marker_mm, dictionary, first_id: 0, board_id: 0, legacy: false }
     }
 
-    /// Number of its markers: there is one in every white square.
+    /// Returns the number of markers, one per white square.
     pub fn markers(&self) -> u32 {
         let [columns, rows] = self.squares;
         let all = columns * rows;
-        // Of an odd number of squares the corners are black, whichever pattern it is.
+        // With an odd number of squares, both patterns have black squares at the corners.
         all / 2
     }
 
-    /// Checks every number by itself; returns the dimension of the markers.
+    /// Checks each number on its own and returns the dimension of the markers.
     ///
     /// # Errors
-    /// Where a setting is not possible.
+    /// Returns an error if a setting is invalid.
     #[doc(hidden)]
     pub fn check(&self) -> Result<Dimension, TargetError> {
         if let Some(side) = self.squares.iter().find(|side| !SIDES.contains(side)) {
@@ -97,17 +97,19 @@ impl CharucoSpec {
             let [least, most] = [MARKER_SQUARES.start(), MARKER_SQUARES.end()]
                 .map(|part| format_mm((part * self.square_mm * 1e3).round() / 1e3));
             let marker = format_mm(self.marker_mm);
-            let problem = format!("{marker} is not between {least} and {most} in such a square");
+            let problem =
+                format!("{marker} is not between {least} and {most} for squares of this size");
             return Err(TargetError::invalid(CharucoMarkerMm, problem));
         }
         if self.board_id == u32::MAX {
-            let problem = format!("{} leaves no id for a board after it", self.board_id);
+            let problem =
+                format!("{} is too large: it leaves no id for a following board", self.board_id);
             return Err(TargetError::invalid(BoardBoardId, problem));
         }
         let Some((_, dimension)) = dictionary(&self.dictionary) else {
             let names: Vec<&str> = dictionary_names().collect();
             let problem = format!(
-                "OpenCV's `{}` is not known here: take one of {}",
+                "unknown OpenCV dictionary `{}` (known: {})",
                 self.dictionary,
                 names.join(", ")
             );
@@ -116,20 +118,20 @@ impl CharucoSpec {
         Ok(dimension)
     }
 
-    /// The first column of its corners in the lattice, in which squares whose lower left vertex has an even sum of
-    /// row and column are black.
+    /// Returns the first column of the corners in the lattice. Squares whose lower left vertex has an even sum of row
+    /// and column are black there.
     fn first_col(&self) -> i32 {
         let even_rows = self.squares[1].is_multiple_of(2);
         i32::from(even_rows && !self.legacy)
     }
 
-    /// The panel of a checked spec with markers of this dimension.
+    /// Returns the panel of a checked spec with markers of this dimension.
     #[doc(hidden)]
     pub fn panel(&self, dimension: Dimension) -> Panel {
         let [columns, rows] = self.squares.map(|side| side as i32);
         let (first, kind, edge_mm) = (self.first_col(), GridKind::Checker, self.square_mm);
         let bit_mm = self.marker_mm / TagCells::of(kind, dimension).width(BORDER_BITS);
-        // From the lower left corner in the panel to the upper left one of the board.
+        // From the lower left corner in the panel frame to the upper left corner of the board.
         let translation =
             DVec3::new(f64::from(1 - first) * edge_mm, f64::from(rows - 1) * edge_mm, 0.0);
         let downwards = DMat3::from_diagonal(DVec3::new(1.0, -1.0, -1.0));
@@ -178,24 +180,24 @@ impl CharucoSpec {
     }
 }
 
-/// The panels that a spec asks for, whether or not its dictionary has so many markers.
+/// Returns the panels of a spec, regardless of the size of its dictionary.
 pub(in crate::targets) fn untied_panels(spec: &CharucoSpec) -> Result<Vec<Panel>, TargetError> {
     Ok(vec![spec.panel(spec.check()?)])
 }
 
-/// The panel of a board, and its dictionary.
+/// Returns the panel of a board and its dictionary.
 pub(in crate::targets) fn tagged(
     spec: &CharucoSpec,
     family: &Family,
 ) -> Result<(Vec<Panel>, FamilyRef), TargetError> {
     let panels = untied_panels(spec)?;
     if dictionary(&spec.dictionary).is_none_or(|(name, _)| name != family.name()) {
-        let given = format!("{} is given", family.name());
+        let given = format!("but {} was given", family.name());
         return Err(TargetError::Family { wanted: spec.dictionary.clone(), given });
     }
     let family =
         check_ids(TagSettings::TAGS, spec.first_id, spec.markers().into(), family, || {
-            format!("take a larger {CharucoDictionary}, or fewer {CharucoSquares}")
+            format!("use a larger {CharucoDictionary}, or fewer {CharucoSquares}")
         })?;
     Ok((panels, family))
 }
@@ -208,10 +210,10 @@ mod tests {
     use crate::targets::Target;
 
     proptest! {
-        /// OpenCV: corner i is at ((i mod (w − 1) + 1) s, (i div (w − 1) + 1) s); the square in column x, row y has a marker
-        /// where x + y is odd, or, in the legacy pattern with an even number of rows, even.
+        /// OpenCV: corner i is at ((i mod (w − 1) + 1) s, (i div (w − 1) + 1) s). The square in column x, row y has a
+        /// marker if x + y is odd; in the legacy pattern with an even number of rows, if x + y is even.
         #[test]
-        fn corners_and_markers_are_those_of_opencv(
+        fn corners_and_markers_match_opencv(
             w in 3u32..12, h in 3u32..12, square_mm in 10.0..50.0f64, legacy: bool,
         ) {
             let spec = CharucoSpec { legacy, ..CharucoSpec::new([w, h], square_mm, "DICT_5X5_100") };
@@ -236,7 +238,7 @@ mod tests {
         }
 
         #[test]
-        fn a_board_is_read_as_it_was_written(w in 3u32..12, h in 3u32..12, legacy: bool) {
+        fn boards_survive_a_target_file(w in 3u32..12, h in 3u32..12, legacy: bool) {
             let spec = CharucoSpec { legacy, ..CharucoSpec::new([w, h], 20.0, "4x4_1000") };
             let target = Target::new("board", spec).unwrap();
             prop_assert_eq!(Target::from_json(&target.to_json()).unwrap(), target);
@@ -244,7 +246,7 @@ mod tests {
     }
 
     #[test]
-    fn what_no_board_has_is_refused() {
+    fn invalid_settings_are_rejected() {
         let good = CharucoSpec::new([8, 6], 30.0, "5x5_100");
         let family = Family::shipped("5x5_100").unwrap();
         let said = |spec: CharucoSpec| {

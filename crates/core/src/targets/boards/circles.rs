@@ -1,4 +1,4 @@
-//! Grids of circles, plain and asymmetric, as OpenCV's `findCirclesGrid` defines and numbers them.
+//! Plain and asymmetric grids of circles, as defined and numbered by OpenCV's `findCirclesGrid`.
 //!
 //! ```text
 //!    x →            plain: circle j of row i is at (j, i)     asymmetric: at (2 j + i mod 2, i)
@@ -32,15 +32,16 @@ const DIAMETER: std::ops::RangeInclusive<f64> = 0.2..=0.8;
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct CirclesSpec {
-    /// Number of circles in each row, and of rows, 2 to 200: OpenCV's `patternSize`.
+    /// Number of circles in each row and number of rows, 2 to 200; OpenCV's `patternSize`.
     pub circles: [u32; 2],
-    /// Distance from row to row, mm; along a row too, in an asymmetric grid half of it.
+    /// Distance between rows, mm. It is also the distance within a row of a plain grid; in an asymmetric grid, that
+    /// is twice as large.
     #[serde(deserialize_with = "quantity::length_mm::de")]
     pub spacing_mm: f64,
     /// Diameter of the circles, mm.
     #[serde(deserialize_with = "quantity::length_mm::de")]
     pub diameter_mm: f64,
-    /// Whether every second row is shifted by half of the distance along a row.
+    /// Whether every second row is shifted by half of the distance within a row.
     #[serde(default)]
     pub asymmetric: bool,
     /// Id of the board.
@@ -49,7 +50,7 @@ pub struct CirclesSpec {
 }
 
 impl CirclesSpec {
-    /// A plain grid of circles of half a spacing.
+    /// Creates a plain grid with circles of half a spacing in diameter.
     pub fn new(circles: [u32; 2], spacing_mm: f64) -> Self {
         let diameter_mm = 0.5 * spacing_mm;
         Self { circles, spacing_mm, diameter_mm, asymmetric: false, board_id: 0 }
@@ -69,17 +70,18 @@ impl CirclesSpec {
             let [least, most] = [DIAMETER.start(), DIAMETER.end()]
                 .map(|part| format_mm((part * self.spacing_mm * 1e3).round() / 1e3));
             let diameter = format_mm(self.diameter_mm);
-            let problem = format!("{diameter} is not between {least} and {most} at such a spacing");
+            let problem = format!("{diameter} is not between {least} and {most} for this spacing");
             return Err(TargetError::invalid(CirclesDiameterMm, problem));
         }
         if self.board_id == u32::MAX {
-            let problem = format!("{} leaves no id for a board after it", self.board_id);
+            let problem =
+                format!("{} is too large: it leaves no id for a following board", self.board_id);
             return Err(TargetError::invalid(BoardBoardId, problem));
         }
         Ok(())
     }
 
-    /// The panel of a checked spec: its corners are the middles of the circles.
+    /// Returns the panel of a checked spec: its corners are the centres of the circles.
     #[doc(hidden)]
     pub fn panel(&self) -> Panel {
         let [columns, rows] = self.circles.map(|side| side as i32);
@@ -121,7 +123,7 @@ impl CirclesSpec {
     }
 }
 
-/// The panels that a spec asks for.
+/// Returns the panels of a spec.
 pub(in crate::targets) fn untied_panels(spec: &CirclesSpec) -> Result<Vec<Panel>, TargetError> {
     spec.check()?;
     Ok(vec![spec.panel()])
@@ -136,7 +138,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn circles_are_where_opencv_has_them(
+        fn circles_match_opencv(
             columns in 2u32..9, rows in 2u32..12, asymmetric: bool, spacing_mm in 5.0..20.0f64,
         ) {
             let spec = CirclesSpec { asymmetric, ..CirclesSpec::new([columns, rows], spacing_mm) };

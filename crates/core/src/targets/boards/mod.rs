@@ -1,8 +1,8 @@
-//! Flat targets: what is asked for of each kind, and where its corners and tags are.
+//! Flat targets: the specification of each kind, and the positions of its corners and tags.
 //!
-//! `board_spec` and `tag_spec` say what is asked for of boards of triangles and squares, and `board` makes their panels;
-//! `charuco`, `aprilgrid` and `circles` are the targets of other detectors, `tag_sheet` single tags: each has its
-//! specification and its panel in one file. `capacity` says what to do where a family has too few codes.
+//! `board_spec` and `tag_spec` specify boards of triangles and squares, and `board` makes their panels. `charuco`,
+//! `aprilgrid` and `circles` are the targets of other detectors, and `tag_sheet` contains single tags: each has its
+//! specification and its panel in one file. `capacity` proposes remedies for families with too few codes.
 
 pub(crate) mod aprilgrid;
 pub(crate) mod board;

@@ -1,4 +1,4 @@
-//! Single tags: a panel of one tile for each.
+//! Single tags: each has a panel of one tile.
 
 use serde::{Deserialize, Serialize};
 
@@ -9,26 +9,26 @@ use crate::setting::Setting::{TagSheetBorderBits, TagSheetEdgeMm, TagSheetFamily
 use crate::targets::length::format_mm;
 use crate::targets::{FamilyRef, Outline, Panel, PanelPose, TagPlacement, TagsIn, TargetError};
 
-/// Single tags on sheets: a panel of one tile without corners for each, whose id is the tag's.
+/// Single tags on sheets. Each has a panel of one tile without corners, whose id is that of the tag.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct TagSheetSpec {
     /// Family name, or path of a family file.
     pub family: String,
-    /// Tags in the order of printing, each once.
+    /// Tags in the order of printing, each at most once.
     pub ids: Vec<u32>,
     /// Length of a tag's edge, mm.
     pub edge_mm: f64,
-    /// Width of the border, in widths of a bit, 0.6 to 10.
+    /// Width of the border, bit-widths, 0.6 to 10.
     pub border_bits: f64,
 }
 
 impl TagSheetSpec {
-    /// Range of a tag's edge, mm: what office printers resolve in a tag, and what fits the largest page.
+    /// Range of a tag's edge, mm: the resolution of office printers, and the size of the largest page.
     pub const EDGE_MM: std::ops::RangeInclusive<f64> = 5.0..=2000.0;
 }
 
-/// A panel for each tag, and their family.
+/// Returns a panel for each tag, and their family.
 pub(in crate::targets) fn tagged(
     spec: &TagSheetSpec,
     family: &Family,
@@ -37,7 +37,7 @@ pub(in crate::targets) fn tagged(
     Ok((panels(spec), FamilyRef::of(family)))
 }
 
-/// A panel for each tag, by their ids.
+/// Returns a panel for each tag id.
 pub(in crate::targets) fn panels(spec: &TagSheetSpec) -> Vec<Panel> {
     let mut panels: Vec<Panel> = spec.ids.iter().map(|&id| panel(spec, id)).collect();
     panels.sort_by_key(|panel| panel.id);
@@ -46,7 +46,8 @@ pub(in crate::targets) fn panels(spec: &TagSheetSpec) -> Vec<Panel> {
 
 fn check(spec: &TagSheetSpec, family: &Family) -> Result<(), TargetError> {
     if family.kind() != GridKind::Deltille {
-        let problem = format!("{} has square tags, a sheet takes triangular ones", family.name());
+        let problem =
+            format!("{} has square tags, but a sheet needs triangular ones", family.name());
         return Err(TargetError::invalid(TagSheetFamily, problem));
     }
     if !TagSheetSpec::EDGE_MM.contains(&spec.edge_mm) {
@@ -58,17 +59,17 @@ fn check(spec: &TagSheetSpec, family: &Family) -> Result<(), TargetError> {
         return Err(TargetError::invalid(TagSheetBorderBits, problem));
     }
     if spec.ids.is_empty() {
-        return Err(TargetError::invalid(TagSheetIds, "there is no tag to print"));
+        return Err(TargetError::invalid(TagSheetIds, "no tag to print: the list is empty"));
     }
     if let Some(id) = spec.ids.iter().find(|&&id| family.code(id).is_none()) {
         let last = family.len() - 1;
-        let problem = format!("{} has no tag {id}, its ids run from 0 to {last}", family.name());
+        let problem = format!("{} has no tag {id}; its ids are 0 to {last}", family.name());
         return Err(TargetError::invalid(TagSheetIds, problem));
     }
     Ok(())
 }
 
-/// One tag: a tile without corners.
+/// Returns the panel of one tag: a tile without corners.
 fn panel(spec: &TagSheetSpec, id: u32) -> Panel {
     Panel {
         id,

@@ -1,4 +1,4 @@
-//! What is asked for of the tags in a board, or on the faces of a solid.
+//! The specification of tags in a board or on the faces of a solid.
 
 use serde::{Deserialize, Serialize};
 
@@ -8,42 +8,41 @@ use crate::quantity;
 use crate::setting::Setting::{self, TagBorderBits, TagFirstId, TagHoleMm, TagSpacing, TagTagsIn};
 use crate::targets::{TagPlacement, TagsIn, TargetError};
 
-/// Most rows or columns of a board: more than the largest paper holds at the finest edge that
-/// anybody prints, and few enough that no number overflows.
+/// Maximum number of rows or columns of a board: more than the largest paper fits at the finest printed edge, and few
+/// enough to avoid overflow.
 pub const MOST_ROWS: u32 = 500;
 
 /// Smallest hole in a tag, mm: for a thin pin.
 const LEAST_HOLE_MM: f64 = 0.5;
 
-/// Fewest tiles of a board of place codes: three by four, which tell their place also where some are hidden.
+/// Fewest tiles of a board of place codes: three by four identify their position even if some are hidden.
 pub(super) const LEAST_DENSE_TILES: u32 = 12;
 
 /// Least border of a square tag, bit-widths: that of an AprilTag.
 const LEAST_SQUARE_BORDER_BITS: f64 = 1.0;
 
-/// Range of a tag's border, bit-widths. The border separates the code from the white around the
-/// tile; with half a bit of it the detector no longer finds every corner of a clean print, from 0.6
-/// on it does.
+/// Range of a tag's border, bit-widths. The border separates the code from the white around the tile. With half a bit
+/// the detector misses some corners of a clean print; from 0.6 bits on it finds all.
 pub const BORDER_BITS: std::ops::RangeInclusive<f64> = 0.6..=10.0;
 
-/// Which tags a board carries, and where.
+/// The tags of a board and their positions.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct TagSpec {
-    /// Family name, or path of a family file. Of [`places`] every tile has a tag, whose id follows from the board's and
-    /// its place.
+    /// Family name, or path of a family file. With [`places`] every tile has a tag, whose id follows from the board
+    /// id and the position.
     pub family: String,
-    /// Id of the first tag; the others follow, by row, then column, board after board. 0 with place codes.
+    /// Id of the first tag; the others follow by row, then column, board after board. It is 0 for place codes.
     pub first_id: u32,
-    /// Every how many rows and columns there is a tag.
+    /// Distance between tags in rows and columns.
     pub spacing: u32,
-    /// Width of the border, in widths of a bit, 0.6 to 10.
+    /// Width of the border, bit-widths, 0.6 to 10.
     pub border_bits: f64,
-    /// Which squares of a checkerboard carry the tags.
+    /// The squares of a checkerboard that carry tags.
     #[serde(default, skip_serializing_if = "TagsIn::is_black")]
     pub tags_in: TagsIn,
-    /// Diameter of a hole in the middle of each tag, mm, for a screw or a camera: bare paper on print, a cut for a laser. The
-    /// family leaves the cells there free.
+    /// Diameter of a hole in the centre of each tag, mm, for a screw or a camera. It is bare paper on a print and a
+    /// cut for a laser. The family must leave these cells free.
     #[serde(
         default,
         skip_serializing_if = "Option::is_none",
@@ -53,8 +52,8 @@ pub struct TagSpec {
 }
 
 impl Default for TagSpec {
-    /// delTag25h7 from id 0, a tag in every third row and column, a border of 1.5 bits: a tag has
-    /// six plain tiles around each of its corners, and the border is that of published targets.
+    /// Returns delTag25h7 from id 0, with a tag in every third row and column and a border of 1.5 bits. A tag then
+    /// has six plain tiles around each of its corners. The border is that of published targets.
     fn default() -> Self {
         let family = "delTag25h7".to_owned();
         Self {
@@ -69,13 +68,13 @@ impl Default for TagSpec {
 }
 
 impl TagSpec {
-    /// A place code in every tile of a deltille grid, with the usual border: corners are as precise as without codes from 2 px
-    /// a cell on.
+    /// Returns a place code in every tile of a deltille grid, with the usual border. From 2 px per cell on, corners
+    /// are as precise as without codes.
     pub fn dense() -> Self {
         Self { family: places::NAME.to_owned(), spacing: 1, ..Self::default() }
     }
 
-    /// The usual tags of a tiling: those above, or of the family that is asked for by its name.
+    /// Returns the usual tags of a tiling: the default ones, or those of the named family.
     pub fn usual(grid: GridKind, family: Option<&str>, tags_in: TagsIn) -> Self {
         let usual = match grid {
             GridKind::Checker => Self::for_squares(tags_in),
@@ -86,18 +85,18 @@ impl TagSpec {
         Self { family, ..usual }
     }
 
-    /// Whether every tile has a place code.
+    /// Returns whether every tile has a place code.
     pub fn is_dense(&self) -> bool {
         self.family == places::NAME
     }
 
-    /// The tags in some tiles of the panel with an id, where those of a family begin with `first`.
+    /// Returns the tags in the given tiles of panel `panel`, with ids from `first` on for ordinary families.
     pub(crate) fn placements(&self, panel: u32, first: u32, tiles: &[Vertex]) -> Vec<TagPlacement> {
         let tiles = tiles.iter().zip(0..);
         let of_tile = |(tile, i): (&Vertex, u32)| TagPlacement {
             id: match self.is_dense() {
                 true => places::id(panel, *tile),
-                // No family has so many codes that ids overflow; a spec may ask for them.
+                // No family is large enough for ids to overflow, but a spec may ask for it.
                 false => first.saturating_add(i),
             },
             row: tile.row,
@@ -106,8 +105,8 @@ impl TagSpec {
         tiles.map(of_tile).collect()
     }
 
-    /// Checks that there are place codes for panels with these ids, whose tiles lie in so many rows and columns; `ids`
-    /// and `size` are the settings that these follow from.
+    /// Checks that place codes exist for panels with these ids, with the given numbers of rows and columns of tiles.
+    /// `ids` and `size` are the settings that determine them.
     pub(crate) fn check_places(
         &self,
         ids: Setting,
@@ -118,7 +117,7 @@ impl TagSpec {
         let last = places::BOARDS - 1;
         if panels.end > places::BOARDS {
             let problem = format!(
-                "boards {} to {} are needed, {} tells {last} as the last: lower it, or make fewer",
+                "boards {} to {} are needed, but the last id of {} is {last}: lower the id, or make fewer boards",
                 panels.start,
                 panels.end - 1,
                 places::NAME
@@ -127,31 +126,30 @@ impl TagSpec {
         }
         if !places::are_different(rows, cols) {
             let problem = format!(
-                "{rows} rows of {cols} tiles are more than {} tells apart, whose places come again after 256 edges: \
-                 make it smaller",
+                "{rows} rows of {cols} tiles are too many for {}, whose codes repeat after 256 edges: \
+                 make the board smaller",
                 places::NAME
             );
             return Err(TargetError::invalid(size, problem));
         }
         let fixed = [
             (TagSpacing, self.spacing, 1, "every tile has a place code"),
-            (TagFirstId, self.first_id, 0, "the ids of place codes follow from the board's"),
+            (TagFirstId, self.first_id, 0, "the ids of place codes follow from the board id"),
         ];
         match fixed.into_iter().find(|(_, value, only, _)| value != only) {
             Some((setting, value, only, why)) => {
-                let problem = format!("{value} is not {only}: {why}; leave it out");
+                let problem = format!("must be {only}, not {value}, because {why}; omit it");
                 Err(TargetError::invalid(setting, problem))
             }
             None => Ok(()),
         }
     }
 
-    /// Tags for a checkerboard: aprilTag36h11 in every second row and column, so that each corner
-    /// touches one tag at most.
+    /// Returns tags for a checkerboard: aprilTag36h11 in every second row and column, so that each corner touches at
+    /// most one tag.
     ///
-    /// In black squares the border has two bits: with one, cells are so close to the corners that a
-    /// sixth of these is lost in squares of 28 px (docs/benchmarks.md, Labels). In white squares it
-    /// has one bit, which every reader of AprilTags supports.
+    /// In black squares the border has two bits. With one, cells are so close to the corners that these are located
+    /// half as precisely (docs/benchmarks.md). In white squares it has one bit, as all readers of AprilTags expect.
     pub fn for_squares(tags_in: TagsIn) -> Self {
         Self {
             family: "aprilTag36h11".to_owned(),
@@ -167,16 +165,16 @@ impl TagSpec {
 }
 
 impl TagSpec {
-    /// Checks every number by itself, of tags in tiles of a kind.
+    /// Checks each number on its own, for tags in tiles of a kind.
     pub(crate) fn check(&self, grid: GridKind) -> Result<(), TargetError> {
         if grid == GridKind::Deltille && self.tags_in == TagsIn::White {
-            let problem = "the tags of a deltille board are in its black tiles";
+            let problem = "deltille boards can only have tags in black tiles";
             return Err(TargetError::invalid(TagTagsIn, problem));
         }
         let least = LEAST_SQUARE_BORDER_BITS;
         if grid == GridKind::Checker && self.border_bits < least {
             let problem = format!(
-                "{} is too narrow, a square tag has a border of at least {least} bit-width",
+                "{} is too narrow: a square tag needs a border of at least {least} bit-width",
                 self.border_bits
             );
             return Err(TargetError::invalid(TagBorderBits, problem));
@@ -192,10 +190,10 @@ impl TagSpec {
         let refused = |problem: &str| Err(TargetError::invalid(TagHoleMm, problem));
         match self.hole_mm {
             Some(_) if grid == GridKind::Checker => {
-                refused("square tags have no free cells: make a deltille board or solid")
+                refused("square tags have no free cells for a hole: use a deltille board or solid")
             }
             Some(mm) if mm.is_nan() || mm < LEAST_HOLE_MM => {
-                refused(&format!("{mm} mm is less than {LEAST_HOLE_MM} mm"))
+                refused(&format!("{mm} mm is less than the minimum of {LEAST_HOLE_MM} mm"))
             }
             _ => Ok(()),
         }

@@ -1,4 +1,4 @@
-//! Solids given as lists of faces: what makes them solids, and how far their triangles are from regular.
+//! Solids given as lists of faces: the requirements of a closed solid, and the irregularity of its triangles.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::f64::consts::TAU;
@@ -11,41 +11,42 @@ use super::polyhedron::{normal, sides, triangles};
 use crate::angles::angle;
 use crate::setting::Setting::{SolidBoardId, TagFirstId};
 
-/// Largest deviation of an edge from the mean of its face for a face that counts as
-/// near-equilateral. The faces of geodesic spheres, made of equal triangles as nearly as a sphere
-/// allows, deviate by up to 11 %; at 15 % the board still has two thirds of the mean edge.
+/// Largest deviation of an edge from the mean of its face, for near-equilateral faces. The faces of geodesic spheres,
+/// made of triangles as equal as a sphere allows, deviate by up to 11 %. At 15 % the board still has two thirds of
+/// the mean edge.
 pub const NEAR_EQUILATERAL: f64 = 0.15;
 
-/// Vertices nearer than this are one, in parts of the mesh's extent: what six written digits leave.
+/// Distance below which vertices are merged, relative to the mesh's extent: the rounding of six written digits.
 const WELD: f64 = 1e-6;
 
-/// A face whose height is less than this part of its longest edge has no area.
+/// Least height of a face relative to its longest edge; a flatter face counts as having no area.
 const LEAST_HEIGHT: f64 = 1e-4;
 
-/// A mesh that encloses less than this part of the cube of its extent is flat.
+/// Least volume of a mesh relative to the cube of its extent; a smaller one counts as flat.
 const LEAST_VOLUME: f64 = 1e-6;
 
-/// A vertex may be so far beside the plane of its face, in parts of the mesh's extent: 0.05 mm on a solid of half a
-/// metre, which is what a made one is allowed.
+/// Largest distance of a vertex from the plane of its face, relative to the mesh's extent: 0.05 mm on a solid of half
+/// a metre, the tolerance of a manufactured one.
 const FLAT: f64 = 1e-4;
 
-/// Sine of the least turn at a corner of a face of four and more, 0.6°: with less, its sides are one line.
+/// Sine of the smallest exterior angle at a corner of a face of four or more, 0.6°. Below it, the two sides count as
+/// one line.
 const LEAST_TURN: f64 = 0.01;
 
 /// Largest coordinate, in the unit of the list.
 const FARTHEST: f64 = 1e9;
 
-/// Whether a number can be a coordinate of a mesh.
+/// Returns whether a number is a valid coordinate of a mesh.
 pub fn is_coordinate(value: f64) -> bool {
     value.abs() <= FARTHEST
 }
 
-/// What faces are called.
+/// The noun for faces in messages.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum FaceNoun {
-    /// Where all of them are triangles.
+    /// All faces are triangles.
     Triangle,
-    /// Where not all of them are.
+    /// Some faces are not triangles.
     Face,
 }
 
@@ -58,58 +59,58 @@ impl fmt::Display for FaceNoun {
     }
 }
 
-/// Why a list of faces is not a closed solid. Faces and vertices are counted from 1.
+/// Why a list of faces is not a closed solid. Faces and vertices are numbered from 1.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum ClosedMeshError {
-    /// Nothing there.
-    #[error("it has no triangles")]
+    /// The list is empty.
+    #[error("the mesh has no triangles")]
     Empty,
     /// A coordinate is not finite, or too large to be squared in single precision.
-    #[error("vertex {0}: its coordinates must be finite numbers of at most {FARTHEST:e}")]
+    #[error("vertex {0}: coordinates must be finite numbers of at most {FARTHEST:e}")]
     NotFinite(usize),
-    /// An index beyond the vertices.
-    #[error("{0} {1} names a vertex that is not there")]
+    /// An index exceeds the number of vertices.
+    #[error("{0} {1} refers to a vertex that does not exist")]
     NoSuchVertex(FaceNoun, usize),
-    /// A face without area.
+    /// A face has no area.
     #[error("{0} {1} has no area")]
     NoArea(FaceNoun, usize),
-    /// Vertices of a face are not in one plane.
-    #[error("face {0} is not flat: divide it into triangles")]
+    /// The vertices of a face are not coplanar.
+    #[error("face {0} is not flat: split it into triangles")]
     NotFlat(usize),
-    /// A face with a corner that is straight, or turned inwards.
-    #[error("face {0} is not convex, or has a corner between two sides in one line: divide it")]
+    /// A face has a straight or concave corner.
+    #[error("face {0} is not convex, or has a corner between two collinear sides: split it")]
     NotConvex(usize),
-    /// An edge with a face on one side only.
-    #[error("it is open: {0} {1} has no neighbour along an edge")]
+    /// An edge has a face on one side only.
+    #[error("the mesh is open: {0} {1} has no neighbour along an edge")]
     Open(FaceNoun, usize),
-    /// More than two faces at an edge.
-    #[error("it is not manifold: an edge of {0} {1} belongs to {2} {0}s")]
+    /// More than two faces share an edge.
+    #[error("the mesh is not manifold: an edge of {0} {1} belongs to {2} {0}s")]
     CrowdedEdge(FaceNoun, usize, usize),
-    /// Two neighbours that turn different sides outwards.
-    #[error("{0}s {1} and {2} are neighbours but wound against each other")]
+    /// Two neighbours have opposite orientation.
+    #[error("neighbouring {0}s {1} and {2} have opposite winding")]
     Winding(FaceNoun, usize, usize),
-    /// Solids that touch in a vertex, at these coordinates.
-    #[error("it is not manifold: parts of it touch only in the vertex at {0}")]
+    /// Solids touch only in a vertex, at these coordinates.
+    #[error("the mesh is not manifold: parts of it touch only in the vertex at {0}")]
     Pinched(DVec3),
-    /// More than one solid.
+    /// The list contains more than one solid.
     #[error(
-        "it has {0} separate pieces: make a target of each, with {TagFirstId} and {SolidBoardId} so that \
+        "the mesh has {0} separate pieces: make a target of each, with {TagFirstId} and {SolidBoardId} set so that \
          no id is used twice"
     )]
     Pieces(usize),
-    /// Nothing inside.
-    #[error("it encloses no volume")]
+    /// The solid has no volume.
+    #[error("the mesh encloses no volume")]
     Flat,
-    /// Faces that go through each other.
-    #[error("{0}s {1} and {2} cut through each other")]
+    /// Faces intersect each other.
+    #[error("{0}s {1} and {2} intersect")]
     CutsItself(FaceNoun, usize, usize),
 }
 
-/// A closed solid of flat, convex faces in one piece, these counter-clockwise as seen from outside.
+/// A closed solid of flat, convex faces in one piece. The faces are counterclockwise as seen from outside.
 ///
-/// It may be concave, but does not cut through itself. The order of faces, and which vertex of a
-/// face comes first, are those of the list that it was made from.
+/// It may be concave, but does not intersect itself. The order of faces, and the first vertex of each face, are those
+/// of the list it was made from.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(try_from = "Lists", into = "Lists")]
 pub struct ClosedMesh {
@@ -117,7 +118,7 @@ pub struct ClosedMesh {
     faces: Vec<Vec<usize>>,
 }
 
-/// A closed mesh as it is written.
+/// Serialised form of a closed mesh.
 #[derive(Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Lists {
@@ -140,12 +141,12 @@ impl From<ClosedMesh> for Lists {
 }
 
 impl ClosedMesh {
-    /// Checks a list of faces. Vertices in the same place become one, those that no face
-    /// names are left out; a mesh that is wound inside out is turned, and the second value says so.
+    /// Checks a list of faces. Merges vertices at the same position, and drops vertices that no face uses. Reverses a
+    /// mesh that is wound inside out; the second value is then true.
     ///
     /// # Errors
-    /// Where the faces are not one closed surface, one of them is not flat and convex, or a coordinate is no
-    /// number.
+    /// Returns an error if the faces are not one closed surface, a face is not flat and convex, or a coordinate is
+    /// not a number.
     pub fn new<F: AsRef<[usize]>>(
         vertices: &[DVec3],
         faces: &[F],
@@ -188,11 +189,11 @@ impl ClosedMesh {
         Ok((mesh, volume < 0.0))
     }
 
-    /// The same with neighbouring faces that lie in one plane as one, where that is convex: files of triangles have squares
-    /// in two halves. Vertices within straight edges are left out.
+    /// Merges neighbouring faces in one plane if the result is convex: files of triangles contain each square in two
+    /// halves. Drops vertices within straight edges.
     ///
     /// # Errors
-    /// Where the larger faces are not one closed surface.
+    /// Returns an error if the merged faces are not one closed surface.
     pub fn with_whole_faces(&self) -> Result<Self, ClosedMeshError> {
         let normals: Vec<DVec3> = (0..self.faces.len())
             .map(|face| normal(&self.corners(face)).normalize_or_zero())
@@ -230,7 +231,7 @@ impl ClosedMesh {
             None => members.iter().map(|&face| self.faces[face].clone()).collect(),
         });
         let outlines: Vec<Vec<usize>> = outlines.collect();
-        // A vertex goes only where no face has a corner there.
+        // A vertex is dropped only if no face has a corner there.
         let is_straight = |face: &[usize], i: usize| {
             let at = |i: usize| self.vertices[face[i % face.len()]];
             let before = (at(i) - at(i + face.len() - 1)).normalize_or_zero();
@@ -247,7 +248,7 @@ impl ClosedMesh {
         Self::new(&self.vertices, &faces).map(|(mesh, _)| mesh)
     }
 
-    /// The outline of faces in one plane that hang together, if it is one and convex.
+    /// Returns the outline of connected faces in one plane, if it is a single convex polygon.
     fn outline_of(&self, faces: &[usize]) -> Option<Vec<usize>> {
         let edges: BTreeSet<(usize, usize)> =
             faces.iter().flat_map(|&face| sides(&self.faces[face])).collect();
@@ -268,25 +269,25 @@ impl ClosedMesh {
         (whole && (0..outline.len()).all(|i| turns(i) > -LEAST_TURN)).then_some(outline)
     }
 
-    /// The vertices, in the unit of the list.
+    /// Returns the vertices, in the unit of the list.
     pub fn vertices(&self) -> &[DVec3] {
         &self.vertices
     }
 
-    /// Indices of the vertices of each face.
+    /// Returns the vertex indices of each face.
     pub fn faces(&self) -> &[Vec<usize>] {
         &self.faces
     }
 
-    /// Mean length of all edges.
+    /// Returns the mean length of all edges.
     pub fn mean_edge(&self) -> f64 {
         // Every edge belongs to two faces.
         let lengths = (0..self.faces.len()).flat_map(|face| self.lengths(face));
         lengths.sum::<f64>() / self.faces.iter().map(Vec::len).sum::<usize>() as f64
     }
 
-    /// The triangle that is farthest from equilateral, and by how much its edges deviate from their
-    /// mean at most, relative.
+    /// Returns the triangle that is farthest from equilateral, and the largest deviation of its edges from their
+    /// mean, relative.
     pub fn most_skewed(&self) -> (usize, f64) {
         let deviation = |face: usize| {
             let lengths = self.lengths(face);
@@ -325,7 +326,7 @@ impl ClosedMesh {
         corners.iter().all(|v| normal.dot(v - corners[0]).abs() <= within)
     }
 
-    /// Whether every corner of a face of more than three turns the same way, once around.
+    /// Returns whether the corners of a face of four or more all bend in the same direction, once around.
     fn is_convex(&self, face: usize) -> bool {
         let corners = self.corners(face);
         let count = corners.len();
@@ -341,15 +342,14 @@ impl ClosedMesh {
         count == 3 || turns.iter().all(|(sine, _)| *sine > LEAST_TURN) && around < 1.5 * TAU
     }
 
-    /// Sum of the signed volumes of the tetrahedra over a vertex.
+    /// Returns the sum of the signed volumes of the tetrahedra over a vertex.
     fn volume(&self) -> f64 {
         let o = self.vertices[0];
         let surface = (0..self.faces.len()).flat_map(|face| triangles(&self.corners(face)));
         surface.map(|[a, b, c]| (a - o).dot((b - o).cross(c - o)) / 6.0).sum()
     }
 
-    /// The faces at each edge, each with whether it runs along the edge from the lower vertex to
-    /// the higher.
+    /// Returns the faces at each edge, and whether each runs along the edge from the lower vertex to the higher.
     fn faces_at_edges(&self) -> BTreeMap<[usize; 2], Vec<(usize, bool)>> {
         let mut edges = BTreeMap::<_, Vec<_>>::new();
         for (face, vertices) in self.faces.iter().enumerate() {
@@ -382,10 +382,10 @@ impl ClosedMesh {
         Ok(())
     }
 
-    /// The faces around a vertex form one ring, and all faces hang together.
+    /// Checks that the faces around each vertex form one ring, and that all faces are connected.
     fn check_vertices(&self) -> Result<(), ClosedMeshError> {
         let mut next = vec![BTreeMap::new(); self.vertices.len()];
-        // Around a vertex each face leads from the vertex after it to the one before.
+        // Around a vertex, each face leads from the vertex after it to the one before.
         for face in &self.faces {
             let count = face.len();
             for i in 0..count {
@@ -416,7 +416,7 @@ impl ClosedMesh {
         if pieces > 1 { Err(ClosedMeshError::Pieces(pieces)) } else { Ok(()) }
     }
 
-    /// No edge goes through a face with which it has no vertex in common.
+    /// Checks that no edge intersects a face with which it shares no vertex.
     fn check_self(&self) -> Result<(), ClosedMeshError> {
         let boxes: Vec<[DVec3; 2]> = (0..self.faces.len())
             .map(|face| {
@@ -453,7 +453,7 @@ fn noun<F: AsRef<[usize]>>(faces: &[F]) -> FaceNoun {
     }
 }
 
-/// Whether a segment goes through a triangle.
+/// Returns whether a segment intersects a triangle.
 fn pierces([p, q]: [DVec3; 2], [a, b, c]: [DVec3; 3]) -> bool {
     let normal = (b - a).cross(c - a);
     let (before, behind) = (normal.dot(p - a), normal.dot(q - a));
@@ -470,13 +470,13 @@ fn extent(vertices: &[DVec3]) -> f64 {
     (most - least).max_element()
 }
 
-/// The mesh with one vertex for all in the same place, in the order in which the faces name them.
+/// Merges vertices at the same position, in the order in which the faces use them.
 fn welded<F: AsRef<[usize]>>(vertices: &[DVec3], faces: &[F]) -> ClosedMesh {
     let used: Vec<DVec3> = faces.iter().flat_map(F::as_ref).map(|&v| vertices[v]).collect();
     let near = WELD * extent(&used);
     let mut by_x: Vec<usize> = (0..vertices.len()).collect();
     by_x.sort_by(|&a, &b| vertices[a].x.total_cmp(&vertices[b].x));
-    // The first of all vertices in a place stands for them.
+    // The first vertex at a position represents all others there.
     let mut stands_for: Vec<usize> = (0..vertices.len()).collect();
     for (i, &a) in by_x.iter().enumerate() {
         let here = by_x[i + 1..].iter().take_while(|&&b| vertices[b].x - vertices[a].x <= near);
@@ -517,7 +517,7 @@ mod tests {
     }
 
     #[test]
-    fn triangles_of_their_own_vertices_are_welded_and_inner_sides_turned() {
+    fn duplicate_vertices_merge_and_inverted_meshes_are_reversed() {
         let solid = Polyhedron::icosahedron(100.0);
         let vertices: Vec<DVec3> =
             (0..20).flat_map(|face| solid.corners_mm(face)).map(|v| v + 1e-5).collect();
@@ -534,7 +534,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_closed_solid_is_refused() {
+    fn open_or_invalid_meshes_are_rejected() {
         let (vertices, faces) = octahedron();
         assert_eq!(refused::<[usize; 3]>(&vertices, &[]), Empty);
         assert_eq!(refused(&vertices, &faces[1..]), Open(Triangle, 1));
@@ -552,7 +552,7 @@ mod tests {
         assert!(matches!(refused(&vertices, &wound), Winding(Triangle, _, _)));
         let twice = [&faces[..], &faces[..]].concat();
         assert!(matches!(refused(&vertices, &twice), CrowdedEdge(Triangle, 1, 4)));
-        // A second solid: apart, in a vertex of the first, and through it.
+        // A second solid: separate from the first, sharing a vertex with it, and intersecting it.
         let beside = |by: DVec3| {
             let more: Vec<DVec3> = vertices.iter().map(|v| v + by).collect();
             let indices: Vec<Vec<usize>> =
@@ -566,7 +566,7 @@ mod tests {
     }
 
     #[test]
-    fn faces_of_four_are_flat_and_convex() {
+    fn faces_of_four_must_be_flat_and_convex() {
         let cube = Polyhedron::cuboid(DVec3::splat(100.0));
         let (mesh, turned) = ClosedMesh::new(&cube.vertices_mm, &cube.faces).unwrap();
         assert!(!turned && mesh.faces().len() == 6 && mesh.most_skewed().1 == 0.0);
@@ -583,7 +583,7 @@ mod tests {
 
     /// A vertex pushed through a face on the other side.
     #[test]
-    fn a_solid_that_cuts_itself_is_refused() {
+    fn self_intersecting_solids_are_rejected() {
         let (mut vertices, faces) = octahedron();
         vertices[4] = DVec3::new(40.0, 30.0, -40.0);
         let result = ClosedMesh::new(&vertices, &faces);

@@ -1,7 +1,7 @@
-//! Boards on the faces of solids: which one a face takes, and the largest that leaves a margin.
+//! Boards on the faces of solids: the kind of board for each face, and the largest one that leaves a margin.
 //!
-//! A triangle has a triangle of deltille tiles. A rectangle has a checkerboard, with squares of one size on
-//! all rectangles of a solid:
+//! A triangle has a triangle of deltille tiles. A rectangle has a checkerboard; its squares have one size on all
+//! rectangles of a solid:
 //!
 //! ```text
 //!      d──────────────────c
@@ -10,9 +10,9 @@
 //!      a──────────────────b
 //! ```
 //!
-//! Any other face is filled with deltille tiles, as many along its shortest side as a triangle has: all
-//! corners whose six tiles lie within its margin. A hexagon is filled by a hexagon of tiles, a rhomb of 60°
-//! by two triangles of them.
+//! Any other face is filled with deltille tiles, with as many along its shortest side as on a triangle: all corners
+//! whose six tiles lie within its margin. A hexagon of tiles fills a hexagon; two triangles of tiles fill a rhombus
+//! of 60°.
 
 use glam::{DMat3, DVec2, DVec3};
 
@@ -22,49 +22,48 @@ use crate::targets::boards::board::board_vertices;
 use crate::targets::boards::tag_spec::MOST_ROWS;
 use crate::targets::{Incircle, Outline, PanelPose, Polyhedron};
 
-/// Cosine of the least angle of a face that counts as rectangular: angles may be 1° off. Along a side of
-/// 150 mm that takes 2.6 mm, which the margin has; a board on a face with other angles would be much
-/// smaller than the face.
+/// Cosine of the smallest angle of a rectangular face: angles may be 1° off. Along a side of 150 mm that takes 2.6
+/// mm, which the margin provides. On a face with other angles the board would be much smaller than the face.
 const RIGHT_COSINE: f64 = 0.017_452_4;
 
-/// So much of a tile may be missing before a row has one less: what rounding leaves.
+/// Fraction of a tile that may be missing before a row loses it: the effect of rounding.
 const ROUNDING: f64 = 1e-6;
 
-/// A face with the board that it takes.
+/// A face with its board.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Face {
-    /// Outline in the panel frame, mm, counter-clockwise from the left end of the lower edge.
+    /// Outline in the panel frame, mm, counterclockwise from the left end of the lower edge.
     pub outline_mm: Vec<DVec2>,
     /// Pose of the panel frame in the target frame.
     pub pose: PanelPose,
     /// Edge of a tile, mm.
     pub tile_edge_mm: f64,
-    /// Its board.
+    /// The board of the face.
     pub board: FaceBoard,
 }
 
-/// The board of a face: which tiles it has.
+/// The board of a face: its tiles.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum FaceBoard {
     /// A triangle of deltille tiles.
     Triangle {
-        /// Black tiles along each side.
+        /// Number of black tiles along each side.
         tiles: u32,
     },
     /// A checkerboard.
     Squares {
-        /// Squares along the lower side of the face, and upwards.
+        /// Number of squares along the lower side of the face, and upwards.
         across: [u32; 2],
     },
     /// Deltille tiles that fill another shape.
     Filled {
-        /// Its corners, by row, then column; the least of each is 0.
+        /// The corners, by row, then column; the smallest row and column are 0.
         corners: Vec<Vertex>,
     },
 }
 
 impl FaceBoard {
-    /// The tiling.
+    /// Returns the tiling.
     pub fn kind(&self) -> GridKind {
         match self {
             Self::Triangle { .. } | Self::Filled { .. } => GridKind::Deltille,
@@ -72,10 +71,10 @@ impl FaceBoard {
         }
     }
 
-    /// Its corners, by row, then column: the vertices with tiles all around.
+    /// Returns the corners, by row, then column: the vertices that are surrounded by tiles.
     ///
     /// ```text
-    ///            ▲               4 tiles a side: the vertices of the outline are no corners,
+    ///            ▲               4 tiles a side: the vertices of the outline are not corners,
     ///           ▲ ▲              two remain in the lowest row, one above
     ///          ▲ · ▲
     ///         ▲ · · ▲
@@ -94,7 +93,7 @@ impl FaceBoard {
         }
     }
 
-    /// Which tiles are drawn around the corners.
+    /// Returns the tiles that are drawn around the corners.
     pub fn outline(&self) -> Outline {
         match self {
             Self::Triangle { .. } => Outline::Triangle,
@@ -102,7 +101,7 @@ impl FaceBoard {
         }
     }
 
-    /// Columns and rows that hold every corner.
+    /// Returns the numbers of columns and rows that contain every corner.
     pub fn matrix(&self) -> [u32; 2] {
         match self {
             Self::Triangle { tiles } => [tiles - 2; 2],
@@ -116,14 +115,14 @@ impl FaceBoard {
 }
 
 impl Polyhedron {
-    /// A face with the largest board that leaves a margin: `tiles` tiles along each side of a triangle, and
-    /// along the shortest side of all rectangles and of every other face; `None` where the margin takes all of
-    /// it.
+    /// Returns a face with the largest board that leaves a margin. It has `tiles` tiles along each side of a
+    /// triangle, or along the shortest side of all rectangles and of every other face. Returns `None` if the margin
+    /// leaves no room.
     pub fn face(&self, face: usize, tiles: u32, margin_mm: f64) -> Option<Face> {
         self.face_with_squares(face, tiles, margin_mm, self.square_edge_mm(tiles, margin_mm))
     }
 
-    /// The tiling that a face takes: squares where it is a rectangle.
+    /// Returns the tiling of a face: squares on rectangles.
     pub fn tiling(&self, face: usize) -> GridKind {
         match self.faces[face].len() == 4 && self.is_rectangle(face) {
             true => GridKind::Checker,
@@ -139,7 +138,7 @@ impl Polyhedron {
         })
     }
 
-    /// The edge of the squares on all rectangular faces, mm: so many along the shortest side.
+    /// Returns the edge of the squares on all rectangular faces, mm, with `tiles` along the shortest side.
     pub(in crate::targets) fn square_edge_mm(&self, tiles: u32, margin_mm: f64) -> f64 {
         let rectangles =
             (0..self.faces.len()).filter(|&face| self.tiling(face) == GridKind::Checker);
@@ -147,7 +146,7 @@ impl Polyhedron {
         sides.fold(f64::INFINITY, f64::min) / f64::from(tiles)
     }
 
-    /// As [`Self::face`], with squares of a known edge.
+    /// Like [`Self::face`], with squares of a known edge.
     pub(in crate::targets) fn face_with_squares(
         &self,
         face: usize,
@@ -164,10 +163,9 @@ impl Polyhedron {
         }
     }
 
-    /// The board is equilateral whatever the face is, and its lower side is parallel to that of
-    /// the face. With its centre on the incentre of the face (inradius r), a vertex of the board
-    /// of side S lies S/√3 away in direction d, and keeps the margin m from the edge with inward
-    /// normal n when r + S/√3 d·n ≥ m.
+    /// The board is equilateral regardless of the face, and its lower side is parallel to that of the face. Its
+    /// centre is the incentre of the face (inradius r). A vertex of the board of side S is then S/√3 away in
+    /// direction d. It keeps the margin m from the edge with inward normal n if r + S/√3 d·n ≥ m.
     fn triangular_face(&self, face: usize, tiles: u32, margin_mm: f64) -> Option<Face> {
         let corners: [DVec3; 3] = self.corners_mm(face).try_into().ok()?;
         let [a, b, c] = corners;
@@ -193,7 +191,7 @@ impl Polyhedron {
         if !(side > 0.0 && side.is_finite()) {
             return None;
         }
-        // The board's lower left end is lattice vertex (−1,−1); the panel's origin is (0,0).
+        // The lower left end of the board is lattice vertex (−1,−1); the panel's origin is (0,0).
         let tile_edge_mm = side / f64::from(tiles);
         let origin = towards[0] * side / 3f64.sqrt() + DVec2::new(1.5, ROW_HEIGHT) * tile_edge_mm;
         let translation = centre + rotation * origin.extend(0.0);
@@ -205,7 +203,7 @@ impl Polyhedron {
         })
     }
 
-    /// A face in its plane.
+    /// Returns a face in its plane.
     fn flat(&self, face: usize) -> Flat {
         let corners = self.corners_mm(face);
         let z = self.normal(face);
@@ -222,13 +220,13 @@ impl Polyhedron {
 struct Flat {
     outline: Vec<DVec2>,
     rotation: DMat3,
-    /// Its first vertex in the target frame, mm.
+    /// First vertex in the target frame, mm.
     origin: DVec3,
 }
 
 impl Flat {
-    /// Middle and size of the largest rectangle within the margins of a nearly rectangular face whose sides
-    /// are parallel to the lower edge, or upright.
+    /// Returns the centre and size of the largest rectangle within the margins of a nearly rectangular face. Its
+    /// sides are parallel or perpendicular to the lower edge.
     fn room(&self, margin_mm: f64) -> (DVec2, DVec2) {
         let [a, b, c, d] = [0, 1, 2, 3].map(|i| self.outline[i]);
         let low = DVec2::new(a.x.max(d.x), a.y.max(b.y));
@@ -242,7 +240,7 @@ impl Flat {
             return None;
         }
         let across = (room / edge_mm + ROUNDING).floor();
-        // The panel's origin is one square right and up of the board's lower left end.
+        // The panel's origin is one square right of and above the board's lower left end.
         let origin = middle - across * edge_mm / 2.0 + edge_mm;
         let translation = self.origin + self.rotation * origin.extend(0.0);
         Some(Face {
@@ -253,8 +251,9 @@ impl Flat {
         })
     }
 
-    /// The deltille lattice is laid so that most corners find room: from the lower left end of the margin, as
-    /// suits angles of 60° and 120°, or with a vertex, the middle of an edge or of a tile in the middle.
+    /// Places the deltille lattice for the largest number of corners. It starts at the lower left end of the margin,
+    /// which suits angles of 60° and 120°, or has a vertex, the centre of an edge or the centre of a tile in the
+    /// middle.
     fn filled(self, tiles: u32, margin_mm: f64) -> Option<Face> {
         let corners: Vec<DVec3> = self.outline.iter().map(|p| p.extend(0.0)).collect();
         let circle = Incircle::of(&corners);
@@ -286,7 +285,7 @@ impl Flat {
     }
 }
 
-/// The vertices of a deltille lattice whose six tiles lie in a convex polygon, by row, then column.
+/// Returns the vertices of a deltille lattice whose six tiles lie in a convex polygon, by row, then column.
 fn corners_within(polygon: &[DVec2], origin: DVec2, edge_mm: f64) -> Vec<Vertex> {
     let place =
         |v: Vertex| origin + GridKind::Deltille.position(v.row.into(), v.col.into()) * edge_mm;
@@ -301,7 +300,7 @@ fn corners_within(polygon: &[DVec2], origin: DVec2, edge_mm: f64) -> Vec<Vertex>
         let [least, most] = from_origin()
             .map(of)
             .fold([f64::INFINITY, f64::NEG_INFINITY], |[a, b], x| [a.min(x), b.max(x)]);
-        // A board may have no more; where more is asked for, all of it is too large.
+        // A board may not have more; a larger request makes the whole board too large.
         let most = most.min(least + 2.0 * f64::from(MOST_ROWS));
         least.floor() as i32..=most.ceil() as i32
     };

@@ -1,8 +1,8 @@
 //! Solids: a board on every face.
 //!
-//! `solid_spec` says what is asked for; `polyhedron` has the regular solids, `closed_mesh` those given as lists of faces;
-//! `face` lays the largest board on a face that leaves a margin, `solid` puts all of them in space, and `skeleton` is a frame
-//! with a seat for a panel on every face.
+//! `solid_spec` contains the specification; `polyhedron` the regular solids, `closed_mesh` those given as lists of
+//! faces. `face` fits the largest board that leaves a margin on a face, `solid` positions all of them in space, and
+//! `skeleton` is a frame with a seat for a panel on every face.
 
 pub(crate) mod closed_mesh;
 pub(crate) mod face;

@@ -4,15 +4,15 @@ use glam::DVec3;
 
 use crate::angles::direction;
 
-/// A closed solid of flat, convex faces, mm; right-handed. Named solids have their centre in the
-/// origin, meshes keep the origin of their file.
+/// A closed solid of flat, convex faces, mm; right-handed. Named solids are centred on the origin, meshes keep the
+/// origin of their file.
 ///
-/// A face lists its vertices counter-clockwise as seen from outside. The first two are the ends of
-/// its lower edge, of a triangle the third is its apex: printed on the face, x runs along the lower
-/// edge, y upwards, to the apex, z outwards.
+/// A face lists its vertices counterclockwise as seen from outside. The first two are the ends of its lower edge; the
+/// third vertex of a triangle is its apex. Printed on the face, x runs along the lower edge, y upwards to the apex, z
+/// outwards.
 ///
-/// Solids of triangles stand on the z axis, `n` is their upper vertex, `s` the lower one; the faces
-/// of a cuboid are perpendicular to the axes:
+/// Solids of triangles stand on the z axis: `n` is their upper vertex, `s` the lower one. The faces of a cuboid are
+/// perpendicular to the axes:
 ///
 /// ```text
 ///   icosahedron, unfolded (the vertices u lie above, l below the middle, u0 in the plane y = 0)
@@ -47,7 +47,7 @@ pub struct Polyhedron {
 }
 
 impl Polyhedron {
-    /// Four faces around a vertical axis.
+    /// Creates four faces around a vertical axis.
     pub fn tetrahedron(edge_mm: f64) -> Self {
         // A base of radius a/√3 lies √6/12 a below the centre, the apex √6/4 a above.
         let mut vertices_mm = ring(3, edge_mm / 3f64.sqrt(), -edge_mm * 6f64.sqrt() / 12.0, 0.0);
@@ -56,7 +56,7 @@ impl Polyhedron {
         Self { vertices_mm, faces: sides.chain([[1, 0, 2]]).map(Vec::from).collect() }
     }
 
-    /// Eight faces; the vertices lie on the axes.
+    /// Creates eight faces; the vertices lie on the axes.
     pub fn octahedron(edge_mm: f64) -> Self {
         let radius = edge_mm / 2f64.sqrt();
         let mut vertices_mm = ring(4, radius, 0.0, 0.0);
@@ -66,7 +66,7 @@ impl Polyhedron {
         Self { vertices_mm, faces: upper.chain(lower).map(Vec::from).collect() }
     }
 
-    /// Twenty faces: five around each pole, ten in between.
+    /// Creates twenty faces: five around each pole, ten in between.
     pub fn icosahedron(edge_mm: f64) -> Self {
         // Circumradius R = a/4 √(10 + 2√5); the rings lie at ±R/√5 with radius 2R/√5.
         let radius = edge_mm / 4.0 * (10.0 + 2.0 * 5f64.sqrt()).sqrt();
@@ -84,7 +84,7 @@ impl Polyhedron {
         Self { vertices_mm, faces: faces.map(Vec::from).collect() }
     }
 
-    /// Six faces, perpendicular to the axes; `size_mm` along these.
+    /// Creates six faces perpendicular to the axes, with the given size along them.
     pub fn cuboid(size_mm: DVec3) -> Self {
         let around = [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)];
         let ring = |z: f64| around.map(|(x, y)| DVec3::new(x, y, z) * size_mm / 2.0);
@@ -95,22 +95,22 @@ impl Polyhedron {
         Self { vertices_mm, faces: sides.chain(ends).map(Vec::from).collect() }
     }
 
-    /// The vertices of a face, mm.
+    /// Returns the vertices of a face, mm.
     pub fn corners_mm(&self, face: usize) -> Vec<DVec3> {
         self.faces[face].iter().map(|&vertex| self.vertices_mm[vertex]).collect()
     }
 
-    /// The unit normal of a face, outwards.
+    /// Returns the outward unit normal of a face.
     pub fn normal(&self, face: usize) -> DVec3 {
         normal(&self.corners_mm(face)).normalize_or_zero()
     }
 
-    /// The surface in triangles, mm, counter-clockwise from outside: each face from its first vertex.
+    /// Returns the surface as triangles, mm, counterclockwise from outside; each face is split from its first vertex.
     pub fn triangles_mm(&self) -> Vec<[DVec3; 3]> {
         (0..self.faces.len()).flat_map(|face| triangles(&self.corners_mm(face))).collect()
     }
 
-    /// Edges as pairs of vertices, lower index first, in the order in which the faces name them.
+    /// Returns the edges as pairs of vertices, lower index first, in the order in which the faces list them.
     pub fn edges(&self) -> Vec<[usize; 2]> {
         let mut edges = Vec::new();
         for face in &self.faces {
@@ -125,23 +125,23 @@ impl Polyhedron {
     }
 }
 
-/// The sides of a face: pairs of vertices.
+/// Returns the sides of a face: pairs of vertices.
 pub fn sides(face: &[usize]) -> impl Iterator<Item = (usize, usize)> {
     face.iter().copied().zip(face.iter().copied().cycle().skip(1))
 }
 
-/// A flat, convex polygon in triangles that have its first corner in common.
+/// Splits a flat, convex polygon into triangles that share its first corner.
 pub fn triangles<T: Copy>(corners: &[T]) -> Vec<[T; 3]> {
     corners.windows(2).skip(1).map(|ends| [corners[0], ends[0], ends[1]]).collect()
 }
 
-/// A normal of a flat polygon whose length is twice its area.
+/// Returns the normal of a flat polygon; its length is twice the area.
 pub(crate) fn normal(corners: &[DVec3]) -> DVec3 {
     let normals = triangles(corners).into_iter().map(|[a, b, c]| (b - a).cross(c - a));
     normals.reduce(|sum, normal| sum + normal).unwrap_or_default()
 }
 
-/// `n` vertices around the z axis; the first lies `turn` steps from the plane y = 0.
+/// Returns `n` vertices around the z axis; the first is `turn` steps from the plane y = 0.
 fn ring(n: usize, radius: f64, z: f64, turn: f64) -> Vec<DVec3> {
     let step = std::f64::consts::TAU / n as f64;
     (0..n).map(|k| (direction((k as f64 + turn) * step) * radius).extend(z)).collect()

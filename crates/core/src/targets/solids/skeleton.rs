@@ -1,4 +1,4 @@
-//! A frame to print, with a seat for a panel on every face.
+//! A printable frame with a seat for a panel on every face.
 //!
 //! ```text
 //!   the face's plane    ──╮rib╭── panel ────────╮   ╭─   The panel lies in its seat, so that its
@@ -8,8 +8,8 @@
 //!   and wall below that   ╰───────╯         ╰───────╯    edges of the solid.
 //! ```
 //!
-//! Every boundary on a face is its outline moved inwards in its own plane, so that a seat is exact
-//! whatever the angles between faces are. Panels are cut straight: nothing is mitred.
+//! Every boundary on a face is its outline moved inwards in its own plane, so a seat is exact regardless of the
+//! angles between faces. Panels are cut straight: nothing is mitred.
 
 use std::f64::consts::PI;
 
@@ -28,14 +28,14 @@ use crate::targets::{ClosedMesh, Polyhedron, TargetError};
 /// Material left at the foot of a rib on either side of the edge, mm: two lines of a 0.4 mm nozzle.
 const FOOT_MM: f64 = 0.8;
 
-/// Least inradius of a window, mm: for fingers and for what a printer must get out.
+/// Least inradius of a window, mm: room for fingers and for removing support material.
 const LEAST_WINDOW_MM: f64 = 3.0;
 
-/// Room around a panel in its seat, mm: what printers and cutters are off.
+/// Clearance around a panel in its seat, mm: the tolerance of printers and cutters.
 const PLAY_MM: f64 = 0.15;
 
-/// Directions in which the faces at a vertex spread less than this count as flat, relative: there
-/// the inner side follows the mean of the faces.
+/// Relative spread of the face directions at a vertex below which they count as flat. The inner side then follows the
+/// mean of the faces.
 const FLAT: f64 = 0.05;
 
 /// Ranges of thicknesses, mm.
@@ -45,26 +45,26 @@ const THICKNESS_MM: std::ops::RangeInclusive<f64> = 0.2..=50.0;
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct SkeletonSpec {
-    /// Thickness of the panels, with what is glued on them, mm.
+    /// Thickness of the panels, including anything glued on them, mm.
     pub panel_thickness_mm: f64,
     /// Thickness of the frame below the panels, and least width of a ledge, mm.
     pub wall_mm: f64,
-    /// Distance of a seat from the edges of its face, mm; `None` for as little as stays solid.
+    /// Distance of a seat from the edges of its face, mm; `None` for the smallest one that is solid.
     pub rib_mm: Option<f64>,
 }
 
 impl Default for SkeletonSpec {
-    /// Panels of 3 mm on a frame of 4 mm.
+    /// Returns a frame of 4 mm for panels of 3 mm.
     fn default() -> Self {
         Self { panel_thickness_mm: 3.0, wall_mm: 4.0, rib_mm: None }
     }
 }
 
-/// The frame of a solid, to be printed in three dimensions.
+/// The frame of a solid, for 3D printing.
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct Skeleton {
-    /// Triangles of its surface in the target frame, counter-clockwise from outside, mm.
+    /// Surface triangles in the target frame, counterclockwise from outside, mm.
     pub triangles_mm: Vec<[DVec3; 3]>,
     /// Distance of the panels from the edges of their faces, mm.
     pub panel_inset_mm: f64,
@@ -75,10 +75,10 @@ pub struct Skeleton {
 }
 
 impl Skeleton {
-    /// The frame of a solid; refused where seats, ledges and windows find no room.
+    /// Makes the frame of a solid.
     ///
     /// # Errors
-    /// Where seats, ledges and windows find no room.
+    /// Returns an error if there is no room for seats, ledges and windows.
     pub fn new(solid: &Polyhedron, spec: &SkeletonSpec) -> Result<Self, TargetError> {
         let SkeletonSpec { panel_thickness_mm: thickness, wall_mm: wall, rib_mm } = *spec;
         let thicknesses = [(SkeletonPanelThicknessMm, thickness), (SkeletonWallMm, wall)];
@@ -88,14 +88,14 @@ impl Skeleton {
                 return Err(TargetError::invalid(setting, problem));
             }
         }
-        // What lies h below two faces that meet at θ is h cot(θ/2) inside their edge.
+        // A point h below two faces that meet at θ is h cot(θ/2) inside their edge.
         let sharpest = solid.dihedral_angles_rad().into_iter().fold(PI, f64::min);
         let inside = |below: f64| below / tangent(sharpest / 2.0);
         let least_rib = inside(thickness) + FOOT_MM;
         let rib = rib_mm.unwrap_or(least_rib);
         if !(rib >= least_rib - 1e-9 && rib.is_finite()) {
             let problem = format!(
-                "{} leaves no foot where faces meet at {:.1}°: take at least {:.1} mm, or thinner \
+                "{} leaves no foot where faces meet at {:.1}°: use at least {:.1} mm, or thinner \
                  panels",
                 format_mm(rib),
                 sharpest.to_degrees(),
@@ -109,9 +109,9 @@ impl Skeleton {
             faces().map(|corners| Incircle::of(&corners).radius).fold(f64::MAX, f64::min);
         if window + LEAST_WINDOW_MM > inradius {
             let problem = format!(
-                "seats and ledges take {:.1} mm from the edges, but the smallest face has its \
-                 middle {inradius:.1} mm from them: take thinner {SkeletonWallMm} or panels, or \
-                 a larger {SolidEdgeMm}",
+                "seats and ledges take {:.1} mm from the edges, but the smallest face is only \
+                     {inradius:.1} mm wide from edge to centre: use thinner {SkeletonWallMm} or panels, or \
+                     a larger {SolidEdgeMm}",
                 window + LEAST_WINDOW_MM
             );
             return Err(TargetError::invalid(SolidSkeleton, problem));
@@ -144,7 +144,7 @@ impl Skeleton {
             Ok((_, false)) => {}
             _ => {
                 let problem = format!(
-                    "the frame would cut through itself: take thinner {SkeletonWallMm} or panels"
+                    "the frame would intersect itself: use thinner {SkeletonWallMm} or panels"
                 );
                 return Err(TargetError::invalid(SolidSkeleton, problem));
             }
@@ -153,20 +153,19 @@ impl Skeleton {
     }
 }
 
-/// How far the sides of a convex polygon in space can be moved inwards: of a triangle the circle that
-/// touches them.
+/// Limit for moving the sides of a convex polygon in space inwards; for a triangle, the inscribed circle.
 pub struct Incircle {
-    /// Centre of the circle, or of another polygon the mean of its corners.
+    /// Centre of the circle; for other polygons the mean of the corners.
     pub centre: DVec3,
-    /// Radius of the circle, in the unit of the corners; of another polygon how far its sides can be moved
-    /// until one vanishes.
+    /// Radius of the circle, in the unit of the corners; for other polygons the distance at which moving sides
+    /// inwards makes one vanish.
     pub radius: f64,
     /// Unit normal of the polygon.
     pub normal: DVec3,
 }
 
 impl Incircle {
-    /// The circle in the polygon of these corners.
+    /// Computes the circle of a polygon with these corners.
     pub fn of(corners: &[DVec3]) -> Self {
         let normal = normal(corners);
         if let [a, b, c] = *corners {
@@ -179,7 +178,7 @@ impl Incircle {
         let normal = normal.normalize_or_zero();
         let centre = corners.iter().sum::<DVec3>() / corners.len() as f64;
         let ways = ways_inwards(corners, normal);
-        // A side is shorter by what its ends come nearer along it.
+        // A side becomes shorter as its ends approach each other along it.
         let side = |i: usize| {
             let j = (i + 1) % corners.len();
             let along = corners[j] - corners[i];
@@ -189,7 +188,7 @@ impl Incircle {
         Self { centre, radius, normal }
     }
 
-    /// The polygon with its sides moved inwards, and below its plane.
+    /// Returns the polygon with its sides moved inwards, and lowered below its plane.
     pub fn inset(&self, corners: &[DVec3], inset: f64, below: f64) -> Vec<DVec3> {
         let down = self.normal * below;
         if corners.len() == 3 {
@@ -202,7 +201,7 @@ impl Incircle {
     }
 }
 
-/// Where each corner of a convex polygon goes when its sides are moved inwards by one unit.
+/// Returns the displacement of each corner of a convex polygon when its sides move inwards by one unit.
 ///
 /// It moves along d = (m + n) / (1 + m·n), as d·m = d·n = 1 with the inward normals m and n of its two sides.
 fn ways_inwards(corners: &[DVec3], normal: DVec3) -> Vec<DVec3> {
@@ -217,8 +216,8 @@ fn ways_inwards(corners: &[DVec3], normal: DVec3) -> Vec<DVec3> {
         .collect()
 }
 
-/// The vertices of the inner side: `below` the planes of all faces around a vertex, exactly where
-/// three faces meet or the faces lie evenly, else in the least-squares sense.
+/// Returns the vertices of the inner side: `below` the planes of all faces around a vertex. This is exact where three
+/// faces meet or the faces are evenly arranged, and a least-squares fit elsewhere.
 fn inner_vertices(solid: &Polyhedron, below: f64) -> Vec<DVec3> {
     let mut normals = vec![Vec::new(); solid.vertices_mm.len()];
     for (index, face) in solid.faces.iter().enumerate() {
@@ -237,8 +236,8 @@ fn inner_vertices(solid: &Polyhedron, below: f64) -> Vec<DVec3> {
 }
 
 impl Polyhedron {
-    /// The angles between the two faces at each edge, measured inside, radians: below π on convex
-    /// edges. In the order of [`Self::edges`].
+    /// Returns the angles between the two faces at each edge, measured inside, radians, in the order of
+    /// [`Self::edges`]. They are below π at convex edges.
     pub fn dihedral_angles_rad(&self) -> Vec<f64> {
         let mut sides = std::collections::BTreeMap::<[usize; 2], Vec<(usize, DVec3)>>::new();
         for (index, face) in self.faces.iter().enumerate() {
@@ -251,7 +250,7 @@ impl Polyhedron {
         let inside = |edge: [usize; 2]| {
             let [(_, one), (apex, other), ..] = sides[&edge].as_slice() else { return PI };
             let between = angle(one.cross(*other).length(), one.dot(*other));
-            // Beyond the plane of the first face the second one closes a hollow.
+            // The edge is concave if the second face extends beyond the plane of the first.
             let hollow = one.dot(self.vertices_mm[*apex] - self.vertices_mm[edge[0]]) > 0.0;
             if hollow { PI + between } else { PI - between }
         };
@@ -265,13 +264,13 @@ mod tests {
 
     use super::*;
 
-    /// Volume below the surface, by the divergence theorem.
+    /// Computes the volume below the surface, by the divergence theorem.
     fn volume(triangles: &[[DVec3; 3]]) -> f64 {
         triangles.iter().map(|[a, b, c]| DMat3::from_cols(*a, *b, *c).determinant() / 6.0).sum()
     }
 
     #[test]
-    fn dihedral_angles_are_those_of_the_books() {
+    fn dihedral_angles_match_known_values() {
         for (solid, cosine) in [
             (Polyhedron::tetrahedron(50.0), 1.0 / 3.0),
             (Polyhedron::octahedron(50.0), -1.0 / 3.0),
@@ -284,9 +283,9 @@ mod tests {
         }
     }
 
-    /// The frame is the solid without its inside, its seats and its windows.
+    /// The volume of the frame is that of the solid without its inside, its seats and its windows.
     #[test]
-    fn the_volume_is_that_of_its_parts() {
+    fn volume_equals_the_sum_of_its_parts() {
         for solid in [Polyhedron::icosahedron(150.0), Polyhedron::octahedron(150.0)] {
             let spec = SkeletonSpec::default();
             let frame = Skeleton::new(&solid, &spec).unwrap();
@@ -302,9 +301,9 @@ mod tests {
         }
     }
 
-    /// The same of a box whose sides differ.
+    /// The same for a box with different sides.
     #[test]
-    fn the_frame_of_a_cuboid_is_that_of_its_parts() {
+    fn cuboid_volume_equals_the_sum_of_its_parts() {
         let size = DVec3::new(200.0, 150.0, 100.0);
         let solid = Polyhedron::cuboid(size);
         let frame = Skeleton::new(&solid, &SkeletonSpec::default()).unwrap();
@@ -320,7 +319,7 @@ mod tests {
     }
 
     #[test]
-    fn frames_without_room_are_refused_with_what_would_do() {
+    fn frames_without_room_are_rejected_with_a_remedy() {
         let said = |solid: Polyhedron, spec: SkeletonSpec| {
             Skeleton::new(&solid, &spec).unwrap_err().to_string()
         };

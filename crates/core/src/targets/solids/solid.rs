@@ -17,12 +17,12 @@ use crate::targets::{
     SolidSpec, TagSpec, TagsIn, TargetError,
 };
 
-/// Least blank along the edges of a panel in a skeleton, mm: room for the number of its face, and
-/// for a cut that is off.
+/// Least blank margin along the edges of a panel in a skeleton, mm: room for the number of its face, and for
+/// inaccurate cuts.
 const LEAST_PANEL_MARGIN_MM: f64 = 3.0;
 
 impl SolidSpec {
-    /// The solid.
+    /// Returns the solid.
     pub fn polyhedron(&self) -> Polyhedron {
         match &self.shape {
             SolidShape::Tetrahedron => Polyhedron::tetrahedron(self.edge_mm),
@@ -40,11 +40,10 @@ impl SolidSpec {
         }
     }
 
-    /// Its faces with their boards, in the order of the panels; refused where the margin leaves
-    /// no room for tiles.
+    /// Returns the faces with their boards, in the order of the panels.
     ///
     /// # Errors
-    /// Where the margin leaves no room for tiles.
+    /// Returns an error if the margin leaves no room for tiles.
     pub fn faces(&self) -> Result<Vec<Face>, TargetError> {
         self.check()?;
         let solid = self.polyhedron();
@@ -59,7 +58,7 @@ impl SolidSpec {
                 let most = face.board.matrix().into_iter().max().unwrap_or_default();
                 if most > MOST_ROWS {
                     let problem = format!(
-                        "face {index} would have {most} corners in a row, more than {MOST_ROWS}: take fewer, or sides that differ less"
+                        "face {index} would have {most} corners in a row, more than {MOST_ROWS}: use fewer tiles, or sides of more similar length"
                     );
                     return Err(TargetError::invalid(SolidTiles, problem));
                 }
@@ -67,7 +66,7 @@ impl SolidSpec {
                 let is_bare = |tags: &TagSpec| tagged(&face.board, tags).is_empty();
                 if is_filled && self.tags.as_ref().is_some_and(is_bare) {
                     let problem = format!(
-                        "{} leave face {index}, of {} sides, no room for a tag: take more",
+                        "{} tiles leave no room for a tag on face {index} with {} sides: use more tiles",
                         self.tiles,
                         face.outline_mm.len()
                     );
@@ -78,10 +77,10 @@ impl SolidSpec {
             .collect()
     }
 
-    /// The faces as they are cut to panels: whole, or as much as the seats of the skeleton take.
+    /// Returns the faces as they are cut to panels: whole, or the part that the seats of the skeleton accept.
     ///
     /// # Errors
-    /// Where the margin leaves no room for tiles, or the seats take more than the margin.
+    /// Returns an error if the margin leaves no room for tiles, or the seats take more than the margin.
     pub fn panel_faces(&self) -> Result<Vec<Face>, TargetError> {
         let (mut faces, inset_mm) = (self.faces()?, self.panel_inset_mm()?);
         for face in &mut faces {
@@ -92,11 +91,11 @@ impl SolidSpec {
         Ok(faces)
     }
 
-    /// A margin with room for numbers and glue: that of [`Self::new`], or more where the panels of
-    /// the skeleton need it for their white, in whole millimetres.
+    /// Returns a margin with room for numbers and glue, in whole millimetres: that of [`Self::new`], or more if the
+    /// panels of the skeleton need it for their white border.
     ///
     /// # Errors
-    /// Where seats, ledges and windows find no room.
+    /// Returns an error if there is no room for seats, ledges and windows.
     pub fn comfortable_margin_mm(&self) -> Result<f64, TargetError> {
         let usual = self.usual_margin_mm();
         let Some(skeleton) = &self.skeleton else { return Ok(usual) };
@@ -104,18 +103,18 @@ impl SolidSpec {
         Ok(usual.max(self.margin_around_mm(inset_mm + LEAST_PANEL_MARGIN_MM).ceil()))
     }
 
-    /// Distance of the edges of panels from those of their faces, mm: 0 without a skeleton. Refused
-    /// where tiles, or the black around white ones, would lie on the ribs.
+    /// Returns the distance of the edges of panels from those of their faces, mm: 0 without a skeleton.
     ///
     /// # Errors
-    /// Where it is more than the white of the margin.
+    /// Returns an error if it exceeds the white of the margin, so that tiles, or the black around white ones, would
+    /// lie on the ribs.
     pub fn panel_inset_mm(&self) -> Result<f64, TargetError> {
         let Some(skeleton) = &self.skeleton else { return Ok(0.0) };
         let inset_mm = Skeleton::new(&self.polyhedron(), skeleton)?.panel_inset_mm;
         if inset_mm > self.white_margin_mm() {
             let what = if self.inverted { "the black around tiles" } else { "tiles" };
             let problem = format!(
-                "{what} {} from the edges would lie on the ribs: take at least {:.1} mm, or thinner \
+                "{what} {} from the edges would lie on the ribs: use at least {:.1} mm, or thinner \
                  panels",
                 format_mm(self.margin_mm),
                 (self.margin_around_mm(inset_mm) * 10.0).ceil() / 10.0
@@ -125,9 +124,9 @@ impl SolidSpec {
         Ok(inset_mm)
     }
 
-    /// Refuses faces without room for their tiles; says with which edge all have it.
+    /// Creates the error for faces without room for their tiles; it states the edge at which all have room.
     ///
-    /// Tiles of a bare face grow with the face's edge; a margin takes the same from faces of all
+    /// Tiles of a face without margin grow with the edge of the face, but a margin takes the same from faces of all
     /// sizes. So tiles of edge t within a margin need a face (t + taken) / bare times as large.
     fn too_fine(&self, solid: &Polyhedron) -> TargetError {
         let edge_of = |margin_mm: f64| {
@@ -135,7 +134,7 @@ impl SolidSpec {
                 .filter_map(move |face| solid.face(face, self.tiles, margin_mm))
                 .map(|face| face.tile_edge_mm)
         };
-        // What a margin takes is in proportion to it; any face has room for this one.
+        // The effect of a margin is proportional to it; any face has room for this one.
         let small = 1e-6 * self.edge_mm;
         let needed = edge_of(0.0).zip(edge_of(small)).map(|(bare, less)| {
             let taken = (bare - less) / small * self.margin_mm;
@@ -143,7 +142,7 @@ impl SolidSpec {
         });
         let least = needed.fold(Self::LEAST_EDGE_MM, f64::max).ceil();
         let problem = format!(
-            "{} leaves no room for {} tiles of at least {} a side within margins of {}: take \
+            "{} leaves no room for {} tiles of at least {} per side within margins of {}: use \
              {SolidEdgeMm} of at least {least} mm, fewer {SolidTiles}, or a smaller \
              {SolidMarginMm}",
             format_mm(self.edge_mm),
@@ -155,12 +154,12 @@ impl SolidSpec {
     }
 }
 
-/// The tiles of a face that carry tags.
+/// Returns the tiles of a face that carry tags.
 fn tagged(board: &FaceBoard, tags: &TagSpec) -> Vec<Vertex> {
     tagged_tiles(board.kind(), &board.corners(), tags.spacing, tags.tags_in)
 }
 
-/// How many tags the faces of a tiling need.
+/// Returns the number of tags that the faces of a tiling need.
 fn tag_count(faces: &[Face], kind: GridKind, tags: &TagSpec) -> u64 {
     let mut of_board = BTreeMap::new();
     let counts = faces.iter().filter(|face| face.board.kind() == kind).map(|face| {
@@ -170,7 +169,7 @@ fn tag_count(faces: &[Face], kind: GridKind, tags: &TagSpec) -> u64 {
     counts.sum()
 }
 
-/// The panels of a checked spec, a face each, and the family of their tags.
+/// Returns the panels of a checked spec, one per face, and the family of their tags.
 pub(crate) fn panels(
     spec: &SolidSpec,
     family: Option<&Family>,
@@ -192,7 +191,7 @@ pub(crate) fn panels(
     Ok((on_faces(spec, &faces), family))
 }
 
-/// The family of the tags on faces of a tiling.
+/// Returns the family of the tags on faces of a tiling.
 fn family_of(
     spec: &SolidSpec,
     tags: &TagSpec,
@@ -203,7 +202,7 @@ fn family_of(
     let has_both = spec.square_tags.is_some();
     let instead = |available: u64| {
         let count = |spacing| tag_count(faces, kind, &TagSpec { spacing, ..tags.clone() });
-        // Square tags beside others have the usual spacing.
+        // Square tags beside triangular ones have the usual spacing.
         let is_free = !has_both || kind == GridKind::Deltille;
         let wider = is_free.then(|| wider_spacing(tags, available, count)).flatten();
         let has_enough = |&tiles: &u32| {
@@ -213,7 +212,7 @@ fn family_of(
         let fewer = (SolidSpec::FEWEST_TILES..spec.tiles)
             .rev()
             .find(has_enough)
-            .map(|tiles| format!("take at most {tiles} {SolidTiles}"));
+            .map(|tiles| format!("use at most {tiles} {SolidTiles}"));
         wider.into_iter().chain(fewer).collect()
     };
     let needed = tag_count(faces, kind, tags);
@@ -222,12 +221,12 @@ fn family_of(
     check_family(kind, tags, finest_mm, family, needed, TagSettings::of(kind, has_both), instead)
 }
 
-/// The panels of a checked spec, whether or not its family has so many tags.
+/// Returns the panels of a checked spec, regardless of the size of its family.
 pub(crate) fn untied_panels(spec: &SolidSpec) -> Result<Vec<Panel>, TargetError> {
     Ok(on_faces(spec, &spec.faces()?))
 }
 
-/// The panels of a solid's faces, with ids that follow from face to face.
+/// Returns the panels of a solid's faces, with ids that continue from face to face.
 fn on_faces(spec: &SolidSpec, faces: &[Face]) -> Vec<Panel> {
     let mut of_board = BTreeMap::new();
     let mut next_corner = 0u32;
@@ -299,7 +298,7 @@ mod tests {
 
     /// The published icosahedron has 13 tiles a side, 66 corners and 10 tags on a face.
     #[test]
-    fn faces_of_13_tiles_are_those_of_the_published_icosahedron() {
+    fn thirteen_tiles_give_the_published_icosahedron() {
         let spec = SolidSpec { tiles: 13, ..SolidSpec::new(SolidShape::Icosahedron) };
         let target = build(&spec).unwrap();
         assert_eq!(target.panels.len(), 20);
@@ -310,20 +309,20 @@ mod tests {
     }
 
     #[test]
-    fn ids_that_run_out_are_refused_with_what_would_do() {
+    fn missing_ids_are_rejected_with_a_remedy() {
         let mut spec = SolidSpec { tiles: 13, ..SolidSpec::new(SolidShape::Icosahedron) };
         spec.tags.as_mut().unwrap().first_id = 200;
         let said = build(&spec).unwrap_err().to_string();
         assert!(said.contains("lower it to at most 143"), "{said}");
         spec.tags.as_mut().unwrap().family = "delTag16h5".to_owned();
         let said = build(&spec).unwrap_err().to_string();
-        // Twenty faces with a tag each are more than are left of the family.
-        assert!(said.contains("take `TagSpec::family` d25h7 with its"), "{said}");
+        // Twenty faces with a tag each need more ids than the family has left.
+        assert!(said.contains("use `TagSpec::family` d25h7 with its"), "{said}");
         spec.tags.as_mut().unwrap().first_id = 0;
         let said = build(&spec).unwrap_err().to_string();
         assert!(
             said.contains(
-                "raise `TagSpec::spacing` to at least 10, or take at most 6 `SolidSpec::tiles`"
+                "raise `TagSpec::spacing` to at least 10, or use at most 6 `SolidSpec::tiles`"
             ),
             "{said}"
         );
@@ -333,8 +332,8 @@ mod tests {
     }
 
     proptest! {
-        /// Every tag once, every corner on its face's plane at its distance from the centre, and
-        /// the file says the same.
+        /// Every tag occurs once, every corner lies on the plane of its face at its distance from the centre, and the
+        /// target file preserves all.
         #[test]
         fn every_solid_is_consistent(
             shape in 0usize..5, tiles in 6u32..16, edge_mm in 100.0f64..400.0, spacing in 3u32..5,

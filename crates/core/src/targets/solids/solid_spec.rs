@@ -1,4 +1,4 @@
-//! What is asked for of a solid.
+//! The specification of a solid.
 
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
@@ -15,30 +15,30 @@ use crate::targets::{ClosedMesh, Polyhedron, SkeletonSpec, TagSpec, TagsIn, Targ
 /// Range of a solid's edge, mm.
 const SOLID_EDGE_MM: std::ops::RangeInclusive<f64> = 10.0..=5000.0;
 
-/// Range of tiles along a side of a face: with fewer than six a face has at most six corners,
-/// and the detector takes so few for no grid.
+/// Range of tiles along a side of a face: with fewer than six a face has at most six corners, too few for the
+/// detector to accept as a grid.
 pub const FACE_TILES: std::ops::RangeInclusive<u32> = 6..=200;
 
-/// Least margin of a face with white tiles on black, mm: it has the black around the tiles, and beyond that the numbers of
-/// the face.
+/// Least margin of a face with white tiles on black, mm: it contains the black around the tiles, and the numbers of
+/// the face outside that.
 const LEAST_INVERTED_MARGIN_MM: f64 = 5.0;
 
-/// Usual margin of a face, mm: room to fold and glue; and of one with white tiles on black.
+/// Usual margins of a face, mm: room to fold and glue; the second is for white tiles on black.
 const MARGIN_MM: f64 = 5.0;
 
 const INVERTED_MARGIN_MM: f64 = 8.0;
 
-/// So much of the margin of a face with white tiles is black.
+/// Fraction of the margin of a face with white tiles that is black.
 const RIM_PART: f64 = 0.4;
 
-/// Farthest a mesh may lie from its origin, mm: meshes and bodies are written in single precision,
-/// which at 100 m leaves 0.01 mm.
+/// Largest distance of a mesh from its origin, mm: meshes and bodies are written in single precision, which resolves
+/// 0.01 mm at 100 m.
 const FARTHEST_MM: f64 = 1e5;
 
-/// Most triangles that the faces of a solid are divided into: meshes count their corners in 16 bits.
+/// Maximum number of triangles of all faces: meshes count their corners in 16 bits.
 const MOST_TRIANGLES: usize = 20_000;
 
-/// Most faces of a solid.
+/// Maximum number of faces of a solid.
 const MOST_FACES: u32 = 10_000;
 
 /// A solid whose faces carry boards with tags: triangles of deltille tiles on triangular faces, checkerboards
@@ -48,24 +48,24 @@ const MOST_FACES: u32 = 10_000;
 pub struct SolidSpec {
     /// The shape of the solid.
     pub shape: SolidShape,
-    /// Length of the solid's edges, mm; of a cuboid or mesh their mean, to which it is scaled.
+    /// Length of the solid's edges, mm. A cuboid or mesh is scaled so that this is the mean length.
     pub edge_mm: f64,
-    /// Number of black tiles along each side of a triangle, and of squares along the shortest side of all
-    /// rectangles, 6 to 200.
+    /// Number of black tiles along each side of a triangle, and of squares along the shortest side of all rectangles;
+    /// 6 to 200.
     pub tiles: u32,
-    /// Blank between a face's edges and its tiles, mm.
+    /// Margin between a face's edges and its tiles, mm.
     pub margin_mm: f64,
     /// Id of the first face's board; the others follow in the order of the faces.
     pub board_id: u32,
-    /// The tags; `None` for bare tilings, whose faces are not told apart.
+    /// The tags; `None` for bare tilings, whose faces cannot be distinguished.
     pub tags: Option<TagSpec>,
-    /// The tags of rectangular faces, where other faces have deltille tiles.
+    /// The tags of rectangular faces, if other faces have deltille tiles.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub square_tags: Option<TagSpec>,
-    /// Whether black and white are exchanged: white tiles on a black field, which takes a part of the margin.
+    /// Whether black and white are inverted: white tiles on a black field, which uses part of the margin.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub inverted: bool,
-    /// A frame that holds the faces as panels, if one is to be printed.
+    /// A frame for the faces as panels, if one is to be printed.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub skeleton: Option<SkeletonSpec>,
 }
@@ -85,12 +85,12 @@ pub enum SolidShape {
     Cube,
     /// Six rectangular faces: the sides along x, y and z, to be scaled to the mean edge.
     Cuboid(DVec3),
-    /// Any other, by its faces.
+    /// Any other shape, given by its faces.
     Mesh(ClosedMesh),
 }
 
 impl SolidShape {
-    /// Its name.
+    /// Returns the name of the shape.
     pub fn name(&self) -> &'static str {
         match self {
             Self::Tetrahedron => "tetrahedron",
@@ -104,7 +104,7 @@ impl SolidShape {
 }
 
 impl SolidSpec {
-    /// Shape and size in words.
+    /// Returns the shape and size in words.
     pub fn size(&self) -> String {
         match &self.shape {
             SolidShape::Cuboid(sides) => {
@@ -119,12 +119,12 @@ impl SolidSpec {
 }
 
 impl SolidShape {
-    /// The tiling whose tags [`SolidSpec::tags`] are: squares where all faces are rectangles.
+    /// Returns the tiling that [`SolidSpec::tags`] refers to: squares if all faces are rectangles.
     pub fn tag_tiling(&self) -> GridKind {
         if self.tilings()[0] { GridKind::Deltille } else { GridKind::Checker }
     }
 
-    /// Whether faces have deltille tiles, and whether faces have squares.
+    /// Returns whether some faces have deltille tiles, and whether some have squares.
     fn tilings(&self) -> [bool; 2] {
         match self {
             Self::Cube | Self::Cuboid(_) => [false, true],
@@ -149,9 +149,9 @@ impl SolidSpec {
     /// Finest edge of a tile, mm: what [`BoardSpec`](crate::targets::BoardSpec) allows.
     pub const FINEST_TILE_MM: f64 = *EDGE_MM.start();
 
-    /// A solid of 150 mm edges, or a cuboid or mesh in its own size, with ten tiles a side (the tags of a
-    /// triangle then lie symmetrically), or eight squares, and 5 mm of blank along its edges, which leaves room to fold
-    /// and glue.
+    /// Creates a solid with edges of 150 mm, or a cuboid or mesh in its own size. It has ten tiles a side (the tags
+    /// of a triangle are then symmetric), or eight squares. A blank margin of 5 mm along its edges leaves room to
+    /// fold and glue.
     pub fn new(shape: SolidShape) -> Self {
         let squares = || TagSpec::for_squares(TagsIn::Black);
         let (tags, square_tags) = match shape.tilings() {
@@ -169,28 +169,28 @@ impl SolidSpec {
         Self { shape, edge_mm, tiles, margin_mm, board_id, tags, square_tags, inverted, skeleton }
     }
 
-    /// The margin that it has unless a skeleton needs more, mm.
+    /// Returns the margin unless a skeleton needs more, mm.
     pub(in crate::targets) fn usual_margin_mm(&self) -> f64 {
         if self.inverted { INVERTED_MARGIN_MM } else { MARGIN_MM }
     }
 
-    /// Width of the black around the tiles, mm; `None` where tiles are black on white.
+    /// Returns the width of the black around the tiles, mm; `None` for black tiles on white.
     pub(crate) fn rim_mm(&self) -> Option<f64> {
         self.inverted.then_some(RIM_PART * self.margin_mm)
     }
 
-    /// Width of the white along the edges of a face, mm.
+    /// Returns the width of the white along the edges of a face, mm.
     #[doc(hidden)]
     pub fn white_margin_mm(&self) -> f64 {
         self.margin_mm - self.rim_mm().unwrap_or_default()
     }
 
-    /// The margin that leaves so much white along the edges, mm.
+    /// Returns the margin that leaves the given width of white along the edges, mm.
     pub(in crate::targets) fn margin_around_mm(&self, white_mm: f64) -> f64 {
         if self.inverted { white_mm / (1.0 - RIM_PART) } else { white_mm }
     }
 
-    /// The tags of faces of a tiling.
+    /// Returns the tags of faces of a tiling.
     pub(in crate::targets) fn tags_of(&self, kind: GridKind) -> Option<&TagSpec> {
         match (kind, &self.square_tags) {
             (GridKind::Checker, Some(tags)) => Some(tags),
@@ -198,14 +198,14 @@ impl SolidSpec {
         }
     }
 
-    /// Checks every number by itself.
+    /// Checks each number on its own.
     pub(crate) fn check(&self) -> Result<(), TargetError> {
         if !SOLID_EDGE_MM.contains(&self.edge_mm) {
             let edge = format_mm(self.edge_mm);
             let problem = match &self.shape {
                 SolidShape::Mesh(_) => {
                     format!(
-                        "the mean is {edge}, not between 10 mm and 5000 mm: set it, or scale the mesh to mm"
+                        "the mean is {edge}, not between 10 mm and 5000 mm: set the edge, or scale the mesh to mm"
                     )
                 }
                 _ => format!("{edge} is not between 10 mm and 5000 mm"),
@@ -224,14 +224,16 @@ impl SolidSpec {
         if let SolidShape::Mesh(mesh) = &self.shape
             && mesh.faces().len() > MOST_FACES as usize
         {
-            let problem = format!("{} faces are more than {MOST_FACES}", mesh.faces().len());
+            let problem =
+                format!("{} faces exceed the maximum of {MOST_FACES}", mesh.faces().len());
             return Err(TargetError::invalid(SolidShapeMesh, problem));
         }
         if let SolidShape::Mesh(mesh) = &self.shape {
             let triangles: usize = mesh.faces().iter().map(|face| face.len() - 2).sum();
             if triangles > MOST_TRIANGLES {
-                let problem =
-                    format!("its faces are {triangles} triangles, more than {MOST_TRIANGLES}");
+                let problem = format!(
+                    "its faces consist of {triangles} triangles, which exceeds the maximum of {MOST_TRIANGLES}"
+                );
                 return Err(TargetError::invalid(SolidShapeMesh, problem));
             }
         }
@@ -241,7 +243,7 @@ impl SolidSpec {
             let farthest = mesh.vertices().iter().map(far).fold(0.0, f64::max);
             if farthest > FARTHEST_MM {
                 let problem = format!(
-                    "it reaches {} from the origin, more than {}: move it nearer",
+                    "the mesh extends to {} from the origin, more than {}: move it closer to the origin",
                     format_mm(farthest),
                     format_mm(FARTHEST_MM)
                 );
@@ -253,16 +255,17 @@ impl SolidSpec {
             return Err(TargetError::invalid(SolidTiles, problem));
         }
         if !(0.0..=SOLID_EDGE_MM.end() / 4.0).contains(&self.margin_mm) {
-            let problem = format!("{} is no margin of a face", format_mm(self.margin_mm));
+            let problem = format!("{} is not a valid margin of a face", format_mm(self.margin_mm));
             return Err(TargetError::invalid(SolidMarginMm, problem));
         }
         if self.board_id.checked_add(MOST_FACES).is_none() {
-            let problem = format!("{} leaves no ids for the faces after it", self.board_id);
+            let problem =
+                format!("{} is too large: it leaves no ids for the following faces", self.board_id);
             return Err(TargetError::invalid(SolidBoardId, problem));
         }
         if self.inverted && self.margin_mm < LEAST_INVERTED_MARGIN_MM {
             let problem = format!(
-                "{} leaves no room for a black field around white tiles: take at least {}",
+                "{} leaves no room for a black field around white tiles: use at least {}",
                 format_mm(self.margin_mm),
                 format_mm(LEAST_INVERTED_MARGIN_MM)
             );
@@ -271,7 +274,7 @@ impl SolidSpec {
         let Some(tags) = &self.tags else {
             return match self.square_tags {
                 Some(_) => {
-                    let problem = "the other faces have no tags: leave it out";
+                    let problem = "the other faces have no tags: omit it";
                     Err(TargetError::invalid(SolidSquareTags, problem))
                 }
                 None => Ok(()),
@@ -279,7 +282,7 @@ impl SolidSpec {
         };
         if tags.is_dense() && self.shape.tag_tiling() == GridKind::Deltille {
             let boards = self.board_id..self.board_id + self.polyhedron().faces.len() as u32;
-            // Faces of other shapes than triangles have up to twice as many rows.
+            // Faces other than triangles have up to twice as many rows.
             let rows = if matches!(self.shape, SolidShape::Mesh(_)) { 2 } else { 1 } * self.tiles;
             tags.check_places(SolidBoardId, boards, SolidTiles, [rows, rows])?;
         }
@@ -291,11 +294,12 @@ impl SolidSpec {
             ([true, false], None) => GridKind::Deltille,
             ([false, _], None) => GridKind::Checker,
             ([true, true], None) => {
-                let problem = "rectangular faces need square tags, the others have triangular ones";
+                let problem =
+                    "rectangular faces need square tags, because the others have triangular ones";
                 return Err(TargetError::invalid(SolidSquareTags, problem));
             }
             (_, Some(_)) => {
-                let problem = "all faces are of one kind and have one kind of tags: leave it out";
+                let problem = "all faces are of one kind and have one kind of tags: omit it";
                 return Err(TargetError::invalid(SolidSquareTags, problem));
             }
         };
@@ -303,7 +307,7 @@ impl SolidSpec {
     }
 }
 
-/// The mean side of a cuboid.
+/// Returns the mean side of a cuboid.
 pub(in crate::targets) fn mean_side(sides: DVec3) -> f64 {
     sides.element_sum() / 3.0
 }
