@@ -2,50 +2,50 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use crate::family::FamilyError;
 
-/// How far a long search has come.
+/// Progress of a long search.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub struct Progress {
     /// Units of work done.
     pub done: u64,
-    /// Units of work in all.
+    /// Total units of work.
     pub total: u64,
-    /// Codes found so far.
+    /// Number of codes found so far.
     pub codes: usize,
 }
 
-/// What lets a long search be watched and stopped; the library itself prints nothing.
+/// Callbacks to watch and stop a long search; the library itself prints nothing.
 #[derive(Clone, Copy, Default)]
 #[non_exhaustive]
 pub struct Control<'a> {
     /// Stops the search soon after it becomes true.
     pub cancel: Option<&'a AtomicBool>,
-    /// Called now and then, from one thread at a time.
+    /// Called from time to time, from one thread at a time.
     pub report: Option<&'a (dyn Fn(Progress) + Sync)>,
 }
 
 impl<'a> Control<'a> {
-    /// With a flag that stops the search soon after it becomes true.
+    /// Sets a flag that stops the search soon after it becomes true.
     #[must_use]
     pub fn cancel(self, cancel: &'a AtomicBool) -> Self {
         Self { cancel: Some(cancel), ..self }
     }
 
-    /// With a function that is called now and then, from one thread at a time.
+    /// Sets a function that is called from time to time, from one thread at a time.
     #[must_use]
     pub fn report(self, report: &'a (dyn Fn(Progress) + Sync)) -> Self {
         Self { report: Some(report), ..self }
     }
 
-    /// Whether it was cancelled.
+    /// Returns whether the search was cancelled.
     pub fn is_cancelled(&self) -> bool {
         self.cancel.is_some_and(|flag| flag.load(Ordering::Relaxed))
     }
 
-    /// Whether to go on.
+    /// Checks that the search may continue.
     ///
     /// # Errors
-    /// When it was cancelled.
+    /// Returns an error if it was cancelled.
     #[doc(hidden)]
     pub fn check(&self) -> Result<(), FamilyError> {
         if self.is_cancelled() { Err(FamilyError::Cancelled) } else { Ok(()) }

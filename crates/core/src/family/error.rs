@@ -1,27 +1,27 @@
 use crate::reading::in_words;
 use crate::setting::Setting::FamilyToJson;
 
-/// What is wrong with a family, its text or its name.
+/// The problem with a family, its text or its name.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum FamilyError {
-    /// No shipped family and no file of this name.
+    /// There is no shipped family and no file of this name.
     #[error(
-        "no family is called `{name}`: give one of {}, or the path of a .json family file",
+        "unknown family `{name}` (known: {}, or the path of a .json family file)",
         shipped.join(", ")
     )]
     Unknown {
-        /// The name asked for.
+        /// The requested name.
         name: String,
-        /// The families that come with the library.
+        /// Names of the shipped families.
         shipped: Vec<&'static str>,
     },
-    /// Not JSON, cut off, or with a field missing, unknown or of the wrong type.
-    #[error("not a family file: {}; generate it anew with {FamilyToJson}", in_words(.0))]
+    /// The text is not JSON or is truncated, or a field is missing, unknown or of the wrong type.
+    #[error("not a family file: {}; generate it again with {FamilyToJson}", in_words(.0))]
     Json(#[from] serde_json::Error),
-    /// Another schema, or another version of it.
+    /// The schema or its version is not supported.
     #[error(
-        "field `schema` is `{found}`, this version reads `{}`: generate the file anew with \
+        "field `schema` is `{found}`, but this version reads `{}`: generate the file again with \
          {FamilyToJson}",
         crate::family::SCHEMA
     )]
@@ -29,35 +29,35 @@ pub enum FamilyError {
         /// The schema that the file names.
         found: String,
     },
-    /// A field holds what it must not.
+    /// The value of a field is invalid.
     #[error("field `{field}`: {problem}")]
     Field {
         /// The field.
         field: String,
-        /// What is wrong and what to do.
+        /// The problem and its remedy.
         problem: String,
     },
-    /// The file is well formed, and contradicts itself.
+    /// The file is well formed but contradicts itself.
     #[error("field `{field}`: {problem}")]
     Claim {
         /// The field.
         field: String,
-        /// What does not hold.
+        /// The wrong claim.
         problem: String,
     },
-    /// The search was stopped from outside.
+    /// The search was cancelled.
     #[error("interrupted; nothing was written")]
     Cancelled,
 }
 
 impl FamilyError {
-    /// A problem of a field.
+    /// Creates the error of a field.
     #[doc(hidden)]
     pub fn field(field: impl Into<String>, problem: impl Into<String>) -> Self {
         Self::Field { field: field.into(), problem: problem.into() }
     }
 
-    /// Whether a file was read whole, and what it claims does not hold.
+    /// Returns whether the file is complete but makes a wrong claim.
     pub fn is_broken_claim(&self) -> bool {
         matches!(self, Self::Claim { .. })
     }

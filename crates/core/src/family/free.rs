@@ -5,25 +5,25 @@ use serde::{Deserialize, Serialize};
 
 use crate::lattice::{Dimension, TagCells};
 
-/// Which cells are free. They are printed black, read as nothing, and count in no distance; a turn of the tag leaves
-/// them where they are.
+/// The choice of free cells. They are printed black, are not read, and do not count in distances. A rotation of the
+/// tag maps them onto themselves.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 #[non_exhaustive]
 pub enum FreeCells {
-    /// Those in the middle: the central cell of 16, 25, 49 and 64, and of 9 and 36 the six around the vertex that is there.
+    /// The central cells: one cell for 16, 25, 49 and 64 cells; the six around the central vertex for 9 and 36.
     Centre,
 }
 
 impl FreeCells {
-    /// Its name in options and files.
+    /// Returns the name in options and files.
     pub fn name(self) -> &'static str {
         match self {
             Self::Centre => "centre",
         }
     }
 
-    /// The bits of these cells.
+    /// Returns the bits of these cells.
     pub fn mask(self, dimension: Dimension) -> u64 {
         match self {
             Self::Centre => {
@@ -38,10 +38,11 @@ impl FreeCells {
         }
     }
 
-    /// Radius of the largest circle around the middle of the tag that has only these cells in it, widths of a bit.
+    /// Returns the radius of the largest circle around the centre of the tag that contains only these cells,
+    /// bit-widths.
     pub fn radius_bits(self, dimension: Dimension) -> f64 {
         match self {
-            // A triangle, or a hexagon of six.
+            // One triangle, or a hexagon of six.
             Self::Centre if self.mask(dimension).count_ones() == 1 => 0.75f64.sqrt() / 3.0,
             Self::Centre => 0.75f64.sqrt(),
         }
@@ -64,7 +65,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn free_cells_are_in_the_middle_and_stay_there() {
+    fn free_cells_are_central_and_invariant() {
         for dimension in Dimension::all() {
             let (cells, mask) = (TagCells::new(dimension), FreeCells::Centre.mask(dimension));
             assert_eq!(mask.count_ones(), if dimension.bits() % 3 == 0 { 6 } else { 1 });

@@ -1,7 +1,7 @@
-//! The few loops in which searches spend their time, compiled for the instructions at hand.
+//! The few loops that dominate searches, compiled for the available instructions.
 //!
-//! On x86-64 each is also compiled with wider vectors and the population count instruction, and the best that
-//! the processor has is chosen when called: counting bits without that instruction takes several times as long.
+//! On x86-64, each loop is also compiled with wider vectors and the population count instruction; a call selects the
+//! best version for the processor. Without that instruction, counting bits takes several times as long.
 
 use multiversion::multiversion;
 
@@ -9,23 +9,23 @@ use multiversion::multiversion;
 pub(super) const LEAF_BITS: u32 = 9;
 /// Words under a leaf, one bit each.
 pub(super) type Leaf = [u64; 8];
-/// An entry of a list of the sweep: the word, and from this bit on its distance so far.
+/// Lowest bit of the distance so far in an entry of the sweep's list; the word is below it.
 const DISTANCE_SHIFT: u32 = 52;
 
-/// Whether some word of `list` is nearer to `word` than `distance`.
+/// Returns whether some word of `list` is closer to `word` than `distance`.
 #[multiversion(targets(
     "x86_64+avx512f+avx512bw+avx512vl+avx512vpopcntdq+popcnt",
     "x86_64+avx2+popcnt"
 ))]
 pub(super) fn any_nearer(word: u64, list: &[u64], distance: u32) -> bool {
-    // Blocks without a branch inside become vector code.
+    // Blocks without an inner branch compile to vector code.
     let (blocks, rest) = list.as_chunks::<64>();
     blocks.iter().any(|block| {
         block.iter().fold(0u64, |n, w| n + u64::from((word ^ w).count_ones() < distance)) > 0
     }) || rest.iter().any(|w| (word ^ w).count_ones() < distance)
 }
 
-/// Position of the first word of `list` that is nearer to `word` than `distance`.
+/// Returns the position of the first word of `list` that is closer to `word` than `distance`.
 #[multiversion(targets(
     "x86_64+avx512f+avx512bw+avx512vl+avx512vpopcntdq+popcnt",
     "x86_64+avx2+popcnt"
@@ -41,7 +41,7 @@ pub(super) fn first_nearer(word: u32, list: &[u32], distance: u32) -> Option<usi
     rest.iter().position(near).map(|at| 32 * blocks.len() + at)
 }
 
-/// Positions in `list` of the words nearer to `word` than `distance`.
+/// Returns the positions in `list` of the words closer to `word` than `distance`.
 #[multiversion(targets(
     "x86_64+avx512f+avx512bw+avx512vl+avx512vpopcntdq+popcnt",
     "x86_64+avx2+popcnt"
@@ -72,8 +72,8 @@ pub(super) fn count_distances(word: u64, list: &[u64], counts: &mut [u64; 65]) {
     }
 }
 
-/// One step down the tree of [`super::lexicode`]'s sweep: the entries whose distance, with the
-/// three bits from `shift` on compared to `symbol`, stays at most `slack`.
+/// Descends one level in the tree of the sweep of [`super::lexicode`]. Keeps the entries whose distance stays at most
+/// `slack` after comparing the three bits from `shift` on with `symbol`.
 #[multiversion(targets(
     "x86_64+avx512f+avx512bw+avx512vl+avx512vpopcntdq+popcnt",
     "x86_64+avx2+popcnt"
@@ -86,15 +86,15 @@ pub(super) fn thin_out(from: &[u64], to: &mut Vec<u64>, shift: u32, symbol: u64,
     for &entry in from {
         let differing = (entry >> shift ^ symbol) & 0b111;
         let entry = entry + ((ONES >> (2 * differing) & 0b11) << DISTANCE_SHIFT);
-        // Written always and counted sometimes: no branch to mispredict.
+        // Always written but counted only if kept: there is no branch to mispredict.
         to[kept] = entry;
         kept += usize::from(entry >> DISTANCE_SHIFT <= u64::from(slack));
     }
     to.truncate(kept);
 }
 
-/// Words under a leaf of the sweep that some entry is too near to; `balls` holds for radius 0
-/// to 9 the 512 balls of the leaf.
+/// Returns the words under a leaf of the sweep that are too close to some entry. `balls` contains the 512 balls of
+/// the leaf for each radius from 0 to 9.
 #[multiversion(targets(
     "x86_64+avx512f+avx512bw+avx512vl+avx512vpopcntdq+popcnt",
     "x86_64+avx2+popcnt"
@@ -123,7 +123,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn loops_are_what_they_say(word: u64, list in prop::collection::vec(any::<u64>(), 0..300)) {
+        fn loops_match_their_definitions(word: u64, list in prop::collection::vec(any::<u64>(), 0..300)) {
             let distances = list.iter().map(|other| (word ^ other).count_ones());
             let distances: Vec<u32> = distances.collect();
             for distance in [0, 20, 26, 40] {

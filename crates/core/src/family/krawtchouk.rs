@@ -1,6 +1,6 @@
-//! Krawtchouk polynomials, exactly.
+//! Exact Krawtchouk polynomials.
 
-/// K_k(i) for length n ≤ 65: the coefficient of z^k in (1−z)^i (1+z)^(n−i).
+/// Returns K_k(i) for length n ≤ 65: the coefficient of z^k in (1−z)^i (1+z)^(n−i).
 pub(super) fn krawtchouk(n: u32, k: u32, i: u32) -> i128 {
     (0..=k.min(i))
         .filter(|&j| k - j <= n - i)

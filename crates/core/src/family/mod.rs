@@ -1,8 +1,8 @@
-//! Code families: what a family is, which words its rules admit, how it is checked, stored and decoded.
+//! Code families: definition, rules, checks, storage and decoding.
 //!
-//! A *family* of bits b and distance h is a list of b-bit codes such that any two of the words a
-//! camera may read off the tags, the codes and their turns by 120° and 240°, differ in at least h
-//! cells. So up to ⌊(h−1)/2⌋ cells may be misread and the tag, and how it is turned, is still known.
+//! A *family* of bits b and distance h is a list of b-bit codes. Any two words that a camera may read from the tags
+//! differ in at least h cells; the words are the codes and their rotations by 120° and 240°. So up to ⌊(h−1)/2⌋
+//! misread cells still leave the tag and its rotation unambiguous.
 //!
 //! ```
 //! use deltille_core::family::{Decoder, Family};
@@ -15,26 +15,25 @@
 //! # Ok::<(), deltille_core::family::FamilyError>(())
 //! ```
 //!
-//! One family is of another kind, [`places`]: on its boards every tile has a tag of nine cells, which tell a place only
-//! together with those beside them.
+//! The family [`places`] is of a different kind: on its boards every tile has a tag of nine cells, which identify a
+//! position only together with the neighbouring tags.
 //!
-//! Families of square tags, the AprilTags of checkerboards, are read, decoded, drawn and certified like the
-//! others, with their four turns by 90°; they are not searched here.
+//! Families of square tags, the AprilTags of checkerboards, are read, decoded, drawn and certified like the others,
+//! with their four rotations by 90°. They cannot be searched here.
 //!
-//! The chapters, in the order in which a family comes to be and is used:
+//! The modules, in the order in which a family is made and used:
 //!
-//! 1. `rules`, `free`: which words may be codes;
-//! 2. [`lexicode`], [`algebra`]: codes by trial and by construction, as a family file records them; `control`: how a search
-//!    is watched and stopped. The searches are the crate `deltille-search`;
-//! 3. `check`: what is proved of a family, and how it compares with bounds and with pictures of the world;
-//! 4. `tables`: families as files, those that ship, those of other programs;
-//! 5. `decode`: from the cells of a photograph to a tag; [`places`]: the codes that tell a place.
+//! 1. `rules`, `free`: the words that may be codes;
+//! 2. [`lexicode`], [`algebra`]: codes by trial and by construction, as a family file records them; `control`:
+//!    callbacks to watch and stop a search. The crate `deltille-search` contains the searches;
+//! 3. `check`: proofs about a family, and its comparison with bounds and with natural images;
+//! 4. `tables`: families as files, shipped families, families of other programs;
+//! 5. `decode`: from the cells of a photograph to a tag; [`places`]: codes that identify a position.
 //!
-//! `kernels` has the loops in which searches and proofs spend their time.
+//! `kernels` contains the loops that dominate searches and proofs.
 //!
-//! Limits: codes have 9, 16, 25, 36, 49 or 64 bits ([`crate::lattice::Dimension`]). Loading a family
-//! checks its form and fingerprint; the distance between its codes is proved by [`certify`], which
-//! costs the square of their number.
+//! Limits: codes have 9, 16, 25, 36, 49 or 64 bits ([`crate::lattice::Dimension`]). Loading a family checks its form
+//! and fingerprint. [`certify`] proves the distance between its codes, which takes time quadratic in their number.
 
 pub mod algebra;
 mod check;
@@ -78,13 +77,13 @@ pub use {hex::parse_word, kernels::nearer};
 
 use crate::lattice::{Dimension, GridKind, TagCells};
 
-/// Schema and version that this crate writes and reads.
+/// Schema and version that this crate reads and writes.
 pub const SCHEMA: &str = "deltille/family/1";
 
-/// The pairs of larger families are too many to count one by one.
+/// Largest number of codes whose pairs are counted one by one.
 pub const PAIRS_COUNTED: usize = 100_000;
 
-/// A family: its codes, and how they came about.
+/// A family: its codes and their construction.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Family {
     name: String,
@@ -103,15 +102,15 @@ pub struct Family {
 }
 
 impl Family {
-    /// A family of triangular tags with these `codes`, in the order of their ids.
+    /// Creates a family of triangular tags with these `codes`, in the order of their ids.
     ///
-    /// Checks the form (name, code width, no code twice in any turn) but not the distance, which
-    /// [`certify`] proves. The distance histogram is counted here. A name that speaks of bits and a
-    /// distance, such as d25h7 or delTag25h7, must speak of these.
+    /// Checks the form (name, code width, no code twice in any rotation) but not the distance, which [`certify`]
+    /// proves. Counts the distance histogram. A name with bits and distance, for example d25h7 or delTag25h7, must
+    /// match the family.
     ///
     /// # Errors
-    /// Where the name is no file name or speaks of other bits or another distance, a code is too wide, or stands there
-    /// twice.
+    /// Returns an error if the name is not a file name or states other bits or another distance, or if a code is too
+    /// wide or occurs twice.
     pub fn new(
         name: &str,
         dimension: Dimension,
@@ -123,7 +122,7 @@ impl Family {
         Self::of(name, GridKind::Deltille, dimension, distance, codes, rules, construction)
     }
 
-    /// The same of tags that fill a tile of `kind`.
+    /// Creates a family of tags that fill a tile of `kind`.
     fn of(
         name: &str,
         kind: GridKind,
@@ -156,13 +155,13 @@ impl Family {
         })
     }
 
-    /// The same family with that of the squares of a target whose faces are of both tilings. Files of families have one
-    /// of them.
+    /// Returns the family together with that of the squares of a target with faces of both tilings. A family file
+    /// contains only one of them.
     pub fn with_squares(self, squares: Family) -> Self {
         Self { squares: Some(Box::new(squares)), ..self }
     }
 
-    /// A family with that of the squares, where there are both.
+    /// Combines a family with that of the squares, if both exist.
     pub fn paired(family: Option<Self>, squares: Option<Self>) -> Option<Self> {
         match (family, squares) {
             (Some(family), Some(squares)) => Some(family.with_squares(squares)),
@@ -170,16 +169,15 @@ impl Family {
         }
     }
 
-    /// The family of tags in tiles of a kind: this one, or that of its squares.
+    /// Returns the family of tags in tiles of a kind: this one, or that of its squares.
     pub fn of_tiling(&self, kind: GridKind) -> Option<&Self> {
         if self.kind == kind { Some(self) } else { self.squares.as_deref() }
     }
 
-    /// A family that comes with the crate, by its name: those of [`shipped_families`], and the dictionaries of
-    /// [`dictionary_names`].
+    /// Returns a shipped family by name: one of [`shipped_families`], or a dictionary of [`dictionary_names`].
     ///
     /// # Errors
-    /// Where no family of that name is shipped; the message names those that are.
+    /// Returns an error if no family of that name is shipped; the message lists those that are.
     pub fn shipped(name: &str) -> Result<Self, FamilyError> {
         match shipped::json(name) {
             Some(json) => Self::from_json(json),
@@ -190,7 +188,7 @@ impl Family {
         }
     }
 
-    /// The family of place codes, see [`places`].
+    /// Creates the family of place codes, see [`places`].
     fn places() -> Self {
         let cells = places::cells();
         let dimension = cells.dimension();
@@ -211,70 +209,72 @@ impl Family {
         }
     }
 
-    /// Whether its tags tell a place only together with those beside them, and every tile has one.
+    /// Returns whether the tags identify a position only together with neighbouring ones, so that every tile has a
+    /// tag.
     pub fn is_of_places(&self) -> bool {
         self.construction == Construction::Places
     }
 
-    /// Reads the text of a family file (`docs/formats.md`, “Family”, schema [`SCHEMA`]).
+    /// Parses the text of a family file (`docs/formats.md`, “Family”, schema [`SCHEMA`]).
     ///
     /// # Errors
-    /// Where it is no family file, a field is wrong, or the codes do not have the stated fingerprint.
+    /// Returns an error if the text is not a family file, a field is invalid, or the codes do not match the stated
+    /// fingerprint.
     pub fn from_json(json: &str) -> Result<Self, FamilyError> {
         file::from_json(json)
     }
 
-    /// The text of the family file.
+    /// Writes the text of the family file.
     pub fn to_json(&self) -> String {
         file::to_json(self)
     }
 
-    /// The name, usable as the stem of a file.
+    /// Returns the name, which is a valid file stem.
     pub fn name(&self) -> &str {
         &self.name
     }
 
-    /// The tiling whose tiles its tags fill: triangular or square tags.
+    /// Returns the tiling whose tiles the tags fill: triangular or square tags.
     pub fn kind(&self) -> GridKind {
         self.kind
     }
 
-    /// The cells of its tags.
+    /// Returns the cells of the tags.
     pub fn cells(&self) -> TagCells {
         TagCells::of(self.kind, self.dimension)
     }
 
-    /// The dimension of its tags.
+    /// Returns the dimension of the tags.
     pub fn dimension(&self) -> Dimension {
         self.dimension
     }
 
-    /// The bits of cells that no code uses, and that are not read: see [`FreeCells`].
+    /// Returns the bits of the cells that no code uses and that are not read: see [`FreeCells`].
     pub fn free_cells(&self) -> u64 {
         self.rules.free.map_or(0, |free| free.mask(self.dimension))
     }
 
-    /// Number of the cells that carry its codes: all but the free ones.
+    /// Returns the number of cells that carry codes: all except the free ones.
     pub fn used_cells(&self) -> u32 {
         self.dimension.bits() - self.free_cells().count_ones()
     }
 
-    /// The claimed minimum distance h between any two words read off different tags or turns.
+    /// Returns the claimed minimum distance h between any two words of different tags or rotations.
     pub fn distance(&self) -> u32 {
         self.distance
     }
 
-    /// The number of misread cells that never hide which tag was read, ⌊(h−1)/2⌋.
+    /// Returns the number of misread cells that can always be corrected, ⌊(h−1)/2⌋.
     pub fn correctable(&self) -> u32 {
         (self.distance - 1) / 2
     }
 
-    /// The codes; an id is a position in this list. Of place codes these are those of the first board.
+    /// Returns the codes; an id is a position in this list. For place codes these are the codes of the first board.
     pub fn codes(&self) -> &[u64] {
         &self.codes
     }
 
-    /// The code of a tag.
+    /// Returns the code of a tag.
     pub fn code(&self, id: u32) -> Option<u64> {
         if self.is_of_places() && (id as usize) < self.len() {
             return Some(places::word(id));
@@ -282,36 +282,36 @@ impl Family {
         self.codes.get(id as usize).copied()
     }
 
-    /// Number of codes.
+    /// Returns the number of codes.
     pub fn len(&self) -> usize {
         let boards = if self.is_of_places() { places::BOARDS as usize } else { 1 };
         boards * self.codes.len()
     }
 
-    /// Whether there is no code; never so for a family that was checked.
+    /// Returns whether there are no codes, which is never true for a checked family.
     pub fn is_empty(&self) -> bool {
         self.codes.is_empty()
     }
 
-    /// What every single code satisfies.
+    /// Returns the rules that every single code satisfies.
     pub fn rules(&self) -> &Rules {
         &self.rules
     }
 
-    /// How the codes were found, in enough detail to find them again.
+    /// Returns the construction of the codes, in enough detail to repeat it.
     pub fn construction(&self) -> &Construction {
         &self.construction
     }
 
-    /// Number of unordered pairs, among the codes and their turns, at each distance; empty for
+    /// Returns the number of unordered pairs, among the codes and their rotations, at each distance. It is empty for
     /// families of more than 100,000 codes, and for place codes.
     pub fn histogram(&self) -> &BTreeMap<u32, u64> {
         &self.histogram
     }
 
-    /// Probability that a word of fair coin tosses is taken for a tag, for 0, 1, …,
-    /// [`Self::correctable`] corrected bits; of place codes every word is one of a place. What pictures show is seldom so
-    /// complex: [`Self::natural_false_positive_rates`].
+    /// Returns the probability that a word of fair coin tosses is mistaken for a tag, for 0, 1, …,
+    /// [`Self::correctable`] corrected bits. For place codes, every word is the word of a place. Image content is
+    /// rarely that complex: see [`Self::natural_false_positive_rates`].
     pub fn false_positive_rates(&self) -> Vec<f64> {
         if self.is_of_places() {
             return vec![1.0];
@@ -319,8 +319,8 @@ impl Family {
         false_positive_rates(self.kind, self.used_cells(), self.distance, self.codes.len())
     }
 
-    /// 16 hexadecimal digits that stand for bits, distance and codes: the first half of the first
-    /// half of the SHA-256 of the text
+    /// Returns 16 hexadecimal digits that identify bits, distance and codes: the first 64 bits of the SHA-256 of the
+    /// text
     ///
     /// ```text
     /// deltille/family
@@ -330,9 +330,9 @@ impl Family {
     /// …
     /// ```
     ///
-    /// one code a line in id order, lower case, ⌈b/4⌉ digits, every line ended by a line feed. That
-    /// of square tags has a second line `kind checker`, that of tags with free cells a line `free centre`
-    /// after the distance.
+    /// with one code per line in id order, in lower case with ⌈b/4⌉ digits, and a line feed after every line. For
+    /// square tags the second line is `kind checker`. For tags with free cells a line `free centre` follows the
+    /// distance.
     pub fn fingerprint(&self) -> &str {
         &self.fingerprint
     }

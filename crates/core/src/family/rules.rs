@@ -4,17 +4,17 @@ use crate::family::kernels::any_nearer;
 use crate::family::{FamilyError, FreeCells, Robust, TagWords};
 use crate::lattice::Dimension;
 
-/// What every single code of a family has to satisfy, besides its distance to the other codes.
+/// Conditions on every single code of a family, besides its distance to the other codes.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Rules {
-    /// Share of the pairs of edge-adjacent cells that differ, at least; 0 to 1.
+    /// Minimum fraction of pairs of edge-adjacent cells that differ; 0 to 1.
     pub min_complexity: f64,
-    /// Distance from the all-black word, an untagged tile, at least: the number of white cells.
+    /// Minimum distance from the all-black word, an untagged tile: the number of white cells.
     pub black_distance: u32,
-    /// Distance from the all-white word, at least: the number of black cells.
+    /// Minimum distance from the all-white word: the number of black cells.
     pub white_distance: u32,
-    /// Cells that may be hidden, and the distance to the other codes that is then left.
+    /// Cells that may be hidden, and the minimum distance to other codes that remains then.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub robust: Vec<Robust>,
     /// Cells that no code uses.
@@ -23,7 +23,7 @@ pub struct Rules {
 }
 
 impl Rules {
-    /// No rules: what is known of families from elsewhere.
+    /// No rules, for families from other sources.
     pub const NONE: Self = Self {
         min_complexity: 0.0,
         black_distance: 0,
@@ -32,17 +32,17 @@ impl Rules {
         free: None,
     };
 
-    /// The rules of the published families: half of the pairs differ, and the untagged tile is as
-    /// far as another code (`docs/families.md`, “What a family is”). The distance from a code to its
-    /// own turns is always h.
+    /// Returns the rules of the published families: half of the pairs differ, and the untagged tile is as far as
+    /// another code (`docs/families.md`, “What a family is”). The distance from a code to its own rotations is always
+    /// h.
     pub fn published(distance: u32) -> Self {
         Self { min_complexity: 0.5, black_distance: distance, ..Self::NONE }
     }
 
-    /// Checks that the numbers make sense for tags of `bits` cells; names the field that does not.
+    /// Checks that the rules are valid for tags of `bits` cells.
     ///
     /// # Errors
-    /// The first field that does not, and why.
+    /// Returns the first invalid field and its problem.
     pub fn check(&self, bits: u32) -> Result<(), FamilyError> {
         if !(0.0..=1.0).contains(&self.min_complexity) {
             let problem = format!("{} is not between 0 and 1", self.min_complexity);
@@ -52,7 +52,7 @@ impl Rules {
             [("black_distance", self.black_distance), ("white_distance", self.white_distance)]
         {
             if value > bits {
-                let problem = format!("{value} is more than the {bits} bits of a tag");
+                let problem = format!("{value} exceeds the {bits} bits of a tag");
                 return Err(FamilyError::field(field, problem));
             }
         }
@@ -60,12 +60,13 @@ impl Rules {
         for (i, robust) in self.robust.iter().enumerate() {
             let seen = bits - robust.to.count(dimension);
             if !(1..=seen).contains(&robust.distance) {
-                let problem =
-                    format!("{robust}: the distance must be between 1 and the {seen} cells seen");
+                let problem = format!(
+                    "{robust}: the distance must be between 1 and the {seen} visible cells"
+                );
                 return Err(FamilyError::field("robust", problem));
             }
             if self.robust[..i].iter().any(|other| other.to == robust.to) {
-                let problem = format!("{} is there twice", robust.to.name());
+                let problem = format!("{} appears twice", robust.to.name());
                 return Err(FamilyError::field("robust", problem));
             }
         }
@@ -73,33 +74,34 @@ impl Rules {
     }
 }
 
-/// The rules made ready for one dimension and distance: a yes or no for every word.
+/// The rules prepared for one dimension and distance, to accept or reject words.
 #[derive(Clone, Debug)]
 pub struct Screen {
     words: TagWords,
     distance: u32,
-    /// Pairs of adjacent cells that must differ.
+    /// Number of pairs of adjacent cells that must differ.
     min_pairs: u32,
     black_distance: u32,
     white_distance: u32,
     /// Cells that no code uses.
     free: u64,
-    /// Where cells may be hidden, and the distance that must be left.
+    /// Masks of possible hidden cells, and the distance that must remain.
     robust: Vec<(Vec<u64>, u32)>,
     reach: u32,
 }
 
 impl Screen {
-    /// The words of `words` under `rules`, `distance` apart from each other and from their own turns.
+    /// Creates a screen for `words` under `rules`, with codes `distance` apart from each other and from their own
+    /// rotations.
     pub fn new(words: TagWords, distance: u32, rules: &Rules) -> Self {
         let free = rules.free.map_or(0, |free| free.mask(words.dimension()));
         let words = words.without(free);
-        // The share is a decimal fraction from a file: 1e-9 keeps its rounding from adding a pair.
+        // The fraction is a decimal number from a file: 1e-9 keeps its rounding from adding a pair.
         let min_pairs = (rules.min_complexity * f64::from(words.pairs()) - 1e-9).ceil() as u32;
         let Rules { black_distance, white_distance, .. } = *rules;
         let dimension = words.dimension();
         let reach = |robust: &Robust| robust.distance + robust.to.count(dimension);
-        // With fewer cells hidden than there is distance to spare nothing is asked for.
+        // With fewer hidden cells than the distance can spare, there is no extra condition.
         let asked: Vec<&Robust> = rules.robust.iter().filter(|r| reach(r) > distance).collect();
         let farthest = asked.iter().map(|robust| reach(robust)).max().unwrap_or(distance);
         let robust = asked.into_iter().map(|r| (r.to.masks(dimension), r.distance)).collect();
@@ -115,35 +117,35 @@ impl Screen {
         }
     }
 
-    /// The word arithmetic.
+    /// Returns the word arithmetic.
     pub fn words(&self) -> &TagWords {
         &self.words
     }
 
-    /// Distance asked for between different tags, and different turns of one.
+    /// Returns the required distance between different tags, and between different rotations of one.
     pub fn distance(&self) -> u32 {
         self.distance
     }
 
-    /// Whether the distance alone does not tell that two codes are far enough apart.
+    /// Returns whether hidden cells impose conditions beyond the distance of two codes.
     pub fn is_robust(&self) -> bool {
         !self.robust.is_empty()
     }
 
-    /// The fewest pairs of neighbouring cells that differ in a word.
+    /// Returns the minimum number of pairs of neighbouring cells that differ in a word.
     #[doc(hidden)]
     pub fn min_pairs(&self) -> u32 {
         self.min_pairs
     }
 
-    /// Words that differ in so many cells are far enough apart, wherever these are.
+    /// Returns the number of differing cells that is always sufficient, whichever cells these are.
     #[doc(hidden)]
     pub fn reach(&self) -> u32 {
         self.reach
     }
 
-    /// Whether words that differ in these cells are far enough apart, with hidden cells too. A turn of both
-    /// words changes nothing, as hidden cells may lie anywhere.
+    /// Returns whether words with this difference are far enough apart, with hidden cells too. Rotating both words
+    /// changes nothing, as hidden cells may lie anywhere.
     #[inline]
     pub fn is_apart(&self, difference: u64) -> bool {
         let count = difference.count_ones();
@@ -153,7 +155,7 @@ impl Screen {
         count >= self.distance && (count >= self.reach || self.robust.iter().all(is_left))
     }
 
-    /// The differences of `distance` cells and more that are too near with hidden cells.
+    /// Returns the differences of `distance` or more cells that are insufficient with hidden cells.
     #[doc(hidden)]
     pub fn hidden_differences(&self) -> Vec<u64> {
         let all = self.words.dimension().mask();
@@ -171,7 +173,7 @@ impl Screen {
         found
     }
 
-    /// Whether a word is far enough from all words of a list.
+    /// Returns whether a word is far enough from all words of a list.
     #[doc(hidden)]
     pub fn is_apart_from(&self, word: u64, list: &[u64]) -> bool {
         match self.is_robust() {
@@ -180,13 +182,13 @@ impl Screen {
         }
     }
 
-    /// Whether a word, on its own, may be a code.
+    /// Returns whether a word, on its own, may be a code.
     #[inline]
     pub fn admits(&self, word: u64) -> bool {
         self.look_is_fine(word) && self.is_apart(word ^ self.words.turn(word))
     }
 
-    /// Whether a word satisfies the rules, its own turns aside.
+    /// Returns whether a word satisfies the rules, apart from the distance to its own rotations.
     #[inline]
     pub fn look_is_fine(&self, word: u64) -> bool {
         let white = word.count_ones();
@@ -198,13 +200,13 @@ impl Screen {
     }
 }
 
-/// All words that are part of a mask.
+/// Returns all words that are subsets of a mask.
 pub(super) fn parts(mask: u64) -> impl Iterator<Item = u64> {
     let next = move |&part: &u64| (part != mask).then(|| part.wrapping_sub(mask) & mask);
     std::iter::successors(Some(0), next)
 }
 
-/// The parts of a mask with so many ones.
+/// Returns the subsets of a mask with the given number of ones.
 fn scattered(mask: u64, ones: u32) -> impl Iterator<Item = u64> {
     parts(mask).filter(move |part| part.count_ones() == ones)
 }
@@ -220,7 +222,7 @@ mod tests {
     }
 
     #[test]
-    fn differences_with_hidden_cells_are_all_of_them() {
+    fn hidden_differences_are_complete() {
         for (distance, robust) in [(5, "edge"), (5, "apex=4"), (3, "tile=5")] {
             let screen = screen(16, distance, robust);
             let near = |word: &u64| word.count_ones() >= distance && !screen.is_apart(*word);
@@ -228,7 +230,7 @@ mod tests {
             assert_eq!(screen.hidden_differences(), all, "{robust}");
             assert!(!all.is_empty() && all.iter().all(|word| word.count_ones() < screen.reach()));
         }
-        // What the distance gives by itself is no rule more.
+        // A rule that already follows from the distance adds nothing.
         assert!(!screen(16, 7, "apex").is_robust());
     }
 }

@@ -5,29 +5,28 @@ use std::collections::BTreeSet;
 use super::ranked::Ranked;
 use super::{CycleSpace, Span};
 
-/// A union of cosets of a linear code. It is invariant under the turn where its
-/// syndromes are whole orbits.
+/// A union of cosets of a linear code. It is invariant under the rotation if its syndromes are whole orbits.
 #[derive(Clone, Debug, PartialEq)]
 pub struct CosetUnion {
     /// The space of the words.
     pub space: CycleSpace,
     /// The linear code whose cosets are united.
     pub code: Span,
-    /// One word of each coset, in cycle coordinates; zero stands for the code itself.
+    /// One word of each coset, in cycle coordinates; zero represents the code itself.
     pub cosets: Vec<u64>,
 }
 
 impl CosetUnion {
-    /// One word of each orbit of three words, in cycle coordinates: the smallest. Words that are
-    /// fixed by the turn are left out, since they do not tell the orientation of a tag.
+    /// Returns the smallest word of each orbit of three words, in cycle coordinates. Omits words that the rotation
+    /// fixes, as they leave the orientation of a tag ambiguous.
     pub fn orbits(&self) -> Vec<u64> {
         let space = self.space;
         let words = self.cosets.iter().flat_map(|&c| self.code.words().map(move |w| w ^ c));
         words.filter(|&w| space.turn(w) != w && space.canonical(w) == w).collect()
     }
 
-    /// The number of orbits of three words, and some of them, spread over all: no more than `most`. Of a linear code of more
-    /// than 24 dimensions no list is made.
+    /// Returns the number of orbits of three words, and at most `most` of them, evenly distributed. A linear code of
+    /// more than 24 dimensions is not listed.
     pub fn some_orbits(&self, most: usize) -> (usize, Vec<u64>) {
         const LISTED_DIMENSIONS: u32 = 24;
         if self.cosets == [0]
@@ -44,7 +43,7 @@ impl CosetUnion {
         (count, orbits.into_iter().step_by(step.max(1)).collect())
     }
 
-    /// The sums of two words that are lighter than `weight`, each once, and not zero.
+    /// Returns the nonzero sums of two words that are lighter than `weight`, each once.
     pub fn differences_lighter_than(&self, weight: u32) -> Vec<u64> {
         let pairs = self.cosets.iter().enumerate();
         let shifts: BTreeSet<u64> = pairs

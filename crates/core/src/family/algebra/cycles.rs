@@ -1,11 +1,10 @@
-//! Cycle coordinates of words, and the arrangements that put the cycles of a code on a tag.
+//! Cycle coordinates of words, and the arrangements that place the cycles of a code on a tag.
 
 use serde::{Deserialize, Serialize};
 
 use crate::lattice::{Dimension, TagCells};
 
-/// The space of words in cycle coordinates: m three-cycles, and perhaps a central bit that every
-/// turn leaves in place.
+/// The space of words in cycle coordinates: m three-cycles, and possibly a central bit that every rotation fixes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct CycleSpace {
     /// Number of three-cycles, m; at most 21, so that words fit 64 bits.
@@ -15,28 +14,28 @@ pub struct CycleSpace {
 }
 
 impl CycleSpace {
-    /// The space of the tags of one dimension.
+    /// Returns the space of the tags of one dimension.
     pub fn of(dimension: Dimension) -> Self {
         Self { cycles: dimension.bits() / 3, centre: dimension.bits() % 3 == 1 }
     }
 
-    /// Number of bits, 3m or 3m + 1.
+    /// Returns the number of bits, 3m or 3m + 1.
     pub fn bits(self) -> u32 {
         3 * self.cycles + u32::from(self.centre)
     }
 
-    /// A word with all bits set.
+    /// Returns a word with all bits set.
     pub fn mask(self) -> u64 {
-        // There is one bit at least.
+        // There is at least one bit.
         u64::MAX >> (u64::BITS - self.bits())
     }
 
-    /// Every third bit: the first of each cycle.
+    /// Returns every third bit: the first of each cycle.
     fn firsts(self) -> u64 {
         0x9249_2492_4924_9249 & ((1 << (3 * self.cycles)) - 1)
     }
 
-    /// The word after one turn of the tag by 120°.
+    /// Returns the word after one rotation of the tag by 120°.
     #[inline]
     pub fn turn(self, word: u64) -> u64 {
         let (first, cycles) = (self.firsts(), (1 << (3 * self.cycles)) - 1);
@@ -44,43 +43,42 @@ impl CycleSpace {
         (moved << 1) | ((word >> 2) & first) | (word & !cycles)
     }
 
-    /// The orbit's representative: the smallest of the three turned words.
+    /// Returns the representative of the orbit: the smallest of the three rotated words.
     #[inline]
     pub fn canonical(self, word: u64) -> u64 {
         let once = self.turn(word);
         word.min(once).min(self.turn(once))
     }
 
-    /// A basis of the words that are fixed by the turn: each whole cycle, and the central bit.
+    /// Returns a basis of the words that the rotation fixes: each whole cycle, and the central bit.
     pub fn fixed_basis(self) -> Vec<u64> {
         let cycles = (0..self.cycles).map(|c| 0b111 << (3 * c));
         cycles.chain(self.centre.then_some(1 << (3 * self.cycles))).collect()
     }
 }
 
-/// How the cycles of a code are placed on the tag: all choices that change neither distances nor
-/// invariance under the turn.
+/// Placement of the cycles of a code on the tag: all choices that preserve distances and invariance under the
+/// rotation.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Arrangement {
-    /// For each cycle of the code the index of the cycle of the tag where it goes.
+    /// For each cycle of the code, the index of its cycle of the tag.
     pub places: Vec<u8>,
-    /// For each cycle of the code the number of steps, 0 to 2, by which it is rotated in its place.
+    /// For each cycle of the code, the number of steps, 0 to 2, by which it is rotated.
     pub starts: Vec<u8>,
-    /// Cycles of the code that are inverted, as a bit set; the central bit comes after the last
-    /// cycle. Inverting adds a word that is fixed by the turn.
+    /// Inverted cycles of the code, as a bit set; the central bit follows the last cycle. Inversion adds a word that
+    /// the rotation fixes.
     pub inverted: u32,
 }
 
 impl Arrangement {
-    /// The identity: every cycle of the code on the cycle of the tag of the same number, nothing
-    /// inverted.
+    /// Returns the identity: every cycle of the code is on the tag's cycle of the same number, none is inverted.
     pub fn plain(space: CycleSpace) -> Self {
         let n = space.cycles as usize;
         Self { places: (0..n as u8).collect(), starts: vec![0; n], inverted: 0 }
     }
 
-    /// Whether this is a valid arrangement of the cycles of `space`.
+    /// Returns whether this is a valid arrangement of the cycles of `space`.
     pub fn fits(&self, space: CycleSpace) -> bool {
         let n = space.cycles as usize;
         let mut seen = self.places.clone();
@@ -91,7 +89,7 @@ impl Arrangement {
             && self.inverted >> (space.cycles + u32::from(space.centre)) == 0
     }
 
-    /// The permutation of bits: for each bit in cycle coordinates the bit of the tag.
+    /// Returns the permutation of bits: for each bit in cycle coordinates, the bit of the tag.
     pub fn bit_map(&self, dimension: Dimension) -> Vec<u8> {
         let (cycles, centre) = tag_cycles(dimension);
         let mut map = Vec::with_capacity(dimension.bits() as usize);
@@ -103,8 +101,8 @@ impl Arrangement {
         map
     }
 
-    /// The word that is added to every code word for the inverted cycles, in cycle coordinates; the
-    /// turn leaves it fixed.
+    /// Returns the word that is added to every code word for the inverted cycles, in cycle coordinates; the rotation
+    /// fixes it.
     pub fn translation(&self, space: CycleSpace) -> u64 {
         let basis = space.fixed_basis();
         (0..).zip(basis).filter(|&(i, _)| self.inverted >> i & 1 == 1).fold(0, |t, (_, w)| t ^ w)
@@ -112,7 +110,7 @@ impl Arrangement {
 
     /// Maps words from cycle coordinates to words of the tag.
     pub fn apply(&self, dimension: Dimension, words: &[u64]) -> Vec<u64> {
-        /// Fewer words are moved bit by bit sooner than tables are made.
+        /// Number of words above which tables are faster than moving bit by bit.
         const MANY: usize = 256;
         if words.len() >= MANY {
             let placing = Placing::new(self, dimension);
@@ -130,11 +128,11 @@ impl Arrangement {
     }
 }
 
-/// An arrangement made ready for many words.
+/// An arrangement prepared for many words.
 #[derive(Clone, Debug)]
 pub struct Placing {
     translation: u64,
-    /// tables[i][x]: the word of the tag of the word with byte i = x and all else 0.
+    /// tables[i][x]: the word of the tag for the word with byte i = x and all else 0.
     tables: Vec<[u64; 256]>,
 }
 
@@ -152,7 +150,7 @@ impl Placing {
         Self { translation: arrangement.translation(CycleSpace::of(dimension)), tables }
     }
 
-    /// The word of the tag of a word in cycle coordinates.
+    /// Maps a word from cycle coordinates to the tag.
     #[inline]
     pub fn on_tag(&self, word: u64) -> u64 {
         let bytes = (word ^ self.translation).to_le_bytes();
@@ -160,21 +158,21 @@ impl Placing {
     }
 }
 
-/// The cycles of the tag, by their index, whose bits are all in a mask.
+/// Returns the indices of the tag's cycles whose bits are all in a mask.
 pub fn cycles_in(dimension: Dimension, mask: u64) -> Vec<u8> {
     let (cycles, _) = tag_cycles(dimension);
     let is_in = |cycle: &[u8; 3]| cycle.iter().all(|bit| mask >> bit & 1 == 1);
     (0..).zip(&cycles).filter(|(_, cycle)| is_in(cycle)).map(|(i, _)| i).collect()
 }
 
-/// The three-cycles of the bits of a tag, each in the order in which a turn moves the content, and
-/// the central bit that stays.
+/// Returns the three-cycles of the bits of a tag, each in the order in which a rotation moves the content, and the
+/// fixed central bit.
 fn tag_cycles(dimension: Dimension) -> (Vec<[u8; 3]>, Option<u8>) {
     let cells = TagCells::new(dimension);
     let source = cells.rotation();
     let (mut cycles, mut centre) = (Vec::new(), None);
     for bit in 0..dimension.bits() as u8 {
-        // A turn moves the content of `source[i]` to i, so content runs the other way.
+        // A rotation moves the content of `source[i]` to i, so content moves in the opposite direction.
         let before = source[usize::from(bit)];
         let two_before = source[usize::from(before)];
         if before == bit {
@@ -193,9 +191,9 @@ mod tests {
     use super::*;
 
     proptest! {
-        /// Turning in cycle coordinates is turning on the tag, under every arrangement.
+        /// Rotation in cycle coordinates is equivalent to rotation on the tag, under every arrangement.
         #[test]
-        fn arrangements_commute_with_turns(
+        fn arrangements_commute_with_rotations(
             rows in 3..=8u32, word: u64, seed: u64, inverted: u32,
         ) {
             let dimension = Dimension::from_bits(rows * rows).unwrap();

@@ -1,7 +1,6 @@
 //! Linear maps over GF(2) from words of up to 64 bits to words of up to 32 bits, such as syndromes.
 
-/// A linear map over GF(2) from words of up to 64 bits to words of up to 32 bits, evaluated byte by
-/// byte with tables.
+/// A linear map over GF(2) from words of up to 64 bits to words of up to 32 bits, evaluated byte by byte with tables.
 #[derive(Clone, Debug)]
 pub struct LinearMap {
     /// tables[i][x]: image of the word with byte i = x and all else 0.
@@ -9,7 +8,7 @@ pub struct LinearMap {
 }
 
 impl LinearMap {
-    /// The map that sends bit i to `columns[i]`, for at most 64 columns; other bits map to zero.
+    /// Creates the map from bit i to `columns[i]`, for at most 64 columns; other bits map to zero.
     pub fn of_columns(columns: &[u32]) -> Self {
         let table = |columns: &[u32]| {
             std::array::from_fn(|x| {
@@ -19,7 +18,7 @@ impl LinearMap {
         Self { tables: columns.chunks(8).map(table).collect() }
     }
 
-    /// The image of a word: the sum (exclusive or) of the columns of its set bits.
+    /// Returns the image of a word: the sum (exclusive or) of the columns of its set bits.
     #[inline]
     pub fn apply(&self, word: u64) -> u32 {
         let bytes = word.to_le_bytes();

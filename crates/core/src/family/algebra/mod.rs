@@ -1,19 +1,18 @@
-//! Codes that are invariant under a turn of the tag by 120°, constructed by algebra instead of
-//! trial.
+//! Codes that are invariant under a rotation of the tag by 120°, constructed by algebra instead of trial.
 //!
-//! A turn permutes the cells of a tag in m cycles of three; one central cell stays where it is when
-//! b mod 3 = 1, b being the number of bits. In *cycle coordinates* cycle c holds bits 3c, 3c+1,
-//! 3c+2 of a word, the turn moves bit 3c+j to 3c+(j+1 mod 3), and the central cell is bit 3m. Words
-//! are `u64` with one bit for each cell, 64 at most. A code that this permutation leaves invariant yields a
-//! family: one tag for each orbit of three words (`docs/families.md`).
+//! A rotation permutes the cells of a tag in m cycles of three. If b mod 3 = 1 for b bits, one central cell is fixed.
+//! In *cycle coordinates*, cycle c contains bits 3c, 3c+1, 3c+2 of a word, the rotation moves bit 3c+j to 3c+(j+1 mod
+//! 3), and the central cell is bit 3m. Words are `u64` with one bit per cell, 64 at most. A code that is invariant
+//! under this permutation yields a family: one tag for each orbit of three words (`docs/families.md`).
 //!
-//! - `cycles`: cycle coordinates, and how cycles are placed on the cells of a tag;
-//! - `span`: linear codes; `linear_map`: their syndromes; `weights`: how many words have each weight, by those of the dual where
-//!   a code has too many;
-//! - `cosets`: unions of cosets of a linear code; `ranked`: the tags of a linear code by number, without listing the code;
-//! - `record`: the construction as its file holds it, which lists the codes again and proves their distance.
+//! - `cycles`: cycle coordinates, and the placement of cycles on the cells of a tag;
+//! - `span`: linear codes; `linear_map`: their syndromes; `weights`: the weight distribution of a code, from that of
+//!   the dual if the code has too many words;
+//! - `cosets`: unions of cosets of a linear code; `ranked`: the tags of a linear code by number, without listing the
+//!   code;
+//! - `record`: the construction as stored in the family file, which lists the codes again and proves their distance.
 //!
-//! How such codes are found is the crate `deltille-search`.
+//! The crate `deltille-search` finds such codes.
 
 mod cosets;
 mod cycles;

@@ -1,11 +1,10 @@
-//! The tags of an invariant linear code by number, computed without listing the code.
+//! The tags of an invariant linear code by number, without listing the code.
 //!
-//! The turn σ splits such a code into the words F that it fixes and the words E with w + σw + σ²w =
-//! 0. On E the turn is multiplication by a primitive third root of unity, so that E is a vector
-//! space over GF(4). Words w + f and w′ + f′ (w, w′ in E; f, f′ in F) are turns of each other
-//! exactly when f = f′ and w, w′ are turns of each other, that is, span the same line over GF(4).
-//! So the orbits of three words are the pairs of a word of F and a point of the projective space of
-//! E: |F| · (|E|−1)/3 of them.
+//! The rotation σ splits such a code into the words F that it fixes and the words E with w + σw + σ²w = 0. On E, the
+//! rotation is multiplication by a primitive third root of unity, so E is a vector space over GF(4). Words w + f and
+//! w′ + f′ (w, w′ in E; f, f′ in F) are rotations of each other exactly if f = f′ and w, w′ are rotations of each
+//! other, that is, span the same line over GF(4). So the orbits of three words are the pairs of a word of F and a
+//! point of the projective space of E: |F| · (|E|−1)/3 of them.
 
 use super::{CycleSpace, Span};
 
@@ -19,7 +18,7 @@ pub struct Ranked {
 }
 
 impl Ranked {
-    /// Numbers the orbits of `code`; `None` when the code is not invariant under the turn.
+    /// Numbers the orbits of `code`; `None` if the code is not invariant under the rotation.
     pub fn new(space: CycleSpace, code: &Span) -> Option<Self> {
         if !code.rows().iter().all(|&row| code.contains(space.turn(row))) {
             return None;
@@ -38,23 +37,22 @@ impl Ranked {
         Some(Self { space, fixed, lines })
     }
 
-    /// Number of orbits of three words.
+    /// Returns the number of orbits of three words.
     pub fn len(&self) -> u64 {
         self.points() << self.fixed.len()
     }
 
-    /// Whether there are no orbits of three words: the turn fixes every word.
+    /// Returns whether there are no orbits of three words: the rotation fixes every word.
     pub fn is_empty(&self) -> bool {
         self.lines.is_empty()
     }
 
-    /// Number of points of the projective space, (4^n − 1)/3 for n dimensions over GF(4).
+    /// Returns the number of points of the projective space, (4^n − 1)/3 for n dimensions over GF(4).
     fn points(&self) -> u64 {
         ((1u64 << (2 * self.lines.len())) - 1) / 3
     }
 
-    /// A word of orbit number `rank`, in cycle coordinates; `None` when there are no more than
-    /// `rank` orbits.
+    /// Returns a word of orbit number `rank`, in cycle coordinates; `None` if there are at most `rank` orbits.
     pub fn word(&self, rank: u64) -> Option<u64> {
         if rank >= self.len() {
             return None;
@@ -62,7 +60,7 @@ impl Ranked {
         let (which, mut point) = (rank / self.points(), rank % self.points());
         let chosen = (0..).zip(&self.fixed).filter(|&(i, _)| which >> i & 1 == 1);
         let mut word = chosen.fold(0, |sum, (_, w)| sum ^ w);
-        // There are 4^lead points whose last non-zero coordinate, scaled to one, is number `lead`.
+        // There are 4^lead points whose last nonzero coordinate, scaled to one, is number `lead`.
         let mut lead = 0;
         while point >> (2 * lead) != 0 {
             point -= 1 << (2 * lead);

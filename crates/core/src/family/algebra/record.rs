@@ -1,5 +1,4 @@
-//! The record of an algebraic family: what suffices to list its codes again, and to prove their
-//! distance.
+//! The record of an algebraic family: enough to list its codes again and to prove their distance.
 
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
@@ -12,36 +11,35 @@ use crate::family::hex::parse_word;
 use crate::family::{FamilyError, Screen};
 use crate::lattice::Dimension;
 
-/// The construction of an algebraic family, as its file holds it.
+/// The construction of an algebraic family, as stored in its file.
 ///
-/// The codes are one word of each orbit of the union of cosets, arranged on the tag, where the
-/// rules admit it and no exchanged word is too near; and the exchanged words. Where cells may be
-/// hidden, words of the union may be too near to each other then: they are taken in order, each that
-/// is far enough from those before it. Where no word of the
-/// union uses the central cell, it is black, or white if only that satisfies the rules. Codes are
-/// sorted by the smallest of the three turned words.
+/// The union of cosets is arranged on the tag. Each orbit gives one code if the rules admit it and no exchanged word
+/// is too close; the exchanged words are codes too. If cells may be hidden, words of the union may be too close to
+/// each other. They are then taken in order, each only if it is far enough from those before it. If no word of the
+/// union uses the central cell, it is black, or white if only that satisfies the rules. Codes are sorted by the
+/// smallest of the three rotated words.
 ///
-/// A linear code may have far more words than anybody lists. With a [`stride`](Self::stride) codes are those of the
-/// tags number 0, stride, 2·stride, … ([`Self::by_rank`]), in this order, that the rules admit. So they are spread over
-/// the whole code, where the first ones in order would all begin with black cells.
+/// A linear code may have far more words than anybody lists. With a [`stride`](Self::stride), codes are those of the
+/// tags number 0, stride, 2·stride, … ([`Self::by_rank`]), in this order, that the rules admit. So they are
+/// distributed over the whole code; the first ones in order would all start with black cells.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct AlgebraicConstruction {
-    /// Where the linear code comes from, for readers.
+    /// Description of the linear code's origin, for readers.
     pub source: String,
     /// Basis of the linear code, in cycle coordinates, hexadecimal.
     pub basis: Vec<String>,
     /// One word of each coset, in cycle coordinates, hexadecimal.
     pub cosets: Vec<String>,
-    /// How the cycles of the code are placed on the tag.
+    /// Placement of the code's cycles on the tag.
     pub arrangement: Arrangement,
     /// Words of the tag that local search added in exchange for others, hexadecimal.
     pub exchanged: Vec<String>,
-    /// Number of codes that are listed, the first in order; absent for all of them.
+    /// Number of listed codes, the first in order; absent if all are listed.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub limit: Option<u64>,
-    /// Which tags of a linear code are listed: each next one is number so many later, modulo the number of them, with which it
-    /// has no divisor in common. There is a `limit` then, and of each code that it allows 64 numbers are tried at most.
+    /// Step between the numbers of listed tags of a linear code, modulo the number of tags, with which it has no
+    /// common divisor. A `limit` is then required. For each code that the limit allows, at most 64 numbers are tried.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub stride: Option<u64>,
     /// Seed of the search that found the construction.
@@ -49,17 +47,17 @@ pub struct AlgebraicConstruction {
 }
 
 impl AlgebraicConstruction {
-    /// Lists the codes as words of the tag, in the order of the family. `screen` holds dimension,
-    /// distance and rules.
+    /// Lists the codes as words of the tag, in the order of the family. `screen` contains dimension, distance and
+    /// rules.
     ///
     /// # Errors
-    /// When a word does not parse or is too long for the dimension, the arrangement does not fit
-    /// it, or the basis has more than 26 dimensions.
+    /// Returns an error if a word does not parse or is too long for the dimension, the arrangement does not fit it,
+    /// or the basis has more than 26 dimensions.
     pub fn codes(&self, screen: &Screen) -> Result<Vec<u64>, FamilyError> {
         let dimension = screen.words().dimension();
         let space = CycleSpace::of(dimension);
         if !self.arrangement.fits(space) {
-            let problem = "does not arrange the cycles of such a tag";
+            let problem = "it does not fit the cycles of tags of this dimension";
             return Err(FamilyError::field("construction.arrangement", problem));
         }
         if let Some(stride) = self.stride {
@@ -85,11 +83,11 @@ impl AlgebraicConstruction {
         Ok(codes)
     }
 
-    /// The codes of a construction with a stride.
+    /// Lists the codes of a construction with a stride.
     fn strided(&self, screen: &Screen, stride: u64) -> Result<Vec<u64>, FamilyError> {
-        /// Codes at most: of 64 bits a gigabyte of memory, and two of a file.
+        /// Maximum number of codes: for 64 bits, they take a gigabyte of memory and two of a file.
         const MOST_CODES: u64 = 1 << 27;
-        /// Numbers that are tried for each code.
+        /// Number of tags tried for each code.
         const TRIED: u64 = 64;
         let wrong = |field, problem: &str| {
             FamilyError::field(format!("construction.{field}"), problem.to_owned())
@@ -98,21 +96,24 @@ impl AlgebraicConstruction {
         let ranked = self.ranked(dimension).ok_or_else(|| {
             wrong(
                 "stride",
-                "only the tags of a linear code alone, which a turn leaves as it is, have numbers",
+                "a stride needs a single linear code that is invariant under rotation, without cosets or exchanged words",
             )
         })?;
         if screen.is_robust() && !self.is_apart(screen, &self.union(dimension)?) {
-            return Err(wrong("stride", "with hidden cells words of the linear code are too near"));
+            return Err(wrong(
+                "stride",
+                "words of the linear code are too close with hidden cells",
+            ));
         }
         let count = ranked.len();
         if count == 0 || greatest_common_divisor(stride, count) != 1 {
             let problem =
-                format!("{stride} and the number of tags, {count}, have a divisor in common");
+                format!("{stride} and the number of tags, {count}, have a common divisor");
             return Err(wrong("stride", &problem));
         }
         let limit = self.limit.filter(|&limit| limit <= MOST_CODES);
         let limit =
-            limit.ok_or_else(|| wrong("limit", "with a stride there are 2^27 codes at most"))?;
+            limit.ok_or_else(|| wrong("limit", "a stride needs a limit of at most 2^27 codes"))?;
         let place = Placing::new(&self.arrangement, dimension);
         let centre = self.free_centre(dimension)?;
         let numbers = (0..count.min(limit.saturating_mul(TRIED))).scan(0u64, |next, _| {
@@ -125,10 +126,10 @@ impl AlgebraicConstruction {
         Ok(codes.take(limit as usize).collect())
     }
 
-    /// The words of the union on the tag that the screen admits one by one, and the exchanged ones.
+    /// Returns the words of the union on the tag that the screen admits one by one, and the exchanged ones.
     ///
     /// # Errors
-    /// Where the record is not valid, see [`Self::codes`].
+    /// Returns an error if the record is invalid, see [`Self::codes`].
     pub fn words_of_the_union(&self, screen: &Screen) -> Result<Vec<u64>, FamilyError> {
         let dimension = screen.words().dimension();
         let mut words = arranged(screen, &self.union(dimension)?, &self.arrangement);
@@ -138,7 +139,7 @@ impl AlgebraicConstruction {
         Ok(words)
     }
 
-    /// Whether any two words of the union, arranged on the tag, are far enough apart.
+    /// Returns whether any two words of the union, arranged on the tag, are far enough apart.
     fn is_apart(&self, screen: &Screen, union: &CosetUnion) -> bool {
         let dimension = screen.words().dimension();
         let zero = self.arrangement.apply(dimension, &[0])[0];
@@ -147,30 +148,34 @@ impl AlgebraicConstruction {
         near.into_iter().all(|word| screen.is_apart(word ^ zero))
     }
 
-    /// The union of cosets, in cycle coordinates.
+    /// Returns the union of cosets, in cycle coordinates.
     ///
     /// # Errors
-    /// When a word does not parse or is too long for the dimension, or the basis has more than 26 dimensions.
+    /// Returns an error if a word does not parse or is too long for the dimension, or the basis has more than 26
+    /// dimensions.
     pub fn union(&self, dimension: Dimension) -> Result<CosetUnion, FamilyError> {
         let code = Span::of(self.words("basis", &self.basis, dimension)?);
         if code.dimension() > MOST_DIMENSIONS {
-            return Err(FamilyError::field("construction.basis", "more than 26 dimensions"));
+            return Err(FamilyError::field(
+                "construction.basis",
+                "the basis has more than 26 dimensions",
+            ));
         }
         let cosets = self.words("cosets", &self.cosets, dimension)?;
         Ok(CosetUnion { space: CycleSpace::of(dimension), code, cosets })
     }
 
-    /// Tag number `rank` of the whole linear code, as a word of the tag whether or not it satisfies
-    /// the rules, and the number of tags; the tag is `None` beyond them. `None` altogether when the
-    /// construction is more than a linear code, or its record is not consistent. A central cell
-    /// that the code does not use is black, unless the arrangement inverts it.
+    /// Returns tag number `rank` of the whole linear code as a word of the tag, whether or not it satisfies the
+    /// rules, and the number of tags. The tag is `None` beyond that number. Returns `None` if the construction is
+    /// more than a linear code, or its record is inconsistent. A central cell that the code does not use is black,
+    /// unless the arrangement inverts it.
     pub fn by_rank(&self, dimension: Dimension, rank: u64) -> Option<(Option<u64>, u64)> {
         let ranked = self.ranked(dimension)?;
         let word = ranked.word(rank).map(|w| self.arrangement.apply(dimension, &[w])[0]);
         Some((word, ranked.len()))
     }
 
-    /// The numbers of the tags of a linear code alone; `None` of more than that, and where the record is not consistent.
+    /// Numbers the tags of a single linear code; `None` for any other or inconsistent record.
     fn ranked(&self, dimension: Dimension) -> Option<Ranked> {
         let space = CycleSpace::of(dimension);
         let words = |field, list| self.words(field, list, dimension).ok();
@@ -182,7 +187,7 @@ impl AlgebraicConstruction {
         Ranked::new(space, &code)
     }
 
-    /// The central cell of the tag, where no word uses it; else 0.
+    /// Returns the central cell of the tag if no word uses it; else 0.
     fn free_centre(&self, dimension: Dimension) -> Result<u64, FamilyError> {
         let (space, code) =
             (CycleSpace::of(dimension), self.words("basis", &self.basis, dimension)?);
@@ -191,9 +196,8 @@ impl AlgebraicConstruction {
         Ok(centre_of(&union, &self.arrangement, dimension))
     }
 
-    /// The linear code and one word of each of its cosets as words of the tag, and a mask of the
-    /// central cell where no word uses it, else 0. `None` when the family has exchanged words, or
-    /// the record is not consistent.
+    /// Returns the linear code and one word of each of its cosets as words of the tag, and a mask of the central cell
+    /// if no word uses it, else 0. Returns `None` if the family has exchanged words, or the record is inconsistent.
     pub fn on_the_tag(&self, dimension: Dimension) -> Option<(Span, Vec<u64>, u64)> {
         let space = CycleSpace::of(dimension);
         if !self.exchanged.is_empty() || !self.arrangement.fits(space) {
@@ -210,17 +214,16 @@ impl AlgebraicConstruction {
         Some((code, cosets, ignored))
     }
 
-    /// Proves from the structure of the code that the words of the family and their turns are
-    /// `screen.distance()` apart. Takes time in proportion to the number of codes, not to its
-    /// square.
+    /// Proves from the structure of the code that the words of the family and their rotations are `screen.distance()`
+    /// apart. The time is proportional to the number of codes, not to its square.
     ///
-    /// The basis has to span a code that is invariant under the turn and whose lightest non-zero
-    /// word weighs the distance or more (all words are weighed, or all of the dual code), and each of `codes`, mapped back
-    /// to cycle coordinates, has to lie in it. Then the sum of any two words is a word of the
-    /// linear code, and their distance is its weight.
+    /// The basis must span a code that is invariant under the rotation and whose lightest nonzero word weighs at
+    /// least the distance. (All words of the code, or all of the dual code, are weighed.) Each of `codes`, mapped
+    /// back to cycle coordinates, must lie in it. Then the sum of any two words is a word of the linear code, and
+    /// their distance is its weight.
     ///
     /// # Errors
-    /// The reason why this is no proof; the distance may hold all the same.
+    /// Returns why the proof fails; the distance may be correct nevertheless.
     pub fn prove(&self, screen: &Screen, codes: &[u64]) -> Result<(), String> {
         let dimension = screen.words().dimension();
         let space = CycleSpace::of(dimension);
@@ -228,30 +231,27 @@ impl AlgebraicConstruction {
         let code = Span::of(words("basis", &self.basis)?);
         let cosets = words("cosets", &self.cosets)?;
         if !self.arrangement.fits(space) {
-            return Err("the construction does not fit such tags".to_owned());
+            return Err("the construction does not fit tags of this dimension".to_owned());
         }
         if !self.exchanged.is_empty() || cosets != [0] {
-            return Err("not a linear code alone".to_owned());
+            return Err("the construction is more than a linear code".to_owned());
         }
         if !code.rows().iter().all(|&row| code.contains(space.turn(row))) {
-            return Err("the linear code changes when the tag turns".to_owned());
+            return Err("the linear code is not invariant under rotation of the tag".to_owned());
         }
         let weights = weights(&code, space.bits());
-        let weights =
-            weights.ok_or("the linear code and its dual have too many words to be weighed")?;
+        let weights = weights.ok_or("the linear code and its dual have too many words to weigh")?;
         if (1..screen.distance()).any(|weight| weights[weight as usize] > 0) {
-            return Err("the linear code has too light a word".to_owned());
+            return Err("the linear code has a word lighter than the distance".to_owned());
         }
         if screen.is_robust() && code.dimension() > MOST_DIMENSIONS {
-            return Err(
-                "the linear code has too many words to be looked at with hidden cells".to_owned()
-            );
+            return Err("the linear code has too many words to check with hidden cells".to_owned());
         }
         let union = CosetUnion { space, code, cosets };
         if screen.is_robust() && !self.is_apart(screen, &union) {
-            return Err("with hidden cells words of the linear code are too near".to_owned());
+            return Err("words of the linear code are too close with hidden cells".to_owned());
         }
-        // A free centre is no part of the linear code: it can only add distance.
+        // A free centre is not part of the linear code: it can only add distance.
         let ignored = if has_free_centre(&union) { 1u64 << (space.bits() - 1) } else { 0 };
         let translation = self.arrangement.translation(space);
         let map = self.arrangement.bit_map(dimension);
@@ -282,10 +282,10 @@ impl AlgebraicConstruction {
     }
 }
 
-/// The most dimensions; the list of words would not fit in memory beyond.
+/// Largest number of dimensions; beyond it, the list of words would not fit in memory.
 const MOST_DIMENSIONS: u32 = 26;
 
-/// Of some words those that are far enough from all that were taken before, up to `limit`.
+/// Returns the words that are far enough from all those taken before, up to `limit`.
 fn taken_in_order(screen: &Screen, words: impl Iterator<Item = u64>, limit: usize) -> Vec<u64> {
     let (mut taken, mut turned) = (Vec::new(), Vec::new());
     for word in words {
@@ -297,7 +297,7 @@ fn taken_in_order(screen: &Screen, words: impl Iterator<Item = u64>, limit: usiz
     taken
 }
 
-/// The words of a union on the tag that the screen admits, one of each orbit.
+/// Returns the words of a union on the tag that the screen admits, one of each orbit.
 pub fn arranged(screen: &Screen, union: &CosetUnion, arrangement: &Arrangement) -> Vec<u64> {
     let dimension = screen.words().dimension();
     let words = arrangement.apply(dimension, &union.orbits());
@@ -308,7 +308,8 @@ pub fn arranged(screen: &Screen, union: &CosetUnion, arrangement: &Arrangement) 
     words.into_par_iter().filter_map(|word| choice(screen, word, centre)).collect()
 }
 
-/// A word as a code, if it may be one: where the central cell is free, black, or white if only that satisfies the rules.
+/// Returns a word as a code, if it may be one. A free central cell is black, or white if only that satisfies the
+/// rules.
 fn choice(screen: &Screen, word: u64, free_centre: u64) -> Option<u64> {
     match free_centre {
         0 => screen.admits(word).then_some(word),
@@ -316,7 +317,7 @@ fn choice(screen: &Screen, word: u64, free_centre: u64) -> Option<u64> {
     }
 }
 
-/// The central cell of the tag, where no word of a union uses it; else 0.
+/// Returns the central cell of the tag if no word of a union uses it; else 0.
 fn centre_of(union: &CosetUnion, arrangement: &Arrangement, dimension: Dimension) -> u64 {
     match has_free_centre(union) {
         true => 1 << arrangement.bit_map(dimension)[3 * union.space.cycles as usize],
@@ -328,14 +329,14 @@ fn greatest_common_divisor(a: u64, b: u64) -> u64 {
     if b == 0 { a } else { greatest_common_divisor(b, a % b) }
 }
 
-/// A stride for so many tags that spreads any number of them evenly: about a golden section of them.
+/// Returns a stride that distributes any number of tags evenly: about the golden section of their number.
 pub fn stride_of(tags: u64) -> u64 {
     let golden = (tags as f64 * 0.618_033_988_749_895) as u64;
     let coprime = |stride: &u64| greatest_common_divisor(*stride, tags) == 1;
     (golden.max(1)..).find(coprime).unwrap_or(1)
 }
 
-/// Whether the space has a central bit that no word of the union uses.
+/// Returns whether the space has a central bit that no word of the union uses.
 pub fn has_free_centre(union: &CosetUnion) -> bool {
     let centre = 1u64 << (union.space.bits() - 1);
     union.space.centre

@@ -2,15 +2,15 @@
 
 use super::LinearMap;
 
-/// A binary linear code of length up to 64, kept as a reduced basis.
+/// A binary linear code of length up to 64, stored as a reduced basis.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Span {
-    /// Rows with distinct leading bits, each leading bit set in its own row only; descending.
+    /// Rows with distinct leading bits, each leading bit set in its own row only; in decreasing order.
     rows: Vec<u64>,
 }
 
 impl Span {
-    /// The linear span of some words.
+    /// Creates the linear span of some words.
     pub fn of(words: impl IntoIterator<Item = u64>) -> Self {
         let mut span = Self::default();
         for word in words {
@@ -19,18 +19,17 @@ impl Span {
         span
     }
 
-    /// Dimension of the code.
+    /// Returns the dimension of the code.
     pub fn dimension(&self) -> u32 {
         self.rows.len() as u32
     }
 
-    /// The reduced basis (reduced row echelon form), by descending leading bit.
+    /// Returns the reduced basis (reduced row echelon form), by decreasing leading bit.
     pub fn rows(&self) -> &[u64] {
         &self.rows
     }
 
-    /// The representative of the coset of a word: the one that is zero at the leading bit of every
-    /// row.
+    /// Returns the representative of the coset of a word: the one that is zero at the leading bit of every row.
     pub fn reduce(&self, word: u64) -> u64 {
         self.rows.iter().fold(
             word,
@@ -40,12 +39,12 @@ impl Span {
         )
     }
 
-    /// Whether the word is in the code.
+    /// Returns whether the word is in the code.
     pub fn contains(&self, word: u64) -> bool {
         self.reduce(word) == 0
     }
 
-    /// Adds a word to the span; returns false when the span contained it already.
+    /// Adds a word to the span; returns false if the span already contained it.
     pub fn insert(&mut self, word: u64) -> bool {
         let word = self.reduce(word);
         if word == 0 {
@@ -62,7 +61,7 @@ impl Span {
         true
     }
 
-    /// All code words, each once, zero first, in Gray code order.
+    /// Returns all code words, each once, zero first, in Gray code order.
     pub fn words(&self) -> impl Iterator<Item = u64> + '_ {
         let mut word = 0;
         (0u64..1 << self.rows.len()).map(move |i| {
@@ -73,9 +72,9 @@ impl Span {
         })
     }
 
-    /// The subcode of words that are zero at every bit set in `mask`.
+    /// Returns the subcode of words that are zero at every bit set in `mask`.
     pub fn vanishing_on(&self, mask: u64) -> Self {
-        // Reduce with the masked bits leading: what is left of rows that have none of them.
+        // Reduced with the masked bits leading: the remaining rows have none of them.
         let mut rows = self.rows.clone();
         let mut kept = Vec::new();
         while let Some(row) = rows.pop() {
@@ -93,25 +92,24 @@ impl Span {
         Self::of(kept)
     }
 
-    /// The dual code: the words of `length` bits that meet every word of the code in an even number of bits.
+    /// Returns the dual code: the words of `length` bits that share an even number of set bits with every code word.
     pub fn dual(&self, length: u32) -> Self {
-        // A free bit, and of the leading ones those whose rows have it.
+        // Each generator has one free bit and the leading bits of the rows that contain it.
         Self::of(self.free_bits(length).into_iter().map(|bit| {
             let rows = self.rows.iter().filter(|&row| row >> bit & 1 == 1);
             rows.fold(1 << bit, |word, row| word | 1 << row.ilog2())
         }))
     }
 
-    /// The bits of a word of `length` bits that lead no row, ascending; their values identify a
+    /// Returns the bits of a word of `length` bits that lead no row, in increasing order; their values identify a
     /// coset.
     pub fn free_bits(&self, length: u32) -> Vec<u32> {
         let leading = self.rows.iter().fold(0u64, |bits, row| bits | 1 << row.ilog2());
         (0..length).filter(|i| leading >> i & 1 == 0).collect()
     }
 
-    /// The map from words of `length` bits to syndromes: the free bits of the representative of the
-    /// coset, side by side in the order of [`Span::free_bits`]. `None` when there are more than 32
-    /// of them.
+    /// Returns the map from words of `length` bits to syndromes: the free bits of the coset representative, adjacent,
+    /// in the order of [`Span::free_bits`]. Returns `None` if there are more than 32 of them.
     pub fn syndromes(&self, length: u32) -> Option<LinearMap> {
         let free_bits = self.free_bits(length);
         let syndrome = |word: u64| {

@@ -1,8 +1,8 @@
-//! How many words of a linear code have each weight: a proof of its distance.
+//! The weight distribution of a linear code: a proof of its distance.
 //!
-//! Of a code of few dimensions all words are weighed. Of one of many all words of its dual are, the words that meet each of its
-//! words in an even number of bits; how many of these have weight j, B_j, tells how many of the code have weight i
-//! (MacWilliams & Sloane, chapter 5):
+//! For a code of few dimensions, all words are weighed. For one of many, all words of its dual are, which share an
+//! even number of set bits with each code word. The number B_j of dual words of weight j determines the number A_i of
+//! code words of weight i (MacWilliams & Sloane, chapter 5):
 //!
 //! ```text
 //!     A_i = Σ B_j K_i(j) / Σ B_j        with the Krawtchouk polynomials K_i of the length
@@ -14,10 +14,11 @@ use super::Span;
 use crate::family::kernels::count_distances;
 use crate::family::krawtchouk::krawtchouk;
 
-/// The most dimensions of a code, or of its dual, that are weighed: a second or two.
+/// Largest number of dimensions of a weighed code or dual: a second or two.
 const MOST_DIMENSIONS: u32 = 30;
 
-/// Number of words of each weight, 0 to `length`; `None` where neither the code nor its dual is small enough.
+/// Returns the number of words of each weight, 0 to `length`; `None` if neither the code nor its dual is small
+/// enough.
 pub fn weights(code: &Span, length: u32) -> Option<Vec<u128>> {
     let other = length - code.dimension();
     if code.dimension().min(other) > MOST_DIMENSIONS {
@@ -37,7 +38,7 @@ pub fn weights(code: &Span, length: u32) -> Option<Vec<u128>> {
 
 /// Weighs all words.
 fn counted(code: &Span) -> [u64; 65] {
-    /// Rows whose sums are listed; each of the others' sums is compared with the list.
+    /// Number of rows whose sums are listed; the sums of the other rows are each compared with the list.
     const LISTED: usize = 12;
     let (listed, others) = code.rows().split_at(code.rows().len().min(LISTED));
     let (listed, others) = (Span::of(listed.iter().copied()), others.to_vec());
@@ -65,7 +66,7 @@ mod tests {
     use super::*;
 
     proptest! {
-        /// By the words or by those of the dual, and whether or not any are listed.
+        /// Tests counting by the words or those of the dual, with and without a list.
         #[test]
         fn weights_are_those_of_all_words(words: [u64; 17], length in 9u32..=20, few in 1usize..17) {
             let mask = (1 << length) - 1;

@@ -1,18 +1,17 @@
 //! Upper bounds on the size of a family.
 //!
-//! The codes of a family and their turns are a binary code of length b, distance h, with three
-//! words a tag, of square tags four; so what bounds binary codes bounds families, divided by these.
+//! The codes of a family and their rotations are a binary code of length b and distance h, with three words per tag,
+//! or four per square tag. So bounds of binary codes, divided by that number, bound families.
 //!
 //! *Sphere packing*: balls of radius ⌊(h−1)/2⌋ do not overlap.
 //!
-//! *Linear programming* (Delsarte, "An algebraic approach to the association schemes of coding
-//! theory", 1973): the distance distribution A_h, …, A_b of a code of M words satisfies
-//! A_i ≥ 0 and Σ_i A_i K_k(i) ≥ −C(b,k) with the Krawtchouk polynomials K_k, and
-//! M = 1 + Σ A_i. The program is solved in floating point; its dual solution is then rounded to
-//! integers and checked exactly, so the bound does not rest on rounding. For odd h a parity bit
-//! gives a code of length b+1, distance h+1 and even distances only, whose bound is often lower; and
-//! for even h a cell less and a parity bit instead make even distances of any code. Where rounding
-//! leaves no solution that can be checked, as with 64 cells and small distances, there is no such bound.
+//! *Linear programming* (Delsarte, "An algebraic approach to the association schemes of coding theory", 1973): the
+//! distance distribution A_h, …, A_b of a code of M words satisfies A_i ≥ 0 and Σ_i A_i K_k(i) ≥ −C(b,k) with the
+//! Krawtchouk polynomials K_k, and M = 1 + Σ A_i. The program is solved in floating point. Its dual solution is then
+//! rounded to integers and checked exactly, so the bound does not depend on rounding. For odd h, a parity bit gives a
+//! code of length b+1, distance h+1 and even distances only, whose bound is often lower. For even h, replacing a cell
+//! by a parity bit makes all distances even. If rounding leaves no solution that can be checked, as with 64 cells and
+//! small distances, there is no such bound.
 
 use super::statistics::ball;
 use crate::family::Family;
@@ -23,45 +22,47 @@ use crate::lattice::{Dimension, GridKind};
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub struct Bounds {
-    /// A third of Delsarte's linear programming bound, as every tag takes three words; of square tags a quarter. Where none was
-    /// found, that part of all words: see [`Self::found_none`].
+    /// A third of Delsarte's linear programming bound, as every tag has three words; a quarter for square tags. If no
+    /// bound was found, it is that fraction of all words: see [`Self::found_none`].
     pub linear_programming: u64,
-    /// The same part of the sphere-packing bound.
+    /// The same fraction of the sphere-packing bound.
     pub sphere_packing: u64,
     found_none: bool,
 }
 
 impl Bounds {
-    /// Whether linear programming found no bound for this distance, so that [`Self::linear_programming`] says nothing.
+    /// Returns whether linear programming found no bound for this distance, so that [`Self::linear_programming`] is
+    /// meaningless.
     pub fn found_none(&self) -> bool {
         self.found_none
     }
 }
 
-/// Bounds for tags of a kind and a dimension at distance `distance` ≥ 1.
+/// Computes the bounds for tags of a kind and a dimension at distance `distance` ≥ 1.
 pub fn bounds(kind: GridKind, dimension: Dimension, distance: u32) -> Bounds {
     bounds_of_cells(kind, dimension.bits(), distance)
 }
 
 impl Family {
-    /// Bounds for families of this kind and distance that use as many cells: those that are free tell nothing apart.
+    /// Computes the bounds for families of this kind and distance with the same number of used cells; free cells do
+    /// not count.
     pub fn bounds(&self) -> Bounds {
         bounds_of_cells(self.kind(), self.used_cells(), self.distance())
     }
 }
 
-/// Bounds for tags of `b` cells.
+/// Computes the bounds for tags of `b` cells.
 pub fn bounds_of_cells(kind: GridKind, b: u32, distance: u32) -> Bounds {
     let turns = u64::from(kind.turns());
     let packed = 2f64.powi(b as i32) / ball(b, distance.saturating_sub(1) / 2);
     let plain = delsarte(b, (distance..=b).collect());
     let even = |length: u32| delsarte(length, (distance..=length).filter(|i| i % 2 == 0).collect());
-    // Where rounding spoils the program, one for a smaller distance bounds these codes, too.
+    // If rounding spoils the program, one for a smaller distance also bounds these codes.
     let best = match plain.min(even(b + distance % 2)) {
         u64::MAX if distance > 1 => delsarte(b, (distance - 1..=b).collect()),
         best => best,
     };
-    // All words, or one less where a machine word cannot tell so many; at distance 1 they are a code.
+    // The number of all words, or one less if it exceeds a machine word; at distance 1 they are a code.
     let all = 1u64.checked_shl(b).unwrap_or(u64::MAX);
     Bounds {
         linear_programming: best.min(all) / turns,
@@ -70,10 +71,10 @@ pub fn bounds_of_cells(kind: GridKind, b: u32, distance: u32) -> Bounds {
     }
 }
 
-/// Bounds beyond the number of all words of 65 bits are none.
+/// Limit above which a bound is useless: it exceeds the number of all words of 65 bits.
 const MOST: f64 = 4e19;
 
-/// Largest number of words of length n whose distances are all among `distances`, or more.
+/// Returns an upper bound on the number of words of length n with all distances among `distances`.
 fn delsarte(n: u32, distances: Vec<u32>) -> u64 {
     let constraints: Vec<u32> = (1..=n).collect();
     // max Σ a_i with Σ_i −K_k(i)/C(n,k) · a_i ≤ 1: feasible at a = 0, so the simplex can start.
@@ -86,7 +87,8 @@ fn delsarte(n: u32, distances: Vec<u32>) -> u64 {
         .collect();
     let multipliers = maximise_sum(matrix);
 
-    // Denominator of the rounded dual solution: as large as sums below allow, which are no larger than the bound itself.
+    // Denominator of the rounded dual solution: the largest one for which the sums below, which do not exceed the
+    // bound, fit.
     let bound = 2.0 + multipliers.iter().map(|y| y.max(0.0)).sum::<f64>();
     if !bound.is_finite() || bound > MOST {
         return u64::MAX;
@@ -101,7 +103,7 @@ fn delsarte(n: u32, distances: Vec<u32>) -> u64 {
     let value = |i: u32| -> i128 {
         constraints.iter().zip(&f).map(|(&k, f)| f * krawtchouk(n, k, i)).sum::<i128>() + scale
     };
-    // Rounding may leave f(i) a little above zero: lower the constant term by as much.
+    // Rounding may leave f(i) slightly above zero: the constant term is lowered by that amount.
     let excess = distances.iter().map(|&i| value(i)).max().unwrap_or(0).max(0);
     if excess >= scale {
         return u64::MAX;
@@ -109,11 +111,11 @@ fn delsarte(n: u32, distances: Vec<u32>) -> u64 {
     u64::try_from((value(0) - excess) / (scale - excess)).unwrap_or(u64::MAX)
 }
 
-/// Simplex method for max Σ x_j, A x ≤ 1, x ≥ 0; returns the dual solution, one value a row.
+/// Solves max Σ x_j, A x ≤ 1, x ≥ 0 by the simplex method; returns the dual solution, one value per row.
 fn maximise_sum(mut a: Vec<Vec<f64>>) -> Vec<f64> {
-    /// Smaller numbers are rounding noise; entries are at most 1 in size at the start.
+    /// Threshold of rounding noise; entries are initially at most 1 in size.
     const ZERO: f64 = 1e-9;
-    /// Bland's rule from here on, which cannot cycle.
+    /// Number of steps after which Bland's rule, which cannot cycle, is used.
     const CAREFUL_AFTER: usize = 2_000;
     let (rows, columns) = (a.len(), a.first().map_or(0, Vec::len));
     // Slack variables columns.., right-hand side last.
@@ -155,7 +157,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn bounds_are_the_published_ones() {
+    fn bounds_match_the_published_ones() {
         // The last column of the table in `docs/families.md`, “Sizes”, and, for 25 bits, h = 8.
         for (bits, distance, expected) in [
             (16, 5, 141),
@@ -166,7 +168,7 @@ mod tests {
             (36, 11, 22_313),
             (49, 12, 37_871_778),
             (64, 12, 331_681_116_691),
-            // Those of the first-order Reed-Muller code, of which two words do not move.
+            // Bounds of the first-order Reed-Muller code, in which two words are fixed.
             (64, 32, 42),
         ] {
             let dimension = Dimension::from_bits(bits).unwrap();
@@ -180,7 +182,7 @@ mod tests {
 
     #[test]
     fn perfect_codes_meet_the_bounds() {
-        // The binary Golay code of length 23 has 4096 words, the repetition code of length 9 two.
+        // The binary Golay code of length 23 has 4096 words, the repetition code of length 9 has two.
         assert_eq!(delsarte(23, (7..=23).collect()), 4096);
         assert_eq!(delsarte(9, vec![9]), 2);
         assert_eq!(delsarte(15, (3..=15).collect()), 2048);

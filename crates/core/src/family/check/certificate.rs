@@ -9,44 +9,43 @@ use crate::family::{
 };
 use crate::lattice::TagCells;
 
-/// What was found out about a family from nothing but its codes.
+/// Results about a family, derived only from its codes.
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct Certificate {
-    /// Smallest distance between any two words, among the codes compared and their turns.
+    /// Smallest distance between any two words, among the compared codes and their rotations.
     pub min_distance: u32,
-    /// Smallest distance between a code and a word, a code in any turn, seen in a mirror; `None` where not all pairs were
-    /// compared. No family claims one: a mirror shows all tags of a board alike.
+    /// Smallest distance between a code and a mirrored word in any rotation; `None` if not all pairs were compared.
+    /// No family claims one, because a mirror affects all tags of a board in the same way.
     pub mirror_distance: Option<u32>,
-    /// For each kind of hidden cells that the rules name the least distance found in those that are seen, among the
-    /// codes compared.
+    /// For each kind of hidden cells in the rules, the minimum distance in the visible cells among the compared
+    /// codes.
     pub robust: Vec<Robust>,
-    /// Two codes (or one, twice) that are this close, when that is too close; else zeros.
+    /// Two codes (or one, twice) at the minimum distance, if it is too small; else zeros.
     pub closest: [u32; 2],
-    /// Whether all pairs were compared; if not, a sample was, and the structure was proved.
+    /// Whether all pairs were compared; if not, a sample was, and the structure was proven.
     pub all_compared: bool,
-    /// Codes that break a rule of the family.
+    /// Ids of codes that break a rule of the family.
     pub rule_breakers: Vec<u32>,
-    /// Number of pairs, among the codes compared and their turns, at each distance.
+    /// Number of pairs, among the compared codes and their rotations, at each distance.
     pub histogram: BTreeMap<u32, u64>,
-    /// What of the construction was not repeated, in words; empty when all of it was.
+    /// The part of the construction that was not repeated, in words; empty if all of it was.
     pub unchecked: String,
-    /// What in the file does not hold; empty when the family is what it claims to be.
+    /// Wrong claims of the file; empty if the family is correct.
     pub failures: Vec<String>,
 }
 
 impl Certificate {
-    /// Whether every claim of the family that was checked holds.
+    /// Returns whether every checked claim of the family holds.
     pub fn holds(&self) -> bool {
         self.failures.is_empty()
     }
 }
 
-/// Checks a family from its codes as [`certify_codes`] does, and its construction.
+/// Checks the codes of a family like [`certify_codes`], and its construction.
 ///
-/// An algebraic construction is written down again and has to give the same codes. So is a lexicode
-/// of up to 25 bits; of a larger one the first candidates are tried again, and have to give the
-/// first codes. A search is not repeated.
+/// An algebraic construction is repeated and must give the same codes. So is a lexicode of up to 25 bits. For a
+/// larger one, the first candidates are tried again and must give the first codes. A search is not repeated.
 ///
 /// ```
 /// use deltille_core::family::{Family, certify};
@@ -66,7 +65,7 @@ pub fn certify(family: &Family) -> Certificate {
             None => Err(format!("construction.start: `{start}` is not a hexadecimal word")),
             Some(start) => {
                 let bits = family.dimension().bits();
-                // Later candidates come round to the first again.
+                // Candidates wrap around to the first one.
                 let all = (*candidates).min(family.dimension().mask().saturating_add(1));
                 let candidates = if bits <= REBUILT_BITS { all } else { all.min(PREFIX) };
                 if candidates < all {
@@ -88,7 +87,7 @@ pub fn certify(family: &Family) -> Certificate {
             certificate.unchecked = "that the search finds these codes again".to_owned();
             return certificate;
         }
-        // Single tags are far from nothing; patches are: `places::distances`.
+        // Single tags have almost no distance; patches do: `places::distances`.
         Construction::Places => return certificate,
         Construction::Imported { .. } => {
             certificate.unchecked = "where the codes come from".to_owned();
@@ -104,7 +103,7 @@ pub fn certify(family: &Family) -> Certificate {
             } else {
                 family.codes().get(..again.len()).unwrap_or_default()
             };
-            // What a family had before it grew comes first, in whatever order.
+            // Codes from before the family grew come first, in any order.
             let same = match family.beginnings() {
                 [] => again == codes,
                 _ => sorted(&again) == sorted(codes),
@@ -112,7 +111,7 @@ pub fn certify(family: &Family) -> Certificate {
             if !same {
                 certificate
                     .failures
-                    .push("construction: gives other codes than the file".to_owned());
+                    .push("construction: it gives other codes than the file".to_owned());
             }
         }
     }
@@ -125,18 +124,18 @@ fn sorted(codes: &[u64]) -> Vec<u64> {
     codes
 }
 
-/// Lexicodes of up to this many bits are built again whole: seconds.
+/// Largest number of bits at which lexicodes are rebuilt completely: seconds.
 const REBUILT_BITS: u32 = 25;
 
-/// First candidates of a larger lexicode that are tried again.
+/// Number of first candidates of a larger lexicode that are tried again.
 const PREFIX: u64 = 1 << 22;
 
-/// Checks the codes of a family: distance, rules and histogram; a second for 100,000 codes.
+/// Checks the codes of a family: distance, rules and histogram; takes a second for 100,000 codes.
 ///
-/// Turns are taken from [`TagCells::rotate`] and complexity from its list of neighbours, not from
-/// the tables that the searches use. Up to 100,000 codes all pairs are compared. Beyond, the
-/// distance is proved from the structure that the file records
-/// ([`crate::family::algebra::AlgebraicConstruction::prove`]), and a sample of pairs is compared as well.
+/// Rotations come from [`TagCells::rotate`] and complexity from its list of neighbours, not from the tables that the
+/// searches use. Up to 100,000 codes, all pairs are compared. Beyond, the distance is proven from the structure that
+/// the file records ([`crate::family::algebra::AlgebraicConstruction::prove`]), and a sample of pairs is compared
+/// too.
 pub fn certify_codes(family: &Family) -> Certificate {
     let cells = family.cells();
     let codes = family.codes();
@@ -157,7 +156,9 @@ pub fn certify_codes(family: &Family) -> Certificate {
     } else {
         let proof = match family.construction() {
             Construction::Algebraic(construction) => construction.prove(&screen, codes),
-            _ => Err("too many codes to compare, and no structure to prove it by".to_owned()),
+            _ => {
+                Err("there are too many codes to compare, and no structure for a proof".to_owned())
+            }
         };
         failures.extend(proof.err().map(|reason| format!("distance: {reason}")));
         let step = codes.len().div_ceil(SAMPLE);
@@ -172,7 +173,7 @@ pub fn certify_codes(family: &Family) -> Certificate {
             codes.iter().position(|&c| c == code).unwrap_or(0) as u32
         });
         failures.push(format!(
-            "distance: codes {} and {} come as close as {min_distance}, the family claims {}",
+            "distance: codes {} and {} differ in {min_distance} cells, but the family claims {}",
             closest[0],
             closest[1],
             family.distance()
@@ -180,8 +181,8 @@ pub fn certify_codes(family: &Family) -> Certificate {
     }
     if let Some(first) = rule_breakers.first() {
         failures.push(match rule_breakers.len() {
-            1 => format!("rules: code {first} breaks them"),
-            many => format!("rules: {many} codes break them, the first is code {first}"),
+            1 => format!("rules: code {first} breaks a rule"),
+            many => format!("rules: {many} codes break a rule; the first is code {first}"),
         });
     }
     let seen =
@@ -191,13 +192,13 @@ pub fn certify_codes(family: &Family) -> Certificate {
         if found.distance < asked.distance {
             let (to, left, asked) = (asked.to.name(), found.distance, asked.distance);
             failures.push(format!(
-                "robust: with the cells of {to} hidden {left} are left that differ, the family claims {asked}"
+                "robust: with the cells of {to} hidden, codes differ in only {left} cells, but the family claims {asked}"
             ));
         }
     }
     let all_compared = compared.len() == codes.len();
     if all_compared && histogram != *family.histogram() {
-        failures.push("distance_histogram: differs from that of the codes".to_owned());
+        failures.push("distance_histogram: it differs from that of the codes".to_owned());
     }
     let unchecked = String::new();
     let mirror_distance = all_compared
@@ -216,7 +217,7 @@ pub fn certify_codes(family: &Family) -> Certificate {
     }
 }
 
-/// Codes of a very large family that are compared pair by pair.
+/// Number of codes of a very large family that are compared pair by pair.
 const SAMPLE: usize = 20_000;
 
 fn admits(cells: &TagCells, screen: &Screen, family: &Family, code: u64) -> bool {

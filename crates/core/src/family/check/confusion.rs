@@ -3,28 +3,29 @@ use std::collections::BTreeMap;
 use super::statistics::cross_distances;
 use crate::family::{Family, PAIRS_COUNTED};
 
-/// How far the tags of a family are from those of another, or of itself in a mirror.
+/// Distances of the tags of a family from those of another, or of itself in a mirror.
 ///
 /// ```
 /// use deltille_core::family::{Confusion, Family};
 ///
 /// let [a, b] = ["d16h5", "delTag16h5"].map(|name| Family::shipped(name).unwrap());
 /// let confusion = Confusion::between(&a, &b).unwrap();
-/// // Each of the 34 tags of the one is compared with all words of the other.
+/// Each of the 34 tags of one family is compared with all words of the other.
 /// assert_eq!(confusion.direct.values().sum::<u64>(), 34 * 3 * 78);
 /// ```
 #[derive(Clone, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub struct Confusion {
-    /// Number of pairs of a word, a code of the one in any turn, and a code of the other, at each distance.
+    /// Number of pairs of a word (a code of the first family in any rotation) and a code of the other, at each
+    /// distance.
     pub direct: BTreeMap<u32, u64>,
-    /// The same where the other's tags are seen in a mirror.
+    /// The same for mirrored tags of the other family.
     pub mirrored: BTreeMap<u32, u64>,
 }
 
 impl Confusion {
-    /// Compares all tags of two families; `None` where their tags have other cells, one of them is too large to be compared
-    /// pair by pair, or its tags tell a place together only.
+    /// Compares all tags of two families. Returns `None` if their tags have different cells, one family is too large
+    /// to be compared pair by pair, or its tags identify a position only together.
     pub fn between(of: &Family, other: &Family) -> Option<Self> {
         let alike = (of.kind(), of.dimension()) == (other.kind(), other.dimension());
         let fits = |family: &Family| family.len() <= PAIRS_COUNTED && !family.is_of_places();
@@ -46,9 +47,9 @@ mod tests {
     use super::*;
     use crate::family::{Decoder, certify};
 
-    /// What is told of a mirror is what a decoder takes mirrored tags for.
+    /// Mirror distances match the decoder's results for mirrored tags.
     #[test]
-    fn tags_in_a_mirror_are_decoded_as_often_as_told() {
+    fn mirrored_tags_decode_as_often_as_predicted() {
         for name in ["d16h5", "delTag25h9", "aprilTag16h5"] {
             let family = Family::shipped(name).unwrap();
             let confusion = Confusion::between(&family, &family).unwrap();

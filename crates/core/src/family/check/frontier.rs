@@ -1,26 +1,27 @@
-//! How complex codes must be, as a choice: fewer differing pairs asked for give more codes, and more of what natural
-//! pictures show is taken for one of them.
+//! Trade-off of the complexity of codes: requiring fewer differing pairs gives more codes, but more natural image
+//! content is mistaken for one.
 
 use super::natural::cumulated;
 use crate::family::{NaturalWords, TagWords};
 use crate::lattice::Dimension;
 
-/// What asking for so many differing pairs leaves of some codes.
+/// Result of requiring a number of differing pairs from some codes.
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct RuleChoice {
-    /// Pairs of neighbouring cells that differ in every code, at least.
+    /// Minimum number of pairs of neighbouring cells that differ in every code.
     pub min_pairs: u32,
-    /// The share of all pairs that this is, as [`crate::family::Rules::min_complexity`] has it.
+    /// The same as a fraction of all pairs, see [`crate::family::Rules::min_complexity`].
     pub min_complexity: f64,
-    /// Codes that satisfy the rule.
+    /// Number of codes that satisfy the rule.
     pub codes: usize,
-    /// Natural false positives for 0, 1, … ⌊(h−1)/2⌋ corrected cells, as
+    /// Natural false positive rates for 0, 1, … ⌊(h−1)/2⌋ corrected cells, as
     /// [`crate::family::Family::natural_false_positive_rates`].
     pub natural: Vec<f64>,
 }
 
-/// What each threshold leaves of `codes` of distance `distance`, the lowest first, each with fewer codes than the last.
+/// Returns the result of each threshold for `codes` of distance `distance`, the lowest first, each with fewer codes
+/// than the previous one.
 pub fn rule_choices(dimension: Dimension, distance: u32, codes: &[u64]) -> Vec<RuleChoice> {
     let words = TagWords::new(dimension);
     let most = distance.saturating_sub(1) / 2;
@@ -37,8 +38,8 @@ pub fn rule_choices(dimension: Dimension, distance: u32, codes: &[u64]) -> Vec<R
     by_pairs.keys().map(choice).collect()
 }
 
-/// Of some choices that with the most codes whose natural false positives with `corrected` cells corrected are at most
-/// `accepted`.
+/// Returns the choice with the most codes whose natural false positive rate with `corrected` corrected cells is at
+/// most `accepted`.
 pub fn best_rule(choices: &[RuleChoice], corrected: u32, accepted: f64) -> Option<&RuleChoice> {
     let fits = |choice: &&RuleChoice| {
         choice.natural.get(corrected as usize).is_some_and(|&rate| rate <= accepted)
@@ -51,7 +52,7 @@ mod tests {
     use super::*;
     use crate::family::Family;
 
-    /// The choice that is a family's own rule has its codes and its rates, and stricter rules have less of both.
+    /// The choice for a family's own rule has its codes and rates; stricter rules have fewer codes and lower rates.
     #[test]
     fn a_familys_own_rule_is_one_of_the_choices() {
         let family = Family::shipped("d36h11").unwrap();

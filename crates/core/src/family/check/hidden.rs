@@ -1,4 +1,4 @@
-//! Cells of a tag that something covers, and how far codes are apart in those that are left.
+//! Hidden cells of a tag, and the distance of codes in the visible ones.
 
 use std::sync::atomic::{AtomicU32, Ordering};
 
@@ -9,7 +9,7 @@ use crate::family::Family;
 use crate::family::kernels::nearer;
 use crate::lattice::{Cell, Dimension, GridKind, TagCells};
 
-/// Which cells are hidden. Each is meant wherever it lies on the tag.
+/// The hidden cells, at any position on the tag.
 ///
 /// ```text
 ///            ╱╲                ╱╲                ╱╲
@@ -25,11 +25,11 @@ use crate::lattice::{Cell, Dimension, GridKind, TagCells};
 #[serde(rename_all = "lowercase")]
 #[non_exhaustive]
 pub enum HiddenCells {
-    /// The four cells of a corner.
+    /// The four cells at a corner.
     Apex,
     /// The 2d − 1 cells along an edge.
     Edge,
-    /// The four cells of a triangle of two cells an edge, upright or inverted.
+    /// The four cells of a triangle with two cells per edge, upright or inverted.
     Tile,
 }
 
@@ -37,7 +37,7 @@ impl HiddenCells {
     /// All kinds.
     pub const ALL: [Self; 3] = [Self::Apex, Self::Edge, Self::Tile];
 
-    /// Its name in options and files.
+    /// Returns the name in options and files.
     pub fn name(self) -> &'static str {
         match self {
             Self::Apex => "apex",
@@ -46,7 +46,7 @@ impl HiddenCells {
         }
     }
 
-    /// How many cells are hidden at a time.
+    /// Returns the number of cells hidden at a time.
     pub fn count(self, dimension: Dimension) -> u32 {
         match self {
             Self::Apex | Self::Tile => 4,
@@ -54,7 +54,7 @@ impl HiddenCells {
         }
     }
 
-    /// The bits of the hidden cells, for each place where they may lie; turns of the tag change places.
+    /// Returns the bits of the hidden cells for each possible position; a rotation of the tag permutes the positions.
     pub fn masks(self, dimension: Dimension) -> Vec<u64> {
         let (cells, d) = (TagCells::new(dimension), dimension.rows());
         let of = |chosen: &dyn Fn(&Cell) -> bool| {
@@ -67,7 +67,7 @@ impl HiddenCells {
             Self::Edge => turned(of(&|cell| cell.row == 0)),
             Self::Tile => {
                 let places = (0..d).flat_map(|row| (0..d).map(move |col| (row, col)));
-                // An inverted cell and its three upright neighbours, or an upright one and its inverted ones.
+                // An inverted cell and its three upright neighbours, or vice versa.
                 let around = |(row, col): (u32, u32)| {
                     let at = |cell: &Cell, row: u32, col: u32| (cell.row, cell.col) == (row, col);
                     let upright = of(&|cell| match cell.upright {
@@ -92,18 +92,18 @@ impl HiddenCells {
     }
 }
 
-/// A guarantee: with such cells hidden, codes in any turn still differ in so many of the cells that are seen.
+/// A guarantee: with these cells hidden, codes in any rotation still differ in at least `distance` visible cells.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Robust {
     /// The cells that are hidden.
     pub to: HiddenCells,
-    /// Least distance in the others.
+    /// Minimum distance in the visible cells.
     pub distance: u32,
 }
 
 impl Robust {
-    /// The distance that is left where nothing else is said: one misread cell is corrected.
+    /// Default remaining distance: one misread cell is corrected.
     pub const DISTANCE: u32 = 3;
 }
 
@@ -122,15 +122,15 @@ impl std::str::FromStr for Robust {
             None => (text, Some(Self::DISTANCE)),
         };
         let to = HiddenCells::ALL.into_iter().find(|cells| cells.name() == name);
-        to.zip(distance)
-            .map(|(to, distance)| Self { to, distance })
-            .ok_or_else(|| "write apex, edge or tile, or with a distance such as edge=5".to_owned())
+        to.zip(distance).map(|(to, distance)| Self { to, distance }).ok_or_else(|| {
+            "expected apex, edge or tile, optionally with a distance (example: edge=5)".to_owned()
+        })
     }
 }
 
 impl Family {
-    /// The least distance of two codes, in any turn, that is left where such cells are hidden, wherever they lie; all
-    /// pairs are compared. `None` of square tags and of place codes.
+    /// Returns the minimum distance of two codes, in any rotation, with these cells hidden at any position. Compares
+    /// all pairs. Returns `None` for square tags and place codes.
     ///
     /// ```
     /// use deltille_core::family::{Family, HiddenCells};
@@ -146,14 +146,14 @@ impl Family {
     }
 }
 
-/// The least distance of two words, codes in any turn, in the cells that are not hidden.
+/// Returns the minimum distance of two words, codes in any rotation, in the visible cells.
 pub(in crate::family) fn least_seen(cells: &TagCells, codes: &[u64], hidden: HiddenCells) -> u32 {
     let (masks, count) = (hidden.masks(cells.dimension()), hidden.count(cells.dimension()));
     let turns = |&code: &u64| [code, cells.rotate(code), cells.rotate(cells.rotate(code))];
     let turned: Vec<u64> = codes.iter().flat_map(turns).collect();
     let least = AtomicU32::new(cells.dimension().bits() - count);
     codes.par_iter().enumerate().for_each(|(i, &code)| {
-        // Of its own turns one suffices, as hidden cells may lie anywhere.
+        // One of its own rotations suffices, as hidden cells may be anywhere.
         let others = &turned[..3 * i];
         let reach = least.load(Ordering::Relaxed) + count;
         let near = nearer(code, others, reach).into_iter().map(|at| others[at as usize]);
@@ -170,7 +170,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn hidden_cells_are_everywhere_and_turn_into_each_other() {
+    fn hidden_cells_cover_all_positions_and_rotations() {
         for dimension in Dimension::all() {
             let (cells, d) = (TagCells::new(dimension), dimension.rows());
             let tiles = d * (d - 1) / 2 + (d - 3) * (d - 2) / 2;
@@ -188,7 +188,7 @@ mod tests {
     }
 
     #[test]
-    fn distances_left_are_those_of_all_pairs() {
+    fn remaining_distances_match_all_pairs() {
         let family = Family::shipped("delTag16h5").unwrap();
         let cells = family.cells();
         let words: Vec<u64> = family

@@ -1,15 +1,16 @@
-//! Bounds for codes that the turn of a tag leaves as they are, by semidefinite programming.
+//! Bounds for codes that are invariant under the rotation of a tag, by semidefinite programming.
 //!
-//! Tags are the vertices of a graph whose edges are conflicts, and Schrijver's θ′ of that graph bounds the number of tags
-//! without conflict. `docs/families/invariant_bound.py` computes it for 9 and 16 bits, and checks the dual solution with
-//! integers and fractions; the table has what came out less than every other bound (`docs/families.md`, “Sizes”).
+//! Tags are the vertices of a graph whose edges are conflicts. Schrijver's θ′ of that graph bounds the number of tags
+//! without conflict. `docs/families/invariant_bound.py` computes it for 9 and 16 bits, and checks the dual solution
+//! with integers and fractions. The table contains the results that are below every other bound (`docs/families.md`,
+//! “Sizes”).
 
 use crate::lattice::Dimension;
 
-/// Bits, distance, tags at most.
+/// Bits, distance, maximum number of tags.
 const TABLE: [(u32, u32, u64); 4] = [(9, 2, 84), (16, 2, 10_912), (16, 4, 672), (16, 6, 82)];
 
-/// The bound for triangular tags, where it is known and less than those for all codes.
+/// Returns the bound for triangular tags, if it is known and below those for all codes.
 pub fn invariant_bound(dimension: Dimension, distance: u32) -> Option<u64> {
     let known = TABLE.iter().find(|&&(bits, h, _)| (bits, h) == (dimension.bits(), distance));
     known.map(|&(.., tags)| tags)
@@ -33,7 +34,7 @@ mod tests {
         }
     }
 
-    /// All words of even weight but those that the turn fixes are as many tags as the bound for distance 2 admits.
+    /// All words of even weight, except those that the rotation fixes, reach the bound for distance 2.
     #[test]
     fn even_words_meet_the_bounds() {
         for bits in [9, 16] {

@@ -1,9 +1,9 @@
-//! What is known of a family.
+//! Checks of a family.
 //!
-//! In comes a family, out go proofs and figures. `certificate` proves what its file claims, with `hidden` (distances where
-//! cells are covered); `statistics` counts distances, `confusion` and `reading` say what becomes of tags that are seen badly,
-//! `natural` how often pictures of the world look like one; `frontier` weighs rules against sizes. [`bounds`] and
-//! `invariant_bounds` say how many codes there can be at most.
+//! The input is a family; the results are proofs and figures. `certificate` proves the claims of its file, with
+//! `hidden` (distances with covered cells). `statistics` counts distances, `confusion` and `reading` predict
+//! misreadings, `natural` false positives in natural images; `frontier` compares rules with sizes. [`bounds`] and
+//! `invariant_bounds` limit the number of codes.
 
 pub mod bounds;
 pub(in crate::family) mod certificate;

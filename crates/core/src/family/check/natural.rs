@@ -1,17 +1,18 @@
-//! False positives in pictures of the world, which fair coins overstate.
+//! False positives in natural images, which are rarer than for fair coin tosses.
 //!
-//! Neighbouring cells of what is no tag are mostly alike. Of a triangle with a border that is cut from a natural
-//! picture the word w is seen with a probability that depends on its number of differing pairs c(w) alone,
+//! Neighbouring cells of content that is not a tag are mostly equal. The probability of the word w in a bordered
+//! triangle cut from a natural image depends only on its number of differing pairs c(w),
 //!
 //! ```text
 //!     P(w) = P(c = c(w)) / |{v : c(v) = c(w)}|
 //! ```
 //!
-//! with the distribution of c that `families/natural/sample.py` found in 32 photographs. How often natural words are
-//! within t cells of a code is predicted by that to a tenth, and for other photographs within a factor of 3
+//! with the distribution of c that `families/natural/sample.py` measured in 32 photographs. It predicts the rate of
+//! natural words within t cells of a code to 10 %, and for other photographs within a factor of 3
 //! ([`NATURAL_FACTOR`]; `docs/families.md`, “False positives”).
 //!
-//! Limits: triangular tags. Textures show more than the mean, grass 2.4 times as much; other tags are no natural pictures.
+//! Limits: triangular tags only. Textures have higher rates than the mean, grass 2.4 times as high; other tags are
+//! not natural images.
 
 use std::collections::BTreeMap;
 
@@ -22,22 +23,23 @@ use crate::family::rules::parts;
 use crate::family::{Family, TagWords, ball};
 use crate::lattice::{Dimension, GridKind};
 
-/// Natural false positives of a triangle with a border that are accepted by [`Family::recommended_correction`]: one in
-/// 10,000, so that by [`TRIANGLES_PER_MEGAPIXEL`] a false tag is met less than once in 40,000 megapixels.
+/// Natural false positive rate per bordered triangle that [`Family::recommended_correction`] accepts: one in 10,000.
+/// With [`TRIANGLES_PER_MEGAPIXEL`], a false tag then occurs less than once in 40,000 megapixels.
 pub const ACCEPTED_FALSE_POSITIVES: f64 = 1e-4;
 
-/// Triangles of natural pictures that the detector reads as tags, in a megapixel, at most: it found no grid in 12.8 megapixels of
-/// photographs, which has a probability of 4 % where there are so many.
+/// Upper limit of triangles in natural images that the detector reads as tags, per megapixel. It found no grid in
+/// 12.8 megapixels of photographs, which has a probability of 4 % at this rate.
 pub const TRIANGLES_PER_MEGAPIXEL: f64 = 0.25;
 
-/// Natural false positives of other pictures are as stated within this factor. Largest deviations met in pictures that
-/// took no part: 2.6 times fewer than stated (d36h11, five cells corrected), 3 times more (d49h12), others 1.8.
+/// Accuracy of the natural false positive rates as a factor for other images. Largest deviations in images that were
+/// not used for the model: 2.6 times fewer than predicted (d36h11, five corrected cells), 3 times more (d49h12),
+/// others 1.8.
 pub const NATURAL_FACTOR: f64 = 3.0;
 
-/// A line for each number of cells: that number, and ln P of a word by the number of its pairs that differ.
+/// One line per number of cells: that number, and ln P of a word by the number of its differing pairs.
 const TABLE: &str = include_str!("../../../families/natural/words.txt");
 
-/// How likely words are in natural pictures.
+/// Probabilities of words in natural images.
 ///
 /// ```
 /// use deltille_core::family::NaturalWords;
@@ -52,14 +54,14 @@ const TABLE: &str = include_str!("../../../families/natural/words.txt");
 #[derive(Clone, Debug)]
 pub struct NaturalWords {
     words: TagWords,
-    /// P by differing pairs.
+    /// Probability P by number of differing pairs.
     chances: Vec<f64>,
-    /// Cells that may show anything.
+    /// Cells with arbitrary content.
     free: u64,
 }
 
 impl NaturalWords {
-    /// The words of triangular tags of a dimension.
+    /// Creates the model for triangular tags of a dimension.
     pub fn new(dimension: Dimension) -> Self {
         let bits = dimension.bits().to_string();
         let of_bits = |line: &&str| line.split(' ').next() == Some(&bits);
@@ -69,40 +71,42 @@ impl NaturalWords {
         Self { words: TagWords::new(dimension), chances, free: 0 }
     }
 
-    /// The same with cells that may show anything; words have these black.
+    /// Declares cells with arbitrary content; words have them black.
     #[must_use]
     pub fn with_free(self, free: u64) -> Self {
         Self { free, ..self }
     }
 
-    /// Probability that a triangle with a border shows a word.
+    /// Returns the probability that a bordered triangle contains a word.
     pub fn chance(&self, word: u64) -> f64 {
         let shown = parts(self.free).map(|part| self.words.differing_pairs(word | part));
         shown.map(|pairs| self.chances[pairs as usize]).sum()
     }
 
-    /// Probability that it shows a word within `errors` cells of a code in one of its turns; every such word is looked at.
+    /// Returns the probability that it contains a word within `errors` cells of a code in one of its rotations;
+    /// enumerates all such words.
     pub fn chance_near(&self, code: u64, errors: u32) -> f64 {
         (0..=errors).map(|radius| self.sphere(code, radius)).sum()
     }
 
-    /// The same of the words that differ in `radius` cells.
+    /// Returns the same for the words that differ in `radius` cells.
     fn sphere(&self, code: u64, radius: u32) -> f64 {
         let bits = self.words.dimension().bits();
         let used = subsets(bits, radius).filter(|flips| flips & self.free == 0);
         used.map(|flips| self.chance(code ^ flips)).sum()
     }
 
-    /// ln Σ P(w) exp Σ l s(w), over all words w, with the half log-odds l that cells are white and s = ±1 for white and
-    /// black cells: how likely what was measured is in natural pictures, up to the factor that
-    /// Σ l s has for a code. `half_odds` are by bit.
+    /// Returns ln Σ P(w) exp Σ l s(w) over all words w, with the half log-odds l that cells are white and s = ±1 for
+    /// white and black cells. This is the log-likelihood of the measurement in natural images, up to the same factor
+    /// that Σ l s has for a code. `half_odds` are by bit.
     ///
-    /// Cell by cell from the base to the apex, the sums are kept by the number of differing pairs so far, and by the colours of
-    /// those cells that have a neighbour to come: inverted ones below, and the one to the left.
+    /// The sums proceed cell by cell from the base to the apex. They are kept by the number of differing pairs so
+    /// far, and by the colours of cells with a later neighbour: inverted ones below, and the one to the left.
     pub fn log_likelihood(&self, half_odds: &[f32]) -> f64 {
         let rows = self.words.dimension().rows();
         let (counts, states) = (self.chances.len(), 1usize << rows);
-        // The colour of the cell to the left has the last bit of a state, that of the inverted cell of column c bit c.
+        // The last bit of a state is the colour of the cell to the left; bit c is that of the inverted cell of column
+        // c.
         let left_of = |state: usize| state >> (rows - 1) & 1;
         let mut sums = vec![0.0; states * counts];
         sums[0] = 1.0;
@@ -130,10 +134,10 @@ impl NaturalWords {
         sums.chunks(counts).map(of_state).sum::<f64>().ln()
     }
 
-    /// Probabilities that it shows a word at distance 0, 1, … `most` of one of the codes that have so many differing
-    /// pairs, by that number: all turns count, and balls around codes do not overlap.
+    /// Returns the probabilities of a word at distance 0, 1, … `most` from one of the codes, by the codes' number of
+    /// differing pairs. All rotations count, and balls around codes do not overlap.
     pub(in crate::family) fn by_pairs(&self, codes: &[u64], most: u32) -> BTreeMap<u32, Vec<f64>> {
-        /// Words that are looked at of each radius; of more a part is drawn.
+        /// Number of words evaluated for each radius; if there are more, a sample is drawn.
         const LOOKED_AT: f64 = 100_000.0;
         let bits = self.words.dimension().bits();
         let used = bits - self.free.count_ones();
@@ -163,10 +167,10 @@ impl NaturalWords {
 }
 
 impl Family {
-    /// Probability that a triangle with a border in a natural picture is taken for a tag, for 0, 1, …,
-    /// [`Self::correctable`] corrected bits; `None` of square tags and of place codes. Beside
-    /// [`Self::false_positive_rates`], which are those of fair coins. Beyond some 100,000 words the words near the codes
-    /// are drawn, always the same ones, and the figures are right to a tenth.
+    /// Returns the probability that a bordered triangle in a natural image is mistaken for a tag, for 0, 1, …,
+    /// [`Self::correctable`] corrected bits. Returns `None` for square tags and place codes. In contrast,
+    /// [`Self::false_positive_rates`] assumes fair coin tosses. Above some 100,000 words, the words near the codes
+    /// are sampled, always in the same way; the rates are then accurate to 10 %.
     pub fn natural_false_positive_rates(&self) -> Option<Vec<f64>> {
         if self.kind() != GridKind::Deltille || self.is_of_places() {
             return None;
@@ -176,22 +180,22 @@ impl Family {
         Some(cumulated(by_pairs.values(), self.correctable()))
     }
 
-    /// The largest number of corrected cells with which natural false positives stay below `accepted` for each triangle with
-    /// a border, for whoever believes single tags; usually of [`ACCEPTED_FALSE_POSITIVES`]. `None` where they do not even
-    /// with nothing corrected, and where natural rates are not known.
+    /// Returns the largest number of corrected cells at which the natural false positive rate per bordered triangle
+    /// is at most `accepted`, for programs that trust single tags. The usual limit is [`ACCEPTED_FALSE_POSITIVES`].
+    /// Returns `None` if the rate is larger without correction, or unknown.
     pub fn recommended_correction(&self, accepted: f64) -> Option<u32> {
         corrected_within(&self.natural_false_positive_rates()?, accepted)
     }
 }
 
-/// The largest number of corrected cells whose rate is at most `accepted`, of rates for 0, 1, … of them; `None` where there is
-/// none.
+/// Returns the largest number of corrected cells whose rate is at most `accepted`, from rates for 0, 1, … of them;
+/// `None` if there is none.
 pub fn corrected_within(rates: &[f64], accepted: f64) -> Option<u32> {
     let fitting = rates.iter().take_while(|rate| **rate <= accepted).count();
     fitting.checked_sub(1).map(|most| most as u32)
 }
 
-/// Sums of some rows, then over distances up to each.
+/// Sums rows, then accumulates over distances.
 pub(in crate::family) fn cumulated<'a>(
     rows: impl Iterator<Item = &'a Vec<f64>>,
     most: u32,
@@ -208,12 +212,12 @@ pub(in crate::family) fn cumulated<'a>(
     sums
 }
 
-/// All words of `bits` bits of which `ones` are set, each next one greater (Gosper).
+/// Returns all words of `bits` bits with `ones` set, in increasing order (Gosper).
 fn subsets(bits: u32, ones: u32) -> impl Iterator<Item = u64> {
     let all = u64::MAX >> (u64::BITS - bits);
     let first = (1u64 << ones) - 1;
     let next = move |&word: &u64| {
-        // Of no ones there is one word.
+        // With no ones, there is one word.
         let zeros = (ones > 0).then(|| word.trailing_zeros())?;
         let carried = word.checked_add(word & word.wrapping_neg())?;
         let next = carried | ((word ^ carried) >> 2 >> zeros);
@@ -222,7 +226,7 @@ fn subsets(bits: u32, ones: u32) -> impl Iterator<Item = u64> {
     std::iter::successors((first <= all).then_some(first), next)
 }
 
-/// One of them at random, of cells that are not free.
+/// Draws one of them at random, from cells that are not free.
 fn drawn_subset(bits: u32, free: u64, ones: u32, random: &mut ChaCha8Rng) -> u64 {
     let mut word = 0u64;
     while word.count_ones() < ones {
@@ -236,9 +240,9 @@ mod tests {
     use super::*;
     use crate::family::{Decoder, shipped_names};
 
-    /// Rates are those of all words, decoded one by one.
+    /// Compares the rates with those of all words, decoded one by one.
     #[test]
-    fn rates_are_those_of_all_words() {
+    fn rates_match_enumeration() {
         for name in ["d16h5", "delTag16h5"] {
             let family = Family::shipped(name).unwrap();
             let (decoder, natural) = (Decoder::new(&family), NaturalWords::new(family.dimension()));
@@ -252,9 +256,9 @@ mod tests {
         }
     }
 
-    /// The sum over all words, one by one.
+    /// Compares with the sum over all words, one by one.
     #[test]
-    fn the_likelihood_is_that_of_all_words() {
+    fn the_likelihood_matches_enumeration() {
         let mut random = ChaCha8Rng::seed_from_u64(3);
         for bits in [9, 16] {
             let natural = NaturalWords::new(Dimension::from_bits(bits).unwrap());
@@ -278,7 +282,7 @@ mod tests {
     }
 
     #[test]
-    fn drawn_words_tell_what_all_words_tell() {
+    fn sampled_rates_match_enumeration() {
         let family = Family::shipped("d25h9").unwrap();
         let natural = NaturalWords::new(family.dimension());
         let rates = family.natural_false_positive_rates().unwrap();
@@ -287,10 +291,10 @@ mod tests {
         assert!((rates[4] / exact - 1.0).abs() < 0.02, "{} and {exact}", rates[4]);
     }
 
-    /// The last but one column of a table in `docs/families.md`, “False positives”; and natural pictures are always safer
-    /// than fair coins.
+    /// Tests the last but one column of a table in `docs/families.md`, “False positives”, and that natural images are
+    /// always safer than fair coins.
     #[test]
-    fn limits_of_what_ships_are_those_told() {
+    fn recommended_limits_match_the_documentation() {
         let told = [
             ("d16h5", None),
             ("d25h7", Some(0)),

@@ -1,4 +1,4 @@
-//! What becomes of tags that are seen badly: the shares that are read, and misread.
+//! Decoding statistics of degraded tags: the fractions read correctly and misread.
 //!
 //! ```text
 //!     W(n, k) = C(n,k) p^k (1−p)^(n−k)                  k of n cells are wrong, each with probability p
@@ -6,25 +6,25 @@
 //!     misread = Σ A_d Σ W(d, a) W(b−d, c)               over d, and over a, c with (d−a) + c ≤ t
 //! ```
 //!
-//! A_d is how many words lie at distance d of a word, on the average over the family and its turns. Of the d cells in which such
-//! a word differs a are wrong, of the others c, which leaves d − a + c to it. Balls of radius t do not overlap, so both are
-//! exact; what remains is refused.
+//! A_d is the mean number of words at distance d from a word, over the family and its rotations. Of the d cells in
+//! which the two words differ, a are wrong; of the others, c are. The distance to the other word is then d − a + c.
+//! Balls of radius t do not overlap, so both values are exact; the remaining readings are rejected.
 
 use crate::family::Family;
 
-/// What becomes of tags whose cells are wrong each by itself.
+/// Decoding statistics of tags with independent cell errors.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct Reading {
-    /// The share that is read as what it is.
+    /// Fraction that is read correctly.
     pub read: f64,
-    /// The share that is taken for another tag, or for itself in another turn.
+    /// Fraction that is mistaken for another tag, or for another rotation of itself.
     pub misread: f64,
 }
 
 impl Family {
-    /// What becomes of tags whose cells are wrong with a probability, where [`Self::correctable`] cells are corrected. `None`
-    /// of families whose pairs are not counted, see [`Self::histogram`].
+    /// Returns the decoding statistics for a cell error probability, with [`Self::correctable`] corrected cells.
+    /// Returns `None` for families whose pairs are not counted, see [`Self::histogram`].
     pub fn reading(&self, rate: f64) -> Option<Reading> {
         let (bits, most) = (self.used_cells(), self.correctable());
         let wrong = |cells: u32, count: u32| {
@@ -43,7 +43,7 @@ impl Family {
         };
         let words = f64::from(self.kind.turns()) * self.len() as f64;
         let of_pairs = self.histogram.iter().map(|(&distance, &pairs)| {
-            // Each of the two may be taken for the other.
+            // Either of the two may be mistaken for the other.
             2.0 * pairs as f64 / words * misread(distance)
         });
         (!self.histogram.is_empty()).then(|| Reading {
@@ -58,7 +58,7 @@ mod tests {
     use crate::family::{Decoder, Family};
 
     #[test]
-    fn shares_are_those_of_all_words_that_may_be_seen() {
+    fn fractions_match_enumeration() {
         for name in ["delTag16h5", "aprilTag16h5"] {
             let family = Family::shipped(name).unwrap();
             let decoder = Decoder::new(&family);

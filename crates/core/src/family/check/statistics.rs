@@ -6,10 +6,11 @@ use crate::family::TagWords;
 use crate::family::kernels::count_distances;
 use crate::lattice::{Dimension, GridKind};
 
-/// Number of unordered pairs of different words, among the codes and their turns, at each distance.
+/// Returns the number of unordered pairs of different words, among the codes and their rotations, at each distance.
 ///
-/// Turning both words of a pair changes nothing, so with n turns pairs come in n, and the count is
-/// n·(pairs of two codes in any turn) + n·(a code and its own turn); but of half turns of a code there are n/2.
+/// Rotating both words of a pair preserves the distance, so with n rotations pairs come in groups of n. The count is
+/// n·(pairs of two codes in any rotation) + n·(a code and its own rotation), but a code has only n/2 pairs with its
+/// 180° rotation.
 pub fn distance_histogram(
     kind: GridKind,
     dimension: Dimension,
@@ -36,7 +37,8 @@ pub fn distance_histogram(
     (0..).zip(counts).filter(|&(_, n)| n > 0).collect()
 }
 
-/// Number of pairs of a code of `codes` and a word, a code of `others` in any turn, at each distance.
+/// Returns the number of pairs of a code of `codes` and a word (a code of `others` in any rotation), at each
+/// distance.
 pub(in crate::family) fn cross_distances(
     kind: GridKind,
     dimension: Dimension,
@@ -65,9 +67,9 @@ fn sum_of(mut sum: [u64; 65], counts: [u64; 65]) -> [u64; 65] {
     sum
 }
 
-/// Probability that a random word of b `cells` is within t cells of a code or one of its turns, for
-/// t = 0 … ⌊(h−1)/2⌋: 3·N·Σ_{i≤t} C(b,i) / 2^b, of square tags 4·N·…, exact because these balls
-/// do not overlap.
+/// Returns the probability that a random word of b `cells` is within t cells of a code or one of its rotations, for t
+/// = 0 … ⌊(h−1)/2⌋: 3·N·Σ_{i≤t} C(b,i) / 2^b, or 4·N·… for square tags. This is exact because these balls do not
+/// overlap.
 pub fn false_positive_rates(kind: GridKind, cells: u32, distance: u32, codes: usize) -> Vec<f64> {
     let b = cells;
     let correctable = distance.saturating_sub(1) / 2;
@@ -75,7 +77,7 @@ pub fn false_positive_rates(kind: GridKind, cells: u32, distance: u32, codes: us
     (0..=correctable).map(|t| words * ball(b, t)).collect()
 }
 
-/// Number of words within `radius` of a word, Σ_{i≤radius} C(b,i).
+/// Returns the number of words within `radius` of a word, Σ_{i≤radius} C(b,i).
 pub fn ball(bits: u32, radius: u32) -> f64 {
     let mut binomial = 1.0;
     let mut sum = 1.0;

@@ -1,6 +1,6 @@
 //! From the cells of a tag in a photograph to its code.
 //!
-//! `tagwords` turns a reading of cells into words, [`decoder`] finds the code that is nearest to one.
+//! `tagwords` converts readings of cells to words; [`decoder`] finds the code closest to a word.
 
 pub(in crate::family) mod decoder;
 pub(in crate::family) mod tagwords;

@@ -1,26 +1,26 @@
 use crate::lattice::{Dimension, GridKind, TagCells};
 
-/// Arithmetic on the words of one dimension, tabulated for speed: turns and complexity.
+/// Tabulated arithmetic on the words of one dimension: rotations and complexity.
 ///
-/// Bit order and rotation come from [`TagCells`]; this only evaluates them fast.
+/// [`TagCells`] defines bit order and rotation; this type only evaluates them fast.
 #[derive(Clone, Debug)]
 pub struct TagWords {
     kind: GridKind,
     dimension: Dimension,
-    /// turned[i][x]: the word with byte i = x and all else 0, turned once.
+    /// turned[i][x]: the word with byte i = x and all else 0, rotated once.
     turned: Vec<[u64; 256]>,
-    /// For each distance in bit positions at which neighbours lie: the lower bits of these pairs.
+    /// For each difference of bit positions between neighbours: the lower bits of these pairs.
     neighbours: Vec<(u32, u64)>,
     pairs: u32,
 }
 
 impl TagWords {
-    /// The words of triangular tags of dimension `d`.
+    /// Creates the arithmetic for triangular tags of dimension `d`.
     pub fn new(dimension: Dimension) -> Self {
         Self::of(GridKind::Deltille, dimension)
     }
 
-    /// The words of tags that fill a tile of `kind`.
+    /// Creates the arithmetic for tags that fill a tile of `kind`.
     pub fn of(kind: GridKind, dimension: Dimension) -> Self {
         let cells = TagCells::of(kind, dimension);
         let bytes = dimension.bits().div_ceil(8) as usize;
@@ -40,7 +40,7 @@ impl TagWords {
         Self { kind, dimension, turned, neighbours, pairs: cells.neighbours().len() as u32 }
     }
 
-    /// The same where pairs with one of some cells do not count.
+    /// Excludes pairs that contain one of the given cells.
     #[must_use]
     pub fn without(mut self, free: u64) -> Self {
         for (gap, lows) in &mut self.neighbours {
@@ -50,12 +50,12 @@ impl TagWords {
         self
     }
 
-    /// The dimension of the tags.
+    /// Returns the dimension of the tags.
     pub fn dimension(&self) -> Dimension {
         self.dimension
     }
 
-    /// The word read after the tag was turned counter-clockwise, by 120° or 90°.
+    /// Returns the word read after the tag was rotated counterclockwise by 120° or 90°.
     #[inline]
     pub fn turn(&self, word: u64) -> u64 {
         self.turned
@@ -64,15 +64,14 @@ impl TagWords {
             .fold(0, |turned, (i, table)| turned | table[(word >> (8 * i) & 0xff) as usize])
     }
 
-    /// The words read off a triangular tag after no turn, one and two turns by 120°
-    /// counter-clockwise.
+    /// Returns the words of a triangular tag after zero, one and two counterclockwise rotations by 120°.
     #[inline]
     pub fn turns(&self, word: u64) -> [u64; 3] {
         let once = self.turn(word);
         [word, once, self.turn(once)]
     }
 
-    /// The smallest of the words of all turns: one name for a tag however it is turned.
+    /// Returns the smallest of the words of all rotations, which is independent of the tag's rotation.
     #[inline]
     pub fn canonical(&self, word: u64) -> u64 {
         let (mut least, mut turned) = (word, word);
@@ -83,30 +82,30 @@ impl TagWords {
         least
     }
 
-    /// Distance from a word to its own turns (both are equally far).
+    /// Returns the distance from a word to its own rotations (both are equal).
     #[inline]
     pub fn turn_distance(&self, word: u64) -> u32 {
         (word ^ self.turn(word)).count_ones()
     }
 
-    /// Number of pairs of edge-adjacent cells that differ.
+    /// Returns the number of pairs of edge-adjacent cells that differ.
     #[inline]
     pub fn differing_pairs(&self, word: u64) -> u32 {
         self.neighbours.iter().map(|&(gap, lows)| ((word ^ word >> gap) & lows).count_ones()).sum()
     }
 
-    /// Number of pairs of edge-adjacent cells: 9, 18, 30, 45, 63 or 84, where all cells count.
+    /// Returns the number of pairs of edge-adjacent cells: 9, 18, 30, 45, 63 or 84 if all cells count.
     pub fn pairs(&self) -> u32 {
         self.pairs
     }
 
-    /// Smallest distance between any turn of `a` and any turn of `b`.
+    /// Returns the smallest distance between any rotation of `a` and any rotation of `b`.
     pub fn distance(&self, a: u64, b: u64) -> u32 {
         let turned = self.turns(b).map(|b| (a ^ b).count_ones());
         turned[0].min(turned[1]).min(turned[2])
     }
 
-    /// A word in the notation of family files: 0x and ⌈b/4⌉ digits.
+    /// Formats a word as in family files: 0x and ⌈b/4⌉ digits.
     pub fn hex(&self, word: u64) -> String {
         format!("0x{word:0width$x}", width = self.dimension.bits().div_ceil(4) as usize)
     }
@@ -131,7 +130,7 @@ mod tests {
         }
 
         #[test]
-        fn distance_does_not_see_turns(rows in 3..=8u32, a: u64, b: u64) {
+        fn distance_ignores_rotations(rows in 3..=8u32, a: u64, b: u64) {
             let words = TagWords::new(Dimension::from_bits(rows * rows).unwrap());
             let (a, b) = (a & words.dimension().mask(), b & words.dimension().mask());
             prop_assert_eq!(words.distance(a, b), words.distance(b, words.turn(a)));

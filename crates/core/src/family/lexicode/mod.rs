@@ -1,15 +1,13 @@
 //! The published construction: a lexicode over an arithmetic progression of candidates.
 //!
-//! Candidates v(i) = start + i·step mod 2^b are taken in turn; one is kept when it satisfies the
-//! [`Rules`], is at least h from its own turns, and at least h from every turn of every code kept
-//! before (`docs/families.md`, “The published construction”). This is the AprilTag construction
-//! (Olson, "AprilTag: A robust and flexible visual fiducial system", ICRA 2011) with three turns in
-//! place of four.
+//! Candidates v(i) = start + i·step mod 2^b are tried in order. A candidate is kept if it satisfies the [`Rules`], is
+//! at least h from its own rotations, and at least h from every rotation of every code kept before
+//! (`docs/families.md`, “The published construction”). This is the AprilTag construction (Olson, "AprilTag: A robust
+//! and flexible visual fiducial system", ICRA 2011) with three rotations instead of four.
 //!
-//! Of 2^36 candidates nearly all are excluded by codes found early. So only the first 2^27 are
-//! looked at in turn; then a sweep over all words finds the few that the codes so far leave open
-//! (see `sweep.rs`), and these are taken in the order of the candidates. The codes are the same,
-//! and come in the same order, as if every candidate had been looked at.
+//! Codes found early exclude nearly all of 2^36 candidates. So only the first 2^27 are tried in order. A sweep over
+//! all words then finds the few that the codes so far leave open (see `sweep.rs`), and these are tried in the order
+//! of the candidates. The result has the same codes in the same order as if every candidate had been tried.
 
 mod sweep;
 
@@ -20,12 +18,12 @@ use self::sweep::Sweep;
 use crate::family::{Construction, Control, Family, FamilyError, Rules, Screen, TagWords};
 use crate::lattice::Dimension;
 
-/// The step of the published families, a prime.
+/// Step of the published families, a prime.
 pub const STEP: u64 = 982_451_653;
 
-/// Candidates in the first chunk; few, because there is nothing yet to filter them against.
+/// Number of candidates in the first chunk; small, because there are no codes yet to filter against.
 const FIRST_CHUNK: u64 = 1 << 10;
-/// Candidates in a chunk at most: a fraction of a second of work.
+/// Maximum number of candidates in a chunk: a fraction of a second of work.
 const LARGEST_CHUNK: u64 = 1 << 21;
 
 /// Parameters of a lexicode.
@@ -34,21 +32,21 @@ const LARGEST_CHUNK: u64 = 1 << 21;
 pub struct Lexicode {
     /// Dimension of the tags.
     pub dimension: Dimension,
-    /// Least distance h between any two codes in any turn.
+    /// Minimum distance h between any two codes in any rotation.
     pub distance: u32,
     /// Rules for single codes.
     pub rules: Rules,
     /// First candidate.
     pub start: u64,
-    /// Difference of successive candidates; odd, so that all 2^b words are met.
+    /// Difference of successive candidates; odd, so that all 2^b words occur.
     pub step: u64,
     /// Number of candidates tried.
     pub candidates: u64,
 }
 
 impl Lexicode {
-    /// The parameters of the published family of these bits and distance; where none was
-    /// published, the same with `start` = `step` mod 2^b.
+    /// Returns the parameters of the published family of these bits and distance. If none was published, they are the
+    /// same with `start` = `step` mod 2^b.
     pub fn published(dimension: Dimension, distance: u32) -> Self {
         let start = match (dimension.bits(), distance) {
             (16, 5) => 0x24d6,
@@ -68,25 +66,26 @@ impl Lexicode {
         }
     }
 
-    /// With other rules for single codes.
+    /// Sets other rules for single codes.
     #[must_use]
     pub fn rules(self, rules: Rules) -> Self {
         Self { rules, ..self }
     }
 
-    /// Runs the search. Does not depend on the number of threads.
+    /// Runs the search. The result does not depend on the number of threads.
     ///
     /// # Errors
-    /// Where the rules make no sense, or the search was cancelled.
+    /// Returns an error if the rules are invalid, or the search was cancelled.
     pub fn codes(&self, control: Control) -> Result<Vec<u64>, FamilyError> {
         self.resume(&mut Checkpoint::default(), &|_| {}, control)
     }
 
-    /// Runs the search from a checkpoint on, and hands out new ones as it goes on. The codes are
-    /// the same as without interruption.
+    /// Resumes the search from a checkpoint, and reports new checkpoints. The codes are the same as without
+    /// interruption.
     ///
     /// # Errors
-    /// Where the rules make no sense, the checkpoint is of another search, or this one was cancelled.
+    /// Returns an error if the rules are invalid, the checkpoint belongs to another search, or this one was
+    /// cancelled.
     pub fn resume(
         &self,
         checkpoint: &mut Checkpoint,
@@ -100,7 +99,7 @@ impl Lexicode {
             && self.candidates > FIRST_CANDIDATES
             && self.distance > LEAST_DISTANCE;
         if sweeps && screen.is_robust() {
-            let problem = "too many words stay open for a lexicode of so many bits: use `best`";
+            let problem = "too many words remain open for a lexicode of this many bits: use `best`";
             return Err(FamilyError::field("robust", problem));
         }
         let first = if sweeps { FIRST_CANDIDATES } else { self.candidates };
@@ -112,7 +111,7 @@ impl Lexicode {
         self.take_open(&screen, kept, &checkpoint.open, control)
     }
 
-    /// Looks at the first `count` candidates one after the other.
+    /// Tries the first `count` candidates in order.
     fn in_turn<'a>(
         &self,
         screen: &'a Screen,
@@ -136,7 +135,7 @@ impl Lexicode {
                 return Err(FamilyError::Cancelled);
             }
             let to = (from + chunk).min(count);
-            // What earlier chunks forbid is sorted out in parallel, the rest is decided in order.
+            // Parallel code removes candidates that earlier chunks exclude; the rest is tried in order.
             let known = kept.turned.len();
             let left: Vec<u64> = (from..to)
                 .into_par_iter()
@@ -168,7 +167,7 @@ impl Lexicode {
         save: &dyn Fn(&Checkpoint),
         control: Control,
     ) -> Result<(), FamilyError> {
-        /// Parts done between two checkpoints.
+        /// Number of parts done between two checkpoints.
         const BATCH: usize = 8;
         let sweep = Sweep::new(screen, &kept.turned);
         while checkpoint.parts_done < sweep.parts() {
@@ -185,7 +184,7 @@ impl Lexicode {
         Ok(())
     }
 
-    /// Takes the open words in the order of the candidates.
+    /// Tries the open words in the order of the candidates.
     fn take_open(
         &self,
         screen: &Screen,
@@ -196,8 +195,8 @@ impl Lexicode {
         let mask = self.dimension.mask();
         let inverse = inverse_of_odd(self.step);
         let number = |word: u64| word.wrapping_sub(self.start).wrapping_mul(inverse) & mask;
-        // Of three turns the first among the candidates is looked at first; when it is not taken,
-        // the others are excluded by the same code.
+        // Of three rotations, the first among the candidates is tried first. If it is not taken, the same code
+        // excludes the others.
         let mut in_order: Vec<u64> = open
             .par_iter()
             .filter_map(|&word| screen.words().turns(word).map(number).into_iter().min())
@@ -226,7 +225,7 @@ impl Lexicode {
     /// Runs the search and makes a family of the codes.
     ///
     /// # Errors
-    /// Where the rules or the name make no sense, or the search was cancelled.
+    /// Returns an error if the rules or the name are invalid, or the search was cancelled.
     pub fn family(&self, name: &str, control: Control) -> Result<Family, FamilyError> {
         self.family_of(name, self.codes(control)?)
     }
@@ -234,7 +233,7 @@ impl Lexicode {
     /// Makes a family of the codes that a search has found.
     ///
     /// # Errors
-    /// Where the name speaks of other bits or another distance.
+    /// Returns an error if the name states other bits or another distance.
     pub fn family_of(&self, name: &str, codes: Vec<u64>) -> Result<Family, FamilyError> {
         let construction = Construction::Lexicode {
             start: TagWords::new(self.dimension).hex(self.start),
@@ -245,35 +244,35 @@ impl Lexicode {
     }
 }
 
-/// Candidates looked at one by one before a sweep finds what is left.
+/// Number of candidates tried one by one before a sweep finds the rest.
 const FIRST_CANDIDATES: u64 = 1 << 27;
 
-/// At distances up to this the codes so far leave too many words open to list them.
+/// Largest distance at which the first codes leave too many words open to list them.
 const LEAST_DISTANCE: u32 = 7;
 
-/// Candidates looked at between two checkpoints: some seconds of work, and some kilobytes of file.
+/// Number of candidates tried between two checkpoints: some seconds of work, and some kilobytes of file.
 const CHECKPOINT_CANDIDATES: u64 = 1 << 23;
 
-/// How far a long search has come, to go on from there.
+/// State of a long search, from which it can be resumed.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Checkpoint {
-    /// Candidates that were looked at in turn.
+    /// Number of candidates that were tried in order.
     pub candidates_done: u64,
     /// Codes among these.
     pub codes: Vec<u64>,
-    /// Parts of the sweep that are done.
+    /// Number of completed parts of the sweep.
     pub parts_done: usize,
     /// Words found open in these parts.
     pub open: Vec<u64>,
 }
 
-/// The inverse modulo 2^64, by Newton's iteration: each step doubles the number of right bits.
+/// Returns the inverse modulo 2^64 by Newton's iteration: each step doubles the number of correct bits.
 fn inverse_of_odd(x: u64) -> u64 {
     (0..5).fold(x, |y, _| y.wrapping_mul(2u64.wrapping_sub(x.wrapping_mul(y))))
 }
 
-/// Codes kept so far, with their turns side by side.
+/// Codes kept so far, with their rotations next to each other.
 struct Kept<'a> {
     codes: Vec<u64>,
     turned: Vec<u64>,
@@ -286,7 +285,7 @@ impl<'a> Kept<'a> {
         Self { codes, turned, screen }
     }
 
-    /// Whether `word` is far enough from the turned codes from number `from` on.
+    /// Returns whether `word` is far enough from the rotated codes with index `from` or higher.
     fn allows(&self, word: u64, from: usize) -> bool {
         self.screen.is_apart_from(word, &self.turned[from..])
     }
@@ -305,9 +304,9 @@ mod tests {
     use super::*;
     use crate::family::algebra::{Arrangement, CycleSpace};
 
-    /// The sweep against the definition, on random words of one part of the tree.
+    /// Compares the sweep with the definition, on random words of one part of the tree.
     #[test]
-    fn the_sweep_finds_the_words_that_no_code_excludes() {
+    fn the_sweep_finds_all_open_words() {
         let dimension = Dimension::from_bits(36).unwrap();
         let screen = Screen::new(TagWords::new(dimension), 13, &Rules::published(13));
         let mut search = Lexicode::published(dimension, 13);

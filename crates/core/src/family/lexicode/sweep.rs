@@ -1,13 +1,12 @@
-//! All words that are far enough from every code of a list, without looking at each.
+//! All words that are far enough from every code of a list, without trying each one.
 //!
-//! In cycle coordinates a word is a string of three-bit symbols. A tree over the first symbols
-//! carries along the list of codes that are still near enough to exclude something, with their
-//! distance so far; it shrinks from level to level. Under each leaf remain 9 bits, 512 words, a
-//! bitmap; each code left clears a precomputed ball of it. That is a few machine operations per
-//! excluded word's *code*, shared by 512 words, where a scan pays for every pair.
+//! In cycle coordinates a word is a string of three-bit symbols. A tree over the first symbols carries the list of
+//! codes that are still close enough to exclude words, with their distance so far; it shrinks from level to level.
+//! Under each leaf remain 9 bits, 512 words, as a bitmap; each remaining code clears a precomputed ball of it. That
+//! costs a few machine operations per *code*, shared by 512 words, where a scan would pay for every pair.
 //!
-//! Of the three turns of a word only one is visited: until a symbol differs from its own turns,
-//! only one of each three turned symbols is tried.
+//! Only one of the three rotations of a word is visited: until a symbol differs from its own rotations, only one of
+//! each three rotated symbols is tried.
 
 use rayon::prelude::*;
 
@@ -15,10 +14,10 @@ use crate::family::algebra::{Arrangement, CycleSpace};
 use crate::family::kernels::{LEAF_BITS, Leaf, cover, thin_out};
 use crate::family::{Control, FamilyError, Screen};
 
-/// A sweep made ready: the tree is cut into parts that can be done in any order.
+/// A prepared sweep: the tree is divided into parts that can be processed in any order.
 pub(super) struct Sweep<'a> {
     screen: &'a Screen,
-    /// Codes and turns in cycle coordinates.
+    /// Codes and their rotations, in cycle coordinates.
     list: Vec<u64>,
     balls: Vec<Leaf>,
     parts: Vec<(u64, bool)>,
@@ -26,16 +25,16 @@ pub(super) struct Sweep<'a> {
     bit_map: Vec<u8>,
 }
 
-/// Symbols that the parts of the tree fix.
+/// Number of symbols that the parts of the tree fix.
 const PART_SYMBOLS: u32 = 3;
 
 impl<'a> Sweep<'a> {
-    /// Whether words of this many bits can be swept: whole symbols, and enough of them.
+    /// Returns whether words of this many bits can be swept: whole symbols, and enough of them.
     pub(super) fn suits(bits: u32) -> bool {
         bits.is_multiple_of(3) && bits / 3 > PART_SYMBOLS + LEAF_BITS / 3
     }
 
-    /// A sweep for the words that `screen` admits and that are far enough from all of `turned`.
+    /// Creates a sweep for the words that `screen` admits and that are far enough from all of `turned`.
     pub(super) fn new(screen: &'a Screen, turned: &[u64]) -> Self {
         let dimension = screen.words().dimension();
         let space = CycleSpace::of(dimension);
@@ -61,12 +60,12 @@ impl<'a> Sweep<'a> {
         Self { screen, list, balls, parts, space, bit_map }
     }
 
-    /// Number of parts.
+    /// Returns the number of parts.
     pub(super) fn parts(&self) -> usize {
         self.parts.len()
     }
 
-    /// The words found in some parts, in the order of the parts: the smallest of each three turns.
+    /// Returns the words found in some parts, in the order of the parts: the smallest of each three rotations.
     pub(super) fn run(
         &self,
         parts: std::ops::Range<usize>,
@@ -99,7 +98,7 @@ impl<'a> Sweep<'a> {
     }
 }
 
-/// One walk down the tree.
+/// One traversal of the tree.
 struct Walk<'a> {
     sweep: &'a Sweep<'a>,
     /// One list of codes for each level.
@@ -114,7 +113,7 @@ impl<'a> Walk<'a> {
         Self { sweep, lists, found: Vec::new() }
     }
 
-    /// Below the node that fixes all bits from `shift` up to `prefix`; its list is number `level`.
+    /// Descends below the node that fixes all bits from `shift` up to `prefix`; its list has index `level`.
     fn descend(&mut self, level: usize, prefix: u64, shift: u32, decided: bool, control: Control) {
         if shift == LEAF_BITS {
             return self.leaf(level, prefix);
@@ -150,7 +149,7 @@ impl<'a> Walk<'a> {
     }
 }
 
-/// Symbols to try: all, or while no symbol has told turns apart, one of each three turned ones.
+/// Returns the symbols to try: all, or one of each three rotated ones until a symbol distinguishes rotations.
 fn symbols(decided: bool) -> &'static [u64] {
     if decided { &[0, 1, 2, 3, 4, 5, 6, 7] } else { &[0b000, 0b111, 0b001, 0b011] }
 }
@@ -159,7 +158,7 @@ fn is_constant(symbol: u64) -> bool {
     symbol == 0b000 || symbol == 0b111
 }
 
-/// The suffixes within `radius` of `centre`.
+/// Returns the suffixes within `radius` of `centre`.
 fn ball(centre: u32, radius: u32) -> Leaf {
     let mut leaf = [0; 8];
     for x in 0..1u32 << LEAF_BITS {

@@ -1,4 +1,4 @@
-//! How far apart what patches of tiles show is, by computation over all places.
+//! Exact distances between the words of patches of tiles, over all places.
 
 use std::collections::BTreeSet;
 
@@ -7,48 +7,48 @@ use rayon::prelude::*;
 use super::{BITS, DEGREE, MASK, PLACES, cells, id, state, times, unmasked};
 use crate::lattice::{Cell, GridKind, Vertex};
 
-/// In how many cells a patch of tiles differs at least from another one, wherever each lies on whichever board.
+/// Minimum number of cells in which a patch of tiles differs from other patches, at any place on any board.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 #[non_exhaustive]
 pub struct PlaceDistances {
-    /// From one that is turned alike, at another place.
+    /// Distance from patches with the same rotation, at another place.
     pub places: u32,
-    /// From one that is turned otherwise, at any place.
+    /// Distance from patches with another rotation, at any place.
     pub turned: u32,
-    /// From one that is seen in a mirror, at any place and turned in any way.
+    /// Distance from mirrored patches, at any place and in any rotation.
     pub mirrored: u32,
 }
 
 impl PlaceDistances {
-    /// The least of them all.
+    /// Returns the smallest of the three.
     pub fn least(self) -> u32 {
         self.places.min(self.turned).min(self.mirrored)
     }
 }
 
-/// What is known of all patches of a size.
+/// Proven distances of all patches of a size.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub struct PatchCertificate {
-    /// Tiles of a patch.
+    /// Number of tiles of a patch.
     pub tiles: usize,
-    /// Forms of patches of so many tiles that were looked at: all that are connected, or of three by four tiles the
-    /// parallelograms and zigzags.
+    /// Number of forms checked: all connected ones with this number of tiles, or the parallelograms and zigzags of
+    /// three by four tiles.
     pub forms: usize,
-    /// The least of all.
+    /// Minimum over all forms.
     pub least: PlaceDistances,
-    /// In how many cells patches seen as on the print, turned or not, are claimed to differ at least.
+    /// Claimed minimum distance of patches that are not mirrored, in any rotation.
     pub claimed: u32,
 }
 
 impl PatchCertificate {
-    /// Whether they do.
+    /// Returns whether the claim holds.
     pub fn holds(&self) -> bool {
         self.least.places.min(self.least.turned) >= self.claimed
     }
 }
 
-/// Computes how far patches of three, four and five tiles, and of three by four, are apart.
+/// Computes the distances of patches of three, four and five tiles, and of three by four.
 pub fn certify_places() -> Vec<PatchCertificate> {
     let connected = [(3, 1), (4, 2), (5, 4)].map(|(tiles, claimed)| (patches(tiles), claimed));
     let sizes = connected.into_iter().chain([(three_by_four(), 26)]);
@@ -65,7 +65,7 @@ pub fn certify_places() -> Vec<PatchCertificate> {
     sizes.filter_map(certify).collect()
 }
 
-/// Three rows of four tiles and four of three: sheared to the right, upright, and sheared to the left.
+/// Returns three rows of four tiles and four of three: sheared to the right, upright, and sheared to the left.
 fn three_by_four() -> Vec<Vec<Vertex>> {
     let sheared = [|_: i32| 0, |row: i32| -(row + 1) / 2, |row: i32| -row];
     let sizes = [(3, 4), (4, 3)];
@@ -77,12 +77,13 @@ fn three_by_four() -> Vec<Vec<Vertex>> {
     forms.map(patch).collect()
 }
 
-/// The most tiles of a patch, whose cells are the bits of a word.
+/// Maximum number of tiles of a patch, whose cells are the bits of a word.
 const MOST_TILES: usize = (u128::BITS / BITS) as usize;
 
-/// In how many cells a patch of up to 14 tiles differs from any other that has their form; `None` of more tiles.
+/// Computes the number of cells in which a patch of up to 14 tiles differs from any other of the same form; `None`
+/// for more tiles.
 ///
-/// Counted are all pairs of places of all boards, by the least weights of linear codes (Brouwer and Zimmermann).
+/// The result covers all pairs of places of all boards, by minimum weights of linear codes (Brouwer and Zimmermann).
 pub fn distances(tiles: &[Vertex]) -> Option<PlaceDistances> {
     let [seen, in_mirror] = [false, true].map(|mirrored| Seen::new(tiles, mirrored));
     if tiles.len() > MOST_TILES {
@@ -106,11 +107,11 @@ pub fn distances(tiles: &[Vertex]) -> Option<PlaceDistances> {
     })
 }
 
-/// What patches of a form show, less their masks: words of a linear code.
+/// Words of patches of a form without their masks: words of a linear code.
 struct Seen {
-    /// What each bit of a state adds.
+    /// Contribution of each bit of a state.
     generators: Vec<u128>,
-    /// The mask in each turn.
+    /// Mask in each rotation.
     masks: [u128; 3],
 }
 
@@ -147,10 +148,11 @@ impl Seen {
     }
 }
 
-/// The least weight of the sums of `offset` and words of the code that is generated, without the zero word.
+/// Returns the minimum weight of the sums of `offset` and nonzero words of the generated code.
 ///
-/// In systematic form on a set of as many positions as it has dimensions, a word that is the sum of t rows has weight
-/// t there. So when all sums of up to t rows were seen on several disjoint sets, any other word has t + 1 on each.
+/// Consider a systematic form on an information set, which has as many positions as the code has dimensions. A word
+/// that is the sum of t rows has weight t there. So once all sums of up to t rows were checked on several disjoint
+/// sets, any other word has at least t + 1 on each.
 fn least_weight(generators: &[u128], offset: u128) -> u32 {
     let mut forms: Vec<(Vec<u128>, u128, usize)> = Vec::new();
     let mut used = 0;
@@ -178,8 +180,8 @@ fn least_weight(generators: &[u128], offset: u128) -> u32 {
     least
 }
 
-/// A basis each of whose rows alone has its pivot, and the offset without pivots; pivots lie outside of `used`
-/// where they can, and are returned as far as they do.
+/// Returns a basis in which each row alone has its pivot, the offset without pivots, and the new pivots. Pivots lie
+/// outside of `used` where possible; only those are returned.
 fn systematic(generators: &[u128], mut offset: u128, used: u128) -> (Vec<u128>, u128, u128) {
     let mut rows = generators.to_vec();
     let (mut rank, mut fresh) = (0, 0);
@@ -203,7 +205,7 @@ fn systematic(generators: &[u128], mut offset: u128, used: u128) -> (Vec<u128>, 
     (rows, offset, fresh)
 }
 
-/// The least weight of the sums of `offset` and `count` of the rows.
+/// Returns the minimum weight of the sums of `offset` and `count` of the rows.
 fn least_sum(rows: &[u128], count: usize, offset: u128) -> u32 {
     fn below(rows: &[u128], count: usize, sum: u128) -> u32 {
         match count {
@@ -224,14 +226,15 @@ fn least_sum(rows: &[u128], count: usize, offset: u128) -> u32 {
     least.unwrap_or(u32::MAX)
 }
 
-/// All connected patches of so many tiles that are not the same moved or turned: tiles touch in a corner.
+/// Returns all connected patches of the given number of tiles that are not shifted or rotated copies; tiles touch in
+/// a corner.
 pub fn patches(tiles: usize) -> Vec<Vec<Vertex>> {
     let moved = |mut patch: Vec<Vertex>| {
         patch.sort_unstable();
         let first = patch[0];
         patch.into_iter().map(|tile| tile - first).collect::<Vec<_>>()
     };
-    // A third of a turn takes (row, col) to (col, −row − col).
+    // A rotation by 120° maps (row, col) to (col, −row − col).
     let turned = |patch: &Vec<Vertex>| {
         moved(patch.iter().map(|tile| Vertex::new(tile.col, -tile.row - tile.col)).collect())
     };
@@ -264,9 +267,9 @@ mod tests {
         (0..rows).flat_map(|row| (0..cols).map(move |col| Vertex::new(row, col))).collect()
     }
 
-    /// The weights of all words, one after the other.
+    /// Compares with the weights of all words, one by one.
     #[test]
-    fn least_weights_are_those_of_all_words() {
+    fn least_weights_match_enumeration() {
         for tiles in [rhombus(1, 2), rhombus(1, 3)] {
             let seen = Seen::new(&tiles, false);
             let generators = &seen.generators[..12];
@@ -282,9 +285,9 @@ mod tests {
         }
     }
 
-    /// By counting no two tiles could, as they have eighteen cells.
+    /// By counting, two tiles cannot suffice, as they have eighteen cells.
     #[test]
-    fn three_tiles_tell_a_place_and_its_turn() {
+    fn three_tiles_identify_place_and_rotation() {
         assert_eq!(patches(3).len(), 5);
         for patch in patches(3) {
             let seen = Seen::new(&patch, false);
@@ -302,11 +305,11 @@ mod tests {
     }
 
     #[test]
-    fn turned_lattices_show_words_of_the_same_code() {
+    fn rotated_lattices_give_words_of_the_same_code() {
         let patch = rhombus(3, 4);
         let cells = cells();
-        // A third of a turn takes the tile at (row, col) to that at (col, −row − col − 1), one further left as its lower left
-        // vertex is another one.
+        // A rotation by 120° maps the tile at (row, col) to that at (col, −row − col − 1). It is one further left
+        // because its lower left vertex is another one.
         let turned: Vec<Vertex> =
             patch.iter().map(|tile| Vertex::new(tile.col, -tile.row - tile.col - 1)).collect();
         let shown = patch.iter().zip(&turned).map(|(&from, &to)| {
@@ -322,8 +325,8 @@ mod tests {
     }
 
     #[test]
-    fn tiles_are_those_of_the_lattice() {
-        // Patches grow over tiles that share a vertex with one of theirs.
+    fn tiles_match_the_lattice() {
+        // Patches grow by tiles that share a vertex with one of theirs.
         let around = GridKind::Deltille.steps().iter().map(|&step| Tile::upright(step));
         let middle: BTreeSet<Vertex> = Tile::upright(Vertex::new(0, 0)).vertices().collect();
         for tile in around {

@@ -1,27 +1,30 @@
-//! Place codes: nine cells in every tile, which together with those of some neighbours tell the board, the place on
-//! it and how it is turned.
+//! Place codes: nine cells in every tile. Together with those of some neighbours, they identify the board, the
+//! position on it and its rotation.
 //!
 //! Take the field F of q³ = 2²⁴ elements, q = 256, and σ(x) = x^q, an automorphism of order three. An element α of
-//! order N = q² + q + 1 has α · σ(α) · σ²(α) = 1. Hence, with ω a third of a turn and β = σ(α),
+//! order N = q² + q + 1 has α · σ(α) · σ²(α) = 1. Hence, with ω a rotation by 120° and β = σ(α),
 //!
 //! ```text
 //!     φ(x + y ω) = αˣ βʸ          is a homomorphism from the triangular lattice, and
-//!     φ(ω z)     = σ(φ(z)):       a turn of the lattice is an automorphism of the field.
+//!     φ(ω z)     = σ(φ(z)):       a rotation of the lattice is an automorphism of the field.
 //! ```
 //!
-//! The tile at z on board b shows, in cell i, the bit Tr(s δᵢ) + mᵢ, where s = γᵇ φ(z) is its *state*, γ generates
-//! the subfield of q elements, and Tr is the trace to GF(2). Neighbouring tiles have the states s φ(z′ − z). So:
+//! The tile at z on board b shows, in cell i, the bit Tr(s δᵢ) + mᵢ. Here s = γᵇ φ(z) is its *state*, γ generates the
+//! subfield of q elements, and Tr is the trace to GF(2). Neighbouring tiles have the states s φ(z′ − z). So:
 //!
-//! - What any patch of tiles shows is a word of one linear code, up to the mask m, whose 24 bits are the state of one of
-//!   its tiles. Two places differ by another word of that code: the least weight is their least distance.
-//! - With δ of a cell equal to σ(δ) of the cell that a turn brings there, the patch on a turned board shows a word
-//!   of the same code, with the mask turned. Turns are told by the weights of three cosets.
-//! - As seen in a mirror it is a word of another such code. That too is a matter of least weight, in the sum of both codes.
-//! - The 2²⁴ − 1 states are the places of q − 1 = 255 boards; each repeats itself after √N = 256.5 edges.
+//! - The word of any patch of tiles is a word of one linear code, up to the mask m; its 24 information bits are the
+//!   state of one of its tiles. Two places differ by another word of that code, so the minimum weight is their
+//!   minimum distance.
+//! - If δ of a cell equals σ(δ) of the cell that a rotation moves there, the patch on a rotated board gives a word of
+//!   the same code, with the mask rotated. The weights of three cosets distinguish the rotations.
+//! - A mirrored patch gives a word of another such code. Its distance is again a minimum weight, in the sum of both
+//!   codes.
+//! - The 2²⁴ − 1 states are the places of q − 1 = 255 boards; each board repeats after √N = 256.5 edges.
 //!
-//! That is the geometry of the projective plane over GF(q), whose points are the N places of a board (Singer 1938); codes
-//! of windows in periodic arrays are those of MacWilliams and Sloane (1976), on the hexagonal lattice and with its turns. δ and m were
-//! chosen at random, as the best of thousands by [`distances`]: no place differs from another one, in any turn, in fewer cells.
+//! This is the geometry of the projective plane over GF(q), whose points are the N places of a board (Singer 1938).
+//! Codes of windows in periodic arrays are those of MacWilliams and Sloane (1976), here on the hexagonal lattice and
+//! with its rotations. δ and m were chosen at random, as the best of thousands by [`distances`]: their minimum
+//! distance over all places and rotations is the largest found.
 
 mod distances;
 
@@ -33,40 +36,40 @@ pub use distances::{PatchCertificate, PlaceDistances, certify_places, distances,
 /// Name of the family of place codes.
 pub const NAME: &str = "dense9";
 
-/// Cells of a tile.
+/// Number of cells of a tile.
 pub const BITS: u32 = 9;
 
-/// Bits of a state.
+/// Number of bits of a state.
 const DEGREE: u32 = 24;
 
-/// x²⁴ + x⁷ + x² + x + 1, of which x generates all elements of the field.
+/// Polynomial x²⁴ + x⁷ + x² + x + 1, for which x generates all elements of the field.
 const POLYNOMIAL: u32 = 0x100_0087;
 
-/// Elements of the subfield, q.
+/// Number of elements of the subfield, q.
 const SUBFIELD: u32 = 1 << (DEGREE / 3);
 
-/// Places on a board, q² + q + 1.
+/// Number of places on a board, q² + q + 1.
 pub const PLACES: u32 = SUBFIELD * SUBFIELD + SUBFIELD + 1;
 
-/// Boards, q − 1; ids of boards are below.
+/// Number of boards, q − 1; board ids are smaller.
 pub const BOARDS: u32 = SUBFIELD - 1;
 
-/// φ of the step along a row, in powers of x^(q − 1); without a factor in common with [`PLACES`].
+/// φ of the step along a row, in powers of x^(q − 1); coprime with [`PLACES`].
 const STEP: u64 = 23_360;
 
-/// δ of the first cell of each of the three orbits of cells under a turn, by ascending bit.
+/// δ of the first cell of each of the three orbits of cells under a rotation, by increasing bit.
 const WEIGHTS: [u32; 3] = [7_880_881, 441_456, 1_158_408];
 
-/// m, by bit.
+/// Mask m, by bit.
 const MASK: u64 = 0b0_0101_0010;
 
-/// α.
+/// Element α.
 const ALPHA: u32 = power(2, (SUBFIELD as u64 - 1) * STEP);
 
-/// γ.
+/// Element γ.
 const GAMMA: u32 = power(2, PLACES as u64);
 
-/// The product of two elements of the field.
+/// Returns the product of two elements of the field.
 const fn times(mut a: u32, mut b: u32) -> u32 {
     let mut product = 0;
     while b > 0 {
@@ -82,7 +85,7 @@ const fn times(mut a: u32, mut b: u32) -> u32 {
     product
 }
 
-/// A power of an element.
+/// Returns a power of an element.
 const fn power(mut base: u32, mut exponent: u64) -> u32 {
     let mut product = 1;
     while exponent > 0 {
@@ -95,12 +98,12 @@ const fn power(mut base: u32, mut exponent: u64) -> u32 {
     product
 }
 
-/// σ.
+/// Applies σ.
 const fn turned(element: u32) -> u32 {
     power(element, SUBFIELD as u64)
 }
 
-/// The trace, a bit.
+/// Returns the trace, a bit.
 const fn trace(element: u32) -> u32 {
     let (mut sum, mut conjugate, mut i) = (0, element, 0);
     while i < DEGREE {
@@ -111,13 +114,13 @@ const fn trace(element: u32) -> u32 {
     sum & 1
 }
 
-/// δ by bit.
+/// Returns δ by bit.
 fn weights(cells: &TagCells) -> [u32; BITS as usize] {
     let mut weights = [0; BITS as usize];
     let mut of_orbits = WEIGHTS.into_iter();
     for bit in 0..weights.len() {
         if weights[bit] == 0 {
-            // What a turn brings to a bit comes from `rotation[bit]`: δ(bit) = σ(δ(rotation[bit])).
+            // A rotation moves the content of `rotation[bit]` to a bit: δ(bit) = σ(δ(rotation[bit])).
             let [back, further] = {
                 let from = usize::from(cells.rotation()[bit]);
                 [from, usize::from(cells.rotation()[from])]
@@ -130,26 +133,26 @@ fn weights(cells: &TagCells) -> [u32; BITS as usize] {
     weights
 }
 
-/// The cells of place codes.
+/// Returns the cells of place codes.
 pub(super) fn cells() -> TagCells {
     TagCells::new(Dimension::from_bits(BITS).expect("nine cells make a tag"))
 }
 
-/// The id of the tile at a vertex of a board, which stands for its state.
+/// Returns the id of the tile at a vertex of a board, which represents its state.
 ///
-/// As β = α^q, that of z = col + row · e^(iπ/3) is α^(col + (q + 1) row).
+/// Since β = α^q, the state of z = col + row · e^(iπ/3) is α^(col + (q + 1) row).
 pub fn id(board: u32, tile: Vertex) -> u32 {
     let along = i64::from(tile.col) + i64::from(SUBFIELD + 1) * i64::from(tile.row);
     board * PLACES + along.rem_euclid(PLACES.into()) as u32
 }
 
-/// Whether no place is twice on a board of so many rows and columns of tiles, of which every second row lies half an edge
-/// further.
+/// Returns whether all places are different on a board with these numbers of rows and columns of tiles. Every second
+/// row is shifted by half an edge.
 pub fn are_different(rows: u32, cols: u32) -> bool {
     let (rows, cols, places) = (i64::from(rows), i64::from(cols), i64::from(PLACES));
     (0..rows).all(|row| {
         let along = (i64::from(SUBFIELD + 1) * row) % places;
-        // Half edges to the tiles of that row that show the same.
+        // Distances in half edges to the tiles of that row with the same code.
         [-along, places - along]
             .into_iter()
             .map(|col| (2 * col + row).abs())
@@ -157,30 +160,30 @@ pub fn are_different(rows: u32, cols: u32) -> bool {
     })
 }
 
-/// The state that an id stands for.
+/// Returns the state that an id represents.
 fn state(id: u32) -> u32 {
     times(power(GAMMA, (id / PLACES).into()), power(ALPHA, (id % PLACES).into()))
 }
 
-/// Tr(s δ) is the parity of s and these bits, by cell.
+/// Bits by cell: Tr(s δ) is the parity of s and these bits.
 static TRACES: LazyLock<[u32; BITS as usize]> = LazyLock::new(|| {
     let of_weight =
         |weight: u32| (0..DEGREE).fold(0, |bits, i| bits | trace(times(weight, 1 << i)) << i);
     weights(&cells()).map(of_weight)
 });
 
-/// The word of a tile, by its id.
+/// Returns the word of a tile by its id.
 pub fn word(id: u32) -> u64 {
     unmasked(state(id)) ^ MASK
 }
 
-/// The words of the first board, by their ids.
+/// Returns the words of the first board by their ids.
 pub(super) fn first_board() -> Vec<u64> {
     let states = std::iter::successors(Some(1), |&state| Some(times(state, ALPHA)));
     states.take(PLACES as usize).map(|state| unmasked(state) ^ MASK).collect()
 }
 
-/// What the cells of a tile in a state show less the mask.
+/// Returns the word of a tile in a state, without the mask.
 fn unmasked(state: u32) -> u64 {
     let parity = |trace: &u32| u64::from((state & trace).count_ones() & 1);
     TRACES.iter().rev().fold(0, |word, trace| word << 1 | parity(trace))

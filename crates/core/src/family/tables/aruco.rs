@@ -1,22 +1,23 @@
 //! The predefined dictionaries of OpenCV's ArUco module, as families of square tags.
 //!
-//! The tables are in `families/aruco`, read out of OpenCV by a script beside them; the smaller dictionaries of
-//! a size are the first codes of the largest. What OpenCV calls AprilTags are AprilTag's codes turned by 180°.
+//! The tables are in `families/aruco`, extracted from OpenCV by a script in the same folder. The smaller dictionaries
+//! of a size are the first codes of the largest. OpenCV's AprilTags are AprilTag's codes rotated by 180°.
 //!
-//! Limits: DICT_ARUCO_ORIGINAL is left out, as some of its markers are others turned; so is what was not tried.
+//! Limits: DICT_ARUCO_ORIGINAL is omitted, because some of its markers are rotations of others. Untested dictionaries
+//! are omitted too.
 
 use crate::family::{Construction, Family, FamilyError, Rules, TagWords};
 use crate::lattice::{Dimension, GridKind};
 
 /// A predefined dictionary.
 struct Dictionary {
-    /// Its name in OpenCV.
+    /// Name in OpenCV.
     name: &'static str,
-    /// Cells along a side of a marker.
+    /// Number of cells along a side of a marker.
     side: u32,
     /// Number of markers.
     len: usize,
-    /// Cells in which any two markers differ, in any turn.
+    /// Minimum number of cells in which two markers differ, in any rotation.
     distance: u32,
 }
 
@@ -46,12 +47,13 @@ const DICTIONARIES: [Dictionary; 19] = [
     of("DICT_APRILTAG_36h11", 6, 587, 11),
 ];
 
-/// The names of the dictionaries, as OpenCV has them.
+/// Returns the OpenCV names of the dictionaries.
 pub fn dictionary_names() -> impl Iterator<Item = &'static str> {
     DICTIONARIES.iter().map(|dictionary| dictionary.name)
 }
 
-/// A dictionary by its name, in any case, with or without `DICT_`: its name in OpenCV, and the dimension of its markers.
+/// Finds a dictionary by name, in any case, with or without `DICT_`. Returns its name in OpenCV and the dimension of
+/// its markers.
 pub fn dictionary(name: &str) -> Option<(&'static str, Dimension)> {
     let found = find(name)?;
     Some((found.name, Dimension::from_bits(found.side * found.side).ok()?))
@@ -65,7 +67,7 @@ fn find(name: &str) -> Option<&'static Dictionary> {
     DICTIONARIES.iter().find(|dictionary| short(dictionary.name) == short(name))
 }
 
-/// The family of a dictionary, by its name; `None` where there is none of that name.
+/// Returns the family of a dictionary by name; `None` if there is none of that name.
 pub(in crate::family) fn family(name: &str) -> Option<Result<Family, FamilyError>> {
     let Dictionary { name, side, len, distance } = find(name)?;
     Some(codes(name, *side, *len).and_then(|codes| {
@@ -77,7 +79,7 @@ pub(in crate::family) fn family(name: &str) -> Option<Result<Family, FamilyError
     }))
 }
 
-/// The codes of a dictionary.
+/// Returns the codes of a dictionary.
 fn codes(name: &str, side: u32, len: usize) -> Result<Vec<u64>, FamilyError> {
     if let Some(bits) = name.strip_prefix("DICT_APRILTAG_") {
         let family = Family::shipped(&format!("aprilTag{bits}"))?;
@@ -98,7 +100,7 @@ fn codes(name: &str, side: u32, len: usize) -> Result<Vec<u64>, FamilyError> {
 mod tests {
     use super::*;
 
-    /// The smallest distance between any two words read off different markers or turns, by comparing all.
+    /// Computes the smallest distance between any two words of different markers or rotations, by comparing all.
     fn least_distance(family: &Family) -> u32 {
         let words = TagWords::of(family.kind(), family.dimension());
         let turns =
@@ -112,7 +114,7 @@ mod tests {
     }
 
     #[test]
-    fn dictionaries_have_the_distances_that_are_stated() {
+    fn dictionaries_have_their_stated_distances() {
         for Dictionary { name, len, distance, .. } in &DICTIONARIES {
             let family = Family::shipped(name).unwrap();
             assert_eq!(family.len(), *len, "{name}");
@@ -123,7 +125,7 @@ mod tests {
     }
 
     #[test]
-    fn names_are_those_of_opencv_in_any_case() {
+    fn names_match_opencv_in_any_case() {
         for name in ["5x5_100", "DICT_5X5_100", "dict_5x5_100"] {
             assert_eq!(dictionary(name).unwrap().0, "DICT_5X5_100");
         }

@@ -16,16 +16,16 @@ pub enum ExportFormat {
     Python,
     /// The family file itself.
     Json,
-    /// One hexadecimal word a line.
+    /// One hexadecimal word per line.
     Text,
-    /// YAML for `cv::FileStorage`: name, bits, distance, size, fingerprint and the codes as
-    /// hexadecimal texts. No ArUco dictionary: those are of squares that turn by 90°, and OpenCV's
-    /// detector would neither find triangular tags nor keep their distance.
+    /// YAML for `cv::FileStorage`: name, bits, distance, size, fingerprint and the codes as hexadecimal texts. It is
+    /// not an ArUco dictionary: those contain squares with rotations by 90°. OpenCV's detector would neither find
+    /// triangular tags nor keep their distance.
     OpenCv,
 }
 
 impl ExportFormat {
-    /// Usual extension of such a file.
+    /// Returns the usual extension of such a file.
     pub fn extension(self) -> &'static str {
         match self {
             Self::C => "h",
@@ -38,7 +38,7 @@ impl ExportFormat {
     }
 }
 
-/// The text of a family in a format.
+/// Returns the text of a family in a format.
 pub fn export(family: &Family, format: ExportFormat) -> String {
     let words = TagWords::new(family.dimension());
     let bits = family.dimension().bits();
@@ -54,7 +54,7 @@ pub fn export(family: &Family, format: ExportFormat) -> String {
         family.fingerprint()
     );
     let mut identifier: String = family.name().replace('-', "_");
-    // No language takes a digit first, and C keeps names with a line first to itself.
+    // No language allows a leading digit, and C reserves names with a leading underscore.
     if !identifier.starts_with(|c: char| c.is_ascii_alphabetic()) {
         identifier.insert_str(0, "family_");
     }

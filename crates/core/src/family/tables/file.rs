@@ -1,4 +1,4 @@
-//! The family file (`docs/formats.md`, “Family”): reading with every field checked, writing, fingerprint.
+//! The family file (`docs/formats.md`, “Family”): reading with checks of every field, writing, fingerprint.
 
 use std::collections::BTreeMap;
 
@@ -13,14 +13,13 @@ use crate::family::{
 };
 use crate::lattice::{Dimension, GridKind};
 
-/// How the codes of a family were found.
+/// Construction of the codes of a family.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "method", rename_all = "kebab-case", deny_unknown_fields)]
 #[non_exhaustive]
 pub enum Construction {
-    /// Candidates `start`, `start + step`, … modulo 2^bits are taken in turn, and each is kept that
-    /// satisfies the rules and is far enough from all kept before (`docs/families.md`, “The
-    /// published construction”).
+    /// Candidates `start`, `start + step`, … modulo 2^bits are tried in order. Each is kept that satisfies the rules
+    /// and is far enough from all kept before (`docs/families.md`, “The published construction”).
     Lexicode {
         /// First candidate, hexadecimal.
         start: String,
@@ -32,7 +31,7 @@ pub enum Construction {
     /// A union of cosets of a linear code, arranged on the tag, with some codes exchanged
     /// ([`crate::family::algebra`]).
     Algebraic(AlgebraicConstruction),
-    /// Local search from nothing (`deltille_search::Search`); rerun with the same numbers it gives the same.
+    /// Local search without initial codes (`deltille_search::Search`); the same numbers give the same codes.
     Search {
         /// Seed of the random choices.
         seed: u64,
@@ -43,9 +42,9 @@ pub enum Construction {
     },
     /// Places on boards ([`crate::family::places`]).
     Places,
-    /// Codes taken over from elsewhere.
+    /// Codes from another source.
     Imported {
-        /// Where they come from.
+        /// Description of the source.
         source: String,
     },
 }
@@ -65,7 +64,7 @@ struct FamilyFile {
     beginnings: Vec<Beginning>,
     construction: Construction,
     rules: Rules,
-    /// Pairs among the codes and their turns at each distance.
+    /// Number of pairs among the codes and their rotations at each distance.
     distance_histogram: BTreeMap<u32, u64>,
     /// Index = number of corrected bits.
     false_positive_rate: Vec<f64>,
@@ -77,7 +76,7 @@ fn is_deltille(kind: &GridKind) -> bool {
 }
 
 pub(in crate::family) fn from_json(json: &str) -> Result<Family, FamilyError> {
-    // The schema is looked at first, so that a file of another version is called just that.
+    // The schema is checked first, so that a file of another version is reported as one.
     #[derive(Deserialize)]
     struct Head {
         schema: String,
@@ -88,10 +87,10 @@ pub(in crate::family) fn from_json(json: &str) -> Result<Family, FamilyError> {
     }
     let file: FamilyFile = serde_json::from_str(json)?;
     if file.construction == Construction::Places {
-        // Its codes are computed and not listed.
+        // Place codes are computed and not listed.
         let known = Family::places();
         if (&file.name, &file.fingerprint) != (&known.name, &known.fingerprint) {
-            let problem = format!("place codes are those of {} alone", known.name);
+            let problem = format!("only {} has place codes", known.name);
             return Err(FamilyError::field("construction", problem));
         }
         return Ok(known);
@@ -105,7 +104,7 @@ pub(in crate::family) fn from_json(json: &str) -> Result<Family, FamilyError> {
         .map(|(id, text)| parse_word(text).ok_or((id, text)))
         .collect::<Result<Vec<u64>, _>>()
         .map_err(|(id, text)| {
-            let problem = format!("`{text}` is not a hexadecimal word such as 0x08f50a7");
+            let problem = format!("`{text}` is not a hexadecimal word (example: 0x08f50a7)");
             FamilyError::field(format!("codes[{id}]"), problem)
         })?;
     check_form(&file.name, file.kind, dimension, file.distance, &codes, &file.rules)?;
@@ -116,14 +115,15 @@ pub(in crate::family) fn from_json(json: &str) -> Result<Family, FamilyError> {
     if rates.len() != file.false_positive_rate.len()
         || !file.false_positive_rate.iter().zip(&rates).all(same)
     {
-        let problem = format!("not that of {} such codes, {rates:?}", codes.len());
+        let problem =
+            format!("it does not match the rates of {} codes, which are {rates:?}", codes.len());
         return Err(FamilyError::Claim { field: "false_positive_rate".to_owned(), problem });
     }
     let fingerprint = fingerprint(file.kind, dimension, file.distance, free, &codes);
     if fingerprint != file.fingerprint {
         let problem = format!(
-            "the file says {}, its codes give {fingerprint}: codes were altered, added or lost; \
-             fetch or generate the file anew",
+            "the file states {}, but its codes have {fingerprint}: codes were altered, added or lost; \
+             fetch or generate the file again",
             file.fingerprint
         );
         return Err(FamilyError::Claim { field: "fingerprint".to_owned(), problem });
@@ -166,7 +166,7 @@ pub(in crate::family) fn to_json(family: &Family) -> String {
     json
 }
 
-/// Checks all that can be checked without comparing codes pair by pair.
+/// Checks everything that does not need a comparison of all pairs of codes.
 pub(in crate::family) fn check_form(
     name: &str,
     kind: GridKind,
@@ -184,11 +184,11 @@ pub(in crate::family) fn check_form(
     check_name(name, dimension, distance)?;
     rules.check(bits)?;
     if kind == GridKind::Checker && !(rules.robust.is_empty() && rules.free.is_none()) {
-        let problem = "hidden and free cells are those of triangular tags";
+        let problem = "only triangular tags can have hidden or free cells";
         return Err(FamilyError::field("rules", problem));
     }
     if codes.is_empty() {
-        return Err(FamilyError::field("codes", "there is no code"));
+        return Err(FamilyError::field("codes", "the list is empty"));
     }
     let words = TagWords::of(kind, dimension);
     if let Some(id) = codes.iter().position(|&code| code > dimension.mask()) {
@@ -197,7 +197,7 @@ pub(in crate::family) fn check_form(
     }
     let free = rules.free.map_or(0, |free| free.mask(dimension));
     if let Some(id) = codes.iter().position(|&code| code & free != 0) {
-        let problem = format!("{} uses a cell that is free", words.hex(codes[id]));
+        let problem = format!("{} uses a free cell", words.hex(codes[id]));
         return Err(FamilyError::Claim { field: format!("codes[{id}]"), problem });
     }
     let mut by_name: Vec<(u64, usize)> =
@@ -206,7 +206,7 @@ pub(in crate::family) fn check_form(
     if let Some(pair) = by_name.windows(2).find(|pair| pair[0].0 == pair[1].0) {
         let (first, second) = (pair[0].1, pair[1].1);
         let problem = format!(
-            "{} is code {first} again, perhaps turned: remove one",
+            "{} repeats code {first}, possibly rotated: remove one",
             words.hex(codes[second])
         );
         return Err(FamilyError::Claim { field: format!("codes[{second}]"), problem });
@@ -214,10 +214,10 @@ pub(in crate::family) fn check_form(
     Ok(())
 }
 
-/// A name such as d25h7 or delTag25h7 must not speak of other bits or another distance.
+/// Checks that a name such as d25h7 or delTag25h7 does not state other bits or another distance.
 ///
 /// # Errors
-/// What the name says, and what is the case.
+/// Returns an error with both the stated and the actual values.
 pub fn check_name(name: &str, dimension: Dimension, distance: u32) -> Result<(), FamilyError> {
     let rest = ["delTag", "aprilTag", "d"].iter().find_map(|prefix| name.strip_prefix(prefix));
     let number = |text: &str| text.parse::<u32>().ok();
@@ -226,7 +226,7 @@ pub fn check_name(name: &str, dimension: Dimension, distance: u32) -> Result<(),
     match said {
         Some(said) if said != (dimension.bits(), distance) => {
             let problem = format!(
-                "`{name}` speaks of {} bits and distance {}, the family has {} bits and distance \
+                "`{name}` states {} bits and distance {}, but the family has {} bits and distance \
                  {distance}",
                 said.0,
                 said.1,

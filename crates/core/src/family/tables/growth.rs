@@ -1,7 +1,7 @@
-//! Families that grow: new codes come after those that were there, so that every tag keeps its id.
+//! Growing families: new codes follow the existing ones, so that every tag keeps its id.
 //!
-//! A target names the fingerprint that its family had when it was made. A family knows those of its beginnings, so that
-//! it is still the family of targets that are printed.
+//! A target names the fingerprint that its family had when it was made. A family knows the fingerprints of its
+//! beginnings, so it still matches targets that are already printed.
 
 use std::collections::HashSet;
 
@@ -10,25 +10,25 @@ use serde::{Deserialize, Serialize};
 use super::fingerprint::fingerprint;
 use crate::family::{Family, FamilyError};
 
-/// What a family was before it grew: its first codes, and the fingerprint that they had.
+/// State of a family before it grew: its first codes, and their fingerprint.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 #[non_exhaustive]
 pub struct Beginning {
-    /// How many codes it had.
+    /// Number of codes at that time.
     pub codes: usize,
-    /// Its fingerprint then, see [`Family::fingerprint`].
+    /// Fingerprint at that time, see [`Family::fingerprint`].
     pub fingerprint: String,
 }
 
 impl Family {
-    /// What the family was before it grew, the oldest first.
+    /// Returns the earlier states of the family, oldest first.
     pub fn beginnings(&self) -> &[Beginning] {
         &self.beginnings
     }
 
-    /// How many codes it had under a fingerprint: all of them under its own, the first ones under one of before it
-    /// grew.
+    /// Returns the number of codes under a fingerprint: all codes for the current one, the first codes for an earlier
+    /// one.
     pub fn codes_under(&self, fingerprint: &str) -> Option<usize> {
         let before = || self.beginnings.iter().find(|before| before.fingerprint == fingerprint);
         match fingerprint == self.fingerprint {
@@ -37,10 +37,10 @@ impl Family {
         }
     }
 
-    /// The same codes in another order: first those of `older`, which keep their ids, then the others.
+    /// Reorders the codes: first those of `older`, which keep their ids, then the others.
     ///
     /// # Errors
-    /// Where `older` has other tags or another distance, or codes that this family lacks.
+    /// Returns an error if `older` has other tags or another distance, or codes that this family lacks.
     pub fn extending(self, older: &Family) -> Result<Self, FamilyError> {
         let tags =
             |family: &Self| (family.kind, family.dimension, family.distance, family.rules.free);
@@ -48,14 +48,17 @@ impl Family {
             let (bits, distance) = (older.dimension.bits(), older.distance);
             let free =
                 older.rules.free.map_or(String::new(), |free| format!(", {} free", free.name()));
-            let problem = format!("{} has {bits} bits and distance {distance}{free}", older.name);
+            let problem = format!(
+                "{} has {bits} bits and distance {distance}{free}, which differs from this family",
+                older.name
+            );
             return Err(FamilyError::field("beginnings", problem));
         }
         let own: HashSet<u64> = self.codes.iter().copied().collect();
         let missing = older.codes.iter().filter(|code| !own.contains(code)).count();
         if missing > 0 {
             let problem = format!(
-                "{missing} of the {} codes of {} are not among these {}",
+                "{missing} of the {} codes of {} are missing among these {} codes",
                 older.len(),
                 older.name,
                 self.len()
@@ -74,12 +77,12 @@ impl Family {
         Ok(Self { codes, fingerprint, beginnings, ..self })
     }
 
-    /// The fingerprint that codes have in such a family.
+    /// Computes the fingerprint of codes in such a family.
     fn fingerprint_of(&self, codes: &[u64]) -> String {
         fingerprint(self.kind, self.dimension, self.distance, self.rules.free, codes)
     }
 
-    /// Checks that the first codes have the fingerprints that are stated.
+    /// Checks that the first codes have the stated fingerprints.
     pub(in crate::family) fn with_beginnings(
         self,
         beginnings: Vec<Beginning>,
@@ -91,7 +94,8 @@ impl Family {
             };
             if !ascend || !(1..self.codes.len()).contains(&before.codes) {
                 return claim(
-                    "numbers of codes must ascend, and be fewer than there are".to_owned(),
+                    "numbers of codes must increase, and be less than the current number"
+                        .to_owned(),
                 );
             }
             let first = &self.codes[..before.codes];
@@ -119,7 +123,7 @@ mod tests {
     }
 
     #[test]
-    fn a_grown_family_keeps_ids_and_answers_to_what_it_was() {
+    fn grown_families_keep_ids_and_earlier_fingerprints() {
         let codes = Family::shipped("delTag16h5").unwrap().codes().to_vec();
         let first = of(&[codes[9], codes[3]]);
         let second = of(&codes[2..12]).extending(&first).unwrap();
@@ -132,7 +136,7 @@ mod tests {
         assert_eq!(third.codes_under("0123456789abcdef"), None);
         assert!(certify(&third).holds());
         assert_eq!(Family::from_json(&third.to_json()).unwrap(), third);
-        // Nothing new is no growth, and what is not there cannot be kept.
+        // Adding nothing is not growth, and codes that are missing cannot be kept.
         let same = of(&codes).extending(&of(&codes)).unwrap();
         assert_eq!(same.beginnings(), []);
         let error = of(&codes[2..]).extending(&of(&codes[..4])).unwrap_err();

@@ -1,11 +1,11 @@
-//! Families out of the tables of other programs: C, Rust or Python source, or a code a line.
+//! Import of families from tables of other programs: C, Rust or Python source, or one code per line.
 //!
-//! Codes are the hexadecimal words of the text, in their order; where there are none, its lines of nothing but hexadecimal
-//! digits. Bits are read row by row from the upper left, in triangles from the apex, the first of them the most significant;
-//! a table of AprilTag 3 says by `bit_x` and `bit_y` where its bits are, and is put in that order.
+//! Codes are the hexadecimal words of the text, in their order; without any, its lines that consist of hexadecimal
+//! digits. Bits are read row by row from the upper left, or from the apex for triangles, the first one being the most
+//! significant. A table of AprilTag 3 states by `bit_x` and `bit_y` where its bits are, and is put in that order.
 //!
-//! Limits: other orders of bits are not known, and AprilTags whose bits do not fill a square, such as those of
-//! tagStandard41h12, are refused.
+//! Limits: other orders of bits are not supported. AprilTags whose bits do not fill a square, for example those of
+//! tagStandard41h12, are rejected.
 
 use crate::family::{
     Construction, Family, FamilyError, PAIRS_COUNTED, Rules, TagWords, distance_histogram,
@@ -13,18 +13,18 @@ use crate::family::{
 use crate::lattice::{Dimension, GridKind};
 use crate::setting::Setting::{ImportBits, ImportDistance, ImportKind};
 
-/// What is known of a table that is to be imported.
+/// Properties of a table to import.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ImportSpec {
     /// Name of the family.
     pub name: String,
-    /// Where the table comes from.
+    /// Description of the table's source.
     pub source: String,
-    /// The tiles that its tags fill; `None` for a table that says so by the places of its bits.
+    /// Tiles that the tags fill; `None` if the positions of the bits in the table show it.
     pub kind: Option<GridKind>,
-    /// Cells of a tag; `None` for a table that says so, as by `nbits = 36`.
+    /// Number of cells of a tag; `None` if the table states it, as in `nbits = 36`.
     pub bits: Option<u32>,
-    /// Distance that the family claims; `None` for the one that it has.
+    /// Distance that the family claims; `None` for its actual distance.
     pub distance: Option<u32>,
 }
 
@@ -32,55 +32,55 @@ pub struct ImportSpec {
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum ImportError {
-    /// Nothing in the text is a code.
+    /// The text contains no code.
     #[error(
-        "there are no codes in it: they are words such as 0x08f50a7, or lines of nothing but hexadecimal digits"
+        "no codes found: a code is a word like 0x08f50a7, or a line of hexadecimal digits only"
     )]
     NoCodes,
-    /// More codes than can be compared.
-    #[error("{found} codes are too many to compare all, at most {PAIRS_COUNTED} are taken")]
+    /// There are more codes than can be compared.
+    #[error("{found} codes are too many to compare all pairs: at most {PAIRS_COUNTED} are allowed")]
     TooMany {
-        /// How many there are.
+        /// Number of codes.
         found: usize,
     },
-    /// The number of cells is not known.
-    #[error("it does not say how many cells a tag has: give {ImportBits}")]
+    /// The number of cells is unknown.
+    #[error("the table does not state the number of cells of a tag: set {ImportBits}")]
     Bits,
-    /// The shape of the tags is not known.
-    #[error("it does not say whether tags are triangles or squares: give {ImportKind}")]
+    /// The shape of the tags is unknown.
+    #[error("the table does not state whether tags are triangles or squares: set {ImportKind}")]
     Kind,
-    /// The bits are not where those of a tag are.
-    #[error("its bits do not fill a square of {bits} cells: such tags are not read here")]
+    /// The bits do not fill a tag.
+    #[error("its bits do not fill a square of {bits} cells: such tags are not supported")]
     Places {
-        /// How many there are.
+        /// Number of bits.
         bits: u32,
     },
-    /// A family file, which is no table.
-    #[error("this is a family file already: it is read by `--family` as it is")]
+    /// The text is a family file, not a table.
+    #[error("this is already a family file: pass it with `--family`")]
     FamilyFile,
-    /// A tag that looks alike in two turns.
-    #[error("codes[{id}] is its own turn: such a tag does not tell how it lies")]
+    /// A tag is rotationally symmetric.
+    #[error("code {id} is rotationally symmetric, so its orientation is ambiguous")]
     OwnTurn {
-        /// Number of the code.
+        /// Index of the code.
         id: usize,
     },
     /// Two codes are too close.
-    #[error("{ImportDistance}: its codes are as close as {found}, not {claimed}")]
+    #[error("{ImportDistance}: the distance of its codes is {found}, not {claimed}")]
     Distance {
         /// Smallest distance of two codes.
         found: u32,
-        /// What was claimed.
+        /// Claimed distance.
         claimed: u32,
     },
-    /// The codes make no family.
+    /// The codes do not form a family.
     #[error(transparent)]
     Family(#[from] FamilyError),
 }
 
-/// Makes a family of the table in a text; its distance is found by comparing all codes.
+/// Makes a family from the table in a text, and computes its distance by comparing all codes.
 ///
 /// # Errors
-/// Where there is no table, something is not known of it, or its codes make no family.
+/// Returns an error if there is no table, a property of it is unknown, or its codes do not form a family.
 ///
 /// ```
 /// use deltille_core::family::{ImportSpec, import};
@@ -113,7 +113,7 @@ pub fn import(text: &str, spec: &ImportSpec) -> Result<Family, ImportError> {
     let squares = (!places.is_empty()).then_some(GridKind::Checker);
     let kind = spec.kind.or(squares).ok_or(ImportError::Kind)?;
     if let Some(id) = codes.iter().position(Option::is_none) {
-        let problem = format!("it has more than {bits} bits");
+        let problem = format!("the code has more than {bits} bits");
         return Err(FamilyError::field(format!("codes[{id}]"), problem).into());
     }
     let codes: Vec<u64> = codes.into_iter().flatten().collect();
@@ -121,7 +121,7 @@ pub fn import(text: &str, spec: &ImportSpec) -> Result<Family, ImportError> {
         [] => codes,
         places => in_rows(&codes, places, dimension)?,
     };
-    // Codes that are too wide, or there twice, are told of by what makes the family.
+    // The constructor of the family reports codes that are too wide or duplicate.
     let fit = codes.iter().all(|&code| code <= dimension.mask());
     let histogram = distance_histogram(kind, dimension, if fit { &codes } else { &[] });
     let found = histogram.keys().next().copied().unwrap_or(bits);
@@ -141,7 +141,7 @@ pub fn import(text: &str, spec: &ImportSpec) -> Result<Family, ImportError> {
     Ok(Family::of(&spec.name, kind, dimension, distance, codes, Rules::NONE, construction)?)
 }
 
-/// A text without the comments of C, Rust and Python.
+/// Removes the comments of C, Rust and Python from a text.
 fn without_comments(text: &str) -> String {
     let mut left = String::with_capacity(text.len());
     let mut rest = text;
@@ -157,7 +157,7 @@ fn without_comments(text: &str) -> String {
     left + rest
 }
 
-/// Names and numbers, and all else but blanks character by character.
+/// Splits a text into names, numbers and other single characters; drops blanks.
 fn tokens(text: &str) -> Vec<&str> {
     let mut tokens = Vec::new();
     let mut rest = text;
@@ -175,7 +175,7 @@ fn tokens(text: &str) -> Vec<&str> {
     tokens
 }
 
-/// The codes of a table; nothing for what is wider than any code.
+/// Returns the codes of a table; `None` for words that are wider than any code.
 fn codes(text: &str, tokens: &[&str]) -> Vec<Option<u64>> {
     let is_hex = |c: char| c.is_ascii_hexdigit();
     let number = |digits: &str| u64::from_str_radix(digits, 16).ok();
@@ -192,7 +192,7 @@ fn codes(text: &str, tokens: &[&str]) -> Vec<Option<u64>> {
     lines.filter(|line| line.chars().all(is_hex)).map(number).collect()
 }
 
-/// The number of cells that a table states, such as `nbits = 36`, `BITS: u32 = 36`.
+/// Returns the number of cells that a table states, as in `nbits = 36` or `BITS: u32 = 36`.
 fn stated_bits(tokens: &[&str]) -> Option<u32> {
     let names_bits = |token: &str| token.to_ascii_lowercase().ends_with("bits");
     tokens.iter().enumerate().filter(|(_, token)| names_bits(token)).find_map(|(i, _)| {
@@ -201,7 +201,7 @@ fn stated_bits(tokens: &[&str]) -> Option<u32> {
     })
 }
 
-/// Column and row of each bit, the first the most significant, of a table that says them.
+/// Returns the column and row of each bit, the most significant first, if the table contains them.
 fn places(tokens: &[&str]) -> Vec<[u32; 2]> {
     let mut places: Vec<[Option<u32>; 2]> = Vec::new();
     for window in tokens.windows(6) {
@@ -218,7 +218,7 @@ fn places(tokens: &[&str]) -> Vec<[u32; 2]> {
     places.into_iter().map(|[x, y]| [x.unwrap_or(u32::MAX), y.unwrap_or(u32::MAX)]).collect()
 }
 
-/// Codes whose bits are at these places, with their bits row by row.
+/// Reorders the bits of codes from these positions to rows.
 fn in_rows(
     codes: &[u64],
     places: &[[u32; 2]],
@@ -258,7 +258,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_exported_is_imported_with_the_same_fingerprint() {
+    fn exported_families_import_with_the_same_fingerprint() {
         let family = Family::shipped("delTag16h5").unwrap();
         for format in [ExportFormat::C, ExportFormat::Rust, ExportFormat::Python] {
             let text = export(&family, format);
@@ -272,9 +272,9 @@ mod tests {
         }
     }
 
-    /// The table of a tag whose bits go round as in AprilTag 3: each quarter is the one before, turned.
+    /// The table of a tag with bits in rotational order as in AprilTag 3: each quarter is the previous one, rotated.
     #[test]
-    fn bits_are_put_where_the_table_says() {
+    fn bits_are_reordered_by_their_positions() {
         let family = Family::shipped("aprilTag16h5").unwrap();
         let quarter = [(1, 1), (2, 1), (3, 1), (2, 2)];
         let places = (0..4)
@@ -302,10 +302,10 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_table_is_refused() {
+    fn texts_without_a_valid_table_are_rejected() {
         let squares = Some(GridKind::Checker);
         let said = |text: &str, spec: ImportSpec| import(text, &spec).unwrap_err().to_string();
-        assert!(said("", spec(squares, Some(16))).starts_with("there are no codes"));
+        assert!(said("", spec(squares, Some(16))).starts_with("no codes found"));
         assert!(said("0x231b", spec(squares, None)).contains("`ImportSpec::bits`"));
         assert!(said("0x231b", spec(None, Some(16))).contains("`ImportSpec::kind`"));
         assert!(said("0x231b", spec(squares, Some(17))).contains("17"));

@@ -1,8 +1,8 @@
-//! Families as tables: files, those that ship, those of other programs.
+//! Families as tables: files, shipped families, and those of other programs.
 //!
-//! `file` is the family file, `fingerprint` what identifies its codes, `shipped` the list of those in the library, `growth` what they were before they had all their
-//! codes; `aruco` and `import` read tables of other programs, `export` writes source text for them. `published_bounds` are
-//! sizes of codes that others keep.
+//! `file` is the family file, `fingerprint` identifies its codes, `shipped` lists the families in the library, and
+//! `growth` records earlier states of a family. `aruco` and `import` read tables of other programs, `export` writes
+//! source text for them. `published_bounds` contains known bounds on the sizes of codes.
 
 pub(in crate::family) mod aruco;
 pub(in crate::family) mod export;

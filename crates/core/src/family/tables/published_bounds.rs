@@ -1,21 +1,22 @@
-//! What is known of the sizes of binary codes, from tables that others keep.
+//! Published bounds on the sizes of binary codes.
 //!
-//! A. E. Brouwer's *Bounds for general binary codes* (<https://www.win.tue.nl/~aeb/codes/binary-1.html>), which continues
-//! Best, Brouwer, MacWilliams, Odlyzko and Sloane, "Bounds for binary codes of length less than 25" (1978); its upper bounds
-//! include those of Schrijver (2005) and of Gijswijt, Mittelmann and Schrijver (2012) by semidefinite programming, which
-//! E. Agrell's tables (<https://codes.se/bounds/unr.html>) name one by one. They end at length 28.
+//! The source is A. E. Brouwer's *Bounds for general binary codes*
+//! (<https://www.win.tue.nl/~aeb/codes/binary-1.html>), which continues Best, Brouwer, MacWilliams, Odlyzko and
+//! Sloane, "Bounds for binary codes of length less than 25" (1978). Its upper bounds include those of Schrijver
+//! (2005) and of Gijswijt, Mittelmann and Schrijver (2012) by semidefinite programming, which E. Agrell's tables
+//! (<https://codes.se/bounds/unr.html>) list one by one. They end at length 28.
 
 use crate::lattice::{GridKind, TagCells};
 
-/// The size of the largest binary code of a length and a distance lies between these.
+/// Bounds on the size of the largest binary code of a length and a distance.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub struct PublishedBounds {
-    /// Words of the largest code that is known, whatever its symmetries.
+    /// Number of words of the largest known code, regardless of its symmetries.
     pub known_words: u64,
-    /// Words that no code exceeds.
+    /// Number of words that no code exceeds.
     pub most_words: u64,
-    /// `most_words` over the turns of a tag: no family has more codes.
+    /// `most_words` divided by the rotations of a tag: no family has more codes.
     pub most_tags: u64,
 }
 
@@ -52,8 +53,8 @@ const TABLE: [(u32, u32, u64, u64); 29] = [
     (25, 2, 1 << 24, 1 << 24),
 ];
 
-/// What is published for tags of so many cells at a distance; `None` beyond the tables, which end at 28 cells, and for
-/// distances that are trivial.
+/// Returns the published bounds for tags with this number of cells at a distance; `None` for more than 28 cells,
+/// where the tables end, and for trivial distances.
 pub fn published_bounds(cells: &TagCells, distance: u32) -> Option<PublishedBounds> {
     let bits = cells.dimension().bits();
     let odd = distance % 2;
@@ -74,7 +75,7 @@ mod tests {
     use crate::family::shipped_families;
     use crate::lattice::Dimension;
 
-    /// No shipped family exceeds a published bound, and no published bound is above our own, proved one.
+    /// No shipped family exceeds a published bound, and no published bound is above our own proven one.
     #[test]
     fn published_and_proved_bounds_and_shipped_families_agree() {
         for &(length, even, known, most) in &TABLE {

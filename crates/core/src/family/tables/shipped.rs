@@ -4,8 +4,8 @@ use super::aruco::dictionary;
 use crate::family::places;
 use crate::lattice::GridKind;
 
-/// What is known of a family without its codes, which a program in a browser fetches when it needs them: so a name, or a
-/// proposal, brings along no codes.
+/// Properties of a family without its codes. A program in a browser fetches codes only when it needs them, so names
+/// and proposals must not include them.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub struct ShippedFamily {
@@ -13,9 +13,9 @@ pub struct ShippedFamily {
     pub name: &'static str,
     /// The tiling whose tiles its tags fill.
     pub kind: GridKind,
-    /// Cells of a tag.
+    /// Number of cells of a tag.
     pub bits: u32,
-    /// Cells in which any two tags differ, in any turn.
+    /// Minimum number of cells in which two tags differ, in any rotation.
     pub distance: u32,
     /// Number of codes.
     pub codes: usize,
@@ -32,7 +32,7 @@ impl ShippedFamily {
         Self { name, kind, bits, distance, codes }
     }
 
-    /// Cells that are corrected.
+    /// Returns the number of correctable cells.
     pub fn correctable(&self) -> u32 {
         (self.distance - 1) / 2
     }
@@ -64,25 +64,25 @@ const SQUARE: [ShippedFamily; 3] = [
     ShippedFamily::of(GridKind::Checker, "aprilTag36h11", 36, 11, 587),
 ];
 
-/// The families that come with the crate, of triangular tags, then of square ones.
+/// Returns the shipped families: of triangular tags, then of square ones.
 pub fn shipped_families() -> impl Iterator<Item = &'static ShippedFamily> {
     TRIANGULAR.iter().chain(&SQUARE)
 }
 
-/// Names of the DelTag families that come with the crate.
+/// Returns the names of the shipped DelTag families.
 pub fn shipped_names() -> Vec<&'static str> {
     TRIANGULAR.iter().map(|family| family.name).collect()
 }
 
-/// Names of the families of square tags that come with the crate. AprilTag's own short names,
-/// `t36h11` for `aprilTag36h11`, are understood too.
+/// Returns the names of the shipped families of square tags. AprilTag's own short names, for example `t36h11` for
+/// `aprilTag36h11`, are accepted too.
 pub fn square_names() -> Vec<&'static str> {
     SQUARE.iter().map(|family| family.name).collect()
 }
 
-/// The family that comes with the crate, is for tiles of `kind`, has at least `needed` codes, corrects at least `corrects`
-/// cells, and is the best of these to print: fewest bits, which makes the largest cells, then the
-/// greatest distance.
+/// Returns the best shipped family for tiles of `kind` that has at least `needed` codes and corrects at least
+/// `corrects` cells. The best one to print has the fewest bits, which makes the largest cells, then the greatest
+/// distance.
 pub fn smallest_shipped(
     kind: GridKind,
     needed: u64,
@@ -94,7 +94,7 @@ pub fn smallest_shipped(
         .min_by_key(|family| (family.bits, std::cmp::Reverse(family.distance), family.codes))
 }
 
-/// The text of a family that comes with the crate.
+/// Returns the text of a shipped family.
 pub(in crate::family) fn json(name: &str) -> Option<&'static str> {
     Some(match whole(name).as_ref() {
         "d16h5" => include_str!("../../../families/d16h5.json"),
@@ -117,14 +117,14 @@ pub(in crate::family) fn json(name: &str) -> Option<&'static str> {
     })
 }
 
-/// A name without AprilTag's abbreviation.
+/// Expands AprilTag's abbreviation of a name.
 fn whole(name: &str) -> Cow<'_, str> {
     let square =
         name.strip_prefix('t').filter(|rest| rest.starts_with(|c: char| c.is_ascii_digit()));
     square.map_or(name.into(), |rest| format!("aprilTag{rest}").into())
 }
 
-/// The name of the family that comes with the crate and is called so, a dictionary of OpenCV among them; it needs no codes.
+/// Returns the full name of a shipped family or OpenCV dictionary; does not load any codes.
 pub(crate) fn shipped_name(called: &str) -> Option<Cow<'_, str>> {
     let name = whole(called);
     if name == places::NAME || shipped_families().any(|family| family.name == name) {
@@ -139,7 +139,7 @@ mod tests {
     use crate::family::Family;
 
     #[test]
-    fn what_is_known_of_families_is_as_in_their_files() {
+    fn listed_properties_match_the_family_files() {
         for &known in shipped_families() {
             let family = Family::shipped(known.name).unwrap();
             let (bits, distance) = (family.dimension().bits(), family.distance());

@@ -2,18 +2,18 @@ use super::Decoded;
 use crate::family::kernels::first_nearer;
 use crate::family::{Family, TagWords, ball};
 
-/// Tables of a family's words, in all turns, by blocks of their bits.
+/// Tables of a family's words in all rotations, by blocks of their bits.
 ///
-/// A word within e errors of a code agrees with it in some block up to ⌊e / blocks⌋ errors, so for
-/// each block only the codes are compared whose block is that close to the word's; they lie side
-/// by side. Of these, 32 bits outside the block are compared first, many at a time.
+/// A word within e errors of a code agrees with it in some block up to ⌊e / blocks⌋ errors. So for each block, only
+/// codes whose block is that close to the word's are compared; they are adjacent in memory. For these, 32 bits
+/// outside the block are compared first, many at a time.
 #[derive(Clone, Debug)]
 pub(super) struct Blocks {
     bits: u32,
     blocks: Vec<Block>,
     /// For each number of errors in a block, its patterns: all words of that weight.
     patterns: Vec<Vec<u32>>,
-    /// The words, three turns of each code, in the order of the ids.
+    /// The words, three rotations of each code, in the order of the ids.
     words: Vec<u64>,
 }
 
@@ -23,13 +23,13 @@ struct Block {
     width: u32,
     /// Bucket of block value x: entries[starts[x]..starts[x + 1]].
     starts: Vec<u32>,
-    /// What each word has outside the block, as far as 32 bits hold it.
+    /// Bits of each word outside the block, up to 32.
     tails: Vec<u32>,
-    /// 3·id + turns of each word.
+    /// Value 3·id + turns for each word.
     readings: Vec<u32>,
 }
 
-/// Blocks wider than this make tables that fall out of the processor's caches.
+/// Largest block width: tables of wider blocks exceed the processor's caches.
 const MAX_BLOCK_BITS: u32 = 18;
 
 impl Blocks {
@@ -48,12 +48,12 @@ impl Blocks {
         Self { bits, blocks, patterns, words }
     }
 
-    /// Time for a word that is no code, roughly, in comparisons.
+    /// Returns the approximate time for a word that is not a code, in comparisons.
     pub(super) fn cost(family: &Family) -> f64 {
         block_count(family).1
     }
 
-    /// The code within `max_errors`, at most ⌊(h−1)/2⌋; the first one found is the only one.
+    /// Returns the code within `max_errors`, at most ⌊(h−1)/2⌋; the first one found is the only one.
     pub(super) fn decode(&self, word: u64, max_errors: u32) -> Option<Decoded> {
         let radius = max_errors / self.blocks.len() as u32;
         for weight in 0..=radius {
@@ -115,18 +115,18 @@ impl Block {
         (word >> self.shift) as usize & ((1 << self.width) - 1)
     }
 
-    /// The bits after the block, and round again from the lowest; the uppermost are dropped where
-    /// these are more than 32.
+    /// Returns the bits after the block, continuing with the lowest ones; drops the uppermost if there are more than
+    /// 32.
     #[inline]
     fn tail(&self, bits: u32, word: u64) -> u32 {
         let end = self.shift + self.width;
-        // The last block of 64 bits leaves nothing above, and its end is no shift.
+        // The last block of 64 bits has no bits above it, and shifting by 64 would overflow.
         let above = word >> (end - 1) >> 1;
         let below = word & ((1 << self.shift) - 1);
         (above | below << (bits - end)) as u32
     }
 
-    /// The first word of a bucket that `confirm` takes, of those whose tails are near enough.
+    /// Returns the first result of `confirm` for the words of a bucket whose tails are close enough.
     #[inline]
     fn find<T>(
         &self,
@@ -147,9 +147,9 @@ impl Block {
     }
 }
 
-/// Number of blocks with the least work for a word that is no code, and that work.
+/// Returns the number of blocks with the least work for a word that is not a code, and that work.
 fn block_count(family: &Family) -> (u32, f64) {
-    /// A bucket costs about as much to reach as this many words to compare, side by side.
+    /// Cost of accessing a bucket, in comparisons of adjacent words.
     const BUCKET_COST: f64 = 100.0;
     let (bits, correctable) = (family.dimension().bits(), family.correctable());
     let words = 3.0 * family.len() as f64;
@@ -162,7 +162,7 @@ fn block_count(family: &Family) -> (u32, f64) {
     (1..=bits / 3).map(cost).min_by(|a, b| a.1.total_cmp(&b.1)).unwrap_or((1, f64::MAX))
 }
 
-/// All words of `width` bits with `weight` ones, ascending.
+/// Returns all words of `width` bits with `weight` ones, in increasing order.
 fn patterns(width: u32, weight: u32) -> Vec<u32> {
     (0..1u32 << width).filter(|x| x.count_ones() == weight).collect()
 }

@@ -1,4 +1,4 @@
-//! Finding the nearest code to a word that was read.
+//! Search for the code closest to a word that was read.
 
 mod blocks;
 mod syndromes;
@@ -9,34 +9,32 @@ use syndromes::Syndromes;
 use crate::family::{Family, TagWords};
 use crate::lattice::GridKind;
 
-/// A word recognised as a tag.
+/// A word decoded as a tag.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub struct Decoded {
     /// Id of the tag.
     pub id: u32,
-    /// Number of counter-clockwise turns of the tag that give the word read: by 120°, 0 to 2, or of
-    /// a square tag by 90°, 0 to 3.
+    /// Number of counterclockwise rotations of the tag that give the word: by 120°, 0 to 2, or by 90° for a square
+    /// tag, 0 to 3.
     pub turns: u8,
     /// Number of cells in which the word differs from the code.
     pub errors: u32,
-    /// Errors of the next best reading (another tag, or another turn), if that lies within the
-    /// errors allowed too. Never so while these are at most ⌊(h−1)/2⌋; then any other reading has
-    /// at least h − `errors`.
+    /// Errors of the second-best reading (another tag or another rotation), if it is also within the allowed errors.
+    /// This is impossible up to ⌊(h−1)/2⌋ allowed errors; any other reading then has at least h − `errors`.
     pub runner_up: Option<u32>,
 }
 
-/// Finds the nearest code, in any turn, to a word that was read.
+/// Finds the code closest to a word, in any rotation.
 ///
-/// The bits are compared in blocks; very large families made from a linear code are searched by the
-/// syndrome of the word instead. Both give the same answers. Square families are so small that every
-/// code is compared.
+/// The decoder compares the bits in blocks. For very large families made from a linear code, it uses the syndrome of
+/// the word instead. Both give the same answers. Square families are small, so every code is compared.
 #[derive(Clone, Debug)]
 pub struct Decoder {
-    /// Largest number of errors at which every word has one nearest code at most.
+    /// Largest number of errors at which the closest code is always unique.
     correctable: u32,
     kind: GridKind,
-    /// Cells that no code uses, whatever they show.
+    /// Cells that no code uses; their content is ignored.
     free: u64,
     words: TagWords,
     codes: Vec<u64>,
@@ -51,8 +49,8 @@ enum Search {
 }
 
 impl Decoder {
-    /// A decoder for `family`, by whatever way is faster. Takes memory in proportion to the number
-    /// of codes, and of patterns of errors that are corrected.
+    /// Creates a decoder for `family` with the faster method. Memory is proportional to the number of codes and of
+    /// correctable error patterns.
     pub fn new(family: &Family) -> Self {
         if family.kind() == GridKind::Checker {
             return Self::with(family, Search::Every);
@@ -69,12 +67,12 @@ impl Decoder {
         )
     }
 
-    /// A decoder that compares blocks, whatever the family of triangular tags.
+    /// Creates a decoder that compares blocks, for any family of triangular tags.
     pub fn by_blocks(family: &Family) -> Self {
         Self::with(family, Search::Blocks(Blocks::new(family)))
     }
 
-    /// A decoder by syndromes; `None` where the family was made otherwise than by a linear code.
+    /// Creates a decoder by syndromes; `None` if the family was not made from a linear code.
     pub fn by_syndromes(family: &Family) -> Option<Self> {
         Syndromes::new(family).map(|s| Self::with(family, Search::Syndromes(Box::new(s))))
     }
@@ -90,10 +88,10 @@ impl Decoder {
         }
     }
 
-    /// The nearest code within `max_errors` cells of `word`, or none.
+    /// Returns the closest code within `max_errors` cells of `word`, if any.
     ///
-    /// Up to ⌊(h−1)/2⌋ errors the answer is unique. Beyond, every code is compared, ties go to the
-    /// lower id, then the fewer turns, and show in `runner_up`.
+    /// Up to ⌊(h−1)/2⌋ errors the answer is unique. Beyond, every code is compared; ties go to the lower id, then to
+    /// fewer rotations, and appear in `runner_up`.
     #[inline]
     pub fn decode(&self, word: u64, max_errors: u32) -> Option<Decoded> {
         let word = word & !self.free;
@@ -107,18 +105,18 @@ impl Decoder {
         }
     }
 
-    /// The nearest code in the cells that are seen: those of `hidden` count for nothing. None where no code is within
-    /// `max_errors` of the other cells, nor where a second reading is as near.
+    /// Returns the closest code in the visible cells; those of `hidden` are ignored. Returns `None` if no code is
+    /// within `max_errors` of the visible cells, or a second reading is equally close.
     ///
-    /// Every code is compared. With h cells of distance left in those that are seen
-    /// ([`Family::distance_without`]) up to ⌊(h−1)/2⌋ misread cells among them never hide which tag it is.
+    /// Every code is compared. If the visible cells keep a distance of h ([`Family::distance_without`]), up to
+    /// ⌊(h−1)/2⌋ misread cells among them can always be corrected.
     ///
     /// ```
     /// use deltille_core::family::{Decoder, Family, HiddenCells};
     ///
     /// let family = Family::shipped("d25h9")?;
     /// let decoder = Decoder::new(&family);
-    /// // A finger covers an edge, which reads as white, and one more cell is misread.
+    /// A finger covers an edge, which reads as white, and one more cell is misread.
     /// let edge = HiddenCells::Edge.masks(family.dimension())[0];
     /// let read = (family.code(12).unwrap() | edge) ^ 1 << 24;
     /// let decoded = decoder.decode_erased(read, edge, 1).unwrap();
@@ -130,7 +128,7 @@ impl Decoder {
         (found.runner_up != Some(found.errors)).then_some(found)
     }
 
-    /// The word of a code that was recognised, without its errors.
+    /// Returns the word of a decoded code, without its errors.
     pub fn word(&self, decoded: Decoded) -> u64 {
         let code = self.codes.get(decoded.id as usize).copied().unwrap_or(0);
         (0..decoded.turns).fold(code, |word, _| self.words.turn(word))
@@ -140,9 +138,9 @@ impl Decoder {
         self.nearest(word, 0, max_errors)
     }
 
-    /// The nearest code in the cells that are not hidden; all are compared.
+    /// Returns the closest code in the cells that are not hidden; compares all codes.
     fn nearest(&self, word: u64, hidden: u64, max_errors: u32) -> Option<Decoded> {
-        // Turning the word back by k turns is comparing it with every code turned k times.
+        // Rotating the word back by k steps is equivalent to comparing it with every code rotated k times.
         let full = usize::from(self.kind.turns());
         let turned_back = |word: u64| {
             let mut turned_back = [word; 4];
@@ -182,9 +180,10 @@ mod tests {
     use super::*;
     use crate::family::HiddenCells;
 
-    /// Whatever hidden cells show, and with as many of the others misread as the distance left allows.
+    /// Tests any content of hidden cells, with as many misread cells among the others as the remaining distance
+    /// allows.
     #[test]
-    fn tags_are_known_with_hidden_cells() {
+    fn tags_are_decoded_with_hidden_cells() {
         let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(3);
         for name in ["d16h5", "d25h7", "d25h9", "d36h11"] {
             let family = Family::shipped(name).unwrap();
@@ -204,7 +203,7 @@ mod tests {
                     let found = decoder.decode_erased(read, mask, errors).unwrap();
                     let told = (found.id as usize, found.turns, found.errors);
                     assert_eq!(told, (id, turns, errors), "{name}, {hidden:?}");
-                    // With all cells hidden nothing is known.
+                    // With all cells hidden, nothing can be decoded.
                     assert!(decoder.decode_erased(read, family.dimension().mask(), 0).is_none());
                 }
             }

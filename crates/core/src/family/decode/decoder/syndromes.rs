@@ -4,39 +4,39 @@ use crate::family::{Construction, Family, TagWords, ball};
 
 /// Decoding by the structure of a family that is part of a union of cosets of a linear code.
 ///
-/// The syndrome of a word is that of its errors plus that of its coset, so one look into a table
-/// of all error patterns per coset gives the word of the union that was meant; whether the family
-/// lists it is looked up by its smallest turn. Time does not depend on the number of codes.
+/// The syndrome of a word is that of its errors plus that of its coset. So one lookup per coset, in a table of all
+/// error patterns, gives the intended word of the union. A second lookup, by its smallest rotation, shows whether the
+/// family contains it. The time does not depend on the number of codes.
 ///
-/// The code is the same when a tag turns, so a turn of errors is a linear map of their syndrome. The table holds one
-/// of three turned patterns, that with the smallest syndrome, and is a third as large.
+/// The code is invariant under a rotation of the tag, so rotating errors is a linear map of their syndrome. The table
+/// contains one of three rotated patterns, that with the smallest syndrome, which makes it a third as large.
 #[derive(Clone, Debug)]
 pub(super) struct Syndromes {
     words: TagWords,
-    /// The central cell, where no word of the union uses it; else none.
+    /// The central cell, if no word of the union uses it; else zero.
     ignored: u64,
     syndromes: LinearMap,
-    /// The syndrome of a turned word, from that of the word.
+    /// Maps the syndrome of a word to that of the rotated word.
     turned: LinearMap,
     /// Syndromes of the cosets.
     cosets: Vec<u32>,
     patterns: PatternTable,
-    /// The smallest turn of each code, without the ignored cell, and its id; ascending.
+    /// The smallest rotation of each code, without the ignored cell, and its id; in increasing order.
     ids: Vec<(u64, u32)>,
 }
 
-/// Tables of more error patterns than this would not be worth their memory, 18 bytes each or more; three patterns that turn
-/// into each other count as one.
+/// Largest number of error patterns: larger tables would not be worth their memory of at least 18 bytes per pattern.
+/// Three patterns that are rotations of each other count as one.
 const MAX_PATTERNS: f64 = 4e6;
 
 impl Syndromes {
-    /// Time for a word, roughly, in the unit of [`super::Blocks::cost`]; infinite where this way
-    /// of decoding is none.
+    /// Returns the approximate time for a word, in the unit of [`super::Blocks::cost`]; infinite if this method does
+    /// not apply.
     pub(super) fn cost(family: &Family) -> f64 {
-        /// A look into the table costs as much as comparing so many words side by side (measured).
+        /// Cost of a table lookup, in comparisons of adjacent words (measured).
         const LOOK_COST: f64 = 30.0;
-        /// Words over which the work is shared that making the table is, about a comparison for each pattern: those of some
-        /// hundred pictures.
+        /// Number of words that share the cost of making the table, about a comparison for each pattern: those of
+        /// some hundred images.
         const WORDS: f64 = 10_000.0;
         match family.construction() {
             Construction::Algebraic(c) if c.exchanged.is_empty() => {
@@ -47,7 +47,7 @@ impl Syndromes {
         }
     }
 
-    /// `None` where the family records no such structure, or its codes are not of it.
+    /// Returns `None` if the family records no such structure, or its codes do not belong to it.
     pub(super) fn new(family: &Family) -> Option<Self> {
         let Construction::Algebraic(construction) = family.construction() else { return None };
         let (code, cosets, ignored) = construction.on_the_tag(family.dimension())?;
@@ -76,7 +76,7 @@ impl Syndromes {
         all_belong.then_some(Self { words, ignored, syndromes, turned, cosets, patterns, ids })
     }
 
-    /// The code within `max_errors`, at most ⌊(h−1)/2⌋.
+    /// Returns the code within `max_errors`, at most ⌊(h−1)/2⌋.
     pub(super) fn decode(&self, codes: &[u64], word: u64, max_errors: u32) -> Option<Decoded> {
         let read = word & !self.ignored;
         let syndrome = self.syndromes.apply(read);
@@ -95,13 +95,13 @@ impl Syndromes {
 }
 
 impl Syndromes {
-    /// The pattern of errors that has a syndrome.
+    /// Returns the error pattern with a syndrome.
     #[inline]
     fn errors(&self, syndrome: u32) -> Option<u64> {
         let turns = turns_of(&self.turned, syndrome);
         let least = turns[0].min(turns[1]).min(turns[2]);
         let pattern = self.patterns.get(least)?;
-        // Turned twice more it is turned back once, and the other way round.
+        // Two more rotations undo one, and vice versa.
         Some(match turns.iter().position(|&syndrome| syndrome == least) {
             Some(1) => self.words.turn(self.words.turn(pattern)),
             Some(2) => self.words.turn(pattern),
@@ -110,21 +110,21 @@ impl Syndromes {
     }
 }
 
-/// The syndromes of a word after no turn, one and two.
+/// Returns the syndromes of a word after zero, one and two rotations.
 #[inline]
 fn turns_of(turned: &LinearMap, syndrome: u32) -> [u32; 3] {
     let once = turned.apply(syndrome.into());
     [syndrome, once, turned.apply(once.into())]
 }
 
-/// Error patterns by their syndromes, one of each three that turn into each other: a hash table with open addressing.
+/// Error patterns by their syndromes, one for every three rotations of each other: a hash table with open addressing.
 #[derive(Clone, Debug)]
 struct PatternTable {
     slots: Vec<Slot>,
     shift: u32,
 }
 
-/// Twelve bytes, so that most looks touch one line of the cache.
+/// Twelve bytes, so that most lookups touch one cache line.
 #[derive(Clone, Copy, Debug)]
 struct Slot {
     syndrome: u32,
@@ -134,11 +134,11 @@ struct Slot {
 const EMPTY: Slot = Slot { syndrome: 0, pattern: [u32::MAX; 2] };
 
 impl PatternTable {
-    /// All patterns of up to `weight` errors in some cells, of each of which the bit is given with its syndromes in all turns;
-    /// `None` when two have the same syndrome.
+    /// Creates a table of all patterns of up to `weight` errors in some cells. `cells` contains the bit of each with
+    /// its syndromes in all rotations. Returns `None` if two patterns have the same syndrome.
     fn new(cells: &[(u64, [u32; 3])], weight: u32) -> Option<Self> {
         let count = cells.len() as u32;
-        // A turn leaves but a few patterns as they are.
+        // Only few patterns are invariant under a rotation.
         let count = ball(count, weight) / 3.0 + ball(count / 3, weight / 3);
         let slots = ((1.5 * count) as usize + 2).next_power_of_two();
         let mut table = Self { slots: vec![EMPTY; slots], shift: 32 - slots.ilog2() };
@@ -160,7 +160,7 @@ impl PatternTable {
                 }))
     }
 
-    /// Takes a pattern whose syndrome is the smallest of its turns; false where another has it.
+    /// Inserts a pattern whose syndrome is the smallest of its rotations; returns false if another one has it.
     fn insert(&mut self, pattern: u64, [syndrome, once, twice]: [u32; 3]) -> bool {
         if once < syndrome || twice < syndrome {
             return true;
@@ -174,7 +174,7 @@ impl PatternTable {
         self.find(syndrome).1
     }
 
-    /// Where a syndrome is, or would be, and its pattern.
+    /// Returns the slot of a syndrome, occupied or free, and its pattern.
     #[inline]
     fn find(&self, syndrome: u32) -> (usize, Option<u64>) {
         // Fibonacci hashing: the upper bits of the product depend on all bits of the syndrome.
