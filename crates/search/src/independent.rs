@@ -1,10 +1,10 @@
-//! Large independent sets in graphs: which of many candidate codes can stand together.
+//! Large independent sets in graphs: compatible codes among many candidates.
 //!
-//! Local search with plateau moves (after Andrade, Resende, Werneck, "Fast local search for the
-//! maximum independent set problem", J. Heuristics 2012): a vertex without conflict is added at
-//! once; else one with a single conflict takes the place of that one, of many such the one that has been
-//! out for longest; without gain for a while, one to four vertices with few conflicts are forced in, or the
-//! search goes back to the best. Deterministic for a seed and a number of steps.
+//! The search is a local search with plateau moves (after Andrade, Resende, Werneck, "Fast local search for the
+//! maximum independent set problem", J. Heuristics 2012). A vertex without conflict is added at once. Otherwise, one
+//! with a single conflict replaces the conflicting vertex; of many, the one that has been outside for longest.
+//! Without gain for a while, one to four vertices with few conflicts are forced in, or the search returns to the best
+//! set. It is deterministic for a seed and a number of steps.
 
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -13,7 +13,7 @@ use rayon::prelude::*;
 use deltille_core::family::Screen;
 use deltille_core::family::nearer;
 
-/// Which vertices exclude each other; lists in one array.
+/// Pairs of vertices that exclude each other; all lists are in one array.
 #[derive(Clone, Debug)]
 pub(crate) struct ConflictGraph {
     starts: Vec<usize>,
@@ -21,7 +21,7 @@ pub(crate) struct ConflictGraph {
 }
 
 impl ConflictGraph {
-    /// The graph of `n` vertices with the given neighbours of each, a symmetric relation.
+    /// Creates the graph of `n` vertices with the given neighbours of each, a symmetric relation.
     pub(crate) fn new(n: usize, neighbours: impl Fn(usize) -> Vec<u32> + Sync + Send) -> Self {
         let rows: Vec<Vec<u32>> = (0..n).into_par_iter().map(neighbours).collect();
         let mut starts = vec![0];
@@ -32,8 +32,8 @@ impl ConflictGraph {
         Self { starts, lists: rows.concat() }
     }
 
-    /// Which words are too near to each other, in any turn. Where `halt` came first some
-    /// conflicts are missing.
+    /// Creates the graph of words that are too close to each other, in any rotation. Some conflicts are missing if
+    /// `halt` returned true first.
     pub(crate) fn of_words(
         screen: &Screen,
         pool: &[u64],
@@ -63,8 +63,8 @@ impl ConflictGraph {
         &self.lists[self.starts[v as usize]..self.starts[v as usize + 1]]
     }
 
-    /// A large independent set, grown from `initial` (itself independent). Stops after `steps`
-    /// moves or when `stop` says so, which is asked now and then.
+    /// Grows a large independent set from `initial` (itself independent). Stops after `steps` moves or when `stop`
+    /// returns true, which is checked from time to time.
     pub(crate) fn search(
         &self,
         initial: &[u32],
@@ -72,15 +72,15 @@ impl ConflictGraph {
         steps: u64,
         stop: impl Fn() -> bool,
     ) -> Vec<u32> {
-        /// Steps between two looks at the clock.
+        /// Steps between two checks of the clock.
         const STOP_CHECK: u64 = 1 << 10;
-        /// A vertex that left stays out for this many steps, and up to four more.
+        /// Minimum number of steps that a removed vertex stays outside; up to four more are added.
         const TABU: u64 = 7;
-        /// Vertices with one conflict that are compared before each exchange.
+        /// Number of vertices with one conflict that are compared before each exchange.
         const LOOK_AT: usize = 50;
-        /// Share of the steps, and number of them at most, without gain after which something is forced in.
+        /// Fraction of the steps, and maximum number, without gain after which vertices are forced in.
         const PATIENCE: (u64, u64) = (8, 3_000);
-        /// So many vertices below the best the search goes back to it.
+        /// Loss of vertices compared with the best set at which the search returns to it.
         const TOO_FAR: usize = 3;
         let patience = (steps / PATIENCE.0).clamp(1, PATIENCE.1);
         let mut random = ChaCha8Rng::seed_from_u64(seed);
@@ -163,7 +163,7 @@ impl Set {
     }
 }
 
-/// An independent set, and for each vertex how many of the set it excludes.
+/// An independent set, and the number of its vertices that exclude each vertex.
 struct State<'a> {
     graph: &'a ConflictGraph,
     chosen: Set,
@@ -223,7 +223,7 @@ impl<'a> State<'a> {
         }
     }
 
-    /// Of some random vertices outside the one with the fewest conflicts.
+    /// Returns the vertex with the fewest conflicts among some random ones outside.
     fn loosest(&self, random: &mut ChaCha8Rng) -> Option<u32> {
         (0..20)
             .map(|_| random.random_range(0..self.graph.len() as u32))
@@ -231,7 +231,7 @@ impl<'a> State<'a> {
             .min_by_key(|&v| self.conflicts[v as usize])
     }
 
-    /// Adds a vertex after removing whatever it excludes.
+    /// Adds a vertex after removing the vertices it excludes.
     fn force(&mut self, v: u32, mut left: impl FnMut(u32)) {
         let out: Vec<u32> =
             self.graph.neighbours(v).iter().copied().filter(|&u| self.chosen.contains(u)).collect();

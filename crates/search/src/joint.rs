@@ -1,9 +1,9 @@
-//! Arrangements judged by what local search makes of them.
+//! Arrangements judged by the result of local search.
 //!
-//! How many words of a code pass the rules is half of an arrangement's worth: words that do not pass can be repaired,
-//! or exchanged, and how many of these can stand together differs between arrangements. So annealing goes on
-//! with the number of codes that a short local search ends with. Up to 16 bits it may exchange any words, whose
-//! conflicts are listed once; beyond, words that do not pass for words one cell away.
+//! The number of a code's words that pass the rules is only part of an arrangement's worth. Other words can be
+//! repaired or exchanged, and the number of compatible ones differs between arrangements. So annealing continues with
+//! the number of codes at the end of a short local search. Up to 16 bits the search may exchange any words, whose
+//! conflicts are listed once; beyond, it exchanges words that do not pass for words one cell away.
 
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -15,7 +15,7 @@ use deltille_core::family::algebra::Arrangement;
 use deltille_core::family::algebra::CosetUnion;
 use deltille_core::family::algebra::{arranged, has_free_centre};
 
-/// Words whose conflicts are all listed, up to so many bits.
+/// Largest number of bits at which the conflicts of all words are listed.
 const LISTED_BITS: u32 = 16;
 
 /// All words that the rules admit, one of each orbit, and their conflicts.
@@ -26,7 +26,7 @@ pub(crate) struct AllWords {
 }
 
 impl AllWords {
-    /// `None` where there are too many, or `halt` came first.
+    /// Returns `None` if there are too many words, or `halt` returned true first.
     pub(crate) fn new(screen: &Screen, halt: &(dyn Fn() -> bool + Sync)) -> Option<Self> {
         let words = screen.words();
         if words.dimension().bits() > LISTED_BITS {
@@ -39,7 +39,7 @@ impl AllWords {
         (!halt()).then_some(Self { words: all, graph })
     }
 
-    /// Codes that a local search finds from some of these words.
+    /// Finds codes by a local search that starts from some of these words.
     fn search(&self, screen: &Screen, codes: &[u64], seed: u64, steps: u64) -> Vec<u64> {
         let index = |code: &u64| self.words.binary_search(&screen.words().canonical(*code)).ok();
         let initial: Vec<u32> = codes.iter().filter_map(index).map(|i| i as u32).collect();
@@ -57,7 +57,7 @@ pub(crate) struct Joint<'a> {
 }
 
 impl Joint<'_> {
-    /// The best arrangement found from `start`, and its codes.
+    /// Returns the best arrangement found from `start`, and its codes.
     pub(crate) fn anneal(
         &self,
         start: &Arrangement,
@@ -65,10 +65,10 @@ impl Joint<'_> {
         steps: u32,
         halt: &(dyn Fn() -> bool + Sync),
     ) -> (Arrangement, Vec<u64>) {
-        /// Codes that are given up at first and at the end, with a probability of 1/e.
+        /// Initial and final loss of codes that is accepted with a probability of 1/e.
         const HOT: f64 = 3.0;
         const COLD: f64 = 0.3;
-        /// Share of the words by which fewer may pass, by the quick judgement, than before.
+        /// Fraction of the words by which the quick score may decrease.
         const CLEARLY_WORSE: f64 = 0.03;
         let mut random = ChaCha8Rng::seed_from_u64(seed);
         let mut now = start.clone();
@@ -101,9 +101,9 @@ impl Joint<'_> {
         best
     }
 
-    /// The codes of an arrangement after a short local search.
+    /// Returns the codes of an arrangement after a short local search.
     fn codes(&self, arrangement: &Arrangement, seed: u64) -> Vec<u64> {
-        /// Moves where all words are candidates, and where repaired ones are.
+        /// Number of moves if all words are candidates, and if repaired ones are.
         const MOVES: [u64; 2] = [3_000, 20_000];
         let mut codes = arranged(self.screen, self.union, arrangement);
         if let Some(all) = self.all {
@@ -116,8 +116,8 @@ impl Joint<'_> {
         codes
     }
 
-    /// Admitted words one cell away from a word of the union that does not pass, and far enough from
-    /// all `codes` that do.
+    /// Returns admitted words one cell away from a word of the union that does not pass, and far enough from all
+    /// passing `codes`.
     fn repaired(&self, arrangement: &Arrangement, codes: &[u64]) -> Vec<u64> {
         let words = self.screen.words();
         let dimension = words.dimension();

@@ -1,7 +1,7 @@
-//! Local search from nothing, for the small families: the same codes for the same seed and rounds,
-//! also when it was interrupted and went on from a [`Checkpoint`].
+//! Local search without initial codes, for the small families. The same seed and rounds give the same codes, even if
+//! the search was interrupted and resumed from a [`Checkpoint`].
 //!
-//! Limits: words of up to 25 bits; larger ones are too many to count conflicts for.
+//! Limits: words of up to 25 bits; for larger ones, counting conflicts takes too long.
 
 use serde::{Deserialize, Serialize};
 
@@ -20,41 +20,41 @@ pub struct Search {
     pub steps: u64,
 }
 
-/// What whole rounds have found, to go on from there.
+/// Result of the completed rounds, from which the search can be resumed.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 #[non_exhaustive]
 pub struct Checkpoint {
-    /// Rounds that are done.
+    /// Number of completed rounds.
     pub rounds_done: u32,
-    /// Codes after these, in the order of the search.
+    /// Codes after these rounds, in the order of the search.
     pub codes: Vec<u64>,
 }
 
 impl Search {
-    /// Moves in a round of the shipped program.
+    /// Number of moves in a round of the shipped program.
     pub const STEPS: u64 = 200_000;
 
-    /// A search of so many rounds of [`Self::STEPS`] moves.
+    /// Creates a search of the given number of rounds of [`Self::STEPS`] moves.
     pub fn new(seed: u64, rounds: u32) -> Self {
         Self { seed, rounds, steps: Self::STEPS }
     }
 
-    /// The codes found, in the order of a family.
+    /// Returns the codes found, in the order of a family.
     ///
     /// # Errors
-    /// Where the search was cancelled.
+    /// Returns an error if the search was cancelled.
     pub fn codes(&self, screen: &Screen, control: Control) -> Result<Vec<u64>, FamilyError> {
         let mut checkpoint = Checkpoint::default();
         self.resume(screen, &mut checkpoint, &|_| true, control)?;
         Ok(checkpoint.family_codes(screen))
     }
 
-    /// Does the rounds that a checkpoint lacks; `save` is called after each, and tells whether to
-    /// go on. When it is cancelled, the checkpoint holds the rounds that were finished.
+    /// Completes the rounds that a checkpoint lacks. Calls `save` after each; its result determines whether to
+    /// continue. After cancelling, the checkpoint contains the completed rounds.
     ///
     /// # Errors
-    /// Where the checkpoint is of another search, or this one was cancelled.
+    /// Returns an error if the checkpoint belongs to another search, or this one was cancelled.
     pub fn resume(
         &self,
         screen: &Screen,
@@ -64,7 +64,7 @@ impl Search {
     ) -> Result<(), FamilyError> {
         let bits = screen.words().dimension().bits();
         if bits > MAX_BITS {
-            let problem = format!("local search works up to {MAX_BITS} bits, not with {bits}");
+            let problem = format!("local search supports at most {MAX_BITS} bits, not {bits}");
             return Err(FamilyError::field("bits", problem));
         }
         let effort =
@@ -73,7 +73,7 @@ impl Search {
         while checkpoint.rounds_done < self.rounds {
             control.check()?;
             let codes = round(screen, &checkpoint.codes, effort, checkpoint.rounds_done, halt);
-            // How far an interrupted round came depends on the moment.
+            // The progress of an interrupted round depends on its timing.
             control.check()?;
             checkpoint.codes = codes;
             checkpoint.rounds_done += 1;
@@ -87,14 +87,14 @@ impl Search {
         Ok(())
     }
 
-    /// The record of a search that did `rounds` rounds.
+    /// Returns the record of a search with `rounds` rounds.
     pub fn construction(&self, rounds: u32) -> Construction {
         Construction::Search { seed: self.seed, rounds, steps: self.steps }
     }
 }
 
 impl Checkpoint {
-    /// The codes in the order of a family: by the smallest of the three turned words.
+    /// Returns the codes in the order of a family: by the smallest of the three rotated words.
     pub fn family_codes(&self, screen: &Screen) -> Vec<u64> {
         let mut codes = self.codes.clone();
         codes.sort_unstable_by_key(|&code| screen.words().canonical(code));
@@ -111,7 +111,7 @@ mod tests {
     use deltille_core::lattice::Dimension;
 
     #[test]
-    fn a_search_that_was_interrupted_finds_the_same() {
+    fn interrupted_searches_find_the_same() {
         let words = TagWords::new(Dimension::from_bits(16).unwrap());
         let screen = Screen::new(words, 7, &Rules::published(7));
         let search = Search { seed: 5, rounds: 4, steps: 3_000 };

@@ -1,8 +1,8 @@
 //! Local search among all words: codes are exchanged for others until more fit.
 //!
-//! Most words conflict with many codes of a good family and never help. So each round counts, for
-//! every word, how many codes it conflicts with, takes the words with the fewest as candidates,
-//! and looks for a larger set of compatible ones among them and the present codes.
+//! Most words conflict with many codes of a good family and never help. So each round counts, for every word, how
+//! many codes it conflicts with. It takes the words with the fewest conflicts as candidates, and searches for a
+//! larger set of compatible ones among them and the present codes.
 
 use rand::seq::IndexedRandom;
 use rand::{Rng, SeedableRng};
@@ -11,25 +11,25 @@ use rand_chacha::ChaCha8Rng;
 use super::independent::ConflictGraph;
 use deltille_core::family::{Control, Screen};
 
-/// Words are counted in a table of all of them up to this size.
+/// Largest number of bits at which words are counted in a table of all of them.
 pub(crate) const MAX_BITS: u32 = 25;
 
-/// Candidates taken into one round: their conflicts must fit in memory.
+/// Number of candidates in one round: their conflicts must fit in memory.
 const POOL: usize = 24_000;
 
-/// How long and from where to search.
+/// Duration and start of a search.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Effort {
     pub seed: u64,
     pub rounds: u32,
-    /// Moves of the local search in a round.
+    /// Number of moves of the local search in a round.
     pub steps: u64,
-    /// So many codes are enough.
+    /// Sufficient number of codes.
     pub most: usize,
 }
 
-/// A family at least as large as `codes`, which has to be valid. Every code of the result is
-/// admitted by the screen and its distance from all others holds.
+/// Returns a family at least as large as `codes`, which must be valid. The screen admits every code of the result,
+/// and all distances are kept.
 pub(crate) fn polish(
     screen: &Screen,
     codes: Vec<u64>,
@@ -52,8 +52,8 @@ pub(crate) fn polish(
     best
 }
 
-/// One round. It has random numbers of its own, so that the rounds after it do not depend on
-/// whether the search was interrupted in between.
+/// Performs one round. It has its own random numbers, so that later rounds do not depend on whether the search was
+/// interrupted in between.
 pub(crate) fn round(
     screen: &Screen,
     codes: &[u64],
@@ -65,7 +65,7 @@ pub(crate) fn round(
     random.set_stream(number.into());
     let Some(pool) = candidates(screen, codes, &mut random, &halt) else { return codes.to_vec() };
     let graph = ConflictGraph::of_words(screen, &pool, &halt);
-    // Without all conflicts nothing can be exchanged.
+    // Without all conflicts, nothing can be exchanged.
     if halt() {
         return codes.to_vec();
     }
@@ -74,8 +74,8 @@ pub(crate) fn round(
     found.into_iter().map(|i| pool[i as usize]).collect()
 }
 
-/// The codes, then the words with the fewest conflicts, up to [`POOL`] in all; nothing where `halt`
-/// came first.
+/// Returns the codes, then the words with the fewest conflicts, up to [`POOL`] in all; `None` if `halt` returned true
+/// first.
 fn candidates(
     screen: &Screen,
     codes: &[u64],

@@ -1,20 +1,20 @@
-//! Codes that stand together although cells are hidden, out of those of a construction.
+//! Compatible codes with hidden cells, selected from those of a construction.
 //!
-//! Words of a code that are far enough apart may be too near where cells are hidden. Which of them stand together is an
+//! Words of a code that are far enough apart may be too close with hidden cells. Selecting compatible ones is an
 //! independent-set problem, solved by local search ([`super::independent`]).
 
 use super::independent::ConflictGraph;
 use deltille_core::family::algebra::AlgebraicConstruction;
 use deltille_core::family::{FamilyError, Screen};
 
-/// Words that are looked at, at most: their conflicts must fit in memory.
+/// Maximum number of words considered: their conflicts must fit in memory.
 const MOST_WORDS: usize = 30_000;
 
-/// Moves of the local search.
+/// Number of moves of the local search.
 const STEPS: u64 = 4_000_000;
 
-/// A construction that lists more of its words, and the codes that it lists. What it lists by itself is taken in order,
-/// which is seldom the best.
+/// Returns a construction that lists more of its words, and its codes. A construction alone takes words in order,
+/// which is rarely the best.
 pub(crate) fn with_the_most_codes(
     screen: &Screen,
     construction: AlgebraicConstruction,
@@ -36,7 +36,7 @@ pub(crate) fn with_the_most_codes(
     if found.len() <= codes.len() {
         return Ok((codes, construction));
     }
-    // Listed one by one they come first, and leave what else has room.
+    // Words listed one by one come first and leave the remaining room to others.
     let listed = found.iter().map(|&i| screen.words().hex(pool[i as usize])).collect();
     let construction = AlgebraicConstruction { exchanged: listed, ..construction };
     Ok((construction.codes(screen)?, construction))
@@ -57,9 +57,9 @@ mod tests {
         Rules { robust, ..Rules::published(distance) }
     }
 
-    /// Whatever the method, what is found is proved, and holds a share of what there is without the rule.
+    /// For every method, the result is proven and contains a fraction of the codes without the rule.
     #[test]
-    fn all_methods_find_codes_that_are_known_with_hidden_cells() {
+    fn all_methods_find_codes_robust_to_hidden_cells() {
         let dimension = Dimension::from_bits(16).unwrap();
         for (robust, least) in [("apex", 20), ("edge", 5), ("tile=2", 20)] {
             let rules = rules(5, robust);
@@ -72,7 +72,7 @@ mod tests {
             let searched =
                 Family::new("own", dimension, 5, codes, rules.clone(), construction).unwrap();
             let mut families = vec![lexicode, searched];
-            // Seconds of work.
+            // This takes seconds.
             if robust == "edge" {
                 let best = Best::new(dimension, 5, Budget::Work(1)).rules(rules);
                 families.push(best.family("own", best.start(), Control::default()).unwrap());
@@ -88,7 +88,7 @@ mod tests {
     }
 
     #[test]
-    fn a_claim_that_does_not_hold_is_found() {
+    fn wrong_claims_are_found() {
         let family = Family::shipped("d16h5").unwrap();
         let construction = Construction::Imported { source: "a test".to_owned() };
         let (dimension, codes) = (family.dimension(), family.codes().to_vec());

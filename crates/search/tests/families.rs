@@ -1,4 +1,4 @@
-//! Families that a search finds, against what the core proves and bounds.
+//! Families found by searches, compared with proofs and bounds of the core.
 
 use std::collections::HashSet;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -11,9 +11,9 @@ use deltille_core::lattice::{Dimension, GridKind};
 use deltille_search::algebra::{bch, residue};
 use deltille_search::best::{Best, Budget};
 
-/// Whatever the distance, no bound is below what is known, and where rounding left none that is said.
+/// At every distance, no bound is below a known code, and a bound missing because of rounding is reported as missing.
 #[test]
-fn bounds_of_64_cells_are_true_or_none() {
+fn bounds_of_64_cells_are_valid_or_missing() {
     let dimension = Dimension::from_bits(64).unwrap();
     for distance in 1..=64 {
         let bounds = bounds::bounds(GridKind::Deltille, dimension, distance);
@@ -27,9 +27,9 @@ fn bounds_of_64_cells_are_true_or_none() {
     }
 }
 
-/// Codes leave the free cells alone, and are known whatever these show; rates are those of all words.
+/// Codes do not use the free cells, and decode regardless of their content; rates match enumeration.
 #[test]
-fn families_with_free_cells_are_read_without_them() {
+fn families_with_free_cells_decode_without_them() {
     let dimension = Dimension::from_bits(16).unwrap();
     let rules = Rules { free: Some(FreeCells::Centre), ..Rules::published(5) };
     let best = Best::new(dimension, 5, Budget::Work(1)).rules(rules);
@@ -39,11 +39,14 @@ fn families_with_free_cells_are_read_without_them() {
     };
     let control = Control::default().report(&report);
     let family = best.family("holed", best.start(), control).unwrap();
-    assert!((1..=family.len()).contains(&told.into_inner()), "only what is found is told");
+    assert!(
+        (1..=family.len()).contains(&told.into_inner()),
+        "progress counts only codes that were found"
+    );
     let (free, certificate) = (family.free_cells(), certify(&family));
     assert!(certificate.holds(), "{:?}", certificate.failures);
     let of_all = bounds::bounds(family.kind(), dimension, 5).linear_programming;
-    assert!(family.bounds().linear_programming < of_all, "a cell less tells less apart");
+    assert!(family.bounds().linear_programming < of_all, "fewer used cells distinguish fewer tags");
     assert!(family.len() >= 30 && family.codes().iter().all(|code| code & free == 0));
     assert_eq!(Family::from_json(&family.to_json()).unwrap(), family);
     assert_ne!(

@@ -1,10 +1,9 @@
 //! The assignment of the cycles of a code to the cycles of the tag, by simulated annealing.
 //!
-//! Permuting cycles, rotating them in their places and adding a word that is fixed by the turn
-//! change neither distances nor invariance ([`Arrangement`]), but they decide how many words are
-//! complex enough to be tags. Annealing maximises that number over these choices; it finds a good
-//! arrangement, not provably the best. All words are judged at once, 64 to a machine word, by
-//! counting differing neighbours in bit slices.
+//! Permuting cycles, rotating them in place and adding a word that the rotation fixes preserve distances and
+//! invariance ([`Arrangement`]). But they determine how many words are complex enough to be tags. Annealing maximises
+//! that number over these choices; it finds a good arrangement, not provably the best. All words are judged at once,
+//! 64 per machine word, by counting differing neighbours in bit slices.
 
 use rand::seq::SliceRandom;
 use rand::{Rng, SeedableRng};
@@ -31,21 +30,19 @@ pub struct Arranger {
     black_distance: u32,
     white_distance: u32,
     free_centre: bool,
-    /// Number of differing pairs that a word may lack and still count, and the fraction as which it
-    /// counts.
+    /// Number of differing pairs that a partially counted word may lack, and the fraction as which it counts.
     nearly: Option<(u32, f64)>,
     /// Sums of two words of the code that may be too light with hidden cells, one of each orbit.
     sums: Vec<u64>,
     screen: Screen,
-    /// Cycles of the tag whose cells are free: there the last cycles of the code lie, which it does not use.
+    /// Cycles of the tag whose cells are free. The last cycles of the code, which it does not use, are there.
     free_cycles: Vec<u8>,
     is_centre_free: bool,
 }
 
 impl Arranger {
-    /// Prepares the words of a code, in cycle coordinates, one of each orbit. With `free_centre`
-    /// the central bit of each word may be chosen afterwards, and a word counts when either choice
-    /// satisfies the rules.
+    /// Prepares the words of a code, in cycle coordinates, one of each orbit. With `free_centre`, the central bit of
+    /// each word may be chosen afterwards, and a word counts if either choice satisfies the rules.
     pub fn new(
         dimension: Dimension,
         distance: u32,
@@ -90,15 +87,15 @@ impl Arranger {
         }
     }
 
-    /// Lets sums of two words of the code, in cycle coordinates, count where hidden cells leave too little of
-    /// them: of n words at least n / (1 + s) can then stand together, where s sums are too light.
+    /// Takes sums of two words of the code, in cycle coordinates, into account, which hidden cells may make too
+    /// light. Of n words, at least n / (1 + s) are compatible if s sums are too light.
     pub fn with_sums(mut self, mut sums: Vec<u64>) -> Self {
         sums.retain(|&word| self.space.canonical(word) == word);
         self.sums = sums;
         self
     }
 
-    /// The share of words that can stand together at least, with hidden cells.
+    /// Returns a lower bound for the fraction of words that are compatible with hidden cells.
     fn share_apart(&self, arrangement: &Arrangement) -> f64 {
         if self.sums.is_empty() {
             return 1.0;
@@ -109,26 +106,26 @@ impl Arranger {
         1.0 / (1.0 + light as f64)
     }
 
-    /// Lets a word that lacks up to `pairs` differing pairs count as the fraction `worth` of one,
-    /// for the annealing only: where the code has distance to spare, changing one cell may repair
-    /// the word.
+    /// Counts a word that lacks up to `pairs` differing pairs as the fraction `worth` of one, for the annealing only:
+    /// if the code has distance to spare, changing one cell may repair the word.
     pub fn with_nearly(mut self, pairs: u32, worth: f64) -> Self {
         self.nearly = Some((pairs.min(self.min_pairs), worth));
         self
     }
 
-    /// Number of words that satisfy the rules under an arrangement.
+    /// Returns the number of words that satisfy the rules under an arrangement.
     pub fn score(&self, arrangement: &Arrangement) -> u32 {
         let weights = self.weights(arrangement.inverted);
         self.count(arrangement, &weights, self.min_pairs)
     }
 
-    /// Codes that an arrangement has for sure: with hidden cells some of the words that satisfy the rules stand apart.
+    /// Returns the guaranteed number of codes of an arrangement; with hidden cells, only some of the words that
+    /// satisfy the rules are compatible.
     pub fn sure(&self, arrangement: &Arrangement) -> usize {
         (self.share_apart(arrangement) * f64::from(self.score(arrangement))) as usize
     }
 
-    /// The objective of the annealing.
+    /// Computes the objective of the annealing.
     fn worth(&self, arrangement: &Arrangement, weights: &[Slice]) -> f64 {
         let share = self.share_apart(arrangement);
         let good = share * f64::from(self.count(arrangement, weights, self.min_pairs));
@@ -139,23 +136,24 @@ impl Arranger {
         })
     }
 
-    /// The objective of [`Self::anneal`] for one arrangement.
+    /// Computes the objective of [`Self::anneal`] for one arrangement.
     pub fn judge(&self, arrangement: &Arrangement) -> f64 {
         self.worth(arrangement, &self.weights(arrangement.inverted))
     }
 
-    /// Cycles that can be arranged: the first ones, as those on free cells stay there.
+    /// Returns the number of cycles that can be arranged: the first ones, as those on free cells are fixed.
     fn movable(&self) -> usize {
         self.space.cycles as usize - self.free_cycles.len()
     }
 
-    /// Cycles that may be inverted, and the central bit unless it is free or chosen for each word.
+    /// Returns the number of cycles that may be inverted, including the central bit unless it is free or chosen for
+    /// each word.
     fn flips(&self) -> u32 {
         let centre = self.space.centre && !self.free_centre && !self.is_centre_free;
         self.movable() as u32 + u32::from(centre)
     }
 
-    /// An arrangement that differs in one choice.
+    /// Returns an arrangement that differs in one choice.
     pub fn changed(&self, arrangement: &Arrangement, random: &mut impl Rng) -> Arrangement {
         let n = self.movable();
         let mut next = arrangement.clone();
@@ -170,15 +168,15 @@ impl Arranger {
         next
     }
 
-    /// Which words are far enough from all black and all white, as bit slices; the places of cycles
-    /// do not matter for this.
+    /// Returns the words that are far enough from all black and all white, as bit slices; the positions of cycles do
+    /// not matter for this.
     fn weights(&self, inverted: u32) -> Vec<Slice> {
         let translation =
             Arrangement { inverted, ..Arrangement::plain(self.space) }.translation(self.space);
         let bits = self.space.bits();
         let centre = u64::from(self.free_centre) << (bits - 1);
         let fine = |word: u64| {
-            // With a free centre the favourable choice is taken.
+            // With a free centre, the better choice counts.
             let white = (word | centre).count_ones();
             let black = bits - (word & !centre).count_ones();
             white >= self.black_distance && black >= self.white_distance
@@ -200,8 +198,8 @@ impl Arranger {
         let mut code_bit = [0u8; 64];
         (0..).zip(&to_tag).for_each(|(i, &to)| code_bit[usize::from(to)] = i);
         let inverted = arrangement.translation(self.space);
-        // For each edge between cells of the tag: the two bits of the code, and whether exactly one
-        // of them is inverted.
+        // For each edge between cells of the tag: the two bits of the code, and whether exactly one of them is
+        // inverted.
         let edges: Vec<(u8, u8, u64)> = self
             .edges
             .iter()
@@ -226,10 +224,9 @@ impl Arranger {
             .sum()
     }
 
-    /// Anneals from a random arrangement, and returns the best objective and arrangement found. The
-    /// objective is the number of words that satisfy the rules, and what [`Arranger::with_nearly`]
-    /// adds. The result depends on `seed` and `steps` only, unless `halt` returns true and ends the
-    /// search early.
+    /// Anneals from a random arrangement, and returns the best objective and arrangement found. The objective is the
+    /// number of words that satisfy the rules, plus the contribution of [`Arranger::with_nearly`]. The result depends
+    /// only on `seed` and `steps`, unless `halt` returns true and ends the search early.
     pub fn anneal(&self, seed: u64, steps: u32, halt: impl Fn() -> bool) -> (f64, Arrangement) {
         let mut random = ChaCha8Rng::seed_from_u64(seed);
         let flips = self.flips();
@@ -242,8 +239,8 @@ impl Arranger {
         let mut weights = self.weights(now.inverted);
         let mut score = self.worth(&now, &weights);
         let mut best = (score, now.clone());
-        // The temperature falls geometrically from the standard deviation that chance gives a score
-        // to that of single words.
+        // The temperature decreases geometrically from the random standard deviation of a score to that of single
+        // words.
         let hot = (self.words.len() as f64).sqrt().max(2.0) * 0.5;
         for step in 0..steps {
             if halt() {
@@ -266,12 +263,11 @@ impl Arranger {
     }
 }
 
-/// The words of a slice that have at least `min_pairs` pairs of differing neighbours, as a bit
-/// slice.
+/// Returns the words of a slice that have at least `min_pairs` pairs of differing neighbours, as a bit slice.
 ///
-/// Counting starts at 64 − `min_pairs` and adds one for each differing pair, so that it overflows
-/// into bit 6 exactly when there are enough; with the 84 pairs of 64 cells it does so from 128 into
-/// bit 7. Eight pairs at a time go through seven full adders.
+/// Counting starts at 64 − `min_pairs` and adds one for each differing pair, so it overflows into bit 6 exactly if
+/// there are enough. With the 84 pairs of 64 cells, it overflows from 128 into bit 7. Seven full adders process eight
+/// pairs at a time.
 fn enough(
     edges: &[(u8, u8, u64)],
     slices: &[Slice],

@@ -1,17 +1,17 @@
 //! The heaviest clique of a small graph, by branch and bound.
 //!
-//! Vertices are coloured greedily, so that no two of a colour are adjacent; a clique has one vertex of each colour at
-//! most, and the heaviest vertices of the colours bound its weight (Carraghan and Pardalos 1990, Tomita and Seki
+//! Vertices are coloured greedily, so that no two of a colour are adjacent. A clique has at most one vertex of each
+//! colour, so the heaviest vertices of the colours bound its weight (Carraghan and Pardalos 1990, Tomita and Seki
 //! 2003, here with weights). Vertex sets are bit sets.
 
-/// A graph of weighted vertices; edges are pairs that may stand together.
+/// A graph of weighted vertices; edges join compatible vertices.
 pub(super) struct Cliques {
     words: usize,
     rows: Vec<u64>,
     weights: Vec<u32>,
 }
 
-/// How far a search has come.
+/// Progress of a search.
 struct Search {
     best: u64,
     found: Vec<usize>,
@@ -20,7 +20,7 @@ struct Search {
 }
 
 impl Cliques {
-    /// The graph of the vertices with these weights and a symmetric relation.
+    /// Creates the graph of vertices with these weights and a symmetric relation.
     pub(super) fn new(weights: Vec<u32>, adjacent: impl Fn(usize, usize) -> bool) -> Self {
         let n = weights.len();
         let words = n.div_ceil(64);
@@ -36,7 +36,7 @@ impl Cliques {
         Self { words, rows, weights }
     }
 
-    /// The heaviest clique, or the heaviest found when `nodes` branches were looked at.
+    /// Returns the heaviest clique, or the heaviest found in `nodes` branches.
     pub(super) fn heaviest(&self, nodes: u32) -> Vec<usize> {
         let mut all = vec![0; self.words];
         (0..self.weights.len()).for_each(|v| all[v / 64] |= 1 << (v % 64));
@@ -67,7 +67,7 @@ impl Cliques {
         }
     }
 
-    /// The vertices colour by colour, each with a bound for cliques among it and those before it.
+    /// Returns the vertices colour by colour, each with a bound for cliques among it and those before it.
     fn coloured(&self, open: &[u64]) -> Vec<(usize, u64)> {
         let mut uncoloured = open.to_vec();
         let mut order = Vec::new();

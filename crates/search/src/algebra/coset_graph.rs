@@ -1,13 +1,13 @@
 //! Unions of cosets of an invariant linear code K, by clique search.
 //!
-//! Two cosets of K are at distance h or more exactly when the sum of their syndromes is not the
-//! syndrome of a word lighter than h. All syndromes of such words are marked once. A code K ∪ (K+a)
-//! ∪ … with distance h is then a set of syndromes that contains 0 and all of whose pairwise sums
-//! are unmarked: a clique in a Cayley graph (an independent set in its complement). Its vertices
-//! here are whole orbits of syndromes under the turn, so that the union is invariant.
+//! Two cosets of K are at distance h or more exactly if the sum of their syndromes is not the syndrome of a word
+//! lighter than h. All syndromes of such words are marked once. A code K ∪ (K+a) ∪ … with distance h is then a set of
+//! syndromes that contains 0 and whose pairwise sums are all unmarked: a clique in a Cayley graph (an independent set
+//! in its complement). Its vertices here are whole orbits of syndromes under the rotation, so that the union is
+//! invariant.
 //!
-//! The search draws the first vertices at random and finds the best of what they leave: the union need not be the largest. The
-//! table of marks has one bit for each syndrome, which limits codes to [`MAX_SYNDROME_BITS`].
+//! The search draws the first vertices at random and finds the best completion, so the union need not be the largest.
+//! The table of marks has one bit for each syndrome, which limits codes to [`MAX_SYNDROME_BITS`].
 
 use deltille_core::family::algebra::{CosetUnion, CycleSpace, LinearMap, Span};
 use rand::SeedableRng;
@@ -16,11 +16,11 @@ use rand_chacha::ChaCha8Rng;
 
 use super::clique::Cliques;
 
-/// The most bits that a syndrome may have; the table of marked syndromes then takes 16 MiB.
+/// Largest number of syndrome bits; the table of marked syndromes then takes 16 MiB.
 pub const MAX_SYNDROME_BITS: u32 = 27;
 
-/// The compatibility graph of the cosets of one code: vertices are orbits of cosets that keep the
-/// distance, edges join those that keep it from each other.
+/// The compatibility graph of the cosets of one code. Vertices are orbits of cosets that keep the distance; edges
+/// join those that keep it from each other.
 #[derive(Clone, Debug)]
 pub struct CosetGraph {
     space: CycleSpace,
@@ -32,7 +32,7 @@ pub struct CosetGraph {
     vertices: Vec<Vertex>,
 }
 
-/// An orbit of syndromes under the turn: one syndrome that the turn fixes, or three.
+/// An orbit of syndromes under the rotation: one syndrome that the rotation fixes, or three.
 #[derive(Clone, Copy, Debug)]
 struct Vertex {
     syndrome: u32,
@@ -41,9 +41,9 @@ struct Vertex {
 }
 
 impl CosetGraph {
-    /// The graph of an invariant `code` for minimum distance `distance` (1 or more). `None` when
-    /// the code itself has a smaller distance, when its syndromes have more than
-    /// [`MAX_SYNDROME_BITS`] bits, or when `halt` returned true before the table was complete.
+    /// Creates the graph of an invariant `code` for minimum distance `distance` (1 or more). Returns `None` if the
+    /// code itself has a smaller distance, its syndromes have more than [`MAX_SYNDROME_BITS`] bits, or `halt`
+    /// returned true before the table was complete.
     pub fn new(
         space: CycleSpace,
         code: Span,
@@ -69,7 +69,7 @@ impl CosetGraph {
         Some(graph)
     }
 
-    /// Number of orbits of cosets that can be united with the code itself.
+    /// Returns the number of orbits of cosets that can be united with the code itself.
     pub fn vertices(&self) -> usize {
         self.vertices.len()
     }
@@ -106,14 +106,14 @@ impl CosetGraph {
         !self.is_marked(a ^ b) && !self.is_marked(a ^ once) && !self.is_marked(a ^ self.turn(once))
     }
 
-    /// A large union, grown from one random start: vertices are added one by one, each time the one of a
-    /// few random candidates that leaves the most words possible, until so few are left that the
-    /// heaviest clique of these is found by branch and bound, or `halt` returns true. The result
-    /// depends on `seed` only, unless `halt` ended the search.
+    /// Returns a large union, grown from one random start. Vertices are added one by one, each time the one of a few
+    /// random candidates that leaves the most possible words. When few are left, branch and bound finds the heaviest
+    /// clique of these, unless `halt` returns true. The result depends only on `seed`, unless `halt` ended the
+    /// search.
     pub fn grow(&self, seed: u64, halt: impl Fn() -> bool) -> CosetUnion {
-        /// Candidates that are compared before each choice.
+        /// Number of candidates that are compared before each choice.
         const LOOK_AT: usize = 12;
-        /// So many vertices are few, and so many branches are looked at.
+        /// Number of vertices that count as few, and number of branches searched.
         const FEW: usize = 800;
         const NODES: u32 = 4_000;
         let mut random = ChaCha8Rng::seed_from_u64(seed);
@@ -165,7 +165,7 @@ impl CosetGraph {
         CosetUnion { space: self.space, code: self.code.clone(), cosets }
     }
 
-    /// The word of this syndrome that has only free bits set.
+    /// Returns the word of this syndrome that has only free bits set.
     fn word(&self, syndrome: u32) -> u64 {
         (0..)
             .zip(&self.free_bits)
@@ -174,9 +174,8 @@ impl CosetGraph {
     }
 }
 
-/// Marks the syndromes of all words of up to `weight` set bits, as sums of columns added to `sum`.
-/// Returns false when one or more columns sum to zero, so that the code has a word that light, or
-/// when `halt` came first.
+/// Marks the syndromes of all words of up to `weight` set bits, as sums of columns added to `sum`. Returns false if
+/// one or more columns sum to zero, so that the code has such a light word, or if `halt` returned true first.
 fn mark(
     columns: &[u32],
     sum: u32,
@@ -184,7 +183,7 @@ fn mark(
     marked: &mut [u64],
     halt: &dyn Fn() -> bool,
 ) -> bool {
-    /// Remaining weight at which `halt` is asked: some ten thousand sums lie between two calls.
+    /// Remaining weight at which `halt` is called: some ten thousand sums lie between two calls.
     const LOOK_AT: u32 = 4;
     marked[sum as usize / 64] |= 1 << (sum % 64);
     if weight == 0 {

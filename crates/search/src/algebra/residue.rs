@@ -1,17 +1,16 @@
 //! Extended quadratic-residue codes and their symmetry of order three.
 //!
-//! For a prime q ≡ ±1 mod 8 the binary code spanned by the shifts of the indicator word of the
-//! quadratic residues mod q has dimension (q+1)/2; a parity bit at ∞ extends it to length q+1.
-//! The extended code is invariant under PSL(2,q) acting on the projective line (Gleason–Prange theorem;
-//! MacWilliams & Sloane, chapter 16). For q ≡ 2 mod 3 its element x → 1/(1−x), of order three,
-//! fixes no point, so it cuts the q+1 positions into three-cycles.
+//! For a prime q ≡ ±1 mod 8, the binary code spanned by the shifts of the indicator word of the quadratic residues
+//! mod q has dimension (q+1)/2. A parity bit at ∞ extends it to length q+1. The extended code is invariant under
+//! PSL(2,q) acting on the projective line (Gleason–Prange theorem; MacWilliams & Sloane, chapter 16). For q ≡ 2 mod
+//! 3, its element x → 1/(1−x), of order three, fixes no point, so it divides the q+1 positions into three-cycles.
 
 use deltille_core::family::algebra::{CycleSpace, Span};
 
 /// Primes q whose extended codes fit a word: lengths q+1 of 18, 24, 42 and 48.
 pub const PRIMES: [u32; 4] = [17, 23, 41, 47];
 
-/// Minimum distance of the extended code; `q` has to be one of [`PRIMES`].
+/// Returns the minimum distance of the extended code; `q` must be one of [`PRIMES`].
 pub fn min_distance(q: u32) -> u32 {
     match q {
         17 => 6,
@@ -21,10 +20,10 @@ pub fn min_distance(q: u32) -> u32 {
     }
 }
 
-/// The extended quadratic-residue code of length q+1 and dimension (q+1)/2, in cycle coordinates.
+/// Returns the extended quadratic-residue code of length q+1 and dimension (q+1)/2, in cycle coordinates.
 ///
 /// # Panics
-/// When `q` is not one of [`PRIMES`].
+/// Panics if `q` is not one of [`PRIMES`].
 pub fn extended(q: u32) -> Span {
     let residues: Vec<u32> = (1..q).map(|x| x * x % q).collect();
     let indicator = |member: &dyn Fn(u32) -> bool| {
@@ -47,12 +46,12 @@ pub fn extended(q: u32) -> Span {
     }))
 }
 
-/// The space of the words of [`extended`]: (q+1)/3 cycles and no central bit.
+/// Returns the space of the words of [`extended`]: (q+1)/3 cycles and no central bit.
 pub fn space(q: u32) -> CycleSpace {
     CycleSpace { cycles: (q + 1) / 3, centre: false }
 }
 
-/// The points of the projective line (∞ = None), cycle by cycle of x → 1/(1−x).
+/// Returns the points of the projective line (∞ = None), cycle by cycle of x → 1/(1−x).
 fn line_in_cycles(q: u32) -> Vec<Option<u32>> {
     let inverse = |x: u32| (1..q).find(|y| x * y % q == 1);
     let image = |point: Option<u32>| match point {
@@ -69,8 +68,8 @@ fn line_in_cycles(q: u32) -> Vec<Option<u32>> {
     order
 }
 
-/// The code shortened to the cycles listed in `keep`, in that order: the words that vanish on all
-/// other cycles, with these left out. Distance and invariance are kept.
+/// Returns the code shortened to the cycles in `keep`, in that order: the words that vanish on all other cycles,
+/// without these cycles. Distance and invariance are preserved.
 pub fn shortened(code: &Span, space: CycleSpace, keep: &[u32]) -> Span {
     let cut = (0..space.cycles).filter(|c| !keep.contains(c)).fold(0, |m, c| m | 0b111 << (3 * c));
     Span::of(code.vanishing_on(cut).rows().iter().map(|&row| {

@@ -1,4 +1,5 @@
-//! Unions of cosets, arranged on the tag: by how many words satisfy the rules, or by what local search makes of them.
+//! Unions of cosets arranged on the tag, judged by the number of words that satisfy the rules, or by the result of
+//! local search.
 
 use rayon::prelude::*;
 
@@ -9,26 +10,26 @@ use crate::joint::{AllWords, Joint};
 use deltille_core::family::algebra::{Arrangement, CosetUnion, has_free_centre};
 use deltille_core::family::{Control, Screen};
 
-/// Words by which an arrangement is judged, at most: of very many a part tells which is good.
+/// Maximum number of words by which an arrangement is judged: a sample of very many is sufficient.
 pub(super) const JUDGED_WORDS: usize = 30_000;
 
-/// A union and how it is arranged.
+/// A union and its arrangement.
 #[derive(Clone, Debug)]
 pub(super) struct Candidate {
     pub(super) source: String,
     pub(super) union: CosetUnion,
     pub(super) arrangement: Arrangement,
-    /// Codes that are expected of it, those counted in part that local search may repair.
+    /// Expected number of codes; codes that local search may repair count fractionally.
     pub(super) worth: f64,
-    /// Codes that it has as it is, at least.
+    /// Guaranteed number of codes without local search.
     pub(super) sure: usize,
-    /// What local search made of it.
+    /// Codes after local search.
     pub(super) codes: Vec<u64>,
 }
 
-/// The candidate that has the most codes as it is, of all that there were: what is told of a search is also written.
+/// The candidate with the most guaranteed codes so far; the codes that progress reports announce can also be written.
 pub(super) struct Surest {
-    /// Codes that are known without it.
+    /// Number of codes known without it.
     pub(super) known: usize,
     pub(super) candidate: Option<Candidate>,
 }
@@ -51,10 +52,10 @@ impl Best {
         self.arranger(union, union.some_orbits(JUDGED_WORDS).1)
     }
 
-    /// What arranges a union, judged by some of its orbits.
+    /// Creates the arranger of a union, judged by some of its orbits.
     pub(super) fn arranger(&self, union: &CosetUnion, orbits: Vec<u64>) -> Arranger {
-        /// A changed cell makes up to three pairs differ, and about this share of such words can
-        /// be had without conflict.
+        /// Number of differing pairs that changing one cell can add, and the approximate fraction of these repaired
+        /// words without conflict.
         const REPAIR: (u32, f64) = (3, 0.45);
         let free_centre = has_free_centre(union);
         let arranger =
@@ -75,7 +76,7 @@ impl Best {
         }
     }
 
-    /// Arranges the candidates thoroughly; the best first.
+    /// Arranges the candidates thoroughly; returns the best first.
     pub(super) fn rearrange(
         &self,
         candidates: &mut [Candidate],
@@ -112,7 +113,7 @@ impl Best {
         candidates.sort_by(|a, b| b.worth.total_cmp(&a.worth));
     }
 
-    /// What is on record, as a candidate.
+    /// Returns the construction on record as a candidate.
     pub(super) fn on_record(&self, start: &Start) -> Option<Candidate> {
         let construction = &start.construction;
         let union = construction.union(self.dimension).ok()?;
@@ -121,7 +122,8 @@ impl Best {
         Some(Candidate { source, union, arrangement, worth: 0.0, sure, codes })
     }
 
-    /// Arranges the best candidates, and what is on record, for what local search makes of them; the best first.
+    /// Arranges the best candidates and the construction on record for the best result of local search; returns the
+    /// best first.
     #[expect(clippy::too_many_arguments)]
     pub(super) fn jointly(
         &self,
@@ -133,9 +135,9 @@ impl Best {
         surest: &mut Surest,
         control: Control,
     ) {
-        /// Candidates that are worth it.
+        /// Number of candidates that are refined.
         const KEPT: usize = 3;
-        /// Steps of the first round; each has half as many more.
+        /// Steps of the first round; each further round has half as many more.
         const STEPS: u32 = 60;
         let until = spent.until(share);
         let over = || is_past(until) || control.is_cancelled();
@@ -168,7 +170,7 @@ impl Best {
     }
 }
 
-/// Minimum distance of a union of cosets.
+/// Computes the minimum distance of a union of cosets.
 fn min_distance(union: &CosetUnion) -> u32 {
     let differences = union
         .cosets

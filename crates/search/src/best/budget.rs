@@ -1,23 +1,23 @@
-//! How long a search goes on, and how far it has come.
+//! Budget and progress of a search.
 
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Duration;
 
 use deltille_core::Clock;
 
-/// How long a search goes on.
+/// Budget of a search.
 #[derive(Clone, Copy, Debug)]
 #[non_exhaustive]
 pub enum Budget {
-    /// So long by a clock; how much is found depends on the machine.
+    /// Time by a clock; the result depends on the machine.
     Time(Duration, Clock),
-    /// So many steps: in each four batches of codes are drawn, the best are arranged once more, and codes are
-    /// exchanged in one round of local search. What is found depends on the seed alone.
+    /// Number of steps. Each step draws four batches of codes, arranges the best once more, and exchanges codes in
+    /// one round of local search. The result depends on the seed alone.
     Work(u32),
 }
 
 impl Budget {
-    /// What the clock says; zero where work is counted.
+    /// Returns the time of the clock; zero for a budget of work.
     pub(super) fn now(self) -> Duration {
         match self {
             Budget::Time(_, clock) => clock(),
@@ -26,21 +26,21 @@ impl Budget {
     }
 }
 
-/// How far a search has come.
+/// Progress of a search.
 pub(super) struct Spent {
-    /// When the search began, by the clock of its budget; zero where work is counted.
+    /// Start time of the search, by the clock of its budget; zero for a budget of work.
     start: Duration,
     budget: Budget,
-    /// Share of the budget that is spent before the first share is asked for.
+    /// Fraction of the budget that is spent before the first fraction is requested.
     first: f64,
-    /// Steps done of a search by work, and in all.
+    /// Steps completed by a search by work, and their total.
     done: AtomicU64,
     total: u64,
 }
 
 impl Spent {
     pub(super) fn new(budget: Budget, first: f64) -> Self {
-        // Drawing, arranging, both at once and exchanging, and exchanging what is on record.
+        // Drawing, arranging, joint search with exchange, and exchange of the codes on record.
         let parts = if first > 0.0 { 5 } else { 4 };
         let total = match budget {
             Budget::Time(..) => 1,
@@ -49,7 +49,7 @@ impl Spent {
         Self { start: budget.now(), budget, first, done: AtomicU64::new(0), total }
     }
 
-    /// When a share of what follows the first share is spent; `None` where work is counted.
+    /// Returns the time when a fraction of the budget after the first one is spent; `None` for a budget of work.
     pub(super) fn until(&self, share: f64) -> Option<End> {
         match self.budget {
             Budget::Time(time, clock) => {
@@ -60,7 +60,7 @@ impl Spent {
         }
     }
 
-    /// Rounds of a kind: as many as are worked, or as the time gives.
+    /// Returns the number of rounds of a kind: at most the steps of work, or as many as the time allows.
     pub(super) fn rounds(&self, most: u64) -> u64 {
         match self.budget {
             Budget::Time(..) => most,
@@ -83,7 +83,7 @@ impl Spent {
     }
 }
 
-/// When something ends.
+/// End time of a phase.
 #[derive(Clone, Copy)]
 pub(super) struct End {
     clock: Clock,
@@ -91,14 +91,14 @@ pub(super) struct End {
 }
 
 impl End {
-    /// An end that leaves so much of what is left.
+    /// Returns an end that leaves the given fraction of the remaining time.
     pub(super) fn after(self, share: f64) -> Self {
         let now = (self.clock)();
         Self { at: now + self.at.saturating_sub(now).mul_f64(share), ..self }
     }
 }
 
-/// Whether an end has come; without one it never does.
+/// Returns whether an end has passed; without one it never does.
 pub(super) fn is_past(end: Option<End>) -> bool {
     end.is_some_and(|end| (end.clock)() >= end.at)
 }

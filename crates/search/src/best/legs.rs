@@ -1,7 +1,9 @@
-//! Long searches in legs: each is a search of its own that starts from the best so far, with random numbers of its own.
+//! Long searches in legs: each is a separate search that starts from the best result so far, with its own random
+//! numbers.
 //!
-//! Between two legs a search can be interrupted, and goes on from a [`Checkpoint`] later. A step of work is a leg, so
-//! that a search by work finds the same with and without a break. Of a time a leg is a tenth, a minute at least.
+//! Between two legs, a search can be interrupted and resumed from a [`Checkpoint`] later. A step of work is a leg, so
+//! a search by work gives the same result with and without a break. For a budget of time, a leg is a tenth of it, but
+//! at least a minute.
 
 use std::time::Duration;
 
@@ -11,31 +13,30 @@ use super::budget::Budget;
 use super::request::{Best, Start};
 use deltille_core::family::{Construction, Control, Family, FamilyError, Progress};
 
-/// What the legs of a search have found, to go on from there.
+/// Result of the legs of a search so far, from which it can be resumed.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 #[non_exhaustive]
 pub struct Checkpoint {
-    /// Legs that are done.
+    /// Number of completed legs.
     pub legs_done: u32,
-    /// Seconds that were searched, where the budget is a time.
+    /// Seconds searched, for a budget of time.
     pub seconds: f64,
     /// The best codes so far.
     pub codes: Vec<u64>,
-    /// How these are made.
+    /// Construction of these codes.
     pub construction: Option<Construction>,
 }
 
-/// The shortest leg of a search by time.
+/// Shortest leg of a search by time.
 const SHORTEST: Duration = Duration::from_secs(60);
 
 impl Best {
-    /// Searches and makes a family of what was found, at least as large as what it starts from. Progress is
-    /// reported in thousandths. When it is cancelled, the search is over: the family is the best so far,
-    /// and only where nothing was found yet there is none.
+    /// Searches and makes a family of the result, at least as large as the one it starts from. Reports progress in
+    /// thousandths. Cancelling ends the search with the best family so far; it fails only if nothing was found yet.
     ///
     /// # Errors
-    /// Where the rules make no sense, or the search was cancelled before anything was found.
+    /// Returns an error if the rules are invalid, or the search was cancelled before anything was found.
     pub fn family(
         &self,
         name: &str,
@@ -45,11 +46,12 @@ impl Best {
         self.resume(name, start, &mut Checkpoint::default(), &|_| (), control)
     }
 
-    /// As [`Self::family`], from where a checkpoint stands; `save` is called after each leg. When it is cancelled, the
-    /// checkpoint of a search by work holds the legs that were finished, that of a search by time also what was found since.
+    /// Like [`Self::family`], but resumes from a checkpoint and calls `save` after each leg. After cancelling, the
+    /// checkpoint of a search by work contains the completed legs, that of a search by time also the result of the
+    /// interrupted one.
     ///
     /// # Errors
-    /// As [`Self::family`], and where the checkpoint is not consistent.
+    /// Like [`Self::family`], and returns an error if the checkpoint is inconsistent.
     pub fn resume(
         &self,
         name: &str,
@@ -61,7 +63,7 @@ impl Best {
         self.rules.check(self.dimension.bits())?;
         let screen = self.screen();
         if let Some(Construction::Algebraic(construction)) = &checkpoint.construction {
-            // Whatever a file says that codes are.
+            // The codes are listed again, because those in the file may be wrong.
             checkpoint.codes = construction.codes(&screen)?;
         } else if checkpoint.construction.is_none()
             && let Some(start) = &start
@@ -95,7 +97,7 @@ impl Best {
             };
             let better = found.filter(|(codes, _)| codes.len() > known);
             if control.is_cancelled() && matches!(self.budget, Budget::Work(_)) {
-                // How far an interrupted leg came depends on the moment.
+                // The progress of an interrupted leg depends on its timing.
                 return match better {
                     Some((codes, construction)) => self.made(name, codes, construction),
                     None => self.best_of(name, checkpoint),
@@ -114,13 +116,13 @@ impl Best {
         self.best_of(name, checkpoint)
     }
 
-    /// The budget of the next leg and its share of the whole; `None` at the end.
+    /// Returns the budget of the next leg and its fraction of the whole; `None` at the end.
     fn next_leg(&self, checkpoint: &Checkpoint) -> Option<(Budget, f64)> {
         match self.budget {
             Budget::Time(time, clock) => {
                 let left =
                     time.saturating_sub(Duration::try_from_secs_f64(checkpoint.seconds).ok()?);
-                // What the end of a leg took longer is not made up for by a leg too short to find anything.
+                // A leg too short to find anything would not make up for an overrun.
                 let over = checkpoint.legs_done > 0 && left < time.mul_f64(0.02).max(SHORTEST / 60);
                 let leg = SHORTEST.max(time / 10);
                 let leg = if left < leg.mul_f64(1.5) { left } else { leg };
@@ -134,7 +136,7 @@ impl Best {
         }
     }
 
-    /// The share of the budget that is spent.
+    /// Returns the fraction of the budget that is spent.
     fn done(&self, checkpoint: &Checkpoint) -> f64 {
         match self.budget {
             Budget::Time(time, _) => checkpoint.seconds / time.as_secs_f64().max(1e-3),
@@ -167,7 +169,7 @@ mod tests {
     use deltille_core::lattice::Dimension;
 
     #[test]
-    fn a_search_by_work_in_pieces_finds_what_it_finds_at_once() {
+    fn interrupted_searches_by_work_find_the_same() {
         let search = Best::new(Dimension::from_bits(9).unwrap(), 4, Budget::Work(3)).seed(5);
         let whole = search.family("d9h4", None, Control::default()).unwrap();
 
@@ -178,7 +180,7 @@ mod tests {
             let stop = |_: &Checkpoint| cancel.store(piece < 3, Ordering::Relaxed);
             search.resume("d9h4", None, &mut checkpoint, &stop, control).unwrap();
             assert_eq!(checkpoint.legs_done, piece);
-            // As a file would bring it back.
+            // As read from a file.
             let text = serde_json::to_string(&checkpoint).unwrap();
             checkpoint = serde_json::from_str(&text).unwrap();
         }
@@ -187,7 +189,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_searched_already_counts() {
+    fn completed_legs_count() {
         let clock: deltille_core::Clock = || Duration::ZERO;
         let time = Budget::Time(Duration::from_secs(600), clock);
         let search = Best::new(Dimension::from_bits(9).unwrap(), 4, time);
@@ -195,7 +197,7 @@ mod tests {
             let checkpoint = Checkpoint { legs_done, seconds, ..Checkpoint::default() };
             search.next_leg(&checkpoint).map(|(budget, _)| match budget {
                 Budget::Time(time, _) => time.as_secs(),
-                Budget::Work(_) => panic!("a leg of a time is a time"),
+                Budget::Work(_) => panic!("a leg of a budget of time has a time"),
             })
         };
         assert_eq!(left(0, 0.0), Some(60));

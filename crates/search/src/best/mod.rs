@@ -1,18 +1,18 @@
-//! The best of all methods within a time limit: the best construction on record, and sources of invariant
-//! codes, arranged on the tag so that as many words as possible satisfy the rules, then repaired and
-//! extended by local search.
+//! The best of all methods within a time limit. It starts from the best construction on record and sources of
+//! invariant codes, arranges them on the tag so that as many words as possible satisfy the rules, and repairs and
+//! extends them by local search.
 //!
-//! How far it gets depends on the time, so what it found is recorded in full
+//! The result depends on the time, so it is recorded in full
 //! ([`AlgebraicConstruction`](deltille_core::family::algebra::AlgebraicConstruction)) and gives the same codes again
-//! without any search. With an amount of work instead of a time the same seed gives the same codes on every machine.
+//! without any search. With an amount of work instead of a time, the same seed gives the same codes on every machine.
 //!
-//! Comes in: a [`Best`], what is asked for. Goes out: a family, at least as large as what is on record.
+//! The input is a [`Best`], the request. The result is a family at least as large as the one on record.
 //!
-//! 1. `request` is what is asked for, what a search starts from, and how many codes there can be.
-//! 2. `budget` is how long it goes on, and how far it has come.
-//! 3. `legs` divides it into legs, so that it can be interrupted; `one_leg` is one of them.
-//! 4. `sources` draws codes, and unions of their cosets.
-//! 5. `arranged` arranges these on the tag, the most promising first.
+//! 1. `request`: the request, the start of a search, and the maximum number of codes;
+//! 2. `budget`: the duration of a search, and its progress;
+//! 3. `legs`: the division into legs, so that a search can be interrupted; `one_leg`: one of them;
+//! 4. `sources`: drawing of codes, and unions of their cosets;
+//! 5. `arranged`: their arrangement on the tag, the most promising first.
 
 mod arranged;
 mod budget;

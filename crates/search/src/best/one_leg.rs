@@ -1,4 +1,5 @@
-//! One search with the whole budget: from sources to a construction in full, with codes exchanged where that gains more.
+//! One search with the whole budget: from sources to a complete construction, with exchanged codes if that gains
+//! more.
 
 use std::collections::HashSet;
 
@@ -11,23 +12,23 @@ use crate::robust::with_the_most_codes;
 use deltille_core::family::algebra::{AlgebraicConstruction, CosetUnion, Ranked, stride_of};
 use deltille_core::family::{Construction, Control, FamilyError, Progress, Screen};
 
-/// Codes of a construction with a stride, where nothing else is said.
+/// Default number of codes of a construction with a stride.
 const STRIDED_CODES: u64 = 1 << 20;
 
 impl Best {
-    /// Searches once with the whole budget: codes at least as many as those it starts from.
+    /// Searches once with the whole budget; finds at least as many codes as it starts from.
     pub(super) fn leg(
         &self,
         screen: &Screen,
         start: Option<&Start>,
         control: Control,
     ) -> Result<(Vec<u64>, Construction), FamilyError> {
-        /// Share of the time in which codes on record are exchanged.
+        /// Fraction of the time for exchanging codes on record.
         const FOR_RECORD: f64 = 0.15;
-        /// Share of what is left until which arrangements are judged by local search.
+        /// Fraction of the remaining time after which local search no longer judges arrangements.
         const JOINT: f64 = 0.85;
-        // Most of the gain comes from good sources and arrangements, at 25 bits and fewer also
-        // from exchanging codes, where there is time for it.
+        // Good sources and arrangements give most of the gain. Up to 25 bits, exchanging codes helps too if there is
+        // time.
         let small = self.exchange && self.dimension.bits() <= crate::polish::MAX_BITS;
         let [sources, arrangements] = match (small, self.exchange_pays()) {
             (false, _) => [0.6, 1.0],
@@ -61,7 +62,7 @@ impl Best {
                 Budget::Work(_) => !is_first,
             };
             let over = over || !small || control.is_cancelled();
-            // What may be large is not written down only to be compared when time is short.
+            // Listing a large construction only for comparison is skipped when time is short.
             let over = over && (!is_first || control.is_cancelled());
             if best.as_ref().is_some_and(|(codes, _)| over || codes.len() >= most) {
                 break;
@@ -77,7 +78,7 @@ impl Best {
             }
             control.tell(spent.thousandths(), 1000, best.as_ref().map_or(0, |b| b.0.len()));
         }
-        // What was judged to be worth more may have ended with less.
+        // A candidate that was judged better may have ended with fewer codes.
         let least = best.as_ref().map_or(0, |b| b.0.len());
         if let Some(mut surest) = surest.candidate.filter(|surest| surest.sure > least) {
             let codes = std::mem::take(&mut surest.codes);
@@ -93,7 +94,7 @@ impl Best {
         }
     }
 
-    /// The record of a candidate.
+    /// Returns the record of a candidate.
     fn construction(&self, screen: &Screen, candidate: Candidate) -> AlgebraicConstruction {
         let words = screen.words();
         let hex = |list: &[u64]| list.iter().map(|&w| words.hex(w)).collect();
@@ -113,7 +114,7 @@ impl Best {
         }
     }
 
-    /// The codes of a construction, some of them exchanged where that gains more.
+    /// Returns the codes of a construction, some of them exchanged if that gains more.
     fn exchanged(
         &self,
         screen: &Screen,
@@ -148,7 +149,7 @@ impl Best {
         Ok((codes, Construction::Algebraic(construction)))
     }
 
-    /// Local search alone, for distances that leave no room for a linear code.
+    /// Runs local search alone, for distances that leave no room for a linear code.
     fn search_alone(
         &self,
         screen: &Screen,
@@ -156,7 +157,7 @@ impl Best {
     ) -> Result<(Vec<u64>, Construction), FamilyError> {
         if self.dimension.bits() > crate::polish::MAX_BITS {
             control.check()?;
-            return Err(FamilyError::field("codes", "none was found"));
+            return Err(FamilyError::field("codes", "no code was found"));
         }
         let search = Search::new(self.seed, 3);
         let codes = search.codes(screen, control)?;
@@ -164,8 +165,8 @@ impl Best {
     }
 }
 
-/// The record of a construction of which so many words were exchanged that it has these codes, or more; what it has
-/// where there are none.
+/// Returns the record of a construction with enough exchanged words to give these codes, or more; unchanged if there
+/// are no codes.
 fn with_exchanged(
     screen: &Screen,
     construction: AlgebraicConstruction,
@@ -184,7 +185,7 @@ fn with_exchanged(
     if found.len() >= codes.len() {
         return Ok((found, construction));
     }
-    // With hidden cells, words that are taken in order can be others.
+    // With hidden cells, words taken in order can be different ones.
     let listed = codes.iter().map(|&word| words.hex(word)).collect();
     let construction = AlgebraicConstruction { exchanged: listed, ..construction };
     Ok((construction.codes(screen)?, construction))

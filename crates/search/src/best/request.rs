@@ -1,4 +1,4 @@
-//! What is asked for, what is on record for it, and what bounds it.
+//! The request of a search, the start on record, and the upper bound.
 
 use std::time::Duration;
 
@@ -10,7 +10,7 @@ use deltille_core::family::{
 };
 use deltille_core::lattice::{Dimension, GridKind};
 
-/// What to search and for how long.
+/// Request of a search: its target and duration.
 ///
 /// ```
 /// use deltille_search::best::{Best, Budget};
@@ -27,69 +27,69 @@ use deltille_core::lattice::{Dimension, GridKind};
 pub struct Best {
     /// Dimension of the tags.
     pub dimension: Dimension,
-    /// Least distance h between any two codes in any turn.
+    /// Minimum distance h between any two codes in any rotation.
     pub distance: u32,
     /// Rules for single codes.
     pub rules: Rules,
-    /// How long to search.
+    /// Budget of the search.
     pub budget: Budget,
     /// Seed of all random choices.
     pub seed: u64,
-    /// Number of codes at most.
+    /// Maximum number of codes.
     pub limit: Option<u64>,
-    /// Whether local search may exchange codes at the end; without it the family is algebraic.
+    /// Whether local search may exchange codes at the end; otherwise the family is algebraic.
     pub exchange: bool,
 }
 
 impl Best {
-    /// A search for all codes that satisfy the published rules of their distance, local search included.
+    /// Creates a search for all codes that satisfy the published rules of their distance, including local search.
     pub fn new(dimension: Dimension, distance: u32, budget: Budget) -> Self {
         let rules = Rules::published(distance);
         Self { dimension, distance, rules, budget, seed: 0, limit: None, exchange: true }
     }
 
-    /// With other rules for single codes.
+    /// Sets other rules for single codes.
     #[must_use]
     pub fn rules(self, rules: Rules) -> Self {
         Self { rules, ..self }
     }
 
-    /// With other random choices.
+    /// Sets another seed.
     #[must_use]
     pub fn seed(self, seed: u64) -> Self {
         Self { seed, ..self }
     }
 
-    /// With so many codes at most.
+    /// Sets the maximum number of codes.
     #[must_use]
     pub fn limit(self, limit: Option<u64>) -> Self {
         Self { limit, ..self }
     }
 
-    /// With local search at the end, or without; see [`Self::exchange`].
+    /// Switches local search at the end on or off; see [`Self::exchange`].
     #[must_use]
     pub fn exchange(self, exchange: bool) -> Self {
         Self { exchange, ..self }
     }
 }
 
-/// Codes of which no more words than of so many dimensions are listed and put in order; of larger ones those are listed
-/// that a stride meets.
+/// Largest number of dimensions whose words are all listed and sorted. For larger codes, only the words selected by a
+/// stride are listed.
 pub(super) const LISTED_DIMENSIONS: u32 = 24;
 
-/// What a search starts from.
+/// Start of a search.
 #[derive(Clone, Debug)]
 pub struct Start {
     /// Name of the family on record.
     pub family: String,
-    /// Its codes, as far as they satisfy the rules.
+    /// Codes of the family that satisfy the rules.
     pub codes: Vec<u64>,
     pub(super) construction: AlgebraicConstruction,
 }
 
 impl Best {
-    /// The best construction on record for such tags: of a shipped family with these bits and this distance or a
-    /// greater one, as far as its codes satisfy the rules.
+    /// Returns the best construction on record for these tags. It belongs to a shipped family with these bits and at
+    /// least this distance; its codes are limited to those that satisfy the rules.
     pub fn start(&self) -> Option<Start> {
         let screen = self.screen();
         let on_record = |name: &str| {
@@ -98,7 +98,7 @@ impl Best {
             let fits = family.dimension() == self.dimension && family.distance() >= self.distance;
             let limit = self.limit.or(construction.stride.and(construction.limit));
             let construction = AlgebraicConstruction { limit, ..construction.clone() };
-            // Exchanged words are listed whatever the rules.
+            // Exchanged words are listed regardless of the rules.
             let admitted = |word: &String| parse_word(word).is_some_and(|w| screen.admits(w));
             let all_admitted = construction.exchanged.iter().all(admitted);
             let construction = match all_admitted && self.exchange {
@@ -112,17 +112,17 @@ impl Best {
         all.filter(|start| !start.codes.is_empty()).max_by_key(|start| start.codes.len())
     }
 
-    /// The family that a search starts from.
+    /// Returns the family that a search starts from.
     ///
     /// # Errors
-    /// Where the name speaks of other bits or another distance.
+    /// Returns an error if the name states other bits or another distance.
     pub fn family_of(&self, name: &str, start: &Start) -> Result<Family, FamilyError> {
         let construction = Construction::Algebraic(start.construction.clone());
         let (codes, rules) = (start.codes.clone(), self.rules.clone());
         Family::new(name, self.dimension, self.distance, codes, rules, construction)
     }
 
-    /// The space that codes are drawn in: without the cells that none may use, which are its last cycles.
+    /// Returns the space in which codes are drawn: without the free cells, which are its last cycles.
     pub(super) fn space(&self) -> CycleSpace {
         let whole = CycleSpace::of(self.dimension);
         let free = self.rules.free.map_or(0, |free| free.mask(self.dimension).count_ones());
@@ -134,8 +134,8 @@ impl Best {
         Screen::new(TagWords::new(self.dimension), self.distance, &self.rules)
     }
 
-    /// Whether there is time to gain more by exchanging codes than better sources gain: in a few
-    /// seconds not even the conflicts are counted.
+    /// Returns whether exchanging codes is likely to gain more than better sources in the available time. A few
+    /// seconds are not even enough to count the conflicts.
     pub(super) fn exchange_pays(&self) -> bool {
         const LEAST: Duration = Duration::from_secs(20);
         let is_long = match self.budget {
@@ -145,7 +145,7 @@ impl Best {
         self.exchange && is_long
     }
 
-    /// No family is larger; once there are so many codes, the search is over.
+    /// Returns an upper bound for the number of codes; the search ends when it is reached.
     pub(super) fn most(&self) -> usize {
         let cells = self.space().bits();
         let bounds = bounds_of_cells(GridKind::Deltille, cells, self.distance);

@@ -1,4 +1,4 @@
-//! Codes that a turn of the tag leaves invariant: constructed, or drawn at random, and unions of their cosets.
+//! Codes that are invariant under a rotation of the tag, constructed or drawn at random, and unions of their cosets.
 
 use rand::seq::{IndexedRandom, SliceRandom};
 use rand::{Rng, SeedableRng};
@@ -14,21 +14,21 @@ use crate::algebra::{bch, residue};
 use deltille_core::family::Control;
 use deltille_core::family::algebra::{CosetUnion, Span};
 
-/// Batches of codes that are drawn in a step of work.
+/// Batches of codes drawn per step of work.
 pub const DRAWS: u64 = 4;
 
-/// Syndromes of up to this many bits are tabulated in a search that draws many codes.
+/// Largest number of syndrome bits that are tabulated in a search that draws many codes.
 const SYNDROME_BITS: u32 = if MAX_SYNDROME_BITS < 24 { MAX_SYNDROME_BITS } else { 24 };
 
-/// What a random linear code is drawn by.
+/// Parameters for drawing a random linear code.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 struct Shape {
     symmetry: Symmetry,
-    /// Dimensions at most.
+    /// Maximum number of dimensions.
     most: u32,
 }
 
-/// One draw: how many orbits it has, how it was drawn, and an arrangement when it is worth one.
+/// One draw: its number of orbits, its parameters, and an arrangement if it is worth one.
 struct Draw {
     orbits: usize,
     shape: Option<Shape>,
@@ -36,7 +36,7 @@ struct Draw {
 }
 
 impl Best {
-    /// Draws unions of cosets until a share of the time is over; the most promising first.
+    /// Draws unions of cosets until a fraction of the time is over; returns the most promising first.
     pub(super) fn sources(
         &self,
         spent: &Spent,
@@ -44,11 +44,11 @@ impl Best {
         surest: &mut Surest,
         control: Control,
     ) -> Vec<Candidate> {
-        /// Draws between two looks at the clock.
+        /// Draws between two checks of the clock.
         const BATCH: u64 = 16;
-        /// Candidates kept for a thorough arrangement.
+        /// Number of candidates kept for a thorough arrangement.
         const KEPT: usize = 6;
-        /// Shapes of random codes to draw more of.
+        /// Number of shapes of random codes that are drawn again.
         const PROMISING: usize = 4;
         let mut kept: Vec<Candidate> = Vec::new();
         let mut promising: Vec<(usize, Shape)> = Vec::new();
@@ -62,7 +62,7 @@ impl Best {
             let most = most_orbits;
             let batch: Vec<Draw> = (draw..draw + BATCH)
                 .into_par_iter()
-                // However short the time is, there are some draws.
+                // There are always some draws, however short the time is.
                 .filter(|&i| !control.is_cancelled() && (i < BATCH || !halt()))
                 .map(|i| self.candidate(self.seed.wrapping_add(i), i, most, &promising, &halt))
                 .collect();
@@ -98,7 +98,7 @@ impl Best {
         }
     }
 
-    /// One draw, with a quick arrangement when it has nearly the most orbits seen.
+    /// Makes one draw, with a quick arrangement if it has almost the most orbits so far.
     fn candidate(
         &self,
         seed: u64,
@@ -107,11 +107,11 @@ impl Best {
         promising: &[(usize, Shape)],
         halt: &(dyn Fn() -> bool + Sync),
     ) -> Draw {
-        /// Share of the most orbits seen from which on an arrangement is tried. Small codes differ
-        /// more in how many of their words pass, and are arranged quickly.
+        /// Fraction of the most orbits so far above which an arrangement is tried. Small codes differ more in the
+        /// fraction of their words that pass, and are arranged quickly.
         const WORTH_A_TRY: [f64; 2] = [0.75, 0.93];
         const MANY_ORBITS: usize = 1_000;
-        /// Steps of the quick arrangement.
+        /// Number of steps of the quick arrangement.
         const STEPS: u32 = 3_000;
         let mut random = ChaCha8Rng::seed_from_u64(seed);
         let Some((source, code, shape)) = self.linear_code(draw, promising, &mut random) else {
@@ -130,9 +130,9 @@ impl Best {
         Draw { orbits: count, shape, candidate }
     }
 
-    /// The extended BCH code of most dimensions that has the distance and cells in the middle for no code where these are
-    /// free; with hidden cells, whose light words have to be listed, of no more than can be. `None` of other tags, and where
-    /// no word of it is moved by a turn.
+    /// Returns the extended BCH code of most dimensions that has the distance and leaves free central cells unused.
+    /// With hidden cells, its light words must be few enough to be listed. Returns `None` for other tags, or if a
+    /// rotation moves none of its words.
     fn bch_code(&self) -> Option<(String, Span)> {
         if self.dimension.bits() != bch::space().bits() {
             return None;
@@ -151,7 +151,8 @@ impl Best {
         is_moved.then_some((source, code))
     }
 
-    /// A linear code: an extended BCH code, a shortened quadratic-residue code or a random quasi-cyclic one, by turns.
+    /// Returns a linear code: alternately an extended BCH code, a shortened quadratic-residue code, and a random
+    /// quasi-cyclic one.
     fn linear_code(
         &self,
         draw: u64,
@@ -187,7 +188,7 @@ impl Best {
         }
         let symmetries = Symmetry::all(space);
         let drawn = symmetries[random.random_range(0..symmetries.len())];
-        /// Beyond this even the list of words of a linear code is long.
+        /// Largest number of dimensions: beyond it, even the list of words of a linear code is long.
         const MOST_DIMENSIONS: u32 = 20;
         let bits = space.bits();
         // Small codes leave room for many cosets, as long as syndromes can be tabulated.
@@ -197,7 +198,7 @@ impl Best {
         } else {
             least + random.random_range(2..=6)
         };
-        // Half of the draws follow the shapes that did best so far.
+        // Half of the draws use the best shapes so far.
         let shape = match promising.choose(random) {
             Some(&(_, shape)) if random.random_bool(0.5) => shape,
             _ => Shape { symmetry: drawn, most },
@@ -219,7 +220,7 @@ impl Best {
         random: &mut ChaCha8Rng,
         halt: &(dyn Fn() -> bool + Sync),
     ) -> CosetUnion {
-        /// Random starts of the clique search; in small spaces they cost next to nothing.
+        /// Numbers of random starts of the clique search; in small spaces they are almost free.
         const STARTS: [u64; 2] = [40, 8];
         let space = self.space();
         let alone = CosetUnion { space, code: code.clone(), cosets: vec![0] };
