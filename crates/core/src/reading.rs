@@ -72,8 +72,12 @@ fn starts_at(message: &str, start: &str) -> Option<usize> {
 
 fn unknown(what: &str, rest: &str) -> Option<String> {
     // The name comes from the file and may contain anything.
-    let (name, known) = rest.rsplit_once(", expected ").unwrap_or((rest, ""));
-    let name = cut_name(name.strip_suffix(", there are no fields").unwrap_or(name));
+    let (name, known) = match rest.rsplit_once(", expected ") {
+        Some(parts) => parts,
+        // Other messages are left unchanged, for example those that were already rewritten.
+        None => (rest.strip_suffix(", there are no fields")?, ""),
+    };
+    let name = cut_name(name);
     let known = known.strip_prefix("one of ").unwrap_or(known);
     Some(match known {
         "" => format!("unknown {what}{name}"),

@@ -117,7 +117,7 @@ fn holes_without_room_are_rejected() {
         ),
         (
             "board --rows 4 --cols 5 --edge 40mm --family families/holed.json --hole 0.1mm",
-            "--hole: 0.1 mm is less than 0.5 mm",
+            "--hole: 0.1 mm is less than the minimum of 0.5 mm",
         ),
         ("board --rows 4 --cols 5 --untagged --hole 2mm", "--hole"),
         ("board --rows 4 --cols 5 --dense --hole 2mm", "--hole"),

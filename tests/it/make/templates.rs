@@ -163,11 +163,11 @@ fn options_override_the_meshes_lasers_and_inks_of_a_template() {
     made(other, &["board-1.svg", "board-2.svg", "board-laser.svg", "board.glb", "board.json"]);
 
     for (text, said) in [
-        ("rows = 4\ncols = 5\ngltf = true\n", "line 3, `gltf`: field `gltf` is not known"),
-        ("rows = 4\ncols = 5\n[meshes]\nglb = true\n", "line 4, `glb`: field `glb` is not known"),
+        ("rows = 4\ncols = 5\ngltf = true\n", "line 3, `gltf`: unknown field `gltf`"),
+        ("rows = 4\ncols = 5\n[meshes]\nglb = true\n", "line 4, `glb`: unknown field `glb`"),
         (
             "rows = 4\ncols = 5\n[laser]\nformats = [\"png\"]\n",
-            "line 4, `formats`: `png` is not known; there are `dxf` or `svg`",
+            "line 4, `formats`: unknown value `png` (known: `dxf` or `svg`)",
         ),
         ("rows = 4\ncols = 5\n[meshes]\ngltf = true\ntexture = 3\n", "--texture: 3 is not between"),
         (
@@ -242,5 +242,5 @@ fn given_tags_replace_those_of_a_template() {
     std::fs::write(folder.path().join("f.toml"), "[finishing]\nmirrored = true\n").unwrap();
     let error = deltille(folder.path(), "cube --template f.toml").code(2);
     let error = String::from_utf8(error.get_output().stderr.clone()).unwrap();
-    assert!(error.contains("line 1, `finishing`: field `finishing` is not known"), "{error}");
+    assert!(error.contains("line 1, `finishing`: unknown field `finishing`"), "{error}");
 }

@@ -47,7 +47,7 @@ const MAX_BYTES: usize = 50_000;
 /// Maximum nesting of lists and maps; a camera has two levels.
 const MAX_DEPTH: usize = 16;
 
-/// What is wrong with a camera file.
+/// The problem with a camera file.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum CameraFileError {
@@ -188,7 +188,9 @@ impl CameraFile {
         let spline = spline.map_err(|problem| key("spline", problem.to_string()))?;
         let lens = model
             .lens(distortion.len().clamp(LEAST_TERMS, MAX_LENS_PARAMETERS), spline)
-            .ok_or_else(|| key("spline", "the model `spline` has it, and no other".to_owned()))?;
+            .ok_or_else(|| {
+                key("spline", "only the model `spline` has this key, and it requires it".to_owned())
+            })?;
         let count = lens.names().len();
         while model != LensKind::Spline
             && distortion.len() > count
@@ -197,7 +199,8 @@ impl CameraFile {
             distortion.pop();
         }
         if model == LensKind::Spline && distortion.len() != count {
-            let problem = format!("there are {} numbers, the grid has {count}", distortion.len());
+            let problem =
+                format!("there are {} numbers, but the grid needs {count}", distortion.len());
             return Err(key("distortion", problem));
         }
         if distortion.len() > count
@@ -288,7 +291,9 @@ fn from_foreign(text: &str) -> Result<Own, CameraFileError> {
     let model = match file.distortion_model.as_deref() {
         None | Some("plumb_bob" | "rational_polynomial") => LensKind::BrownConrady,
         Some("equidistant" | "fisheye") => LensKind::KannalaBrandt,
-        Some(other) => return Err(key("distortion_model", format!("`{other}` is not known"))),
+        Some(other) => {
+            return Err(key("distortion_model", format!("unknown distortion model `{other}`")));
+        }
     };
     Ok(Own {
         width: file.image_width,
@@ -319,7 +324,7 @@ mod tests {
     }
 
     #[test]
-    fn every_model_is_written_and_read() {
+    fn every_model_survives_a_file() {
         // Of a perspective lens the last ones are zero here.
         let short = (LensKind::BrownConrady, 8);
         for (kind, count) in LensKind::ALL.iter().map(|kind| (*kind, 40)).chain([short]) {

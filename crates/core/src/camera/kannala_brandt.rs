@@ -3,11 +3,10 @@ use glam::{DVec2, DVec3};
 use super::equidistant::{self, Angle};
 use super::law::{Imaged, LensLaw, Ray};
 
-/// Terms of the polynomial that are there even when a file has fewer.
+/// Minimum number of terms of the polynomial; a file may have fewer.
 pub(super) const LEAST_TERMS: usize = 4;
 
-/// Equidistant fisheye polynomial (Kannala and Brandt 2006), with four terms as in OpenCV's
-/// fisheye module, or more:
+/// Equidistant fisheye polynomial (Kannala and Brandt 2006), with four terms as in OpenCV's fisheye module, or more:
 ///
 /// ```text
 ///     θ = ∠(point, axis),  r = θ (1 + k1 θ² + k2 θ⁴ + k3 θ⁶ + k4 θ⁸ + …)

@@ -4,7 +4,7 @@ use glam::{DVec2, DVec3};
 
 use crate::quantity::Range;
 
-/// A half-line in the camera frame, along which a pixel looks.
+/// A half-line in the camera frame: the line of sight of a pixel.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Ray {
     /// Start point, mm: zero unless the lens is not central.
@@ -41,19 +41,19 @@ pub(super) trait LensLaw {
     /// Sets the parameters; `values` has one entry per name.
     fn set_parameters(&mut self, values: &[f64]);
 
-    /// The ranges of its parameters, from the first; those without one have that of coefficients.
+    /// Returns the ranges of the first parameters; the others have the range of coefficients.
     fn ranges(&self) -> &'static [Range] {
         &[]
     }
 
-    /// How many coefficients a camera file has at least, where those left out at the end are zero; `None` where all are
-    /// there.
+    /// Returns the minimum number of coefficients in a camera file, which omits zeros at the end. Returns `None` if a
+    /// file always has all of them.
     fn least_coefficients(&self) -> Option<usize> {
         None
     }
 
-    /// The image of a point, and in `by_parameters` the derivatives of x', y' by each parameter;
-    /// `None` where the formula has no value that a search may pass through.
+    /// Returns the image of a point, and writes the derivatives of x', y' by each parameter to `by_parameters`.
+    /// Returns `None` if the formula has no value there that an optimiser may use.
     fn image(&self, point: DVec3, by_parameters: &mut [[f64; 2]]) -> Option<Imaged>;
 
     /// Returns whether a point that has an image lies in the domain of the model.

@@ -10,17 +10,17 @@ use crate::quantity::Range;
 /// Largest number of parameters of a lens whose parameters all affect every point; those of a spline act locally.
 pub const MAX_LENS_PARAMETERS: usize = 12;
 
-/// The enum of lenses, from a line for each: its type, the name of its model in camera files, what messages call it, and
-/// how it begins with so many coefficients, and with a grid where it has one.
+/// Makes the enum of lenses from one line for each: its type, the name of its model in camera files, its name in messages,
+/// and its start value for a number of coefficients and an optional grid.
 macro_rules! lenses {
     ($($(#[$doc:meta])* $lens:ident $name:literal $title:literal $given:pat => $start:expr,)*) => {
-        /// How a point of the camera frame becomes a point of the normalised image plane.
+        /// Projection from the camera frame to the normalised image plane.
         #[derive(Clone, Debug, PartialEq)]
         pub enum Lens {
             $($(#[$doc])* $lens($lens),)*
         }
 
-        /// What kind of lens it is.
+        /// Kind of a lens.
         #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
         pub enum LensKind {
             $($(#[$doc])* #[serde(rename = $name)] $lens,)*
@@ -30,22 +30,22 @@ macro_rules! lenses {
             /// All kinds.
             pub const ALL: &[Self] = &[$(Self::$lens),*];
 
-            /// The name of the model in camera files.
+            /// Returns the name of the model in camera files.
             pub fn name(self) -> &'static str {
                 match self {
                     $(Self::$lens => $name,)*
                 }
             }
 
-            /// What messages call a lens, such as `a double sphere lens`.
+            /// Returns the name in messages, such as `a double sphere lens`.
             pub fn title(self) -> &'static str {
                 match self {
                     $(Self::$lens => $title,)*
                 }
             }
 
-            /// A lens from which a search may start, with so many coefficients if it can have any number; `None` where
-            /// it is a spline without grid, or another lens with one.
+            /// Returns a lens of this kind as a start value, with `count` coefficients if their number is free. Returns
+            /// `None` for a spline without a grid, or another lens with one.
             pub fn lens(self, count: usize, grid: Option<SplineGrid>) -> Option<Lens> {
                 match (self, (count, grid)) {
                     $((Self::$lens, $given) => Some(Lens::$lens($start)),)*
@@ -67,7 +67,7 @@ macro_rules! lenses {
                 }
             }
 
-            /// Its kind.
+            /// Returns the kind.
             pub fn kind(&self) -> LensKind {
                 match self {
                     $(Self::$lens(_) => LensKind::$lens,)*
@@ -80,7 +80,7 @@ macro_rules! lenses {
 lenses! {
     /// Perspective with polynomial or rational distortion; sees less than 180°.
     BrownConrady "pinhole" "a perspective lens" (_, None) => BrownConrady::default(),
-    /// Equidistant polynomial; sees more than 180° where its polynomial grows.
+    /// Equidistant polynomial; sees more than 180° if its polynomial increases.
     KannalaBrandt "fisheye" "a fisheye polynomial" (count, None) => KannalaBrandt { k: vec![0.0; count] },
     /// Extended unified model; sees more than 180°.
     ExtendedUnified "eucm" "an EUCM lens" (_, None) => ExtendedUnified::default(),
@@ -88,7 +88,7 @@ lenses! {
     DoubleSphere "double-sphere" "a double sphere lens" (_, None) => DoubleSphere::default(),
     /// Equidistant polynomial with a moving entrance pupil: not central.
     Pupil "pupil" "a fisheye with a moving pupil" (_, None) => Pupil::default(),
-    /// Stereographic with a correction by a spline; sees more than 180°.
+    /// Stereographic with a spline correction; sees more than 180°.
     Spline "spline" "a spline" (_, Some(grid)) => Spline::new(grid),
 }
 

@@ -143,15 +143,15 @@ impl fmt::Display for Reason {
             }
             ReasonKind::UnreadableTags if !self.figures.contains_key("needed_bit_px") => write!(
                 f,
-                "tag cells are {:.1} px wide with a blur of {:.1} px, and their contrast is too low for the noise; use more light \
-             or contrast",
+                "tag cells are {:.1} px wide with a blur of {:.1} px, and their contrast is too \
+                 low for the noise; use more light or contrast",
                 figure("bit_px"),
                 figure("blur_px")
             ),
             ReasonKind::UnreadableTags => write!(
                 f,
-                "tag cells are {:.1} px wide with a blur of {:.1} px; reading them needs {:.1} px: move closer or focus \
-             better",
+                "tag cells are {:.1} px wide with a blur of {:.1} px; reading them needs {:.1} px: \
+                 move closer or focus better",
                 figure("bit_px"),
                 figure("blur_px"),
                 figure("needed_bit_px")
@@ -168,7 +168,7 @@ impl fmt::Display for Reason {
             }
             ReasonKind::OtherIds => write!(
                 f,
-                "{} with ids that the target does not have, for example {}; is this another target?",
+                "{} not on the target, for example id {}; is this another target?",
                 count("tags", "tag"),
                 figure("id")
             ),
@@ -197,7 +197,7 @@ impl fmt::Display for Reason {
             }
             ReasonKind::NotWhole if figure("corners") == figure("expected") => write!(
                 f,
-                "a grid of {} has different rows and columns than the board; are they swapped?",
+                "a grid of {} has different rows and columns from the board; are they swapped?",
                 count("corners", "corner")
             ),
             ReasonKind::NotWhole => write!(

@@ -7,7 +7,7 @@ use crate::setting::Setting::FamilyToJson;
 pub enum FamilyError {
     /// There is no shipped family and no file of this name.
     #[error(
-        "unknown family `{name}` (known: {}, or the path of a .json family file)",
+        "unknown family `{name}`: use one of {}, or the path of a .json family file",
         shipped.join(", ")
     )]
     Unknown {

@@ -109,9 +109,9 @@ impl Skeleton {
             faces().map(|corners| Incircle::of(&corners).radius).fold(f64::MAX, f64::min);
         if window + LEAST_WINDOW_MM > inradius {
             let problem = format!(
-                "seats and ledges take {:.1} mm from the edges, but the smallest face is only \
-                     {inradius:.1} mm wide from edge to centre: use thinner {SkeletonWallMm} or panels, or \
-                     a larger {SolidEdgeMm}",
+                "seats and ledges take {:.1} mm from the edges, but the smallest face has only \
+                 {inradius:.1} mm from edge to centre: use thinner {SkeletonWallMm} or panels, or \
+                 a larger {SolidEdgeMm}",
                 window + LEAST_WINDOW_MM
             );
             return Err(TargetError::invalid(SolidSkeleton, problem));
