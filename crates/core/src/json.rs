@@ -196,8 +196,8 @@ mod tests {
 
     #[test]
     fn a_list_is_rejected() {
-        let said = schema(b" [\"deltille/target/1\"]").unwrap_err();
-        assert_eq!(said.to_string(), "expected an object, found a list");
+        let message = schema(b" [\"deltille/target/1\"]").unwrap_err();
+        assert_eq!(message.to_string(), "expected an object, found a list");
         assert_eq!(schema(b"{\"schema\": \"x/1\"}").unwrap().as_deref(), Some("x/1"));
     }
 

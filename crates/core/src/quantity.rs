@@ -262,8 +262,8 @@ mod tests {
         let read = |text: &str| serde_json::from_str::<File>(text);
         assert_eq!(read(r#"{"cov": [1, 2e-20]}"#).unwrap().cov, Some([1.0, 2e-20]));
         assert!(read("{}").unwrap().cov.is_none());
-        let said = read(r#"{"cov": [1, 1e308]}"#).unwrap_err().to_string();
-        assert!(said.starts_with("1e308 is not between 1e-20 and 1e8 px²"), "{said}");
+        let message = read(r#"{"cov": [1, 1e308]}"#).unwrap_err().to_string();
+        assert!(message.starts_with("1e308 is not between 1e-20 and 1e8 px²"), "{message}");
         for bad in ["nan", "inf", "-1e308", "x", ""] {
             assert_eq!(
                 place_mm::RANGE.parse(bad).unwrap_err(),

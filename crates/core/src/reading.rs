@@ -19,10 +19,10 @@ pub fn in_words(message: impl Display) -> String {
     if message.ends_with(" at line 1 column 0") {
         return "the text is empty".to_owned();
     }
-    let (message, line) = without_place(&message);
+    let (message, line) = without_position(&message);
     let at = KNOWN.iter().filter_map(|(start, _)| starts_at(message, start)).min().unwrap_or(0);
     let (before, said) = message.split_at(at);
-    let known = KNOWN.iter().find_map(|(start, told)| told(said.strip_prefix(start)?));
+    let known = KNOWN.iter().find_map(|(start, rewrite)| rewrite(said.strip_prefix(start)?));
     let said = known.unwrap_or_else(|| said.to_owned());
     let (before, said) = (with_short_quotes(before), with_short_quotes(&said));
     match line {
@@ -32,10 +32,10 @@ pub fn in_words(message: impl Display) -> String {
 }
 
 /// Rewrites the rest of a message; `None` if it does not have the parser's usual form.
-type Telling = fn(&str) -> Option<String>;
+type Rewrite = fn(&str) -> Option<String>;
 
 /// Beginnings of messages, and how the rest is rewritten.
-const KNOWN: &[(&str, Telling)] = &[
+const KNOWN: &[(&str, Rewrite)] = &[
     ("EOF while parsing ", |what| {
         Some(format!("the text ends inside {what} and may be truncated"))
     }),
@@ -43,8 +43,8 @@ const KNOWN: &[(&str, Telling)] = &[
     ("duplicate field ", |field| Some(format!("field {field} appears twice"))),
     ("unknown field ", |rest| unknown("field ", rest)),
     ("unknown variant ", |rest| unknown("value ", rest)),
-    ("invalid type: ", in_place_of),
-    ("invalid value: ", in_place_of),
+    ("invalid type: ", mismatch),
+    ("invalid value: ", mismatch),
     ("invalid length ", |rest| {
         let (count, wanted) = rest.split_once(", expected ")?;
         let s = if count == "1" { "" } else { "s" };
@@ -53,7 +53,7 @@ const KNOWN: &[(&str, Telling)] = &[
 ];
 
 /// Splits the position from the end of a message; returns the message and the line number.
-fn without_place(message: &str) -> (&str, Option<&str>) {
+fn without_position(message: &str) -> (&str, Option<&str>) {
     let parts = message.rsplit_once(" at line ").and_then(|(before, place)| {
         let (line, column) = place.split_once(" column ")?;
         let are_numbers = [line, column].iter().all(|n| n.bytes().all(|b| b.is_ascii_digit()));
@@ -93,7 +93,7 @@ fn cut_name(name: &str) -> String {
     }
 }
 
-fn in_place_of(rest: &str) -> Option<String> {
+fn mismatch(rest: &str) -> Option<String> {
     let (there, wanted) = rest.rsplit_once(", expected ")?;
     Some(format!("expected {}, found {}", expected(wanted), found(there)))
 }
@@ -168,7 +168,7 @@ mod tests {
 
     #[test]
     fn parser_messages_are_rewritten() {
-        for (text, told) in [
+        for (text, wanted) in [
             ("", "the text is empty"),
             ("{\"count\": 1", "the text ends inside an object and may be truncated (line 1)"),
             ("\n[", "the text ends inside a list and may be truncated (line 2)"),
@@ -185,7 +185,7 @@ mod tests {
             ("{\"count\": 1 x", "expected `,` or `}` (line 1)"),
         ] {
             let said = in_words(serde_json::from_str::<File>(text).unwrap_err());
-            assert!(said.starts_with(told), "{text}: {said}");
+            assert!(said.starts_with(wanted), "{text}: {said}");
         }
     }
 

@@ -22,8 +22,8 @@ pub fn quantile(values: &mut [f64], part: f64) -> Option<f64> {
 /// Returns the upper tail probability of the χ² distribution with `freedom` degrees of freedom.
 ///
 /// ```
-/// let chance = deltille_core::statistics::chi_squared_chance(11.07, 5);
-/// assert!((chance - 0.05).abs() < 1e-4);
+/// let probability = deltille_core::statistics::chi_squared_chance(11.07, 5);
+/// assert!((probability - 0.05).abs() < 1e-4);
 /// ```
 pub fn chi_squared_chance(sum: f64, freedom: usize) -> f64 {
     let half = sum.max(0.0) / 2.0;
@@ -31,7 +31,7 @@ pub fn chi_squared_chance(sum: f64, freedom: usize) -> f64 {
         return 0.0;
     }
     // Q(a + 1, h) = Q(a, h) + hᵃ e⁻ʰ / Γ(a + 1), from Q(1, h) = e⁻ʰ or Q(1/2, h) = erfc √h.
-    let (mut chance, mut term, mut a) = match freedom % 2 {
+    let (mut probability, mut term, mut a) = match freedom % 2 {
         0 => (0.0, (-half).exp(), 0.0),
         _ => (
             libm::erfc(half.sqrt()),
@@ -40,18 +40,18 @@ pub fn chi_squared_chance(sum: f64, freedom: usize) -> f64 {
         ),
     };
     while 2.0 * a + 0.5 < freedom as f64 {
-        chance += term;
+        probability += term;
         a += 1.0;
         term *= half / a;
     }
-    chance.min(1.0)
+    probability.min(1.0)
 }
 
 /// Returns the upper tail probability of the F distribution with `above` and `below` degrees of freedom.
 ///
 /// ```
-/// let chance = deltille_core::statistics::f_chance(3.326, 5.0, 10.0);
-/// assert!((chance - 0.05).abs() < 1e-4);
+/// let probability = deltille_core::statistics::f_chance(3.326, 5.0, 10.0);
+/// assert!((probability - 0.05).abs() < 1e-4);
 /// ```
 pub fn f_chance(ratio: f64, above: f64, below: f64) -> f64 {
     let (a, b) = (below / 2.0, above / 2.0);
@@ -75,12 +75,12 @@ fn beta_part(x: f64, a: f64, b: f64) -> f64 {
         }
     };
     // Evaluates the fraction from its last term.
-    let fraction = (1..=FRACTIONS).rev().fold(1.0, |rest, m| 1.0 + term(m) / rest);
+    let fraction = (1..=FRACTION_TERMS).rev().fold(1.0, |rest, m| 1.0 + term(m) / rest);
     (front / fraction).clamp(0.0, 1.0)
 }
 
 /// Terms of the continued fraction; thousands of degrees of freedom need fewer.
-const FRACTIONS: u32 = 400;
+const FRACTION_TERMS: u32 = 400;
 
 #[cfg(test)]
 mod tests {
@@ -99,9 +99,12 @@ mod tests {
             (0.2, 7.0, 30.0, 9.830186062e-01),
             (50.0, 2.0, 5.0, 4.948251479e-04),
         ];
-        for (ratio, above, below, chance) in of_ratios {
+        for (ratio, above, below, probability) in of_ratios {
             let found = f_chance(ratio, above, below);
-            assert!((found / chance - 1.0_f64).abs() < 1e-7, "{ratio} {above} {below}: {found}");
+            assert!(
+                (found / probability - 1.0_f64).abs() < 1e-7,
+                "{ratio} {above} {below}: {found}"
+            );
         }
         let of_sums = [
             (0.5, 1, 4.795001222e-01),
@@ -109,9 +112,9 @@ mod tests {
             (40.0, 12, 7.190884053e-05),
             (100.0, 31, 3.464370245e-09),
         ];
-        for (sum, freedom, chance) in of_sums {
+        for (sum, freedom, probability) in of_sums {
             let found = chi_squared_chance(sum, freedom);
-            assert!((found / chance - 1.0_f64).abs() < 1e-7, "{sum} {freedom}: {found}");
+            assert!((found / probability - 1.0_f64).abs() < 1e-7, "{sum} {freedom}: {found}");
         }
     }
 

@@ -33,14 +33,14 @@ fn families_with_free_cells_decode_without_them() {
     let dimension = Dimension::from_bits(16).unwrap();
     let rules = Rules { free: Some(FreeCells::Centre), ..Rules::published(5) };
     let best = Best::new(dimension, 5, Budget::Work(1)).rules(rules);
-    let told = AtomicUsize::new(0);
+    let reported = AtomicUsize::new(0);
     let report = |progress: Progress| {
-        told.fetch_max(progress.codes, Ordering::Relaxed);
+        reported.fetch_max(progress.codes, Ordering::Relaxed);
     };
     let control = Control::default().report(&report);
     let family = best.family("holed", best.start(), control).unwrap();
     assert!(
-        (1..=family.len()).contains(&told.into_inner()),
+        (1..=family.len()).contains(&reported.into_inner()),
         "progress counts only codes that were found"
     );
     let (free, certificate) = (family.free_cells(), certify(&family));

@@ -343,8 +343,8 @@ mod tests {
                       distortion_coefficients: {data: [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 2, TAU, 0]}\n";
         let camera = Camera::from_yaml(&tilted.replace("TAU", "0")).unwrap();
         assert_eq!(camera.lens.parameters()[11], 2.0);
-        let said = Camera::from_yaml(&tilted.replace("TAU", "0.1")).unwrap_err().to_string();
-        assert!(said.contains("s3 s4"), "{said}");
+        let message = Camera::from_yaml(&tilted.replace("TAU", "0.1")).unwrap_err().to_string();
+        assert!(message.contains("s3 s4"), "{message}");
     }
 
     #[test]
@@ -363,8 +363,9 @@ mod tests {
         let camera = Camera::from_yaml(own).unwrap();
         assert_eq!(Camera::from_yaml(ros).unwrap(), camera);
         assert_eq!(Camera::from_yaml(opencv).unwrap(), camera);
-        let said = Camera::from_yaml(&own.replace("500, 501", "0, 501")).unwrap_err().to_string();
-        assert!(said.contains("focal_px"), "{said}");
+        let message =
+            Camera::from_yaml(&own.replace("500, 501", "0, 501")).unwrap_err().to_string();
+        assert!(message.contains("focal_px"), "{message}");
         assert!(Camera::from_yaml(&own.replace("width", "wdith")).is_err());
         // Transposed, skewed, scaled, and with a different size.
         for (from, to) in [
@@ -374,8 +375,8 @@ mod tests {
             ("240, 0, 0, 1", "240, 0, .nan, 1"),
             ("cols: 3", "cols: 4"),
         ] {
-            let said = Camera::from_yaml(&ros.replace(from, to)).unwrap_err().to_string();
-            assert!(said.contains("camera_matrix"), "{said}");
+            let message = Camera::from_yaml(&ros.replace(from, to)).unwrap_err().to_string();
+            assert!(message.contains("camera_matrix"), "{message}");
         }
     }
 }

@@ -29,7 +29,7 @@ const STEPS_A_KNOT: f64 = 4.0;
 /// Grid of spline knots over the stereographic plane.
 ///
 /// The grid is centred on the plane with equal distances h along both axes. The spline is determined over `fov_x_deg`
-/// across: up to a whole knot spacing within the outermost knots for degree 3, half of one for degree 2.
+/// across. For degree 3 this range ends one knot spacing inside the outermost knots, for degree 2 half a spacing.
 ///
 /// ```text
 ///     (columns − 3) h = 4 tan(fov_x/4)   degree 3        (columns − 2) h = 4 tan(fov_x/4)   degree 2

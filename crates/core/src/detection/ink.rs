@@ -20,7 +20,7 @@ pub enum Ink {
 }
 
 /// Largest accepted ink spread, µm: more fills the space between the bits of tags.
-const MOST_UM: f64 = 1000.0;
+const MAX_UM: f64 = 1000.0;
 
 impl std::str::FromStr for Ink {
     type Err = String;
@@ -29,8 +29,8 @@ impl std::str::FromStr for Ink {
         match (text, text.parse()) {
             ("auto", _) => Ok(Self::Auto),
             ("none", _) => Ok(Self::Um(0.0)),
-            (_, Ok(um)) if (-MOST_UM..=MOST_UM).contains(&um) => Ok(Self::Um(um)),
-            _ => Err(format!("expected auto, none, or µm from -{MOST_UM} to {MOST_UM}")),
+            (_, Ok(um)) if (-MAX_UM..=MAX_UM).contains(&um) => Ok(Self::Um(um)),
+            _ => Err(format!("expected auto, none, or µm from -{MAX_UM} to {MAX_UM}")),
         }
     }
 }
@@ -71,8 +71,8 @@ const CHI2: f64 = 10.8;
 
 /// Ratios for a normal distribution: standard deviation to median absolute deviation, and standard deviation of the
 /// median to that of the mean.
-const OVER_MEDIAN_DISTANCE: f64 = 1.4826;
-const OVER_THAT_OF_THE_MEAN: f64 = 1.2533;
+const SD_OVER_MEDIAN_DEVIATION: f64 = 1.4826;
+const MEDIAN_SD_OVER_MEAN_SD: f64 = 1.2533;
 
 /// Lower limit for the standard deviation of one image, in edge lengths.
 const LEAST_DEVIATION: f64 = 1e-9;
@@ -103,8 +103,8 @@ impl InkEstimate {
             return Some(middle);
         }
         let off = |p: &Self| (p.edges - middle.edges).abs() * weight(p).sqrt();
-        let scatter = OVER_MEDIAN_DISTANCE * median(pictures.iter().map(off).collect())?;
-        let deviation = OVER_THAT_OF_THE_MEAN * scatter.max(1.0) / total.sqrt();
+        let scatter = SD_OVER_MEDIAN_DEVIATION * median(pictures.iter().map(off).collect())?;
+        let deviation = MEDIAN_SD_OVER_MEAN_SD * scatter.max(1.0) / total.sqrt();
         let um = |edges: f64| {
             let um = middle.um.map(|um| um / middle.edges * edges);
             um.filter(|um| um.is_finite())
@@ -165,8 +165,8 @@ mod tests {
         assert!((0.3e-4..2e-4).contains(&all.edges_deviation), "{all:?}");
         assert_eq!(InkEstimate::of_all(&[all, all, all]), Some(all));
         assert_eq!(InkEstimate::of_all(&[]), None);
-        let chance = InkEstimate::of_all(&[seen(1e-4, 1e-4), seen(-2e-4, 1e-4)]).unwrap();
-        assert!(!chance.used);
+        let noise = InkEstimate::of_all(&[seen(1e-4, 1e-4), seen(-2e-4, 1e-4)]).unwrap();
+        assert!(!noise.used);
     }
 
     #[test]

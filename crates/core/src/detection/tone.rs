@@ -115,11 +115,11 @@ const STEP: f64 = 1.0 / 64.0;
 const NODES: usize = 193;
 
 /// Number of slope samples: at the nodes and half-way between them.
-const PLACES_OF_SLOPES: usize = 2 * NODES - 1;
+const SLOPE_SAMPLES: usize = 2 * NODES - 1;
 
 /// Logarithms of the distances of the slope samples from black and white.
 static TO_ENDS: LazyLock<Vec<[f64; 2]>> =
-    LazyLock::new(|| (0..PLACES_OF_SLOPES).map(|i| to_ends(place(i))).collect());
+    LazyLock::new(|| (0..SLOPE_SAMPLES).map(|i| to_ends(sample_grey(i))).collect());
 
 /// Distance δ from black and white below which the slope of an estimated curve is constant. Few grey values are
 /// closer, and that of sRGB is twice as large.
@@ -152,7 +152,7 @@ pub struct Piece {
 }
 
 /// Returns the grey value of a slope sample.
-fn place(i: usize) -> f64 {
+fn sample_grey(i: usize) -> f64 {
     LOWEST + 0.5 * STEP * i as f64
 }
 
@@ -189,7 +189,7 @@ impl Curve {
         let at_middle = at(middle);
         let [slope_from, slope_to] = [from, to].map(|y| (at(y) - at_middle).exp());
         let slopes = TO_ENDS.iter().enumerate().map(|(i, &to_ends)| {
-            let y = place(i);
+            let y = sample_grey(i);
             if y < from {
                 slope_from
             } else if y > to {
@@ -202,7 +202,7 @@ impl Curve {
     }
 
     fn with_slope(slope: impl Fn(f64) -> f64) -> Self {
-        Self::with_slopes(&(0..PLACES_OF_SLOPES).map(|i| slope(place(i))).collect::<Vec<f64>>())
+        Self::with_slopes(&(0..SLOPE_SAMPLES).map(|i| slope(sample_grey(i))).collect::<Vec<f64>>())
     }
 
     /// Creates the curve with these slopes of the light at the nodes and half-way between them.
@@ -256,7 +256,7 @@ impl Curve {
         if half.abs() < 1e-9 {
             return Piece::line(level, amplitude);
         }
-        let excess = PLACES.map(|s| {
+        let excess = CHEBYSHEV.map(|s| {
             let grey = (self.grey(middle + half * s) - level) / amplitude;
             (grey - s) / (1.0 - s * s)
         });
@@ -292,7 +292,7 @@ impl Piece {
 }
 
 /// Chebyshev nodes between −1 and 1: cos(kπ/7).
-const PLACES: [f64; TERMS] = [
+const CHEBYSHEV: [f64; TERMS] = [
     0.900_968_867_902_419_1,
     0.623_489_801_858_733_5,
     0.222_520_933_956_314_4,
@@ -301,21 +301,21 @@ const PLACES: [f64; TERMS] = [
     -0.900_968_867_902_419_1,
 ];
 
-/// Computes the coefficients of the polynomial with these values at [`PLACES`], by Newton's divided differences.
+/// Computes the coefficients of the polynomial with these values at [`CHEBYSHEV`], by Newton's divided differences.
 fn interpolated(values: [f64; TERMS]) -> [f64; TERMS] {
     let mut divided = values;
     for order in 1..TERMS {
         for i in (order..TERMS).rev() {
-            divided[i] = (divided[i] - divided[i - 1]) / (PLACES[i] - PLACES[i - order]);
+            divided[i] = (divided[i] - divided[i - 1]) / (CHEBYSHEV[i] - CHEBYSHEV[i - order]);
         }
     }
     let mut terms = [0.0; TERMS];
     for i in (0..TERMS).rev() {
         // terms ← terms·(S − Sᵢ) + dᵢ
         for j in (1..TERMS).rev() {
-            terms[j] = terms[j - 1] - PLACES[i] * terms[j];
+            terms[j] = terms[j - 1] - CHEBYSHEV[i] * terms[j];
         }
-        terms[0] = divided[i] - PLACES[i] * terms[0];
+        terms[0] = divided[i] - CHEBYSHEV[i] * terms[0];
     }
     terms
 }

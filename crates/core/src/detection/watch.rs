@@ -28,12 +28,12 @@ const FEWEST_CORNERS: usize = 12;
 /// ```
 #[derive(Clone, Debug, Default)]
 pub struct Watch {
-    last: Places,
-    kept: Vec<Places>,
+    last: Positions,
+    kept: Vec<Positions>,
 }
 
 /// Labelled corners by panel and id, in image widths.
-type Places = BTreeMap<(u32, u32), DVec2>;
+type Positions = BTreeMap<(u32, u32), DVec2>;
 
 /// Assessment of an image in a stream.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -58,31 +58,32 @@ impl Watch {
     /// Assesses the next image. If it is worth keeping, later images are compared with it.
     pub fn look(&mut self, found: &Detection) -> Glance {
         let labelled = found.grids.iter().filter_map(|grid| Some((grid.panel?, grid)));
-        let places: Places = labelled
+        let positions: Positions = labelled
             .flat_map(|(panel, grid)| {
                 grid.corners.iter().filter_map(move |corner| {
-                    let place = corner.position() / f64::from(found.width.max(1));
-                    Some(((panel, corner.id?), place))
+                    let at = corner.position() / f64::from(found.width.max(1));
+                    Some(((panel, corner.id?), at))
                 })
             })
             .collect();
         let glance = Glance {
-            corners: places.len(),
-            is_still: moved(&places, &self.last) < STILL,
-            is_new: self.kept.iter().all(|kept| moved(&places, kept) > ELSEWHERE),
+            corners: positions.len(),
+            is_still: moved(&positions, &self.last) < STILL,
+            is_new: self.kept.iter().all(|kept| moved(&positions, kept) > ELSEWHERE),
         };
         if glance.is_worth_keeping() {
-            self.kept.push(places.clone());
+            self.kept.push(positions.clone());
         }
-        self.last = places;
+        self.last = positions;
         glance
     }
 }
 
 /// Returns the mean displacement of common corners; infinite if there are none.
-fn moved(one: &Places, other: &Places) -> f64 {
-    let ways = one.iter().filter_map(|(id, at)| Some(at.distance(*other.get(id)?)));
-    let (count, sum) = ways.fold((0, 0.0), |(count, sum), way| (count + 1, sum + way));
+fn moved(one: &Positions, other: &Positions) -> f64 {
+    let distances = one.iter().filter_map(|(id, at)| Some(at.distance(*other.get(id)?)));
+    let (count, sum) =
+        distances.fold((0, 0.0), |(count, sum), distance| (count + 1, sum + distance));
     if count == 0 { f64::INFINITY } else { sum / f64::from(count) }
 }
 

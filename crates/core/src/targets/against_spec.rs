@@ -184,7 +184,7 @@ mod tests {
     use crate::targets::{BoardSpec, SolidShape, SolidSpec};
 
     /// Returns the error of a target file after a change of the target.
-    fn said<S: Into<TargetSpec>>(spec: S, change: impl Fn(&mut Target)) -> Option<String> {
+    fn message<S: Into<TargetSpec>>(spec: S, change: impl Fn(&mut Target)) -> Option<String> {
         let spec = spec.into();
         let family = Family::shipped("delTag25h7").unwrap();
         let mut target = Target::build("board", &spec, Some(&family)).unwrap();
@@ -194,7 +194,8 @@ mod tests {
 
     #[test]
     fn files_contradicting_their_spec_are_rejected() {
-        let edit = |change: fn(&mut Target)| said(BoardSpec::deltille(4, 4, 20.0), change).unwrap();
+        let edit =
+            |change: fn(&mut Target)| message(BoardSpec::deltille(4, 4, 20.0), change).unwrap();
         fn spec(target: &mut Target) -> &mut BoardSpec {
             let TargetSpec::Board(spec) = &mut target.spec else { panic!("a board") };
             spec
@@ -216,8 +217,8 @@ mod tests {
             (|t| spec(t).tags.as_mut().unwrap().family = "d36h9".to_owned(), "spec.tags.family"),
         ];
         for (change, field) in cases {
-            let said = edit(change);
-            assert!(said.starts_with(&format!("field `{field}`")), "{said}");
+            let message = edit(change);
+            assert!(message.starts_with(&format!("field `{field}`")), "{message}");
         }
     }
 
@@ -228,7 +229,7 @@ mod tests {
             TargetSpec::Board(spec) => spec.two_sided_mm = Some(3.002),
             _ => unreachable!(),
         };
-        assert!(said(two, thicker).unwrap().starts_with("field `panels[1].pose`"));
+        assert!(message(two, thicker).unwrap().starts_with("field `panels[1].pose`"));
         let moved = |covariance| {
             move |target: &mut Target| {
                 let mut poses: Vec<PanelPose> =
@@ -240,7 +241,7 @@ mod tests {
         };
         let solid = || SolidSpec::new(SolidShape::Tetrahedron);
         assert_eq!(
-            said(
+            message(
                 solid(),
                 moved(Some(std::array::from_fn(|i| std::array::from_fn(|j| f64::from(u8::from(
                     i == j
@@ -248,7 +249,7 @@ mod tests {
             ),
             None
         );
-        assert!(said(solid(), moved(None)).unwrap().starts_with("field `panels[2].pose`"));
+        assert!(message(solid(), moved(None)).unwrap().starts_with("field `panels[2].pose`"));
     }
 
     #[test]
@@ -259,6 +260,6 @@ mod tests {
                 corner.target_mm = (corner.target_mm * 1e3).round() / 1e3;
             }
         };
-        assert_eq!(said(SolidSpec::new(SolidShape::Octahedron), rounded), None);
+        assert_eq!(message(SolidSpec::new(SolidShape::Octahedron), rounded), None);
     }
 }

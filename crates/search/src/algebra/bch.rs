@@ -89,8 +89,8 @@ mod tests {
     /// the code or of its dual are weighed.
     #[test]
     fn codes_have_their_dimension_distance_and_symmetry() {
-        let told = [(1, 57, 4), (2, 51, 6), (3, 45, 8), (4, 39, 10), (5, 36, 12), (7, 24, 16)];
-        for (errors, dimension, distance) in told.into_iter().chain([(10, 18, 22), (11, 16, 24)]) {
+        let table = [(1, 57, 4), (2, 51, 6), (3, 45, 8), (4, 39, 10), (5, 36, 12), (7, 24, 16)];
+        for (errors, dimension, distance) in table.into_iter().chain([(10, 18, 22), (11, 16, 24)]) {
             let (code, space) = (extended(errors), space());
             assert_eq!(code.dimension(), dimension);
             assert!(code.rows().iter().all(|&row| code.contains(space.turn(row))));

@@ -105,7 +105,7 @@ pub fn random_code(
         let mut larger = code.clone();
         let fresh: Vec<u64> = module.into_iter().filter(|&w| larger.insert(w)).collect();
         let fits = !fresh.is_empty() && larger.dimension() <= max_dimension;
-        if fits && news_are_heavy(&code, &larger, distance) {
+        if fits && additions_are_heavy(&code, &larger, distance) {
             code = larger;
             failures = 0;
         } else {
@@ -117,7 +117,7 @@ pub fn random_code(
 
 /// Returns whether all words of `larger` that are not in its subcode `code` have at least weight `distance`. Stops at
 /// the first lighter one.
-fn news_are_heavy(code: &Span, larger: &Span, distance: u32) -> bool {
+fn additions_are_heavy(code: &Span, larger: &Span, distance: u32) -> bool {
     let mut complement = Vec::new();
     let mut span = code.clone();
     for &row in larger.rows() {

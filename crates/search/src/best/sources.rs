@@ -109,7 +109,7 @@ impl Best {
     ) -> Draw {
         /// Fraction of the most orbits so far above which an arrangement is tried. Small codes differ more in the
         /// fraction of their words that pass, and are arranged quickly.
-        const WORTH_A_TRY: [f64; 2] = [0.75, 0.93];
+        const TRY_THRESHOLD: [f64; 2] = [0.75, 0.93];
         const MANY_ORBITS: usize = 1_000;
         /// Number of steps of the quick arrangement.
         const STEPS: u32 = 3_000;
@@ -119,7 +119,7 @@ impl Best {
         };
         let union = self.with_cosets(code, &mut random, halt);
         let (count, orbits) = union.some_orbits(JUDGED_WORDS);
-        let share = WORTH_A_TRY[usize::from(most_orbits > MANY_ORBITS)];
+        let share = TRY_THRESHOLD[usize::from(most_orbits > MANY_ORBITS)];
         if count == 0 || (count as f64) < share * most_orbits as f64 {
             return Draw { orbits: count, shape, candidate: None };
         }

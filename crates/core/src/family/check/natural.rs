@@ -271,10 +271,10 @@ mod tests {
                     natural.chance(word) * sum.exp()
                 };
                 let all: f64 = (0..1 << bits).map(of).sum();
-                let told = natural.log_likelihood(&odds);
+                let result = natural.log_likelihood(&odds);
                 assert!(
-                    (told - all.ln()).abs() < 1e-6,
-                    "{bits} bits, {strength}: {told}, {}",
+                    (result - all.ln()).abs() < 1e-6,
+                    "{bits} bits, {strength}: {result}, {}",
                     all.ln()
                 );
             }
@@ -295,7 +295,7 @@ mod tests {
     /// always safer than fair coins.
     #[test]
     fn recommended_limits_match_the_documentation() {
-        let told = [
+        let result = [
             ("d16h5", None),
             ("d25h7", Some(0)),
             ("d25h9", Some(1)),
@@ -309,8 +309,8 @@ mod tests {
             ("delTag36h9", Some(2)),
             ("delTag36h11", Some(3)),
         ];
-        assert_eq!(told.map(|(name, _)| name).to_vec(), shipped_names());
-        for (name, limit) in told {
+        assert_eq!(result.map(|(name, _)| name).to_vec(), shipped_names());
+        for (name, limit) in result {
             let family = Family::shipped(name).unwrap();
             assert_eq!(family.recommended_correction(ACCEPTED_FALSE_POSITIVES), limit, "{name}");
             let natural = family.natural_false_positive_rates().unwrap();

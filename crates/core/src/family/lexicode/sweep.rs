@@ -75,18 +75,18 @@ impl<'a> Sweep<'a> {
             .into_par_iter()
             .map(|part| {
                 let (prefix, decided) = self.parts[part];
-                let mut walk = Walk::new(self);
+                let mut traversal = Traversal::new(self);
                 let mut shift = self.space.bits();
                 for i in (0..PART_SYMBOLS).rev() {
                     shift -= 3;
-                    let (from, to) = walk.lists.split_at_mut(1);
+                    let (from, to) = traversal.lists.split_at_mut(1);
                     thin_out(&from[0], &mut to[0], shift, prefix >> (3 * i) & 0b111, self.slack());
-                    walk.lists.swap(0, 1);
+                    traversal.lists.swap(0, 1);
                 }
                 if !control.is_cancelled() {
-                    walk.descend(0, prefix, shift, decided, control);
+                    traversal.descend(0, prefix, shift, decided, control);
                 }
-                walk.found
+                traversal.found
             })
             .collect();
         control.check()?;
@@ -99,14 +99,14 @@ impl<'a> Sweep<'a> {
 }
 
 /// One traversal of the tree.
-struct Walk<'a> {
+struct Traversal<'a> {
     sweep: &'a Sweep<'a>,
     /// One list of codes for each level.
     lists: Vec<Vec<u64>>,
     found: Vec<u64>,
 }
 
-impl<'a> Walk<'a> {
+impl<'a> Traversal<'a> {
     fn new(sweep: &'a Sweep<'a>) -> Self {
         let mut lists = vec![Vec::new(); sweep.space.cycles as usize];
         lists[0] = sweep.list.clone();

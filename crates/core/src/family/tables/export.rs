@@ -77,7 +77,7 @@ pub fn export(family: &Family, format: ExportFormat) -> String {
         ),
         ExportFormat::Rust => format!(
             "//! {about}\n\n/// Bits of a code.\npub const BITS: u32 = {bits};\n\
-             /// Cells in which any two codes, in any turn, differ at least.\n\
+             /// Minimum number of cells in which any two codes differ, in any rotation.\n\
              pub const DISTANCE: u32 = {};\n/// The codes; an id is a position.\n\
              pub const CODES: [u64; {}] = [\n{}];\n",
             family.distance(),

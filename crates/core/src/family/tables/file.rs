@@ -221,15 +221,15 @@ pub(in crate::family) fn check_form(
 pub fn check_name(name: &str, dimension: Dimension, distance: u32) -> Result<(), FamilyError> {
     let rest = ["delTag", "aprilTag", "d"].iter().find_map(|prefix| name.strip_prefix(prefix));
     let number = |text: &str| text.parse::<u32>().ok();
-    let said = rest.and_then(|rest| rest.split_once('h'));
-    let said = said.and_then(|(bits, distance)| Some((number(bits)?, number(distance)?)));
-    match said {
-        Some(said) if said != (dimension.bits(), distance) => {
+    let stated = rest.and_then(|rest| rest.split_once('h'));
+    let stated = stated.and_then(|(bits, distance)| Some((number(bits)?, number(distance)?)));
+    match stated {
+        Some(stated) if stated != (dimension.bits(), distance) => {
             let problem = format!(
                 "`{name}` states {} bits and distance {}, but the family has {} bits and distance \
                  {distance}",
-                said.0,
-                said.1,
+                stated.0,
+                stated.1,
                 dimension.bits()
             );
             Err(FamilyError::Claim { field: "name".to_owned(), problem })

@@ -304,19 +304,19 @@ mod tests {
     #[test]
     fn texts_without_a_valid_table_are_rejected() {
         let squares = Some(GridKind::Checker);
-        let said = |text: &str, spec: ImportSpec| import(text, &spec).unwrap_err().to_string();
-        assert!(said("", spec(squares, Some(16))).starts_with("no codes found"));
-        assert!(said("0x231b", spec(squares, None)).contains("`ImportSpec::bits`"));
-        assert!(said("0x231b", spec(None, Some(16))).contains("`ImportSpec::kind`"));
-        assert!(said("0x231b", spec(squares, Some(17))).contains("17"));
-        assert!(said("0x1231b", spec(squares, Some(16))).contains("more than 16 bits"));
+        let message = |text: &str, spec: ImportSpec| import(text, &spec).unwrap_err().to_string();
+        assert!(message("", spec(squares, Some(16))).starts_with("no codes found"));
+        assert!(message("0x231b", spec(squares, None)).contains("`ImportSpec::bits`"));
+        assert!(message("0x231b", spec(None, Some(16))).contains("`ImportSpec::kind`"));
+        assert!(message("0x231b", spec(squares, Some(17))).contains("17"));
+        assert!(message("0x1231b", spec(squares, Some(16))).contains("more than 16 bits"));
         let wide = format!("0x{}", "f".repeat(17));
         for bits in [16, 64] {
-            let told = said(&wide, spec(squares, Some(bits)));
-            assert!(told.contains(&format!("more than {bits} bits")), "{told}");
+            let error = message(&wide, spec(squares, Some(bits)));
+            assert!(error.contains(&format!("more than {bits} bits")), "{error}");
         }
-        assert!(said("0x231b 0x231b", spec(squares, Some(16))).contains("again"));
+        assert!(message("0x231b 0x231b", spec(squares, Some(16))).contains("again"));
         let claims = ImportSpec { distance: Some(9), ..spec(squares, Some(16)) };
-        assert!(said("0x231b 0x2ea5", claims).contains("`ImportSpec::distance`"));
+        assert!(message("0x231b 0x2ea5", claims).contains("`ImportSpec::distance`"));
     }
 }

@@ -96,7 +96,7 @@ mod tests {
             }
         }
         let cells = TagCells::new(Dimension::from_bits(25).unwrap());
-        let told = [7, 9].map(|h| published_bounds(&cells, h).unwrap().most_tags);
-        assert_eq!(told, [3091, 278]);
+        let most = [7, 9].map(|h| published_bounds(&cells, h).unwrap().most_tags);
+        assert_eq!(most, [3091, 278]);
     }
 }

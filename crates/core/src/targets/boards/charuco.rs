@@ -249,7 +249,7 @@ mod tests {
     fn invalid_settings_are_rejected() {
         let good = CharucoSpec::new([8, 6], 30.0, "5x5_100");
         let family = Family::shipped("5x5_100").unwrap();
-        let said = |spec: CharucoSpec| {
+        let message = |spec: CharucoSpec| {
             Target::build("board", &spec.into(), Some(&family)).unwrap_err().to_string()
         };
         let cases = [
@@ -264,8 +264,8 @@ mod tests {
             (CharucoSpec { squares: [90, 90], ..good }, "`TagSpec::first_id`"),
         ];
         for (spec, start) in cases {
-            let said = said(spec);
-            assert!(said.starts_with(start), "{said}");
+            let message = message(spec);
+            assert!(message.starts_with(start), "{message}");
         }
     }
 }

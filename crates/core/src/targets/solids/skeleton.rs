@@ -177,7 +177,7 @@ impl Incircle {
         }
         let normal = normal.normalize_or_zero();
         let centre = corners.iter().sum::<DVec3>() / corners.len() as f64;
-        let ways = ways_inwards(corners, normal);
+        let ways = inward_directions(corners, normal);
         // A side becomes shorter as its ends approach each other along it.
         let side = |i: usize| {
             let j = (i + 1) % corners.len();
@@ -196,7 +196,7 @@ impl Incircle {
             let moved = |v: &DVec3| self.centre + (v - self.centre) * scale - down;
             return corners.iter().map(moved).collect();
         }
-        let ways = ways_inwards(corners, self.normal);
+        let ways = inward_directions(corners, self.normal);
         corners.iter().zip(ways).map(|(v, way)| v + way * inset - down).collect()
     }
 }
@@ -204,7 +204,7 @@ impl Incircle {
 /// Returns the displacement of each corner of a convex polygon when its sides move inwards by one unit.
 ///
 /// It moves along d = (m + n) / (1 + m·n), as d·m = d·n = 1 with the inward normals m and n of its two sides.
-fn ways_inwards(corners: &[DVec3], normal: DVec3) -> Vec<DVec3> {
+fn inward_directions(corners: &[DVec3], normal: DVec3) -> Vec<DVec3> {
     let count = corners.len();
     let inwards =
         |i: usize| normal.cross(corners[(i + 1) % count] - corners[i % count]).normalize_or_zero();
@@ -320,19 +320,19 @@ mod tests {
 
     #[test]
     fn frames_without_room_are_rejected_with_a_remedy() {
-        let said = |solid: Polyhedron, spec: SkeletonSpec| {
+        let message = |solid: Polyhedron, spec: SkeletonSpec| {
             Skeleton::new(&solid, &spec).unwrap_err().to_string()
         };
         let spec = SkeletonSpec::default();
         let thin = SkeletonSpec { rib_mm: Some(1.0), ..spec };
         assert!(
-            said(Polyhedron::icosahedron(150.0), thin)
+            message(Polyhedron::icosahedron(150.0), thin)
                 .contains("`SkeletonSpec::rib_mm`: 1 mm leaves no foot")
         );
         assert!(
-            said(Polyhedron::tetrahedron(50.0), spec).contains("a larger `SolidSpec::edge_mm`")
+            message(Polyhedron::tetrahedron(50.0), spec).contains("a larger `SolidSpec::edge_mm`")
         );
         let none = SkeletonSpec { wall_mm: 0.0, ..spec };
-        assert!(said(Polyhedron::icosahedron(150.0), none).contains("`SkeletonSpec::wall_mm`"));
+        assert!(message(Polyhedron::icosahedron(150.0), none).contains("`SkeletonSpec::wall_mm`"));
     }
 }

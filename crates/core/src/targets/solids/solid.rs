@@ -312,23 +312,23 @@ mod tests {
     fn missing_ids_are_rejected_with_a_remedy() {
         let mut spec = SolidSpec { tiles: 13, ..SolidSpec::new(SolidShape::Icosahedron) };
         spec.tags.as_mut().unwrap().first_id = 200;
-        let said = build(&spec).unwrap_err().to_string();
-        assert!(said.contains("lower it to at most 143"), "{said}");
+        let message = build(&spec).unwrap_err().to_string();
+        assert!(message.contains("lower it to at most 143"), "{message}");
         spec.tags.as_mut().unwrap().family = "delTag16h5".to_owned();
-        let said = build(&spec).unwrap_err().to_string();
+        let message = build(&spec).unwrap_err().to_string();
         // Twenty faces with a tag each need more ids than the family has left.
-        assert!(said.contains("use `TagSpec::family` d25h7 with its"), "{said}");
+        assert!(message.contains("use `TagSpec::family` d25h7 with its"), "{message}");
         spec.tags.as_mut().unwrap().first_id = 0;
-        let said = build(&spec).unwrap_err().to_string();
+        let message = build(&spec).unwrap_err().to_string();
         assert!(
-            said.contains(
+            message.contains(
                 "raise `TagSpec::spacing` to at least 10, or use at most 6 `SolidSpec::tiles`"
             ),
-            "{said}"
+            "{message}"
         );
         let small = SolidSpec { edge_mm: 20.0, ..SolidSpec::new(SolidShape::Icosahedron) };
-        let said = build(&small).unwrap_err().to_string();
-        assert!(said.contains("`SolidSpec::edge_mm` of at least "), "{said}");
+        let message = build(&small).unwrap_err().to_string();
+        assert!(message.contains("`SolidSpec::edge_mm` of at least "), "{message}");
     }
 
     proptest! {

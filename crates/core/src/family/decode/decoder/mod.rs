@@ -201,8 +201,8 @@ mod tests {
                         read ^= 1 << rng.random_range(0..family.dimension().bits());
                     }
                     let found = decoder.decode_erased(read, mask, errors).unwrap();
-                    let told = (found.id as usize, found.turns, found.errors);
-                    assert_eq!(told, (id, turns, errors), "{name}, {hidden:?}");
+                    let decoded = (found.id as usize, found.turns, found.errors);
+                    assert_eq!(decoded, (id, turns, errors), "{name}, {hidden:?}");
                     // With all cells hidden, nothing can be decoded.
                     assert!(decoder.decode_erased(read, family.dimension().mask(), 0).is_none());
                 }
