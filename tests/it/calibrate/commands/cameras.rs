@@ -182,7 +182,8 @@ fn pictures_that_show_no_board_are_told_with_the_reason_of_most() {
         reasons(&[]),
     ];
     let folder = folder(&board(8, 9), &empty);
-    let why = "no board of this kind in 4 pictures; 2 of them: 1 tag not on the target, for example id 4";
+    let why =
+        "no board of this kind in 4 pictures; 2 of them: 1 tag not on the target, for example id 4";
     refused(folder.path(), CALIBRATE, &[why]);
     std::fs::create_dir(folder.path().join("b")).unwrap();
     let rig = "rig --camera a=corners --camera b=b --target board.json";
