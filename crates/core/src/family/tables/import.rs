@@ -315,7 +315,7 @@ mod tests {
             let error = message(&wide, spec(squares, Some(bits)));
             assert!(error.contains(&format!("more than {bits} bits")), "{error}");
         }
-        assert!(message("0x231b 0x231b", spec(squares, Some(16))).contains("again"));
+        assert!(message("0x231b 0x231b", spec(squares, Some(16))).contains("repeats code 0"));
         let claims = ImportSpec { distance: Some(9), ..spec(squares, Some(16)) };
         assert!(message("0x231b 0x2ea5", claims).contains("`ImportSpec::distance`"));
     }
