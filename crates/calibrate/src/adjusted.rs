@@ -70,18 +70,18 @@ impl Calibration {
         Ok(Estimate { excluded, findings, ..estimate })
     }
 
-    /// Refuses views of panels whose places are not given.
+    /// Rejects views of panels whose poses are not given.
     fn check_panels(&self) -> Result<(), CalibrationError> {
         let views = self.cameras.iter().flat_map(|camera| &camera.views);
         let mut seen = views.flat_map(|view| view.sightings.iter().map(move |of| (view, of.panel)));
         let Some((view, panel)) = seen.find(|(_, panel)| panel.index() >= self.panels.len()) else {
             return Ok(());
         };
-        let problem = format!("panel {panel} is none of those whose places are given");
+        let problem = format!("the calibration has no pose for panel {panel}");
         Err(CalibrationError::WrongDetection { view: view.name.clone(), problem })
     }
 
-    /// Refuses views of which too few belong together.
+    /// Rejects views if too few of them agree.
     fn check_frames(&self, gross: &Gross) -> Result<(), CalibrationError> {
         let (wrong, all) = (gross.frames.len(), gross.problem.frames.len());
         match self.cameras.as_slice() {
@@ -89,7 +89,7 @@ impl Calibration {
                 enough(all - wrong, only.views.len())
             }
             [_] => Ok(()),
-            // Cameras whose places are known can only be held against the frames.
+            // Cameras of known pose can only be compared with the frames.
             cameras if gross.problem.cameras.iter().any(|camera| camera.pose_free) => {
                 if 2 * wrong <= all {
                     return Ok(());

@@ -1,21 +1,21 @@
-//! A flag by which somebody else ends a calibration.
+//! A flag by which the caller stops a calibration.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-/// A flag by which somebody else ends a calibration, see [`Calibration::stopped_by`](crate::Calibration::stopped_by).
+/// A flag by which the caller stops a calibration, see [`Calibration::stopped_by`](crate::Calibration::stopped_by).
 ///
-/// It says nothing of what is calibrated: any two are equal.
+/// The flag is not part of the problem, so any two flags are equal.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Stop(Option<Arc<AtomicBool>>);
 
 impl Stop {
-    /// A flag that may be raised.
+    /// Creates a flag that the caller may raise.
     pub(crate) fn by(flag: Arc<AtomicBool>) -> Self {
         Self(Some(flag))
     }
 
-    /// Whether the work is to end.
+    /// Whether the calibration must stop.
     pub(crate) fn is_raised(&self) -> bool {
         self.0.as_ref().is_some_and(|flag| flag.load(Ordering::Relaxed))
     }
@@ -34,7 +34,7 @@ mod tests {
     use deltille_core::camera::Pose;
 
     #[test]
-    fn a_calibration_ends_when_it_is_told_to() {
+    fn a_raised_flag_stops_a_calibration() {
         let flag = Arc::new(AtomicBool::new(true));
         let calibration = Calibration::new([Pose::IDENTITY]).camera("c", Vec::new(), Model::Radtan);
         assert_ne!(calibration.solve(), Err(CalibrationError::Stopped));

@@ -1,15 +1,15 @@
-//! Why a calibration fails, in sentences.
+//! Errors of a calibration and their messages.
 
 use std::fmt;
 
 use deltille_core::setting::Setting::CalibrationRefinePanels;
 
-/// How a rig moved too plainly to place cameras that do not see the same target.
+/// Why the motion of a rig does not determine the pose of a camera that shares no target with the others.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum TooPlain {
-    /// It did not turn.
+    /// The rig did not rotate.
     NoTurn,
-    /// It turned about one axis.
+    /// The rig rotated about one axis only.
     OneAxis,
 }
 
@@ -17,18 +17,18 @@ impl fmt::Display for TooPlain {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(match self {
             Self::NoTurn => {
-                "and the rig was moved without being turned: how far the camera is from the others is not \
-                 determined; turn the rig, or the targets before it, by 20° and more about two axes"
+                "and the rig did not rotate, so the position of the camera relative to the others is \
+                 undetermined; rotate the rig, or the targets in front of it, by at least 20° about two axes"
             }
             Self::OneAxis => {
-                "and the rig was turned about one axis only: where the camera is along that axis is not \
-                 determined; turn the rig, or the targets before it, about a second axis too"
+                "and the rig rotated about one axis only, so the position of the camera along that axis is \
+                 undetermined; rotate the rig, or the targets in front of it, about a second axis as well"
             }
         })
     }
 }
 
-/// Why a camera was not calibrated. Messages say what to do about it.
+/// Why a calibration failed. Each message says what to do about it.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum CalibrationError {
@@ -38,188 +38,188 @@ pub enum CalibrationError {
         first_px[0], first_px[1], other_px[0], other_px[1]
     )]
     MixedSizes {
-        /// A view.
+        /// Name of the first view.
         first: String,
-        /// Its size.
+        /// Its width and height.
         first_px: [u32; 2],
-        /// A view of another size.
+        /// Name of a view of a different size.
         other: String,
-        /// Its size.
+        /// Its width and height.
         other_px: [u32; 2],
     },
-    /// Pictures of another size than the camera that is given for them.
+    /// Images whose size differs from that of the given camera.
     #[error(
-        "the camera is of {} × {} px, {view} has {} × {} px: it is another camera's, or of another mode",
+        "the given camera has {} × {} px, but {view} has {} × {} px: it comes from another camera or mode",
         camera_px[0], camera_px[1], view_px[0], view_px[1]
     )]
     OtherSize {
-        /// Width and height that the camera has.
+        /// Width and height of the given camera.
         camera_px: [u32; 2],
-        /// A view.
+        /// Name of the view.
         view: String,
         /// Its width and height.
         view_px: [u32; 2],
     },
-    /// A detection of another target, or with labels that run the wrong way round.
+    /// A detection of another target, or one with mirrored labels.
     #[error("{view}: {problem}")]
     WrongDetection {
-        /// The view.
+        /// Name of the view.
         view: String,
-        /// What is wrong with it.
+        /// The problem with it.
         problem: String,
     },
-    /// Most detections are wrong in themselves.
+    /// Most detections are wrong.
     #[error("{first} ({wrong} of {all} detections are wrong)")]
     MostWrong {
-        /// What is wrong with the first of them.
+        /// The error of the first wrong detection.
         first: Box<CalibrationError>,
-        /// How many are wrong.
+        /// Number of wrong detections.
         wrong: usize,
-        /// How many show something.
+        /// Number of detections that are not empty.
         all: usize,
     },
-    /// Cameras that were given and did not take their pictures, which may be why nothing was found.
-    #[error("the camera given for {cameras} did not take its pictures: {error}")]
+    /// Given intrinsics that contradict the images, which may be the reason for the failure.
+    #[error("the camera given for {cameras} did not take the images: {error}")]
     ForeignCameras {
-        /// Their names.
+        /// Names of the cameras.
         cameras: String,
-        /// Why nothing was found.
+        /// The failure.
         error: Box<CalibrationError>,
     },
-    /// More frames than there are would have to be held out.
+    /// Too few frames to hold any out.
     #[error(
-        "there are only {all} {}, so that none is the {every}-th",
+        "cannot hold out one in {every} {}: there are only {all}",
         if *is_rig { "frames" } else { "views" }
     )]
     NothingHeldOut {
-        /// Whether frames of several cameras are meant.
+        /// Whether the calibration has several cameras.
         is_rig: bool,
-        /// Every how many-th was to be held out.
+        /// One frame in this many was to be held out.
         every: usize,
-        /// How many there are.
+        /// Number of frames.
         all: usize,
     },
-    /// Not enough views.
+    /// Too few usable views.
     #[error(
         "usable views: {found} of {all}; a calibration needs at least {needed}, tilted differently \
          (20 or more are better)"
     )]
     TooFewViews {
-        /// How many can be used.
+        /// Number of usable views.
         found: usize,
-        /// How many there are.
+        /// Number of all views.
         all: usize,
-        /// How many are needed.
+        /// Least number of usable views.
         needed: usize,
     },
     /// The board was never tilted.
     #[error(
         "all views are parallel (the board's tilt differs by at most {spread_deg:.1}°): focal \
-         length and distance cannot be told apart; tilt the board by 20° to 45° in some views"
+         length and distance cannot be distinguished; tilt the board by 20° to 45° in some views"
     )]
     Parallel {
-        /// The largest angle between a view's board and the mean, degrees.
+        /// Largest angle between the board in a view and its mean orientation, degrees.
         spread_deg: f64,
     },
-    /// A camera of a rig that saw nothing of the target.
+    /// A camera of a rig that did not see the target.
     #[error("camera {camera}: no detection shows the target")]
     NotSeen {
-        /// Its name.
+        /// Name of the camera.
         camera: String,
     },
-    /// A camera of a rig by itself.
+    /// An error of one camera of a rig.
     #[error("camera {camera}: {error}")]
     OfCamera {
-        /// Its name.
+        /// Name of the camera.
         camera: String,
-        /// Why it was not calibrated.
+        /// Why its calibration failed.
         error: Box<CalibrationError>,
     },
-    /// Cameras that nothing ties to the others.
+    /// Cameras that share too few frames with the others.
     #[error(
-        "{cameras}: {} the target in these and in another camera, {needed} are needed: pictures of \
-         one moment must have the same file name in each folder, and some must show the target in \
-         both cameras",
+        "{cameras}: {} the target in these and in another camera, but at least {needed} are needed; \
+         images taken at the same time must have the same file name in each folder, and some must show \
+         the target in both cameras",
         match shared {
             0 => "no frame shows".to_owned(),
             1 => "only one frame shows".to_owned(),
-            n => format!("no more than {n} frames show"),
+            n => format!("only {n} frames show"),
         }
     )]
     Apart {
-        /// Their names.
+        /// Names of the cameras.
         cameras: String,
-        /// How many frames are shared.
+        /// Number of shared frames.
         shared: usize,
-        /// How many are needed.
+        /// Least number of shared frames.
         needed: usize,
     },
-    /// One of several targets that no camera saw.
+    /// One of several targets, seen by no camera.
     #[error("no detection shows target {target}")]
     TargetNotSeen {
-        /// Its name.
+        /// Name of the target.
         target: String,
     },
-    /// One of several targets that nothing ties to the others.
+    /// One of several targets that shares too few frames with the others.
     #[error(
-        "target {target}: fewer than {needed} frames show it together with another target, in whichever \
-         cameras: where it is to the others is not known"
+        "target {target}: fewer than {needed} frames show it together with another target (in any of the \
+         cameras), so its pose relative to the others is undetermined"
     )]
     TargetApart {
-        /// Its name.
+        /// Name of the target.
         target: String,
-        /// How many frames are needed.
+        /// Least number of shared frames.
         needed: usize,
     },
-    /// A camera that sees a target of its own only, on a rig that moved too plainly.
-    #[error("camera {camera} alone sees target {target}, {why}")]
+    /// A camera that shares no target with the others, on a rig whose motion does not determine its pose.
+    #[error("only camera {camera} sees target {target}, {why}")]
     PlainMotion {
-        /// The camera's name.
+        /// Name of the camera.
         camera: String,
-        /// The target's name.
+        /// Name of the target.
         target: String,
-        /// What was missing.
+        /// The rotation that was missing.
         why: TooPlain,
     },
-    /// Cameras that moved against each other.
+    /// Cameras that moved relative to each other.
     #[error(
-        "in {wrong} of {all} frames the cameras do not agree where the target is, most of all camera \
-         {camera}: they moved against each other, or pictures of the same name were not taken at the \
-         same moment"
+        "in {wrong} of {all} frames the cameras disagree about the pose of the target, most often camera \
+         {camera}: the cameras moved relative to each other, or images of the same name were not taken at \
+         the same time"
     )]
     NotRigid {
-        /// The camera that is off in most of them.
+        /// The camera that disagrees in most of these frames.
         camera: String,
-        /// Frames that do not fit.
+        /// Number of frames that do not fit.
         wrong: usize,
-        /// All frames.
+        /// Number of all frames.
         all: usize,
     },
-    /// The shape of a target of several panels.
+    /// A board shape requested for a target of several panels.
     #[error(
-        "the target has {panels} panels: the shape of a sheet is found for one board; the places of \
-         the panels are found by {CalibrationRefinePanels}"
+        "the target has {panels} panels, but a board shape can be estimated for a single board only; \
+         {CalibrationRefinePanels} estimates the poses of the panels"
     )]
     ShapeOfMany {
-        /// How many.
+        /// Number of panels.
         panels: usize,
     },
     /// No focal length explains the views.
     #[error(
-        "no camera explains the views: most corners must be wrongly labelled, or the target is not \
-         the one that was photographed"
+        "no camera fits the views: most corners are mislabelled, or the target is not the one that was \
+         photographed"
     )]
     NoStart,
-    /// Somebody has ended it, see [`Calibration::stopped_by`](crate::Calibration::stopped_by).
-    #[error("interrupted before it was solved")]
+    /// Stopped by the caller, see [`Calibration::stopped_by`](crate::Calibration::stopped_by).
+    #[error("interrupted before the calibration was finished")]
     Stopped,
-    /// The views leave parameters open.
+    /// Parameters that the views do not determine.
     #[error(
-        "the views do not determine {parameters}: tilt the board more, fill the corners of the \
-         image, or choose another model: this one has too many parameters, or does not hold the lens"
+        "the views do not determine {parameters}: tilt the board more, fill the corners of the image, \
+         or choose another model (this one has too many parameters, or does not fit the lens)"
     )]
     Undetermined {
-        /// The parameters' names.
+        /// Names of the parameters.
         parameters: String,
     },
 }

@@ -1,64 +1,64 @@
-//! Views, frames and panels that take no part, and why.
+//! Views, frames and panels excluded from a calibration, with the reasons.
 
 use std::fmt;
 
 use serde::{Serialize, Serializer};
 
-/// A view, a frame or a panel in a view that took no part in a calibration, and why.
+/// A view, a frame or a panel in a view that was excluded from a calibration.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Excluded {
-    /// Name of the camera, in a rig; `None` where all its cameras are meant.
+    /// Name of the camera in a rig; `None` if the whole frame was excluded.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub camera: Option<String>,
     /// Name of the view, or of the frame of a rig.
     pub view: String,
-    /// File name of the picture; empty where pictures of several cameras are meant.
+    /// File name of the image; empty if images of several cameras were excluded.
     pub image: String,
-    /// Id of the panel that is wrong in itself; `None` where the view does not fit as a whole.
+    /// Id of the panel that does not fit; `None` if the view as a whole does not fit.
     pub panel: Option<u32>,
-    /// How many corners were left out by it.
+    /// Number of excluded corners.
     pub corners: usize,
-    /// Why it was left out.
+    /// Why it was excluded.
     pub reason: Reason,
 }
 
-/// Why something takes no part.
+/// Why a view, a frame or a panel was excluded.
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum Reason {
-    /// A detection that is not of the target, and what is wrong with it.
+    /// A detection that is not of the target; the text states the problem.
     Foreign(String),
-    /// The picture of another view once more, which tells nothing new.
+    /// A copy of the image of another view, which adds no information.
     Copy {
         /// Name of the other view.
         of: String,
     },
-    /// A view for which there is no pose.
+    /// A view that no pose fits.
     NoPose,
-    /// A view whose corners are too far off.
+    /// A view whose residuals are too large.
     Off {
-        /// The median error of its corners, px.
+        /// Median residual of its corners, px.
         off_px: f64,
-        /// That of other views, px.
+        /// Median residual of the corners of other views, px.
         usual_px: f64,
     },
-    /// A frame of a rig in which one camera's corners are too far off.
+    /// A frame of a rig in which the residuals of one camera are too large.
     AnotherMoment {
         /// Name of the camera.
         camera: String,
-        /// The median error of its corners, px.
+        /// Median residual of its corners, px.
         off_px: f64,
     },
-    /// A frame that speaks for other cameras than all others do.
+    /// A frame that implies other cameras than the remaining frames do.
     Stranger {
-        /// Whether there are several cameras.
+        /// Whether the calibration has several cameras.
         is_rig: bool,
-        /// By how many of their deviations the cameras would move.
+        /// Shift of the cameras that the frame would cause, in standard deviations.
         deviations: f64,
     },
-    /// Labels that run the wrong way round.
+    /// Mirrored labels.
     Mirrored,
-    /// A frame that shows only panels that take no part.
+    /// A frame that shows only excluded panels.
     OnlyWrongPanels,
 }
 
@@ -66,36 +66,36 @@ impl fmt::Display for Reason {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Foreign(problem) => f.write_str(problem),
-            Self::Copy { of } => write!(f, "it is the picture of {of} once more, and counts once"),
+            Self::Copy { of } => write!(f, "it is a copy of the image of {of}, which is counted once"),
             Self::NoPose => f.write_str(
-                "no pose explains its corners: wrong labels, another target, or corners where the lens \
-                 model has ended",
+                "no pose fits its corners: wrong labels, another target, or corners beyond the valid range \
+                 of the lens model",
             ),
             Self::Off { off_px, usual_px } => write!(
                 f,
-                "its corners are off by {off_px:.1} px where those of other views are by {usual_px:.2} px: \
+                "its corners are off by {off_px:.1} px, those of other views by only {usual_px:.2} px: \
                  wrong labels, or another target"
             ),
             Self::AnotherMoment { camera, off_px } => write!(
                 f,
-                "the corners of camera {camera} are off by {off_px:.1} px: not taken at the same moment, or \
-                 wrong labels"
+                "the corners of camera {camera} are off by {off_px:.1} px: its image was taken at another \
+                 time, or its labels are wrong"
             ),
             Self::Stranger { is_rig: false, deviations } => write!(
                 f,
-                "it speaks for another camera than the other views do, and would move theirs by \
-                 {deviations:.1} deviations: another zoom, focus or crop, or a board that was bent"
+                "this view implies a different camera: it would shift the intrinsics by {deviations:.1}σ \
+                 (zoom, focus or crop changed, or the board bent)"
             ),
             Self::Stranger { is_rig: true, deviations } => write!(
                 f,
-                "it speaks for other cameras than the other frames do, and would move theirs by \
-                 {deviations:.1} deviations: not taken at the same moment, or one had moved"
+                "this frame implies different cameras: it would shift their parameters by {deviations:.1}σ \
+                 (its images were not taken at the same time, or a camera moved)"
             ),
             Self::Mirrored => f.write_str(
                 "the labels are mirrored: rows and columns are exchanged, or the image was flipped",
             ),
             Self::OnlyWrongPanels => f.write_str(
-                "it shows only panels that are not where the target's file has them",
+                "it shows only panels that are not where the target file places them",
             ),
         }
     }
@@ -108,7 +108,7 @@ impl Serialize for Reason {
 }
 
 impl Excluded {
-    /// The view's name, in a rig with its camera's.
+    /// The name of the view, followed in a rig by that of the camera.
     pub fn shown(&self) -> String {
         match &self.camera {
             Some(camera) => format!("{} of camera {camera}", self.view),

@@ -1,4 +1,4 @@
-//! Where a target is in a picture of a known camera.
+//! The pose of a target in an image of a known camera.
 
 use super::diagnose::diagnosis::Diagnosis;
 use super::diagnose::words::Words;
@@ -8,11 +8,11 @@ use super::input::calibration::Calibration;
 use deltille_core::detection::Detection;
 
 impl Calibration {
-    /// [`Self::solve`] for one picture of a known camera: the pose of the target in it, or a sentence that says why
-    /// there is none; `seen` is the detection.
+    /// Solves for the pose of the target in one image of a known camera, as [`Self::solve`] does. The inner error is a
+    /// sentence that says why no pose was found; `seen` is the detection.
     ///
     /// # Errors
-    /// Where the calibration itself is wrong.
+    /// Returns an error if the calibration itself is invalid.
     pub fn located(&self, seen: &Detection) -> Result<Result<Estimate, String>, CalibrationError> {
         let found = match self.solve() {
             Err(error @ CalibrationError::OtherSize { .. }) => return Ok(Err(error.to_string())),
@@ -28,7 +28,7 @@ impl Calibration {
             let reason = || seen.reasons.first().map(ToString::to_string);
             return Ok(Err(excluded
                 .or_else(reason)
-                .unwrap_or_else(|| "no target in it".to_owned())));
+                .unwrap_or_else(|| "no target found".to_owned())));
         }
         Ok(Ok(found))
     }

@@ -145,7 +145,7 @@ fn pictures_of_the_size_that_most_have_count_and_each_counts_once() {
         stderr.contains("b0.png: left out: it has 512 × 384 pixels, most have 1024 × 768"),
         "{stderr}"
     );
-    assert!(stderr.contains("c3: left out: it is the picture of b3 once more"), "{stderr}");
+    assert!(stderr.contains("c3: left out: it is a copy of the image of b3"), "{stderr}");
 }
 
 /// A picture reduced by a whole number.

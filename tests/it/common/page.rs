@@ -106,15 +106,15 @@ fn same_everywhere(line: &str) -> String {
             all + " within " + &within(figure.parse().unwrap()) + " mm" + after
         });
     }
-    if let Some((before, after)) = line.split_once("the lens is good up to ") {
-        // Poles of weakly determined numbers.
+    if let Some((before, after)) = line.split_once("the lens model is valid up to ") {
+        // Poles of weakly determined parameters.
         let figures = after.split(" px").take(3).map(|to| to.rsplit(' ').next().unwrap());
         let figures: Vec<f64> = figures.map(|figure| figure.parse().unwrap()).collect();
         let [steady, outermost, farthest] = figures[..] else { panic!("{line}") };
         assert!(0.0 < steady && steady < farthest, "{line}");
-        assert_eq!(steady < outermost, after.contains("use no pixels near that radius"), "{line}");
+        assert_eq!(steady < outermost, after.contains("avoid pixels near that radius"), "{line}");
         let after = after.trim_start_matches(|c: char| c.is_ascii_digit());
-        return format!("{before}the lens is good up to …{after}");
+        return format!("{before}the lens model is valid up to …{after}");
     }
     let Some(end) = line.find(" (os error ") else { return line };
     let begin = line[..end].rfind(": ").map_or(0, |colon| colon + 2);

@@ -101,7 +101,7 @@ pub struct Difference {
 pub enum ComparisonError {
     /// Images of different size.
     #[error(
-        "images of {} × {} px and of {} × {} px are not of one camera: give two calibrations of the same camera and size", first[0], first[1], second[0], second[1]
+        "the image sizes differ ({} × {} px and {} × {} px): compare two calibrations of one camera at one image size", first[0], first[1], second[0], second[1]
     )]
     Sizes {
         /// Of the first.
@@ -111,7 +111,7 @@ pub enum ComparisonError {
     },
     /// No part of the image that both cover.
     #[error(
-        "too little of the image was seen by both, or lies in the region: take {RegionImage}, or a larger part"
+        "the region is too small, or the calibrations saw too little of the image in common: use {RegionImage}, or a larger region"
     )]
     Nothing,
 }
@@ -146,8 +146,8 @@ pub fn compare_boards(
     if !assume_target {
         check_same_board(what, boards).map_err(|problem| {
             format!(
-                "{problem}; calibrate both with its description, or set {CompareBoardsAssumeTarget} to compare them as \
-                 they are"
+                "{problem}; calibrate both with the right description, or set {CompareBoardsAssumeTarget} to compare \
+                 them anyway"
             )
         })?;
     }

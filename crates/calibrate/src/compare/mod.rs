@@ -1,4 +1,5 @@
-//! Two calibrations of one camera: `comparison` of their projections with what both are known to, and the `verdict`.
+//! Comparison of two calibrations of one camera: `comparison` tests the difference of their projections against their
+//! uncertainties, `verdict` summarises it.
 
 pub(crate) mod comparison;
 pub(crate) mod verdict;

@@ -1,25 +1,25 @@
-//! Whether two calibrations are of the same camera, in one word.
+//! The verdict whether two calibrations describe the same camera.
 
 use super::comparison::{CameraMotion, Comparison};
 
-/// Differences up to this are rounding: what a pixel shows is found by iteration, to about 10⁻⁹ px.
+/// Largest difference that counts as rounding, px: unprojection iterates to about 10⁻⁹ px.
 const ROUNDING_PX: f64 = 1e-6;
 
 /// Whether a camera or a rig has changed from one calibration to another.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Verdict {
-    /// Nothing differs significantly, or by more than is tolerated.
+    /// No difference is significant and larger than the tolerance.
     Same,
     /// A camera, or its pose on the rig, differs significantly.
     Changed,
-    /// Nothing that can be judged differs, and something cannot be judged: uncertainties are missing.
+    /// No judged difference is significant, but some cannot be judged because uncertainties are missing.
     Undecided,
 }
 
 impl Verdict {
-    /// The verdict on all cameras that were compared, of which differences up to a tolerance, px rms a coordinate, do not
-    /// count, and on their motions.
+    /// Returns the verdict on all compared cameras and their motions. Differences between cameras up to the tolerance
+    /// (px, RMS per axis) do not count.
     pub fn of(found: &[Comparison], motions: &[CameraMotion], tolerance_px: f64) -> Self {
         let of_cameras =
             found.iter().map(|found| match found.rms_px <= tolerance_px.max(ROUNDING_PX) {
@@ -37,7 +37,7 @@ impl Verdict {
         }
     }
 
-    /// Its word in files.
+    /// The word for the verdict in files.
     pub fn name(self) -> &'static str {
         match self {
             Self::Same => "same",
@@ -48,22 +48,26 @@ impl Verdict {
 }
 
 impl Comparison {
-    /// Why it cannot be judged whether the camera has changed; `None` where it can.
+    /// Why the comparison cannot decide whether the camera has changed; `None` if it can.
     pub fn why_undecided(&self) -> Option<&'static str> {
         match (self.chance, self.lacks_uncertainty) {
             (Some(_), _) => None,
-            (None, [true, true]) => Some("the uncertainties of both are not known"),
-            (None, [true, false]) => Some("the uncertainties of the first are not known"),
-            (None, [false, true]) => Some("the uncertainties of the second are not known"),
-            (None, [false, false]) => Some("the region leaves the motion between the two open"),
+            (None, [true, true]) => Some("both calibrations lack uncertainties"),
+            (None, [true, false]) => Some("the first calibration lacks uncertainties"),
+            (None, [false, true]) => Some("the second calibration lacks uncertainties"),
+            (None, [false, false]) => {
+                Some("the region does not determine the motion between the two cameras")
+            }
         }
     }
 }
 
 impl CameraMotion {
-    /// Why it cannot be judged whether the camera has moved; `None` where it can.
+    /// Why the comparison cannot decide whether the camera has moved; `None` if it can.
     pub fn why_undecided(&self) -> Option<&'static str> {
-        self.chance.is_none().then_some("deviations of its pose are not known in both")
+        self.chance
+            .is_none()
+            .then_some("the pose uncertainty is missing in at least one calibration")
     }
 }
 
@@ -76,7 +80,7 @@ mod tests {
     }
 
     #[test]
-    fn what_cannot_be_judged_is_not_the_same() {
+    fn missing_uncertainties_do_not_count_as_the_same() {
         let (same, changed, open) =
             (comparison(0.1, Some(0.5)), comparison(0.1, Some(1e-9)), comparison(0.1, None));
         let of = |found: &[&Comparison], tolerance| {

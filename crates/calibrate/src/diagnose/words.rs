@@ -1,4 +1,4 @@
-//! Diagnoses in words, for a terminal, a page and a file.
+//! Sentences of diagnoses, for the terminal, the report page and files.
 
 use super::diagnosis::Diagnosis;
 use super::model_selection::{FOREIGN_PART, Instead, Remedy};
@@ -17,36 +17,36 @@ use deltille_core::setting::Setting::{
 };
 use deltille_core::words::{counted, p_value, places};
 
-/// A panel that is turned by less looks only moved.
+/// Smallest rotation of a panel that the sentence mentions, degrees.
 const TURNED_DEG: f64 = 0.05;
 
 const GIVEN_CAMERA: &str =
-    "the camera that was given is another one, or has changed since (lens, focus, zoom, crop)";
+    "the given camera is the wrong one, or has changed since (lens, focus, zoom, crop)";
 
-/// Tells what is to be said about an estimate, in sentences without capital and full stop.
+/// Formats the diagnoses of an estimate as sentences, without initial capital and final full stop.
 #[derive(Clone, Copy, Debug)]
 #[non_exhaustive]
 pub struct Words<'a> {
-    /// What it is said about.
+    /// The diagnosed estimate.
     pub estimate: &'a Estimate,
-    /// How the print came out, where that was given.
+    /// The measured print scale along x and y, if it was given.
     pub print_scale: Option<[f64; 2]>,
 }
 
 impl<'a> Words<'a> {
-    /// What is to be said about an estimate, of a print that came out like this where that was given.
+    /// Creates the formatter for an estimate and its print scale, if one was given.
     pub fn new(estimate: &'a Estimate, print_scale: Option<[f64; 2]>) -> Self {
         Self { estimate, print_scale }
     }
 
-    /// A diagnosis.
+    /// Returns the sentence of a diagnosis.
     pub fn sentence(&self, diagnosis: &Diagnosis) -> String {
         match diagnosis {
             Diagnosis::ForeignCamera { camera, rms_px } => self.of_camera(
                 *camera,
                 format!(
-                    "with this camera corners are off by {rms_px:.1} px, more than {} % of the image's \
-                     width: it did not take these pictures, or not with this lens, zoom or crop",
+                    "with this camera the residuals are {rms_px:.1} px RMS, more than {} % of the image width: \
+                     the images come from another camera, or were taken with another lens, zoom or crop",
                     100.0 * FOREIGN_PART
                 ),
             ),
@@ -56,16 +56,16 @@ impl<'a> Words<'a> {
             ),
             Diagnosis::ManyLeftOut { left_out, all } => self.many_left_out(*left_out, *all),
             Diagnosis::ManyPanelsLeftOut { left_out, all } => format!(
-                "{left_out} of {all} corners were left out with their panels, more than a fifth: what was found is that \
-                 of the others only; a board has another size or other labels than its description states: measure an \
-                 edge of each"
+                "{left_out} of {all} corners (more than a fifth) were left out with their panels, so the result rests \
+                 on the others only; the size or the labels of a board differ from its description: measure an edge of \
+                 each board"
             ),
             Diagnosis::OtherMinimum { camera, other, rms_px } => self.other_minimum(*camera, other, *rms_px),
             Diagnosis::Late { camera, frames } => self.late(*camera, *frames),
             Diagnosis::LabelsRotated { camera, rotation } => self.labels_rotated(*camera, rotation),
             Diagnosis::LabelsOpen { degrees } => format!(
-                "the board has no tags and looks the same after a rotation by {degrees}°: what was found of its corners or \
-                 its shape is right only if it was the same way round in all views"
+                "the board has no tags and looks the same after a rotation by {degrees}°: its estimated corners or shape \
+                 are right only if it was the same way up in all views"
             ),
             Diagnosis::ChangedCamera { camera, change } => {
                 self.of_camera(*camera, changed(change))
@@ -82,12 +82,12 @@ impl<'a> Words<'a> {
             Diagnosis::PoorFit { camera, rms_px } => self.of_camera(
                 *camera,
                 format!(
-                    "corners are off by {rms_px:.1} px: {}, or labels are wrong",
+                    "residuals are {rms_px:.1} px RMS: {}, or the labels are wrong",
                     other_lens(self.model(*camera))
                 ),
             ),
             Diagnosis::IllConditioned { camera, parameters, sufficient } => {
-                self.of_camera(*camera, cannot_tell_apart(parameters, *sufficient))
+                self.of_camera(*camera, ill_conditioned(parameters, *sufficient))
             }
         }
     }
@@ -95,23 +95,20 @@ impl<'a> Words<'a> {
     fn many_left_out(&self, left_out: usize, all: usize) -> String {
         let (what, lens) = match self.estimate.cameras.as_slice() {
             [only] => ("views", other_lens(only.model)),
-            _ => ("frames", "a camera was moved, or pictures are not of one moment".to_owned()),
+            _ => ("frames", "a camera moved, or images were not taken at the same time".to_owned()),
         };
         format!(
-            "{left_out} of {all} {what} were left out, more than a fifth: what was found is that of the \
-             others only; {lens}, or labels are wrong in so many"
+            "{left_out} of {all} {what} (more than a fifth) were left out, so the result rests on the others \
+             only: {lens}, or the labels of the excluded {what} are wrong"
         )
     }
 
     fn late(&self, camera: usize, frames: i32) -> String {
         let count = counted(frames.unsigned_abs() as usize, "frame");
-        let (is, before) = match frames > 0 {
-            true => ("late", "earlier"),
-            false => ("ahead", "later"),
-        };
+        let lags = if frames > 0 { "lags" } else { "leads" };
         format!(
-            "camera {} is {count} {is}: its pictures show what those of the others show {count} {before}, and were \
-             put to these; mend the trigger or the numbering before the rig is used",
+            "camera {} {lags} by {count}; its frames were re-paired. Fix the trigger or the file numbering before \
+             using the rig",
             self.estimate.cameras[camera].name
         )
     }
@@ -120,18 +117,19 @@ impl<'a> Words<'a> {
         let LabelRotation { degrees, frames, of, is_sure } = *rotation;
         let name = &self.estimate.cameras[camera].name;
         let board =
-            format!("a board without tags that looks the same after a rotation by {degrees}°");
+            format!("the board has no tags and looks the same after a rotation by {degrees}°");
         let labels = match frames {
             0 => "were kept as detected".to_owned(),
             _ => format!("were rotated in {frames} of {}", counted(of, "frame")),
         };
         match is_sure {
             true => format!(
-                "camera {name}: its labels of {board} {labels}: only so do the cameras agree on where the board is"
+                "camera {name}: {board}; its labels {labels}, because only then do the cameras agree on the pose of \
+                 the board"
             ),
             false => format!(
-                "camera {name}: its labels of {board} {labels}, but rotated otherwise they fit as well: the poses \
-                 between the cameras may be wrong; tilt the board about different axes, or take one with tags"
+                "camera {name}: {board}; its labels {labels}, but another rotation fits equally well, so the relative \
+                 poses of the cameras may be wrong; tilt the board about different axes, or use one with tags"
             ),
         }
     }
@@ -140,9 +138,9 @@ impl<'a> Words<'a> {
         let found = &self.estimate.cameras[camera];
         let focal = |of: &Camera| of.focal_px.x;
         let text = format!(
-            "another camera of the model explains the views nearly as well: fx {:.1} px leaves {rms_px:.4} px, fx \
-             {:.1} px {:.4} px: a deviation is that around one of the two; parameters of the lens mean nothing by \
-             themselves, take a model without a second minimum",
+            "the model has a second minimum that fits the views nearly as well: fx {:.1} px leaves {rms_px:.4} px RMS, \
+             fx {:.1} px leaves {:.4} px; standard deviations describe one minimum only, and single parameters of the \
+             lens have no meaning on their own; use a model without a second minimum",
             focal(other),
             focal(&found.camera),
             found.inlier_rms_px()
@@ -150,7 +148,7 @@ impl<'a> Words<'a> {
         self.of_camera(camera, text)
     }
 
-    /// What outliers share.
+    /// Returns the sentence of a finding: the panel, view, region or camera that outliers have in common.
     pub fn finding(&self, finding: &Finding) -> String {
         let Finding { shared, outliers, corners, left_out } = finding;
         let of = |camera: &usize, what: String| match self.estimate.camera_name(*camera) {
@@ -163,25 +161,25 @@ impl<'a> Words<'a> {
         };
         let text = match shared {
             Shared::Beyond { camera, view } => {
-                let far = counted(*outliers, "corner");
+                let corners = counted(*corners, "corner");
                 let who = of(camera, format!("view {view}"));
-                return format!("{who}: {far} of {corners} far outside the picture, left out");
+                return format!("{who}: {outliers} of {corners} far outside the image; left out");
             }
             Shared::Panel { panel, moved } => {
                 let why = match moved {
                     Some(Moved { by_mm, turned_rad }) => {
                         let degrees = turned_rad.to_degrees();
                         let turned = match degrees >= TURNED_DEG {
-                            true => format!(" and turned by {degrees:.1}°"),
+                            true => format!(" and rotated by {degrees:.1}°"),
                             false => String::new(),
                         };
                         format!(
-                            "it seems displaced by {by_mm:.2} mm{turned} from where the target's file has \
-                             it ({CalibrationRefinePanels} finds where panels are)"
+                            "the panel seems displaced by {by_mm:.2} mm{turned} from its pose in the target \
+                             file ({CalibrationRefinePanels} estimates the poses of panels)"
                         )
                     }
                     None => {
-                        "no place of it explains them: wrong labels, a sheet that is not flat, or \
+                        "no pose of the panel explains them: wrong labels, a sheet that is not flat, or \
                              another print"
                             .to_owned()
                     }
@@ -191,19 +189,19 @@ impl<'a> Words<'a> {
             Shared::PanelInView { panel, camera, view, off_px } => {
                 let who = of(camera, format!("view {view}, panel {panel}"));
                 format!(
-                    "{who}: its corners are off by {off_px:.1} px where the view's others fit: wrong labels, or \
-                     it or another board has another size than its description states"
+                    "{who}: its corners are off by {off_px:.1} px, while the rest of the view fits: wrong labels, \
+                     or the size of this or another board differs from its description"
                 )
             }
             Shared::View { camera, view } => {
-                format!("{}: {count}: look at the picture", of(camera, format!("view {view}")))
+                format!("{}: {count}: inspect the image", of(camera, format!("view {view}")))
             }
             Shared::Region { camera, from_px: from, to_px: to } => {
                 let where_ =
                     format!("x {:.0} to {:.0}, y {:.0} to {:.0} px", from.x, to.x, from.y, to.y);
                 format!(
-                    "{}: {count}, in several views: the lens is not one of the model there, or \
-                     something is before it",
+                    "{}: {count}, in several views: the model does not fit the lens there, or something \
+                     is in front of it",
                     of(camera, where_)
                 )
             }
@@ -217,24 +215,24 @@ impl<'a> Words<'a> {
     fn remedied(&self, camera: usize, Remedy { instead, from_px, to_px }: &Remedy) -> String {
         let model = self.model(camera);
         let (cause, found) = match *instead {
-            Instead::Shape => (self.board(model), "the shape of the board".to_owned()),
-            Instead::Panels => (self.moved_panels(None), "the place of every panel".to_owned()),
-            Instead::Camera => (GIVEN_CAMERA.to_owned(), "the camera".to_owned()),
+            Instead::Shape => (self.board(model), "estimating the shape of the board".to_owned()),
+            Instead::Panels => {
+                (self.moved_panels(None), "estimating the pose of every panel".to_owned())
+            }
+            Instead::Camera => (GIVEN_CAMERA.to_owned(), "estimating the camera".to_owned()),
             Instead::Model(other) => (
                 match model {
                     Some(model) => {
-                        format!("the lens is not one of `{model}`: take {CalibrateModel} {other}")
+                        format!("`{model}` does not fit the lens: use {CalibrateModel} {other}")
                     }
                     None => GIVEN_CAMERA.to_owned(),
                 },
-                format!("a lens of `{other}`"),
+                format!("the model `{other}`"),
             ),
         };
         self.of_camera(
             camera,
-            format!(
-                "corners are off by {from_px:.3} px, and by {to_px:.3} px where {found} is found: {cause}"
-            ),
+            format!("{found} lowers the residuals from {from_px:.3} to {to_px:.3} px RMS: {cause}"),
         )
     }
 
@@ -242,8 +240,9 @@ impl<'a> Words<'a> {
         match *misfit {
             LackOfFit::Lens { camera, rms_px } => {
                 let lens = other_lens(self.model(camera));
-                let text =
-                    format!("residuals leave a pattern of {rms_px:.3} px over the image: {lens}");
+                let text = format!(
+                    "residuals form a pattern of {rms_px:.3} px RMS over the image: {lens}"
+                );
                 self.of_camera(camera, text)
             }
             LackOfFit::Target { rms_px, rms_mm, panel } => {
@@ -251,8 +250,9 @@ impl<'a> Words<'a> {
                 let (where_, cause) = match board {
                     Some(name) => (
                         format!("target {name}"),
-                        "its board, or that of another target, has another size or other labels than its \
-                         description states, is not flat or not printed as stated: measure an edge of each"
+                        "the size or the labels of its board, or of that of another target, differ from the \
+                         description, or the board is not flat or not printed as stated: measure an edge of \
+                         each board"
                             .to_owned(),
                     ),
                     None if self.is_solid() => {
@@ -261,8 +261,8 @@ impl<'a> Words<'a> {
                     None => ("the target".to_owned(), self.board(self.model(0))),
                 };
                 format!(
-                    "corners lie {rms_mm:.2} mm beside their places on {where_}, in all views alike \
-                     ({rms_px:.3} px): {cause}"
+                    "corners on {where_} are displaced by {rms_mm:.2} mm RMS ({rms_px:.3} px), the same way in \
+                     all views: {cause}"
                 )
             }
         }
@@ -274,16 +274,16 @@ impl<'a> Words<'a> {
             return format!("panels are not flat or not printed as stated{most}");
         }
         format!(
-            "panels are not where the target's file has them{most}: {CalibrationRefinePanels} finds \
-             where they are"
+            "panels are not where the target file places them{most}: {CalibrationRefinePanels} estimates \
+             their poses"
         )
     }
 
     fn board(&self, model: Option<Model>) -> String {
         let scale = match self.print_scale {
-            // The same scale both ways leaves nothing behind.
+            // A scale that is equal along x and y leaves no residuals.
             Some([across, up]) if across != up => {
-                format!("{SightingStretch} {across},{up} is not how it was printed, or ")
+                format!("{SightingStretch} {across},{up} does not match the print, or ")
             }
             _ => String::new(),
         };
@@ -294,45 +294,46 @@ impl<'a> Words<'a> {
         let measuring = self.measuring();
         match (self.estimate.shape, model) {
             _ if self.estimate.map.is_some() => format!(
-                "{scale}the board is not the same in all views: glue it on something flat, {bars}"
+                "{scale}the board changed its shape between views: glue it to a flat surface, and {bars}"
             ),
             (Some(_), _) => format!(
-                "{scale}the board is bent in more ways than {CalibrationBoardShape} describes, or not \
-                 the same in all views: {measuring}, glue it on something flat, {bars}"
+                "{scale}the board is bent in more ways than {CalibrationBoardShape} describes, or changed its \
+                 shape between views: {measuring}, glue the board to a flat surface, or {bars}"
             ),
             (None, Some(_)) => format!(
                 "{scale}the board is not flat or not printed as stated: try \
-                 {CalibrationBoardShape}, {measuring}, {bars}"
+                 {CalibrationBoardShape}, {measuring}, or {bars}"
             ),
             (None, None) => format!(
-                "{scale}the board is not flat or not printed as stated, or the camera that was given is \
-                 another one: find its shape by a calibration with {CalibrationBoardShape}, \
-                 and give it by {SightingBend}, {bars}"
+                "{scale}the board is not flat or not printed as stated, or the given camera is the wrong one: \
+                 estimate the shape in a calibration with {CalibrationBoardShape} and pass it with \
+                 {SightingBend}, or {bars}"
             ),
         }
     }
 
-    /// Whether there are views enough to find the place of every corner.
+    /// Advice to measure the position of every corner, or to take more views first.
     fn measuring(&self) -> String {
         match self.estimate.views_of_a_corner() {
             views if views >= LEAST_TO_MEASURE => {
-                format!("find the place of every corner by {CalibrationMeasureTarget}")
+                format!("measure the position of every corner with {CalibrationMeasureTarget}")
             }
             views => format!(
-                "take at least {LEAST_TO_MEASURE} views of every corner, not {views}, to find their places by \
-                 {CalibrationMeasureTarget}"
+                "take at least {LEAST_TO_MEASURE} views of every corner (now {views}) to measure their positions \
+                 with {CalibrationMeasureTarget}"
             ),
         }
     }
 
-    /// The name of one of several targets that has this panel only, so that nothing moves on it.
+    /// The name of the target that consists of this panel only, if there are several targets. Such a target has no
+    /// panels that could have moved.
     fn board_among_targets(&self, panel: PanelRef) -> Option<&str> {
         let targets = &self.estimate.targets;
         let of_panel = targets.iter().find(|target| target.panels.contains(&panel.index()))?;
         (targets.len() > 1 && of_panel.panels.len() == 1).then_some(of_panel.name.as_str())
     }
 
-    /// Whether views show several panels, fixed to each other.
+    /// Whether a view shows several panels, fixed to each other.
     fn is_solid(&self) -> bool {
         let views = self.estimate.cameras.iter().flat_map(|camera| &camera.views);
         views.into_iter().any(|view| {
@@ -354,26 +355,26 @@ impl<'a> Words<'a> {
     }
 }
 
-/// A camera of a model that does not fit the lens at all.
+/// Sentence for a model that does not fit the lens at all.
 fn does_not_fit(model: Option<Model>, rms_px: f64) -> String {
     let of = model.map_or(String::new(), |model| format!("{model}, "));
     let richer = model.map_or(&[] as &[Model], Model::richer).iter().copied();
-    // A lens of the other kind has a pupil that moves as often as not.
+    // A fisheye often has a pupil that moves with the angle.
     let fisheye = model.filter(|model| model.is_perspective()).map(|_| Model::Pupil);
     let others: Vec<String> = richer.chain(fisheye).map(|model| model.to_string()).collect();
     let advice = match others.as_slice() {
-        [] => "none of the richer models here does".to_owned(),
+        [] => "no richer model is available".to_owned(),
         others => format!("try {CalibrateModel} {}", others.join(" or ")),
     };
     format!(
-        "the model does not fit the lens ({of}{rms_px:.1} px, more than {} % of the image's width): {advice}; or \
-         labels are wrong",
+        "the model does not fit the lens ({of}{rms_px:.1} px RMS, more than {} % of the image width): {advice}; or \
+         the labels are wrong",
         100.0 * FOREIGN_PART
     )
 }
 
-/// What keeps the principal point where it is.
-const STABILISATION: &str = "switch image stabilisation off and fix the lens";
+/// Advice for a principal point that moved.
+const STABILISATION: &str = "switch off image stabilisation and secure the lens";
 
 fn changed(change: &CameraChange) -> String {
     let CameraChange {
@@ -391,9 +392,9 @@ fn changed(change: &CameraChange) -> String {
         ChangedIntrinsic::CentreY => ("the principal point in y", STABILISATION),
     };
     format!(
-        "the views do not show one camera: {what} is {first:.digits$} px in the first {before} views and \
-         {second:.digits$} px in the {after} from {from_view} on, a difference of {:.digits$} ± {sd_px:.digits$} px \
-         ({}); what was found is neither: {lock}, and calibrate each group of views by itself",
+        "the camera changed between views: {what} is {first:.digits$} px in the first {before} views and \
+         {second:.digits$} px in the {after} views from {from_view} on, a difference of {:.digits$} ± \
+         {sd_px:.digits$} px ({}); the result fits neither group: {lock}, and calibrate each group separately",
         second - first,
         p_value(change.significance)
     )
@@ -402,9 +403,9 @@ fn changed(change: &CameraChange) -> String {
 fn rolling_shutter(shutter: &RollingShutter, all: usize) -> String {
     let RollingShutter { shear_px, views, significance, left_px } = shutter;
     format!(
-        "rows are displaced against each other, by {shear_px:.1} px from the first to the last one, in {views} of {all} \
-         views ({}; {left_px:.3} px are left where that is allowed for): the shutter reads row by row while board or \
-         camera move; hold both still for each picture, or take a camera with a global shutter",
+        "rolling shutter: rows are displaced by {shear_px:.1} px between the first and the last, in {views} of {all} \
+         views ({}; modelling it leaves {left_px:.3} px RMS), because the board or the camera moved during readout; \
+         hold both still for each image, or use a camera with a global shutter",
         p_value(*significance)
     )
 }
@@ -417,25 +418,24 @@ fn stretched(stretch: &BoardStretch) -> String {
     };
     let digits = places(100.0 * sd).clamp(1, 3);
     format!(
-        "the board is {:.digits$} ± {:.digits$} % longer along {along} than described, compared with {other} ({}): it \
-         is another board, its tiles have two different edges, or the print was fitted to its page; correct the \
-         description, or measure both check bars for {SightingStretch}",
+        "relative to its description, the board is {:.digits$} ± {:.digits$} % longer along {along} than along {other} \
+         ({}): it is another board, its tiles have two different edge lengths, or the print was scaled to fit the \
+         page; correct the description, or measure both check bars for {SightingStretch}",
         100.0 * (ratio - 1.0),
         100.0 * sd,
         p_value(significance)
     )
 }
 
-/// What follows from parameters that the views leave open; `sufficient` is a smaller model that holds
-/// the lens as well.
-fn cannot_tell_apart(parameters: &[String], sufficient: Option<Model>) -> String {
+/// Sentence for ill-conditioned parameters; `sufficient` is a smaller model that fits the lens equally well.
+fn ill_conditioned(parameters: &[String], sufficient: Option<Model>) -> String {
     let advice = match sufficient {
-        Some(model) => format!("take {CalibrateModel} {model}, which holds this lens as well"),
+        Some(model) => format!("use {CalibrateModel} {model}, which fits this lens equally well"),
         None => "fill the corners of the image, or choose a model with fewer parameters".to_owned(),
     };
     format!(
-        "the views cannot tell apart {}: their numbers mean nothing by themselves; where corners were \
-         seen the camera is right, beyond them it may not be; {advice}",
+        "the views do not distinguish {} (ill-conditioned): their values have no meaning on their own; the \
+         camera is right where corners were seen, but may be wrong elsewhere; {advice}",
         parameters.join(", ")
     )
 }
@@ -445,10 +445,9 @@ fn other_lens(model: Option<Model>) -> String {
         return GIVEN_CAMERA.to_owned();
     };
     match model.richer().iter().map(|model| format!("`{model}`")).collect::<Vec<_>>().as_slice() {
-        [] => format!("the lens is not one of `{model}`, nor of any richer model here"),
-        models => format!(
-            "the lens is not one of `{model}`: try {CalibrateModel} {}",
-            models.join(" or ")
-        ),
+        [] => format!("`{model}` does not fit the lens, and no richer model is available"),
+        models => {
+            format!("`{model}` does not fit the lens: try {CalibrateModel} {}", models.join(" or "))
+        }
     }
 }

@@ -1,4 +1,4 @@
-//! Where the curve of a lens turns back or runs away within the image.
+//! The radius within the image at which a lens model folds back or has a pole.
 
 use std::fmt;
 
@@ -7,22 +7,22 @@ use glam::DVec2;
 use super::image_circle::ImageCircle;
 use deltille_core::camera::Camera;
 
-/// A lens whose curve turns back or runs away within the image, as polynomials and quotients do where
-/// no corner holds them.
+/// A lens model that folds back or has a pole within the image, as polynomials and rational functions do
+/// where no corner constrains them.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct LensEnd {
-    /// Radius from the principal point up to which the lens is good, px.
+    /// Radius from the principal point up to which the lens model is valid, px.
     pub steady_px: f64,
-    /// Radius of the outermost corner that was seen, px.
+    /// Radius of the outermost detected corner, px.
     pub outermost_px: f64,
-    /// Radius of the image's farthest corner, px.
+    /// Radius of the farthest corner of the image, px.
     pub farthest_px: f64,
 }
 
 impl LensEnd {
-    /// The end of a camera's lens; `None` where it lies beyond the image, or beyond the image circle
-    /// that corners fill. `seen` are the places of all corners.
+    /// Finds the fold or pole of a camera; `None` if it lies beyond the image, or beyond the image circle
+    /// that the corners fill. `seen` are the positions of all corners.
     pub fn of(camera: &Camera, seen: &[DVec2]) -> Option<Self> {
         let (steady_px, farthest_px) = (camera.steady_px()?, camera.farthest_px());
         let rim_px = ImageCircle::filled(camera, seen).map_or(farthest_px, |c| c.radius_px);
@@ -35,13 +35,13 @@ impl fmt::Display for LensEnd {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
         write!(
             f,
-            "the lens is good up to {:.0} px from the principal point, where its curve turns back or \
-             has a pole; the outermost corner was seen at {:.0} px, the image ends at {:.0} px: ",
+            "the lens model is valid up to {:.0} px from the principal point, where it folds back or has a \
+             pole; the outermost corner is at {:.0} px, the corner of the image at {:.0} px: ",
             self.steady_px, self.outermost_px, self.farthest_px
         )?;
         f.write_str(match self.outermost_px > self.steady_px {
-            true => "use no pixels near that radius, or choose another model",
-            false => "use no pixels beyond, bring corners there, or choose another model",
+            true => "avoid pixels near that radius, or choose another model",
+            false => "avoid pixels beyond that radius, add corners there, or choose another model",
         })
     }
 }
@@ -52,7 +52,7 @@ mod tests {
     use deltille_core::camera::{BrownConrady, Lens};
 
     #[test]
-    fn a_fold_is_told_only_within_the_image() {
+    fn only_a_fold_within_the_image_is_reported() {
         // r (1 − r²/3) turns back at 2/3 of the focal length.
         let lens = BrownConrady { radial: [-1.0 / 3.0, 0.0, 0.0], ..BrownConrady::default() };
         let camera = |focal| Camera::centred(1600, 1200, focal, Lens::BrownConrady(lens));

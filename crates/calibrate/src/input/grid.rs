@@ -1,4 +1,4 @@
-//! An untagged board that no file describes.
+//! An untagged board given without a description file.
 
 use std::collections::BTreeSet;
 
@@ -13,30 +13,30 @@ use deltille_core::targets::{
     BoardSpec, Target, TargetError, TargetIdentity, TargetSpec, board_vertices, symmetries,
 };
 
-/// What to do about detections of another target.
+/// Advice for detections of another target.
 pub(super) fn assume_target() -> String {
     format!(
-        "give the description that it was detected with, or set {DetectionAssumeTargets} to assume this one"
+        "give the description that was used for detection, or set {DetectionAssumeTargets} to use this one"
     )
 }
 
-/// An untagged board that no file describes. Its labels may differ between views by a motion of the
-/// lattice, which the pose of the view takes up.
+/// An untagged board given without a description file. Its labels may differ between views by a symmetry of
+/// the lattice, which the pose of the view absorbs.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct UntaggedGrid {
     /// The tiling.
     pub kind: GridKind,
-    /// Length of a tile's edge, mm.
+    /// Edge length of a tile, mm.
     pub edge_mm: f64,
-    /// Rows and columns of corners, where they are known.
+    /// Rows and columns of corners, if they are known.
     pub size: Option<[u32; 2]>,
 }
 
 impl UntaggedGrid {
-    /// The board as a target; `None` where its size is not known.
+    /// Returns the board as a target; `None` if its size is not known.
     ///
     /// # Errors
-    /// Where no board is so small, or so large.
+    /// Returns an error if the size is too small or too large for a board.
     pub fn target(&self, name: &str) -> Option<Result<Target, TargetError>> {
         let [rows, cols] = self.size?;
         let plain = BoardSpec::new(self.kind, rows, cols, self.edge_mm);
@@ -44,12 +44,12 @@ impl UntaggedGrid {
         Some(Target::build(name, &TargetSpec::Board(spec), None))
     }
 
-    /// Where a corner is, mm.
+    /// Position of a corner, mm.
     pub(crate) fn place(&self, row: i32, col: i32) -> DVec3 {
         self.edge_mm * self.kind.position(row.into(), col.into()).extend(0.0)
     }
 
-    /// Refuses a grid that was detected as a target with tiles of another size, or more or fewer corners.
+    /// Rejects a grid that was detected as a target of another tile size or corner count.
     pub(super) fn check_target(&self, seen: Option<&TargetIdentity>) -> Result<(), String> {
         match seen {
             Some(seen) if seen.edge_mm != [self.edge_mm; 2] => Err(format!(
@@ -68,13 +68,15 @@ impl UntaggedGrid {
         }
     }
 
-    /// Whether a detected grid can be this board; what speaks against it.
+    /// Checks whether a detected grid can be this board; the error says why not.
     pub(crate) fn check(&self, grid: &Grid) -> Result<(), String> {
         let Some([rows, cols]) = self.size else { return Ok(()) };
         let found = grid.corners.len();
         let most = rows as usize * cols as usize;
         if found > most {
-            return Err(format!("{found} corners are more than {rows} × {cols}"));
+            return Err(format!(
+                "it has {found} corners, more than the {rows} × {cols} of the board"
+            ));
         }
         if found < most {
             return Ok(());
@@ -85,22 +87,22 @@ impl UntaggedGrid {
         }
         Err(if labels == self.labels(cols, rows) {
             format!(
-                "it has {cols} rows × {rows} columns: those of {UntaggedGridSize} are exchanged"
+                "it has {cols} rows × {rows} columns: {UntaggedGridSize} has rows and columns exchanged"
             )
         } else {
-            format!("its rows and columns are not those of a board of {rows} × {cols} corners")
+            format!("its rows and columns do not match a board of {rows} × {cols} corners")
         })
     }
 
-    /// The rotations of its labels that no picture shows, see
-    /// [`Panel::label_symmetries`](deltille_core::targets::Panel::label_symmetries); none where its size is not known.
+    /// The rotations of its labels that look the same in an image, see
+    /// [`Panel::label_symmetries`](deltille_core::targets::Panel::label_symmetries); none if its size is not known.
     pub(super) fn label_symmetries(&self) -> Vec<LatticeMap> {
         self.size.map_or(Vec::new(), |[rows, cols]| {
             symmetries(self.kind, board_vertices(self.kind, rows, cols))
         })
     }
 
-    /// Whether labels reach to all four ends of its rows and columns.
+    /// Whether the labels reach the first and last row and column of the board.
     pub(super) fn is_spanned_by(&self, labels: &BTreeSet<(i32, i32)>) -> bool {
         let ends = |labels: &BTreeSet<(i32, i32)>| {
             let rows = labels.iter().map(|(row, _)| *row);

@@ -1,4 +1,4 @@
-//! What was photographed, and how detections are compared with it: identity, panels, corners and tags.
+//! The photographed target, and the checks of detections against it: identity, panels, corners and tags.
 
 use std::collections::BTreeMap;
 
@@ -13,30 +13,32 @@ use deltille_core::lattice::LatticeMap;
 use deltille_core::setting::Setting::UntaggedGridKind;
 use deltille_core::targets::{Panel, Target, TargetIdentity};
 
-/// What is wrong with a board of the other tiling.
+/// Message for a board of the other tiling.
 fn other_kind() -> String {
-    format!("the board in it has the other tiling: give {UntaggedGridKind} that of the board")
+    format!(
+        "the board in the image has the other tiling: set {UntaggedGridKind} to the tiling of the board"
+    )
 }
 
-/// What follows from labels that are not on the target.
-const OTHER_TARGET: &str = "; the target does not belong to this detection";
+/// Conclusion from labels that are not on the target.
+const OTHER_TARGET: &str = "; the detection is of another target";
 
-/// What is wrong with detections of one target where there are several.
+/// Message for a detection that was made with one of several targets.
 const OF_ONE_TARGET: &str =
     "it does not say which target its corners belong to: detect again with all targets at once";
 
-/// Why labels of a grid without panel are not on the target.
-const CUT_OFF: &str = "its rows and columns are not those of the target: it is another board, or a part of one without tags, \
-                       whose rows and columns are known only where it is seen whole";
+/// Message for labels of an untagged grid that are not on the target.
+const CUT_OFF: &str = "its rows and columns do not match the target: it shows another board, or only part of a board without \
+                       tags (rows and columns are known only if the whole board is visible)";
 
-/// What was photographed.
+/// The photographed target or board.
 #[derive(Clone, Copy, Debug)]
 pub enum Reference<'a> {
-    /// A target that its file describes.
+    /// A target with a description.
     Target(&'a Target),
-    /// Several targets that are fixed to each other; detections say which one a grid belongs to.
+    /// Several targets that are fixed to each other; each detection says which target a grid belongs to.
     Scene(&'a [Target]),
-    /// An untagged board.
+    /// An untagged board without a description.
     Grid(UntaggedGrid),
 }
 
@@ -228,18 +230,18 @@ impl Reference<'_> {
         if let Some(index) = identities.iter().position(|own| own.is_same_print(seen)) {
             return Ok(Some(index));
         }
-        // Other targets in the same image are of no concern, unless they may be mistaken for these.
+        // Other targets in the same image do not matter, unless they can be mistaken for these.
         let confusable = identities.iter().find(|own| own.is_confusable(seen));
         match confusable.or_else(|| identities.first().filter(|_| grid.target.is_none())) {
             Some(own) => Err(format!(
-                "it was detected as {seen}, but the target given is {own}: {}",
+                "it was detected as {seen}, but the given target is {own}: {}",
                 assume_target()
             )),
             None => Ok(None),
         }
     }
 
-    /// The corners of a grid on the panel of a target; `None` where the grid was not labelled.
+    /// Returns the corners of a grid on its panel of a target; `None` if the grid was not labelled.
     fn on_target(&self, index: usize, grid: &Grid) -> Result<Option<Sighting>, String> {
         let targets = self.targets();
         let first = targets[..index].iter().map(|target| target.panels.len()).sum();
@@ -247,7 +249,7 @@ impl Reference<'_> {
     }
 }
 
-/// Whether a target is that of a name: measured or with refined panels it is still the same.
+/// Whether a target has this name; a measured target or one with refined panels is still the same target.
 fn is_named(target: &Target, name: &str) -> bool {
     let of_print = |name: &str| -> String {
         let mut name = name;
@@ -261,8 +263,8 @@ fn is_named(target: &Target, name: &str) -> bool {
     of_print(&target.name) == of_print(name)
 }
 
-/// The corners of a grid on its panel, which are counted from `first` on; `None` where it was not labelled and the
-/// target has several.
+/// Returns the corners of a grid on its panel; panel indices start at `first`. `None` if the grid was not labelled
+/// and the target has several panels.
 fn on_target(target: &Target, first: usize, grid: &Grid) -> Result<Option<Sighting>, String> {
     let index = match grid.panel {
         Some(id) => target.panels.iter().position(|panel| panel.id == id),
@@ -271,7 +273,7 @@ fn on_target(target: &Target, first: usize, grid: &Grid) -> Result<Option<Sighti
     };
     let Some(index) = index else {
         let id = grid.panel.unwrap_or_default();
-        return Err(format!("panel {id} is not on the target {}{OTHER_TARGET}", target.name));
+        return Err(format!("panel {id} is not on target {}{OTHER_TARGET}", target.name));
     };
     let panel = &target.panels[index];
     check_panel(target, panel, grid).map_err(|problem| problem + OTHER_TARGET)?;
@@ -306,10 +308,10 @@ fn on_target(target: &Target, first: usize, grid: &Grid) -> Result<Option<Sighti
     Ok(Some(Sighting { panel, observations: observations(grid, at) }))
 }
 
-/// Compares what a detection says of a panel with the target.
+/// Checks the labels of a detected grid against its panel of the target.
 fn check_panel(target: &Target, panel: &Panel, grid: &Grid) -> Result<(), String> {
     if panel.kind != grid.kind {
-        return Err(format!("panel {} has another tiling on {}", panel.id, target.name));
+        return Err(format!("panel {} has a different tiling on {}", panel.id, target.name));
     }
     for corner in &grid.corners {
         let Some(id) = corner.id else { continue };

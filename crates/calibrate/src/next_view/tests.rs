@@ -241,7 +241,7 @@ fn spec_family(spec: &TargetSpec) -> Option<deltille_core::family::Family> {
 fn words_say_where_and_how() {
     let mut next = Guide::new(&board(), [1280, 960], Model::Radtan).unwrap().next(0, None);
     let said = next.to_string();
-    assert!(said.starts_with("hold the board in the middle of the picture, about "), "{said}");
+    assert!(said.starts_with("hold the board in the middle of the image, about "), "{said}");
     assert!(said.ends_with("facing the camera"), "{said}");
     next.at = DVec2::new(0.9, 0.1);
     next.tilt_rad = 0.7;
@@ -250,15 +250,15 @@ fn words_say_where_and_how() {
     next.distance_mm = 612.0;
     assert_eq!(
         next.to_string(),
-        "hold the board in the upper right corner of the picture, about 60 cm away, its left side tilted away by 40°, \
-         turned counterclockwise by 90°"
+        "hold the board in the upper right corner of the image, about 60 cm away, with its left side tilted away by 40°, \
+         rotated counterclockwise by 90°"
     );
     next.at = DVec2::new(0.5, 0.9);
     next.roll_rad = PI;
     next.distance_mm = 2345.0;
     assert_eq!(
         next.to_string(),
-        "hold the board at the lower edge of the picture, about 2.3 m away, its left side tilted away by 40°, upside down"
+        "hold the board at the lower edge of the image, about 2.3 m away, with its left side tilted away by 40°, upside down"
     );
 }
 

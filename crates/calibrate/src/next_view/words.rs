@@ -1,11 +1,11 @@
-//! A view that is proposed, in a sentence.
+//! The sentence that describes a proposed view.
 
 use std::f64::consts::{FRAC_PI_2, FRAC_PI_4, TAU};
 use std::fmt;
 
 use super::guide::NextView;
 
-/// Names of the eight directions of an image, from right towards below: what is there, and a side of the board.
+/// Names of the parts of an image and of the sides of a board, in eight directions from right clockwise.
 const PARTS: [&str; 8] = [
     "at the right edge",
     "in the lower right corner",
@@ -27,19 +27,19 @@ const SIDES: [&str; 8] = [
     "upper right corner",
 ];
 
-/// Within so much of the middle, in parts of the image's sides, a board is in the middle.
+/// Largest offset from the image centre that counts as the middle, as a fraction of the image sides.
 const MIDDLE: f64 = 0.09;
 
-/// Tilts and turns below this are not told, rad (8°): nobody holds a board better.
-const TOLD: f64 = 0.14;
+/// Smallest tilt or roll that is mentioned, rad (8°): nobody holds a board more accurately.
+const MENTIONED: f64 = 0.14;
 
-/// Which of eight directions an angle is.
+/// Index of the nearest of the eight directions.
 fn direction(angle: f64) -> usize {
     ((angle / FRAC_PI_4).round() as i64).rem_euclid(8) as usize
 }
 
 impl fmt::Display for NextView {
-    /// What a person is to do. Left and right are those of the picture, which is not mirrored.
+    /// Writes the instruction for a person. Left and right are those of the image, which is not mirrored.
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
         let off = self.at - 0.5;
         let [aside, up] = [off.x.abs() > MIDDLE, off.y.abs() > MIDDLE];
@@ -52,25 +52,25 @@ impl fmt::Display for NextView {
                 PARTS[if off.y > 0.0 { right } else { 8 - right }]
             }
         };
-        write!(f, "hold the board {place} of the picture, about {} away, ", far(self.distance_mm))?;
-        match self.tilt_rad < TOLD {
+        write!(f, "hold the board {place} of the image, about {} away, ", far(self.distance_mm))?;
+        match self.tilt_rad < MENTIONED {
             true => write!(f, "facing the camera")?,
             false => write!(
                 f,
-                "its {} tilted away by {:.0}°",
+                "with its {} tilted away by {:.0}°",
                 SIDES[direction(self.away_rad)],
                 round_to_5(self.tilt_rad.to_degrees())
             )?,
         }
-        // A sheet that is upside down has its rows level, but other corners where others were.
+        // An upside-down sheet has level rows too, but shows other corners there.
         let roll = self.roll_rad.rem_euclid(TAU);
         let roll = if roll > 2.0 * FRAC_PI_2 { roll - TAU } else { roll };
         match roll {
-            _ if roll.abs() < TOLD => Ok(()),
-            _ if roll.abs() > 2.0 * FRAC_PI_2 - TOLD => write!(f, ", upside down"),
+            _ if roll.abs() < MENTIONED => Ok(()),
+            _ if roll.abs() > 2.0 * FRAC_PI_2 - MENTIONED => write!(f, ", upside down"),
             _ => write!(
                 f,
-                ", turned {} by {:.0}°",
+                ", rotated {} by {:.0}°",
                 if roll > 0.0 { "counterclockwise" } else { "clockwise" },
                 round_to_5(roll.abs().to_degrees())
             ),
@@ -82,7 +82,7 @@ fn round_to_5(degrees: f64) -> f64 {
     5.0 * (degrees / 5.0).round()
 }
 
-/// A distance as a person judges it.
+/// Formats a distance, rounded to what a person can judge.
 fn far(mm: f64) -> String {
     match mm {
         ..950.0 => format!("{:.0} cm", (mm / 50.0).round().max(1.0) * 5.0),
