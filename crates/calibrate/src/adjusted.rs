@@ -1,4 +1,4 @@
-//! From views to an estimate: start, gross errors, adjustment, added unknowns, uncertainties.
+//! From views to an estimate: start, outliers, adjustment, added unknowns, uncertainties.
 
 use super::adjust::reweighting::Kept;
 use super::adjust::wrong_views::{Gross, WrongFrame, within_pictures};
@@ -12,13 +12,13 @@ use super::start::frames::{Frame, Start};
 use super::start::together::{self, Alone};
 use deltille_core::camera::PROJECTION_PARAMETERS;
 
-/// Focal lengths and the principal point are not determined when a deviation is more than this part
-/// of the focal length: equations that are linear near the solution, as deviations are computed from,
-/// are then off by as much as they say, and the deviation means nothing.
+/// Largest standard deviation of focal lengths and principal point, as a fraction of the focal length. Beyond it the
+/// parameter counts as undetermined: standard deviations come from linearised equations, which are then wrong by as
+/// much as the standard deviation itself.
 const LOOSE_FOCAL: f64 = 0.1;
 
 impl Calibration {
-    /// The estimate from all views: start, gross errors, adjustment, added unknowns, uncertainties.
+    /// Computes the estimate from all views: start, outliers, adjustment, added unknowns, uncertainties.
     pub(super) fn adjusted(&self) -> Result<Estimate, CalibrationError> {
         if self.board_shape && self.panels.len() > 1 {
             return Err(CalibrationError::ShapeOfMany { panels: self.panels.len() });
@@ -106,7 +106,7 @@ impl Calibration {
         }
     }
 
-    /// What is told of a frame that does not belong.
+    /// The record of an excluded frame.
     fn without_frame(
         &self,
         frame: &Frame,
@@ -140,7 +140,7 @@ impl Calibration {
 }
 
 /// # Errors
-/// Where no start is found, or the views cannot determine what is sought.
+/// Returns an error if no start is found, or the views do not determine the unknowns.
 fn start(calibration: &Calibration) -> Result<Start, CalibrationError> {
     match calibration.is_single() {
         true => alone::start(calibration),
@@ -148,7 +148,7 @@ fn start(calibration: &Calibration) -> Result<Start, CalibrationError> {
     }
 }
 
-/// The estimate of a calibration of one camera, as the start of several needs it.
+/// The estimate of a calibration of one camera, in the form that the start of a rig needs.
 fn by_itself(calibration: &Calibration) -> Result<Alone, CalibrationError> {
     let Estimate { cameras, excluded, .. } = calibration.adjusted()?;
     let only = cameras.into_iter().next().ok_or(CalibrationError::NoStart)?;
@@ -157,8 +157,8 @@ fn by_itself(calibration: &Calibration) -> Result<Alone, CalibrationError> {
     Ok(Alone { camera, roughness, poses, excluded })
 }
 
-/// Refuses a camera that the views leave open. Parameters of the lens that cannot be told apart are
-/// no reason: within the image they make the same camera.
+/// Rejects a camera whose focal length or principal point the views do not determine. Ill-conditioned parameters of the
+/// lens are accepted: within the image they describe the same camera.
 fn check_focal(found: &CameraEstimate) -> Result<(), CalibrationError> {
     let of_every_lens = &found.parameters[..PROJECTION_PARAMETERS.len()];
     let loose = of_every_lens.iter().filter(|p| {

@@ -1,20 +1,21 @@
-//! From detections to calibrated cameras.
+//! Calibration of cameras and multi-camera rigs from detections of targets.
 //!
-//! Comes in: detections with their names, a target, and what is known of the cameras. Goes out: an [`Estimate`] with
-//! uncertainties, and each [`Diagnosis`] of it in words. Data meets the chapters in this order:
+//! Input: named detections, a target, and what is known of the cameras. Output: an [`Estimate`] with uncertainties, and
+//! a [`Diagnosis`] in words for each problem. The modules, in the order in which they process the data:
 //!
-//! 1. `input` compares detections with the target, and holds what is known and what is asked for: a [`Calibration`].
-//! 2. `problem` has the unknowns, observations and residuals of a bundle adjustment, their weights and their priors.
-//! 3. `equations` forms the normal equations, eliminates the poses of frames, and walks to the minimum.
-//! 4. `start` finds the first cameras and poses, without any guess.
-//! 5. `adjust` excludes gross errors, reweights, and adds unknowns such as the shape of a board.
-//! 6. `uncertainty` has the covariances: from noise, from the scatter between frames, from errors of the board.
-//! 7. `estimate` is the result as values, assembled from all of these.
-//! 8. `diagnose` says what is wrong with an estimate, what that comes from, and what helps.
+//! 1. `input` checks detections against the target and collects them with the settings in a [`Calibration`].
+//! 2. `problem` defines the unknowns, observations and residuals of a bundle adjustment, with their weights and priors.
+//! 3. `equations` forms the normal equations, eliminates the poses of frames, and iterates to the minimum.
+//! 4. `start` computes initial cameras and poses without a first guess.
+//! 5. `adjust` excludes outliers, reweights, and adds unknowns such as the shape of a board.
+//! 6. `uncertainty` computes covariances: from noise, from the scatter between frames, and from errors of the board.
+//! 7. `estimate` assembles the result from all of these.
+//! 8. `diagnose` reports the problems of an estimate, their causes and remedies.
 //!
-//! `adjusted` runs 4 to 7 on all views. `solve` is around it and holds frames out, `automatic` chooses a model by `solve`,
-//! `located` asks where a target is. `compare` and `next_view` read estimates. Everything may import `model` (of lenses), `matrix` (in results),
-//! `error` (why there is no estimate), `excluded` (views that took no part, and why) and `cancel`; otherwise a module imports from chapters above it in this list, never in a circle.
+//! `adjusted` runs 4 to 7 on all views. `solve` wraps it and holds frames out; `automatic` selects a model with
+//! `solve`; `located` computes the pose of a target. `compare` and `next_view` read estimates. Every module may import
+//! `model` (lens models), `matrix` (in results), `error` (failures), `excluded` (excluded views and the reasons) and
+//! `cancel`; otherwise a module imports only from modules above it in this list.
 //!
 //! A pixel is predicted through a chain of frames,
 //!
@@ -22,14 +23,12 @@
 //!   pixel = camera( camera_from_rig · rig_from_scene(frame) · scene_from_target · target_from_panel · corner )
 //! ```
 //!
-//! and each link may be unknown. One camera with one target is a rig of one camera that is the rig
-//! frame, and panels that stay where the target's file has them. That fixes the *gauge*: camera 0
-//! is the rig, the target frame is that of its file, and that of the first target is the scene; every pose is
-//! relative to these.
+//! and each link may be unknown. One camera with one target is a rig of one camera, which defines the rig frame, with
+//! the panels fixed where the target file places them. That fixes the *gauge*: camera 0 is the rig frame, the target
+//! frame is that of its file, and the frame of the first target is the scene frame. Every pose is relative to these.
 //!
-//! A small change of a pose is (ω, τ): the rotation turns by exp(ω), seen from the frame that the
-//! pose leads to, and the translation grows by τ. Standard deviations of poses are those of ω (rad)
-//! and τ (mm).
+//! A small change of a pose is (ω, τ): exp(ω) multiplies the rotation from the left, in the frame that the pose maps
+//! to, and τ is added to the translation. Standard deviations of poses are those of ω (rad) and τ (mm).
 
 mod adjust;
 mod adjusted;

@@ -14,12 +14,12 @@ use nalgebra::DMatrix;
 pub struct Matrix(DMatrix<f64>);
 
 impl Matrix {
-    /// A matrix of entries by row and column.
+    /// Creates a matrix from a function of row and column.
     pub fn from_fn(rows: usize, columns: usize, entry: impl FnMut(usize, usize) -> f64) -> Self {
         Self(DMatrix::from_fn(rows, columns, entry))
     }
 
-    /// One without rows, where nothing is known.
+    /// A matrix without rows, for unknown values.
     pub(crate) fn empty() -> Self {
         Self(DMatrix::zeros(0, 0))
     }

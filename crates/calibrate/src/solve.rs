@@ -1,13 +1,13 @@
-//! From a calibration to its estimate: with frames held out, and cameras that do not belong named in errors.
+//! Solves a calibration: holds frames out, and names given cameras that contradict their images.
 
 use super::error::CalibrationError;
 use super::estimate::values::Estimate;
 use super::input::calibration::{Calibration, CameraViews, TargetPanels};
 
 impl Calibration {
-    /// Finds the cameras, where they are to each other, where the target was, and what else was asked for.
+    /// Estimates the cameras, their relative poses, the poses of the target, and everything else that was requested.
     ///
-    /// Of a known camera that is the pose of the target:
+    /// For a known camera, the result is the pose of the target:
     ///
     /// ```
     /// use deltille_calibrate::{Calibration, Observation, PanelRef, Sighting, View};
@@ -33,7 +33,7 @@ impl Calibration {
     /// ```
     ///
     /// # Errors
-    /// Where views are too few, too much alike, of different sizes, or do not belong together.
+    /// Returns an error if there are too few views, or they are too similar, differ in size, or contradict each other.
     pub fn solve(&self) -> Result<Estimate, CalibrationError> {
         let found = self.solved();
         if self.stop.is_raised() { Err(CalibrationError::Stopped) } else { found }
@@ -57,7 +57,7 @@ impl Calibration {
         Ok(Estimate { held_out, calibrated_with, ..estimate })
     }
 
-    /// The same with nothing to be found but where the target was: all else is as an estimate has it.
+    /// The same calibration with everything fixed to the estimate except the poses of the target.
     fn given(&self, estimate: &Estimate) -> Self {
         let cameras = self.cameras.iter().zip(&estimate.cameras).map(|(camera, found)| {
             let mut views = camera.views.clone();

@@ -1,19 +1,18 @@
-//! Two calibrations of one camera: whether they project alike.
+//! Comparison of the projections of two calibrations of one camera.
 //!
-//! What a pixel of the one shows is projected by the other, after the motion that makes them differ least: a
-//! principal point that is off and a camera that is turned are one and the same to every user of a picture. What
-//! is left is compared with what the covariances of both allow for,
+//! The direction of a pixel in the first camera is projected by the second camera, after the motion that minimises the
+//! difference: a shifted principal point and a rotated camera have the same effect in an image. The remaining
+//! difference is compared with its expectation from the covariances of both,
 //!
 //! ```text
 //!     d = (I − P) (J_B δθ_B − J_A δθ_A)        P: what the motion explains
 //!     |d|² / Σᵢ (λᵢ + ε²)                       λᵢ: variances of d in independent directions
 //! ```
 //!
-//! d over all places of the region, and ε what no calibration is better known than. So what is tested is the
-//! ratio of the two numbers that are reported. How covariances of few frames divide between directions is
-//! known too roughly for a test of each.
+//! with d over all positions in the region, and ε the accuracy that no calibration exceeds. The test is the ratio of
+//! the two reported numbers. Covariances from few frames are known too roughly in single directions for a test of each.
 //!
-//! Both calibrations are taken to be of one board: what its errors do to both alike is no difference.
+//! Both calibrations are assumed to use one board: the effect of its errors on both is not a difference.
 
 use std::collections::BTreeMap;
 
@@ -30,68 +29,68 @@ use deltille_core::setting::Setting::{CompareBoardsAssumeTarget, RegionImage};
 use deltille_core::statistics::{chi_squared_chance, f_chance};
 use deltille_core::targets::{check_result_of, check_same_board};
 
-/// Places along the longer side of the image.
+/// Number of grid positions along the longer side of the image.
 const PLACES: usize = 40;
 
-/// A camera saw a place where so many corners were on it and on those around it: one or two by themselves at the
-/// border of an image tell little of it.
+/// Least number of corners in a cell and its neighbours for a cell to count as seen: single corners at the border of an
+/// image carry little information.
 const AROUND: usize = 5;
 
-/// Steps until the motion fits, and the change below which it does.
+/// Most iterations of the motion, and the change at which it has converged.
 const MOST_STEPS: usize = 50;
 const SAME_PX: f64 = 1e-9;
 
-/// No calibration is known better than this, px: neither lens nor sensor is what its model says.
+/// Least standard deviation of a calibration, px: neither lens nor sensor follow their model exactly.
 const LEAST_SD_PX: f64 = 1e-3;
 
-/// Chance makes two calibrations of a camera that has not changed differ this seldom.
+/// Significance level of the test that the camera has changed.
 const SELDOM: f64 = 1e-3;
 
-/// Where two cameras are compared.
+/// The region of the image in which two cameras are compared.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub enum Region {
-    /// Where both saw corners; everywhere where that is not known.
+    /// Where both saw corners; everywhere if that is not known.
     #[default]
     Seen,
     /// The whole image.
     Image,
-    /// Between two pixels.
+    /// The rectangle between two pixels.
     Within(DVec2, DVec2),
 }
 
-/// How two cameras differ; by default of no place.
+/// The difference of two cameras; by default without any positions.
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct Comparison {
-    /// How far the points are by which they were compared; `None` of points at infinity.
+    /// Distance of the compared points; `None` for points at infinity.
     pub distance_mm: Option<f64>,
-    /// Places along a row of the image.
+    /// Number of grid positions along a row of the image.
     pub columns: usize,
-    /// Row by row how the second camera differs; `None` beyond one of the lenses.
+    /// The difference of the second camera, row by row; `None` beyond one of the lenses.
     pub places: Vec<Option<Difference>>,
-    /// What the second camera sees is this motion of what the first one sees: a turn, and a move of points that
-    /// are not at infinity.
+    /// The motion from the view of the first camera to that of the second: a rotation, and for points that are not at
+    /// infinity a translation.
     pub second_from_first: Pose,
-    /// Root mean square difference of a coordinate in the region, px.
+    /// RMS difference per axis in the region, px.
     pub rms_px: f64,
-    /// The same as the uncertainties of both have it; `None` where they are not known.
+    /// The RMS difference expected from the uncertainties of both; `None` if they are not known.
     pub expected_px: Option<f64>,
-    /// How often chance makes them differ as much where the camera is the same.
+    /// Probability that an unchanged camera shows such a difference.
     pub chance: Option<f64>,
-    /// Whether the uncertainty of the first, and of the second, is not known.
+    /// Whether the uncertainty of the first and of the second camera is missing.
     pub lacks_uncertainty: [bool; 2],
 }
 
-/// How the second camera differs at a pixel of the first.
+/// The difference of the second camera at a pixel of the first.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Difference {
     /// The pixel of the first camera.
     pub pixel: DVec2,
-    /// By how much that of the second differs, px.
+    /// Offset of the pixel of the second camera, px.
     pub by: DVec2,
-    /// Its deviation as the uncertainties of both have it, of a coordinate, px.
+    /// Standard deviation per axis of the offset from the uncertainties of both, px.
     pub sd_px: Option<f64>,
-    /// Whether it is in the region.
+    /// Whether the pixel is in the region.
     pub is_compared: bool,
 }
 
@@ -99,17 +98,17 @@ pub struct Difference {
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum ComparisonError {
-    /// Images of different size.
+    /// The images differ in size.
     #[error(
         "the image sizes differ ({} × {} px and {} × {} px): compare two calibrations of one camera at one image size", first[0], first[1], second[0], second[1]
     )]
     Sizes {
-        /// Of the first.
+        /// Image size of the first camera.
         first: [u32; 2],
-        /// Of the second.
+        /// Image size of the second camera.
         second: [u32; 2],
     },
-    /// No part of the image that both cover.
+    /// Both cameras cover too little of the image in common.
     #[error(
         "the region is too small, or the calibrations saw too little of the image in common: use {RegionImage}, or a larger region"
     )]
@@ -131,12 +130,12 @@ impl Default for Comparison {
     }
 }
 
-/// Prepares two calibrations for comparisons. Those of one board share its errors, which then do not count; those of
-/// different boards do not. `what` names the two in messages; with `assume_target` they are compared whatever they were made
-/// with.
+/// Prepares two calibrations for comparison. Calibrations with the same board share its errors, which then do not
+/// count; calibrations with different boards do not. `what` names the two in messages; `assume_target` compares them
+/// regardless of their boards.
 ///
 /// # Errors
-/// Where they were made with boards of the same tags at different sizes, so that at most one of them is right.
+/// Returns an error if their boards have the same tags at different sizes, so that at most one of them is right.
 pub fn compare_boards(
     what: [&str; 2],
     [first, second]: [&mut Estimate; 2],
@@ -163,7 +162,7 @@ impl Comparison {
     /// Compares two cameras by points at a distance, or at infinity.
     ///
     /// # Errors
-    /// Where images are of different size, or no part of it is compared.
+    /// Returns an error if the images differ in size, or no part of them is compared.
     pub fn of(
         first: &CameraEstimate,
         second: &CameraEstimate,
@@ -215,41 +214,41 @@ impl Comparison {
         })
     }
 
-    /// The places that were compared.
+    /// The compared positions.
     pub fn compared(&self) -> impl Iterator<Item = &Difference> {
         self.places.iter().flatten().filter(|place| place.is_compared)
     }
 
-    /// The largest difference of a place that was compared, px.
+    /// The largest difference at a compared position, px.
     pub fn largest_px(&self) -> f64 {
         self.compared().map(|place| place.by.length()).fold(0.0, f64::max)
     }
 
-    /// Whether the cameras differ by more than their uncertainties explain; `None` where these are not known.
+    /// Whether the cameras differ by more than their uncertainties explain; `None` if these are not known.
     pub fn is_significant(&self) -> Option<bool> {
         self.chance.map(|chance| chance < SELDOM)
     }
 }
 
-/// How a camera of a rig is elsewhere than before, seen from another one.
+/// The motion of a camera of a rig relative to another camera.
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct CameraMotion {
-    /// The camera from which it is seen.
+    /// The reference camera.
     pub from: String,
-    /// The camera.
+    /// The moved camera.
     pub to: String,
-    /// By how much it is turned, rad, along its axes.
+    /// Rotation about its axes, rad.
     pub turn_rad: DVec3,
-    /// By how much it is elsewhere, mm, along its axes.
+    /// Translation along its axes, mm.
     pub moved_mm: DVec3,
-    /// How often chance makes as large a motion where nothing has moved; `None` where deviations are not known.
+    /// Probability of such a motion if nothing has moved; `None` if standard deviations are not known.
     pub chance: Option<f64>,
 }
 
 impl CameraMotion {
-    /// The motions of the cameras of a rig, from the first that both calibrations have as the rig's frame, else from
-    /// their first; `pairs` are the same cameras in both.
+    /// Returns the motions of the cameras of a rig. They are relative to the first camera that is the rig frame in both
+    /// calibrations, else to the first camera; `pairs` are the same cameras in both.
     pub fn of_rig(pairs: &[(&CameraEstimate, &CameraEstimate)]) -> Vec<Self> {
         let is_rig = |(a, b): &&(&CameraEstimate, &CameraEstimate)| {
             [a, b].iter().all(|camera| camera.pose_sd.is_none())
@@ -267,7 +266,7 @@ impl CameraMotion {
             let known = deviations(a).zip(deviations(b)).filter(|_| is_frame);
             let off = turn_rad.to_array().into_iter().chain(moved_mm.to_array());
             let chance = known.map(|(a, b)| {
-                // However the six are correlated, the largest is as rare as this.
+                // Bonferroni bound for the largest of six, whatever their correlation.
                 let largest = off.zip(a.iter().zip(b)).map(|(off, (a, b))| off.abs() / a.hypot(b));
                 let largest = largest.fold(0.0, f64::max);
                 (6.0 * libm::erfc(largest / std::f64::consts::SQRT_2)).min(1.0)
@@ -278,23 +277,23 @@ impl CameraMotion {
         others.map(motion).collect()
     }
 
-    /// Whether the camera moved by more than the deviations explain; `None` where these are not known.
+    /// Whether the camera moved by more than the standard deviations explain; `None` if these are not known.
     pub fn is_significant(&self) -> Option<bool> {
         self.chance.map(|chance| chance < SELDOM)
     }
 }
 
-/// A motion has six unknowns.
+/// Least number of compared positions: a motion has six unknowns.
 const LEAST_PLACES: usize = 6;
 
-/// A place of the image, and what the first camera sees there.
+/// A position in the image, and the point that the first camera sees there.
 struct Place {
     pixel: DVec2,
     point: DVec3,
     is_compared: bool,
 }
 
-/// Places over an image.
+/// A grid of positions over an image.
 struct Grid {
     size: DVec2,
     columns: usize,
@@ -312,19 +311,19 @@ impl Grid {
         DVec2::new(self.columns as f64, self.rows as f64)
     }
 
-    /// The middle of a place.
+    /// The centre of a cell.
     fn pixel(&self, index: usize) -> DVec2 {
         let at = DVec2::new((index % self.columns) as f64, (index / self.columns) as f64) + 0.5;
         at * self.size / self.parts() - 0.5
     }
 
-    /// The place, column and row, of a pixel.
+    /// Column and row of the cell of a pixel.
     fn place(&self, pixel: DVec2) -> [i64; 2] {
         let at = (pixel + 0.5) / self.size * self.parts();
         [at.x.floor() as i64, at.y.floor() as i64]
     }
 
-    /// Which places are compared.
+    /// Returns a test of which cells are compared.
     fn compared<'a>(
         &'a self,
         first: &CameraEstimate,
@@ -358,7 +357,7 @@ impl Grid {
     }
 }
 
-/// The motion after which the second camera sees points nearest to where the first one does.
+/// The motion after which the second camera projects points nearest to their pixels in the first.
 fn aligned(second: &CameraEstimate, places: &[&Place], distance_mm: Option<f64>) -> Pose {
     let unknowns = unknowns(distance_mm);
     let mut motion = Pose::IDENTITY;
@@ -390,12 +389,12 @@ fn aligned(second: &CameraEstimate, places: &[&Place], distance_mm: Option<f64>)
     motion
 }
 
-/// A turn, and a move of points that are not at infinity.
+/// Number of unknowns: a rotation, and a translation for points that are not at infinity.
 fn unknowns(distance_mm: Option<f64>) -> usize {
     if distance_mm.is_some() { 6 } else { 3 }
 }
 
-/// The inverse where a matrix has one; of what it leaves open nothing.
+/// The pseudo-inverse of a matrix: zero in the directions that it does not determine.
 fn pseudo_inverse(matrix: &DMatrix<f64>) -> Option<DMatrix<f64>> {
     let n = matrix.nrows();
     let scale = DVector::from_fn(n, |i, _| matrix[(i, i)].max(f64::MIN_POSITIVE).sqrt().recip());
@@ -404,22 +403,22 @@ fn pseudo_inverse(matrix: &DMatrix<f64>) -> Option<DMatrix<f64>> {
     Some(DMatrix::from_fn(n, n, |i, j| inverse[(i, j)] * scale[i] * scale[j]))
 }
 
-/// Of matrices with a unit diagonal what is below this is rounding.
+/// Singular values below this are rounding, for a matrix with unit diagonal.
 const SINGULAR: f64 = 1e-12;
 
-/// What the uncertainties of two cameras say of their difference.
+/// The difference expected from the uncertainties of two cameras.
 struct Known {
     expected_px: f64,
     chance: f64,
     /// Square roots of the covariances of both cameras' parameters.
     halves: [DMatrix<f64>; 2],
-    /// The motion that goes with each of their columns.
+    /// The motion that belongs to each of their columns.
     motions: DMatrix<f64>,
     unknowns: usize,
 }
 
 impl Known {
-    /// `None` where they are not known of one of the two.
+    /// Computes it; `None` if the uncertainty of a camera is not known.
     fn of(
         first: &CameraEstimate,
         second: &CameraEstimate,
@@ -478,7 +477,7 @@ impl Known {
         Some(DMatrix::from_fn(2, self.unknowns, |i, j| rows[(i, j)]))
     }
 
-    /// How the difference at a point changes with each deviation of the first and of the second camera.
+    /// Derivatives of the difference at a point with respect to the columns of both covariance roots.
     fn changes(
         &self,
         first: &CameraEstimate,
@@ -495,7 +494,7 @@ impl Known {
         Some(DMatrix::from_fn(2, columns.len(), |i, j| columns[j][i]))
     }
 
-    /// The deviation of a coordinate of the difference at a point.
+    /// Standard deviation per axis of the difference at a point.
     fn sd_px(
         &self,
         first: &CameraEstimate,
@@ -509,9 +508,9 @@ impl Known {
     }
 }
 
-/// The probability of a sum of squares as large as `found` or larger, of which `mean` is expected and whose
-/// variances have squares that sum up to `spread`: by the χ² of the same mean and variance (Satterthwaite
-/// 1946); where covariances are known as from so many squares only, by the F distribution.
+/// The probability of a sum of squares of at least `found`, if `mean` is expected and the squared variances sum to
+/// `spread`: from the χ² distribution of equal mean and variance (Satterthwaite 1946), or from the F distribution if
+/// the covariances have limited degrees of freedom.
 fn chance_of(found: f64, mean: f64, spread: f64, known: [Option<f64>; 2]) -> f64 {
     if mean <= 0.0 || spread <= 0.0 {
         return 1.0;
@@ -529,8 +528,8 @@ impl CameraEstimate {
     }
 }
 
-/// A square root of the covariance of a camera's parameters: that which is observed, without errors of the board,
-/// else that from noise.
+/// A square root of the covariance of a camera's parameters: the observed one without errors of the board, else that
+/// from noise.
 fn half_of(camera: &CameraEstimate) -> Option<DMatrix<f64>> {
     let observed = camera.projection.as_ref().and_then(|known| known.observed.as_ref());
     let observed = observed.map(ObservedCovariance::without_board);

@@ -1,4 +1,4 @@
-//! What is to be said about an estimate: what is wrong with it, what that comes from, and what helps.
+//! Diagnoses of an estimate: its problems, their causes and remedies.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -16,140 +16,138 @@ use crate::problem::shape::STRETCH;
 use crate::start::symmetry::LabelRotation;
 use deltille_core::camera::Camera;
 
-/// Corners are found to a few hundredths of a pixel; a camera that leaves more than this does not
-/// have the lens of the model.
+/// RMS residual beyond which a lens does not match its model, px: corners are located to a few hundredths of a pixel.
 const POOR_RMS_PX: f64 = 1.0;
 
-/// The part of its views that a calibration may leave out.
+/// Fraction of the views that a calibration may exclude.
 const MOST_LEFT_OUT: f64 = 0.2;
 
-/// Focal lengths that differ by so many deviations are those of two minima; one that leaves so many times as much as
-/// the best is none to be taken for it.
+/// Least difference of the focal lengths of two minima, in standard deviations.
 const APART_SIGMA: f64 = 10.0;
 const NEARLY: f64 = 1.5;
 
-/// What is to be said about an estimate. Cameras are indices.
+/// A diagnosis of an estimate. Cameras are indices.
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum Diagnosis {
-    /// A camera that was given did not take its pictures; nothing of the estimate is of use.
+    /// A given camera did not take the images; the estimate is unusable.
     ForeignCamera {
         /// The camera.
         camera: usize,
-        /// What it leaves, outliers left out, px.
+        /// RMS residual per axis without outliers, px.
         rms_px: f64,
     },
-    /// A camera that was found leaves so much that nothing of the estimate is of use.
+    /// The residuals of an estimated camera are so large that the estimate is unusable.
     AbsurdFit {
         /// The camera.
         camera: usize,
-        /// What it leaves, outliers left out, px.
+        /// RMS residual per axis without outliers, px.
         rms_px: f64,
     },
-    /// More than a fifth of the views, of a rig of the frames, took no part: what was found is that of the others only.
+    /// More than a fifth of the views (of a rig: of the frames) were excluded, so the result rests on the others only.
     ManyLeftOut {
-        /// How many took no part.
+        /// Number of excluded views or frames.
         left_out: usize,
-        /// Of how many.
+        /// Number of all views or frames.
         all: usize,
     },
-    /// More than a fifth of the corners were left out with their panels, in views of which other panels were kept: what was found
-    /// is that of the others only.
+    /// More than a fifth of the corners were excluded with their panels, in views whose other panels were kept, so the
+    /// result rests on the others only.
     ManyPanelsLeftOut {
-        /// How many corners.
+        /// Number of excluded corners.
         left_out: usize,
-        /// Of how many.
+        /// Number of all corners.
         all: usize,
     },
-    /// Another camera of the same model explains the views as well, or nearly.
+    /// Another camera of the same model fits the views as well or nearly as well.
     OtherMinimum {
         /// The camera.
         camera: usize,
-        /// The other one.
+        /// The other camera.
         other: Camera,
-        /// What that leaves, outliers left out, px.
+        /// RMS residual per axis of the other camera without outliers, px.
         rms_px: f64,
     },
-    /// A camera whose pictures show what the others saw some frames before; they were put to the right moments.
+    /// A camera that lags behind the others by some frames; its frames were re-paired.
     Late {
         /// The camera.
         camera: usize,
-        /// By how many frames; negative where it was ahead of the others.
+        /// Lag in frames; negative if the camera leads.
         frames: i32,
     },
     /// The board looks the same after a rotation, and the labels of a camera of a rig were rotated so that the cameras
-    /// agree on where it is, or both labellings fit.
+    /// agree on its pose, or both labellings fit.
     LabelsRotated {
         /// The camera.
         camera: usize,
-        /// By how much, in how many frames, and whether that is sure.
+        /// The rotation, the number of frames, and whether it is certain.
         rotation: LabelRotation,
     },
-    /// The shape of a board, or its corners, were to be found, and it looks the same after a rotation, so that views may
-    /// show it either way round.
+    /// The shape or the corners of a board were estimated, but it looks the same after a rotation, so views may show it
+    /// either way up.
     LabelsOpen {
-        /// The least such rotation, degrees.
+        /// The smallest such rotation, degrees.
         degrees: u32,
     },
-    /// The views do not show one camera: from some view on its focal length or principal point is another one.
+    /// The camera changed between views: from some view on, its focal length or principal point differs.
     ChangedCamera {
         /// The camera.
         camera: usize,
-        /// What changed, and when.
+        /// The change and its view.
         change: CameraChange,
     },
-    /// Rows were read one after the other while board or camera moved.
+    /// Rows were read one after the other while the board or the camera moved.
     RollingShutter {
         /// The camera.
         camera: usize,
-        /// By how much rows are displaced.
+        /// The displacement of rows.
         shutter: RollingShutter,
     },
-    /// The board is longer in one direction than in the other, against its description.
+    /// The board is stretched in one direction relative to its description.
     StretchedBoard {
-        /// The camera by whose views that was found.
+        /// The camera whose views show it.
         camera: usize,
-        /// By how much.
+        /// The stretch.
         stretch: BoardStretch,
     },
-    /// The lens turns back or runs away within the image.
+    /// The lens model folds back or has a pole within the image.
     LensEnds {
         /// The camera.
         camera: usize,
-        /// Where.
+        /// The radius and the extent of corners and image.
         end: LensEnd,
     },
-    /// Corners are wrong together.
+    /// Outliers have something in common.
     GrossErrors(Finding),
-    /// Something that was taken for given explains the residuals when it is found.
+    /// Estimating a quantity that was taken as given explains the residuals.
     Remedied {
-        /// The camera by whose views that was found.
+        /// The camera whose views show it.
         camera: usize,
-        /// What, and by how much.
+        /// The quantity and its effect.
         remedy: Remedy,
     },
-    /// Residuals are not noise, and nothing that was tried explains them.
+    /// Residuals are not noise, and no tried alternative explains them.
     LackOfFit(LackOfFit),
     /// Residuals are large.
     PoorFit {
         /// The camera.
         camera: usize,
-        /// What is left, outliers left out, px.
+        /// RMS residual per axis without outliers, px.
         rms_px: f64,
     },
-    /// Parameters that the views cannot tell apart.
+    /// Parameters that the views do not distinguish.
     IllConditioned {
         /// The camera.
         camera: usize,
-        /// Their names.
+        /// Names of the parameters.
         parameters: Vec<String>,
-        /// A smaller model that holds the lens as well, if there is one.
+        /// A smaller model that fits the lens equally well, if there is one.
         sufficient: Option<Model>,
     },
 }
 
 impl Diagnosis {
-    /// Whether what was found is not to be used as it is.
+    /// Whether the estimate must not be used as it is.
     pub fn is_failure(&self) -> bool {
         matches!(
             self,
@@ -161,7 +159,8 @@ impl Diagnosis {
         )
     }
 
-    /// The camera whose lens is not that of the model by this, so that no view is to blame for its residuals.
+    /// The camera whose lens the model does not fit according to this diagnosis, so that no view is to blame for its
+    /// residuals.
     pub fn misfit_of(&self) -> Option<usize> {
         match *self {
             Self::AbsurdFit { camera, .. }
@@ -174,7 +173,7 @@ impl Diagnosis {
         }
     }
 
-    /// The camera of whose state this is, and what is left where it is allowed for, px.
+    /// The camera whose state this diagnosis describes, and the RMS residual with it modelled, px.
     fn of_state(&self) -> Option<(usize, f64)> {
         match self {
             Self::ChangedCamera { camera, change } => Some((*camera, change.left_px)),
@@ -184,7 +183,7 @@ impl Diagnosis {
         }
     }
 
-    /// Whether this explains the residuals of its camera at least as well as a remedy does.
+    /// Whether this diagnosis explains the residuals of its camera at least as well as a remedy.
     fn explains(&self, (camera, remedy): &(usize, Remedy)) -> bool {
         let is_shape =
             matches!(self, Self::StretchedBoard { .. }) && remedy.instead == Instead::Shape;
@@ -194,11 +193,11 @@ impl Diagnosis {
 }
 
 impl Calibration {
-    /// What [`Estimate::diagnose`] says of what [`solve`](Self::solve) found, and what explains it, what matters most first.
-    /// Where residuals are not noise, other calibrations are solved: with other models, the shape of the board, and the
-    /// places of panels, on a part of the views.
+    /// Returns the diagnoses of [`Estimate::diagnose`] for an estimate from [`solve`](Self::solve) with their causes,
+    /// the most serious first. If residuals are not noise, alternatives are solved on a part of the views: other
+    /// models, the shape of the board, and the poses of panels.
     pub fn explain(&self, found: &Estimate) -> Vec<Diagnosis> {
-        // What was solved was split before.
+        // `solve` had split off the held-out frames.
         let own = self.split().map_or_else(|_| self.clone(), |(own, _)| own);
         let alone = own.each_alone(found);
         let mut said = said(found, &alone);
@@ -212,7 +211,7 @@ impl Calibration {
         said
     }
 
-    /// Where what was to be found of the board depends on which way round it was seen.
+    /// The diagnosis that the estimated shape or corners depend on which way up the board was seen.
     fn open_labels(&self) -> Option<Diagnosis> {
         let is_of_place = self.board_shape || self.measure_target;
         let maps = self.symmetries.iter().flatten().filter(|_| is_of_place);
@@ -220,7 +219,7 @@ impl Calibration {
         Some(Diagnosis::LabelsOpen { degrees })
     }
 
-    /// Replaces what one step says of a change or a stretch by what a calibration finds that allows for it.
+    /// Replaces the values of a change or a stretch from one linear step by those of a full calibration.
     fn refine(&self, found: &Estimate, said: &mut Diagnosis) {
         match said {
             Diagnosis::ChangedCamera { change, .. } => {
@@ -249,7 +248,7 @@ impl Calibration {
         }
     }
 
-    /// A camera of another valley that leaves not much more, where a model has several.
+    /// The camera of another minimum with only slightly larger residuals, if the model has several minima.
     fn other_minimum(&self, found: &Estimate) -> Option<(Camera, f64)> {
         let model = self.cameras[0].intrinsics.model()?;
         let own = found.cameras.first()?;
@@ -266,8 +265,7 @@ impl Calibration {
         others.min_by(|(_, one), (_, other)| one.total_cmp(other))
     }
 
-    /// Every camera by itself, and what its views say; `None` where they say nothing, or where there is nothing
-    /// to ask.
+    /// The calibration of every camera on its own; `None` where it fails or is not needed.
     fn each_alone(&self, found: &Estimate) -> Vec<Alone> {
         let is_good = is_explained(found);
         let alone = found.cameras.iter().enumerate().map(|(index, camera)| {
@@ -279,8 +277,8 @@ impl Calibration {
 }
 
 impl Estimate {
-    /// What is wrong with it as far as it says so by itself, what matters most first; no other calibration is solved. See
-    /// [`Calibration::explain`].
+    /// Returns the diagnoses that follow from the estimate itself, the most serious first; no other calibration is
+    /// solved. See [`Calibration::explain`].
     pub fn diagnose(&self) -> Vec<Diagnosis> {
         said(self, &vec![None; self.cameras.len()])
     }
@@ -319,7 +317,7 @@ fn said(found: &Estimate, alone: &[Alone]) -> Vec<Diagnosis> {
         .chain(many_left_out(found))
         .chain(many_panels_left_out(found))
         .collect();
-    // Where the lens is not that of the model, photographs are not to blame.
+    // If the model does not fit the lens, single images are not to blame.
     let misfits: BTreeSet<usize> =
         failures.iter().chain(&causes).filter_map(Diagnosis::misfit_of).collect();
     let is_of_view = |said: &Diagnosis| match said {
@@ -333,7 +331,7 @@ fn said(found: &Estimate, alone: &[Alone]) -> Vec<Diagnosis> {
     before.chain(ends).chain(gross).chain(causes).chain(open).collect()
 }
 
-/// What the views of each camera show that is not one camera in one state, or not the board that is described.
+/// The diagnoses of changed cameras, rolling shutters and stretched boards.
 fn states(found: &Estimate) -> Vec<Diagnosis> {
     let of_camera = |(camera, of): (usize, &CameraEstimate)| {
         let equations = found.states.get(camera)?.as_ref()?;
@@ -343,7 +341,7 @@ fn states(found: &Estimate) -> Vec<Diagnosis> {
         let shutter = shutter.map(|shutter| Diagnosis::RollingShutter { camera, shutter });
         let stretch = stretch.map(|stretch| Diagnosis::StretchedBoard { camera, stretch });
         let said = change.into_iter().chain(shutter).chain(stretch);
-        // What still leaves an absurd fit explains nothing.
+        // A state that still leaves an absurd fit explains nothing.
         let most_px = FOREIGN_PART * f64::from(of.camera.width);
         let explains = |said: &Diagnosis| said.of_state().is_some_and(|(_, px)| px < most_px);
         Some(said.filter(explains).collect::<Vec<_>>())
@@ -351,12 +349,12 @@ fn states(found: &Estimate) -> Vec<Diagnosis> {
     found.cameras.iter().enumerate().filter_map(of_camera).flatten().collect()
 }
 
-/// Whether a state is what leaves patterns in the residuals.
+/// Whether a state leaves patterns in the residuals.
 fn leaves_patterns(state: &Diagnosis) -> bool {
     matches!(state, Diagnosis::RollingShutter { .. } | Diagnosis::StretchedBoard { .. })
 }
 
-/// Whether too many views of cameras that were to be found took no part.
+/// The diagnosis that too many views of estimated cameras were excluded.
 fn many_left_out(found: &Estimate) -> Option<Diagnosis> {
     let frames: BTreeSet<&str> = found.frames.iter().map(|frame| frame.name.as_str()).collect();
     let whole = found.excluded.iter().filter(|out| out.panel.is_none());
@@ -374,7 +372,7 @@ fn many_left_out(found: &Estimate) -> Option<Diagnosis> {
     (is_sought && is_many).then_some(Diagnosis::ManyLeftOut { left_out, all })
 }
 
-/// Whether too many corners took no part with their panels, as where one of several boards has another size than stated.
+/// The diagnosis that too many corners were excluded with their panels, as when one of several boards has another size.
 fn many_panels_left_out(found: &Estimate) -> Option<Diagnosis> {
     let excluded = found.excluded.iter().filter(|out| out.panel.is_some());
     let excluded: usize = excluded.map(|out| out.corners).sum();
@@ -386,9 +384,9 @@ fn many_panels_left_out(found: &Estimate) -> Option<Diagnosis> {
             (*seen, *out) = (*seen + 1, *out + usize::from(corner.outlier));
         }
         all += view.corners.len();
-        // A few may fit by chance.
+        // A few corners may fit by chance.
         let is_whole = |(seen, out): &&(usize, usize)| 10 * out >= 9 * seen;
-        // Of one panel alone the view would have been left out.
+        // With one panel only, the whole view would have been excluded.
         let several = of_panels.values().filter(|_| of_panels.len() > 1);
         outliers += several.filter(is_whole).map(|(seen, _)| seen).sum::<usize>();
     }
@@ -397,7 +395,7 @@ fn many_panels_left_out(found: &Estimate) -> Option<Diagnosis> {
     is_many.then_some(Diagnosis::ManyPanelsLeftOut { left_out, all })
 }
 
-/// Why residuals are not noise, and which of the states explain them better than any remedy does.
+/// The causes of residuals that are not noise. Removes the states that a remedy explains better.
 fn causes(found: &Estimate, alone: &[Alone], states: &mut Vec<Diagnosis>) -> Vec<Diagnosis> {
     let remedies = alone.iter().enumerate().filter_map(|(camera, alone)| {
         let (alone, found) = alone.as_ref()?;
@@ -405,7 +403,7 @@ fn causes(found: &Estimate, alone: &[Alone], states: &mut Vec<Diagnosis>) -> Vec
     });
     let mut remedies: Vec<(usize, Remedy)> = remedies.collect();
     let of = |instead: Instead| move |(_, remedy): &(usize, Remedy)| remedy.instead == instead;
-    // A wrong camera moves everything else with it.
+    // A wrong camera shifts everything else too.
     if remedies.iter().any(of(Instead::Camera)) {
         remedies.retain(of(Instead::Camera));
     }
@@ -417,22 +415,22 @@ fn causes(found: &Estimate, alone: &[Alone], states: &mut Vec<Diagnosis>) -> Vec
         !remedies.iter().filter(is_of_model).any(is_worse)
     });
     remedies.retain(|remedy| !states.iter().any(|state| state.explains(remedy)));
-    // There is one board, and one target.
-    let mut told = Vec::new();
+    // Report the one board and the one target only once.
+    let mut seen = Vec::new();
     remedies.retain(|(_, Remedy { instead, .. })| {
         let is_shared = matches!(instead, Instead::Shape | Instead::Panels);
-        let is_first = !told.contains(instead);
-        told.push(*instead);
+        let is_first = !seen.contains(instead);
+        seen.push(*instead);
         is_first || !is_shared
     });
     let is_of_target = |misfit: &&LackOfFit| matches!(misfit, LackOfFit::Target { .. });
     let of_target: Vec<&LackOfFit> = found.lack_of_fit.iter().filter(is_of_target).collect();
-    // Where panels are moved their corners tell most of it.
+    // For displaced panels, their corners describe most of it.
     let panels = remedies.iter().any(of(Instead::Panels)) && !of_target.is_empty();
     if panels {
         remedies.retain(|remedy| !of(Instead::Panels)(remedy));
     }
-    let told: Vec<&LackOfFit> = match (panels, remedies.is_empty()) {
+    let misfits: Vec<&LackOfFit> = match (panels, remedies.is_empty()) {
         (true, _) => of_target,
         (false, true) if states.iter().any(leaves_patterns) => Vec::new(),
         (false, true) => found.lack_of_fit.iter().collect(),
@@ -440,18 +438,18 @@ fn causes(found: &Estimate, alone: &[Alone], states: &mut Vec<Diagnosis>) -> Vec
     };
     let is_named = |camera: usize| {
         let poor_px = found.cameras[camera].inlier_rms_px();
-        // A target that leaves most of the error bends the cameras, too.
+        // A target that causes most of the error biases the cameras, too.
         let is_cause = |misfit: &&LackOfFit| match **misfit {
             LackOfFit::Lens { camera: of, .. } => of == camera,
             LackOfFit::Target { rms_px, .. } => rms_px > 0.5 * poor_px,
         };
-        // Of a single camera anything is.
-        let is_single = found.cameras.len() == 1 && !(told.is_empty() && remedies.is_empty());
+        // For a single camera, any diagnosis names it.
+        let is_single = found.cameras.len() == 1 && !(misfits.is_empty() && remedies.is_empty());
         let is_of_state = |state: &Diagnosis| state.of_state().is_some_and(|(of, _)| of == camera);
         is_single
             || states.iter().any(is_of_state)
             || remedies.iter().any(|(of, _)| *of == camera)
-            || told.iter().any(is_cause)
+            || misfits.iter().any(is_cause)
     };
     let is_poor = |(index, camera): &(usize, &CameraEstimate)| {
         camera.inlier_rms_px() > POOR_RMS_PX && !is_absurd(camera) && !is_named(*index)
@@ -461,6 +459,6 @@ fn causes(found: &Estimate, alone: &[Alone], states: &mut Vec<Diagnosis>) -> Vec
         .map(|(camera, of)| Diagnosis::PoorFit { camera, rms_px: of.inlier_rms_px() })
         .collect();
     let remedied = remedies.iter().map(|&(camera, remedy)| Diagnosis::Remedied { camera, remedy });
-    let told = told.into_iter().copied().map(Diagnosis::LackOfFit);
-    remedied.chain(told).chain(poor).collect()
+    let misfits = misfits.into_iter().copied().map(Diagnosis::LackOfFit);
+    remedied.chain(misfits).chain(poor).collect()
 }

@@ -1,11 +1,11 @@
-//! What is to be said about an estimate.
+//! Diagnoses of an estimate.
 //!
-//! Comes in: an estimate, and the calibration to try alternatives with. Goes out: diagnoses, and sentences.
+//! Input: an estimate, and its calibration for trials of alternatives. Output: diagnoses, and sentences.
 //!
-//! 1. `one_state` asks whether views show one camera in one state, and the board as described.
-//! 2. `model_selection` tries what explains a lack of fit, and which smaller model suffices.
-//! 3. `diagnosis` says what is wrong, what it comes from, and what helps.
-//! 4. `words` says it in sentences.
+//! 1. `one_state` tests whether the views show one camera in one state, and the board as described.
+//! 2. `model_selection` tries alternatives that may explain a lack of fit, and smaller models that may suffice.
+//! 3. `diagnosis` collects the problems, their causes and remedies.
+//! 4. `words` formats them as sentences.
 
 pub(crate) mod diagnosis;
 pub(crate) mod model_selection;

@@ -17,8 +17,8 @@ use crate::problem::whitening::{MEDIAN_OF_CHI_SQUARED_2, OUTLIER_SIGMA};
 use deltille_core::camera::{Camera, PROJECTION_PARAMETERS};
 use deltille_core::statistics::median;
 
-/// Where the noise of detections explains at least this fraction of the squares of the residuals,
-/// nothing is sought: the rest does not matter.
+/// Fraction of the squares of the residuals from which the noise of detections explains them well enough: the rest does
+/// not matter, and no remedy is sought.
 const EXPLAINED: f64 = 1.0 / (1.0 + MATTERS * MATTERS);
 
 /// A remedy counts as equal to the best from this fraction of its gain on: squares of a thousand
@@ -29,24 +29,23 @@ const AS_GOOD: f64 = 0.9;
 /// many, and a trial must not take longer than the calibration.
 const TRIAL_VIEWS: usize = 12;
 
-/// A known camera that leaves more than this part of the image's width did not take the pictures: poses
-/// take up most of what focal lengths and principal point are off by, and so much is left by another
-/// lens, zoom or crop only.
+/// Largest residual of a given camera, as a fraction of the image width. Poses absorb most of the effect of a wrong
+/// focal length or principal point; only another lens, zoom or crop leaves more.
 pub(super) const FOREIGN_PART: f64 = 0.005;
 
 /// A change of assumptions that makes the residuals of a calibration significantly smaller.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct Remedy {
-    /// The quantity that was estimated and had been taken for given.
+    /// The quantity that was estimated instead of being taken as given.
     pub instead: Instead,
-    /// RMS residual of a coordinate without the remedy, outliers excluded, px.
+    /// RMS residual per axis without the remedy, outliers excluded, px.
     pub from_px: f64,
-    /// RMS residual of a coordinate with the remedy, outliers excluded, px.
+    /// RMS residual per axis with the remedy, outliers excluded, px.
     pub to_px: f64,
 }
 
-/// The quantity to estimate instead of taking it for given.
+/// The quantity to estimate instead of taking it as given.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Instead {
@@ -60,7 +59,7 @@ pub enum Instead {
     Camera,
 }
 
-/// A camera by itself, and what its views say.
+/// The calibration of one camera on its own, and its estimate.
 pub(super) type Alone = Option<(Calibration, Estimate)>;
 
 impl Calibration {
@@ -143,8 +142,8 @@ impl Calibration {
         Self { panels, ..self.clone() }.adjusted().ok()
     }
 
-    /// Indices of the cameras of a rig that were given and are contradicted by their own pictures:
-    /// other cameras, or changed since. Empty for a single camera.
+    /// Indices of the given cameras of a rig that contradict their own images:
+    /// they are other cameras, or have changed since. Empty for a single camera.
     pub(crate) fn foreign_cameras(&self) -> Vec<usize> {
         let is_foreign = |&index: &usize| {
             let alone = self.alone(index, &self.panels);
@@ -158,7 +157,7 @@ impl Calibration {
         }
     }
 
-    /// A camera by itself, with panels where they were found, and what its views say.
+    /// The calibration of one camera on its own, with the panels as estimated, and its estimate.
     pub(super) fn and_alone(&self, camera: usize, found: &Estimate) -> Alone {
         if self.is_single() {
             return Some((self.clone(), found.clone()));
@@ -197,7 +196,7 @@ impl Calibration {
     }
 }
 
-/// Whether a camera leaves so much that it cannot be that of the pictures.
+/// Whether the residuals of a camera are so large that it cannot have taken the images.
 pub(super) fn is_absurd(camera: &CameraEstimate) -> bool {
     camera.inlier_rms_px() > FOREIGN_PART * f64::from(camera.camera.width)
 }

@@ -1,4 +1,4 @@
-//! Whether the views show one camera in one state, and the board that is described.
+//! Tests whether the views show one camera in one state, and the board as described.
 //!
 //! ```text
 //!   change     views 1 … k | k + 1 … n     a focal length or principal point for each group; every k is tried
@@ -6,11 +6,11 @@
 //!   stretch    x and y of the board in another ratio than described
 //! ```
 //!
-//! Each is a score test on [`StateEquations`]. Deviations are those of the scatter between views, so that
-//! errors of the model and of the board, which differ from view to view, do not pass for a change. Stretch, shear and
-//! bend of the board are unknowns of each test: a bent board that is seen from one side first and from the other
-//! later is no change of the camera. Nor is what a drift, or the tilt and the distance of the board, explain as well: many
-//! sequences go from frontal to oblique views.
+//! Each is a score test on [`StateEquations`]. Standard deviations come from the scatter between views, so that errors
+//! of the model and of the board, which differ from view to view, do not look like a change. Stretch, shear and bend of
+//! the board are unknowns of each test: a bent board seen first from one side and later from the other is not a change
+//! of the camera. A change is also not reported if a drift, or the tilt and the distance of the board, explain it
+//! equally well: many sequences go from frontal to oblique views.
 
 use crate::problem::whitening::OUTLIER_SIGMA;
 use crate::uncertainty::state_equations::{
@@ -19,30 +19,32 @@ use crate::uncertainty::state_equations::{
 use deltille_core::camera::Camera;
 use deltille_core::statistics::f_chance;
 
-/// Probability of each of the three diagnoses for views in which nothing is wrong, 1 % for all; that of a change is
-/// for all positions together.
+/// Significance level of each of the three diagnoses, 1 % for all; the level for a change covers all its positions
+/// together.
 const SIGNIFICANT: f64 = 0.01 / 3.0;
 
-/// Least number of views before and after a change: two and one to test them.
+/// Least number of views before and after a change: two, and one to test them.
 const LEAST_VIEWS: usize = 3;
 
-/// A displacement during the shutter is claimed where it explains all but this part of the squares, so that the
-/// residual halves. A lens of another model and a bent board have most of their pattern in other directions.
+/// Greatest fraction of the squares that displacements during readout may leave, so that the residual halves. Another
+/// lens model and a bent board leave most of their pattern in other directions.
 const MOST_LEFT: f64 = 0.25;
 
-/// Least displacement at the edge of the image by a change, in standard deviations of a corner: that of an outlier.
-/// A smaller one, as of a lens that warms up, is within what deviations allow for, see [`crate::uncertainty::halves`].
+/// Least displacement at the edge of the image that counts as a change, in standard deviations of a corner: that of an
+/// outlier. Smaller changes, such as those of a lens that warms up, are covered by the uncertainties, see
+/// [`crate::uncertainty::halves`].
 const LEAST_CHANGE: f64 = OUTLIER_SIGMA;
 
-/// Least stretch of a board that is another board, or a print that was fitted to its page: printers feed paper with
-/// errors of some tenths of a per cent.
+/// Least stretch that implies another board or a print scaled to its page: printers feed paper with errors of a few
+/// tenths of a per cent.
 const LEAST_STRETCH: f64 = 0.005;
 
-/// A view shows a displacement by itself where the sum of three squares exceeds this: once in a thousand views.
+/// Limit of the sum of three squares beyond which a single view shows a displacement: exceeded once in a thousand
+/// views.
 const OF_VIEW: f64 = 16.27;
 
-/// What of a camera changes from one view to the next: zoom and focus change the focal length; stabilised lenses and shifted
-/// ones move the principal point.
+/// The intrinsic that changed between views. Zoom and focus change the focal length; stabilised and shifted lenses move
+/// the principal point.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ChangedIntrinsic {
     /// The focal length.
@@ -56,7 +58,7 @@ pub enum ChangedIntrinsic {
 impl ChangedIntrinsic {
     const ALL: [Self; 3] = [Self::Focal, Self::CentreX, Self::CentreY];
 
-    /// Its value, px; the focal length in x.
+    /// Its value, px; for the focal length, that in x.
     pub(crate) fn of(self, camera: &Camera) -> f64 {
         match self {
             Self::Focal => camera.focal_px.x,
@@ -83,62 +85,63 @@ impl ChangedIntrinsic {
     }
 }
 
-/// The camera differs between the first views and the others.
+/// A change of the camera between the first views and the others.
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct CameraChange {
-    /// What changed.
+    /// The intrinsic that changed.
     pub intrinsic: ChangedIntrinsic,
     /// Name of the first view after the change.
     pub from_view: String,
-    /// How many views there are before and after it.
+    /// Numbers of views before and after the change.
     pub views: [usize; 2],
-    /// The intrinsic before and after the change, px; focal lengths in x.
+    /// The intrinsic before and after the change, px; for the focal length, that in x.
     pub value_px: [f64; 2],
     /// Standard deviation of their difference, px.
     pub sd_px: f64,
-    /// Probability of a difference as significant as this at any view of an unchanged camera.
+    /// Probability that an unchanged camera shows such a difference at any view.
     pub significance: f64,
-    /// RMS residual of a coordinate that is left where the change is allowed for, px.
+    /// RMS residual per axis with the change modelled, px.
     pub left_px: f64,
 }
 
 impl CameraChange {
-    /// The values before and after, px, if it is this intrinsic that changed.
+    /// Returns the values before and after, px, if this intrinsic changed.
     pub fn of(&self, intrinsic: ChangedIntrinsic) -> Option<[f64; 2]> {
         (self.intrinsic == intrinsic).then_some(self.value_px)
     }
 }
 
-/// Rows are displaced against each other as a rolling shutter does while the board moves.
+/// Rows displaced relative to each other, as by a rolling shutter while the board moves.
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct RollingShutter {
-    /// Displacement between the first and the last row of the image, px; the root mean square over the views.
+    /// Displacement between the first and the last row of the image, px; the RMS over the views.
     pub shear_px: f64,
-    /// How many views show it by themselves.
+    /// Number of views that show it individually.
     pub views: usize,
-    /// Probability of residuals that agree as well with such displacements by noise.
+    /// Probability that noise makes residuals agree as well with such displacements.
     pub significance: f64,
-    /// RMS residual of a coordinate that is left where displacements are allowed for, px.
+    /// RMS residual per axis with the displacements modelled, px.
     pub left_px: f64,
 }
 
-/// The board is longer in one direction than in the other, against its description.
+/// A board stretched in one direction relative to its description.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct BoardStretch {
-    /// Length along x over length along y, in units of what is described; less than 1 where y is longer.
+    /// Length along x over length along y, each relative to the description; less than 1 if the board is longer along
+    /// y.
     pub ratio: f64,
     /// Standard deviation of the ratio.
     pub sd: f64,
-    /// Probability of a ratio as significant as this for a board as described.
+    /// Probability that a board as described shows such a ratio.
     pub significance: f64,
-    /// RMS residual of a coordinate that is left where it is allowed for, px.
+    /// RMS residual per axis with the stretch modelled, px.
     pub left_px: f64,
 }
 
-/// What the views of a camera show.
+/// The changes of state that the views of a camera show.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(super) struct State {
     pub change: Option<CameraChange>,
@@ -158,7 +161,7 @@ impl State {
         let change = step.as_ref().and_then(|step| {
             let &Step { intrinsic, first, effect, significance, ref fit } = step;
             let left_px = equations.px() * fit.variance().sqrt();
-            // A relative change of the focal length, or px; and px at the edge of the image.
+            // Units: relative for the focal length, px for the principal point; and px at the edge of the image.
             let (scale, at_edge) = match intrinsic {
                 ChangedIntrinsic::Focal => (camera.focal_px.x, f64::from(camera.width) / 2.0),
                 ChangedIntrinsic::CentreX | ChangedIntrinsic::CentreY => (1.0, 1.0),
@@ -166,7 +169,7 @@ impl State {
             if at_edge * effect.value.abs() < LEAST_CHANGE * left_px {
                 return None;
             }
-            // Of the first group the camera is that of the fit.
+            // The fit describes the camera of the first group.
             let parameter = intrinsic.parameter();
             let change_px = equations.change_px(fit, parameter, intrinsic.candidate(), scale);
             let before = intrinsic.of(camera) + change_px;
@@ -180,7 +183,8 @@ impl State {
                 left_px,
             })
         });
-        // What one step leaves of a stretch may pass for a shutter, and what shutters do together for a stretch.
+        // One linear step leaves a part of a stretch, which may look like a shutter; shutters together may look like a
+        // stretch.
         let shutter = shutter(equations, step.as_ref());
         let (stretch, shutter) = match (stretch, shutter) {
             (Some((stretch, true)), Some(_)) => (Some(stretch), None),
@@ -191,7 +195,7 @@ impl State {
     }
 }
 
-/// Columns of the camera and of the board.
+/// The columns of the camera and of the board.
 fn base(equations: &StateEquations) -> Vec<Column> {
     let mut columns = equations.camera();
     if equations.is_of_one_panel {
@@ -219,7 +223,7 @@ pub(crate) fn after(first: usize, count: usize) -> Vec<f64> {
     (0..count).map(|view| f64::from(u8::from(view >= first))).collect()
 }
 
-/// The most significant change, where it is significant.
+/// The most significant change, if it is significant.
 fn step(equations: &StateEquations) -> Option<Step> {
     let count = equations.count();
     let places = LEAST_VIEWS..(count + 1).saturating_sub(LEAST_VIEWS);
@@ -229,7 +233,7 @@ fn step(equations: &StateEquations) -> Option<Step> {
         let mut columns = base(equations);
         columns.push(Step::column(intrinsic, first, equations));
         let fit = equations.fit(&columns)?;
-        // Each group has its mean.
+        // One degree of freedom for the mean of each group.
         let effect = fit.effect(columns.len() - 1, 2.0)?;
         let significance = (tried * significance(effect)).min(1.0);
         Some(Step { intrinsic, first, effect, significance, fit })
@@ -239,8 +243,8 @@ fn step(equations: &StateEquations) -> Option<Step> {
     (best.significance < SIGNIFICANT && best.fit.left < smooth.left).then_some(best)
 }
 
-/// The fit of an intrinsic that drifts from the first view to the last, and follows the tilt and the distance of the board. A
-/// lens that warms up drifts; what a model or a map of the board leaves follows tilt and distance.
+/// The fit of an intrinsic that drifts from the first view to the last, and follows the tilt and the distance of the
+/// board. A lens that warms up drifts; errors of the model or of the measured board follow tilt and distance.
 fn smooth(intrinsic: ChangedIntrinsic, equations: &StateEquations) -> Option<Fit> {
     let views = equations.views.iter().enumerate();
     let of_view = views.map(|(i, view)| [i as f64, view.obliquity, view.log_distance]);
@@ -282,7 +286,7 @@ fn shutter(equations: &StateEquations, changed: Option<&Step>) -> Option<Rolling
     Some(RollingShutter { shear_px, views, significance, left_px })
 }
 
-/// The stretch, and whether the board's columns explain most of the squares.
+/// The stretch, and whether the columns of the board explain most of the squares.
 fn stretch(equations: &StateEquations) -> Option<(BoardStretch, bool)> {
     if !equations.is_of_one_panel || equations.count() < LEAST_VIEWS {
         return None;

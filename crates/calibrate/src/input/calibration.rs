@@ -1,4 +1,4 @@
-//! What a calibration starts from: cameras with their views, a target, and what of them is known.
+//! The input of a calibration: cameras with their views, a target, and what is known of them.
 
 use std::collections::BTreeSet;
 use std::ops::Range;
@@ -18,13 +18,13 @@ use deltille_core::camera::{Camera, Pose};
 use deltille_core::lattice::LatticeMap;
 use deltille_core::targets::{Target, TargetIdentity};
 
-/// Cameras that are fixed to each other, their views of one rigid target or of several that are fixed to each
-/// other, and what of these is known.
+/// A calibration of cameras that are fixed to each other, from their views of one rigid target, or of several targets
+/// that are fixed to each other.
 ///
-/// A single camera is a rig of one. Everything that is not said to be known is found by
-/// [`solve`](Self::solve): the cameras without any guess, the poses between them, and where the
-/// target was in each frame; on request also where its panels are on it and how its board is bent. Where
-/// there are several targets, see [`of_targets`](Self::of_targets), it is found where they are to each other.
+/// A single camera is a rig of one. [`solve`](Self::solve) estimates everything that is not given: the intrinsics of
+/// the cameras, without a first guess, their relative poses, and the pose of the target in each frame. On request it
+/// also estimates the poses of the panels on the target and the shape of the board. With several targets, see
+/// [`of_targets`](Self::of_targets), it also estimates the poses of the targets relative to each other.
 ///
 /// ```
 /// # use deltille_calibrate::{Calibration, CalibrationError, Estimate, Model, PanelPlace, View};
@@ -38,10 +38,10 @@ use deltille_core::targets::{Target, TargetIdentity};
 /// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct Calibration {
-    /// Those of all targets, one after the other.
+    /// The panels of all targets, one target after the other.
     pub(crate) panels: Vec<PanelPlace>,
     pub(crate) targets: Vec<TargetPanels>,
-    /// Identities of the targets, where those are described.
+    /// Identities of the targets that have a description.
     pub(crate) identities: Vec<TargetIdentity>,
     pub(crate) cameras: Vec<CameraViews>,
     pub(crate) loss: Loss,
@@ -49,19 +49,19 @@ pub struct Calibration {
     pub(crate) refine_panels: bool,
     pub(crate) board_shape: bool,
     pub(crate) measure_target: bool,
-    /// Standard deviation of a corner of the board from its plan, mm; that of a print where it is not known.
+    /// Standard deviation of a corner of the board from its plan, mm; `None` for that of an ordinary print.
     pub(crate) board_accuracy_mm: Option<f64>,
     pub(crate) hold_out: Option<usize>,
     pub(crate) distances_mm: Vec<f64>,
-    /// Which of the model's starts is taken; the best where none is said.
+    /// Index of the model's start to use; `None` for the best.
     pub(crate) start: Option<usize>,
-    /// Names of all frames in their order, where only a part of them is here.
+    /// Names of all frames in order, if this calibration contains only some of them.
     pub(crate) order: Vec<String>,
-    /// By how many frames each camera is late, where that is known.
+    /// Lag of each camera in frames, if it is known.
     pub(crate) delays: Option<Vec<i32>>,
-    /// Rotations of the labels of each panel that no picture shows; may be shorter than there are panels.
+    /// Rotations of the labels of each panel that look the same in an image; may be shorter than the list of panels.
     pub(crate) symmetries: Vec<Vec<LatticeMap>>,
-    /// Whether the work is to end.
+    /// Flag that stops the calibration.
     pub(crate) stop: Stop,
 }
 
@@ -69,38 +69,37 @@ pub struct Calibration {
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct TargetPanels {
     pub name: String,
-    /// Its panels among all.
+    /// Range of its panels among all panels.
     pub panels: Range<usize>,
-    /// Its place in the scene, where that is known.
+    /// Its pose in the scene, if it is known.
     pub scene_from_target: Option<Pose>,
 }
 
-/// What one camera saw, and what is known of it.
+/// The views of one camera, and what is known of the camera.
 #[derive(Clone, Debug, PartialEq)]
 pub struct CameraViews {
-    /// Name of the camera, by which results and messages call it.
+    /// Name of the camera in results and messages.
     pub name: String,
-    /// Its views; those of the same name in different cameras were taken at the same moment.
+    /// Its views; views of the same name in different cameras were taken at the same time.
     pub views: Vec<View>,
     /// What is known of its intrinsics.
     pub intrinsics: Intrinsics,
-    /// Its pose on the rig, where that is known. The frame of the first camera is the rig frame unless said
-    /// otherwise.
+    /// Its pose on the rig, if it is known. Without a given pose, the frame of the first camera is the rig frame.
     pub camera_from_rig: Option<Pose>,
 }
 
 /// What is known of the intrinsics of a camera.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Intrinsics {
-    /// Nothing but the model, whose parameters are estimated.
+    /// Only the model is known; its parameters are estimated.
     Unknown(Model),
-    /// All parameters, which are kept.
+    /// All parameters are known and stay fixed.
     Known(Camera),
-    /// All parameters approximately: some are estimated, starting from the values that they have.
+    /// All parameters are known approximately; some are estimated from these initial values.
     Near {
         /// The camera.
         camera: Camera,
-        /// Which parameters are found, in the order of [`Camera::parameter_names`].
+        /// Which parameters are estimated, in the order of [`Camera::parameter_names`].
         free: Vec<bool>,
     },
 }
@@ -118,7 +117,7 @@ impl From<Camera> for Intrinsics {
 }
 
 impl Intrinsics {
-    /// The model that is to be found; `None` where a camera was given.
+    /// The model to estimate; `None` if a camera was given.
     pub fn model(&self) -> Option<Model> {
         match self {
             Self::Unknown(model) => Some(*model),
@@ -126,7 +125,7 @@ impl Intrinsics {
         }
     }
 
-    /// Which parameters are found.
+    /// Which parameters are estimated.
     pub(crate) fn free(&self) -> Vec<bool> {
         match self {
             Self::Unknown(model) => model.free(),
@@ -137,7 +136,7 @@ impl Intrinsics {
 }
 
 impl CameraViews {
-    /// A camera whose pose on the rig is to be estimated.
+    /// Creates a camera whose pose on the rig is estimated.
     pub fn new(name: &str, views: Vec<View>, intrinsics: impl Into<Intrinsics>) -> Self {
         let (name, intrinsics) = (name.to_owned(), intrinsics.into());
         Self { name, views, intrinsics, camera_from_rig: None }
@@ -145,19 +144,19 @@ impl CameraViews {
 }
 
 impl Calibration {
-    /// A calibration with a target of these panels, see
-    /// [`Reference::panels`](crate::Reference::panels), without any camera yet.
+    /// Creates a calibration with a target of these panels, see [`Reference::panels`](crate::Reference::panels), and
+    /// without cameras.
     pub fn new(panels: impl IntoIterator<Item = impl Into<PanelPlace>>) -> Self {
         let panels = panels.into_iter().map(Into::into).collect();
         Self::of_targets([(String::new(), panels)])
     }
 
-    /// A calibration with several targets, of these names and panels, that are fixed to each other, nobody knows
-    /// how. [`PanelRef::index`](crate::PanelRef::index) counts the panels of all targets, one target after the
-    /// other. The scene's frame is that of the first target.
+    /// Creates a calibration with several targets of these names and panels, which are fixed to each other in unknown
+    /// poses. [`PanelRef::index`](crate::PanelRef::index) counts the panels of all targets, one target after the other.
+    /// The frame of the first target is the scene frame.
     ///
-    /// Two cameras need not see the same target: where each sees one of its own, the cameras and the targets are
-    /// found from how the rig moves, which must turn about two axes.
+    /// Two cameras need not see the same target. If each sees a target of its own, the motion of the rig determines the
+    /// poses of the cameras and the targets; the rig must rotate about two axes.
     pub fn of_targets(targets: impl IntoIterator<Item = (String, Vec<PanelPlace>)>) -> Self {
         let (mut panels, mut of_targets) = (Vec::new(), Vec::new());
         for (name, of_target) in targets {
@@ -187,11 +186,11 @@ impl Calibration {
         }
     }
 
-    /// A calibration of what was photographed, with panels at these places: one target, or several with their panels one
-    /// target after the other.
+    /// Creates a calibration of the photographed target or targets with these panel poses, listed one target after the
+    /// other.
     pub fn of(reference: &Reference, panels: Vec<PanelPlace>) -> Self {
         let targets = reference.targets();
-        // Of several targets the least accurate one.
+        // The least accurate of several targets counts.
         let accuracy_mm = targets.iter().map(Target::measured_sd_mm);
         let accuracy_mm = accuracy_mm.reduce(|one, other| Some(one?.max(other?))).flatten();
         let symmetries = reference.label_symmetries();
@@ -207,7 +206,7 @@ impl Calibration {
         Self { identities, symmetries, ..calibration.board_accuracy_mm(accuracy_mm) }
     }
 
-    /// Adds a camera: of an unknown lens of a [`Model`], or a known [`Camera`] that is kept.
+    /// Adds a camera: a [`Model`] for an unknown lens, or a known [`Camera`] that stays fixed.
     #[must_use]
     pub fn camera(self, name: &str, views: Vec<View>, intrinsics: impl Into<Intrinsics>) -> Self {
         self.with(CameraViews::new(name, views, intrinsics))
@@ -220,54 +219,54 @@ impl Calibration {
         self
     }
 
-    /// Says something else of one of its cameras, by its index.
+    /// Replaces the intrinsics of a camera by its index.
     pub fn set_intrinsics(&mut self, camera: usize, intrinsics: impl Into<Intrinsics>) {
         self.cameras[camera].intrinsics = intrinsics.into();
     }
 
-    /// With a loss, by which corners with large residuals count less; it is [`Loss::Huber`] unless said otherwise.
+    /// Sets the robust loss for corners with large residuals; the default is [`Loss::Huber`].
     #[must_use]
     pub fn loss(self, loss: Loss) -> Self {
         Self { loss, ..self }
     }
 
-    /// With weights of the corners; they are [`Weights::Covariance`] unless said otherwise.
+    /// Sets the weights of the corners; the default is [`Weights::Covariance`].
     #[must_use]
     pub fn weights(self, weights: Weights) -> Self {
         Self { weights, ..self }
     }
 
-    /// Whether the poses of the target's panels on it are found, too. One panel stays: that which was
-    /// seen most of those that were never measured. What an earlier measurement says of the others
-    /// counts as an observation.
+    /// Sets whether the poses of the panels on the target are estimated. One panel stays fixed: the one seen most often
+    /// among those that were never measured. An earlier measurement of the other panels counts as an observation.
     #[must_use]
     pub fn refine_panels(self, refine_panels: bool) -> Self {
         Self { refine_panels, ..self }
     }
 
-    /// Whether the shape of the board's sheet is found, too; for targets of one panel.
+    /// Sets whether the shape of the board's sheet is estimated; for targets of one panel only.
     #[must_use]
     pub fn board_shape(self, board_shape: bool) -> Self {
         Self { board_shape, ..self }
     }
 
-    /// Whether the place of every corner of the target is found, too, see [`Estimate::map`](crate::Estimate::map).
+    /// Sets whether the position of every corner of the target is estimated, see
+    /// [`Estimate::map`](crate::Estimate::map).
     #[must_use]
     pub fn measure_target(self, measure_target: bool) -> Self {
         Self { measure_target, ..self }
     }
 
-    /// With the standard deviation of a coordinate of the board's corners from where its file has them, mm: what
-    /// such errors do to a camera is in its observed covariance. Zero where the board is exact; unless said
-    /// otherwise 0.1 mm, the error of office printers, and not more than half a percent of an edge. Where
-    /// [`measure_target`](Self::measure_target) finds the corners it does not matter.
+    /// Sets the standard deviation of the board's corners from their positions in the file, mm per axis. The observed
+    /// covariance of a camera includes the effect of these errors. Zero means an exact board. The default is 0.1 mm,
+    /// the error of office printers, but at most 0.5 % of an edge. It has no effect if
+    /// [`measure_target`](Self::measure_target) estimates the corners.
     #[must_use]
     pub fn board_accuracy_mm(self, board_accuracy_mm: Option<f64>) -> Self {
         Self { board_accuracy_mm, ..self }
     }
 
-    /// With the targets that detections name ([`Detection::targets`](deltille_core::detection::Detection)), where nothing else is known of
-    /// what was photographed than its tiles, see [`Estimate::calibrated_with`](crate::Estimate).
+    /// Sets the targets that the detections name ([`Detection::targets`](deltille_core::detection::Detection)) when
+    /// only the tiles of the target are known, see [`Estimate::calibrated_with`](crate::Estimate).
     #[must_use]
     pub fn named_by(mut self, targets: impl IntoIterator<Item = TargetIdentity>) -> Self {
         if self.identities.is_empty() {
@@ -280,22 +279,22 @@ impl Calibration {
         self
     }
 
-    /// Keeps every n-th frame (the n-th, the 2n-th, …) out of the calibration; only the poses in these are
-    /// found, see [`Estimate::held_out`](crate::Estimate::held_out).
+    /// Holds out every n-th frame (the n-th, the 2n-th, …); only the poses in these frames are estimated, see
+    /// [`Estimate::held_out`](crate::Estimate::held_out).
     #[must_use]
     pub fn hold_out(self, hold_out: Option<usize>) -> Self {
         Self { hold_out, ..self }
     }
 
-    /// How far points are, mm, for which the uncertainty of projections is told beside that at infinity; unless
-    /// said otherwise as far as the corners were.
+    /// Sets the distances, mm, at which the projection uncertainty is reported in addition to infinity; the default is
+    /// the distance of the corners.
     #[must_use]
     pub fn distances_mm(self, distances_mm: Vec<f64>) -> Self {
         Self { distances_mm, ..self }
     }
 
-    /// With a flag that ends the work soon after it is raised: [`Self::solve`] returns
-    /// [`CalibrationError::Stopped`] then.
+    /// Sets a flag that stops the calibration soon after it is raised; [`Self::solve`] then returns
+    /// [`CalibrationError::Stopped`].
     #[must_use]
     pub fn stopped_by(self, flag: Arc<AtomicBool>) -> Self {
         Self { stop: Stop::by(flag), ..self }
@@ -316,17 +315,17 @@ impl Calibration {
         self.targets.partition_point(|target| target.panels.end <= panel.index())
     }
 
-    /// Target_from_panel of every panel.
+    /// The poses `target_from_panel` of all panels.
     pub(crate) fn panel_poses(&self) -> Vec<Pose> {
         self.panels.iter().map(|panel| panel.target_from_panel).collect()
     }
 
-    /// Whether it is one camera with a target that is taken as it is stated.
+    /// Whether it has one camera and a target that is taken as described.
     pub(crate) fn is_single(&self) -> bool {
         self.cameras.len() == 1 && self.targets.len() == 1 && !self.refine_panels
     }
 
-    /// The same with other cameras.
+    /// The same calibration with other cameras.
     pub(crate) fn of_cameras(&self, cameras: Vec<CameraViews>) -> Self {
         let (panels, targets) = (self.panels.clone(), self.targets.clone());
         let identities = self.identities.clone();
@@ -347,7 +346,8 @@ impl Calibration {
         }
     }
 
-    /// One of its cameras by itself, with panels at these places. What it saw of each target is a view of its own.
+    /// The calibration of one camera on its own, with these panel poses. Each target in an image becomes a view of its
+    /// own.
     pub(crate) fn alone(&self, camera: usize, panels: &[PanelPlace]) -> Self {
         let mut camera = self.cameras[camera].clone();
         if self.targets.len() > 1 {
@@ -372,7 +372,7 @@ impl Calibration {
         }
     }
 
-    /// What a view shows of each target, by itself.
+    /// Splits a view into one view for each target.
     pub(crate) fn by_target(&self, view: &View) -> Vec<View> {
         let of_target = |(index, target): (usize, &TargetPanels)| {
             let is_of = |sighting: &&Sighting| self.target_of(sighting.panel) == index;
@@ -383,7 +383,7 @@ impl Calibration {
         self.targets.iter().enumerate().filter_map(of_target).collect()
     }
 
-    /// What a view of one of several targets is called.
+    /// The name of a view of one of several targets.
     pub(crate) fn name_on(&self, view: &str, target: &TargetPanels) -> String {
         match self.targets.len() {
             1 => view.to_owned(),
@@ -391,7 +391,7 @@ impl Calibration {
         }
     }
 
-    /// Names of all frames in the order of their numbers, also of those that are held out.
+    /// Names of all frames in the order of their numbers, including held-out frames.
     pub(crate) fn moments(&self) -> Vec<String> {
         match self.order.as_slice() {
             [] => {
@@ -402,10 +402,10 @@ impl Calibration {
         }
     }
 
-    /// The frames that take part, and those that are held out.
+    /// Splits the calibration into its own frames and the held-out frames.
     ///
     /// # Errors
-    /// Where there are too few to hold one out.
+    /// Returns an error if there are too few frames to hold one out.
     pub(crate) fn split(&self) -> Result<(Self, Option<Self>), CalibrationError> {
         let Some(every) = self.hold_out else { return Ok((self.clone(), None)) };
         let views = self.cameras.iter().flat_map(|camera| &camera.views);

@@ -1,10 +1,10 @@
-//! Robust loss: how a residual counts.
+//! Robust losses for residuals.
 
-/// Residuals count in full up to this many standard deviations. Of normally distributed corners
-/// 1.1 % lie beyond it, so that little is lost on data without outliers.
+/// Largest residual that counts in full, in standard deviations. Of normally distributed corners 1.1 % lie beyond it,
+/// so data without outliers lose little.
 const SCALE_SIGMA: f64 = 3.0;
 
-/// How the distance e of a corner from its prediction counts, in standard deviations.
+/// The loss of a corner as a function of its distance e from its prediction, in standard deviations.
 ///
 /// ```text
 ///     squared  e²          Huber  e² up to c, then 2ce − c²          Cauchy  c² ln(1 + e²/c²)
@@ -12,28 +12,27 @@ const SCALE_SIGMA: f64 = 3.0;
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Loss {
-    /// Every corner in full: least squares.
+    /// Least squares without a robust loss: every corner counts in full.
     Squared,
-    /// Corners far off pull with a constant force.
+    /// The influence of a residual stays constant beyond 3σ.
     #[default]
     Huber,
-    /// Corners far off hardly pull.
+    /// Residuals beyond 3σ have almost no influence.
     Cauchy,
 }
 
-/// How a corner pulls at what explains it, for an estimate's covariance.
+/// The influence of a corner on an estimate, for the covariance of the estimate.
 pub(crate) struct Influence {
     /// Its weight in the normal equations.
     pub weight: f64,
-    /// The square of its pull.
+    /// The square of its influence.
     pub squared: f64,
-    /// By how much the pull grows with a coordinate, the mean of both.
+    /// The derivative of the influence with respect to a coordinate, the mean of both axes.
     pub slope: f64,
 }
 
 impl Loss {
-    /// What a squared distance costs, and the weight of its normal equations, where a standard
-    /// deviation is `sigma`.
+    /// The loss of a squared distance and its weight in the normal equations, for a standard deviation `sigma`.
     pub(crate) fn of(self, squared: f64, sigma: f64) -> (f64, f64) {
         let c = SCALE_SIGMA * sigma;
         match self {
@@ -48,11 +47,11 @@ impl Loss {
             }
         }
     }
-    /// The pull w e of a corner at a squared distance.
+    /// The influence w e of a corner at a squared distance.
     pub(crate) fn influence(self, squared: f64, sigma: f64) -> Influence {
         let (_, weight) = self.of(squared, sigma);
         let relative = squared / (SCALE_SIGMA * sigma).powi(2);
-        // Half the divergence of the pull: w + e w′ / 2.
+        // Half the divergence of the influence: w + w′ e / 2.
         let slope = match self {
             Self::Huber if relative > 1.0 => weight / 2.0,
             Self::Squared | Self::Huber => 1.0,

@@ -1,14 +1,14 @@
-//! From named detections to views, and what a calibration is made from.
+//! The input of a calibration: named detections become views.
 //!
-//! Comes in: detections, and the target that was photographed. Goes out: a [`calibration::Calibration`], which has all that
-//! is known and all that is asked for.
+//! Input: detections and the photographed target. Output: a [`calibration::Calibration`] with everything that is known
+//! and everything that is requested.
 //!
-//! 1. `reference` is the target, several targets, or an untagged board (`grid`), and compares labels with it.
-//! 2. `views` reads all detections: sizes, copies of one picture, wrong labels and mirrored pictures.
-//! 3. `observation` is what a picture shows then: corners of panels (`panel`).
-//! 4. `calibration` holds cameras with their views and the settings, among them `loss` and `weights`.
+//! 1. `reference` describes one target, several targets, or an untagged board (`grid`), and checks labels against it.
+//! 2. `views` converts all detections and checks them for image sizes, duplicates, wrong labels and mirrored images.
+//! 3. `observation` holds the content of an image: corners of panels (`panel`).
+//! 4. `calibration` collects cameras with their views and the settings, among them `loss` and `weights`.
 //!
-//! `order` sorts names of frames by their numbers, `sample` takes some of many.
+//! `order` sorts the names of frames by their numbers, `sample` selects some of many items.
 
 pub(crate) mod calibration;
 pub(crate) mod grid;

@@ -1,11 +1,11 @@
-//! What pictures show: corners of a panel, panels of a picture.
+//! The content of images: corners of a panel, panels of an image.
 
 use glam::{DQuat, DVec2, DVec3};
 
 use super::panel::PanelRef;
 use crate::excluded::{Excluded, Reason};
 
-/// Corners that a panel needs in a view, so that a few wrong ones show.
+/// Least number of corners of a panel in a view; with fewer, wrong corners cannot be recognised.
 pub(crate) const LEAST_CORNERS: usize = 6;
 
 /// A corner of a panel that a camera detected.
@@ -19,25 +19,25 @@ pub struct Observation {
     pub panel_mm: DVec3,
     /// Detected position, px.
     pub pixel: DVec2,
-    /// Covariance xx, xy, yy of the detected position, px²; `None` where it is not known.
+    /// Covariance xx, xy, yy of the detected position, px²; `None` if it is not known.
     pub cov: Option<[f64; 3]>,
 }
 
-/// What one picture shows of one rigid target.
+/// The corners of one rigid target in one image.
 #[derive(Clone, Debug, PartialEq)]
 pub struct View {
-    /// Name of the view, such as that of the detection's file; views of several cameras with the same name belong to
+    /// Name of the view, for example that of the detection file; views of several cameras with the same name belong to
     /// one frame.
     pub name: String,
-    /// File name of the picture.
+    /// File name of the image.
     pub image: String,
-    /// Width and height of the picture, px.
+    /// Width and height of the image, px.
     pub size_px: [u32; 2],
-    /// The panels that were found.
+    /// The detected panels.
     pub sightings: Vec<Sighting>,
 }
 
-/// A panel in a picture.
+/// A panel in an image.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Sighting {
     /// The panel.
@@ -47,12 +47,12 @@ pub struct Sighting {
 }
 
 impl View {
-    /// How many corners it shows.
+    /// The number of its corners.
     pub fn corner_count(&self) -> usize {
         self.sightings.iter().map(|sighting| sighting.observations.len()).sum()
     }
 
-    /// The view as one that does not fit as a whole.
+    /// The record of the view as excluded.
     pub(crate) fn excluded(&self, reason: Reason) -> Excluded {
         Excluded {
             camera: None,
@@ -66,8 +66,8 @@ impl View {
 }
 
 impl Sighting {
-    /// Moves the corners to where a print has them that is stretched across and up its sheet;
-    /// the panel is turned by `angle_rad` on it.
+    /// Moves the corners to their positions on a print that is stretched across and up its sheet; the panel is rotated
+    /// by `angle_rad` on the sheet.
     pub fn stretch(&mut self, [across, up]: [f64; 2], angle_rad: f64) {
         let turn = DQuat::from_rotation_z(angle_rad);
         for seen in &mut self.observations {

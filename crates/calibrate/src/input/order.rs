@@ -1,15 +1,15 @@
-//! Names of frames in the order of the numbers in them.
+//! Sorting of frame names by the numbers in them.
 
 use std::collections::BTreeSet;
 
-/// Names with numbers in the order in which one counts: 2 before 10.
+/// Sorts names by their numbers: 2 before 10.
 pub(crate) fn in_order(names: BTreeSet<&str>) -> Vec<String> {
     let mut names: Vec<&str> = names.into_iter().collect();
     names.sort_by_cached_key(|name| parts(name));
     names.into_iter().map(str::to_owned).collect()
 }
 
-/// Text and numbers by turns, numbers as their length without zeros in front, and their digits.
+/// Splits a name into alternating texts and numbers; a number is its length without leading zeros, and its digits.
 fn parts(name: &str) -> Vec<(String, usize, String)> {
     let mut parts = Vec::new();
     let mut rest = name;
@@ -30,7 +30,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn frames_are_counted() {
+    fn numbers_sort_by_value() {
         let names = ["a10", "a9", "a100", "b1", "a010x"];
         let order = in_order(names.into_iter().collect());
         assert_eq!(order, ["a9", "a10", "a010x", "a100", "b1"]);

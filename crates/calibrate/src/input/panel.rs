@@ -1,4 +1,4 @@
-//! Panels of a target: which one, and where it is.
+//! Panels of a target: their identity and pose.
 
 use std::fmt;
 
@@ -7,10 +7,10 @@ use serde::{Serialize, Serializer};
 use deltille_core::camera::Pose;
 use deltille_core::targets::PanelPose;
 
-/// One of the panels of what was photographed.
+/// A reference to one of the photographed panels.
 ///
-/// It has a place among them, by which everything that is kept for each is found, and an id, which stands
-/// in the target's file and on the print. Only the id is shown and written, and only the place finds anything.
+/// The index finds everything that is stored per panel; the id stands in the target file and on the print. Only the id
+/// is shown and written, and only the index is used for lookup.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct PanelRef {
     index: usize,
@@ -18,15 +18,15 @@ pub struct PanelRef {
 }
 
 impl PanelRef {
-    /// The only panel of an untagged board that no file describes.
+    /// The only panel of an untagged board without a description file.
     pub const ONLY: Self = Self { index: 0, id: 0 };
 
-    /// The panel with this place and this id.
+    /// Creates the reference to the panel of this index and id.
     pub fn new(index: usize, id: u32) -> Self {
         Self { index, id }
     }
 
-    /// Its place among the panels of the target.
+    /// Its index among the panels of the target.
     pub fn index(self) -> usize {
         self.index
     }
@@ -54,8 +54,8 @@ impl Serialize for PanelRef {
 pub struct PanelPlace {
     /// The pose, from the panel frame to the target frame, mm.
     pub target_from_panel: Pose,
-    /// Covariance of a turn (rad) and a move (mm) along the target's axes, where it was measured;
-    /// `None` where it is as stated.
+    /// Covariance of rotation (rad) and translation (mm) along the axes of the target, if the pose was measured; `None`
+    /// if it is as stated.
     pub covariance: Option<[[f64; 6]; 6]>,
 }
 

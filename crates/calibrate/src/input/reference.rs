@@ -43,7 +43,7 @@ pub enum Reference<'a> {
 }
 
 impl Reference<'_> {
-    /// Where its panels are on it.
+    /// The poses of the panels on the target.
     pub fn panels(&self) -> Vec<PanelPlace> {
         match self {
             Self::Grid(_) => vec![Pose::IDENTITY.into()],
@@ -54,7 +54,7 @@ impl Reference<'_> {
         }
     }
 
-    /// The rotations of each panel's labels that no picture shows, see [`Panel::label_symmetries`].
+    /// The rotations of each panel's labels that look the same in an image, see [`Panel::label_symmetries`].
     pub fn label_symmetries(&self) -> Vec<Vec<LatticeMap>> {
         match self {
             Self::Grid(grid) => vec![grid.label_symmetries()],
@@ -65,8 +65,8 @@ impl Reference<'_> {
         }
     }
 
-    /// What a half turn or another rotation that no picture shows leaves open, as a sentence without capital and full
-    /// stop; `None` where labels are known.
+    /// The ambiguity left by a rotation that looks the same in an image, as a sentence without initial capital and full
+    /// stop; `None` if the labels are unambiguous.
     pub fn label_ambiguity(&self) -> Option<String> {
         let maps = self.label_symmetries();
         let of_most = maps.iter().max_by_key(|maps| maps.len()).filter(|maps| !maps.is_empty())?;
@@ -78,7 +78,7 @@ impl Reference<'_> {
         ))
     }
 
-    /// What its file describes, or their files; none of an untagged board.
+    /// The described targets; empty for an untagged board without a description.
     pub fn targets(&self) -> &[Target] {
         match *self {
             Self::Grid(_) => &[],
@@ -87,7 +87,7 @@ impl Reference<'_> {
         }
     }
 
-    /// Identities of the targets; of an untagged board that of the target it makes, where its size is known.
+    /// Identities of the targets; for an untagged board of known size, the identity of the equivalent target.
     pub fn identities(&self) -> Vec<TargetIdentity> {
         match self {
             Self::Grid(grid) => {
@@ -100,7 +100,7 @@ impl Reference<'_> {
         }
     }
 
-    /// The panel with an id, which is 0 on an untagged board, of the target of a name where there are several.
+    /// Finds a panel by its id (0 on an untagged board) and, if there are several targets, the name of its target.
     pub fn panel(&self, target: Option<&str>, id: u32) -> Option<PanelRef> {
         if let Self::Grid(_) = self {
             return (id == PanelRef::ONLY.id()).then_some(PanelRef::ONLY);
@@ -117,8 +117,8 @@ impl Reference<'_> {
         None
     }
 
-    /// Whether the labels of a view are those of the target: tags tell them, or that the board is seen
-    /// whole.
+    /// Whether the labels of a view are certainly those of the target: because of its tags, or because the whole board
+    /// is visible.
     pub fn is_sure_of(&self, view: &View) -> bool {
         if let Self::Grid(grid) = self {
             let whole = grid.size.map(|[rows, cols]| rows as usize * cols as usize);
@@ -137,8 +137,9 @@ impl Reference<'_> {
         })
     }
 
-    /// Whether it is known but for a [symmetry](Self::label_symmetries) which corner of a board is which: always of
-    /// targets; of an untagged board whose rows and columns are given, where the view reaches from its first to its last.
+    /// Whether the labels of a view identify the corners of the board, except for a [symmetry](Self::label_symmetries).
+    /// This always holds for targets. For an untagged board it holds if rows and columns are given and the view reaches
+    /// from the first to the last of them.
     pub fn labels_are_of_board(&self, view: &View) -> bool {
         let Self::Grid(grid) = self else { return true };
         view.sightings.iter().all(|sighting| {
@@ -147,7 +148,7 @@ impl Reference<'_> {
         })
     }
 
-    /// Whether its panels are boards that lie about, each for itself.
+    /// Whether its panels are boards that are not fixed to each other.
     pub fn is_loose(&self) -> bool {
         self.targets().iter().any(|target| target.is_loose())
     }
@@ -160,7 +161,7 @@ impl Reference<'_> {
         }
     }
 
-    /// What a detection shows of the panels, or the panel that is wrong in it and why; `identities` are those of the targets.
+    /// Returns the panels in a detection; or the wrong panel, and the reason. `identities` are those of the targets.
     pub(super) fn sightings(
         &self,
         detection: &Detection,
@@ -198,10 +199,10 @@ impl Reference<'_> {
 }
 
 impl Reference<'_> {
-    /// Compares the labels of a grid of a detection with what is on the target: its identity, panel, corners and tags.
+    /// Checks the labels of a detected grid against the target: identity, panel, corners and tags.
     ///
     /// # Errors
-    /// A sentence that says what is not on it.
+    /// Returns a sentence that names the label that is not on the target.
     pub fn check_labels(&self, detection: &Detection, grid: &Grid) -> Result<(), String> {
         let identities = self.identities();
         match self.target_of(grid, detection.target_of(grid), &identities)? {
@@ -210,8 +211,8 @@ impl Reference<'_> {
         }
     }
 
-    /// Index of the target that a grid belongs to: by the identity of the target that it was labelled with, where the
-    /// detection has that, else by its name. `None` where it is none of these targets.
+    /// Returns the index of the target that a grid belongs to. The identity of the target that was used for labelling
+    /// decides if the detection has it, otherwise the name. `None` if the grid belongs to none of these targets.
     fn target_of(
         &self,
         grid: &Grid,

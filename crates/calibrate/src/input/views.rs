@@ -1,4 +1,4 @@
-//! From named detections to views: sizes, copies of one picture, wrong labels and mirrored pictures.
+//! Conversion of named detections to views, with checks for image sizes, duplicates, wrong labels and mirrored images.
 
 use std::collections::hash_map::Entry;
 use std::collections::{BTreeMap, HashMap};
@@ -12,29 +12,28 @@ use crate::excluded::{Excluded, Reason};
 use deltille_core::detection::Detection;
 use deltille_core::targets::TargetIdentity;
 
-/// Corners of a mirrored picture turn the wrong way round, but for wrong ones: by so much, at least, of all of
-/// them more do than do not.
+/// Least excess of reversed over correctly oriented corners in a mirrored image, as a fraction of all corners. Only
+/// wrong corners are not reversed there.
 const MIRRORED_MOST: f64 = 0.5;
 
-/// And by so many deviations: places anywhere turn either way, of a few all may turn the wrong one. By chance
-/// as many do once in a thousand pictures that show nothing else.
+/// Least excess in standard deviations. Misplaced corners have either orientation, and all of a few may be reversed by
+/// chance. By chance, one in a thousand images of misplaced corners only reaches this value.
 const MIRRORED_SURE: f64 = 3.09;
 
 /// The views of detections.
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct Shown {
-    /// One for each picture, or for each board in it where several lie about.
+    /// One view for each image, or for each loose board in it.
     pub views: Vec<View>,
-    /// Positions of the detections that show nothing.
+    /// Indices of the empty detections.
     pub empty: Vec<usize>,
-    /// Positions of the detections that do not belong to the target, or are of the same picture as another, and what is
-    /// wrong with them.
+    /// Indices of the detections that are not of the target or duplicate another image, with the reason.
     pub left_out: Vec<(usize, Excluded)>,
 }
 
-/// A detection and the name of its view: that of its image, or another one. Views of several cameras that were seen at the
-/// same moment have the same name.
+/// A detection and the name of its view: that of its image, or another. Views of several cameras taken at the same time
+/// have the same name.
 #[derive(Clone, Copy, Debug)]
 pub struct Named<'a> {
     name: &'a str,
@@ -53,7 +52,7 @@ impl<'a> From<&'a (String, Detection)> for Named<'a> {
     }
 }
 
-/// The views of all detections; an error where most of those that show something do not belong to the target.
+/// Converts all detections to views. Fails if most of those that are not empty are not of the target.
 ///
 /// ```
 /// use deltille_calibrate::{Reference, views};
@@ -75,7 +74,7 @@ impl<'a> From<&'a (String, Detection)> for Named<'a> {
 /// ```
 ///
 /// # Errors
-/// Where pictures have different sizes, or most that show something are not of the target.
+/// Returns an error if image sizes differ, or if most detections that are not empty are not of the target.
 pub fn views<'a, N: Into<Named<'a>>>(
     detections: impl IntoIterator<Item = N>,
     reference: &Reference,
@@ -84,7 +83,7 @@ pub fn views<'a, N: Into<Named<'a>>>(
     views_of(&named, reference)
 }
 
-/// [`views`], compiled here and not in every crate that uses it.
+/// The body of [`views`], compiled in this crate only.
 fn views_of(detections: &[Named], reference: &Reference) -> Result<Shown, CalibrationError> {
     let mut views = Vec::new();
     let mut empty = Vec::new();
@@ -151,7 +150,7 @@ fn views_of(detections: &[Named], reference: &Reference) -> Result<Shown, Calibr
     }
 }
 
-/// The name of the detection before, if any, that has the same corners to the last bit: of the same picture.
+/// The name of an earlier detection with bitwise equal corners, that is, of the same image.
 fn copied<'a>(
     detection: &'a Detection,
     name: &'a str,
@@ -170,7 +169,7 @@ fn copied<'a>(
     }
 }
 
-/// What a detection shows of the panels, or the panel that is wrong in it and why.
+/// Returns the panels in a detection; or the wrong panel, and the reason.
 fn sightings(
     detection: &Detection,
     reference: &Reference,
@@ -185,16 +184,16 @@ fn sightings(
     }
 }
 
-/// Whether the corners with two neighbours are mirrored, nearly all of the picture: of one in which two fifths
-/// of the corners are anywhere two fifths of these are mirrored too, and a panel of a few may be by chance.
+/// Whether nearly all corners with two neighbours are mirrored. In an image with two fifths of its corners misplaced,
+/// two fifths of these appear mirrored too, and a panel of a few corners may appear mirrored by chance.
 fn is_mirrored(sightings: &[Sighting]) -> bool {
     let turns: Vec<f64> = sightings.iter().flat_map(turns).collect();
     let (count, more) = (turns.len() as f64, turns.iter().sum::<f64>());
     more > MIRRORED_MOST * count && more > MIRRORED_SURE * count.sqrt()
 }
 
-/// Which way corners turn to their neighbours in column and row: 1 where they are mirrored. In a picture, y
-/// down, rows and columns that run as on the print turn clockwise.
+/// Orientation of each corner and its neighbours in column and row: 1 if they are mirrored. In an image (y down), rows
+/// and columns as on the print are oriented clockwise.
 fn turns(sighting: &Sighting) -> Vec<f64> {
     let places: BTreeMap<(i32, i32), DVec2> =
         sighting.observations.iter().map(|o| ((o.row, o.col), o.pixel)).collect();
@@ -214,7 +213,7 @@ mod tests {
     use crate::input::panel::PanelRef;
     use glam::DVec3;
 
-    /// A board of `rows` × 8 corners from above, of which a part are anywhere in the picture.
+    /// A board of `rows` × 8 corners seen from above, with a fraction of the corners at random positions.
     fn board(rows: i32, part_anywhere: f64, is_flipped: bool, seed: u64) -> Sighting {
         let mut random = rand_chacha::ChaCha8Rng::seed_from_u64(seed);
         let places = (0..rows).flat_map(|row| (0..8).map(move |col| (row, col)));
@@ -234,16 +233,16 @@ mod tests {
     }
 
     #[test]
-    fn a_mirror_is_told_from_wrong_places() {
+    fn mirrored_labels_differ_from_misplaced_corners() {
         for seed in 0..100 {
             assert!(!is_mirrored(&[board(6, 0.4, false, seed)]), "seed {seed}");
             assert!(is_mirrored(&[board(6, 0.05, true, seed)]), "seed {seed}");
         }
     }
 
-    /// A panel of a few corners, of which most are wrong, beside one that is not mirrored, and by itself.
+    /// A panel of a few corners, most of them wrong, beside a panel that is not mirrored, and on its own.
     #[test]
-    fn a_few_wrong_corners_are_no_mirror() {
+    fn a_few_wrong_corners_do_not_count_as_mirrored() {
         for seed in 0..100 {
             let few = board(2, 0.8, false, seed);
             assert!(!is_mirrored(&[few.clone(), board(6, 0.2, false, seed)]), "seed {seed}");

@@ -1,14 +1,14 @@
-//! What is known beforehand of how precise corners are.
+//! Weights of corners.
 
-/// What is known of the corners' precision.
+/// The weights of corners in the adjustment.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Weights {
-    /// All corners alike.
+    /// All corners have the same weight.
     Equal,
-    /// By their covariances, and a common deviation beside them: a covariance tells what the noise
-    /// of the image does, not what the print, the paper and the lens do, which is the same for all.
-    /// The common deviation is found from the residuals. Without covariances all corners are alike.
+    /// Weights from the covariance of each corner plus a common variance. The covariance describes the noise of the
+    /// image; the common variance, estimated from the residuals, describes errors of print, paper and lens, which are
+    /// the same for all corners. Without covariances all corners have the same weight.
     #[default]
     Covariance,
 }

@@ -1,4 +1,4 @@
-//! A target as it is held into a picture: its corners, its outline, and which of it a detector finds.
+//! The geometry of a target in a proposed view: its corners, its outline, and the corners that a detector finds.
 
 use glam::{DMat3, DVec2, DVec3};
 
@@ -7,32 +7,32 @@ use deltille_core::camera::{Camera, Pose, Projection};
 use deltille_core::polygon::hull;
 use deltille_core::targets::{Panel, Target};
 
-/// Corners by which a panel is judged: more tell the same more slowly. Of several panels, of which a picture shows
-/// some, each has fewer.
+/// Number of corners used to judge a panel of a board or of a solid: more corners add time but no information. A solid
+/// shows several panels, so each has fewer.
 const SAMPLED: [usize; 2] = [40, 14];
 
-/// Of how far a board reaches from its middle, the length of the arrow that tells its upper side.
+/// Length of the arrow towards the upper side, as a fraction of the reach of the board.
 const UPWARDS: f64 = 0.4;
 
-/// Steps along a side of an outline, so that it bends with the lens.
+/// Number of points along a side of an outline, which bends with the lens.
 const STEPS: usize = 18;
 
-/// Of these, every so many are enough to tell how large it is.
+/// Stride over these points that suffices for the size of an outline.
 pub(super) const COARSE: usize = 3;
 
-/// What the detector needs of an edge in its most foreshortened direction, px: tags are read from 12 px on,
-/// untagged grids found from 7 px on (`docs/choosing.md`), and a hand is a quarter farther away than it should be.
+/// Least edge length in the most foreshortened direction, px: tags are read from 12 px on, untagged grids are found
+/// from 7 px on (`docs/choosing.md`), and a person holds the board up to a quarter too far away.
 const TAGGED_EDGE_PX: f64 = 15.0;
 const PLAIN_EDGE_PX: f64 = 8.75;
 
-/// Corners are found up to 75° of tilt; here the limit leaves a hand room to be wrong by 12°.
+/// Cosine of the largest tilt. Corners are found up to 75°; the limit leaves a margin of 12° for a person.
 const MOST_TILT_COS: f64 = 0.454;
 
-/// A corner is located where the detector's window around it is in the picture, px.
+/// Margin that the window of the detector needs around a corner, px.
 const MARGIN_PX: f64 = 8.0;
 
-/// A board that is cut off by the picture is labelled where some tags are whole, and tells enough of its pose with
-/// this part of its corners.
+/// Least fraction of the corners inside the image: a board that is cut off is labelled if some tags are whole, and this
+/// fraction determines its pose well enough.
 const LEAST_PART: f64 = 0.5;
 
 /// A panel of a target.
@@ -42,13 +42,13 @@ pub(super) struct BodyPanel {
     /// The direction of its front in the target frame.
     normal: DVec3,
     pub corners: Vec<BodyCorner>,
-    /// Indices of the corners by which it is judged.
+    /// Indices of the corners used for judging.
     sampled: Vec<usize>,
-    /// Indices of the corners around which all others lie.
+    /// Indices of the outermost corners, which enclose all others.
     rim: Vec<usize>,
     edge_mm: f64,
     has_tags: bool,
-    /// Around its tiles, in the target frame, mm.
+    /// Outline of its tiles in the target frame, mm.
     outline: Vec<DVec3>,
 }
 
@@ -57,36 +57,36 @@ pub(super) struct BodyPanel {
 pub(super) struct BodyCorner {
     pub row: i32,
     pub col: i32,
-    /// In the panel frame as it is planned, mm.
+    /// Planned position in the panel frame, mm.
     pub panel_mm: DVec3,
-    /// In the target frame, as it was measured or else planned, mm.
+    /// Measured or else planned position in the target frame, mm.
     pub target_mm: DVec3,
 }
 
-/// A target, and where its front is.
+/// A target and its front.
 #[derive(Clone, Debug)]
 pub(super) struct Body {
     pub panels: Vec<BodyPanel>,
-    /// Target_from_front: the origin is the middle of the first panel, x to its right, y up, z out of it.
+    /// The pose `target_from_front`: origin at the centre of the first panel, x to its right, y up, z out of it.
     pub front: Pose,
-    /// Turns a vector of the panel frame to the target frame, of each panel.
+    /// Rotation from the panel frame to the target frame, for each panel.
     pub turns: Vec<DMat3>,
 }
 
-/// A corner that a camera sees, and for how many it stands.
+/// A corner that a camera sees, with the number of corners it represents.
 pub(super) struct Seen {
     /// Index of its panel in the body.
     pub panel: usize,
     /// Index of the corner.
     pub corner: usize,
-    /// In the camera frame, mm.
+    /// Position in the camera frame, mm.
     pub point: DVec3,
     pub at: Projection,
     pub weight: f64,
 }
 
 impl Body {
-    /// `None` where the target has no corners. Of boards that lie about only the first is taken.
+    /// Creates the body; `None` if the target has no corners. Of several loose boards only the first is used.
     pub(super) fn new(target: &Target) -> Option<Self> {
         let count = if target.spec.is_rigid() { target.panels.len() } else { 1 };
         let panels = target.panels.iter().enumerate().filter(|(_, of)| !of.corners.is_empty());
@@ -101,8 +101,8 @@ impl Body {
         Some(Self { panels: panels.collect(), front, turns })
     }
 
-    /// The corners that a detector finds where the target is at a pose: all, or those by which it is judged. `None`
-    /// where it finds none, or too few of them for a view.
+    /// The corners that a detector finds with the target at a pose: all, or those used for judging. `None` if it finds
+    /// none, or too few for a view.
     pub(super) fn seen(&self, camera: &Camera, pose: &Pose, all: bool) -> Option<Vec<Seen>> {
         let mut seen = Vec::new();
         for (index, panel) in self.panels.iter().enumerate() {
@@ -111,8 +111,7 @@ impl Body {
         (!seen.is_empty()).then_some(seen)
     }
 
-    /// Outlines of the panels that are seen from the front, by every so many of their points, px, as far as the lens shows
-    /// them.
+    /// Outlines of the panels seen from the front, with every `every`-th point, px, as far as the lens images them.
     pub(super) fn outlines(&self, camera: &Camera, pose: &Pose, every: usize) -> Vec<Vec<DVec2>> {
         let panels = self.panels.iter().filter(|panel| panel.is_towards(pose));
         let outlines = panels.map(|panel| {
@@ -122,7 +121,7 @@ impl Body {
         outlines.filter(|outline| outline.len() > 2).collect()
     }
 
-    /// From its middle a part of the way to its upper side, px.
+    /// Arrow from its centre towards its upper side, px.
     pub(super) fn upwards(&self, camera: &Camera, pose: &Pose) -> Option<[DVec2; 2]> {
         let upper = self.front.rotation * DVec3::Y * (UPWARDS * self.reach_mm());
         let place = |target_mm: DVec3| camera.project(pose.apply(target_mm));
@@ -147,7 +146,7 @@ impl BodyPanel {
         let rim = (0..corners.len()).filter(|&index| is_rim(&corners[index])).collect();
         let mut step = corners.len().div_ceil(most).max(1);
         let across = panel.matrix[0] as usize;
-        // Otherwise only some columns were taken.
+        // Otherwise only some columns would be sampled.
         while step > 1 && across.is_multiple_of(step) {
             step += 1;
         }
@@ -171,7 +170,7 @@ impl BodyPanel {
         }
     }
 
-    /// Whether its front is towards the camera, in its middle.
+    /// Whether the centre of its front faces the camera.
     fn is_towards(&self, pose: &Pose) -> bool {
         let middle = self.corners.iter().map(|corner| corner.target_mm).sum::<DVec3>();
         let middle = pose.apply(middle / self.corners.len() as f64);
@@ -205,7 +204,7 @@ impl BodyPanel {
             let is_found = is_inside && self.edge_mm * narrowest(&at, &turn) >= least_px;
             is_found.then_some(Seen { panel: index, corner, point, at, weight })
         };
-        // Without tags rows and columns are known where the board is seen whole.
+        // Without tags, rows and columns are known only if the whole board is visible.
         if !self.has_tags && !self.rim.iter().all(|&corner| find(corner).is_some()) {
             return;
         }
@@ -218,7 +217,7 @@ impl BodyPanel {
     }
 }
 
-/// How many px a millimetre of a plane has at least, in its most foreshortened direction.
+/// Scale of a plane in its most foreshortened direction, px/mm.
 fn narrowest(at: &Projection, turn: &DMat3) -> f64 {
     let rows = at.by_point.map(DVec3::from);
     let [a, b] = rows.map(|row| row.dot(turn.x_axis));

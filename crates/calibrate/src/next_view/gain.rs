@@ -1,5 +1,5 @@
-//! What a view would tell: its part of the normal equations with its own pose eliminated, and how sure projections
-//! are with it.
+//! The information of a proposed view: its normal equations with its own pose eliminated, and the projection
+//! uncertainty with it.
 //!
 //! ```text
 //!     view:  Σ Jᵀ J / σ²  of (θ, ξ)  =  ⎡ S  Bᵀ ⎤       tells of θ:  S − Bᵀ A⁻¹ B
@@ -9,8 +9,9 @@
 //!     mean variance of a coordinate = tr(M V) / 2,   M = mean of (J_θ + J_ξ K)ᵀ (J_θ + J_ξ K) over the image
 //! ```
 //!
-//! θ are parameters of the camera, and of the board's shape where that is found too; ξ is a turn and a move of what
-//! the camera sees, by which a pose and the alignment of [`uncertainty`](crate::uncertainty::projection) are the same.
+//! θ are the parameters of the camera, and of the board's shape if that is estimated too; ξ is a rotation and
+//! translation of the scene, the same for a pose and for the alignment of
+//! [`uncertainty`](crate::uncertainty::projection).
 
 use glam::{DMat3, DVec2};
 use nalgebra::{DMatrix, DVector, Matrix3, Matrix6, SMatrix};
@@ -24,21 +25,22 @@ use crate::uncertainty::known_so_far::KnownSoFar;
 use crate::uncertainty::projection::{by_motion, by_parameters, seen_at, solved};
 use deltille_core::camera::{Camera, PROJECTION_PARAMETERS};
 
-/// Places along the longer side of the image by which projections are judged.
+/// Number of positions along the longer side of the image at which projections are judged.
 const PLACES: usize = 16;
 
-/// A parameter that alone moves projections by more than this part of the image's longer side, rms, makes another lens.
-/// It is what is expected before corners are seen, and keeps what they leave open finite.
+/// Prior standard deviation of each parameter: it shifts projections by this fraction of the longer image side, RMS.
+/// The prior keeps parameters finite that the corners do not determine.
 const EXPECTED_PART: f64 = 0.05;
 
-/// The same of a sheet's shape, parts of its reach: what is bent more nobody calls a board.
+/// Prior standard deviation of the shape of a sheet, as a fraction of its reach: nobody calls anything more bent a
+/// board.
 const EXPECTED_BEND: f64 = 0.02;
 
-/// What is known of a camera from views, and how views are judged by it.
+/// The information on a camera from the views so far, and the projection uncertainty with another view.
 pub(super) struct Gain {
-    /// The lens as it is believed to be, also where no corner was.
+    /// The most likely camera, also where no corner was seen.
     pub camera: Camera,
-    /// Indices of the parameters that are found.
+    /// Indices of the estimated parameters.
     free: Vec<usize>,
     shape: Option<Shape>,
     /// Information on the unknowns so far.
@@ -46,7 +48,7 @@ pub(super) struct Gain {
     /// Sums of the corners so far, for the alignment.
     sums: Sums,
     field: Field,
-    /// Variance that a coordinate of a corner is expected to have, px².
+    /// Expected variance of a corner per axis, px².
     variance: f64,
 }
 
@@ -60,7 +62,7 @@ struct Sums {
     motion: Matrix6<f64>,
 }
 
-/// Means over the places of an image, at infinity.
+/// Means over the positions in an image, at infinity.
 struct Field {
     own: DMatrix<f64>,
     turns_across: DMatrix<f64>,
@@ -68,7 +70,7 @@ struct Field {
 }
 
 impl Gain {
-    /// Of what an estimate found of its only camera; `None` where it does not say.
+    /// From the estimate of a single camera; `None` if it lacks the information.
     pub(super) fn of(estimate: &Estimate, body: &Body) -> Option<Self> {
         let [found] = estimate.cameras.as_slice() else { return None };
         let known = estimate.known.as_ref()?;
@@ -94,7 +96,7 @@ impl Gain {
         Some(gain)
     }
 
-    /// The corners that took part.
+    /// Sums over the used corners.
     fn seen_so_far(&self, found: &CameraEstimate, body: &Body) -> Sums {
         let mut sums = self.sums.clone();
         let mut row = DMatrix::zeros(2, self.unknowns());
@@ -119,12 +121,12 @@ impl Gain {
         self.known.nrows()
     }
 
-    /// How sure projections are at infinity, over the image, px: the root mean square of a coordinate.
+    /// The projection uncertainty at infinity over the image, px: RMS per axis.
     pub(super) fn now_px(&self) -> Option<f64> {
         self.px(&self.known, &self.sums)
     }
 
-    /// The same with one more view, in which these corners are seen; `None` where they do not tell its pose.
+    /// The same with one more view of these corners; `None` if they do not determine its pose.
     pub(super) fn with_px(&self, body: &Body, seen: &[Seen], turn: &DMat3) -> Option<f64> {
         let count = self.free.len();
         let mut sums = Sums::zeros(self.unknowns());
@@ -226,7 +228,7 @@ impl Field {
     }
 }
 
-/// Places over an image, px.
+/// Grid of positions over an image, px.
 fn places(camera: &Camera) -> impl Iterator<Item = DVec2> + use<> {
     let size = DVec2::new(camera.width.into(), camera.height.into());
     let parts = (size * PLACES as f64 / size.max_element()).round().max(DVec2::ONE);
@@ -237,9 +239,9 @@ fn places(camera: &Camera) -> impl Iterator<Item = DVec2> + use<> {
     })
 }
 
-/// The camera that is most likely with what is expected of a lens beforehand, and the deviation that is expected of
-/// each parameter. Where no corner was, a polynomial runs anywhere; so what views leave open goes back to where
-/// the model starts, and what they determine stays.
+/// The most likely camera under the prior of a lens, and the prior standard deviation of each parameter. A polynomial
+/// is unconstrained where no corner was; the prior returns undetermined directions to the start of the model and leaves
+/// determined ones unchanged.
 fn believed(
     camera: &Camera,
     start: Option<deltille_core::camera::Lens>,

@@ -1,4 +1,4 @@
-//! Which view of a target to take next: the one after which projections are known best.
+//! The next view of a target: the one that reduces the projection uncertainty most.
 //!
 //! ```text
 //!   no camera yet ─→ a first set: facing, then tilted to three sides
@@ -7,8 +7,8 @@
 //!                                              └→ projection uncertainty over the image with it
 //! ```
 //!
-//! Nothing here opens a file or asks a clock: estimates go in, and a pose with its outline, figures and a sentence
-//! comes out. Whether somebody holds the board there is told by [`Holding`](super::holding::Holding).
+//! This module opens no file and reads no clock: it takes estimates and returns a pose with its outline, figures and a
+//! sentence. [`Holding`](super::holding::Holding) detects when a person holds the board there.
 
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
@@ -27,43 +27,42 @@ use crate::input::reference::Reference;
 use deltille_core::camera::{Camera, Lens, Pose};
 use deltille_core::targets::Target;
 
-/// Horizontal fields of view that are assumed before anything is known: of a webcam or telephone, and of a lens
-/// whose model is that of a fisheye, rad.
+/// Horizontal fields of view assumed before the first estimate, rad: of a webcam or telephone, and of a fisheye model.
 const ASSUMED_RAD: f64 = 1.15;
 const ASSUMED_FISHEYE_RAD: f64 = 2.0;
 
-/// Where the middle of the board may be, parts of the image's sides.
+/// Candidate positions of the board's centre, as fractions of the image sides.
 const AT: [f64; 5] = [0.14, 0.32, 0.5, 0.68, 0.86];
 
-/// Parts of the image that a board fills along the side that it fills more.
+/// Candidate sizes of the board: fractions of the image along the side that it fills more.
 const FILLS: [f64; 3] = [0.4, 0.65, 0.95];
 
-/// Tilts, rad: 30° and 50°, of which the last is as far as a hand still gets right.
+/// Candidate tilts, rad: 30° and 50°, the largest that a person holds accurately.
 const TILTS: [f64; 2] = [0.52, 0.87];
 
-/// Unless said otherwise no board is held nearer than this many times its reach, half of a board's diagonal: nearer
-/// the camera shades it, and few lenses are in focus.
+/// Default nearest distance, in multiples of the reach of the board (half of its diagonal): nearer boards are shaded by
+/// the camera, and few lenses are in focus there.
 const NEAREST: f64 = 1.0;
 
-/// Directions of a tilt.
+/// Number of directions of a tilt.
 const DIRECTIONS: usize = 8;
 
-/// Candidates from which the search goes on, and what each first step is: in parts of the image, of the logarithm
+/// Number of candidates that are refined, and the first step in each coordinate: fractions of the image, the logarithm
 /// of the distance, and rad.
 const KEPT: usize = 4;
 const STEP: [f64; 6] = [0.08, 0.08, 0.18, 0.15, 0.3, 0.4];
 
-/// Times that steps are halved.
+/// Number of times that steps are halved.
 const HALVINGS: usize = 2;
 
-/// Tilts beyond this are neither held nor found well, rad (55°).
+/// Largest tilt, rad (55°): beyond it boards are neither held nor detected well.
 const MOST_TILT: f64 = 0.96;
 
-/// A view that would lower the uncertainty by less than this part is hardly worth the trouble: of pictures that
-/// are all as good the fifteenth does.
+/// Least reduction of the uncertainty that is worth another view, as a fraction: the fifteenth of equally good images
+/// achieves it.
 const LEAST_GAIN: f64 = 0.03;
 
-/// Proposes views of one camera, one after the other.
+/// Proposes views for the calibration of one camera, one after the other.
 ///
 /// ```
 /// use deltille_calibrate::{Guide, Model};
@@ -80,47 +79,46 @@ const LEAST_GAIN: f64 = 0.03;
 pub struct Guide {
     body: Body,
     intrinsics: Intrinsics,
-    /// The camera as it is assumed to be before there is an estimate.
+    /// The camera assumed before there is an estimate.
     assumed: Camera,
     distances_mm: [f64; 2],
     refused: Vec<Placing>,
 }
 
-/// A view that is proposed.
+/// A proposed view.
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct NextView {
     /// The pose of the target: from the target frame to the camera frame, mm.
     pub camera_from_target: Pose,
-    /// The camera by which it is drawn: as it is known so far, or assumed.
+    /// The camera used for drawing it: the estimate so far, or an assumed camera.
     pub camera: Camera,
-    /// Outlines of the panels that are seen from the front, px: polygons without their first point again, which may
-    /// reach beyond the image. Of a board it is one.
+    /// Outlines of the panels seen from the front, px: polygons without repeated first point, which may reach beyond
+    /// the image. A board has one.
     pub outlines: Vec<Vec<DVec2>>,
-    /// From the middle of the board towards its upper side, px: the way its labels stand. `None` where the lens does not
-    /// see there.
+    /// Arrow from the centre of the board towards its upper side (as its labels read), px. `None` if the lens does not
+    /// image it.
     pub upwards: Option<[DVec2; 2]>,
     /// The corners that are expected to be found.
     pub corners: Vec<ProposedCorner>,
-    /// Where the middle of the board is, in parts of the image from its upper left corner.
+    /// Position of the board's centre, in fractions of the image from its upper left corner.
     pub at: DVec2,
-    /// How far the middle of the board is from the camera, mm.
+    /// Distance of the board's centre from the camera, mm.
     pub distance_mm: f64,
     /// The angle between the board's normal and the line of sight, rad.
     pub tilt_rad: f64,
-    /// The direction in the image towards which the tilted board is farther away, rad from right towards below.
+    /// Direction in the image in which the tilted board recedes, rad, clockwise from right.
     pub away_rad: f64,
-    /// By how much the board is turned in its plane, rad, counterclockwise as seen; 0 where its rows are level.
+    /// Rotation of the board in its plane, rad, counterclockwise as seen; 0 if its rows are level.
     pub roll_rad: f64,
-    /// How sure projections at infinity are so far, px: the root mean square over the whole image of the deviation
-    /// of a coordinate, as [`ProjectionUncertainty`](crate::ProjectionUncertainty) has it from noise. `None` before
-    /// there is an estimate.
+    /// Projection uncertainty at infinity so far, px: the RMS over the whole image of the standard deviation per axis
+    /// from noise, see [`ProjectionUncertainty`](crate::ProjectionUncertainty). `None` before there is an estimate.
     pub now_px: Option<f64>,
-    /// How sure they are expected to be with this view. `None` before there is an estimate.
+    /// Projection uncertainty expected with this view, px. `None` before there is an estimate.
     pub expected_px: Option<f64>,
 }
 
-/// A corner where it is expected.
+/// A corner at its expected position.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ProposedCorner {
     /// The panel that it lies on.
@@ -133,22 +131,22 @@ pub struct ProposedCorner {
     pub pixel: DVec2,
 }
 
-/// What views are worth so far, and which one to take next.
+/// The estimate from the views so far, and the next view.
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct Guided {
-    /// What the views say of the camera, or why they do not say it yet.
+    /// The estimate from the views, or the reason why there is none yet.
     pub estimate: Result<Estimate, CalibrationError>,
     /// The next view.
     pub next: NextView,
 }
 
 impl Guide {
-    /// A guide to views of a target by a camera of which nothing is known but its model, or which is known nearly.
-    /// A camera that is known is calibrated anew with all parameters that it has.
+    /// Creates a guide for views of a target by a camera with a given model, or one that is known approximately. A
+    /// known camera is recalibrated with all its parameters.
     ///
-    /// `None` where there is nothing to propose: a target without corners, an image without pixels, or a spline,
-    /// whose knots need corners everywhere; take its pictures by another model.
+    /// `None` if there is nothing to propose: a target without corners, an image without pixels, or a spline, whose
+    /// knots need corners everywhere. Take the images for a spline with another model.
     pub fn new(
         target: &Target,
         [width, height]: [u32; 2],
@@ -188,8 +186,8 @@ impl Guide {
         })
     }
 
-    /// With the nearest and the farthest distance, mm, at which boards can be held and are in focus; unless said
-    /// otherwise from half of the board's diagonal on, and as far as corners are found.
+    /// Sets the nearest and the farthest distance, mm, at which boards can be held and are in focus. The defaults are
+    /// half of the board's diagonal, and the distance up to which corners are found.
     #[must_use]
     pub fn within_mm(self, nearest: Option<f64>, farthest: Option<f64>) -> Self {
         let [near, far] = self.distances_mm;
@@ -197,7 +195,7 @@ impl Guide {
         Self { distances_mm, ..self }
     }
 
-    /// Without views like these, which cannot be taken: a wall is in the way, or an arm too short.
+    /// Avoids views similar to these, which cannot be taken: a wall is in the way, or an arm too short.
     #[must_use]
     pub fn avoiding<'a>(self, refused: impl IntoIterator<Item = &'a NextView>) -> Self {
         let placings = refused.into_iter().map(|view| Placing {
@@ -210,13 +208,13 @@ impl Guide {
         Self { refused: placings.collect(), ..self }
     }
 
-    /// Width and height of the pictures, px.
+    /// Width and height of the images, px.
     pub fn size_px(&self) -> [u32; 2] {
         [self.assumed.width, self.assumed.height]
     }
 
-    /// What so many views are worth, and which one to take next. It finds the camera anew, which takes longer than
-    /// [`Self::next`]; with few views, or views that are too much alike, there is no camera yet.
+    /// Calibrates the camera from these views and proposes the next one. This takes longer than [`Self::next`]; with
+    /// few or too similar views there is no estimate yet.
     pub fn after(&self, reference: &Reference, views: &[View]) -> Guided {
         let calibration = Calibration::of(reference, reference.panels());
         let calibration = calibration.camera("camera", views.to_vec(), self.intrinsics.clone());
@@ -225,8 +223,8 @@ impl Guide {
         Guided { estimate, next }
     }
 
-    /// The view to take next after so many. The estimate is what was found from them, of one camera with the model of
-    /// this guide; without one, and where it does not tell enough, the view is one of the first set.
+    /// Proposes the next view after `taken` views. The estimate from them is of one camera with the model of this
+    /// guide. If it is missing or not informative enough, the view comes from the first set.
     pub fn next(&self, taken: usize, estimate: Option<&Estimate>) -> NextView {
         let gain = estimate.and_then(|estimate| Gain::of(estimate, &self.body));
         let best = gain.as_ref().and_then(|gain| self.best(gain));
@@ -253,7 +251,7 @@ impl Guide {
             0 => (DVec2::splat(0.5), 0.0, 0.0),
             number => {
                 let turn = number - 1;
-                // Right, below, left, above, and between these the next time round.
+                // Right, below, left, above, then the directions between them.
                 let away = FRAC_PI_2 * (turn % 4) as f64 + 0.25 * PI * (turn / 4 % 2) as f64;
                 let aside = if turn < 3 { 0.0 } else { 0.2 };
                 (DVec2::splat(0.5) - aside * DVec2::from_angle(away), FIRST_TILT, away)
@@ -266,7 +264,7 @@ impl Guide {
             ..placing
         });
         placing.and_then(|placing| self.view(camera, placing)).unwrap_or_else(|| {
-            // In the middle of an image any lens sees.
+            // Every lens images the centre.
             let [nearest, farthest] = self.distances_mm;
             let distance_mm = 1000.0f64.max(nearest).min(farthest);
             let placing = Placing { distance_mm, ..UPRIGHT };
@@ -275,7 +273,7 @@ impl Guide {
         })
     }
 
-    /// The candidate after which projections are surest, and how sure they are then.
+    /// The candidate with the least projection uncertainty, and that uncertainty.
     fn best(&self, gain: &Gain) -> Option<(Placing, f64)> {
         let candidates = self.candidates(&gain.camera);
         let judged: Vec<Option<f64>> =
@@ -288,14 +286,14 @@ impl Guide {
         let refined = judged.into_par_iter().map(|(start, px)| self.refined(gain, start, px));
         let mut refined: Vec<(Placing, f64)> = refined.collect();
         refined.sort_by(|a, b| a.1.total_cmp(&b.1));
-        // They were judged by some corners; a board without tags needs all.
+        // Candidates were judged by some corners; a board without tags needs all.
         refined.into_iter().find(|(placing, _)| {
             let pose = placing.pose(&gain.camera, &self.body);
             pose.is_some_and(|pose| self.body.seen(&gain.camera, &pose, true).is_some())
         })
     }
 
-    /// How sure projections are with a view; `None` where the board cannot be held or found there.
+    /// The projection uncertainty with a view; `None` if the board cannot be held or found there.
     fn judge(&self, gain: &Gain, placing: &Placing) -> Option<f64> {
         let [nearest, farthest] = self.distances_mm;
         let is_far_enough = (nearest..=farthest).contains(&placing.distance_mm);
@@ -313,13 +311,13 @@ impl Guide {
         gain.with_px(&self.body, &seen, &DMat3::from_quat(pose.rotation))
     }
 
-    /// Places over the image, sizes, tilts and turns.
+    /// Candidates over positions, sizes, tilts and rotations.
     fn candidates(&self, camera: &Camera) -> Vec<Placing> {
         let mut all = Vec::new();
         for (y, x) in AT.into_iter().flat_map(|y| AT.map(|x| (y, x))) {
             let upright = Placing { at: DVec2::new(x, y), ..UPRIGHT };
             for fill in FILLS {
-                // Tilted boards are as near as one that faces the camera.
+                // Tilted boards are at the distance of a facing one.
                 let Some(facing) = upright.filling(fill, camera, &self.body) else { continue };
                 for roll in [0.0, FRAC_PI_2] {
                     all.push(Placing { roll, ..facing });
@@ -335,7 +333,7 @@ impl Guide {
         all
     }
 
-    /// The best near a candidate, after which projections are this sure, by steps along one coordinate after the other.
+    /// Refines a candidate and its uncertainty by steps along one coordinate after the other.
     fn refined(&self, gain: &Gain, start: Placing, px: f64) -> (Placing, f64) {
         let mut best = (start, px);
         for halving in 0..=HALVINGS {
@@ -353,7 +351,7 @@ impl Guide {
         best
     }
 
-    /// A view with all that is told of it; `None` where the board is not found there.
+    /// The view with all its figures; `None` if the lens does not image the board there.
     fn view(&self, camera: &Camera, placing: Placing) -> Option<NextView> {
         let pose = placing.pose(camera, &self.body)?;
         Some(self.described(camera, pose, placing))
@@ -385,23 +383,23 @@ impl Guide {
     }
 }
 
-/// Facing the camera in the middle.
+/// A board in the centre that faces the camera.
 const UPRIGHT: Placing =
     Placing { at: DVec2::splat(0.5), distance_mm: 1.0, tilt: 0.0, away: 0.0, roll: 0.0 };
 
-/// Of the first views: large, but so that a field of view that was guessed wrong does not cut the board off; tilted
-/// by 40°, as focal lengths show by perspective alone.
+/// Size and tilt of the first views: large, but small enough for a wrongly assumed field of view not to cut off the
+/// board; tilted by 40°, as only perspective reveals the focal length.
 const FIRST_FILL: f64 = 0.7;
 const FIRST_TILT: f64 = 0.7;
 
 impl NextView {
-    /// The part by which the uncertainty is expected to fall; `None` before there is an estimate.
+    /// The expected relative reduction of the uncertainty; `None` before there is an estimate.
     pub fn gain(&self) -> Option<f64> {
         Some(1.0 - self.expected_px? / self.now_px?)
     }
 
-    /// Whether no more views are needed: projections are as sure as asked for, px; where nothing is asked for,
-    /// whether this view would lower their uncertainty by less than 3 %.
+    /// Whether no more views are needed: the uncertainty has reached `until_px`, or, without it, this view would reduce
+    /// the uncertainty by less than 3 %.
     pub fn is_enough(&self, until_px: Option<f64>) -> bool {
         match until_px {
             Some(until) => self.now_px.is_some_and(|now| now <= until),

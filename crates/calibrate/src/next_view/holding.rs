@@ -1,4 +1,4 @@
-//! Whether a board is in the proposed pose, still and in focus, so that a picture can be taken.
+//! Detects when a board is in the proposed pose, still and in focus, so that an image can be taken.
 
 use std::collections::BTreeMap;
 
@@ -12,69 +12,67 @@ use deltille_core::camera::Pose;
 use deltille_core::polygon::{area, clip, hull};
 use deltille_core::statistics::median;
 
-/// The part of both outlines together that they have in common where a board is where it is to be. Of squares of
-/// equal size a shift by a ninth of the side leaves 0.8; a hand does hardly better, and a view that is off by as much
-/// tells nearly the same.
+/// Least overlap of the proposed and the seen outline (intersection over union). For equal squares, a shift by a ninth
+/// of the side leaves 0.8; a person hardly does better, and such a view carries nearly the same information.
 const LEAST_OVERLAP: f64 = 0.7;
 
-/// How far the normal may be from the proposed one, rad (12°), which tells a facing board from one that is tilted
-/// by the least that is proposed.
+/// Largest angle between the normal and the proposed one, rad (12°). It distinguishes a facing board from one at the
+/// least proposed tilt.
 const MOST_TURN_RAD: f64 = 0.21;
 
-/// How much of an edge may be smeared by motion, px: the deviation of a box of this width is a tenth of a pixel,
-/// which is small beside the blur of any lens.
+/// Largest motion blur of an edge, px: the standard deviation of a box of this width is a tenth of a pixel, small
+/// compared with the blur of any lens.
 const MOST_SMEAR_PX: f64 = 0.35;
 
-/// How long an exposure is unless said otherwise, s: the longest of a webcam at 30 pictures a second.
+/// Default exposure time, s: the longest of a webcam at 30 frames per second.
 const EXPOSURE_S: f64 = 1.0 / 30.0;
 
-/// How long it is to be held still, s: longer than the rest at a turn of a motion.
+/// Default time for which the board must be held still, s: longer than the pause when a motion reverses.
 const HELD_S: f64 = 0.4;
 
-/// Detections that are farther apart than this say nothing of the motion between, s.
+/// Largest interval between detections from which motion is computed, s.
 const FORGOTTEN_S: f64 = 1.0;
 
-/// Largest blur at which corners are accepted, px (1σ): their error is then two and a half times that at a blur of 1 px
-/// (`docs/benchmarks.md`, Corner accuracy).
+/// Largest accepted blur (standard deviation), px: corners are three times less accurate there than at a blur of one
+/// pixel (`docs/benchmarks.md`, refined corners).
 const MOST_BLUR_PX: f64 = 3.0;
 
-/// A corner that is known worse than this, px, shows a picture that is smeared or dark, where the blur is not told.
+/// Largest standard deviation of corners, px, if the blur is not given: beyond it the image is smeared or dark.
 const MOST_SD_PX: f64 = 0.15;
 
-/// What a board does, as live detections show it.
+/// The state of a board in live detections.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum Held {
-    /// No corner of it is seen.
+    /// No corner is visible.
     Unseen,
-    /// It is elsewhere.
+    /// The board is elsewhere.
     Elsewhere {
-        /// The part of both outlines together that they have in common, 0 to 1.
+        /// Overlap of both outlines (intersection over union), 0 to 1.
         overlap: f64,
     },
-    /// It is where it is to be, but tilted or turned otherwise.
+    /// The board is at the proposed position, but tilted differently.
     Turned {
-        /// By how much, rad.
+        /// Angle to the proposed normal, rad.
         off_rad: f64,
     },
-    /// It moves.
+    /// The board moves.
     Moving {
-        /// By how much a corner moves while the picture is exposed, px.
+        /// Motion of a corner during the exposure, px.
         smear_px: f64,
     },
-    /// It is still, but not sharp.
+    /// The board is still, but not sharp.
     Blurred,
-    /// It is as it is to be.
+    /// The board is in the proposed pose.
     Steady {
-        /// Which part of the time has passed for which it is to be held, 0 to 1.
+        /// Fraction of the holding time that has passed, 0 to 1.
         part: f64,
     },
-    /// It was held long enough: this picture is to be taken.
+    /// The board was held long enough: take this image.
     Taken,
 }
 
-/// Watches whether a board is held as a view proposes it. The caller says at which time each picture was taken, on any
-/// clock.
+/// Watches whether a board is held as proposed. The caller passes the time of each image, on any clock.
 #[derive(Clone, Debug)]
 pub struct Holding {
     next: NextView,
@@ -89,7 +87,7 @@ pub struct Holding {
 type Corners = BTreeMap<(PanelRef, i32, i32), DVec2>;
 
 impl Holding {
-    /// Of a proposed view; `panels` are target_from_panel of the target's panels, see
+    /// Creates the watch for a proposed view; `panels` are the poses `target_from_panel` of the target's panels, see
     /// [`Reference::panels`](crate::Reference::panels).
     pub fn new(next: &NextView, panels: impl IntoIterator<Item = Pose>) -> Self {
         Self {
@@ -103,20 +101,20 @@ impl Holding {
         }
     }
 
-    /// With the exposure of the camera, s, where it is known: unless said otherwise a thirtieth of a second.
+    /// Sets the exposure time of the camera, s; the default is 1/30 s.
     #[must_use]
     pub fn exposure_s(self, exposure_s: f64) -> Self {
         Self { exposure_s, ..self }
     }
 
-    /// With the time for which the board is to be held, s; unless said otherwise 0.4.
+    /// Sets the time for which the board must be held, s; the default is 0.4 s.
     #[must_use]
     pub fn held_s(self, held_s: f64) -> Self {
         Self { held_s, ..self }
     }
 
-    /// Looks at what a picture shows that was taken at a time, s. `blur_px` is the deviation of its blur, where that
-    /// was measured; otherwise the corners' covariances tell whether it is sharp.
+    /// Judges an image taken at a time, s. `blur_px` is the standard deviation of its blur, if it was measured;
+    /// otherwise the covariances of the corners show whether it is sharp.
     pub fn look(&mut self, time_s: f64, view: Option<&View>, blur_px: Option<f64>) -> Held {
         let Some(view) = view.filter(|view| view.corner_count() > 0) else {
             (self.last, self.since) = (None, None);
@@ -144,7 +142,7 @@ impl Holding {
         }
     }
 
-    /// What is amiss; `None` where nothing is.
+    /// The first problem; `None` if there is none.
     fn judge(
         &self,
         time_s: f64,
@@ -164,7 +162,7 @@ impl Holding {
             pose.and_then(|()| estimate_pose(&self.next.camera, &self.panels, &view.sightings));
         let off_rad = pose.map_or(0.0, |pose| {
             let [now, wanted] = [pose, self.next.camera_from_target].map(|pose| pose.rotation);
-            // A turn in the plane of the board matters little, and without tags it is not known.
+            // A rotation in the plane of the board matters little, and without tags it is not known.
             let off = view.sightings.iter().filter_map(|sighting| {
                 let normal = self.panels.get(sighting.panel.index())?.rotation * DVec3::Z;
                 Some((now * normal).angle_between(wanted * normal))
@@ -176,7 +174,7 @@ impl Holding {
         }
         let before = last.filter(|(before, _)| (0.0..=FORGOTTEN_S).contains(&(time_s - before)));
         let Some((before_s, before)) = before.filter(|(before, _)| *before < time_s) else {
-            // One picture alone does not tell whether it moves.
+            // A single image does not show motion.
             return Some(Held::Moving { smear_px: f64::INFINITY });
         };
         let moved = corners.iter().filter_map(|(key, at)| Some(at.distance(*before.get(key)?)));
@@ -196,7 +194,7 @@ impl Holding {
     }
 }
 
-/// The part of two convex polygons together that both have, 0 to 1.
+/// Overlap of two convex polygons (intersection over union), 0 to 1.
 fn overlap(a: &[DVec2], b: &[DVec2]) -> f64 {
     let mut common = a.to_vec();
     for (i, &from) in b.iter().enumerate() {

@@ -1,11 +1,11 @@
-//! Which view of a target to take next.
+//! The next view of a target to take.
 //!
-//! Comes in: a target and the estimate so far. Goes out: a pose with its outline, figures and a sentence.
+//! Input: a target and the estimate so far. Output: a pose with its outline, figures and a sentence.
 //!
-//! 1. `body` is what a detector finds of a target at a pose, `place` how the target is held.
-//! 2. `gain` is what a view would tell.
-//! 3. `guide` proposes the view after which projections are known best.
-//! 4. `words` says it; `holding` tells when somebody holds the target there.
+//! 1. `body` predicts which corners a detector finds of a target at a pose; `place` describes the pose.
+//! 2. `gain` computes the information that a view adds.
+//! 3. `guide` proposes the view that reduces the projection uncertainty most.
+//! 4. `words` formats it as a sentence; `holding` detects when a person holds the target there.
 
 pub(crate) mod body;
 pub(crate) mod gain;

@@ -1,4 +1,4 @@
-//! How a board is held: where in the picture, how large, how tilted and turned, and the pose that follows.
+//! The placement of a board: position in the image, distance, tilt and rotation, and the resulting pose.
 
 use std::f64::consts::{PI, TAU};
 
@@ -7,35 +7,35 @@ use glam::{DMat3, DQuat, DVec2};
 use super::body::{Body, COARSE};
 use deltille_core::camera::{Camera, Pose};
 
-/// Poses are alike within this part of the image, so many rad (20°), and this part of the distance: twice of what a hand
-/// is off by.
+/// Limits within which placements are similar: fraction of the image, rad (20°), and fraction of the distance; twice
+/// the error of a person.
 const LIKE_AT: f64 = 0.12;
 const LIKE_RAD: f64 = 0.35;
 const LIKE_DEEP: f64 = 0.2;
 
-/// How a board is held into a picture.
+/// The placement of a board in an image.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Placing {
-    /// Where its middle is, parts of the image's width and height.
+    /// Position of its centre, in fractions of the image's width and height.
     pub at: DVec2,
-    /// How far away its middle is, mm.
+    /// Distance of its centre, mm.
     pub distance_mm: f64,
     /// The angle between its normal and the line of sight, rad.
     pub tilt: f64,
-    /// The direction in the image in which it is farther away, rad from right towards below.
+    /// Direction in the image in which it recedes, rad, clockwise from right.
     pub away: f64,
-    /// By how much it is turned in its plane, rad, counterclockwise as seen.
+    /// Rotation in its plane, rad, counterclockwise as seen.
     pub roll: f64,
 }
 
 impl Placing {
-    /// camera_from_target; `None` where the lens does not see there.
+    /// Returns the pose `camera_from_target`; `None` if the lens does not image the position.
     pub(super) fn pose(&self, camera: &Camera, body: &Body) -> Option<Pose> {
         let size = DVec2::new(camera.width.into(), camera.height.into());
         let pixel = self.at * size - 0.5;
         let sight = camera.unproject(pixel)?.direction.normalize();
         let along = |step: DVec2| {
-            // Whichever side of the place the lens sees.
+            // On whichever side of the position the lens has a ray.
             let ends = [camera.unproject(pixel + step), camera.unproject(pixel - step)];
             let across = match ends {
                 [Some(after), Some(before)] => after.direction - before.direction,
@@ -63,11 +63,12 @@ impl Placing {
         Some(camera_from_front.after(&body.front.inverse()))
     }
 
-    /// The same so far away that the outline is this part of the image, along the side that it fills more.
+    /// The placement at the distance where the outline fills this fraction of the image, along the side that it fills
+    /// more.
     pub(super) fn filling(self, part: f64, camera: &Camera, body: &Body) -> Option<Self> {
         let size = DVec2::new(camera.width.into(), camera.height.into());
         let reach = body.reach_mm();
-        // Seen in the middle of an image of a usual angle, then nearer or farther by how much it is off.
+        // Start from the size in the centre of a usual field of view, then scale the distance by the error.
         let mut placing = Self { distance_mm: 2.0 * reach / part, ..self };
         for _ in 0..ROUNDS {
             let outlines = body.outlines(camera, &placing.pose(camera, body)?, COARSE);
@@ -81,11 +82,11 @@ impl Placing {
     }
 }
 
-/// Steps to a distance: each halves what is off at least, as sizes are nearly inverse to distances.
+/// Number of iterations of the distance: each at least halves the error, as size is nearly inverse to distance.
 const ROUNDS: usize = 5;
 
 impl Body {
-    /// How far its outline reaches from the middle of its front, mm.
+    /// Reach of its outline from the centre of its front, mm.
     pub(super) fn reach_mm(&self) -> f64 {
         let corners = self.panels.iter().flat_map(|panel| &panel.corners);
         let far = corners.map(|corner| corner.target_mm.distance(self.front.translation));
@@ -94,7 +95,7 @@ impl Body {
 }
 
 impl Placing {
-    /// Whether a hand would hardly tell it from another.
+    /// Whether a person could hardly distinguish the two placements.
     pub(super) fn is_like(&self, other: &Self) -> bool {
         let lean = |placing: &Self| placing.tilt * DVec2::from_angle(placing.away);
         let turn = (self.roll - other.roll + PI).rem_euclid(TAU) - PI;
@@ -104,7 +105,7 @@ impl Placing {
             && (self.distance_mm / other.distance_mm).ln().abs() < LIKE_DEEP
     }
 
-    /// With one of its coordinates changed: x, y, the logarithm of the distance, tilt, away, roll.
+    /// Changes one of its coordinates: x, y, the logarithm of the distance, tilt, away, roll.
     pub(super) fn moved(self, coordinate: usize, by: f64) -> Self {
         let mut moved = self;
         match coordinate {

@@ -19,8 +19,8 @@ fn truth() -> Camera {
     Camera::centred(1280, 960, 1150.0, Lens::BrownConrady(lens))
 }
 
-/// A view of the corners that are proposed, moved by a motion of the board's middle; corners are off by about
-/// 0.05 px, always the same.
+/// A view of the proposed corners with the board moved about its centre; the corners have a fixed error of about 0.05
+/// px.
 fn held(target: &Target, next: &NextView, moved: Pose, index: usize) -> View {
     let camera = truth();
     let pose = moved.after(&next.camera_from_target);
@@ -56,7 +56,7 @@ fn held(target: &Target, next: &NextView, moved: Pose, index: usize) -> View {
     View { name, image: String::new(), size_px: [1280, 960], sightings }
 }
 
-/// A hand that is off by some degrees and a hundredth of the distance, each time otherwise.
+/// The error of a person: some degrees and a hundredth of the distance, different each time.
 fn hand(next: &NextView, index: usize) -> Pose {
     let turn = DVec3::new(0.05, -0.03, 0.04) * if index.is_multiple_of(2) { 1.0 } else { -1.0 };
     let rotation = DQuat::from_scaled_axis(turn);
@@ -81,19 +81,19 @@ fn guided(count: usize, with: impl Fn(Guide) -> Guide) -> (Vec<View>, Vec<NextVi
 }
 
 #[test]
-fn what_is_expected_of_a_view_comes_of_it() {
+fn a_view_reduces_the_uncertainty_as_predicted() {
     let (_, proposed, last) = guided(9, |guide| guide);
     assert!(proposed[..3].iter().all(|next| next.expected_px.is_none()), "no camera yet");
     let ends = proposed[4..].iter().zip(proposed[5..].iter().chain([&last.next]));
     for (view, after) in ends {
         let (expected, came) = (view.expected_px.unwrap(), after.now_px.unwrap());
-        assert!(expected < view.now_px.unwrap(), "a view that tells nothing is not proposed");
+        assert!(expected < view.now_px.unwrap(), "a proposed view adds information");
         assert!((came / expected - 1.0).abs() < 0.25, "expected {expected}, came {came}");
     }
 }
 
 #[test]
-fn the_uncertainty_is_that_of_the_map() {
+fn the_uncertainty_equals_that_of_the_map() {
     let (_, _, last) = guided(8, |guide| guide);
     let estimate = last.estimate.unwrap();
     let map: UncertaintyMap =
@@ -109,12 +109,12 @@ fn the_uncertainty_is_that_of_the_map() {
     let count = map.columns * map.rows;
     let over_image = ((0..count).map(place).sum::<f64>() / count as f64).sqrt();
     let now = last.next.now_px.unwrap();
-    // Corners count alike in the alignment here, and by their covariances there.
+    // Here all corners have equal weight in the alignment, there they are weighted by covariance.
     assert!((now / over_image - 1.0).abs() < 0.05, "{now} {over_image}");
 }
 
 #[test]
-fn corners_that_are_proposed_are_found_and_poses_are_as_told() {
+fn proposed_corners_are_found_and_poses_match_their_description() {
     let (_, proposed, _) = guided(8, |guide| guide);
     let target = board();
     for next in &proposed {
@@ -133,7 +133,7 @@ fn corners_that_are_proposed_are_found_and_poses_are_as_told() {
             assert!(at.distance(corner.pixel) < 1e-9);
             assert!(corner.pixel.min_element() > 0.0 && corner.pixel.x < 1279.0);
         }
-        // The side that is said to be farther away is.
+        // The side described as farther away is farther away.
         if next.tilt_rad > 0.2 {
             let depth = |corner: &ProposedCorner| {
                 let places = &target.panels[0].corners;
@@ -150,7 +150,7 @@ fn corners_that_are_proposed_are_found_and_poses_are_as_told() {
 }
 
 #[test]
-fn what_cannot_be_held_is_not_proposed_again() {
+fn refused_views_are_not_proposed_again() {
     let (_, _, last) = guided(6, |guide| guide);
     let estimate = last.estimate.unwrap();
     let guide = Guide::new(&board(), [1280, 960], Model::Radtan).unwrap();
@@ -172,7 +172,7 @@ fn what_cannot_be_held_is_not_proposed_again() {
 }
 
 #[test]
-fn distances_are_kept() {
+fn proposals_stay_within_the_distances() {
     let (_, proposed, _) = guided(8, |guide| guide.within_mm(Some(280.0), Some(420.0)));
     for next in &proposed {
         assert!((280.0..=420.0).contains(&next.distance_mm), "{next}");
@@ -180,7 +180,7 @@ fn distances_are_kept() {
 }
 
 #[test]
-fn it_ends_when_a_view_is_hardly_worth_the_trouble_or_what_was_asked_for_is_reached() {
+fn it_ends_when_a_view_gains_little_or_the_limit_is_reached() {
     let (_, _, few) = guided(5, |guide| guide);
     assert!(!few.next.is_enough(None), "{:?}", few.next.gain());
     let (_, _, many) = guided(22, |guide| guide);
@@ -191,7 +191,7 @@ fn it_ends_when_a_view_is_hardly_worth_the_trouble_or_what_was_asked_for_is_reac
 }
 
 #[test]
-fn the_shape_of_the_board_is_among_what_views_are_chosen_for() {
+fn an_unknown_board_shape_enters_the_choice_of_views() {
     let (views, ..) = guided(10, |guide| guide);
     let target = board();
     let panels = || Reference::Target(&target).panels();
@@ -202,11 +202,11 @@ fn the_shape_of_the_board_is_among_what_views_are_chosen_for() {
     let guide = Guide::new(&target, [1280, 960], Model::Radtan).unwrap();
     let [flat, bent] = [false, true].map(|shape| guide.next(10, Some(&solve(shape))));
     let (flat, bent) = (flat.now_px.unwrap(), bent.now_px.unwrap());
-    assert!(bent > 1.02 * flat, "a shape that is open makes cameras less sure: {flat} {bent}");
+    assert!(bent > 1.02 * flat, "an unknown shape increases the uncertainty: {flat} {bent}");
 }
 
 #[test]
-fn a_solid_shows_several_faces_and_boards_without_tags_are_whole() {
+fn a_solid_shows_several_faces_and_untagged_boards_are_whole() {
     let spec = TargetSpec::Solid(SolidSpec::new(SolidShape::Icosahedron));
     let family = spec_family(&spec);
     let solid = Target::build("solid", &spec, family.as_ref()).unwrap();
@@ -238,7 +238,7 @@ fn spec_family(spec: &TargetSpec) -> Option<deltille_core::family::Family> {
 }
 
 #[test]
-fn words_say_where_and_how() {
+fn the_sentence_states_position_and_tilt() {
     let mut next = Guide::new(&board(), [1280, 960], Model::Radtan).unwrap().next(0, None);
     let said = next.to_string();
     assert!(said.starts_with("hold the board in the middle of the image, about "), "{said}");
@@ -263,7 +263,7 @@ fn words_say_where_and_how() {
 }
 
 #[test]
-fn a_picture_is_taken_when_the_board_is_held_there_still_and_sharp() {
+fn an_image_is_taken_when_the_board_is_in_place_still_and_sharp() {
     let target = board();
     let guide = Guide::new(&target, [1280, 960], truth()).unwrap();
     let next = guide.next(1, None);
@@ -274,7 +274,7 @@ fn a_picture_is_taken_when_the_board_is_held_there_still_and_sharp() {
     let mut holding = Holding::new(&next, panels());
     assert_eq!(holding.look(0.0, None, None), Held::Unseen);
     assert!(matches!(holding.look(0.1, Some(&view(shifted(150.0))), None), Held::Elsewhere { .. }));
-    // Coming in by 8 mm in a tenth of a second is 2 px of smear at 30 pictures a second.
+    // A motion of 8 mm in a tenth of a second is 2 px of smear at 30 frames per second.
     assert!(matches!(holding.look(0.2, Some(&view(shifted(8.0))), None), Held::Moving { .. }));
     assert!(
         matches!(holding.look(0.3, Some(&there), None), Held::Moving { smear_px } if smear_px > 1.0)
@@ -282,7 +282,7 @@ fn a_picture_is_taken_when_the_board_is_held_there_still_and_sharp() {
     assert_eq!(holding.look(0.4, Some(&there), None), Held::Steady { part: 0.0 });
     assert!(matches!(holding.look(0.6, Some(&there), None), Held::Steady { part } if part > 0.4));
     assert_eq!(holding.look(0.81, Some(&there), None), Held::Taken);
-    // A picture that is blurred begins anew.
+    // A blurred image restarts the holding time.
     assert_eq!(holding.look(0.9, Some(&there), Some(5.0)), Held::Blurred);
     assert_eq!(holding.look(1.0, Some(&there), Some(1.0)), Held::Steady { part: 0.0 });
     let mut smeared = there.clone();
@@ -290,12 +290,12 @@ fn a_picture_is_taken_when_the_board_is_held_there_still_and_sharp() {
         seen.cov = Some([0.09, 0.0, 0.01]);
     }
     assert_eq!(holding.look(1.1, Some(&smeared), None), Held::Blurred);
-    // A board that faces the camera is not one that is tilted by 40°.
+    // A board facing the camera differs from one tilted by 40°.
     let middle = next.camera_from_target.apply(target.panels[0].middle_mm());
     let back = DQuat::from_axis_angle(DVec3::Y, if next.away_rad.cos() > 0.0 { 0.6 } else { -0.6 });
     let facing = Pose { rotation: back, translation: middle - back * middle };
     let held = holding.look(1.2, Some(&view(facing)), None);
     assert!(matches!(held, Held::Turned { off_rad } if off_rad > 0.4), "{held:?}");
-    // After a pause nothing is known of the motion.
+    // After a pause the motion is not known.
     assert!(matches!(holding.look(9.0, Some(&there), None), Held::Moving { .. }));
 }

@@ -398,6 +398,7 @@ fn a_comparison_without_uncertainties_is_undecided() {
         let (code, told) = code(&format!("compare {args} --region image -o said.json"));
         assert_eq!(code, Some(3), "{told}");
         assert!(told.contains("cannot judge whether the camera has changed"), "{told}");
+        let which = format!("{which} calibration");
         assert!(told.contains(&which), "{told}");
         let said = json(&at.join("said.json"));
         assert!(said["cameras"][0]["significant"].is_null());
