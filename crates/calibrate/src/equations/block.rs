@@ -1,4 +1,4 @@
-//! Normal equations of one block: of one panel in one picture.
+//! Normal equations of one block: one panel in one image.
 
 use std::collections::BTreeSet;
 
@@ -16,23 +16,24 @@ use deltille_core::camera::{
     Lens, MAX_PARAMETERS, MOST_TOUCHED, PROJECTION_PARAMETERS, Pose, Projection,
 };
 
-/// Most columns that a corner depends on: parameters and poses of a camera, a panel, a target and a frame, and a shape.
+/// Largest number of columns that a corner depends on: parameters and pose of a camera, poses of a panel, a target and
+/// a frame, and a shape.
 const LONGEST_ROW: usize = MOST_OF_LENS + 24 + shape::COUNT;
 
-/// Most parameters of a camera that a corner depends on.
+/// Largest number of camera parameters that a corner depends on.
 const MOST_OF_LENS: usize =
     if MAX_PARAMETERS > MOST_TOUCHED { MAX_PARAMETERS } else { MOST_TOUCHED };
 
-/// Of a block that a spline images, which columns it has, and which of them each of its corners has.
+/// The columns of a block seen by a spline, and the columns that each of its corners depends on.
 struct Support {
-    /// The column of each parameter of the lens, if it is unknown.
+    /// The column of each parameter of the lens; `None` if it is known.
     columns: Vec<Option<usize>>,
     /// The columns of the lens on which any corner depends, ascending.
     touched: Vec<usize>,
 }
 
 impl Support {
-    /// `None` of another lens, or where nothing of it is unknown.
+    /// `None` for another lens, or if all its parameters are known.
     fn of(free: &[(usize, usize)], seen: &[Projection], parameters: usize) -> Option<Self> {
         seen.first()?.knots?;
         let mut columns = vec![None; parameters - PROJECTION_PARAMETERS.len()];
@@ -47,7 +48,7 @@ impl Support {
         Some(Self { columns, touched })
     }
 
-    /// Whether dx and dy of each knot of a point are unknown, and its part.
+    /// The knots of a point: whether dx and dy are unknown, and the weight.
     fn knots(&self, at: &Projection) -> impl Iterator<Item = (usize, usize, f64)> {
         let knots = at.knots.into_iter().flat_map(|knots| knots.iter());
         knots.flat_map(move |(knot, part)| {
@@ -57,7 +58,7 @@ impl Support {
         })
     }
 
-    /// The columns of a block of n that a point depends on.
+    /// The columns of a block of n columns that a point depends on.
     fn places(&self, at: &Projection, n: usize, places: &mut Vec<usize>) {
         places.clear();
         let of_knots =
@@ -66,7 +67,7 @@ impl Support {
         places.extend(self.touched.len()..n);
     }
 
-    /// The derivatives of a coordinate by the knots.
+    /// The derivatives of a coordinate with respect to the knots.
     fn derivatives(&self, at: &Projection, coordinate: usize, push: &mut impl FnMut(f64)) {
         for (_, axis, part) in self.knots(at) {
             push(if axis == coordinate { at.by_image(axis) * part } else { 0.0 });
@@ -74,34 +75,35 @@ impl Support {
     }
 }
 
-/// The normal equations of one block, with only the columns that it has.
+/// The normal equations of one block, in the columns that it touches.
 pub(crate) struct Local {
     pub cost: f64,
-    /// Shared columns; those of the frame's pose follow.
+    /// Shared columns; the columns of the frame's pose follow.
     pub columns: Vec<usize>,
     /// Rows of the lower triangle, one after the other.
     matrix: Vec<f64>,
     pub right: Vec<f64>,
-    /// The corners, where they are unknown.
+    /// The corners, if they are unknown.
     pub corners: Vec<OfCorner>,
 }
 
-/// What a corner in a block says of its own offset.
+/// The contribution of a corner in a block to the equations of its own offset.
 pub(crate) struct OfCorner {
-    /// Its place in the map.
+    /// Its index in the map.
     pub index: usize,
-    /// For each column of the block.
+    /// The product with each column of the block.
     pub cross: Vec<[f64; 3]>,
     pub own: Matrix3<f64>,
     pub right: Vector3<f64>,
 }
 
-/// Hands the derivatives by a pose to `push`: for y = exp(ω) a + t + τ a derivative j by y is a × j by ω, and j by τ.
+/// Passes the derivatives with respect to a pose to `push`: for y = exp(ω) a + t + τ, a derivative j with respect to y
+/// becomes a × j for ω, and j for τ.
 fn pose(arm: DVec3, by: DVec3, push: &mut impl FnMut(f64)) {
     arm.cross(by).to_array().into_iter().chain(by.to_array()).for_each(push);
 }
 
-/// The frames between the panel of a block and its camera, and which links between them are unknown.
+/// The coordinate frames between the panel of a block and its camera, and the unknown links between them.
 struct Chain<'a> {
     problem: &'a Problem,
     block: &'a Block,
@@ -112,14 +114,14 @@ struct Chain<'a> {
     rig_from_camera: DMat3,
     scene_from_rig: DMat3,
     target_from_scene: DMat3,
-    /// First columns of what is unknown of the camera's pose, the panel's, the target's, and of the shape.
+    /// First columns of the unknown pose of the camera, of the panel, of the target, and of the shape.
     of_camera: Option<usize>,
     of_panel: Option<usize>,
     of_target: Option<usize>,
     of_shape: Option<usize>,
 }
 
-/// A corner on its way from the panel to the camera: before each translation, and in the end.
+/// The position of a corner along the chain from the panel to the camera: before each translation, and at the end.
 struct Along {
     turned_panel: DVec3,
     turned_target: DVec3,
@@ -171,14 +173,14 @@ impl<'a> Chain<'a> {
         Along { turned_panel, turned_target, turned_scene, turned_rig, in_camera }
     }
 
-    /// The pixel of a corner; `None` where it is out of the camera's reach.
+    /// The pixel of a corner; `None` if the camera cannot image it.
     fn project(&self, along: &Along) -> Option<Projection> {
         self.camera.camera.project_with_derivatives(along.in_camera)
     }
 
-    /// Hands the derivatives of a coordinate by the unknown links, the shape (which `bends` the corner along these
-    /// directions) and the frame's pose to `push`, from that by the point before the camera; returns that by the place of the
-    /// corner on its panel.
+    /// Passes the derivatives of a coordinate with respect to the unknown links, the shape (which `bends` the corner
+    /// along these directions) and the frame's pose to `push`, from the derivative with respect to the point in the
+    /// camera frame. Returns the derivative with respect to the position of the corner on its panel.
     fn derivatives(
         &self,
         along: &Along,
@@ -186,7 +188,7 @@ impl<'a> Chain<'a> {
         bends: Option<&[DVec3; shape::COUNT]>,
         push: &mut impl FnMut(f64),
     ) -> DVec3 {
-        // For y = exp(ω) a + t + τ a derivative j by y is a × j by ω, and j by τ.
+        // For y = exp(ω) a + t + τ, a derivative j with respect to y becomes a × j for ω, and j for τ.
         let by_rig = self.rig_from_camera * by_camera;
         if self.of_camera.is_some() {
             pose(along.turned_rig, by_camera, push);
@@ -237,7 +239,7 @@ impl Local {
         let mut local =
             Self { cost: 0.0, columns, matrix, right: vec![0.0; n], corners: Vec::new() };
         let mut rows = [[0.0; LONGEST_ROW]; 2];
-        // Of a spline the columns of the block that a corner has: of its knots, and all after those of the lens.
+        // For a spline: the columns of the corner, that is, of its knots and all columns after those of the lens.
         let mut places: Vec<usize> = Vec::new();
         for (seen, &w) in block.observations.iter().zip(whitening) {
             let bends = problem.shape.map(|shape| shape.directions(seen.panel_mm));
@@ -288,7 +290,7 @@ impl Local {
         &self.matrix[i * (i + 1) / 2..][..=i]
     }
 
-    /// Adds a corner's two rows in some columns, ascending; returns the weight that the loss gives it.
+    /// Adds the two rows of a corner in some columns, ascending; returns the weight from the loss.
     fn add_some(
         &mut self,
         places: &[usize],
@@ -314,7 +316,7 @@ impl Local {
         weight
     }
 
-    /// Adds a corner's two rows; returns the weight that the loss gives it.
+    /// Adds the two rows of a corner; returns the weight from the loss.
     fn add(
         &mut self,
         [along_x, along_y]: [&[f64]; 2],
@@ -343,7 +345,7 @@ impl Local {
 }
 
 impl OfCorner {
-    /// For all columns of a block of which it has some.
+    /// Expands the products from some columns to all columns of a block.
     fn spread(&mut self, places: &[usize], n: usize) {
         let mut cross = vec![[0.0; 3]; n];
         places.iter().zip(&self.cross).for_each(|(&place, values)| cross[place] = *values);
@@ -361,7 +363,7 @@ impl OfCorner {
         let r = Whitening::apply(w, residual);
         let [a, b, c] = w;
         let (x, y) = (a * by_place[0], b * by_place[0] + c * by_place[1]);
-        // By the residual before it was whitened.
+        // With respect to the residual before whitening.
         let (by_x, by_y) = (weight * (a * x + b * y), weight * (c * y));
         let cross = along_x.iter().zip(along_y);
         let cross = cross.map(|(&of_x, &of_y)| (by_x * of_x + by_y * of_y).to_array());

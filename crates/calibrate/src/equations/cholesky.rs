@@ -1,11 +1,11 @@
 //! Factors, inverses and products of symmetric matrices by blocks of columns.
 //!
-//! nalgebra factors and inverts column by column. A matrix that is larger than the caches is then read from memory once
-//! for each column; by blocks nearly all of the work is products of matrices, which read it once for each block.
+//! nalgebra factors and inverts column by column, which reads a matrix larger than the caches from memory once
+//! for each column. By blocks, nearly all of the work is products of matrices, which read it once for each block.
 
 use nalgebra::{Cholesky, DMatrix, Dyn};
 
-/// Columns of a block.
+/// Number of columns of a block.
 const WIDTH: usize = 64;
 
 /// The first column and the number of columns of each block.
@@ -13,8 +13,8 @@ fn blocks(n: usize) -> impl Iterator<Item = (usize, usize)> {
     (0..n).step_by(WIDTH).map(move |first| (first, WIDTH.min(n - first)))
 }
 
-/// The Cholesky factor of a symmetric matrix, of which only the lower triangle is read; `None` where it is not
-/// positive definite.
+/// The Cholesky factor of a symmetric matrix, of which only the lower triangle is read; `None` if it is not positive
+/// definite.
 pub(super) fn cholesky(mut matrix: DMatrix<f64>) -> Option<Cholesky<f64, Dyn>> {
     let n = matrix.nrows();
     for (first, count) in blocks(n) {
@@ -55,7 +55,7 @@ pub(super) fn inverse(factor: &Cholesky<f64, Dyn>) -> DMatrix<f64> {
     inverse
 }
 
-/// Takes the product of two matrices, which is symmetric, away from the blocks of a matrix on its diagonal and below.
+/// Subtracts the product of two matrices, which is symmetric, from the blocks of a matrix on and below its diagonal.
 pub(super) fn subtract_product(
     matrix: &mut DMatrix<f64>,
     left: &DMatrix<f64>,
@@ -68,7 +68,7 @@ pub(super) fn subtract_product(
     }
 }
 
-/// Makes the blocks of a symmetric matrix above its diagonal those below.
+/// Copies the blocks of a symmetric matrix from below its diagonal to above it.
 pub(super) fn fill_upper_blocks(matrix: &mut DMatrix<f64>) {
     let n = matrix.nrows();
     for (first, count) in blocks(n) {
@@ -82,9 +82,9 @@ pub(super) fn fill_upper_blocks(matrix: &mut DMatrix<f64>) {
 mod tests {
     use super::*;
 
-    /// The same as by nalgebra, of one block, of several, and of several and a part.
+    /// Results equal those of nalgebra for one block, several blocks, and several blocks and a part.
     #[test]
-    fn factors_and_inverses_are_those_of_nalgebra() {
+    fn factors_and_inverses_equal_those_of_nalgebra() {
         for n in [0, 1, WIDTH, 3 * WIDTH, 3 * WIDTH + 7] {
             let any = |i: usize, j: usize| ((i * 31 + j * 17) % 103) as f64 / 103.0 - 0.5;
             let half = DMatrix::from_fn(n, n + 5, any);

@@ -1,4 +1,4 @@
-//! The inverse of the normal equations: covariances of all unknowns, and which of them are open.
+//! The inverse of the normal equations: covariances of all unknowns, and the undetermined ones.
 
 use deltille_core::damping::Damping;
 use std::collections::BTreeSet;
@@ -9,31 +9,31 @@ use super::cholesky::{cholesky, inverse};
 use super::layout::Layout;
 use super::normal::{Normal, PARTS_AT_A_TIME, Part, Reduced};
 
-/// The covariance of all unknowns for residuals of variance 1: of the shared ones, of each frame's pose, and
-/// of each corner's offset.
+/// The covariance of all unknowns for residuals of variance 1: of the shared unknowns, of each frame's pose, and of
+/// each corner's offset.
 pub(crate) struct Covariances {
     pub shared: DMatrix<f64>,
-    /// Of all that are kept.
+    /// Of all kept unknowns.
     pub kept: DMatrix<f64>,
-    /// A square root of that of the shared unknowns.
+    /// A square root of the covariance of the shared unknowns.
     pub root: Root,
     pub frames: Vec<Matrix6<f64>>,
     pub corners: Vec<Matrix3<f64>>,
-    /// The columns that nothing tells apart beyond what rounding leaves; their variances are the
-    /// least that they can be.
+    /// The columns that the observations do not determine beyond rounding; their variances are lower bounds.
     pub loose: Vec<usize>,
-    /// The columns whose deviation is [`TIED`] times what it were if all other shared ones were known.
+    /// The columns whose standard deviation is more than [`TIED`] times what it would be if all other shared unknowns
+    /// were known.
     pub tied: Vec<usize>,
 }
 
-/// A square root L of a covariance, LLᵀ, and its inverse, both from the equations, so that what is well determined is
-/// exact beside what is not.
+/// A square root L of a covariance LLᵀ, and its inverse. Both come from the equations, so that well determined
+/// directions stay exact beside others.
 pub(crate) struct Root {
     pub half: DMatrix<f64>,
     pub inverse: DMatrix<f64>,
 }
 
-/// The inverse of equations, and the columns that they leave open, and tie to others.
+/// The inverse of equations, with the undetermined and the tied columns.
 struct Inverse {
     matrix: DMatrix<f64>,
     root: Root,
@@ -51,21 +51,20 @@ fn fixed<const K: usize>(matrix: &DMatrix<f64>) -> SMatrix<f64, K, K> {
     matrix.fixed_view::<K, K>(0, 0).into_owned()
 }
 
-/// Eigenvalues of the reduced equations, scaled by the diagonal that they would have if poses were
-/// known, mean nothing below this: elimination leaves a few dozen times the precision of numbers.
+/// Eigenvalue below which the reduced equations are singular, after scaling by the diagonal that they would have with
+/// known poses: elimination leaves errors of a few dozen times the machine precision.
 const SINGULAR: f64 = 1e-14;
 
-/// An unknown takes part in a direction if it moves by this part of what the one does that moves
-/// most.
+/// Least component of an unknown that is involved in a direction, as a fraction of the largest component.
 const INVOLVED: f64 = 0.3;
 
-/// From here on the number of a parameter means nothing by itself. What fits as well is then a valley a
-/// thousand times as long as it is wide; deviations are those of a straight one, and a bend by a
-/// thousandth of its length leads out of that. Terms of a polynomial stay below while there are few.
+/// Inflation of the standard deviation from which a single parameter is not meaningful. Equally good values then form a
+/// valley a thousand times as long as wide; standard deviations assume a straight valley, but a bend by a thousandth of
+/// its length leads out of it. The terms of a short polynomial stay below.
 const TIED: f64 = 1000.0;
 
 impl Normal {
-    /// The inverse of the equations; `None` where a frame's pose is open by itself.
+    /// The inverse of the equations; `None` if the pose of a frame is undetermined.
     pub(crate) fn covariances(&self, layout: &Layout) -> Option<Covariances> {
         let Reduced { matrix, inverses, .. } = self.reduced(Damping::NONE)?;
         let Inverse { matrix: kept, root, loose, tied } = self.invert(matrix)?;
@@ -89,7 +88,7 @@ impl Normal {
         Some(Covariances { shared, kept, root, frames, corners, loose, tied })
     }
 
-    /// The covariance of what is kept for residuals of variance 1; `None` where something is open.
+    /// The covariance of the kept unknowns for residuals of variance 1; `None` if any is undetermined.
     pub(crate) fn covariance_of_kept(&self) -> Option<DMatrix<f64>> {
         let matrix = self.reduced(Damping::NONE)?.matrix;
         let n = matrix.nrows();
@@ -99,8 +98,8 @@ impl Normal {
         Some(DMatrix::from_fn(n, n, |i, j| inverse[(i, j)] * scale[i] * scale[j]))
     }
 
-    /// The solutions of the equations for right sides (columns) of shared unknowns and corners' offsets, in this
-    /// order, which are zero for the poses of frames. `None` where a corner is open by itself.
+    /// Solves the equations for right sides (columns) of the shared unknowns and the corner offsets, in this order,
+    /// which are zero for the poses of frames. `None` if a corner is undetermined.
     pub(crate) fn solve_without_frames(
         &self,
         layout: &Layout,
@@ -125,7 +124,7 @@ impl Normal {
         Some(solution)
     }
 
-    /// Solves the equations of each part by itself.
+    /// Solves the equations of each part separately.
     fn solve_parts(&self, right: &mut DMatrix<f64>) -> Option<()> {
         let mut first = 0;
         for Part { c, .. } in &self.parts {
@@ -135,7 +134,7 @@ impl Normal {
         Some(())
     }
 
-    /// The inverse of the reduced equations; the root is that of what all frames share, which alone may be open.
+    /// The inverse of the reduced equations; the root is that of the shared unknowns, which alone may be undetermined.
     fn invert(&self, reduced: DMatrix<f64>) -> Option<Inverse> {
         let (n, shared) = (reduced.nrows(), self.shared);
         let others = n - shared;
@@ -159,7 +158,7 @@ impl Normal {
         Some(Inverse { matrix: inverse, ..found })
     }
 
-    /// The inverse of the equations of what all frames share.
+    /// The inverse of the equations of the shared unknowns.
     fn invert_shared(&self, reduced: DMatrix<f64>) -> Inverse {
         let n = reduced.nrows();
         if n == 0 {

@@ -1,4 +1,4 @@
-//! Normal equations of one frame, its pose eliminated.
+//! Normal equations of one frame with its pose eliminated.
 
 use std::collections::BTreeMap;
 
@@ -6,18 +6,18 @@ use nalgebra::{Cholesky, DMatrix, DVector, Matrix6, U6, Vector6};
 
 use super::block::Local;
 
-/// The normal equations of one frame for the shared unknowns followed by the offsets of all corners, its pose
+/// The normal equations of one frame for the shared unknowns followed by the offsets of all corners, with its pose
 /// eliminated.
 pub(crate) struct OfFrame {
     locals: Vec<Local>,
     /// Number of shared unknowns.
     shared: usize,
-    /// Those of the pose.
+    /// The equations of the pose.
     pose: Cholesky<f64, U6>,
 }
 
 impl OfFrame {
-    /// From the blocks of the frame. `None` where the pose is open.
+    /// Sums the blocks of the frame; `None` if the pose is undetermined.
     pub(crate) fn of(locals: Vec<Local>, shared: usize) -> Option<Self> {
         let mut pose = Matrix6::<f64>::zeros();
         for local in &locals {
@@ -30,7 +30,7 @@ impl OfFrame {
         Some(Self { locals, shared, pose: pose.cholesky()? })
     }
 
-    /// The right side of n unknowns. The pose is at its optimum, so that nothing is left of its own.
+    /// The right side for n unknowns. The pose is at its optimum, so its own right side is zero.
     pub(crate) fn right(&self, n: usize) -> DVector<f64> {
         let mut right = DVector::zeros(n);
         for local in &self.locals {
@@ -43,8 +43,8 @@ impl OfFrame {
         right
     }
 
-    /// Calls `each` for every unknown that the frame touches, with what is between it and the pose; for some more
-    /// than once, with what is to be summed.
+    /// Calls `each` with the coupling of every touched unknown to the pose; for some unknowns more than once, with
+    /// terms to be summed.
     fn with_pose(&self, mut each: impl FnMut(usize, Vector6<f64>)) {
         for local in &self.locals {
             let of_shared = local.columns.len();
@@ -91,7 +91,7 @@ impl OfFrame {
         product
     }
 
-    /// Adds what is between the shared unknowns (rows) and the offsets of all corners (columns).
+    /// Adds the coupling between the shared unknowns (rows) and the offsets of all corners (columns).
     pub(crate) fn add_across(&self, across: &mut DMatrix<f64>) {
         for local in &self.locals {
             for corner in &local.corners {

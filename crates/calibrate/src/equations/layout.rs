@@ -1,14 +1,14 @@
-//! Which column of the normal equations belongs to which unknown.
+//! The assignment of columns of the normal equations to unknowns.
 
 use nalgebra::{DVector, SMatrix, Vector3, Vector6};
 
 use crate::problem::bundle::Problem;
 use crate::problem::shape;
 
-/// Which column of the unknowns that are kept belongs to what.
+/// The columns of the kept unknowns.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Layout {
-    /// For each camera the parameters that are unknown, and their columns.
+    /// For each camera, the unknown parameters and their columns.
     pub parameters: Vec<Vec<(usize, usize)>>,
     /// First of the six columns of a camera's pose.
     pub cameras: Vec<Option<usize>>,
@@ -18,11 +18,11 @@ pub(crate) struct Layout {
     pub targets: Vec<Option<usize>>,
     /// First of the columns of the sheet's shape.
     pub shape: Option<usize>,
-    /// Number of columns of what all frames share: all of the above.
+    /// Number of columns of the shared unknowns: all of the above.
     pub shared: usize,
-    /// First of the columns of the frames' poses; `None` where they are eliminated.
+    /// First of the columns of the frames' poses; `None` if they are eliminated.
     pub frames: Option<usize>,
-    /// First of the columns of the corners' offsets; `None` where they are eliminated, or known.
+    /// First of the columns of the corners' offsets; `None` if they are eliminated or known.
     pub corners: Option<usize>,
     /// Number of columns.
     pub count: usize,
@@ -58,7 +58,7 @@ impl Layout {
 }
 
 impl Layout {
-    /// What belongs to frames and to corners of a vector over what is kept, and of those over parts.
+    /// Splits a vector of kept unknowns and the vectors of parts into those of frames and of corners.
     pub(super) fn split(
         &self,
         kept: &DVector<f64>,

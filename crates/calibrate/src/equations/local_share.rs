@@ -67,9 +67,9 @@ impl LocalShare {
 mod tests {
     use super::*;
 
-    /// The same as of the whole matrices.
+    /// Results equal those of the whole matrices.
     #[test]
-    fn a_share_of_some_unknowns_is_that_of_all() {
+    fn the_share_in_a_subspace_equals_that_of_all_unknowns() {
         let n = 7;
         let any = |i: usize, j: usize| (((i * 31 + j * 17) % 13) as f64 - 6.0) / 7.0;
         let half = DMatrix::from_fn(n, n, |i, j| any(i, j) + if i == j { 2.0 } else { 0.0 });

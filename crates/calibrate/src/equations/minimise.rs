@@ -1,4 +1,4 @@
-//! Levenberg–Marquardt: from a problem's values to the next minimum of the cost.
+//! Levenberg–Marquardt: iterates from the values of a problem to the next minimum of the cost.
 
 use super::layout::Layout;
 use super::normal::Normal;
@@ -7,23 +7,22 @@ use crate::problem::bundle::Problem;
 use crate::problem::whitening::Whitening;
 use deltille_core::damping::Damping;
 
-/// Accepted steps at most; problems that have a minimum take ten to forty.
+/// Most accepted steps; problems with a minimum take ten to forty.
 const MOST_STEPS: usize = 200;
 
-/// Damping at the start.
+/// Initial damping.
 const DAMPING: f64 = 1e-4;
 
-/// Beyond this damping no step is left that would help.
+/// Largest damping: beyond it no step lowers the cost.
 const MOST_DAMPING: f64 = 1e12;
 
-/// How far the search goes on. A step that is expected to lower the cost by δ² variances moves no
-/// unknown by more than δ of its standard deviations, however many corners there are; below that the
-/// search ends.
+/// The accuracy at which the search ends. A step expected to lower the cost by δ² variances moves no unknown by more
+/// than δ of its standard deviations, however many corners there are; below that the search ends.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum Until {
-    /// Good enough to go on with more unknowns or other weights: what is left is small beside noise.
+    /// Accurate enough to continue with more unknowns or other weights: the remainder is small compared with noise.
     Rough,
-    /// Good enough to be told: three digits of the deviations, and more of the values.
+    /// Accurate enough for results: three digits of the standard deviations, and more of the values.
     Fine,
 }
 
@@ -37,7 +36,7 @@ impl Until {
     }
 }
 
-/// Where the search ended.
+/// The end of the search.
 pub(crate) struct Minimum {
     pub problem: Problem,
     pub normal: Normal,
@@ -45,8 +44,8 @@ pub(crate) struct Minimum {
     pub steps: usize,
 }
 
-/// Walks from the problem's values to the next minimum of the cost (Levenberg–Marquardt); `None`
-/// where a corner is out of its camera's reach at the start, or the work is to end.
+/// Iterates from the problem's values to the next minimum of the cost (Levenberg–Marquardt); `None` if a camera cannot
+/// image a corner at the start, or the calibration was stopped.
 pub(crate) fn minimise(
     problem: Problem,
     whitening: &Whitening,

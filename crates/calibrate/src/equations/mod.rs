@@ -1,14 +1,13 @@
 //! Normal equations of a problem, and its minimum.
 //!
-//! Comes in: a problem and its whitening. Goes out: the minimum, and covariances of all unknowns.
+//! Input: a problem and its whitening. Output: the minimum, and covariances of all unknowns.
 //!
-//! 1. `layout` gives every unknown its column.
-//! 2. `block` has the equations of one panel in one picture; `frame` those of a frame, its pose eliminated.
-//! 3. `normal` sums blocks and eliminates the poses of frames, or the offsets of corners; and solves for a step;
-//!    `step` is that change of all unknowns.
-//!    `cholesky` factors and inverts large matrices by blocks.
-//! 4. `minimise` walks to the minimum (Levenberg–Marquardt).
-//! 5. `covariances` inverts the equations; `local_share` is what one frame tells of the unknowns that all share.
+//! 1. `layout` assigns a column to every unknown.
+//! 2. `block` forms the equations of one panel in one image, `frame` those of a frame with its pose eliminated.
+//! 3. `normal` sums blocks, eliminates the poses of frames or the offsets of corners, and solves for a step, a change
+//! of all unknowns (`step`). `cholesky` factors and inverts large matrices by blocks.
+//! 4. `minimise` iterates to the minimum (Levenberg–Marquardt).
+//! 5. `covariances` inverts the equations; `local_share` computes the contribution of one frame to the shared unknowns.
 
 pub(crate) mod block;
 mod cholesky;

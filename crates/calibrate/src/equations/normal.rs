@@ -7,9 +7,8 @@
 //!     (A − Σ B C⁻¹ Bᵀ) kept = a − Σ B C⁻¹ c,     part = C⁻¹ (c − Bᵀ kept)
 //! ```
 //!
-//! Where corners of the target are unknown too, no frame has an unknown in common with another frame but
-//! through them, nor a corner with another corner but through frames: of the two the one that has more
-//! unknowns is eliminated, and the other is kept.
+//! If corners of the target are unknown too, frames have unknowns in common only through corners, and corners only
+//! through frames. Of frames and corners, those with more unknowns are eliminated, and the others are kept.
 
 use std::ops::Range;
 
@@ -26,29 +25,29 @@ use crate::problem::corner_map::CornerMap;
 use crate::problem::whitening::Whitening;
 use deltille_core::damping::Damping;
 
-/// The equations of unknowns that are eliminated: a frame, or a corner.
+/// The equations of a group of eliminated unknowns: a frame, or a corner.
 #[derive(Clone, Debug)]
 pub(super) struct Part {
     pub c: DMatrix<f64>,
     pub right: DVector<f64>,
 }
 
-/// The normal equations at a point, and what the residuals cost there.
+/// The normal equations at a point, and the cost of the residuals there.
 #[derive(Clone, Debug)]
 pub(crate) struct Normal {
     pub cost: f64,
-    /// Columns of what all frames share, the first.
+    /// Number of the columns of the shared unknowns, which come first.
     pub(super) shared: usize,
     pub(super) a: DMatrix<f64>,
     right: DVector<f64>,
-    /// What is between what is kept (rows) and parts, one after the other (columns).
+    /// The coupling between kept unknowns (rows) and parts, one after the other (columns).
     pub(super) b: DMatrix<f64>,
     /// Frames, or corners.
     pub(super) parts: Vec<Part>,
 }
 
 impl Normal {
-    /// `None` where a corner is out of its camera's reach.
+    /// Forms the equations; `None` if a camera cannot image a corner.
     pub(crate) fn of(
         problem: &Problem,
         layout: &Layout,
@@ -75,7 +74,7 @@ impl Normal {
             let locals = some.par_iter().map(|(block, whitening_of)| {
                 Local::of(problem, layout, block, whitening_of, loss, whitening.sigma)
             });
-            // Summed in the order of the blocks, however many threads there are.
+            // The sum is in the order of the blocks, so it does not depend on the number of threads.
             let locals = locals.collect::<Vec<Option<Local>>>();
             for ((block, _), local) in some.iter().zip(locals) {
                 normal.add(layout, &local?, block.frame);
@@ -101,8 +100,8 @@ impl Normal {
         normal.cost.is_finite().then_some(normal)
     }
 
-    /// Adds what is known of a pose beforehand; `sigma` is the deviation of a whitened coordinate,
-    /// the unit in which costs are counted.
+    /// Adds the prior of a pose; `sigma` is the standard deviation of a whitened coordinate, the unit in which costs
+    /// are counted.
     fn add_prior(
         &mut self,
         off: Vector6<f64>,
@@ -121,7 +120,7 @@ impl Normal {
         }
     }
 
-    /// Adds what is expected of the corners' offsets.
+    /// Adds the prior of the corner offsets.
     fn add_map(&mut self, map: &CornerMap, layout: &Layout, sigma: f64) {
         let weights = map.prior_mm.map(|sd| (sigma / sd).powi(2));
         for (index, offset) in map.offsets_mm.iter().enumerate() {
@@ -143,8 +142,8 @@ impl Normal {
         }
     }
 
-    /// Adds a block, to the lower triangle of what is kept only: its columns ascend, and its last six are
-    /// those of the frame's pose.
+    /// Adds a block to the lower triangle of the kept unknowns only: its columns ascend, and its last six are those of
+    /// the frame's pose.
     fn add(&mut self, layout: &Layout, local: &Local, frame: usize) {
         self.cost += local.cost;
         let shared = local.columns.len();
@@ -183,7 +182,7 @@ impl Normal {
         local.corners.iter().for_each(|corner| self.add_corner(layout, local, corner, frame));
     }
 
-    /// Adds what a block says of a corner's offset.
+    /// Adds the contribution of a block to the equations of a corner's offset.
     fn add_corner(&mut self, layout: &Layout, local: &Local, corner: &OfCorner, frame: usize) {
         let (of_shared, of_frame) = corner.cross.split_at(local.columns.len());
         for k in 0..3 {
@@ -215,8 +214,8 @@ impl Normal {
         }
     }
 
-    /// The step of Levenberg and Marquardt: diagonals grow by the factor 1 + `damping`. `None`
-    /// where the equations have no unique solution.
+    /// The Levenberg–Marquardt step: diagonals grow by the factor 1 + `damping`. `None` if the equations have no unique
+    /// solution.
     pub(crate) fn step(&self, layout: &Layout, damping: Damping) -> Option<Step> {
         let Reduced { matrix, right, inverses } = self.reduced(damping)?;
         let kept = solve_scaled(matrix, right)?;
@@ -230,7 +229,7 @@ impl Normal {
         kept.iter().all(|v| v.is_finite()).then_some(step)
     }
 
-    /// By how much the cost falls along a step if the equations hold.
+    /// The reduction of the cost along a step as predicted by the equations.
     pub(crate) fn predicted(&self, layout: &Layout, step: &Step) -> f64 {
         let parts = self.parts.iter().map(|part| &part.right).collect::<Vec<_>>();
         let (frames, corners) = layout.split(&self.right, &parts);
@@ -240,7 +239,7 @@ impl Normal {
         shared + of_frames.chain(of_corners).sum::<f64>()
     }
 
-    /// B of some parts.
+    /// The columns of B of some parts.
     pub(super) fn between(&self, parts: Range<usize>) -> DMatrixView<'_, f64> {
         let size = self.b.ncols() / self.parts.len().max(1);
         self.b.columns(size * parts.start, size * parts.len())
@@ -256,7 +255,7 @@ impl Normal {
         through
     }
 
-    /// What is left of the equations when parts are eliminated. `None` where a frame's pose is open by itself.
+    /// The reduced equations after elimination of the parts. `None` if the pose of a frame is undetermined.
     pub(crate) fn reduced(&self, damping: Damping) -> Option<Reduced> {
         let grown = |diagonal: f64| damping.grown(diagonal);
         let (mut matrix, mut right) = (self.a.clone(), self.right.clone());
@@ -282,14 +281,14 @@ impl Normal {
     }
 }
 
-/// What is left of equations, S and s of S kept = s, and the inverses by which parts were eliminated.
+/// The reduced equations S kept = s, and the inverses of the eliminated parts.
 pub(crate) struct Reduced {
     pub matrix: DMatrix<f64>,
     pub right: DVector<f64>,
     pub(super) inverses: Vec<DMatrix<f64>>,
 }
 
-/// Parts whose share of the reduced equations is taken away at a time: as one product of matrices.
+/// Number of parts that are subtracted from the reduced equations in one matrix product.
 pub(super) const PARTS_AT_A_TIME: usize = 64;
 
 /// Solves symmetric equations after scaling their diagonal to 1.
@@ -304,7 +303,8 @@ fn solve_scaled(matrix: DMatrix<f64>, right: DVector<f64>) -> Option<DVector<f64
     Some(solution.component_mul(&scale))
 }
 
-/// Corners whose equations are held at a time, in whole blocks: enough for every thread, little for the memory.
+/// Number of corners whose equations are in memory at the same time, in whole blocks: enough for every thread, but
+/// little memory.
 const CORNERS_AT_A_TIME: usize = 100_000;
 
 #[cfg(test)]
@@ -333,8 +333,8 @@ mod tests {
         Map { frames: usize },
     }
 
-    /// Two cameras and two panels in three frames, every link open that may be, seen with noise; the same with a target
-    /// for each panel; or one camera and a panel that is bent, or whose corners are anywhere.
+    /// Two cameras and two panels in three frames with noise, and every link unknown that may be; the same with a
+    /// target for each panel; or one camera and a panel that is bent, or whose corners are unknown.
     fn problem(kind: Kind) -> Problem {
         let mut rng = ChaCha8Rng::seed_from_u64(7);
         let count = if matches!(kind, Kind::Rig | Kind::Scene) { 2 } else { 1 };
@@ -399,7 +399,7 @@ mod tests {
                 let panel = PanelRef::new(panel as usize, panel);
                 let block =
                     Block { camera: camera as usize, frame, panel, observations: seen.collect() };
-                let residuals = problem.residuals(&block).expect("all corners are in sight");
+                let residuals = problem.residuals(&block).expect("the cameras image all corners");
                 let mut block = block;
                 let seen = Arc::make_mut(&mut block.observations).iter_mut();
                 for (seen, residual) in seen.zip(residuals) {
@@ -426,7 +426,7 @@ mod tests {
         Whitening { blocks: problem.blocks.iter().map(of).collect(), common_px: None, sigma: 0.8 }
     }
 
-    /// All residuals, whitened: those of the corners, and what is off from what was known beforehand.
+    /// All whitened residuals: those of the corners, and the deviations from priors.
     fn residuals(problem: &Problem, whitening: &Whitening) -> DVector<f64> {
         let mut all = Vec::new();
         for (block, weights) in problem.blocks.iter().zip(&whitening.blocks) {
@@ -456,11 +456,11 @@ mod tests {
         Step { shared: DVector::from_column_slice(shared), frames, corners }
     }
 
-    /// Eliminating frames or corners changes nothing, and every derivative is that of the residuals: cost, step and
-    /// covariances are those of the whole equations, made from differences.
+    /// Elimination of frames or corners changes nothing, and every derivative matches the residuals: cost, step and
+    /// covariances equal those of the whole equations, formed by finite differences.
     #[test]
-    fn equations_are_those_of_the_residuals_differences() {
-        // Of few frames corners are eliminated, of many frames.
+    fn equations_match_finite_differences_of_the_residuals() {
+        // With few frames corners are eliminated, with many frames the frames.
         let maps = [5, 12].map(|frames| Kind::Map { frames });
         for kind in [Kind::Rig, Kind::Scene, Kind::Bent].into_iter().chain(maps) {
             let problem = problem(kind);
@@ -471,7 +471,7 @@ mod tests {
             let frames = problem.frames.len();
             let count = layout.shared + 6 * frames + of_corners;
             let column = |i: usize| {
-                // A ten-millionth of a pixel, about, whatever the unit.
+                // About a ten-millionth of a pixel, whatever the unit.
                 let unit = DVector::from_fn(count, |j, _| f64::from(u8::from(i == j)));
                 let at = |by: f64| {
                     residuals(
@@ -487,7 +487,7 @@ mod tests {
             let whole = jacobian.tr_mul(&jacobian);
             let scale = DVector::from_fn(count, |i, _| whole[(i, i)].sqrt());
             let scaled = DMatrix::from_fn(count, count, |i, j| whole[(i, j)] / scale[i] / scale[j]);
-            let inverse = scaled.cholesky().expect("nothing is open").inverse();
+            let inverse = scaled.cholesky().expect("everything is determined").inverse();
             let right = jacobian.tr_mul(&-&here).component_div(&scale);
             let expected = (&inverse * right).component_div(&scale);
 

@@ -1,4 +1,4 @@
-//! The estimate from an adjustment that settled: values, deviations, residuals and patterns in them.
+//! Assembles the estimate from a settled adjustment: values, standard deviations, residuals and patterns in them.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -33,11 +33,10 @@ use crate::uncertainty::state_equations::StateEquations;
 use deltille_core::camera::PROJECTION_PARAMETERS;
 
 impl Estimate {
-    /// What was settled on; `frames` are those of the settled problem, and `f_ratio` is that of the
-    /// shape.
+    /// Assembles the estimate; `frames` are those of the settled problem, and `f_ratio` is that of the shape.
     ///
     /// # Errors
-    /// Where views leave the pose of a frame, a camera or a panel open.
+    /// Returns an error if the views do not determine the pose of a frame, a camera or a panel.
     pub(crate) fn new(
         calibration: &Calibration,
         frames: &[&Frame],
@@ -114,7 +113,7 @@ impl Estimate {
     }
 }
 
-/// The poses of cameras, panels and targets that the views leave open, in words.
+/// The poses of cameras, panels and targets that the views do not determine, in words.
 fn open_poses(calibration: &Calibration, minimum: &Minimum, found: &Covariances) -> Vec<String> {
     let Minimum { problem, layout, .. } = minimum;
     let is_open = |first: Option<usize>| {
@@ -132,7 +131,7 @@ fn open_poses(calibration: &Calibration, minimum: &Minimum, found: &Covariances)
     of_cameras.chain(of_panels).chain(of_targets).collect()
 }
 
-/// What the views of each camera say of its state, in the natural order of their names.
+/// The state equations of the views of each camera, in the natural order of their names.
 fn states(frames: &[&Frame], settled: &Settled, loss: Loss) -> Vec<Option<StateEquations>> {
     let Settled { minimum, whitening, .. } = settled;
     let names = in_order(frames.iter().map(|frame| frame.name.as_str()).collect());
@@ -166,7 +165,7 @@ fn frame_estimates(
     of_frames.collect()
 }
 
-/// The views of every camera, with all corners that are within its reach.
+/// The views of every camera, with all corners that the camera can image.
 fn views(cameras: &[CameraViews], frames: &[&Frame], settled: &Settled) -> Vec<Vec<ViewEstimate>> {
     let Settled { problem, outliers, .. } = settled;
     let mut corners: BTreeMap<(usize, usize), Vec<Corner>> = BTreeMap::new();
@@ -208,7 +207,7 @@ fn camera_estimate(
     let unknowns = &problem.cameras[index];
     let columns = &layout.parameters[index];
     let names = unknowns.camera.parameter_names();
-    // Of a spline no number means anything by itself.
+    // Single knots of a spline have no meaning on their own.
     let is_spline = unknowns.roughness.is_some();
     let is_loose = |&(i, column): &(usize, usize)| {
         found.loose.contains(&column)
@@ -242,7 +241,7 @@ fn camera_estimate(
     }
 }
 
-/// How a camera's projections are known, with the covariance of what all frames share as these show it.
+/// The projection uncertainty of a camera; the frames give the observed covariance of the shared unknowns.
 fn projection(
     camera: &CameraEstimate,
     state: &Option<StateEquations>,
@@ -273,20 +272,20 @@ fn projection(
     ProjectionUncertainty::of(problem, whitening, index, &free, distances_mm, observed)
 }
 
-/// Least sum of the weights of a corner's observations for its position to be measured: a view has two
-/// coordinates, a position three.
+/// Least sum of the weights of a corner's observations for a measured position: a view has two coordinates, a position
+/// three.
 const LEAST_VIEWS: f64 = 2.0;
 
-/// Least mean weight of them: a majority.
+/// Least mean weight of these observations: a majority.
 const LEAST_WEIGHT: f64 = 0.5;
 
-/// Whether a position rests on observations that count.
+/// Whether a position rests on too few effective observations.
 fn rests_on_few(&(weight, count): &(f64, usize)) -> bool {
     weight < LEAST_VIEWS || weight < LEAST_WEIGHT * count as f64
 }
 
-/// For each corner the weights of its observations, summed, and their number. Outliers weigh nothing; views in
-/// which the whole panel takes no part are left out.
+/// For each corner, the sum of the weights of its observations and their number. Outliers have no weight; views whose
+/// whole panel is excluded are omitted.
 fn weights(map: &CornerMap, settled: &Settled, loss: Loss) -> Vec<(f64, usize)> {
     let Settled { minimum, whitening, problem, outliers } = settled;
     let mut weights = vec![(0.0, 0); map.len()];

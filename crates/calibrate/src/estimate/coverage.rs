@@ -1,11 +1,11 @@
-//! How many corners a camera saw in each part of its image: what is left of them where they are not listed.
+//! Numbers of corners in the parts of an image, kept when the corners themselves are not listed.
 
 use glam::DVec2;
 
-/// Cells along the longer side of the image.
+/// Number of cells along the longer side of the image.
 const CELLS: f64 = 40.0;
 
-/// Corners in each cell of an image, outliers left out.
+/// Numbers of corners in the cells of an image, without outliers.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Coverage {
     columns: usize,
@@ -14,13 +14,13 @@ pub struct Coverage {
 }
 
 impl Coverage {
-    /// Of counts row by row from the top; `None` where these are not one for each cell.
+    /// Creates a coverage from counts, row by row from the top; `None` if there is not one count for each cell.
     pub fn new(columns: usize, rows: usize, counts: Vec<u32>) -> Option<Self> {
         let is_whole = columns.checked_mul(rows) == Some(counts.len());
         is_whole.then_some(Self { columns, rows, counts })
     }
 
-    /// Of corners at these places in an image of this size, px.
+    /// Counts corners at these positions in an image of this size, px.
     pub(super) fn counted(size: DVec2, corners: impl Iterator<Item = DVec2>) -> Self {
         let cells = (size * CELLS / size.max_element()).round().max(DVec2::ONE);
         let (columns, rows) = (cells.x as usize, cells.y as usize);
@@ -33,17 +33,17 @@ impl Coverage {
         Self { columns, rows, counts }
     }
 
-    /// Cells along a row, and rows.
+    /// Number of cells along a row, and number of rows.
     pub fn cells(&self) -> [usize; 2] {
         [self.columns, self.rows]
     }
 
-    /// Corners in each cell, row by row from the top.
+    /// Number of corners in each cell, row by row from the top.
     pub fn counts(&self) -> &[u32] {
         &self.counts
     }
 
-    /// The middle of each cell of an image of this size in which there are corners, px, and how many these are.
+    /// The centre, px, and the number of corners of each non-empty cell, for an image of this size.
     pub(crate) fn places(&self, size: DVec2) -> impl Iterator<Item = (DVec2, u32)> {
         let step = size / DVec2::new(self.columns as f64, self.rows as f64);
         let seen = self.counts.iter().enumerate().filter(|(_, count)| **count > 0);

@@ -1,4 +1,4 @@
-//! The image circle of a fisheye, from the corners that were seen.
+//! The image circle of a fisheye, estimated from the detected corners.
 
 use std::f64::consts::TAU;
 
@@ -9,24 +9,24 @@ use deltille_core::camera::Camera;
 /// The image circle of a fisheye.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ImageCircle {
-    /// Its middle, px.
+    /// Its centre, px.
     pub centre_px: DVec2,
     /// Its radius, px.
     pub radius_px: f64,
 }
 
-/// Directions from the middle in which the outermost corners are compared: between a side of the image
-/// and its corner lie several.
+/// Number of directions from the centre in which the outermost corners are compared; several lie between a side of the
+/// image and its corner.
 const DIRECTIONS: usize = 16;
 
-/// Corners lie on the rim of a circle from this part of its radius on: boards reach the rim with their
-/// last row of corners, not with their paper.
+/// Fraction of the radius from which corners count as on the rim of the circle: boards reach the rim with their last
+/// row of corners, not with their paper.
 const RIM: f64 = 0.85;
 
 impl ImageCircle {
-    /// The image circle of a camera that saw these corners; `None` where its lens shows all of the
-    /// image, as perspective ones do. There is one where corners fill one, and where corners of the
-    /// image are beyond what the lens sees.
+    /// Finds the image circle of a camera from the detected corners; `None` if the lens covers the whole image, as
+    /// perspective lenses do. There is a circle if the corners fill one, or if the lens does not image the corners of
+    /// the image.
     pub fn of(camera: &Camera, seen: &[DVec2]) -> Option<Self> {
         if camera.lens.is_perspective() {
             return None;
@@ -39,8 +39,7 @@ impl ImageCircle {
         Self::filled(camera, seen).or_else(by_lens)
     }
 
-    /// The circle that corners fill: it reaches the nearest side and leaves the corners of the image
-    /// empty.
+    /// Finds the circle that the corners fill: it reaches the nearest side and leaves the corners of the image empty.
     pub(crate) fn filled(camera: &Camera, seen: &[DVec2]) -> Option<Self> {
         if camera.lens.is_perspective() {
             return None;
@@ -62,14 +61,14 @@ impl ImageCircle {
         is_circle.then_some(Self { centre_px, radius_px })
     }
 
-    /// Distance of a pixel position from the middle, px.
+    /// Distance of a pixel position from the centre, px.
     pub fn radius_of(&self, pixel: DVec2) -> f64 {
         let from_centre = pixel - self.centre_px;
         from_centre.x.hypot(from_centre.y)
     }
 }
 
-/// How far from the principal point a lens sees towards a corner of the image that it does not see.
+/// Radius from the principal point up to which a lens images the direction of an image corner beyond its range.
 fn seen_towards(camera: &Camera, corner: DVec2) -> Option<f64> {
     let centre = camera.centre_px;
     let at = |part: f64| centre + part * (corner - centre);
@@ -91,7 +90,7 @@ mod tests {
     use deltille_core::camera::{BrownConrady, KannalaBrandt, Lens};
 
     #[test]
-    fn a_fisheye_has_a_circle_where_corners_fill_one_or_the_lens_ends() {
+    fn a_fisheye_has_a_circle_if_corners_fill_one_or_the_lens_ends() {
         let fisheye = |k: f64| {
             let lens = Lens::KannalaBrandt(KannalaBrandt { k: vec![k, 0.0, 0.0, 0.0] });
             Camera::centred(1600, 1200, 380.0, lens)
@@ -105,7 +104,7 @@ mod tests {
         let lens = fisheye(-0.01);
         let filled = ImageCircle::of(&lens, &disc(&lens, 590.0)).unwrap();
         assert!((filled.radius_px - 600.0).abs() < 1.0, "{filled:?}");
-        // A small disc says nothing, nor do corners in the corners of the image.
+        // Neither a small disc nor corners in the corners of the image imply a circle.
         assert_eq!(ImageCircle::of(&lens, &disc(&lens, 300.0)), None);
         let mut all = disc(&lens, 590.0);
         all.extend([DVec2::new(20.0, 20.0), DVec2::new(1580.0, 1180.0)]);

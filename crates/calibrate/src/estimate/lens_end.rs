@@ -53,7 +53,7 @@ mod tests {
 
     #[test]
     fn only_a_fold_within_the_image_is_reported() {
-        // r (1 − r²/3) turns back at 2/3 of the focal length.
+        // r (1 − r²/3) folds back at 2/3 of the focal length.
         let lens = BrownConrady { radial: [-1.0 / 3.0, 0.0, 0.0], ..BrownConrady::default() };
         let camera = |focal| Camera::centred(1600, 1200, focal, Lens::BrownConrady(lens));
         let seen = [DVec2::new(800.0, 600.0), DVec2::new(800.0, 100.0)];

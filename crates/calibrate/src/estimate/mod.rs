@@ -1,12 +1,12 @@
-//! The result of a calibration, as values.
+//! The result of a calibration.
 //!
-//! Comes in: what was settled on. Goes out: a [`values::Estimate`].
+//! Input: the settled adjustment. Output: a [`values::Estimate`].
 //!
 //! 1. `values` are cameras, targets, frames, views and corners with residuals.
-//! 2. `target_map` (measured corners), `coverage` (where corners were seen), `lens_end` and `image_circle` (up to where a lens
-//!    is good) are parts of it.
-//! 3. `uncertainty_map` is how sure a camera is over its image.
-//! 4. `assemble` makes the estimate.
+//! 2. `target_map` (measured corners), `coverage` (where corners were seen), `lens_end` and `image_circle` (extent of
+//! the lens) are parts of it.
+//! 3. `uncertainty_map` is the projection uncertainty of a camera over its image.
+//! 4. `assemble` builds the estimate.
 
 pub(crate) mod assemble;
 pub(crate) mod coverage;

@@ -1,4 +1,4 @@
-//! How sure an estimated camera is of where it projects a point, over its image.
+//! The projection uncertainty of an estimated camera over its image.
 
 use glam::DVec2;
 
@@ -6,30 +6,30 @@ use super::values::CameraEstimate;
 use crate::matrix::Matrix;
 use crate::uncertainty::projection::{Source, by_motion, by_parameters, seen_at};
 
-/// How sure a camera is over its image.
+/// A map of the projection uncertainty of a camera over its image.
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct UncertaintyMap {
-    /// How far the points are; `None` of points at infinity.
+    /// Distance of the points, mm; `None` for points at infinity.
     pub distance_mm: Option<f64>,
-    /// Where the deviations come from.
+    /// The source of the standard deviations.
     pub source: Source,
-    /// Number of places along a row.
+    /// Number of positions along a row.
     pub columns: usize,
     /// Number of rows.
     pub rows: usize,
-    /// Row by row the standard deviation of a projection along the worst direction, px; `None` beyond the lens.
+    /// Standard deviation of a projection along the worst direction, px, row by row; `None` beyond the lens.
     pub sd_px: Vec<Option<f64>>,
 }
 
-/// Places along the longer side of an image.
+/// Number of positions along the longer side of an image.
 const PLACES: usize = 24;
 
-/// So many corners tell how sure a camera is where it saw any.
+/// Number of corners that suffices for the mean uncertainty over the seen part of the image.
 const ENOUGH_CORNERS: usize = 1000;
 
 impl CameraEstimate {
-    /// The covariance of its parameters that were found, in their order; `None` where it is not known from there.
+    /// The covariance of its estimated parameters, in their order; `None` if this source does not provide one.
     pub fn covariance_from(&self, source: Source) -> Option<&Matrix> {
         match source {
             Source::Noise => (self.covariance.rows() > 0).then_some(&self.covariance),
@@ -37,8 +37,8 @@ impl CameraEstimate {
         }
     }
 
-    /// Covariance of where the camera projects what a pixel shows, px²; `None` beyond the lens, or where it is
-    /// not known. The point is so many mm away, or at infinity.
+    /// Covariance of the projection of the point seen at a pixel, px²; `None` beyond the lens, or if it is not known.
+    /// The point is at a distance in mm, or at infinity.
     pub fn projection_covariance(
         &self,
         pixel: DVec2,
@@ -58,7 +58,7 @@ impl CameraEstimate {
         Some([[found[(0, 0)], found[(0, 1)]], [found[(1, 0)], found[(1, 1)]]])
     }
 
-    /// How sure it is over its image of points so many mm away, or at infinity. `None` where that is not known.
+    /// The uncertainty map for points at a distance in mm, or at infinity; `None` if it is not known.
     pub fn uncertainty_map(
         &self,
         distance_mm: Option<f64>,
@@ -78,8 +78,9 @@ impl CameraEstimate {
         Some(UncertaintyMap { distance_mm, source, columns, rows, sd_px })
     }
 
-    /// How sure it is over its image of points at infinity, and at the distances of
-    /// [`ProjectionUncertainty::distances_mm`](crate::ProjectionUncertainty::distances_mm): as far as these are known, from noise and observed.
+    /// The uncertainty maps at infinity and at the distances of
+    /// [`ProjectionUncertainty::distances_mm`](crate::ProjectionUncertainty::distances_mm), from noise and observed, as
+    /// far as these are known.
     pub fn uncertainty_maps(&self) -> Vec<UncertaintyMap> {
         let distances = self.projection.iter().flat_map(|known| &known.distances_mm);
         let distances = std::iter::once(None).chain(distances.map(|&mm| Some(mm)));
@@ -87,8 +88,7 @@ impl CameraEstimate {
         both.filter_map(|(mm, source)| self.uncertainty_map(mm, source)).collect()
     }
 
-    /// Standard deviation of a coordinate of a projection, px, the root of its mean square over where corners were
-    /// seen. `None` where it is not known.
+    /// Standard deviation of a projection per axis, px: the RMS over the detected corners. `None` if it is not known.
     pub fn projection_sd_px(&self, distance_mm: Option<f64>, source: Source) -> Option<f64> {
         let every = self.corner_count().div_ceil(ENOUGH_CORNERS).max(1);
         let corners = self.corners().step_by(every).map(|corner| (corner.pixel, 1));
@@ -106,8 +106,8 @@ impl CameraEstimate {
         (total > 0.0).then(|| (sum / total).sqrt())
     }
 
-    /// Standard deviation of each of its parameters as the frames agree with each other; `None` of those that were
-    /// not found, or where it is not known.
+    /// Observed standard deviation of each of its parameters; `None` for parameters that were not estimated, or if it
+    /// is not known.
     pub fn observed_sd(&self) -> Vec<Option<f64>> {
         let observed = self.covariance_from(Source::Observed);
         let mut of_found = (0..).filter_map(|i| observed.map(|c| c[(i, i)].sqrt()));
@@ -116,7 +116,7 @@ impl CameraEstimate {
         parameters.map(|p| if known && p.sd.is_some() { of_found.next() } else { None }).collect()
     }
 
-    /// Indices of the parameters that were found.
+    /// Indices of the estimated parameters.
     pub(crate) fn free(&self) -> Vec<usize> {
         let parameters = self.parameters.iter().enumerate();
         parameters.filter(|(_, p)| p.sd.is_some()).map(|(index, _)| index).collect()

@@ -32,41 +32,40 @@ use deltille_core::targets::{Name, PanelPose, Target, TargetIdentity};
 pub struct Estimate {
     /// The cameras, in the order given.
     pub cameras: Vec<CameraEstimate>,
-    /// The moments at which pictures were taken: in the order of the views of a single camera, by name for
-    /// a rig.
+    /// The frames, that is, the times at which images were taken: in the order of the views for a single camera, by
+    /// name for a rig.
     pub frames: Vec<FrameEstimate>,
-    /// The targets, in the order given; the scene is that of the first one that was seen.
+    /// The targets, in the order given; the scene frame is that of the first target that was seen.
     pub targets: Vec<TargetEstimate>,
-    /// Identities of the targets that the cameras were calibrated with; empty where they are not known.
+    /// Identities of the targets used for the calibration; empty if they are not known.
     pub calibrated_with: Vec<TargetIdentity>,
-    /// The panels of all targets; those that were found have a covariance.
+    /// The panels of all targets; estimated poses have a covariance.
     pub panels: Vec<PanelPlace>,
-    /// The shape of the board's sheet, where it was to be found.
+    /// The shape of the board's sheet, if it was estimated.
     pub shape: Option<BoardShape>,
-    /// Where the corners of the target are, where that was to be found.
+    /// The positions of the corners of the target, if they were estimated.
     pub map: Option<TargetMap>,
-    /// Root mean square error of a coordinate over all corners, px: √(Σ(dx² + dy²)/2N).
+    /// RMS reprojection error per axis over all corners, px: √(Σ(dx² + dy²)/2N).
     pub rms_px: f64,
-    /// The deviation that was added to every corner's covariance, px; `None` where corners were
-    /// taken as equally precise.
+    /// The common standard deviation added to the covariance of every corner, px; `None` if all corners had equal
+    /// weight.
     pub common_px: Option<f64>,
-    /// A-posteriori standard deviation of a coordinate: in px where corners were taken as equally
-    /// precise, else in units of what its covariance says. All covariances are scaled by its square.
+    /// A-posteriori standard deviation per axis: in px if all corners had equal weight, else in units of the standard
+    /// deviation from the corner's covariance. All covariances are scaled by its square.
     pub sigma: f64,
-    /// Views and frames that do not belong with the others and took no part, and why.
+    /// Excluded views and frames, with the reasons.
     pub excluded: Vec<Excluded>,
-    /// What outliers share, and corners that were left out together.
+    /// Findings: what outliers have in common, and corners that were excluded together.
     pub findings: Vec<Finding>,
-    /// Patterns in the residuals that noise does not make, the strongest first.
+    /// Patterns in the residuals that noise does not explain, the strongest first.
     pub lack_of_fit: Vec<LackOfFit>,
-    /// The same cameras in frames that took no part, where some were held out; only the poses of the
-    /// target were found there.
+    /// The same cameras in the held-out frames, if there are any; only the poses of the target were estimated there.
     pub held_out: Option<Box<Estimate>>,
     /// Number of iterations of the last bundle adjustment.
     pub steps: usize,
-    /// What the corners say of the first camera and the board's shape, by which views are proposed.
+    /// The information on the first camera and the board's shape, from which views are proposed.
     pub(crate) known: Option<KnownSoFar>,
-    /// What the views of each camera say of its state.
+    /// The state equations of the views of each camera.
     pub(crate) states: Vec<Option<StateEquations>>,
 }
 
@@ -74,70 +73,71 @@ pub struct Estimate {
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct CameraEstimate {
-    /// Name of the camera, as it was given.
+    /// Name of the camera, as given.
     pub name: String,
     /// The camera with its estimated parameters.
     pub camera: Camera,
-    /// The model that was estimated; `None` where the camera was given.
+    /// The estimated model; `None` if the camera was given.
     pub model: Option<Model>,
-    /// All its parameters, estimated and kept ones.
+    /// All its parameters, both estimated and fixed.
     pub parameters: Vec<Parameter>,
     /// Covariance of the estimated parameters, in their order; each entry in the product of their units.
     pub covariance: Matrix,
-    /// How sure it is of where it projects a point; `None` where it was given, or where its motion is open.
+    /// The projection uncertainty; `None` if the camera was given, or if its motion is undetermined.
     pub projection: Option<ProjectionUncertainty>,
-    /// Names of parameters that the views cannot tell apart: some change of them together moves no
-    /// corner, and their deviations are the least that they can be; or hardly any, so that neither the
-    /// value nor the deviation of one alone means anything.
+    /// Names of ill-conditioned parameters. Either a joint change of them moves no corner; then their standard
+    /// deviations are lower bounds. Or it moves corners hardly at all; then neither the value nor the standard
+    /// deviation of a single parameter is meaningful.
     pub ill_conditioned: Vec<String>,
     /// Pose on the rig: from the rig frame to the camera frame, mm.
     pub camera_from_rig: Pose,
-    /// Standard deviations of that pose: of a rotation (rad) and a translation (mm) about the camera's axes; `None`
-    /// where it was not to be found, as of the first camera, which is the rig.
+    /// Standard deviations of that pose: rotation (rad) and translation (mm) about the camera's axes; `None` if it was
+    /// not estimated, as for the first camera, which is the rig frame.
     pub pose_sd: Option<[f64; 6]>,
-    /// The same as the frames agree with each other; `None` where it was not to be found, or of too few frames.
+    /// Observed standard deviations of that pose, from the scatter between frames; `None` if it was not estimated, or
+    /// with too few frames.
     pub observed_pose_sd: Option<[f64; 6]>,
-    /// By how many frames its pictures are late, against those of most other cameras: a picture of it shows the moment
-    /// that theirs of so many frames before show.
+    /// Lag of its images in frames, relative to most other cameras: its image shows the moment that the others showed
+    /// so many frames earlier.
     pub delay: i32,
-    /// How its labels were rotated so that the cameras of a rig agree, where the board looks the same after a rotation
-    /// and the detected labels do not agree, or do not decide; `None` where neither is the case.
+    /// The rotation of its labels that makes the cameras of a rig agree, for a board that looks the same after a
+    /// rotation. `None` if there is no such board, or the detected labels agree and are decisive.
     pub label_rotation: Option<LabelRotation>,
-    /// The views that took part, in the order of the frames.
+    /// The used views, in the order of the frames.
     pub views: Vec<ViewEstimate>,
-    /// Where corners were seen, of a camera whose views do not list them, as one that was read from a file.
+    /// Where corners were seen, for a camera whose views do not list them, such as one read from a file.
     pub coverage: Option<Coverage>,
-    /// Root mean square error of a coordinate over all its views, px.
+    /// RMS reprojection error per axis over all its views, px.
     pub rms_px: f64,
-    /// What was expected of the knots of a spline that was found.
+    /// The prior of the knots of an estimated spline.
     pub(crate) roughness: Option<Roughness>,
 }
 
-/// Where a target is.
+/// The pose of a target.
 #[derive(Clone, Debug, PartialEq)]
 pub struct TargetEstimate {
-    /// Its name; empty where it is the only one.
+    /// Its name; empty if it is the only one.
     pub name: String,
-    /// Its panels among all.
+    /// Range of its panels among all panels.
     pub panels: Range<usize>,
-    /// Where it is to the first target.
+    /// Pose relative to the first target.
     pub scene_from_target: Pose,
-    /// Standard deviations of that: of a turn (rad) and a move (mm) along the first target's axes; `None` where it
-    /// was not to be found, as of the first target.
+    /// Standard deviations of that pose: rotation (rad) and translation (mm) along the first target's axes; `None` if
+    /// it was not estimated, as for the first target.
     pub pose_sd: Option<[f64; 6]>,
 }
 
-/// A moment at which the cameras took pictures, and the pose of the target in it.
+/// A time at which the cameras took images, and the pose of the target then.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FrameEstimate {
     /// Name of the frame: that of its views.
     pub name: String,
-    /// Pose of the target, of several the first: from the target frame to the rig frame, mm. Of a single camera the rig frame is the camera
-    /// frame.
+    /// Pose of the target (the first of several): from the target frame to the rig frame, mm. For a single camera, the
+    /// rig frame is the camera frame.
     pub rig_from_target: Pose,
-    /// Standard deviations of that pose: of a rotation (rad) and a translation (mm) about the rig's axes.
+    /// Standard deviations of that pose: rotation (rad) and translation (mm) about the rig's axes.
     pub pose_sd: [f64; 6],
-    /// Root mean square error of a coordinate over all cameras, px.
+    /// RMS reprojection error per axis over all cameras, px.
     pub rms_px: f64,
 }
 
@@ -146,9 +146,9 @@ pub struct FrameEstimate {
 pub struct Parameter {
     /// Name, such as `k1`.
     pub name: String,
-    /// Value: px for focal lengths and the principal point, mm for shifts of the pupil, else without unit.
+    /// Value: px for focal lengths and the principal point, mm for shifts of the pupil, else dimensionless.
     pub value: f64,
-    /// Standard deviation, in the unit of the value; `None` where the parameter was given.
+    /// Standard deviation, in the unit of the value; `None` if the parameter was given.
     pub sd: Option<f64>,
 }
 
@@ -157,13 +157,13 @@ pub struct Parameter {
 pub struct ViewEstimate {
     /// Name of the view.
     pub name: String,
-    /// File name of its picture.
+    /// File name of its image.
     pub image: String,
     /// Index of the frame in which it was taken.
     pub frame: usize,
-    /// Pose of the target, of several the first: from the target frame to the camera frame, mm.
+    /// Pose of the target (the first of several): from the target frame to the camera frame, mm.
     pub pose: Pose,
-    /// Root mean square error of a coordinate, px.
+    /// RMS reprojection error per axis, px.
     pub rms_px: f64,
     /// The corners.
     pub corners: Vec<Corner>,
@@ -180,9 +180,9 @@ pub struct Corner {
     pub col: i32,
     /// Detected position, px.
     pub pixel: DVec2,
-    /// Residual: detected less predicted position, px.
+    /// Residual: detected minus predicted position, px.
     pub residual: DVec2,
-    /// Whether the residual is larger than chance explains, see [`Loss`](crate::Loss).
+    /// Whether the residual is an outlier, larger than noise explains, see [`Loss`](crate::Loss).
     pub outlier: bool,
 }
 
@@ -192,17 +192,17 @@ impl Estimate {
         self.cameras.iter().flat_map(CameraEstimate::corners)
     }
 
-    /// How many corners took part.
+    /// Number of used corners.
     pub fn corner_count(&self) -> usize {
         self.corners().count()
     }
 
-    /// How many corners are outliers.
+    /// Number of outliers.
     pub fn outlier_count(&self) -> usize {
         self.corners().filter(|corner| corner.outlier).count()
     }
 
-    /// In how many views a corner of the target was seen, the median of all.
+    /// Median number of views that show a corner of the target.
     pub fn views_of_a_corner(&self) -> usize {
         let mut counts: BTreeMap<_, usize> = BTreeMap::new();
         for corner in self.corners() {
@@ -212,24 +212,24 @@ impl Estimate {
         median(counts).unwrap_or(0.0) as usize
     }
 
-    /// [`Self::rms_px`] of the corners that are no outliers.
+    /// [`Self::rms_px`] without outliers.
     pub fn inlier_rms_px(&self) -> f64 {
         rms_px(self.corners().filter(|corner| !corner.outlier))
     }
 
-    /// The name of a camera where there are several, by which it is told from the others.
+    /// The name of a camera if there are several.
     pub fn camera_name(&self, camera: usize) -> Option<&str> {
         let cameras = &self.cameras;
         cameras.get(camera).filter(|_| cameras.len() > 1).map(|camera| camera.name.as_str())
     }
 
-    /// The name of a target where there are several, by which its panels are told from others.
+    /// The name of the target of a panel if there are several targets.
     pub fn target_name(&self, panel: PanelRef) -> Option<&str> {
         let of_panel = self.targets.iter().find(|target| target.panels.contains(&panel.index()));
         of_panel.filter(|_| self.targets.len() > 1).map(|target| target.name.as_str())
     }
 
-    /// What is known of one of several targets, and of what was seen of it, as if it were the only one.
+    /// The estimate of one of several targets and its observations, as if it were the only one.
     #[must_use]
     pub fn of_target(&self, target: usize) -> Self {
         let Some(of) = self.targets.get(target) else { return self.clone() };
@@ -239,7 +239,7 @@ impl Estimate {
         Self { panels, map, targets, ..Self::default() }
     }
 
-    /// Which other cameras saw the target in the same frames, of each camera.
+    /// For each camera, the other cameras that saw the target in the same frames.
     pub fn overlaps(&self) -> Vec<Vec<usize>> {
         let frames = self.cameras.iter();
         let frames = frames.map(|camera| camera.views.iter().map(|view| view.frame).collect());
@@ -251,13 +251,13 @@ impl Estimate {
         (0..frames.len()).map(others).collect()
     }
 
-    /// Whether panels were to be found.
+    /// Whether panel poses were estimated.
     pub fn has_refined_panels(&self) -> bool {
         self.panels.iter().any(|panel| panel.covariance.is_some())
     }
 
-    /// The target with its panels where they were found, named `<target>-refined`. [`TargetMap::on`] does the
-    /// same for its corners.
+    /// Returns the target with its estimated panel poses, named `<target>-refined`. [`TargetMap::on`] does the same for
+    /// its corners.
     pub fn refined(&self, target: &Target) -> Target {
         let poses = self.panels.iter();
         let poses =
@@ -269,7 +269,7 @@ impl Estimate {
         refined
     }
 
-    /// How many unknowns were found beside the poses of the frames.
+    /// Number of estimated unknowns besides the poses of the frames.
     pub(crate) fn unknown_count(&self) -> usize {
         let of_panels = self.panels.iter().filter(|panel| panel.covariance.is_some()).count();
         let of_cameras = self
@@ -283,7 +283,7 @@ impl Estimate {
 }
 
 impl CameraEstimate {
-    /// A camera that was given, in the place of the rig, without views.
+    /// Creates a given camera at the rig frame, without views.
     pub fn given(name: &str, camera: Camera) -> Self {
         let values = camera.parameter_names().into_iter().zip(camera.parameters());
         let parameter = |(name, value)| Parameter { name, value, sd: None };
@@ -307,7 +307,7 @@ impl CameraEstimate {
         }
     }
 
-    /// Removes all uncertainties, as of a calibration that failed: they follow from residuals that the model does not explain.
+    /// Removes all uncertainties of a failed calibration: they follow from residuals that the model does not explain.
     pub fn forget_uncertainties(&mut self) {
         self.covariance = Matrix::empty();
         (self.projection, self.pose_sd, self.observed_pose_sd) = (None, None, None);
@@ -323,33 +323,33 @@ impl CameraEstimate {
         self.views.iter().flat_map(|view| &view.corners)
     }
 
-    /// How many corners took part.
+    /// Number of used corners.
     pub fn corner_count(&self) -> usize {
         self.corners().count()
     }
 
-    /// How many corners are outliers.
+    /// Number of outliers.
     pub fn outlier_count(&self) -> usize {
         self.corners().filter(|corner| corner.outlier).count()
     }
 
-    /// [`Self::rms_px`] of the corners that are no outliers.
+    /// [`Self::rms_px`] without outliers.
     pub fn inlier_rms_px(&self) -> f64 {
         rms_px(self.corners().filter(|corner| !corner.outlier))
     }
 
-    /// Correlation of two of the parameters that were found.
+    /// Correlation of two of the estimated parameters.
     pub fn correlation(&self, i: usize, j: usize) -> f64 {
         let c = &self.covariance;
         c[(i, j)] / (c[(i, i)] * c[(j, j)]).sqrt()
     }
 
-    /// The names of the parameters that were found.
+    /// The names of the estimated parameters.
     pub fn found(&self) -> impl Iterator<Item = &str> {
         self.parameters.iter().filter(|p| p.sd.is_some()).map(|p| p.name.as_str())
     }
 
-    /// Where the lens ends to be good, if that is within the image.
+    /// The fold or pole of the lens model within the image, if there is one.
     pub fn lens_end(&self) -> Option<LensEnd> {
         let seen: Vec<DVec2> = self.corners().map(|corner| corner.pixel).collect();
         LensEnd::of(&self.camera, &seen)
@@ -357,7 +357,7 @@ impl CameraEstimate {
 }
 
 impl Coverage {
-    /// Where a camera saw corners: those of its views, else what is known of it without them.
+    /// The corners of a camera's views, or the stored coverage if the views do not list them.
     pub fn of(camera: &CameraEstimate) -> Self {
         match &camera.coverage {
             Some(known) if camera.corners().next().is_none() => known.clone(),
@@ -370,13 +370,13 @@ impl Coverage {
 }
 
 impl ViewEstimate {
-    /// How many of its corners are outliers.
+    /// Number of outliers among its corners.
     pub fn outlier_count(&self) -> usize {
         self.corners.iter().filter(|corner| corner.outlier).count()
     }
 }
 
-/// √(Σ(dx² + dy²)/2N); zero of none.
+/// √(Σ(dx² + dy²)/2N); zero without corners.
 pub(super) fn rms_px<'a>(corners: impl Iterator<Item = &'a Corner>) -> f64 {
     let residuals = corners.map(|corner| corner.residual);
     let (sum, count) =

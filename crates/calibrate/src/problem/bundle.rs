@@ -15,7 +15,7 @@ use deltille_core::camera::Pose;
 pub(crate) struct Problem {
     /// Cameras.
     pub cameras: Vec<CameraUnknowns>,
-    /// rig_from_scene, for each moment at which pictures were taken.
+    /// The poses `rig_from_scene`, one for each frame.
     pub frames: Vec<Pose>,
     /// Targets.
     pub targets: Vec<TargetUnknowns>,
@@ -23,34 +23,34 @@ pub(crate) struct Problem {
     pub panels: Vec<PanelUnknowns>,
     /// Observations.
     pub blocks: Vec<Block>,
-    /// How the panels' sheets differ from their plan, where that is unknown too; of one panel.
+    /// The deviation of the sheet from its plan, if it is unknown; for one panel only.
     pub shape: Option<Shape>,
-    /// How the corners differ from their plan, each by itself, where that is unknown.
+    /// The offset of each corner from its plan, if they are unknown.
     pub map: Option<CornerMap>,
-    /// Whether the work is to end.
+    /// Flag that stops the calibration.
     pub stop: Stop,
 }
 
 impl Problem {
-    /// Where the target of a panel is in the scene.
+    /// The pose of a panel's target in the scene.
     #[inline]
     pub(crate) fn scene_from_target(&self, panel: PanelRef) -> Pose {
         self.targets[self.panels[panel.index()].target].scene_from_target
     }
 
-    /// Where a panel is in the scene.
+    /// The pose of a panel in the scene.
     pub(crate) fn scene_from_panel(&self, panel: PanelRef) -> Pose {
         self.scene_from_target(panel).after(&self.panels[panel.index()].target_from_panel)
     }
 
-    /// Where all panels are in the scene.
+    /// The poses of all panels in the scene.
     pub(crate) fn panel_places(&self) -> impl Iterator<Item = Pose> {
         self.panels.iter().map(|panel| {
             self.targets[panel.target].scene_from_target.after(&panel.target_from_panel)
         })
     }
 
-    /// Where a corner is in the frame of its panel, mm.
+    /// Position of a corner in the frame of its panel, mm.
     #[inline]
     pub(crate) fn panel_point(&self, block: &Block, seen: &Observation) -> DVec3 {
         let bent = self.shape.map_or(DVec3::ZERO, |shape| shape.offset(seen.panel_mm));
@@ -58,7 +58,7 @@ impl Problem {
         seen.panel_mm + bent + moved
     }
 
-    /// Where a corner is in the frame of the camera that saw it, mm.
+    /// Position of a corner in the frame of the camera that saw it, mm.
     #[inline]
     pub(crate) fn camera_point(&self, block: &Block, observation: &Observation) -> DVec3 {
         let at = self.panel_point(block, observation);
@@ -68,25 +68,24 @@ impl Problem {
         self.cameras[block.camera].camera_from_rig.apply(rig)
     }
 
-    /// Seen less predicted positions of a block's corners, px; `None` where one is out of the
-    /// model's reach.
+    /// Detected minus predicted positions of the corners of a block, px; `None` if the camera cannot image one of them.
     pub(crate) fn residuals(&self, block: &Block) -> Option<Vec<DVec2>> {
         block.observations.iter().map(|seen| self.residual(block, seen)).collect()
     }
 
-    /// Seen less predicted position of a corner, px; `None` where it is out of the model's reach.
+    /// Detected minus predicted position of a corner, px; `None` if the camera cannot image it.
     pub(crate) fn residual(&self, block: &Block, seen: &Observation) -> Option<DVec2> {
         let camera = &self.cameras[block.camera].camera;
         let at = camera.project_with_derivatives(self.camera_point(block, seen))?;
         Some(seen.pixel - at.pixel)
     }
 
-    /// How many corners there are in all.
+    /// Number of all corners.
     pub(crate) fn count(&self) -> usize {
         self.blocks.iter().map(|block| block.observations.len()).sum()
     }
 
-    /// The same with the frames for which `keep` holds, and their observations.
+    /// The problem with the frames for which `keep` holds, and their observations.
     pub(crate) fn with_frames(&self, keep: impl Fn(usize) -> bool) -> Problem {
         let mut places = vec![None; self.frames.len()];
         let mut frames = Vec::new();
@@ -105,12 +104,12 @@ impl Problem {
 /// Some of a problem's observations, and the frames that have enough of them to be adjusted.
 pub(crate) struct Part {
     pub problem: Problem,
-    /// Indices of its frames in the whole.
+    /// Indices of its frames in the whole problem.
     frames: Vec<usize>,
 }
 
 impl Problem {
-    /// The same with only the corners for which `kept` holds.
+    /// The problem with only the corners for which `kept` is true.
     pub(crate) fn with_corners(&self, kept: &[Vec<bool>]) -> Problem {
         let of_block = |(block, kept): (&Block, &Vec<bool>)| {
             if kept.iter().all(|kept| *kept) {
@@ -123,7 +122,7 @@ impl Problem {
         Problem { blocks, ..self.unknowns() }
     }
 
-    /// The blocks for which `kept` holds, and the frames that still have as many corners as a panel needs.
+    /// The blocks for which `kept` returns true, and the frames that still have as many corners as a panel needs.
     pub(crate) fn part(&self, kept: impl Fn(usize, &Block) -> bool) -> Part {
         let kept: Vec<bool> =
             self.blocks.iter().enumerate().map(|(index, block)| kept(index, block)).collect();
@@ -140,7 +139,7 @@ impl Problem {
         Part { problem, frames: (0..self.frames.len()).filter(|&f| has_enough(f)).collect() }
     }
 
-    /// Takes over what was found in a part.
+    /// Takes over the values of a part.
     pub(crate) fn take(&mut self, part: Part) {
         let Part { problem, frames } = part;
         for (frame, pose) in frames.into_iter().zip(problem.frames) {
@@ -151,12 +150,12 @@ impl Problem {
         (self.shape, self.map) = (problem.shape, problem.map);
     }
 
-    /// Its observations with what was found in a problem of the same unknowns.
+    /// Its observations with the values of a problem of the same unknowns.
     pub(crate) fn at(&self, found: &Problem) -> Problem {
         Problem { blocks: self.blocks.clone(), ..found.unknowns() }
     }
 
-    /// The same without observations.
+    /// The problem without observations.
     fn unknowns(&self) -> Problem {
         let Problem { cameras, frames, targets, panels, shape, map, .. } = self;
         let (cameras, frames, panels) = (cameras.clone(), frames.clone(), panels.clone());

@@ -9,12 +9,12 @@ use crate::input::panel::PanelRef;
 
 impl CornerMap {
     /// The covariances of the offsets less the share of the directions that poses and distances
-    /// absorb (the gauge): in these directions only the prior determines the offsets, and holds
+    /// absorb (the gauge): in these directions only the prior determines the offsets, and fixes
     /// them at zero. `covariances` are 3 × 3 for each corner, from the normal equations; `sigma` is
     /// the standard deviation of a whitened coordinate, the unit in which costs are counted.
     ///
-    /// These directions are a translation and a rotation of the whole target, or of each panel by
-    /// itself where panel poses are estimated, and a common scale where nothing else determines
+    /// These directions are a translation and a rotation of the whole target, or of each panel
+    /// separately if panel poses are estimated, and a common scale if nothing else determines
     /// lengths.
     pub(crate) fn without_gauge(
         &self,

@@ -1,4 +1,4 @@
-//! Offsets of single corners from their places in the plan of the target.
+//! Offsets of single corners from their planned positions.
 //!
 //! The prior of an offset is normal, with one standard deviation in the plane of the panels and one
 //! out of it. Both are estimated from the data by maximising the marginal likelihood (empirical
@@ -15,10 +15,10 @@ use crate::input::observation::Observation;
 use crate::input::panel::PanelRef;
 use deltille_core::statistics::median;
 
-/// First prior standard deviation, in edges: more than the error of any print.
+/// Initial prior standard deviation, in edges: more than the error of any print.
 const FIRST_PRIOR: f64 = 0.01;
 
-/// Least prior standard deviation, mm: a hundredth of what the best print resolves.
+/// Least prior standard deviation, mm: a hundredth of the resolution of the best print.
 const LEAST_PRIOR_MM: f64 = 1e-4;
 
 /// A corner of a panel: index of the panel, row, column.
@@ -30,7 +30,7 @@ pub(crate) struct CornerMap {
     index: BTreeMap<Label, usize>,
     /// The corners, ordered by label.
     pub corners: Vec<MappedCorner>,
-    /// The offset of each corner from its place in the plan, in the frame of its panel, mm.
+    /// The offset of each corner from its planned position, in the frame of its panel, mm.
     pub offsets_mm: Vec<DVec3>,
     /// The prior standard deviation of an offset along x, y and z of the panel, mm.
     pub prior_mm: DVec3,
@@ -38,13 +38,13 @@ pub(crate) struct CornerMap {
     pub determined: f64,
 }
 
-/// A corner whose place is unknown.
+/// A corner of unknown position.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct MappedCorner {
     pub panel: PanelRef,
     pub row: i32,
     pub col: i32,
-    /// Its place in the plan, in the frame of its panel, mm.
+    /// Planned position in the frame of its panel, mm.
     pub panel_mm: DVec3,
 }
 
@@ -62,7 +62,7 @@ impl CornerMap {
                 }
             }
         }
-        // By label.
+        // Ordered by label.
         corners.sort_by_key(|corner| (corner.panel, corner.row, corner.col));
         let labels = corners.iter().map(|corner| (corner.panel.index(), corner.row, corner.col));
         let index = labels.enumerate().map(|(at, label)| (label, at)).collect();

@@ -1,8 +1,8 @@
-//! Panels whose places on their target are found, and targets whose places in the scene are.
+//! Choice of the panels and targets whose poses are estimated.
 //!
-//! The frame of a target is that of its file, held by the panel that was seen most, which stays; all others move
-//! against it. The scene's frame is that of the first target that takes part. Lengths are those of the panels,
-//! which are taken to be true in themselves.
+//! The target frame is that of the target file, fixed by the panel that was seen most; all other panels move relative
+//! to it. The scene frame is that of the first used target. Lengths are those of the panels, which are assumed to be
+//! true.
 
 use std::collections::BTreeSet;
 
@@ -11,7 +11,7 @@ use super::unknowns::{Block, PanelUnknowns, Prior, TargetUnknowns};
 use crate::input::calibration::Calibration;
 use deltille_core::camera::Pose;
 
-/// What is unknown of the panels.
+/// The unknowns of the panels.
 pub(crate) fn unknowns(blocks: &[Block], calibration: &Calibration) -> Vec<PanelUnknowns> {
     let Calibration { panels, targets, refine_panels, .. } = calibration;
     let mut unknowns = Vec::with_capacity(panels.len());
@@ -31,7 +31,7 @@ pub(crate) fn unknowns(blocks: &[Block], calibration: &Calibration) -> Vec<Panel
     unknowns
 }
 
-/// What is unknown of the targets, from where they are.
+/// The unknowns of the targets, from their initial poses.
 pub(crate) fn targets_unknown(
     blocks: &[Block],
     calibration: &Calibration,
@@ -48,8 +48,8 @@ pub(crate) fn targets_unknown(
     places.iter().enumerate().map(unknown).collect()
 }
 
-/// Holds a panel of those that take part, and a target. Where frames went, a panel may hang together with no
-/// other, or another be held.
+/// Fixes one of the used panels, and a target. After the exclusion of frames, a panel may no longer be connected to the
+/// others, or another panel may have to be fixed.
 pub(crate) fn hold(problem: &mut Problem, left_out: &[bool], calibration: &Calibration) {
     let of_blocks = problem.blocks.iter().zip(left_out);
     let taking_part = of_blocks.filter(|(_, out)| !**out).map(|(block, _)| block.clone());
@@ -64,8 +64,8 @@ pub(crate) fn hold(problem: &mut Problem, left_out: &[bool], calibration: &Calib
     problem.targets = targets_unknown(&taking_part, calibration, &places);
 }
 
-/// The panel of a target to be held: the one seen most of those that no measurement moves, which an earlier
-/// refinement held too; and those that hang together with it by frames in which both were seen.
+/// The panel of a target to fix, and the panels connected with it by frames in which both were seen. It is the one seen
+/// most among those without an earlier measurement, as an earlier refinement fixed it too.
 fn connected(
     blocks: &[Block],
     calibration: &Calibration,

@@ -23,16 +23,15 @@ use nalgebra::{DMatrix, DVector};
 
 use deltille_core::camera::{Camera, Lens, PROJECTION_PARAMETERS, Spline, SplineGrid};
 
-/// First standard deviation of a second difference, in distances of knots: a tenth is more than any
-/// lens differs from its parametric model, so that the corners decide.
+/// Initial standard deviation of a second difference, in knot distances: a tenth is more than any lens differs from its
+/// parametric model, so the corners decide.
 const FIRST_PART: f64 = 0.1;
 
-/// Least standard deviation of a second difference, in distances of knots: with a hundred pixels
-/// from knot to knot, a ten-thousandth of a pixel.
+/// Least standard deviation of a second difference, in knot distances: a ten-thousandth of a pixel for knots a hundred
+/// pixels apart.
 const LEAST_PART: f64 = 1e-6;
 
-/// Over-relaxation of the update of s, as a power: the plain fixed-point steps are small, and all
-/// in one direction.
+/// Exponent of the over-relaxation of the update of s: plain fixed-point steps are small, and all in one direction.
 const FARTHER: f64 = 1.5;
 
 /// A direction of the family counts as independent if this fraction of its squared length is
@@ -251,7 +250,7 @@ pub(crate) fn differences(grid: &SplineGrid) -> impl Iterator<Item = Difference>
 mod tests {
     use super::*;
 
-    /// Planes cost nothing, and R has no other such directions.
+    /// Planes cost nothing, and R has no other null directions.
     #[test]
     fn only_planes_cost_nothing() {
         let grid = SplineGrid::new(3, [6, 5], 90).unwrap();
@@ -270,9 +269,9 @@ mod tests {
         assert!((&penalty * plane).amax() < 1e-9);
     }
 
-    /// Nor does what the family has, and the equations are those of the cost's differences.
+    /// The family costs nothing, and the equations equal the differences of the cost.
     #[test]
-    fn the_family_costs_nothing_and_equations_are_those_of_the_cost() {
+    fn the_family_costs_nothing_and_equations_match_the_cost() {
         let grid = SplineGrid::new(3, [6, 5], 90).unwrap();
         let count = grid.count();
         let any = |seed: f64| -> Vec<DVec2> {
@@ -296,7 +295,7 @@ mod tests {
         let knots = any(2.3);
         let (cost, matrix, right) = equations(knots.clone());
         assert!(equations(of_family).0.abs() < 1e-9 * cost);
-        // Quadratic, so that the equations tell the cost: x'Mx, and the pull is −Mx.
+        // The cost is quadratic, so the equations give it exactly: x'Mx, and the gradient is −Mx.
         let x = DVector::from_iterator(2 * count, knots.iter().flat_map(|knot| knot.to_array()));
         assert!((cost - x.dot(&(&matrix * &x))).abs() < 1e-9 * cost);
         assert!((&matrix * &x + right).amax() < 1e-9 * cost);

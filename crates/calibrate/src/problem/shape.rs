@@ -4,15 +4,15 @@ use glam::DVec3;
 
 use crate::input::observation::Sighting;
 
-/// Coefficients of a shape.
+/// Number of coefficients of a shape.
 pub const COUNT: usize = 9;
 
 /// Index of the coefficient a₁.
 pub(crate) const STRETCH: usize = 7;
 
-/// How a board's sheet differs from its plan: bent, stretched and sheared.
+/// The deviation of a board's sheet from its plan: bent, stretched and sheared.
 ///
-/// With u, v the place on the board from its middle, of which the farthest corner is 1 away,
+/// With u, v the position on the board from its centre, in units of the distance of the farthest corner,
 ///
 /// ```text
 ///     z  = b₁ u² + b₂ u v + b₃ v² + b₄ u³ + b₅ u² v + b₆ u v² + b₇ v³
@@ -20,10 +20,10 @@ pub(crate) const STRETCH: usize = 7;
 ///     dy = a₂ u − a₁ v
 /// ```
 ///
-/// in mm. A uniform scale, turns and moves are left out: distance and pose of the views take them up.
+/// in mm. It contains no uniform scale, rotation or translation: the distances and poses of the views absorb them.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Shape {
-    /// The middle of the board, in the panel frame.
+    /// The centre of the board, in the panel frame.
     pub middle_mm: DVec3,
     /// Distance of its farthest corner from there, more than zero.
     pub reach_mm: f64,
@@ -38,29 +38,28 @@ pub struct BoardShape {
     pub shape: Shape,
     /// Standard deviations of the coefficients of the shape, mm.
     pub sd_mm: [f64; COUNT],
-    /// By how much the residuals fall for each coefficient, in a-posteriori variances: about 1 where
-    /// the sheet is as planned.
+    /// Reduction of the squared residuals per coefficient, in a-posteriori variances: about 1 if the sheet is as
+    /// planned.
     pub f_ratio: f64,
-    /// How far apart the lowest and the highest corner of the sheet are, mm, in the plane that fits
-    /// the plan's middle.
+    /// Height difference of the lowest and the highest corner of the sheet, mm, above the plane that fits the centre of
+    /// the plan.
     pub bent_mm: f64,
-    /// The most that a corner lies beside its place in the plan, mm.
+    /// Largest displacement of a corner in the plane from its planned position, mm.
     pub stretched_mm: f64,
 }
 
-/// Of the F distribution with 9 and many degrees of freedom one in a thousand is larger: χ²₉ reaches
-/// 27.9 so seldom, and F is a ninth of it.
+/// The 99.9 % quantile of the F distribution with 9 and many degrees of freedom: a ninth of that of χ²₉, 27.9.
 const SIGNIFICANT_F: f64 = 3.1;
 
 impl BoardShape {
-    /// Whether chance alone would seldom make so much of a flat sheet.
+    /// Whether the shape is significant: noise alone would seldom explain it for a flat sheet.
     pub fn is_significant(&self) -> bool {
         self.f_ratio > SIGNIFICANT_F
     }
 }
 
 impl Shape {
-    /// The shape of a sheet as planned, with these corners.
+    /// The shape of a flat sheet with these corners.
     pub(crate) fn flat(corners: impl Iterator<Item = DVec3> + Clone) -> Self {
         let count = corners.clone().count().max(1) as f64;
         let middle_mm = corners.clone().sum::<DVec3>() / count;
@@ -68,7 +67,7 @@ impl Shape {
         Self { middle_mm, reach_mm: reach_mm.max(f64::MIN_POSITIVE), coefficients_mm: [0.0; COUNT] }
     }
 
-    /// What each coefficient moves a point of the plan by, in its own units.
+    /// The displacement of a point of the plan per unit of each coefficient.
     pub(crate) fn directions(&self, at: DVec3) -> [DVec3; COUNT] {
         let DVec3 { x: u, y: v, .. } = (at - self.middle_mm) / self.reach_mm;
         let up = |z: f64| DVec3::new(0.0, 0.0, z);
@@ -85,7 +84,7 @@ impl Shape {
         ]
     }
 
-    /// How far a point of the plan is moved.
+    /// The displacement of a point of the plan.
     pub(crate) fn offset(&self, at: DVec3) -> DVec3 {
         let moved = self.directions(at).into_iter().zip(self.coefficients_mm);
         moved.map(|(direction, mm)| direction * mm).sum()
@@ -93,7 +92,7 @@ impl Shape {
 }
 
 impl Sighting {
-    /// Moves the corners to where a sheet of this shape has them.
+    /// Moves the corners to their positions on a sheet of this shape.
     pub fn bend(&mut self, shape: &Shape) {
         for seen in &mut self.observations {
             seen.panel_mm += shape.offset(seen.panel_mm);

@@ -1,4 +1,4 @@
-//! Cameras, targets and panels with what of them is unknown, and the observations of a block.
+//! The unknowns of cameras, targets and panels, and the observations of a block.
 
 use std::sync::Arc;
 
@@ -10,27 +10,27 @@ use crate::input::panel::PanelRef;
 use crate::model::without_gauge;
 use deltille_core::camera::{Camera, Pose};
 
-/// A camera and what of it is unknown.
+/// A camera and its unknowns.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct CameraUnknowns {
     /// The camera.
     pub camera: Camera,
     /// Which of its parameters are unknown, in the order of [`Camera::parameter_names`].
     pub free: Vec<bool>,
-    /// Where it is on the rig.
+    /// Its pose on the rig.
     pub camera_from_rig: Pose,
-    /// Whether that is unknown; one camera must stay where it is.
+    /// Whether the pose is unknown; one camera must stay fixed.
     pub pose_free: bool,
-    /// What is expected of the knots of a spline.
+    /// The prior of the knots of a spline.
     pub roughness: Option<Roughness>,
 }
 
 /// A target, whose panels move together.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct TargetUnknowns {
-    /// Where it is in the scene.
+    /// Its pose in the scene.
     pub scene_from_target: Pose,
-    /// Whether that is unknown; one target must stay where it is.
+    /// Whether the pose is unknown; one target must stay fixed.
     pub pose_free: bool,
 }
 
@@ -39,11 +39,11 @@ pub(crate) struct TargetUnknowns {
 pub(crate) struct PanelUnknowns {
     /// Index of its target.
     pub target: usize,
-    /// Where it is on the target.
+    /// Its pose on the target.
     pub target_from_panel: Pose,
-    /// Whether that is unknown; one panel must stay where it is.
+    /// Whether the pose is unknown; one panel must stay fixed.
     pub pose_free: bool,
-    /// What is known of it beforehand.
+    /// The prior of the pose.
     pub prior: Option<Prior>,
 }
 
@@ -56,10 +56,10 @@ pub(crate) struct Prior {
 }
 
 impl Prior {
-    /// A measured pose; `None` where the covariance has no inverse.
+    /// Creates the prior of a measured pose; `None` if the covariance has no inverse.
     pub(crate) fn new(pose: Pose, covariance: [[f64; 6]; 6]) -> Option<Self> {
         let covariance = Matrix6::from_fn(|i, j| covariance[i][j]);
-        // Turns and moves have different units: their scale must not look like a lack of rank.
+        // Rotations and translations have different units: their scale must not look like a rank deficiency.
         let scale = Vector6::from_fn(|i, _| covariance[(i, i)].sqrt().recip());
         let scaled = Matrix6::from_fn(|i, j| covariance[(i, j)] * scale[i] * scale[j]);
         let inverse = scaled.cholesky()?.inverse();
@@ -67,7 +67,7 @@ impl Prior {
         information.iter().all(|v| v.is_finite()).then_some(Self { pose, information })
     }
 
-    /// How far a pose is from the measured one, as (ω, τ), and the inverse covariance of that.
+    /// Deviation of a pose from the measured one as (ω, τ), and the inverse covariance of that.
     pub(crate) fn off(&self, pose: &Pose) -> (Vector6<f64>, Matrix6<f64>) {
         let [turn, moved] = pose.off(&self.pose);
         let off = Vector6::new(turn.x, turn.y, turn.z, moved.x, moved.y, moved.z);
@@ -75,7 +75,7 @@ impl Prior {
     }
 }
 
-/// What one camera saw of one panel in one frame.
+/// The observations of one panel by one camera in one frame.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Block {
     /// Index of the camera.
@@ -89,20 +89,20 @@ pub(crate) struct Block {
 }
 
 impl CameraUnknowns {
-    /// A single camera, which is the rig.
+    /// A single camera, which defines the rig frame.
     pub(crate) fn alone(camera: Camera, free: Vec<bool>) -> Self {
         let free = without_gauge(&camera.lens, free);
         let roughness = Roughness::of(&camera, &free);
         Self { camera, free, camera_from_rig: Pose::IDENTITY, pose_free: false, roughness }
     }
 
-    /// Without what is expected of it.
+    /// Removes the prior of its knots.
     pub(crate) fn forget_expected(&mut self) {
         self.roughness = None;
     }
 }
 
 impl TargetUnknowns {
-    /// The target that is the scene's frame.
+    /// The target that defines the scene frame.
     pub(crate) const SCENE: Self = Self { scene_from_target: Pose::IDENTITY, pose_free: false };
 }

@@ -1,4 +1,4 @@
-//! How far each corner is to be trusted.
+//! Weights of corners: whitening of residuals by covariances and a common variance.
 
 use glam::DVec2;
 
@@ -10,24 +10,22 @@ use deltille_core::statistics::median;
 /// The median of a squared distance in the plane whose coordinates have variance 1: 2 ln 2.
 pub(crate) const MEDIAN_OF_CHI_SQUARED_2: f64 = 1.386_294_361_119_890_6;
 
-/// Halvings of the interval in which the common deviation is sought: to 1e-9 of its upper end.
+/// Number of halvings of the interval for the common standard deviation: to 1e-9 of its upper end.
 const HALVINGS: usize = 30;
 
-/// The least deviation that residuals are said to have: far below any corner's, so that exact data
-/// does not divide by zero.
+/// Least standard deviation of residuals: far below that of any corner, so that exact data do not divide by zero.
 const LEAST_SIGMA: f64 = 1e-6;
 
-/// A corner is an outlier beyond so many standard deviations: of a million corners with normal
-/// errors four are.
+/// Limit of an outlier in standard deviations: four in a million corners with normal errors exceed it.
 pub(crate) const OUTLIER_SIGMA: f64 = 5.0;
 
-/// For each corner the lower triangle a, b, c of W, with WᵀW = Σ⁻¹.
+/// For each corner, the lower triangle a, b, c of W, with WᵀW = Σ⁻¹.
 #[derive(Clone, Debug)]
 pub(crate) struct Whitening {
     pub blocks: Vec<Vec<[f64; 3]>>,
-    /// The common deviation beside the covariances, px; `None` where corners count alike.
+    /// The common standard deviation besides the covariances, px; `None` if all corners have equal weight.
     pub common_px: Option<f64>,
-    /// Standard deviation of a whitened coordinate, by the median.
+    /// Standard deviation of a whitened coordinate, from the median.
     pub sigma: f64,
 }
 
@@ -37,7 +35,7 @@ impl Whitening {
         DVec2::new(a * x, b * x + c * y)
     }
 
-    /// Whether a corner is farther off than corners are by chance.
+    /// Whether a corner is an outlier.
     pub(crate) fn is_outlier(&self, weight: [f64; 3], residual: DVec2) -> bool {
         let off = Self::apply(weight, residual);
         off.x.hypot(off.y) > self.outlier_limit()
@@ -48,7 +46,7 @@ impl Whitening {
         OUTLIER_SIGMA * self.sigma
     }
 
-    /// Every corner alike.
+    /// Equal weights.
     fn equal(problem: &Problem, residuals: &[Vec<DVec2>]) -> Self {
         let mut whitening = Self { blocks: alike(problem), common_px: None, sigma: 1.0 };
         whitening.sigma = whitening.median_sigma(problem, residuals);
@@ -72,7 +70,7 @@ impl Whitening {
         if alone.sigma <= 1.0 {
             return alone;
         }
-        // With the deviation of all residuals as the common one, sigma is below 1.
+        // With the standard deviation of all residuals as the common one, sigma is below 1.
         let (mut low, mut high) = (0.0, Self::equal(problem, residuals).sigma);
         for _ in 0..HALVINGS {
             let middle = 0.5 * (low + high);
@@ -99,14 +97,14 @@ impl Whitening {
     }
 }
 
-/// The part of the residuals' squares that unknowns leave. Where corners are unknown too, few views leave little.
+/// The fraction of the squared residuals that the unknowns leave. If corners are unknown too, few views leave little.
 fn left_free(problem: &Problem) -> f64 {
     let Some(map) = &problem.map else { return 1.0 };
     let unknowns = map.determined + 6.0 * problem.frames.len() as f64;
     (1.0 - unknowns / (2.0 * problem.count().max(1) as f64)).max(LEAST_FREE)
 }
 
-/// Least part of the squares that is taken to be left: two views of a corner leave a quarter.
+/// Least value of that fraction: two views of a corner leave a quarter.
 const LEAST_FREE: f64 = 0.25;
 
 /// The covariances of all corners, `None` where no corner has one. A corner without one among
@@ -120,18 +118,18 @@ fn covariances(problem: &Problem) -> Option<Vec<Vec<[f64; 3]>>> {
     (largest > 0.0).then(|| problem.blocks.iter().map(of).collect())
 }
 
-/// W of corners that are all as precise.
+/// W for corners of equal accuracy.
 fn alike(problem: &Problem) -> Vec<Vec<[f64; 3]>> {
     problem.blocks.iter().map(|block| vec![[1.0, 0.0, 1.0]; block.observations.len()]).collect()
 }
 
-/// W of covariances with a deviation beside them.
+/// W for covariances with a common standard deviation added.
 fn triangles(covariances: &[Vec<[f64; 3]>], common: f64) -> Vec<Vec<[f64; 3]>> {
     let whiten = |cov: &[f64; 3]| triangle(*cov, common * common);
     covariances.iter().map(|block| block.iter().map(whiten).collect()).collect()
 }
 
-/// W of a covariance with `common` added to both variances.
+/// W for a covariance with `common` added to both variances.
 fn triangle([xx, xy, yy]: [f64; 3], common: f64) -> [f64; 3] {
     // Σ = L Lᵀ with L = [[l, 0], [m, n]], W = L⁻¹.
     let l = (xx + common).sqrt();

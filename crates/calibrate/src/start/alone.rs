@@ -1,4 +1,4 @@
-//! A single camera: its lens, and the poses of its views.
+//! The start of a single camera: its lens, and the poses of its views.
 
 use glam::DVec3;
 
@@ -21,15 +21,15 @@ use crate::problem::whitening::scale;
 use deltille_core::camera::{Camera, Lens, Pose};
 use deltille_core::statistics::median;
 
-/// Two views of a plane determine focal lengths and principal point if nothing is off; a third
-/// shows whether something is.
+/// Least number of views: two views of a plane determine focal length and principal point if there are no errors; a
+/// third reveals errors.
 const LEAST_VIEWS: usize = 3;
 
-/// Lenses from which a spline may start: one bends lines as fisheyes do, one as other lenses.
+/// Parametric lenses from which a spline may start: a fisheye and a perspective lens.
 const FORERUNNERS: [Model; 2] = [Model::KannalaBrandt(4), Model::Radtan5];
 
-/// Boards whose normals differ by less count as parallel. A corner's noise of a twentieth of a
-/// pixel on a board of 500 px already looks like a tilt of one degree.
+/// Largest difference of normals of parallel boards. Corner noise of a twentieth of a pixel on a board of 500 px
+/// already looks like a tilt of one degree.
 const PARALLEL_RAD: f64 = 0.05;
 
 pub(crate) fn start(calibration: &Calibration) -> Result<Start, CalibrationError> {
@@ -52,7 +52,7 @@ pub(crate) fn start(calibration: &Calibration) -> Result<Start, CalibrationError
     Ok(Start { problem, frames, excluded, delays: vec![0], rotations: vec![None] })
 }
 
-/// Refuses too few views to find a camera from.
+/// Rejects too few views for a calibration.
 pub(crate) fn enough(found: usize, all: usize) -> Result<(), CalibrationError> {
     match found < LEAST_VIEWS {
         true => Err(CalibrationError::TooFewViews { found, all, needed: LEAST_VIEWS }),
@@ -60,20 +60,20 @@ pub(crate) fn enough(found: usize, all: usize) -> Result<(), CalibrationError> {
     }
 }
 
-/// The camera and the poses on the way.
+/// The current camera and poses.
 struct Search<'a> {
-    /// The views with only those corners that agree with each other.
+    /// The views, with only those corners that agree with each other.
     views: Vec<View>,
     panels: &'a [Pose],
     camera: Camera,
-    /// What is expected of the knots of a spline, where it was started from another lens.
+    /// The prior of the knots of a spline that started from another lens.
     roughness: Option<Roughness>,
-    /// `None` where a view has no pose that the camera can have seen, or does not belong.
+    /// The pose of each view; `None` if no pose fits the view.
     poses: Vec<Option<Pose>>,
 }
 
 impl<'a> Search<'a> {
-    /// A camera of a model that explains the views.
+    /// Finds a camera of a model that explains the views.
     fn without_guess(
         views: &[View],
         panels: &'a [Pose],
@@ -95,11 +95,11 @@ impl<'a> Search<'a> {
             let mut search = Search { views, panels, camera, roughness: None, poses };
             search.adjust(model.coarse())?;
             search.adjust(model.free())?;
-            search.look_again();
+            search.reestimate_poses();
             search.adjust(model.free())?;
             Ok((search.error_px(), search))
         };
-        // The best of all starts; an error where none leads anywhere.
+        // The best of all starts; an error if all fail.
         let starts = model.starts().into_iter().enumerate();
         let starts = starts.filter(|(index, _)| start.is_none_or(|start| start == *index));
         let found = starts.map(|(_, start)| from(start));
@@ -113,7 +113,7 @@ impl<'a> Search<'a> {
         Ok(search)
     }
 
-    /// A spline that images as the parametric lens does that explains the views best.
+    /// A spline that starts as the parametric lens that explains the views best.
     fn of_spline(
         views: &[View],
         panels: &'a [Pose],
@@ -131,7 +131,7 @@ impl<'a> Search<'a> {
         best.ok_or(CalibrationError::NoStart)??.1.ok_or(CalibrationError::NoStart)
     }
 
-    /// The same with a spline that images as the camera does.
+    /// The same search with the lens replaced by an equivalent spline.
     fn splined(self, model: Model, degree: usize, knots: Option<[usize; 2]>) -> Option<Self> {
         let sightings = self.views.iter().flat_map(|view| &view.sightings);
         let seen = sightings.flat_map(|sighting| &sighting.observations).map(|seen| seen.pixel);
@@ -139,7 +139,7 @@ impl<'a> Search<'a> {
         Some(Self { camera, roughness: Some(roughness), ..self })
     }
 
-    /// The poses of the views of a camera.
+    /// Computes the poses of the views of a camera.
     fn with_camera(
         views: &[View],
         panels: &'a [Pose],
@@ -159,8 +159,7 @@ impl<'a> Search<'a> {
         Ok(Self { views, panels, camera: camera.clone(), roughness: None, poses })
     }
 
-    /// The views that have a pose and are within the camera's reach, and the problem of what is seen in
-    /// them.
+    /// The views that have a pose and that the camera can image, and the problem of their observations.
     fn problem(&self, views: &[View], free: Vec<bool>) -> (Vec<usize>, Problem) {
         let mut camera = CameraUnknowns::alone(self.camera.clone(), free);
         if let Some(roughness) = &self.roughness {
@@ -188,7 +187,7 @@ impl<'a> Search<'a> {
         (used, problem)
     }
 
-    /// Bundle adjustment in which wrong corners and wrong views hardly count.
+    /// Adjusts the bundle with a loss that gives wrong corners and views almost no influence.
     fn adjust(&mut self, free: Vec<bool>) -> Result<(), CalibrationError> {
         let (used, problem) = self.problem(&self.views, free);
         enough(used.len(), self.views.len())?;
@@ -202,9 +201,8 @@ impl<'a> Search<'a> {
         Ok(())
     }
 
-    /// Estimates the pose of every view anew, now that the camera is nearly known, and keeps the
-    /// better one.
-    fn look_again(&mut self) {
+    /// Re-estimates the pose of every view with the nearly known camera, and keeps the better pose.
+    fn reestimate_poses(&mut self) {
         for (view, pose) in self.views.iter().zip(&mut self.poses) {
             let again = estimate_pose(&self.camera, self.panels, &view.sightings);
             let error = |pose: &Option<Pose>| {
@@ -218,7 +216,7 @@ impl<'a> Search<'a> {
         }
     }
 
-    /// Median over all views of the median error of their corners, px.
+    /// Median over all views of the median residual of their corners, px.
     fn error_px(&self) -> f64 {
         let views = self.views.iter().zip(&self.poses);
         let error = |(view, pose): (&View, &Option<Pose>)| {
@@ -230,7 +228,7 @@ impl<'a> Search<'a> {
     }
 }
 
-/// Refuses views of a board that was never tilted.
+/// Rejects views of a board that was never tilted.
 fn check_tilts(poses: &[Option<Pose>]) -> Result<(), CalibrationError> {
     let normals = || poses.iter().flatten().map(|pose| pose.rotation * DVec3::Z);
     let mean = normals().sum::<DVec3>().normalize_or(DVec3::Z);

@@ -1,4 +1,4 @@
-//! Consensus among the corners of a picture, before anything is known of the camera.
+//! Consensus among the corners of an image, before anything is known of the camera.
 //!
 //! Through any lens three neighbours in a row are imaged nearly in a row, at nearly equal
 //! distances:

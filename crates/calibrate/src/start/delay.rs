@@ -1,8 +1,8 @@
-//! Cameras whose pictures are late by some frames: a trigger that was missed once, a recording that began later.
+//! Detection of cameras that lag by some frames: a missed trigger, or a recording that began later.
 //!
-//! Two cameras that are fixed to each other see one target always the same way apart, if pictures of one moment are
-//! compared; and turns from one moment to another are as large for every camera, whatever target it sees. So the
-//! delay is sought by which the one, or where no target is common the other, scatters least.
+//! The relative pose of two cameras that see one target is the same in all frames if the images were taken at the same
+//! time. Rotations between frames are equally large for every camera, whatever target it sees. The lag is the shift at
+//! which the relative poses, or without a common target the rotations, scatter least.
 
 use std::collections::BTreeMap;
 
@@ -12,24 +12,24 @@ use crate::input::calibration::Calibration;
 use crate::input::sample::evenly;
 use deltille_core::statistics::median;
 
-/// Delays that are looked for, frames.
+/// Largest lag that is detected, frames.
 const MOST_DELAY: i32 = 10;
 
-/// Fewest moments by which delays are compared, and the most: more tell no more.
+/// Least and greatest number of frames used for comparing lags: more do not help.
 const LEAST_MOMENTS: usize = 8;
 const MOST_MOMENTS: usize = 60;
 
-/// Pictures of one moment scatter less than others by this factor, or nothing is late: a target that was hardly
-/// moved, or moved the same way from frame to frame, tells no delay, and needs none.
+/// Factor by which the scatter at the lag must be smaller than without. A target that hardly moved, or moved uniformly
+/// from frame to frame, does not reveal a lag, and does not need it corrected.
 const DECISIVE: f64 = 3.0;
 
-/// Turns are compared over so many frames and fewer.
+/// Greatest number of frames over which rotations are compared.
 const LONGEST_TURN: usize = 3;
 
-/// What a camera saw in each moment, in the order of the moments.
+/// The observations of a camera in each frame, in order.
 type Track<'a> = Vec<&'a [Seen]>;
 
-/// By how many frames each camera is late against most of the others.
+/// Returns the lag of each camera in frames, relative to most of the others.
 pub(super) fn delays(
     calibration: &Calibration,
     seen: &ByFrame,
@@ -44,7 +44,7 @@ pub(super) fn delays(
         held.iter().map(|of_camera| of_camera.iter().map(Vec::as_slice).collect()).collect();
     let mut found: Vec<Option<i32>> = vec![None; tracks.len()];
     found[0] = Some(0);
-    // From camera to camera, along the pairs that tell most.
+    // From camera to camera, along the pairs with the most information.
     loop {
         let placed = (0..tracks.len()).filter_map(|from| Some((from, found[from]?)));
         let pairs = placed.flat_map(|(from, delay)| {
@@ -63,14 +63,14 @@ pub(super) fn delays(
     found.into_iter().map(|delay| delay - usual).collect()
 }
 
-/// The delay that most cameras have; of several that of the first camera, if it is among them.
+/// The most frequent lag; among equally frequent ones that of the first camera, if it is among them.
 fn usual(delays: &[i32]) -> i32 {
     let count = |delay: &i32| delays.iter().filter(|other| *other == delay).count();
     let most = delays.iter().map(count).max().unwrap_or_default();
     delays.iter().find(|&delay| count(delay) == most).copied().unwrap_or_default()
 }
 
-/// By how many frames a camera is later than another, and how many moments tell; `None` where too few do.
+/// The lag of a camera relative to another, and the number of informative frames; `None` if these are too few.
 fn delay_between(from: &Track, to: &Track, symmetries: &Symmetries) -> Option<(i32, usize)> {
     let scatters = |how: &dyn Fn(i32) -> Option<(f64, usize)>| {
         let all = (-MOST_DELAY..=MOST_DELAY).filter_map(|delay| Some((delay, how(delay)?)));
@@ -87,14 +87,14 @@ fn delay_between(from: &Track, to: &Track, symmetries: &Symmetries) -> Option<(i
         Some((_, (scatter, moments))) => (*scatter, *moments),
         None => (usual()?, moments),
     };
-    // What is seen by chance only a few times is no evidence against what is seen often.
+    // Agreement by chance in a few frames is no evidence against agreement in many.
     match DECISIVE * least < compared && 2 * moments >= of_moments {
         true => Some((delay, moments)),
         false => Some((0, of_moments)),
     }
 }
 
-/// The moments of both tracks if the second is late by so much.
+/// The paired frames of both tracks for this lag.
 fn moments<'a>(
     from: &'a Track,
     to: &'a Track,
@@ -107,7 +107,7 @@ fn moments<'a>(
     both.filter(|&(first, second)| !from[first].is_empty() && !to[second].is_empty())
 }
 
-/// How much the pose of one camera in the other scatters, mm, by the targets that both see.
+/// Scatter of the pose of one camera in the other, mm, from the targets that both see.
 fn scatter_of_poses(
     from: &Track,
     to: &Track,
@@ -125,7 +125,7 @@ fn scatter_of_poses(
     (count >= LEAST_MOMENTS).then(|| Some((agreed(&moments)?.spread_mm, count))).flatten()
 }
 
-/// By how much turns from moment to moment differ between the cameras, rad.
+/// Difference of the rotations between frames as seen by the two cameras, rad.
 fn scatter_of_turns(from: &Track, to: &Track, delay: i32) -> Option<(f64, usize)> {
     let both: Vec<(usize, usize)> = moments(from, to, delay).collect();
     let mut off = Vec::new();
@@ -141,14 +141,14 @@ fn scatter_of_turns(from: &Track, to: &Track, delay: i32) -> Option<(f64, usize)
     (count >= LEAST_MOMENTS).then(|| median(off)).flatten().map(|scatter| (scatter, count))
 }
 
-/// How far a target was turned between two moments; `None` where none is seen in both.
+/// Rotation of a target between two frames; `None` if no target is seen in both.
 fn turn_rad(before: &[Seen], after: &[Seen]) -> Option<f64> {
     let mut pairs = before.iter().flat_map(|a| after.iter().map(move |b| (a, b)));
     let (a, b) = pairs.find(|(a, b)| a.target == b.target)?;
     Some(a.camera_from_target.rotation.angle_between(b.camera_from_target.rotation))
 }
 
-/// Puts what late cameras saw to the moments that they show.
+/// Moves the observations of lagging cameras to the frames that they show.
 pub(super) fn in_time(calibration: &Calibration, delays: &[i32], seen: &mut ByFrame) {
     let order = calibration.moments();
     let places: BTreeMap<&str, usize> =
@@ -160,7 +160,7 @@ pub(super) fn in_time(calibration: &Calibration, delays: &[i32], seen: &mut ByFr
                 .and_then(|&place| place.checked_add_signed(-(delay as isize)));
             match place.and_then(|place| order.get(place)) {
                 Some(moment) => moment.clone(),
-                // Before the first moment of the others, or after their last.
+                // Before the first frame of the others, or after their last.
                 None => format!("{name} of {}", camera.name),
             }
         };
@@ -178,7 +178,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn most_cameras_are_in_time() {
+    fn the_most_frequent_lag_is_the_reference() {
         assert_eq!(usual(&[0, -1, -1, -1]), -1);
         assert_eq!(usual(&[0, 2]), 0);
         assert_eq!(usual(&[0, 0, 1, 1]), 0);

@@ -1,8 +1,7 @@
-//! A first camera without any guess.
+//! A first camera without a guess.
 //!
-//! Of ideal cameras, perspective and equidistant, over all focal lengths, with the principal point
-//! in the middle, the one is taken under which the views look most like views of planes. Half of the
-//! views may be wrong.
+//! Among ideal cameras, perspective and equidistant, of all focal lengths and with a central principal point, the
+//! search selects the one under which the views look most like views of planes. Up to half of the views may be wrong.
 
 use super::pose::planar_pose;
 use crate::input::observation::{Observation, View};
@@ -11,26 +10,25 @@ use crate::model::Model;
 use deltille_core::camera::{BrownConrady, Camera, KannalaBrandt, Lens, Pose};
 use deltille_core::statistics::median;
 
-/// Focal lengths that are tried, in image widths: from lenses that show all around to those that
-/// show a degree.
+/// Trial focal lengths, in image widths: from all-around lenses to those with a field of view of a degree.
 const SHORTEST: f64 = 0.12;
 const LONGEST: f64 = 60.0;
 
-/// Ratio of one focal length to the one before; bundle adjustment converges from much farther.
+/// Ratio of successive trial focal lengths; bundle adjustment converges from much farther.
 const RATIO: f64 = 1.1;
 
-/// Views that are looked at, evenly over the sequence; and corners in each.
+/// Number of views used, evenly over the sequence, and number of corners in each.
 const MOST_VIEWS: usize = 15;
 const MOST_CORNERS: usize = 40;
 
-/// The ideal camera that explains the views best.
+/// Finds the ideal camera that explains the views best.
 pub(super) fn first_camera(views: &[View], model: Model) -> Option<Camera> {
     let [width, height] = views.first()?.size_px;
     let samples: Vec<Vec<Observation>> =
         evenly(views, MOST_VIEWS).filter_map(largest_panel).collect();
     let perspective = Lens::BrownConrady(BrownConrady::default());
     let equidistant = Lens::KannalaBrandt(KannalaBrandt::default());
-    // A strongly distorted perspective lens is nearer to an equidistant one.
+    // A strongly distorted perspective lens is closer to an equidistant one.
     let lenses =
         if model.is_perspective() { vec![perspective, equidistant] } else { vec![equidistant] };
     let mut best: Option<(f64, Camera)> = None;
@@ -49,7 +47,7 @@ pub(super) fn first_camera(views: &[View], model: Model) -> Option<Camera> {
     best.map(|(_, camera)| camera)
 }
 
-/// Root mean square error of a view under a camera, px.
+/// RMS residual of a view under a camera, px.
 fn error_px(camera: &Camera, view: &[Observation]) -> f64 {
     let Some(pose) = planar_pose(camera, view) else { return f64::INFINITY };
     let squares = view.iter().map(|seen| squared_px(camera, &pose, seen));

@@ -1,4 +1,4 @@
-//! Where cameras are on their rig and targets in their scene, from what each camera saw by itself.
+//! Poses of cameras on the rig and of targets in the scene, from the results of each camera on its own.
 //!
 //! ```text
 //!   two cameras that see one target in one frame  ─→ camera_from_camera
@@ -14,10 +14,10 @@ use crate::error::{CalibrationError, TooPlain};
 use crate::input::calibration::Calibration;
 use deltille_core::camera::Pose;
 
-/// Frames that two cameras must share: one may be wrong, of three the middle one is not.
+/// Least number of frames that two cameras must share: one may be wrong, but the median of three is right.
 pub(super) const LEAST_SHARED: usize = 3;
 
-/// A target as a camera by itself sees it.
+/// The view of a target by a camera on its own.
 #[derive(Clone, Copy)]
 pub(super) struct Seen {
     /// Index of the target.
@@ -26,14 +26,14 @@ pub(super) struct Seen {
     /// Its index among the camera's views.
     pub view: usize,
     pub corners: usize,
-    /// Which of the [`Symmetries`](super::symmetry::Symmetries) of the target its labels are rotated by.
+    /// Index of the rotation of its labels among the [`Symmetries`](super::symmetry::Symmetries) of the target.
     pub rotated: Option<usize>,
 }
 
-/// What each camera saw, by the name of the frame.
+/// The views of each camera, by the name of the frame.
 pub(super) type ByFrame = Vec<BTreeMap<String, Vec<Seen>>>;
 
-/// Where everything is that does not move.
+/// The poses of everything that does not move.
 pub(super) struct Places {
     pub camera_from_rig: Vec<Pose>,
     pub scene_from_target: Vec<Pose>,
@@ -41,7 +41,7 @@ pub(super) struct Places {
 
 impl Places {
     /// # Errors
-    /// Where something hangs together with nothing else.
+    /// Returns an error if a camera or a target is not connected with the others.
     pub(super) fn of(calibration: &Calibration, seen: &ByFrame) -> Result<Self, CalibrationError> {
         let known = |(index, camera): (usize, &crate::input::calibration::CameraViews)| {
             camera.camera_from_rig.or((index == 0).then_some(Pose::IDENTITY))
@@ -59,7 +59,7 @@ impl Places {
         linking.placed()
     }
 
-    /// Where the scene was in a frame: of all that was seen in it, what shows the most corners has the best pose.
+    /// The pose of the scene in a frame, from the view with the most corners, whose pose is the best.
     pub(super) fn rig_from_scene(&self, of_frame: &[(usize, &Seen)]) -> Option<Pose> {
         let best = of_frame.iter().max_by_key(|(_, seen)| seen.corners);
         best.map(|(camera, seen)| {
@@ -74,18 +74,18 @@ fn rig_from_scene(camera_from_rig: &Pose, seen: &Seen, scene_from_target: &Pose)
     rig_from_target.after(&scene_from_target.inverse())
 }
 
-/// What is placed so far.
+/// The poses known so far.
 struct Linking<'a> {
     calibration: &'a Calibration,
     seen: &'a ByFrame,
     cameras: Vec<Option<Pose>>,
     targets: Vec<Option<Pose>>,
-    /// A camera and a target that motion does not place, and why.
+    /// A camera and a target whose poses the motion does not determine, and the reason.
     plain: Option<(usize, usize, TooPlain)>,
 }
 
 impl Linking<'_> {
-    /// Refuses targets that no camera sees.
+    /// Rejects targets that no camera sees.
     fn check_seen(&self) -> Result<(), CalibrationError> {
         let all = self.seen.iter().flat_map(BTreeMap::values).flatten();
         let seen: BTreeSet<usize> = all.map(|seen| seen.target).collect();
@@ -99,7 +99,7 @@ impl Linking<'_> {
         }
     }
 
-    /// Without a target whose place is known, the scene is that of the first one that a placed camera sees.
+    /// Without a target of known pose, the scene frame is that of the first target seen by a placed camera.
     fn place_first_target(&mut self) {
         if self.targets.iter().any(Option::is_some) {
             return;
@@ -114,7 +114,7 @@ impl Linking<'_> {
         (0..places.len()).filter(move |&index| places[index].is_some() == is_placed)
     }
 
-    /// Places a camera by the one with which it shares the most frames.
+    /// Places a camera relative to the one with which it shares the most frames.
     fn by_common_target(&mut self) -> bool {
         let from = Self::indices(&self.cameras, true);
         let to = |from: usize| Self::indices(&self.cameras, false).map(move |to| (from, to));
@@ -130,12 +130,12 @@ impl Linking<'_> {
         true
     }
 
-    /// How many frames show the same target to two cameras, and where the one is to the other by each.
+    /// The number of frames that show the same target to two cameras, and the relative pose from each.
     fn common(&self, from: usize, to: usize) -> (usize, Vec<Pose>) {
         common(&self.seen[from], &self.seen[to])
     }
 
-    /// Where the scene was in the frames that are known.
+    /// The poses of the scene in the known frames.
     fn known_frames(&self) -> BTreeMap<&str, Pose> {
         let mut best: BTreeMap<&str, (usize, Pose)> = BTreeMap::new();
         for (of_camera, place) in self.seen.iter().zip(&self.cameras) {
@@ -154,7 +154,7 @@ impl Linking<'_> {
         best.into_iter().map(|(name, (_, pose))| (name, pose)).collect()
     }
 
-    /// Places the target that placed cameras see in the most frames that are known.
+    /// Places the target that placed cameras see in the most known frames.
     fn target_in_known_frames(&mut self) -> bool {
         let frames = self.known_frames();
         let of_target = |target: usize| {
@@ -182,7 +182,7 @@ impl Linking<'_> {
         true
     }
 
-    /// Places the camera that sees placed targets in the most frames that are known.
+    /// Places the camera that sees placed targets in the most known frames.
     fn camera_in_known_frames(&mut self) -> bool {
         let frames = self.known_frames();
         let of_camera = |camera: usize| {
@@ -235,7 +235,7 @@ impl Linking<'_> {
         false
     }
 
-    /// Everything relative to the first target; an error where something is not placed.
+    /// Returns all poses relative to the first target, or an error if something is not placed.
     fn placed(self) -> Result<Places, CalibrationError> {
         let calibration = self.calibration;
         let open: Vec<usize> = Self::indices(&self.cameras, false).collect();
@@ -275,7 +275,8 @@ impl Linking<'_> {
     }
 }
 
-/// How many frames show the same target to two cameras, and where the second is to the first by each.
+/// The number of frames that show the same target to two cameras, and the pose of the second relative to the first from
+/// each.
 pub(super) fn common(
     from: &BTreeMap<String, Vec<Seen>>,
     to: &BTreeMap<String, Vec<Seen>>,
@@ -294,7 +295,7 @@ pub(super) fn common(
     (frames, relative)
 }
 
-/// Where a camera saw a target, by frame.
+/// The poses of a target seen by a camera, by frame.
 fn sightings(
     of_camera: &BTreeMap<String, Vec<Seen>>,
     target: usize,

@@ -1,13 +1,14 @@
-//! Where a bundle adjustment starts: cameras, and where they and the target were, without any guess.
+//! The start of a bundle adjustment: initial cameras and poses without a first guess.
 //!
-//! Comes in: a calibration. Goes out: a problem with values near those that are sought ([`frames::Start`]).
+//! Input: a calibration. Output: a problem with values near the solution ([`frames::Start`]).
 //!
-//! 1. `consensus` takes corners that fit to their neighbours; `first_camera` finds a camera under which these are planes.
-//! 2. `pose` finds the pose of a target in one picture; `splined` is a spline that images as another lens does.
-//! 3. `alone` does all that for one camera.
-//! 4. `together` has every camera alone first, then: `delay` (by how many frames each is late), `symmetry` (labels of a board
-//!    that looks the same after a rotation), `linked` (poses between cameras and targets that share frames), and `motion`
-//!    (those that share none, from how the rig moves).
+//! 1. `consensus` selects corners that agree with their neighbours; `first_camera` finds an ideal camera that makes
+//! them planar.
+//! 2. `pose` computes the pose of a target in one image; `splined` converts a lens to a spline.
+//! 3. `alone` combines these for one camera.
+//! 4. `together` solves every camera on its own, then combines them: `delay` (lag of each camera in frames), `symmetry`
+//! (labels of a board that looks the same after a rotation), `linked` (poses between cameras and targets that share
+//! frames), and `motion` (those that share none, from the motion of the rig).
 
 pub(crate) mod alone;
 pub(crate) mod consensus;

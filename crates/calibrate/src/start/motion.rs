@@ -1,13 +1,13 @@
-//! A camera and a target that nothing shows beside the others, from how the rig moves.
+//! The poses of a camera and a target that share no frame with the others, from the motion of the rig.
 //!
-//! A camera that sees a target of its own only, fixed to the others while the rig moves, has in every frame
+//! A camera that sees only a target of its own, fixed to the others while the rig moves, has in every frame
 //!
 //! ```text
 //!     camera_from_target = camera_from_rig · rig_from_scene · scene_from_target
 //! ```
 //!
-//! with the first and the last link the same in all frames. Rotations by themselves are linear in the two (Shah 2013),
-//! and with these the places are. Where the rig turns about one axis only, a shift of both along it is open.
+//! with the first and the last link the same in all frames. The rotations alone are linear in the two (Shah 2013), and
+//! the positions follow from them. If the rig rotates about one axis only, a shift of both along it is undetermined.
 
 use glam::{DMat3, DQuat, DVec3};
 use nalgebra::{Matrix3, Matrix6, SMatrix, Vector6};
@@ -16,20 +16,20 @@ use crate::error::TooPlain;
 use deltille_core::camera::Pose;
 use deltille_core::statistics::median;
 
-/// Turns about a second axis that tell more than the noise of poses does, rad (1°).
+/// Least rotation about a second axis, rad (1°): more than the noise of poses.
 const LEAST_TURN_RAD: f64 = 0.017;
 
-/// Rounds in which frames that do not fit lose their weight.
+/// Number of reweighting rounds, in which frames that do not fit lose their weight.
 const ROUNDS: usize = 10;
 
-/// What one frame shows: the rig by the others, and the camera from the target.
+/// The observations of one frame: the pose of the rig by the other cameras, and the pose of the target in the camera.
 #[derive(Clone, Copy)]
 pub(super) struct Moment {
     pub rig_from_scene: Pose,
     pub camera_from_target: Pose,
 }
 
-/// camera_from_rig and scene_from_target.
+/// Computes `camera_from_rig` and `scene_from_target`.
 pub(super) fn placed_by_motion(moments: &[Moment]) -> Result<[Pose; 2], TooPlain> {
     check_turns(moments)?;
     let mut weights = vec![1.0; moments.len()];
@@ -60,7 +60,7 @@ fn posed(rotations: [DQuat; 2], places: [DVec3; 2]) -> [Pose; 2] {
     [0, 1].map(|i| Pose { rotation: rotations[i], translation: places[i] })
 }
 
-/// Refuses a rig that did not turn about two axes.
+/// Rejects a rig that did not rotate about two axes.
 fn check_turns(moments: &[Moment]) -> Result<(), TooPlain> {
     let Some(first) = moments.first() else { return Err(TooPlain::NoTurn) };
     let back = first.rig_from_scene.rotation.conjugate();
@@ -82,7 +82,7 @@ fn check_turns(moments: &[Moment]) -> Result<(), TooPlain> {
     }
 }
 
-/// Weights of frames that are off by so much: those farther off than most hardly count.
+/// Weights of frames by their residuals: frames with larger residuals than most have almost no influence.
 fn lighter(off: Vec<f64>) -> Vec<f64> {
     let usual = median(off.clone()).unwrap_or(0.0).max(f64::MIN_POSITIVE);
     off.into_iter().map(|off| (1.0 + (off / (2.0 * usual)).powi(2)).powi(-2)).collect()
@@ -122,7 +122,7 @@ fn nearest_rotation(matrix: Matrix3<f64>) -> DQuat {
     DQuat::from_mat3(&DMat3::from_cols_slice(rotation.as_slice())).normalize()
 }
 
-/// The places x of the camera and y of the target, from X F y + x = place − X f.
+/// The positions x of the camera and y of the target, from X F y + x = place − X f.
 fn moved(moments: &[Moment], camera: DQuat, weights: &[f64]) -> [DVec3; 2] {
     let (mut normal, mut right) = (Matrix6::zeros(), Vector6::zeros());
     for (moment, weight) in moments.iter().zip(weights) {
@@ -155,7 +155,7 @@ mod tests {
         Pose { rotation: DQuat::from_scaled_axis(turn), translation }
     }
 
-    /// Moments of a rig that turns so far about each axis, of which every fifth is wrong.
+    /// Frames of a rig that rotates up to these angles about each axis; every fifth is wrong.
     fn moments(random: &mut ChaCha8Rng, truth: [Pose; 2], reach: DVec3) -> Vec<Moment> {
         let [camera, target] = truth;
         let at = (0..30).map(|index| {
@@ -171,7 +171,7 @@ mod tests {
     }
 
     #[test]
-    fn a_camera_of_its_own_target_is_placed_where_the_rig_turns_about_two_axes() {
+    fn a_camera_with_its_own_target_is_placed_if_the_rig_rotates_about_two_axes() {
         for seed in 0..20 {
             let mut random = ChaCha8Rng::seed_from_u64(seed);
             let mut any = || DVec3::from([0; 3].map(|_| random.random_range(-3.0..3.0)));

@@ -1,4 +1,4 @@
-//! The pose of a target in one picture, from nothing but its corners.
+//! The pose of a target in one image, from its corners alone.
 
 use glam::{DMat3, DQuat, DVec3};
 use nalgebra::{Matrix3, SMatrix};
@@ -13,18 +13,18 @@ use crate::problem::whitening::{Whitening, scale};
 use deltille_core::camera::{Camera, Pose};
 use deltille_core::statistics::median;
 
-/// Corners that determine a homography.
+/// Number of corners that determine a homography.
 const LEAST_RAYS: usize = 4;
 
-/// Panels from which a pose is started, the largest first: one of them may be wrong, and one more.
+/// Number of panels, the largest first, that give initial poses: two of them may be wrong.
 const STARTS: usize = 3;
 
-/// Panels that are off by more than so many times what the best is do not fit its pose.
+/// Panels do not fit a pose if their error exceeds that of the best panel by this factor.
 const DISAGREE: f64 = 5.0;
 
-/// camera_from_target; `panels` are the poses of the target's panels on it. Of one panel it has the least
-/// squared error of all corners; of several it is the one on which most corners agree. `None` where the
-/// corners lie on a line or out of the camera's reach.
+/// Computes the pose `camera_from_target`; `panels` are the poses of the target's panels on it. For one panel it
+/// minimises the squared error of all corners; for several it is the pose on which most corners agree. `None` if the
+/// corners lie on a line or the camera cannot image them.
 pub(crate) fn estimate_pose(
     camera: &Camera,
     panels: &[Pose],
@@ -53,7 +53,7 @@ pub(crate) fn estimate_pose(
     best.map(|(_, pose)| pose)
 }
 
-/// The median error of the corners of panels, px; infinite where most are out of the camera's reach.
+/// The median residual of the corners of panels, px; infinite if the camera cannot image most of them.
 pub(super) fn median_off_px(
     camera: &Camera,
     panels: &[Pose],
@@ -70,7 +70,7 @@ pub(super) fn median_off_px(
     median(off.collect()).unwrap_or(0.0)
 }
 
-/// The pose that is found from that of one panel.
+/// The pose of the target that starts from that of one panel.
 fn pose_from(
     camera: &Camera,
     panels: &[Pose],
@@ -79,7 +79,7 @@ fn pose_from(
 ) -> Option<Pose> {
     let camera_from_panel = planar_pose(camera, &largest.observations)?;
     let start = camera_from_panel.after(&panels[largest.panel.index()].inverse());
-    // Seen from afar a panel looks nearly the same when its tilt is mirrored at the line of sight.
+    // From afar, a panel looks nearly the same when its tilt is mirrored at the line of sight.
     let centre = largest.observations.iter().map(|o| o.panel_mm).sum::<DVec3>()
         / largest.observations.len() as f64;
     let mirrored =
@@ -102,7 +102,7 @@ pub(crate) fn planar_pose(camera: &Camera, observations: &[Observation]) -> Opti
     let mut normal = SMatrix::<f64, 9, 9>::zeros();
     let mut rays = Vec::with_capacity(observations.len());
     for seen in observations {
-        // The lens may have no ray for some, at its rim or at a pole.
+        // The lens may have no ray for some pixels, at its rim or at a pole.
         let Some(b) = camera.unproject(seen.pixel).map(|ray| ray.direction) else { continue };
         let at = (seen.panel_mm - centre) / size;
         let h = [at.x, at.y, 1.0];
@@ -142,7 +142,7 @@ pub(crate) fn planar_pose(camera: &Camera, observations: &[Observation]) -> Opti
     Some(Pose { rotation, translation: t - rotation * centre })
 }
 
-/// The pose whose plane is mirrored at the line of sight to `centre`, which stays.
+/// The pose with its plane mirrored at the line of sight to `centre`, which stays fixed.
 fn mirrored(pose: &Pose, centre: DVec3) -> Pose {
     let seen = pose.apply(centre);
     let sight = seen.normalize_or(DVec3::Z);
@@ -152,7 +152,7 @@ fn mirrored(pose: &Pose, centre: DVec3) -> Pose {
     Pose { rotation, translation: seen - rotation * centre }
 }
 
-/// The best pose near another, and its cost.
+/// Refines a pose and returns it with its cost.
 fn refine(
     camera: &Camera,
     panels: &[Pose],
@@ -176,13 +176,13 @@ fn refine(
     let minimum = minimise(problem, &whitening, loss, Until::Rough)?;
     let cost = match loss {
         Loss::Squared => minimum.normal.cost,
-        // Scales differ, so that costs do not compare.
+        // Scales differ, so costs are not comparable.
         Loss::Huber | Loss::Cauchy => scale(&minimum.problem).sigma,
     };
     Some((minimum.problem.frames[0], cost))
 }
 
-/// Panels of one target that stay where they are.
+/// The panels of one target, all fixed.
 pub(crate) fn fixed(panels: &[Pose]) -> Vec<PanelUnknowns> {
     let fixed = |&target_from_panel| PanelUnknowns {
         target: 0,
@@ -203,8 +203,8 @@ pub(crate) fn blocks(sightings: &[Sighting], frame: usize) -> impl Iterator<Item
     })
 }
 
-/// The pose that lies in the middle of others: its median distance from them is the least. A turn
-/// counts by how far it moves a point as far away as the translations reach.
+/// The medoid of poses: its median distance from the others is the least. A rotation counts by the displacement of a
+/// point at the distance of the translations.
 pub(crate) fn middle(poses: &[Pose]) -> Pose {
     let arm = median(poses.iter().map(|pose| pose.translation.length()).collect())
         .unwrap_or(0.0)

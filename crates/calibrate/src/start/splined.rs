@@ -1,4 +1,4 @@
-//! A spline that images as another lens does, from which its search starts, and how it changes with that lens's parameters.
+//! The initial spline equivalent to a parametric lens, and its derivatives with respect to the parameters of that lens.
 
 use glam::DVec2;
 use nalgebra::{DMatrix, DVector};
@@ -8,29 +8,29 @@ use deltille_core::camera::{
     Camera, Lens, PROJECTION_PARAMETERS, Spline, SplineGrid, stereographic_direction,
 };
 
-/// The grid reaches this much beyond the outermost corner: a search moves it by less.
+/// Size of the grid relative to the outermost corner: a search moves it by less.
 const MARGIN: f64 = 1.02;
 
-/// What the image shows beyond the outermost corner is covered as far as this part of that corner's angle: what lies
-/// beyond, such as the black rim of a fisheye, would take the knots from where the corners are.
+/// Extent of the grid towards the image border, relative to the angle of the outermost corner. What lies beyond, such
+/// as the black rim of a fisheye, would take knots from where the corners are.
 const BEYOND: f64 = 1.25;
 
-/// Knots are this part of the image's longer side apart in its middle, unless said otherwise: what lenses do beside their
-/// polynomial changes little from one to the next.
+/// Default distance of knots in the image centre, as a fraction of the longer side: the deviations of lenses from their
+/// polynomial change little from one knot to the next.
 const APART: f64 = 1.0 / 12.0;
 
-/// Places along each border of the image that are looked at.
+/// Number of sample positions along each border of the image.
 const ALONG: usize = 32;
 
-/// Places from one knot to the next at which the two lenses are to agree.
+/// Number of sample positions per knot at which the two lenses are matched.
 const A_KNOT: usize = 3;
 
-/// How second differences count beside these: only where there are none.
+/// Weight of second differences relative to these positions: they count only where there are none.
 const SMOOTH: f64 = 1e-9;
 
-/// The camera with a spline of a degree in place of its lens, of so many knots, columns and rows, or as many as it takes. `seen` are pixels at
-/// which there are corners. Expected of its knots is
-/// that it images as a lens of the same kind, whose parameters are `free`. `None` where the lens shows none of them.
+/// Replaces the lens of a camera by a spline of a degree, with this number of knots (columns and rows) or as many as it
+/// takes. `seen` are the pixels of corners. The prior of the knots expects a lens of the same kind with free parameters
+/// `free`. `None` if the lens images none of the pixels.
 pub(super) fn splined(
     camera: &Camera,
     free: &[bool],
@@ -47,7 +47,7 @@ pub(super) fn splined(
     let spline = Spline::new(grid);
     let count = grid.count();
     let mut matrix = DMatrix::<f64>::zeros(count, count);
-    // Of the lens, and of its derivatives by each of its parameters.
+    // For the lens, and for its derivatives with respect to each parameter.
     let of_lens = PROJECTION_PARAMETERS.len()..free.len().max(PROJECTION_PARAMETERS.len());
     let terms: Vec<usize> = of_lens.filter(|&parameter| free[parameter]).collect();
     let mut right = vec![[0, 1].map(|_| DVector::<f64>::zeros(count)); 1 + terms.len()];
@@ -87,7 +87,7 @@ pub(super) fn splined(
     Some((Camera { lens: Lens::Spline(spline), ..camera.clone() }, roughness))
 }
 
-/// The largest |u| along both axes that is to be covered.
+/// The largest |u| along both axes to cover.
 fn reach(camera: &Camera, seen: impl Iterator<Item = DVec2>) -> Option<DVec2> {
     let place = |pixel: DVec2| {
         let ray = camera.unproject(pixel)?.direction;
@@ -111,7 +111,7 @@ mod tests {
     use deltille_core::camera::{BrownConrady, KannalaBrandt};
 
     #[test]
-    fn a_spline_images_as_the_lens_that_it_starts_from() {
+    fn a_spline_projects_like_the_lens_that_it_starts_from() {
         let radial = [-0.25, 0.08, -0.01];
         for (lens, focal) in [
             (Lens::BrownConrady(BrownConrady { radial, ..BrownConrady::default() }), 900.0),

@@ -1,18 +1,19 @@
-//! Labels of a board that looks the same after a rotation, so that each camera of a rig may call its corners otherwise.
+//! Labels of a board that looks the same after a rotation, so that the cameras of a rig may label its corners
+//! differently.
 //!
-//! The detector labels such a board by how it lies in the image. A camera that is upside down, or a moment at which the
-//! board lies on its side in one image, gives labels that differ by one of the rotations Sₖ of the board. The pose of
-//! camera b in camera a is the same in all frames only with the right one,
+//! The detector labels such a board by its orientation in the image. A camera that is upside down, or a board that lies
+//! on its side in one image, gives labels that differ by one of the rotations Sₖ of the board. Only with the right
+//! rotation is the pose of camera b in camera a the same in all frames,
 //!
 //! ```text
 //!     b_from_a = b_from_target · Sₖ⁻¹ · a_from_target⁻¹
 //! ```
 //!
-//! as any other lets it rotate with the board. In each frame the poses for different k are as far apart as the rotations
-//! are, 90° or more, so that a frame is decided as soon as the pose is known about.
+//! because any other makes it rotate with the board. In each frame, the poses for different k differ by 90° or more, so
+//! a frame is decided as soon as the pose is known roughly.
 //!
-//! Limits: cameras are compared by a board that both see. What a rotation of all cameras' labels in one frame changes is
-//! the pose of the board alone, which stays as the first of them has it.
+//! Limits: cameras are compared by a board that both see. A rotation of all cameras' labels in one frame changes only
+//! the pose of the board, which stays as in the first camera.
 
 use std::collections::BTreeMap;
 use std::f64::consts::FRAC_PI_4;
@@ -27,39 +28,39 @@ use deltille_core::camera::Pose;
 use deltille_core::lattice::{LatticeMap, Vertex};
 use deltille_core::statistics::median;
 
-/// Poses of most frames that are compared: more decide no better.
+/// Greatest number of frames whose poses are compared: more do not improve the decision.
 const MOST_FRAMES: usize = 60;
 
-/// Poses scatter by so many times more where labels are wrong, or labels are kept as they were detected: what a frame by
-/// itself says of a pose scatters by two or three times as much as in other frames, and wrong labels scatter as far as
-/// the board was tilted.
+/// Factor by which poses must scatter more with the detected labels before these are changed. Poses from single frames
+/// scatter by a factor of two or three between data sets, and poses with wrong labels scatter as far as the board was
+/// tilted.
 const DECISIVE: f64 = 3.0;
 
-/// Rotations of a board differ by 90° or more; by half of the least they are told from one another.
+/// Half of the least difference between rotations of a board, 90°, which separates them.
 const OTHER_RAD: f64 = FRAC_PI_4;
 
-/// How the labels of a camera were rotated.
+/// The rotation of the labels of a camera.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct LabelRotation {
-    /// The least rotation after which the board looks the same, degrees.
+    /// The smallest rotation after which the board looks the same, degrees.
     pub degrees: u32,
-    /// Frames in which the labels were rotated.
+    /// Number of frames in which the labels were rotated.
     pub frames: usize,
-    /// Frames in which the camera saw the board together with another one.
+    /// Number of frames in which the camera saw the board together with another camera.
     pub of: usize,
-    /// Whether labels that are rotated otherwise do not fit.
+    /// Whether no other rotation of the labels fits.
     pub is_sure: bool,
 }
 
 /// The rotations after which each target looks the same.
 pub(super) struct Symmetries {
     of_target: Vec<Vec<Symmetry>>,
-    /// Where the corners of each target are in the frame of its panel, by their labels, mm.
+    /// Positions of the corners of each target in the frame of its panel, by their labels, mm.
     places: Vec<BTreeMap<(i32, i32), DVec3>>,
 }
 
-/// A rotation of the labels of a target, and what it does to the pose of a view.
+/// A rotation of the labels of a target, and its effect on the pose of a view.
 struct Symmetry {
     map: LatticeMap,
     /// From the target with its labels rotated to the target as it was labelled.
@@ -67,7 +68,7 @@ struct Symmetry {
 }
 
 impl Symmetries {
-    /// Those of the targets of one panel; of several panels tags decide.
+    /// The symmetries of targets of one panel; tags decide for several panels.
     pub(super) fn of(calibration: &Calibration) -> Self {
         let mut places = vec![BTreeMap::new(); calibration.targets.len()];
         let of_target = calibration.targets.iter().enumerate().map(|(target, of)| {
@@ -90,21 +91,21 @@ impl Symmetries {
         Self { of_target, places }
     }
 
-    /// The poses of a view of a target: as it was labelled, then with its labels rotated.
+    /// The poses of a view of a target: with the detected labels, then with rotated labels.
     fn poses(&self, seen: &Seen) -> impl Iterator<Item = Pose> {
         let rotated = self.of_target[seen.target].iter();
         let rotated = rotated.map(|of| seen.camera_from_target.after(&of.labelled_from_rotated));
         std::iter::once(seen.camera_from_target).chain(rotated)
     }
 
-    /// Where camera b is, seen from camera a, by what both saw of one target: as it was labelled, then with the labels of
+    /// The poses of camera b in camera a from a target that both saw: with the detected labels, then with the labels of
     /// b rotated.
     pub(super) fn relative(&self, a: &Seen, b: &Seen) -> Vec<Pose> {
         let target_from_a = a.camera_from_target.inverse();
         self.poses(b).map(|b_from_target| b_from_target.after(&target_from_a)).collect()
     }
 
-    /// What was seen of a target, with its labels rotated.
+    /// The observations of a target with rotated labels.
     pub(super) fn rotated(
         &self,
         target: usize,
@@ -115,15 +116,15 @@ impl Symmetries {
         let Symmetry { map, .. } = self.of_target[target][rotation];
         let relabelled = observations.iter().filter_map(|seen| {
             let Vertex { row, col } = map.apply(Vertex::new(seen.row, seen.col));
-            // A place that no view has belongs to no corner of the board.
+            // A position that no view has belongs to no corner of the board.
             let panel_mm = *self.places[target].get(&(row, col))?;
             Some(Observation { row, col, panel_mm, ..*seen })
         });
         relabelled.collect()
     }
 
-    /// Rotates the labels of all cameras but the first so that the cameras agree, from camera to camera along those that
-    /// share the most frames. Returns what is to be said of each camera.
+    /// Rotates the labels of all cameras except the first so that the cameras agree, from camera to camera along those
+    /// that share the most frames. Returns the rotation to report for each camera.
     pub(super) fn agree(
         &self,
         calibration: &Calibration,
@@ -168,7 +169,7 @@ impl Symmetries {
         said
     }
 
-    /// The least rotation of the targets that a camera saw, degrees.
+    /// The smallest symmetry rotation of the targets that a camera saw, degrees.
     fn least_degrees(&self, seen: &BTreeMap<String, Vec<Seen>>) -> Option<u32> {
         let targets = seen.values().flatten().map(|seen| seen.target);
         let maps = targets.flat_map(|target| &self.of_target[target]).map(|of| of.map);
@@ -186,8 +187,8 @@ impl Symmetries {
         relative.collect()
     }
 
-    /// Rotates the labels of a camera at this pose on the rig to those of the placed ones, and counts the frames in which
-    /// that was done, and all.
+    /// Rotates the labels of a camera with this pose on the rig to those of the placed cameras. Returns the number of
+    /// rotated frames and of all frames.
     fn rotate(
         &self,
         seen: &mut ByFrame,
@@ -200,7 +201,7 @@ impl Symmetries {
         for (name, of_frame) in &mut own {
             let (mut is_rotated, mut is_shared) = (false, false);
             for view in of_frame {
-                // What shows the most corners has the best pose.
+                // The view with the most corners has the best pose.
                 let others = placed.iter().flat_map(|(camera, from_rig)| {
                     let of_camera = seen[*camera].get(name).into_iter().flatten();
                     of_camera.map(move |seen| (from_rig, seen))
@@ -231,14 +232,14 @@ impl Symmetries {
 }
 
 impl Symmetry {
-    /// `None` where no view shows two corners of which one goes to the other.
+    /// `None` if no view shows two corners that the rotation maps to each other.
     fn of(
         map: LatticeMap,
         places: &BTreeMap<(i32, i32), DVec3>,
         target_from_panel: &Pose,
     ) -> Option<Self> {
         let rotation = DQuat::from_rotation_z(map.angle_rad());
-        // The corner with the rotated label is where the corner with the detected one is.
+        // The corner with the rotated label takes the position of the corner with the detected label.
         let shifts = places.iter().filter_map(|(&(row, col), &at)| {
             let Vertex { row, col } = map.apply(Vertex::new(row, col));
             Some(*places.get(&(row, col))? - rotation * at)
@@ -259,17 +260,17 @@ pub(super) struct Agreed {
     pub pose: Pose,
     /// The median distance of the frames from it, mm.
     pub spread_mm: f64,
-    /// Whether no pose that belongs to other labels fits.
+    /// Whether no pose from other labels fits.
     pub is_sure: bool,
 }
 
-/// A rotation counts by how far it moves a point at the end of an arm.
+/// Distance of two poses; a rotation counts by the displacement of a point at the end of an arm.
 fn apart_mm(a: &Pose, b: &Pose, arm_mm: f64) -> f64 {
     (a.translation - b.translation).length() + arm_mm * a.rotation.angle_between(b.rotation)
 }
 
-/// The pose on which most frames agree, of each of which there are the pose as it was labelled, and those with labels
-/// rotated: that of the labels as they are, unless others agree decisively better. `None` without frames.
+/// Finds the pose on which most frames agree. Each frame has the pose with the detected labels and those with rotated
+/// labels; the detected labels win unless others agree decisively better. `None` without frames.
 pub(super) fn agreed(frames: &[Vec<Pose>]) -> Option<Agreed> {
     let frames: Vec<&Vec<Pose>> = evenly(frames, MOST_FRAMES).collect();
     let labelled = || frames.iter().filter_map(|poses| poses.first());

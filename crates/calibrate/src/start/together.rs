@@ -1,5 +1,5 @@
-//! Several cameras, or one with panels that are not where they are stated to be: each camera by itself, laid
-//! together.
+//! The start of several cameras, or of one camera with unknown panel poses: each camera is solved on its own, and the
+//! results are combined.
 //!
 //! ```text
 //!   each camera by itself ─→ camera_from_target in its own views
@@ -28,18 +28,18 @@ use crate::problem::unknowns::{Block, CameraUnknowns};
 use crate::problem::whitening::scale;
 use deltille_core::camera::{Camera, Pose};
 
-/// A camera by itself.
+/// The result of a camera on its own.
 pub(crate) struct Alone {
     pub camera: Camera,
-    /// What is expected of the knots of a spline.
+    /// The prior of the knots of a spline.
     pub roughness: Option<Roughness>,
     /// The pose of the target in each view, by its name.
     pub poses: BTreeMap<String, Pose>,
-    /// Views that took no part.
+    /// Excluded views.
     pub excluded: Vec<Excluded>,
 }
 
-/// `by_itself` solves a calibration of one camera.
+/// Combines the cameras; `by_itself` solves a calibration of one camera.
 pub(crate) fn start(
     calibration: &Calibration,
     by_itself: impl Fn(&Calibration) -> Result<Alone, CalibrationError>,
@@ -100,10 +100,10 @@ pub(crate) fn start(
     problem.cameras = of_cameras.map(unknown).collect();
     problem.targets = targets_unknown(&blocks, calibration, &places.scene_from_target);
     problem.panels = unknowns(&blocks, calibration);
-    // What is out of a camera's reach from this start cannot be walked to.
+    // A corner that the camera cannot image from this start cannot be reached by steps.
     blocks.retain(|block| problem.residuals(block).is_some());
     problem.blocks = blocks;
-    // A first pass in which frames that were not taken at one moment hardly count.
+    // A first pass in which frames that were not taken at the same time have almost no influence.
     let whitening = scale(&problem);
     let first = minimise(problem, &whitening, Loss::Cauchy, Until::Rough)
         .ok_or(CalibrationError::NoStart)?;
@@ -131,7 +131,7 @@ fn frames(seen: &ByFrame, places: &Places, problem: &mut Problem) -> Vec<Frame> 
     frames
 }
 
-/// A camera by itself: as it is known, or as its views have it.
+/// The result of a camera on its own: given, or estimated from its views.
 fn alone(
     calibration: &Calibration,
     index: usize,
@@ -148,7 +148,7 @@ fn alone(
     })
 }
 
-/// What a camera saw, by frame, with the poses that its views have by themselves.
+/// The views of a camera by frame, with the poses from the camera on its own.
 fn by_frame(
     calibration: &Calibration,
     camera: &CameraViews,
