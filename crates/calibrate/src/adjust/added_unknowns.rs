@@ -1,4 +1,4 @@
-//! Unknowns that are added to an adjustment: how smooth splines are, the shape of a board, offsets of corners.
+//! Unknowns that are added to an adjustment: smoothness of splines, shape of a board, offsets of corners.
 
 use super::reweighting::{Kept, Settled, settle, variance};
 use super::wrong_views::Gross;
@@ -10,20 +10,20 @@ use crate::problem::corner_map::CornerMap;
 use crate::problem::shape;
 use crate::problem::shape::Shape;
 
-/// An expectation is found when it changes by less than this part.
+/// Relative change below which a prior has converged.
 const SAME_PRIOR: f64 = 0.05;
 
-/// Rounds in which offsets and what is expected of them are fitted to one another.
+/// Most rounds in which offsets and their prior are fitted to each other.
 const PRIOR_ROUNDS: usize = 10;
 
-/// The same of the knots of a spline, whose rounds are shorter.
+/// Most rounds for the knots of a spline, which are shorter.
 const KNOT_ROUNDS: usize = 15;
 
-/// A size of second differences is found when it changes by less than this part.
+/// Relative change below which the size of second differences has converged.
 const SAME_SIZE: f64 = 0.1;
 
 impl Calibration {
-    /// With splines as smooth as the corners have them.
+    /// Fits the smoothness of splines to the corners.
     pub(crate) fn smoothed(
         &self,
         gross: &Gross,
@@ -56,7 +56,7 @@ impl Calibration {
         settle(Kept { problem, ..gross.kept() }, self.weights, self.loss)
     }
 
-    /// Finds the shape of the sheet too, and the F ratio of what that explains.
+    /// Estimates the shape of the sheet too, and the F ratio of its effect.
     pub(crate) fn bent(
         &self,
         gross: &Gross,
@@ -66,7 +66,7 @@ impl Calibration {
         let mut problem = settled.minimum.problem;
         let observations = problem.blocks.iter().flat_map(|block| block.observations.iter());
         problem.shape = Some(Shape::flat(observations.map(|seen| seen.panel_mm)));
-        // Compared under the same weights.
+        // The comparison uses the same weights.
         let bent = minimise(problem, &settled.whitening, self.loss, Until::Fine)
             .ok_or(CalibrationError::NoStart)?;
         let variance = variance(&bent, &settled.whitening, self.loss);
@@ -76,7 +76,7 @@ impl Calibration {
         Ok((settled, f_ratio))
     }
 
-    /// Finds the place of every corner of the target too.
+    /// Estimates the position of every corner of the target too.
     pub(crate) fn measured(
         &self,
         gross: &Gross,

@@ -1,4 +1,4 @@
-//! What outliers have in common: a panel, a view, a place in the image.
+//! Findings: what outliers have in common, such as a panel, a view, or a region of the image.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -7,63 +7,63 @@ use glam::DVec2;
 use crate::input::panel::PanelRef;
 use crate::problem::bundle::Problem;
 
-/// Gross errors of corners that have something in common.
+/// Outliers that have something in common.
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct Finding {
-    /// What they have in common.
+    /// The common element.
     pub shared: Shared,
-    /// How many of these corners are outliers.
+    /// Number of outliers among its corners.
     pub outliers: usize,
-    /// How many corners have it in common.
+    /// Number of all its corners.
     pub corners: usize,
-    /// Whether all of them were left out of the calibration.
+    /// Whether all of them were excluded from the calibration.
     pub left_out: bool,
 }
 
-/// What outliers have in common.
+/// The element that outliers have in common.
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum Shared {
-    /// They lie far beyond the picture that they were seen in.
+    /// They lie far outside their image.
     Beyond {
         /// Index of the camera.
         camera: usize,
         /// Name of the view.
         view: String,
     },
-    /// A panel of the target, wherever it was seen.
+    /// A panel of the target, in all views.
     Panel {
-        /// Which one.
+        /// The panel.
         panel: PanelRef,
-        /// Where it is instead, if that explains them.
+        /// Its displacement, if that explains the outliers.
         moved: Option<Moved>,
     },
-    /// A panel in one picture.
+    /// A panel in one image.
     PanelInView {
-        /// Which one.
+        /// The panel.
         panel: PanelRef,
         /// Index of the camera.
         camera: usize,
         /// Name of the view.
         view: String,
-        /// The median error of its corners, px.
+        /// Median residual of its corners, px.
         off_px: f64,
     },
-    /// A picture.
+    /// An image.
     View {
         /// Index of the camera.
         camera: usize,
         /// Name of the view.
         view: String,
     },
-    /// A part of the image, in several views.
+    /// A region of the image, in several views.
     Region {
         /// Index of the camera.
         camera: usize,
-        /// Its upper left, px.
+        /// Its upper left corner, px.
         from_px: DVec2,
-        /// Its lower right, px.
+        /// Its lower right corner, px.
         to_px: DVec2,
     },
     /// A camera of a rig.
@@ -73,38 +73,38 @@ pub enum Shared {
     },
 }
 
-/// How far a panel is from its stated pose.
+/// The displacement of a panel from its stated pose.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct Moved {
-    /// Distance of its middle from the stated position, mm.
+    /// Distance of its centre from the stated position, mm.
     pub by_mm: f64,
     /// Angle between its orientation and the stated one, rad.
     pub turned_rad: f64,
 }
 
-/// Outliers are a finding from so many on: fewer may meet by chance.
+/// Least number of outliers for a finding: fewer may coincide by chance.
 const LEAST_OUTLIERS: usize = 6;
 
-/// From this part on most of what is seen there is wrong.
+/// Least fraction of outliers among the corners of a finding.
 const MOST: f64 = 0.5;
 
-/// And elsewhere at most this part of that, so that it is wrong there.
+/// Greatest fraction of outliers among the other corners, relative to that fraction.
 const ELSEWHERE: f64 = 0.5;
 
-/// And so many deviations more than elsewhere, as counts scatter: of a million groups hardly one by chance.
+/// Least excess of outliers in standard deviations of the count: chance exceeds it hardly once in a million groups.
 const SIGNIFICANT: f64 = 5.0;
 
-/// Cells of the image along its longer side in which outliers are counted.
+/// Number of cells along the longer side of the image in which outliers are counted.
 const CELLS: f64 = 8.0;
 
-/// Views of which a part of the image shows outliers, if it is the image's fault.
+/// Least number of views with outliers in a region of the image.
 const LEAST_VIEWS: usize = 3;
 
-/// A camera, and a cell of its image.
+/// Index of a camera, and a cell of its image.
 type Cell = (usize, [i32; 2]);
 
-/// Outliers and corners.
+/// Numbers of outliers and of corners.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct Count {
     pub outliers: usize,
@@ -121,7 +121,7 @@ impl Count {
         self.outliers as f64 / self.corners.max(1) as f64
     }
 
-    /// Whether most of these are outliers, and few of the others of all.
+    /// Whether most of these corners are outliers, but few of the others among `all`.
     pub(super) fn stands_out(self, all: Count) -> bool {
         let others =
             Count { outliers: all.outliers - self.outliers, corners: all.corners - self.corners };
@@ -131,7 +131,7 @@ impl Count {
             && others.share() <= ELSEWHERE * self.share()
     }
 
-    /// Whether these are outliers more often than others, by more than chance.
+    /// Whether the fraction of outliers is significantly larger than among the others.
     pub(super) fn exceeds(self, others: Count) -> bool {
         let (count, chance) = (self.corners as f64, others.share());
         let more = count * (self.share() - chance);
@@ -140,7 +140,7 @@ impl Count {
     }
 }
 
-/// What the outliers of a problem share, of what took part; `names` are those of the frames.
+/// Finds what the outliers among the used corners of a problem have in common; `names` gives the names of frames.
 pub(super) fn shared_outliers(
     problem: &Problem,
     outliers: &[Vec<bool>],
@@ -159,7 +159,7 @@ pub(super) fn shared_outliers(
             all.add(outlier);
             cameras.entry(block.camera).or_default().add(outlier);
             views.entry((block.camera, block.frame)).or_default().add(outlier);
-            // Where it should have been seen: wrong places are anywhere.
+            // The predicted position: wrong positions are anywhere.
             let Some(off) = problem.residual(block, corner) else { continue };
             let cell = ((corner.pixel - off) / cell_px).floor().as_ivec2().to_array();
             let (count, of_views) = cells.entry((block.camera, cell)).or_default();
@@ -183,7 +183,7 @@ pub(super) fn shared_outliers(
             found.push(finding(Shared::View { camera, view: names(frame) }, count));
         }
     }
-    // The cells of a camera that stand out, as one rectangle.
+    // Merge the conspicuous cells of a camera into one rectangle.
     let mut regions: BTreeMap<usize, (Count, [i32; 2], [i32; 2])> = BTreeMap::new();
     for (&(camera, cell), (count, of_views)) in &cells {
         let is_of_image = of_views.len() >= LEAST_VIEWS && !cameras.contains_key(&camera);

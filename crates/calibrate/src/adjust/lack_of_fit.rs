@@ -1,4 +1,4 @@
-//! Patterns in the residuals that noise does not make.
+//! Patterns in the residuals that noise does not explain.
 //!
 //! ```text
 //!   over the image    the mean residual of a cell, against how it differs between views
@@ -6,9 +6,9 @@
 //!                     against what is left; the same of a panel as a whole
 //! ```
 //!
-//! Both are analyses of variance: what a pattern explains, for each of its unknowns, over what is left,
-//! for each of its degrees of freedom, is F. Cameras and poses have taken up their part of every pattern
-//! before, so that F is rather too small than too large. Outliers take no part.
+//! Both are analyses of variance: F is the sum of squares that a pattern explains, per unknown, over the remainder, per
+//! degree of freedom. Cameras and poses have already absorbed a part of every pattern, so F is too small rather than
+//! too large. Outliers are excluded.
 
 use std::collections::BTreeMap;
 
@@ -19,54 +19,54 @@ use crate::input::panel::PanelRef;
 use crate::problem::bundle::Problem;
 use crate::problem::whitening::Whitening;
 
-/// Cells of the image along its longer side: the rings that a wrong polynomial leaves between the
-/// middle and the rim are a few, and a cell is well within one of them.
+/// Number of cells along the longer side of the image: a wrong polynomial leaves a few rings between the centre and the
+/// rim, and a cell is well within one of them.
 const CELLS: f64 = 16.0;
 
-/// A normal deviate is larger once in a thousand times.
+/// Normal deviate that is exceeded once in a thousand times.
 pub(crate) const SIGNIFICANT: f64 = 3.09;
 
-/// A pattern matters from this part of the remaining noise on. Deviations take every residual for
-/// independent; a pattern is the same in all views, so that it does not average out, and with half of the
-/// noise it outweighs what the noise leaves of a parameter as soon as a few corners bear on it.
+/// Size of a pattern relative to the remaining noise from which it matters. Standard deviations assume independent
+/// residuals, but a pattern is the same in all views and does not average out. At half of the noise, it outweighs the
+/// noise in a parameter as soon as a few corners bear on it.
 pub(crate) const MATTERS: f64 = 0.5;
 
-/// Of many panels one must be displaced by more: of a million hardly one is by chance.
+/// Significance of the displacement of one among many panels: chance exceeds it hardly once in a million.
 const SIGNIFICANT_PANEL: f64 = 5.0;
 
-/// Fewest panels of which one can be displaced against the others.
+/// Least number of panels for identifying a displaced one.
 const LEAST_PANELS: usize = 3;
 
-/// A direction in which views move a corner by less than this part of what they do in the best one is
-/// not sought: its information is the square. All views came from the same side then.
+/// Least sensitivity to a displacement of a corner, relative to the best direction; the information is its square.
+/// Below it all views came from the same side, and the direction is not estimated.
 const BLIND: f64 = 0.03;
 
-/// Fewest views of a corner: two coordinates each, and its move has three.
+/// Least number of views of a corner: each has two coordinates, and the displacement three.
 const LEAST_VIEWS: usize = 3;
 
-/// A pattern that noise does not make, and that matters beside the noise.
+/// A pattern that noise does not explain, and that matters compared with the noise.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum LackOfFit {
-    /// Residuals depend on the place in the image: the lens is not what the model says.
+    /// Residuals depend on the position in the image: the model does not fit the lens.
     Lens {
         /// Index of the camera.
         camera: usize,
-        /// Root mean square of the pattern, px a coordinate.
+        /// RMS of the pattern per axis, px.
         rms_px: f64,
     },
-    /// Residuals depend on the place on the target: its corners are not where they are said to be.
+    /// Residuals depend on the position on the target: its corners are not where the description places them.
     Target {
-        /// The panel that shows it most.
+        /// The panel with the strongest pattern.
         panel: PanelRef,
-        /// Root mean square of the pattern, px a coordinate.
+        /// RMS of the pattern per axis, px.
         rms_px: f64,
-        /// The same of what moves the corners in space, mm. What poses and camera take up is not in it.
+        /// RMS displacement of the corners in space, mm, without what poses and camera absorb.
         rms_mm: f64,
     },
 }
 
-/// A corner in a view; whitened.
+/// A corner in a view, whitened.
 struct Seen {
     block: usize,
     camera: usize,
@@ -75,11 +75,11 @@ struct Seen {
     label: [i32; 2],
     place_mm: DVec3,
     residual: DVec2,
-    /// The residual by the corner's place on the panel, 1/mm.
+    /// Derivative of the residual with respect to the corner's position on the panel, 1/mm.
     by_place: [DVec3; 2],
 }
 
-/// What can leave a pattern.
+/// A possible source of a pattern.
 #[derive(Clone, Copy, PartialEq)]
 enum Source {
     Lens(usize),
@@ -87,24 +87,25 @@ enum Source {
     Panels,
 }
 
-/// What a source explains of the residuals.
+/// The part of the residuals that a source explains.
 #[derive(Default)]
 struct Explained {
-    /// By index of the corner.
+    /// Explained residuals by index of the corner.
     fitted: Vec<(usize, DVec2)>,
-    /// Sums of squares: of all, and of the means or moves.
+    /// Sums of squares: of all residuals, and of the means or displacements.
     all: f64,
     explained: f64,
     unknowns: f64,
     left: f64,
     freedom: f64,
-    /// By panel: what is explained; and Σ|move|², Σ of its variances by that of the residuals, corners.
+    /// By panel: the explained sum of squares; and Σ|displacement|², Σ of its variances in units of that of the
+    /// residuals, and the number of corners.
     by_panel: BTreeMap<PanelRef, f64>,
     moves: [f64; 3],
 }
 
-/// The patterns of a problem's residuals, the strongest first. Each is taken out before weaker ones are
-/// looked for: corners of the board and places in the image go together where all views are alike.
+/// Finds the patterns in a problem's residuals, the strongest first. Each is subtracted before weaker ones are sought:
+/// corners of the board and positions in the image coincide if all views are similar.
 pub(crate) fn lack_of_fit(problem: &Problem, whitening: &Whitening) -> Vec<LackOfFit> {
     let (mut seen, px) = seen(problem, whitening);
     let mut open: Vec<Source> = (0..problem.cameras.len()).map(Source::Lens).collect();
@@ -125,7 +126,7 @@ pub(crate) fn lack_of_fit(problem: &Problem, whitening: &Whitening) -> Vec<LackO
         let rms_px = px * (part * explained.all / (2 * explained.fitted.len()) as f64).sqrt();
         let source = open.remove(index);
         if !matches!(source, Source::Lens(_)) {
-            // Where panels are displaced their corners are.
+            // Displaced panels imply displaced corners.
             open.retain(|other| matches!(other, Source::Lens(_)));
         }
         found.push(match source {
@@ -145,7 +146,7 @@ pub(crate) fn lack_of_fit(problem: &Problem, whitening: &Whitening) -> Vec<LackO
     }
 }
 
-/// The corners that are no outliers, and how many px a whitened coordinate is worth.
+/// The corners that are not outliers, and the size of a whitened coordinate, px.
 fn seen(problem: &Problem, whitening: &Whitening) -> (Vec<Seen>, f64) {
     let mut all = Vec::new();
     let (mut px, mut white) = (0.0, 0.0);
@@ -185,8 +186,8 @@ fn seen(problem: &Problem, whitening: &Whitening) -> (Vec<Seen>, f64) {
     (all, px)
 }
 
-/// Means of cells. Corners of one view in one cell share what is wrong with that view, so that a
-/// view's mean counts as one.
+/// Means over the cells of an image. Corners of one view in one cell share the errors of that view, so the mean of a
+/// view counts as one observation.
 fn over_image(seen: &[Seen], camera: usize) -> Explained {
     let mut cells: BTreeMap<[i32; 2], BTreeMap<usize, Vec<usize>>> = BTreeMap::new();
     for (index, corner) in seen.iter().enumerate().filter(|(_, c)| c.camera == camera) {
@@ -218,7 +219,7 @@ fn over_image(seen: &[Seen], camera: usize) -> Explained {
     found
 }
 
-/// Moves of corners in space.
+/// Displacements of corners in space.
 fn over_target(seen: &[Seen]) -> Explained {
     let mut corners: BTreeMap<(PanelRef, [i32; 2]), Vec<usize>> = BTreeMap::new();
     for (index, corner) in seen.iter().enumerate() {
@@ -239,14 +240,14 @@ fn over_target(seen: &[Seen]) -> Explained {
     found
 }
 
-/// Moves of panels as a whole, of those alone that show one.
+/// Displacements of panels as a whole, from views that show several panels.
 fn over_panels(seen: &[Seen]) -> Explained {
     let mut panels: BTreeMap<PanelRef, Vec<usize>> = BTreeMap::new();
     for (index, corner) in seen.iter().enumerate() {
         panels.entry(corner.panel).or_default().push(index);
     }
     let mut found = Explained::default();
-    // Of two nothing tells which is wrong, and of one there is nothing that it could be wrong to.
+    // Of two panels it is unknown which one is wrong, and a single one has no reference.
     if panels.len() < LEAST_PANELS {
         return found;
     }
@@ -254,7 +255,7 @@ fn over_panels(seen: &[Seen]) -> Explained {
         let places = || views.iter().map(|&index| seen[index].place_mm);
         let middle = places().sum::<DVec3>() / views.len() as f64;
         let reach = places().map(|at| at.distance(middle)).fold(f64::MIN_POSITIVE, f64::max);
-        // Turns in lengths at the rim, so that all unknowns are alike.
+        // Rotations as lengths at the rim, so that all unknowns have the same unit.
         let arm = |seen: &Seen| (seen.place_mm - middle) / reach;
         let row = |by: DVec3, seen: &Seen| {
             let turn = arm(seen).cross(by);
@@ -277,16 +278,16 @@ fn over_panels(seen: &[Seen]) -> Explained {
     found
 }
 
-/// What explains the residuals of some corners best.
+/// The displacement that explains the residuals of some corners best.
 struct Move<const N: usize> {
     by: [f64; N],
-    /// By the variance of a residual.
+    /// In units of the variance of a residual.
     variances: [f64; N],
     explained: f64,
     unknowns: f64,
 }
 
-/// Least squares of some corners' residuals, of which each coordinate has a row; what views hardly see is not sought.
+/// Least-squares fit to the residuals of some corners, one row per coordinate; poorly observed directions are omitted.
 fn best_move<const N: usize>(
     seen: &[Seen],
     corners: &[usize],
@@ -318,7 +319,7 @@ fn best_move<const N: usize>(
 }
 
 impl Explained {
-    /// Adds what a move explains of some corners of a panel.
+    /// Adds the residuals that a displacement explains for some corners of a panel.
     fn add<const N: usize>(
         &mut self,
         panel: PanelRef,
@@ -341,13 +342,13 @@ impl Explained {
         self.fitted.extend(corners.iter().map(fitted));
     }
 
-    /// How rare it is that chance makes as much of a pattern, as a normal deviate.
+    /// The significance of the pattern as a normal deviate.
     fn deviate(&self) -> f64 {
         let f_ratio = self.explained / self.unknowns / (self.left / self.freedom);
         deviate_of_f(f_ratio, self.unknowns, self.freedom)
     }
 
-    /// The part of all squares that the pattern makes, where that is more than chance and matters.
+    /// The fraction of all squares that the pattern explains, if it is significant and matters.
     fn pattern(&self) -> Option<f64> {
         let noise = self.left / self.freedom;
         let pattern = self.explained - self.unknowns * noise;
@@ -363,8 +364,8 @@ impl Explained {
     }
 }
 
-/// The normal deviate as rare as a value of the F distribution, by Paulson's cube roots; no
-/// number where there is no freedom.
+/// The normal deviate of the same probability as a value of the F distribution, by Paulson's cube-root approximation;
+/// NaN without degrees of freedom.
 pub(crate) fn deviate_of_f(f_ratio: f64, unknowns: f64, freedom: f64) -> f64 {
     let (a, b) = (2.0 / (9.0 * unknowns), 2.0 / (9.0 * freedom));
     let root = f_ratio.cbrt();
@@ -375,9 +376,9 @@ pub(crate) fn deviate_of_f(f_ratio: f64, unknowns: f64, freedom: f64) -> f64 {
 mod tests {
     use super::*;
 
-    /// Tables of the F distribution, once in a thousand.
+    /// Values from tables of the F distribution, probability 0.001.
     #[test]
-    fn one_in_a_thousand_is_three_deviations() {
+    fn one_in_a_thousand_is_three_standard_deviations() {
         for (unknowns, freedom, f_ratio) in
             [(10.0, 10.0, 8.754), (10.0, 60.0, 3.54), (60.0, 120.0, 1.95)]
         {

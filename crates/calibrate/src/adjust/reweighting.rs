@@ -1,8 +1,8 @@
-//! Iteratively reweighted adjustment: the weights of corners, the set of corners that count, and
-//! the unknowns are estimated in turn until they are consistent.
+//! Iteratively reweighted adjustment: estimates the weights of corners, the set of corners that count, and the unknowns
+//! alternately until they are consistent.
 //!
-//! Robust losses are M-estimators. Corners with gross errors, beyond a gap in the distribution of
-//! residuals, are excluded; smooth deviations, as an unsuitable lens model leaves, are not.
+//! Robust losses are M-estimators. Gross outliers, beyond a gap in the distribution of residuals, are excluded; smooth
+//! residuals, as an unsuitable lens model leaves, are not.
 
 use std::collections::BTreeMap;
 
@@ -25,33 +25,30 @@ const WEIGHT_ROUNDS: usize = 3;
 /// sides for ever.
 const MOST_ROUNDS: usize = 12;
 
-/// Least size of a gross error, in deviations. Beyond [`OUTLIER_SIGMA`] a corner is called an
-/// outlier.
+/// Least size of a gross outlier, in standard deviations. Beyond [`OUTLIER_SIGMA`] a corner is called an outlier.
 const GROSS_SIGMA: f64 = 2.0 * OUTLIER_SIGMA;
 
-/// Gross errors are separated from the other corners by a gap: between half the limit and the limit
-/// lie at most this fraction of the number of corners beyond it. A lens that the model does not
-/// represent well leaves a tail of residuals at its rim instead, with more corners nearer than
-/// farther; excluding the rim would make the fit there ever worse.
+/// Greatest number of corners in the gap before the gross outliers, relative to the number beyond it; the gap reaches
+/// from half the limit to the limit. A lens that the model does not fit well leaves a tail of residuals at its rim
+/// instead, with more corners nearer than farther; excluding the rim would make the fit there ever worse.
 const IN_THE_GAP: f64 = 0.25;
 
-/// Lens model errors are smooth: of the neighbours of corners that are far off, more than the
-/// fraction `SMOOTH` are off towards the same side, by more than the fraction `FALLS_OFF` as much
-/// and by more than `LEAST_SMOOTH_SIGMA` deviations. Wrong positions are smooth nowhere; where
-/// labels or corners are displaced alike, only the displaced corners are such neighbours.
+/// Lens model errors are smooth: more than the fraction `SMOOTH` of the neighbours of corners with large residuals have
+/// residuals towards the same side, of more than the fraction `FALLS_OFF` of the size and of more than
+/// `LEAST_SMOOTH_SIGMA` standard deviations. Wrong positions are not smooth; for labels or corners that are displaced
+/// together, only the displaced corners are such neighbours.
 const SMOOTH: f64 = 0.5;
 const FALLS_OFF: f64 = 0.05;
 const LEAST_SMOOTH_SIGMA: f64 = 3.0;
 
-/// The parts of a problem that belong together.
+/// The parts of a problem that agree with each other.
 #[derive(Clone, Debug)]
 pub(crate) struct Kept {
     pub problem: Problem,
-    /// Blocks that take no part.
+    /// Excluded blocks.
     pub left_out: Vec<bool>,
-    /// Whether corners with gross errors stand out from the start. They must then have no influence
-    /// even in the first round: if two fifths of the corners are displaced alike, they bias the
-    /// estimate so much that they no longer stand out.
+    /// Whether gross outliers stand out from the start. They must then have no influence even in the first round: if
+    /// two fifths of the corners are displaced together, they bias the estimate so much that they no longer stand out.
     pub some_stand_out: bool,
 }
 
@@ -63,16 +60,15 @@ pub(crate) struct Settled {
     pub whitening: Whitening,
     /// The same unknowns with all corners.
     pub problem: Problem,
-    /// For each block, which of all its corners are outliers: farther off than by chance.
+    /// For each block, which of its corners are outliers.
     pub outliers: Vec<Vec<bool>>,
 }
 
-/// Minimises with weights that are consistent with the residuals at the minimum. Corners with gross
-/// errors, and blocks that are left out, do not take part, so that deviations are those of the
-/// corners that do; with [`Loss::Squared`] every corner takes part.
+/// Minimises with weights that are consistent with the residuals at the minimum. Gross outliers and excluded blocks are
+/// not used, so standard deviations describe the corners that are; with [`Loss::Squared`] every corner is used.
 ///
 /// # Errors
-/// When the normal equations cannot be formed or solved from the initial values.
+/// Returns an error if the normal equations cannot be formed or solved from the initial values.
 pub(super) fn settle(
     kept: Kept,
     weights: Weights,
@@ -127,8 +123,7 @@ pub(super) fn settle(
     Ok(Settled { minimum, whitening, problem, outliers })
 }
 
-/// Marks the corners with gross errors, for each block. Every frame keeps at least its nearest
-/// corners, as many as a pose needs.
+/// Marks the gross outliers of each block. Every frame keeps at least its nearest corners, as many as a pose needs.
 pub(super) fn with_gross_errors(
     problem: &Problem,
     left_out: &[bool],
@@ -167,8 +162,8 @@ pub(super) fn with_gross_errors(
     gross
 }
 
-/// For every corner with a gross error: the number of neighbours that are off towards the same side
-/// by a comparable amount, and the number of neighbours. Zero for all other corners.
+/// For every gross outlier: the number of neighbours with a residual towards the same side and of comparable size, and
+/// the number of neighbours. Zero for all other corners.
 fn smooth_neighbours(
     problem: &Problem,
     block: &Block,
@@ -194,7 +189,7 @@ fn smooth_neighbours(
     block.observations.iter().enumerate().map(of_corner).collect()
 }
 
-/// The whitened residual from which errors are gross: the first gap; `f64::MAX` without one.
+/// The whitened residual from which outliers are gross: the first gap; `f64::MAX` without one.
 fn gross_limit(off: &[f64], sigma: f64) -> f64 {
     let beyond = |limit: f64| off.iter().filter(|&&off| off > limit).count() as f64;
     let mut limit = GROSS_SIGMA * sigma;
@@ -203,7 +198,7 @@ fn gross_limit(off: &[f64], sigma: f64) -> f64 {
             return limit;
         }
         limit *= 2.0;
-        // Corners that a camera cannot image are off by an infinite amount.
+        // Corners that a camera cannot image have an infinite residual.
         if limit.is_infinite() {
             break;
         }

@@ -9,10 +9,9 @@
 //!     T = sᵀ (Sᵥ − Sᵥ S⁻¹ Sᵥ)⁺ s
 //! ```
 //!
-//! is χ² distributed with as many degrees of freedom as the view determines of the camera. This is
-//! the Chow test (Chow 1960) of whether the camera of this view is that of all others. A stranger
-//! increases the statistic of all views until it is removed; lack of fit of the model increases it
-//! in any case, and then no single view is to blame.
+//! is χ² distributed with as many degrees of freedom as the view determines of the camera. This is the Chow test (Chow
+//! 1960) of whether the camera of this view is that of all others. An inconsistent view increases the statistic of all
+//! views until it is removed; lack of fit of the model increases it in any case, and then no single view is to blame.
 
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
@@ -30,9 +29,9 @@ use deltille_core::statistics::median;
 /// Least number of views for the test: three remain without the tested one.
 const LEAST_VIEWS: usize = 4;
 
-/// A direction of the camera parameters is undetermined when all views together tell less than the
-/// fraction `OPEN` of what they tell in the best one, and is not tested when the view, or all
-/// others, contribute less than `LEAST_PART` of it.
+/// Least information on a direction of the camera parameters. A direction is undetermined if all views together
+/// contribute less than the fraction `OPEN` of the best direction. It is not tested if the view, or all others,
+/// contribute less than the fraction `LEAST_PART` of it.
 const OPEN: f64 = 1e-9;
 const LEAST_PART: f64 = 1e-3;
 
@@ -40,11 +39,11 @@ const LEAST_PART: f64 = 1e-3;
 /// is usual.
 const AGREEING: f64 = 1.5;
 
-/// Significance from which a view is a stranger, in standard deviations relative to the scatter of
-/// all views: chance exceeds it hardly once in a million views.
+/// Significance from which a view is inconsistent, in standard deviations relative to the scatter of all views: chance
+/// exceeds it hardly once in a million views.
 const SIGNIFICANT: f64 = 5.0;
 
-/// A stranger also has to shift the camera by this many of its standard deviations.
+/// Least shift of the camera by an inconsistent view, in its standard deviations.
 const HARMFUL: f64 = 1.0;
 
 /// Efficiency of the median relative to the mean, for squares.
@@ -54,34 +53,34 @@ const EFFICIENCY: f64 = 0.64;
 #[derive(Clone, Copy, Debug)]
 struct Pull {
     /// T divided by its degrees of freedom, in units of the variance of residuals.
-    strange: f64,
+    statistic: f64,
     freedom: f64,
     /// Shift of the camera without the view, in its standard deviations.
     moves: f64,
 }
 
 impl Pull {
-    /// From pairs of the fraction of a direction that the view contributes, and the component of
-    /// its gradient along it.
+    /// Computes it from pairs: the fraction of a direction that the view contributes, and the component of its gradient
+    /// along it.
     fn of(directions: impl Iterator<Item = (f64, f64)>, variance: f64) -> Self {
-        let mut found = Self { strange: 0.0, freedom: 0.0, moves: 0.0 };
+        let mut found = Self { statistic: 0.0, freedom: 0.0, moves: 0.0 };
         for (part, along) in directions {
             let others = 1.0 - part;
             if part > LEAST_PART && others > LEAST_PART {
                 let along = along.powi(2) / variance;
-                found.strange += along / (part * others);
+                found.statistic += along / (part * others);
                 found.moves += along / (others * others);
                 found.freedom += 1.0;
             }
         }
-        found.strange /= found.freedom.max(1.0);
+        found.statistic /= found.freedom.max(1.0);
         found.moves = found.moves.sqrt();
         found
     }
 }
 
 /// Result of the test over all frames.
-pub(super) struct Opinions {
+pub(super) struct Consistency {
     /// Whether most frames agree on the cameras.
     pub agree: bool,
     /// The frame that contradicts the cameras of all others most significantly, if any, and the
@@ -89,20 +88,20 @@ pub(super) struct Opinions {
     pub stranger: Option<(usize, f64)>,
 }
 
-impl Opinions {
-    /// Tests all frames at a minimum; `None` where cameras are known or frames are too few.
+impl Consistency {
+    /// Tests all frames at a minimum; `None` if the cameras are known or there are too few frames.
     pub(super) fn of(settled: &Settled, loss: Loss) -> Option<Self> {
         let pulls = pulls(settled, loss)?;
-        let told = pulls.iter().flatten().filter(|pull| pull.freedom > 0.0);
-        let told: Vec<Pull> = told.copied().collect();
-        if told.len() < LEAST_VIEWS {
+        let tested = pulls.iter().flatten().filter(|pull| pull.freedom > 0.0);
+        let tested: Vec<Pull> = tested.copied().collect();
+        if tested.len() < LEAST_VIEWS {
             return None;
         }
-        let usual = median(told.iter().map(|pull| pull.strange).collect()).unwrap_or(0.0);
-        let all: f64 = told.iter().map(|pull| pull.freedom).sum();
+        let usual = median(tested.iter().map(|pull| pull.statistic).collect()).unwrap_or(0.0);
+        let all: f64 = tested.iter().map(|pull| pull.freedom).sum();
         let deviations = |pull: &Pull| {
             let others = EFFICIENCY * (all - pull.freedom);
-            deviate_of_f(pull.strange / usual.max(1.0), pull.freedom, others)
+            deviate_of_f(pull.statistic / usual.max(1.0), pull.freedom, others)
         };
         let of_frames =
             pulls.iter().enumerate().filter_map(|(frame, pull)| Some((frame, (*pull)?)));
@@ -114,7 +113,7 @@ impl Opinions {
     }
 }
 
-/// The test of each frame; `None` for a frame that determines nothing by itself.
+/// The test of each frame; `None` for a frame that determines nothing on its own.
 fn pulls(settled: &Settled, loss: Loss) -> Option<Vec<Option<Pull>>> {
     let problem = &settled.minimum.problem;
     if problem.cameras.iter().any(|camera| camera.roughness.is_some()) {
@@ -133,7 +132,7 @@ fn pulls(settled: &Settled, loss: Loss) -> Option<Vec<Option<Pull>>> {
     Some((0..problem.frames.len()).into_par_iter().map(of_frame).collect())
 }
 
-/// The same for cameras with a spline, of whose knots a frame determines only some.
+/// The same for cameras with a spline: a frame determines only some of its knots.
 fn pulls_of_some(settled: &Settled, loss: Loss) -> Option<Vec<Option<Pull>>> {
     let problem = &settled.minimum.problem;
     let all = settled.minimum.normal.covariance_of_kept()?;
@@ -147,8 +146,7 @@ fn pulls_of_some(settled: &Settled, loss: Loss) -> Option<Vec<Option<Pull>>> {
     Some((0..problem.frames.len()).into_par_iter().map(of_frame).collect())
 }
 
-/// The reduced normal equations (Schur complement) of a frame by itself, without priors: matrix and
-/// right side.
+/// The reduced normal equations (Schur complement) of a single frame, without priors: matrix and right side.
 fn reduced_of(
     problem: &Problem,
     settled: &Settled,
@@ -163,8 +161,7 @@ fn reduced_of(
     found.filter(|(matrix, right)| matrix.iter().chain(right).all(|v| v.is_finite()))
 }
 
-/// The whitening matrix W of S, with W S Wᵀ = 1 over the directions that S determines; `None` where
-/// there are none.
+/// The whitening matrix W of S, with W S Wᵀ = 1 over the directions that S determines; `None` if it determines none.
 fn whitener(matrix: &DMatrix<f64>) -> Option<DMatrix<f64>> {
     let n = matrix.nrows();
     if n == 0 || !matrix.iter().all(|v| v.is_finite()) {

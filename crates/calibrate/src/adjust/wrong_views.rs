@@ -1,5 +1,5 @@
-//! Detection of gross errors before the final adjustment: panels, views, and panels in single views
-//! that contradict the majority.
+//! Detection of outliers before the final adjustment: panels, views, and panels in single views that contradict the
+//! majority.
 //!
 //! ```text
 //!   agree: all corners, with a redescending loss (Cauchy) of ever smaller scale
@@ -10,11 +10,10 @@
 //!      └─→ a view that contradicts the camera of all others (Chow test) is removed; back to settled
 //! ```
 //!
-//! Gross errors bias the estimate of correct corners, least where the scale of the loss is the
-//! smallest that still holds most corners. So the scale is reduced step by step before anything is
-//! called wrong. Where many corners are displaced alike, this may come to rest between the two
-//! groups of corners; from there the nearest corners of every frame are followed, which mostly
-//! belong to the larger group. All decisions assume that most corners are correct.
+//! Outliers bias the estimate of correct corners, least at the smallest scale of the loss that still covers most
+//! corners. So the scale is reduced step by step before anything is called wrong. If many corners are displaced
+//! together, the iteration may end between the two groups of corners; from there it follows the nearest corners of
+//! every frame, which mostly belong to the larger group. All decisions assume that most corners are correct.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -23,7 +22,7 @@ use glam::{DVec2, DVec3};
 use super::finding::{Count, Finding, Moved, Shared, shared_outliers};
 use super::lack_of_fit::lack_of_fit;
 use super::reweighting::{Kept, Settled, settle, with_gross_errors};
-use super::view_consistency::Opinions;
+use super::view_consistency::Consistency;
 use crate::equations::minimise::{Until, minimise};
 use crate::error::CalibrationError;
 use crate::input::loss::Loss;
@@ -37,8 +36,8 @@ use crate::start::pose::{estimate_pose, middle, planar_pose};
 use deltille_core::camera::Pose;
 use deltille_core::statistics::median;
 
-/// Scale of the loss during the reduction, as a fraction of the usual one: 1.5 deviations. A wider
-/// loss comes to rest between two groups of corners.
+/// Scale of the loss during the reduction, as a fraction of the usual one: 1.5 standard deviations. A wider loss ends
+/// between two groups of corners.
 const NARROW: f64 = 0.5;
 
 /// The reduction ends when a round leaves more than this fraction of the scale, or after
@@ -54,34 +53,32 @@ const FOLLOWED: f64 = 0.5;
 /// alone hardly shrinks.
 const SHRUNK: f64 = 0.5;
 
-/// Least number of panels of which one can be identified as wrong: of two it is not known which.
+/// Least number of panels for identifying a wrong one: of two it is not known which.
 const LEAST_PANELS: usize = 3;
 
-/// Corners farther outside their picture than this many times its size cannot have been seen in it.
+/// Distance beyond the image, in image sizes, from which a corner cannot have been seen in it.
 const BEYOND: f64 = 1.0;
 
-/// Corners that one camera sees in one frame contradict the others when their median error is more
-/// than this many times the usual median. Blur, light and distance change it by a small factor;
-/// labels that are off by a tile, and pictures that were not taken at the same moment, by about a
-/// hundred.
+/// Ratio of the median residual of one camera in one frame to the usual median from which the corners contradict the
+/// others. Blur, light and distance change it by a small factor; labels that are off by a tile, and images not taken at
+/// the same time, by about a hundred.
 const WRONG_RATIO: f64 = 10.0;
 
-/// Corners are not called wrong with a median error below this, px: a corner that was detected at
-/// all is located to a pixel.
+/// Least median residual of wrong corners, px: every detected corner is located to a pixel.
 const WRONG_PX: f64 = 1.0;
 
 /// A problem at the estimate on which most of its corners agree, and the parts that contradict it.
 pub(crate) struct Gross {
     pub problem: Problem,
-    /// Blocks that take no part.
+    /// Excluded blocks.
     pub left_out: Vec<bool>,
     /// Frames that contradict the others, by index, with the reason.
     pub frames: BTreeMap<usize, WrongFrame>,
-    /// The usual median error of a picture, px.
+    /// The usual median residual of an image, px.
     pub usual_px: f64,
     /// Panels that are excluded in all frames.
     panels: BTreeSet<PanelRef>,
-    /// The median error of every block, px.
+    /// The median residual of every block, px.
     off_px: Vec<f64>,
     /// See [`Kept::some_stand_out`].
     some_stand_out: bool,
@@ -91,21 +88,21 @@ pub(crate) struct Gross {
 #[derive(Clone, Debug)]
 struct Walked {
     problem: Problem,
-    /// The standard deviation of a coordinate, px.
+    /// The standard deviation per axis, px.
     sigma: f64,
     /// See [`Kept::some_stand_out`].
     some_stand_out: bool,
 }
 
-/// One frame in so many may be of another camera; with more, it is not clear which ones are.
+/// One frame in this many may show another camera; with more, it is unclear which ones do.
 const FEW: usize = 10;
 
 /// Why a frame is excluded.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum WrongFrame {
-    /// The corners of one camera have this median error, px.
+    /// The corners of one camera have this median residual, px.
     Off { camera: usize, off_px: f64 },
-    /// Its corners are seen as in a mirror.
+    /// Its corners are mirrored.
     Mirrored,
     /// It shows only panels that are excluded.
     OnlyWrongPanels,
@@ -126,7 +123,7 @@ impl Gross {
         let Walked { problem, some_stand_out, .. } = walked;
         let residuals = residuals(&problem);
         let off_px: Vec<f64> = residuals.iter().map(median_px).collect();
-        // The blocks of every picture: of each camera in each frame.
+        // The blocks of every image, that is, of each camera in each frame.
         let mut pictures: BTreeMap<(usize, usize), Vec<usize>> = BTreeMap::new();
         for (index, block) in problem.blocks.iter().enumerate() {
             if !panels.contains(&block.panel) {
@@ -167,11 +164,11 @@ impl Gross {
         Self { problem, left_out, frames, usual_px, panels, off_px, some_stand_out }
     }
 
-    /// Adjusts the parts that belong, after `prepare`. A panel that looked wrong may be right once
-    /// gross errors have been removed; it is then included again.
+    /// Adjusts the parts that agree, after `prepare`. A panel that looked wrong may be right once outliers have been
+    /// removed; it is then included again.
     ///
     /// # Errors
-    /// When nothing can be adjusted.
+    /// Returns an error if nothing can be adjusted.
     pub(crate) fn settled(
         mut self,
         weights: Weights,
@@ -206,14 +203,17 @@ impl Gross {
         let before = self.frames.clone();
         let mut without = None;
         for _ in 0..=most {
-            // Displaced panels, a board that is bent, or an unsuitable lens model make views
-            // contradict each other, too.
+            // Displaced panels, a bent board, or an unsuitable lens model make views contradict each other, too.
             let now = without.as_ref().unwrap_or(&settled);
-            let can_tell = self.panels.is_empty() && has_no_pattern(now);
-            let Some(opinions) = can_tell.then(|| Opinions::of(now, loss)).flatten() else { break };
-            match opinions.stranger.and_then(|(index, by)| Some((self.belonging().nth(index)?, by)))
+            let can_test = self.panels.is_empty() && has_no_pattern(now);
+            let Some(consistency) = can_test.then(|| Consistency::of(now, loss)).flatten() else {
+                break;
+            };
+            match consistency
+                .stranger
+                .and_then(|(index, by)| Some((self.belonging().nth(index)?, by)))
             {
-                None if opinions.agree => return (self, without.unwrap_or(settled)),
+                None if consistency.agree => return (self, without.unwrap_or(settled)),
                 None => break,
                 Some((frame, deviations)) => {
                     self.frames.insert(frame, WrongFrame::Stranger { deviations });
@@ -303,8 +303,7 @@ fn median_px<'a>(residuals: impl IntoIterator<Item = &'a DVec2>) -> f64 {
     median(residuals.into_iter().map(|r| r.x.hypot(r.y)).collect()).unwrap_or(0.0)
 }
 
-/// The median error beyond which corners contradict the others, px, from the medians of all
-/// pictures.
+/// The median residual beyond which corners contradict the others, px, from the medians of all images.
 fn limit_px(medians: &[f64]) -> f64 {
     f64::max(WRONG_RATIO * median(medians.to_vec()).unwrap_or(0.0), WRONG_PX)
 }
@@ -317,8 +316,7 @@ fn nearest_px(residuals: &[DVec2]) -> f64 {
     off.get(off.len() / 4).copied().unwrap_or(f64::INFINITY)
 }
 
-/// The blocks whose panel shows the other side than most do: a plane seen in a mirror has a valid
-/// pose, from behind.
+/// The blocks whose panel faces the other way than in most views: a mirrored plane has a valid pose, from behind.
 fn mirrored(problem: &Problem) -> Vec<usize> {
     let side = |block: &Block| {
         let camera_from_scene =
@@ -343,7 +341,7 @@ fn agree(problem: Problem) -> Option<(Walked, BTreeSet<PanelRef>)> {
     let mut walked = all.clone();
     while let Some(panel) = worst_panel(&walked.problem, walked.sigma, &wrong) {
         wrong.insert(panel);
-        // Where half of the panels are wrong, it is another target.
+        // If half of the panels are wrong, it is another target.
         if 2 * wrong.len() >= seen.len() {
             return Some((all, BTreeSet::new()));
         }
@@ -352,12 +350,12 @@ fn agree(problem: Problem) -> Option<(Walked, BTreeSet<PanelRef>)> {
     Some((walked, wrong))
 }
 
-/// Estimates where most corners agree without the panels in `wrong`; frames that show them are
-/// placed anew first, as they were misplaced by them.
+/// Estimates where most corners agree without the panels in `wrong`. Frames that show these first get new poses, as the
+/// wrong panels biased them.
 fn walked_without(mut problem: Problem, wrong: &BTreeSet<PanelRef>) -> Option<Walked> {
     let of_wrong = problem.blocks.iter().filter(|block| wrong.contains(&block.panel));
     let frames: BTreeSet<usize> = of_wrong.map(|block| block.frame).collect();
-    frames.into_iter().for_each(|frame| place_anew(&mut problem, frame, wrong));
+    frames.into_iter().for_each(|frame| reestimate_pose(&mut problem, frame, wrong));
     let mut part = problem.part(|_, block| !wrong.contains(&block.panel));
     let walked = narrowed(part.problem)?;
     part.problem = walked.problem;
@@ -371,9 +369,8 @@ fn has_no_pattern(settled: &Settled) -> bool {
     lack_of_fit(&settled.minimum.problem, &settled.whitening).is_empty()
 }
 
-/// Estimates the pose of a frame anew from the panels that are not wrong, and keeps the better one
-/// by median residual.
-fn place_anew(problem: &mut Problem, frame: usize, wrong: &BTreeSet<PanelRef>) {
+/// Re-estimates the pose of a frame from the panels that are not wrong, and keeps the better pose by median residual.
+fn reestimate_pose(problem: &mut Problem, frame: usize, wrong: &BTreeSet<PanelRef>) {
     let is_right = |block: &&Block| block.frame == frame && !wrong.contains(&block.panel);
     let off_px = |problem: &Problem| {
         let blocks = problem.blocks.iter().filter(is_right);
@@ -437,7 +434,7 @@ fn narrowed(mut problem: Problem) -> Option<Walked> {
         problem = minimise(problem, &whitening, Loss::Cauchy, Until::Rough)?.problem;
     }
     let mut whitening = Whitening { sigma, ..scale(&problem) };
-    if let Some(apart) = to_larger_crowd(&problem) {
+    if let Some(apart) = to_larger_group(&problem) {
         (problem, whitening) = apart;
     }
     let none_left_out = vec![false; problem.blocks.len()];
@@ -448,7 +445,7 @@ fn narrowed(mut problem: Problem) -> Option<Walked> {
 
 /// Re-estimates from the nearest corners of every frame, away from an estimate between two groups
 /// of corners; `None` where there are not two.
-fn to_larger_crowd(problem: &Problem) -> Option<(Problem, Whitening)> {
+fn to_larger_group(problem: &Problem) -> Option<(Problem, Whitening)> {
     let between = scale(problem);
     let (mut found, mut whitening) = (problem.clone(), between.clone());
     for _ in 0..MOST_ROUNDS {
@@ -482,9 +479,8 @@ fn nearest_of_frames(problem: &Problem, whitening: &Whitening) -> Vec<Vec<bool>>
     problem.blocks.iter().zip(&off).map(of_block).collect()
 }
 
-/// How far an excluded panel is displaced: the difference of its stated pose from the one that its
-/// own corners determine while the inliers of all others count. `None` where no pose explains its
-/// corners.
+/// The displacement of an excluded panel: the difference of its stated pose from the pose that its own corners
+/// determine while the inliers of all others count. `None` if no pose explains its corners.
 fn moved(settled: &Settled, panel: PanelRef) -> Option<Moved> {
     let Settled { problem, whitening, outliers, .. } = settled;
     let of_panel = || problem.blocks.iter().filter(|block| block.panel == panel);
@@ -523,8 +519,8 @@ fn moved(settled: &Settled, panel: PanelRef) -> Option<Moved> {
     })
 }
 
-/// The views of a camera without the corners that lie far outside their pictures, and a finding for
-/// each view that had such corners. Views with too few corners left are omitted.
+/// The views of a camera without the corners that lie far outside their images, and a finding for each view that had
+/// such corners. Views with too few corners left are omitted.
 pub(crate) fn within_pictures(views: &[View], camera: usize) -> (Vec<View>, Vec<Finding>) {
     let mut found = Vec::new();
     let of_view = |view: &View| {

@@ -1,25 +1,22 @@
 //! Empirical covariance of the shared unknowns, from the scatter between frames.
 //!
-//! Standard deviations that follow from the noise of corners take the model of cameras and target
-//! for exact. Model errors, such as a board that is not quite flat, bias the estimate differently
-//! in every frame. So the gradient of each frame is taken for one draw, and the scatter of all
-//! gives the cluster-robust covariance with the correction CR2, which equals that of the noise
-//! where there are no model errors (Bell & McCaffrey 2002).
+//! Standard deviations from the noise of corners assume an exact model of cameras and target. Model errors, such as a
+//! board that is not quite flat, bias the estimate differently in every frame. So the gradient of each frame counts as
+//! one sample, and the scatter of all gives the cluster-robust covariance with the correction CR2, which equals that
+//! from noise if there are no model errors (Bell & McCaffrey 2002).
 //!
 //! ```text
 //!     yᵥ = (I − LᵀHᵥL)^−½ Lᵀ gᵥ,    Σ = LLᵀ       Hᵥ, gᵥ: normal equations and gradient of frame v
 //!     S = L (Σᵥ yᵥ yᵥᵀ) Lᵀ
 //! ```
 //!
-//! Priors, on the knots of a spline and on the offsets of corners, do not come from any frame: with P
-//! their part of the normal equations, frames scatter only as I − LᵀPL, and LᵀPL is added with its
-//! nominal size.
+//! Priors, on the knots of a spline and on the offsets of corners, do not come from any frame: with P their part of the
+//! normal equations, frames scatter only as I − LᵀPL, and LᵀPL is added with its nominal size.
 //!
-//! What all frames have in common shows in no scatter: see [`super::board_errors`].
+//! Errors that all frames have in common do not show in the scatter: see [`super::board_errors`].
 //!
-//! F frames determine at most F − 1 directions, and each only roughly; so S is shrunk towards a
-//! multiple of the covariance that follows from noise, as far as its own scatter calls for (Ledoit
-//! & Wolf 2004).
+//! F frames determine at most F − 1 directions, and each only roughly; so S is shrunk towards a multiple of the
+//! covariance from noise, as far as its own scatter calls for (Ledoit & Wolf 2004).
 
 use nalgebra::{DMatrix, DVector, Matrix6};
 use rayon::prelude::*;
@@ -33,11 +30,10 @@ use crate::input::loss::Loss;
 use crate::problem::corner_map::CornerMap;
 use crate::problem::whitening::Whitening;
 
-/// Least number of frames for an empirical covariance: without one of them a calibration is left.
+/// Least number of frames for an empirical covariance: a calibration remains without one of them.
 const LEAST_FRAMES: usize = 4;
 
-/// Greatest leverage of one frame on a direction that is corrected for: beyond it no other frame
-/// tests it.
+/// Greatest leverage of one frame on a direction that is corrected for: beyond it no other frame tests the direction.
 const MOST_OF_ONE: f64 = 0.9;
 
 /// An empirical covariance.
@@ -45,12 +41,12 @@ pub(crate) struct Observed {
     pub covariance: DMatrix<f64>,
     /// The part of it that comes from errors of the board.
     pub of_board: Option<DMatrix<f64>>,
-    /// Degrees of freedom from which a variance of it is known.
+    /// Degrees of freedom of its variances.
     pub freedom: f64,
 }
 
 impl Observed {
-    /// The same with what errors of the board add to it, and what is `drawn` to the plan of one that is measured.
+    /// Adds the covariance from errors of the board, and from the attraction (`drawn`) of a measured board to its plan.
     pub(crate) fn with(self, of_board: Option<DMatrix<f64>>, drawn: Option<&DMatrix<f64>>) -> Self {
         let mut covariance = self.covariance;
         covariance = of_board.iter().fold(covariance, |sum, of_board| sum + of_board);
@@ -62,8 +58,8 @@ impl Observed {
     }
 }
 
-/// The empirical covariance of the unknowns that all frames share (n × n, in the order of the
-/// layout); `None` with too few frames, or where nothing is shared.
+/// The empirical covariance of the shared unknowns (n × n, in the order of the layout); `None` with too few frames, or
+/// without shared unknowns.
 pub(crate) fn observed(
     minimum: &Minimum,
     whitening: &Whitening,
@@ -87,7 +83,7 @@ pub(crate) fn observed(
         }
     };
     let mut pulls = DMatrix::from_columns(&columns);
-    // At the minimum they sum to zero; the remainder of the minimisation is no scatter.
+    // At the minimum they sum to zero; the remainder of the minimisation is not scatter.
     let mean = pulls.column_mean();
     pulls.column_iter_mut().for_each(|mut pull| pull -= &mean);
     let count = frames as f64;
@@ -107,7 +103,7 @@ pub(crate) fn observed(
     })
 }
 
-/// LᵀPL of the priors on the knots of splines and on the offsets of corners; `None` where there are none.
+/// LᵀPL of the priors on the knots of splines and on the offsets of corners; `None` without such priors.
 fn expected(minimum: &Minimum, whitening: &Whitening, found: &Covariances) -> Option<DMatrix<f64>> {
     let Minimum { problem, layout, .. } = minimum;
     let (mut matrix, mut right) =
@@ -129,7 +125,7 @@ fn expected(minimum: &Minimum, whitening: &Whitening, found: &Covariances) -> Op
     }
 }
 
-/// A square root of that of the offsets.
+/// A square root of LᵀPL of the offsets.
 fn of_offsets(
     minimum: &Minimum,
     whitening: &Whitening,
@@ -195,7 +191,7 @@ fn pull_of(
     pull.iter().all(|v| v.is_finite()).then_some(pull)
 }
 
-/// The same where corners are unknowns too: their offsets adapt to each frame, and a frame's leverage on lens and
+/// The same if corners are unknowns too: their offsets adapt to each frame, and the leverage of a frame on lens and
 /// offsets together is large in few directions. With H all normal equations, Hᵥ those of the frame over the shared
 /// unknowns and the offsets, and M = H^−½ Hᵥ H^−½,
 ///
@@ -203,10 +199,10 @@ fn pull_of(
 ///     y = f(M) H^−½ gᵥ,    f(p) = 1 / (1 − p)        the jackknife (CR3), linearised
 /// ```
 ///
-/// by Lanczos' method. It is the more cautious choice: on halves of robot-hand, with the exponent 3/4 in place of 1,
-/// differences found over expected were 0.94 to 1.09, with 1 they were 0.77 to 0.88. CR2 (1/2) was not tried there.
+/// by Lanczos' method. It is the more cautious choice: on halves of robot-hand, observed over expected differences were
+/// 0.94 to 1.09 with the exponent 3/4, and 0.77 to 0.88 with 1. CR2 (1/2) was not tried there.
 ///
-/// The equations are solved for several frames at once: for each by itself they would be read from memory as often.
+/// The equations are solved for several frames at once: one by one, they would be read from memory as often.
 fn with_leverage(
     minimum: &Minimum,
     whitening: &Whitening,
@@ -240,24 +236,24 @@ fn with_leverage(
     }
     let count = problem.frames.len() as f64;
     let change = |one: Lanczos| {
-        // (F − 1)/F is the jackknife's; the caller multiplies by F/(F − 1).
+        // The factor (F − 1)/F belongs to the jackknife; the caller multiplies by F/(F − 1).
         let change = &found.root.inverse * one.change(layout.shared) * ((count - 1.0) / count);
         change.iter().all(|v| v.is_finite()).then_some(change)
     };
     all.into_iter().map(change).collect()
 }
 
-/// Frames whose leverage is resolved at the same time.
+/// Number of frames whose leverage is resolved at the same time.
 const FRAMES_AT_A_TIME: usize = 32;
 
-/// Lanczos' method for one frame: right sides that are orthonormal by H⁻¹, and what H⁻¹ makes of them.
+/// Lanczos' method for one frame: right sides that are orthonormal with respect to H⁻¹, and their products with H⁻¹.
 struct Lanczos {
     own: OfFrame,
     basis: Vec<DVector<f64>>,
     solutions: Vec<DVector<f64>>,
-    /// The right side to be solved next.
+    /// The next right side.
     next: DVector<f64>,
-    /// The tridiagonal matrix: its diagonal, and beside it the sizes of right sides, that of the gradient first.
+    /// The tridiagonal matrix: its diagonal, and its off-diagonal, the norms of right sides starting with the gradient.
     along: Vec<f64>,
     sizes: Vec<f64>,
 }
@@ -269,13 +265,13 @@ impl Lanczos {
         Self { own, basis, solutions, next, along, sizes }
     }
 
-    /// Whether the next right side counts.
+    /// Whether the next right side is significant.
     fn goes_on(&self) -> bool {
         let left: f64 = self.sizes.iter().skip(1).product();
         self.sizes.len() <= MOST_DIRECTIONS && left > LEFT && self.sizes.last() != Some(&0.0)
     }
 
-    /// Takes the solution for the next right side, and makes the one after it.
+    /// Accepts the solution for the next right side, and forms the one after it.
     fn advance(&mut self, solution: DVector<f64>) {
         let size = self.next.dot(&solution).max(0.0).sqrt();
         self.sizes.push(size);
@@ -293,7 +289,7 @@ impl Lanczos {
         }
     }
 
-    /// How the shared unknowns change.
+    /// The change of the shared unknowns.
     fn change(&self, shared: usize) -> DVector<f64> {
         let n = self.basis.len();
         let tridiagonal = DMatrix::from_fn(n, n, |i, j| match i.abs_diff(j) {
@@ -314,10 +310,10 @@ impl Lanczos {
     }
 }
 
-/// What is left beyond the directions found so far does not count below this part of the whole.
+/// Greatest negligible remainder beyond the directions found so far, relative to the whole.
 const LEFT: f64 = 1e-4;
 
-/// Directions at most in which a frame's leverage is resolved: those with much of it are found first.
+/// Most directions in which the leverage of a frame is resolved: those of large leverage come first.
 const MOST_DIRECTIONS: usize = 40;
 
 /// The same for a frame that touches only some of the unknowns.

@@ -1,15 +1,15 @@
-//! What errors of the board do to the unknowns that all frames share.
+//! The effect of errors of the board on the shared unknowns.
 //!
-//! A corner that is not where the plan has it is so in every frame. The estimate moves, and no scatter between
-//! frames shows that. With R the normal equations between the shared unknowns and the corners' offsets b, the
-//! poses of the frames eliminated,
+//! A corner that is off its planned position is off in every frame. It biases the estimate, and the scatter between
+//! frames does not show that. With R the normal equations between the shared unknowns and the corner offsets b, after
+//! elimination of the poses of the frames,
 //!
 //! ```text
 //!     δs = S⁻¹ R b,    covariance S⁻¹ R Σ_b Rᵀ S⁻¹
 //! ```
 //!
-//! Σ_b has two parts of equal size: offsets of single corners, and the sheet of each panel stretched, sheared,
-//! scaled and bent as a whole.
+//! Σ_b has two parts of equal size: offsets of single corners, and a stretch, shear, scale and bend of the sheet of
+//! each panel as a whole.
 
 use glam::DVec3;
 use nalgebra::{DMatrix, DVector};
@@ -23,20 +23,19 @@ use crate::input::loss::Loss;
 use crate::problem::corner_map::CornerMap;
 use crate::problem::whitening::Whitening;
 
-/// Standard deviation of a corner of a printed board, mm. Office printers stretch a sheet by 0.05 to 0.2 %, by a
-/// different amount across and along the feed: 0.05 to 0.2 mm at 100 mm from the middle. The sheet of the
-/// robot-hand photographs (20 mm edges, 200 mm across) is off by 0.07 mm a coordinate.
+/// Standard deviation of a corner of a printed board, mm. Office printers stretch a sheet by 0.05 to 0.2 %, by
+/// different amounts across and along the feed: 0.05 to 0.2 mm at 100 mm from the centre. The sheet of the robot-hand
+/// photographs (20 mm edges, 200 mm across) is off by 0.07 mm per axis.
 const PRINTED_MM: f64 = 0.1;
 
-/// The same in edges for small boards, which are not made by office printers.
+/// Limit of the same in edges, for small boards, which office printers do not make.
 const PRINTED_EDGES: f64 = 0.005;
 
-/// Frames whose equations are in memory at the same time.
+/// Number of frames whose equations are in memory at the same time.
 const FRAMES_AT_A_TIME: usize = 64;
 
-/// The covariance of the shared unknowns from errors of the board; `accuracy_mm` is the standard deviation of a
-/// corner's coordinate, that of a printed board where it is not known. `None` where the corners are unknowns
-/// themselves, or exact.
+/// The covariance of the shared unknowns from errors of the board; `accuracy_mm` is the standard deviation of a corner
+/// per axis, `None` for that of a printed board. `None` if the corners are unknowns themselves, or exact.
 pub(crate) fn board_errors(
     minimum: &Minimum,
     whitening: &Whitening,
@@ -75,26 +74,26 @@ pub(crate) fn board_errors(
     Some(covariance * accuracy_mm.powi(2))
 }
 
-/// Standard deviation of a corner's coordinate, mm; `None` of an exact board.
+/// Standard deviation of a corner per axis, mm; `None` for an exact board.
 fn accuracy(map: &CornerMap, given_mm: Option<f64>) -> Option<f64> {
     let printed = || PRINTED_MM.min(PRINTED_EDGES * map.edge_mm());
     Some(given_mm.unwrap_or_else(printed)).filter(|mm| *mm > 0.0)
 }
 
-/// How the shared unknowns and the offsets of corners, in this order, are off where the corners are found too: columns
-/// whose products with themselves sum to the covariance.
+/// Errors of the shared unknowns and the offsets of corners, in this order, if the corners are estimated too: columns
+/// whose outer products sum to the covariance.
 ///
-/// The prior of the offsets is white, and draws a sheet that is distorted as a whole towards its plan where views
-/// do not determine it: with P the part of the prior in the normal equations H, by X a = H⁻¹ P M a, where the columns of M
-/// are ways in which a sheet differs from its plan, one standard deviation of a printed sheet each, and a is how much of
-/// each there is. Of many views that is nothing, of four it is most of what is wrong. The views say of a, with the offsets
-/// b that were found,
+/// The prior of the offsets is white, and draws a sheet that is distorted as a whole towards its plan if the views do
+/// not determine it: with P the part of the prior in the normal equations H, by X a = H⁻¹ P M a. The columns of M are
+/// modes in which a sheet differs from its plan, one standard deviation of a printed sheet each, and a is the amount of
+/// each mode. With many views this is negligible, with four views it is most of the error. The views determine a, from
+/// the estimated offsets b, as
 ///
 /// ```text
 ///     C = (1 + Mᵀ P M − Mᵀ P X)⁻¹,    mean C Mᵀ P b
 /// ```
 ///
-/// so that a board that is found to be exact is not taken for a printed sheet.
+/// so a board that is found to be exact is not treated as a printed sheet.
 pub(crate) fn drawn_to_plan(
     minimum: &Minimum,
     whitening: &Whitening,
@@ -104,9 +103,9 @@ pub(crate) fn drawn_to_plan(
     let Minimum { problem, normal, layout, .. } = minimum;
     let map = problem.map.as_ref()?;
     let accuracy_mm = accuracy(map, accuracy_mm)?;
-    // A scale is not measured: distances take it up.
+    // A scale is not measured: distances absorb it.
     let sheets = sheets(map, &SHEET[1..]);
-    // P M, of which the normal equations have the square of sigma.
+    // P M; the normal equations contain it times the square of sigma.
     let pulls = DMatrix::from_fn(sheets.nrows(), sheets.ncols(), |i, mode| {
         accuracy_mm * map.prior_mm[i % 3].powi(-2) * sheets[(i, mode)]
     });
@@ -127,7 +126,7 @@ pub(crate) fn drawn_to_plan(
     Some(off * root)
 }
 
-/// Displacements of a sheet as a whole, over the position from its middle: scaled, stretched, sheared, and bent.
+/// Displacements of a sheet as a function of the position from its centre: scaled, stretched, sheared, and bent.
 const SHEET: [fn(DVec3) -> DVec3; 6] = [
     |at| DVec3::new(at.x, at.y, 0.0),
     |at| DVec3::new(at.x, -at.y, 0.0),
@@ -137,8 +136,8 @@ const SHEET: [fn(DVec3) -> DVec3; 6] = [
     |at| DVec3::new(0.0, 0.0, at.y * at.y),
 ];
 
-/// Offsets of all corners, a column for each way in which the sheet of a panel differs from its plan. Those in the
-/// plane have together a mean square of 1 a coordinate, those out of it likewise.
+/// Offsets of all corners, one column for each mode in which the sheet of a panel differs from its plan. The modes in
+/// the plane have together a mean square of 1 per axis, those out of it likewise.
 fn sheets(map: &CornerMap, fields: &[fn(DVec3) -> DVec3]) -> DMatrix<f64> {
     let mut columns = Vec::new();
     let mut first = 0;
@@ -149,7 +148,7 @@ fn sheets(map: &CornerMap, fields: &[fn(DVec3) -> DVec3]) -> DMatrix<f64> {
         for field in fields {
             let moved = of_panel.iter().map(|corner| field(corner.panel_mm - middle));
             let mut moved: Vec<DVec3> = moved.collect();
-            // A move of the whole sheet is none of its errors.
+            // A translation of the whole sheet is not an error.
             let mean = moved.iter().sum::<DVec3>() / count;
             moved.iter_mut().for_each(|offset| *offset -= mean);
             let squares: DVec3 = moved.iter().map(|offset| *offset * *offset).sum();

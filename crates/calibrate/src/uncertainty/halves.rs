@@ -1,9 +1,9 @@
-//! An observed covariance that is never below what halves of the views show.
+//! Raises the observed covariance to what halves of the views show.
 //!
-//! The scatter of single views averages out what changes slowly, or once: each view differs little from its
-//! neighbours. Two halves of the views, the first and the last, or the odd and the even ones, differ by δ then, and
-//! the camera of all by half of that from that of either. Where δ is significantly larger than the observed covariance
-//! says, δδᵀ/4 is added: the variance of a mean of two, as the two show it.
+//! The scatter of single views averages out slow or single changes: each view differs little from its neighbours. Two
+//! halves of the views (the first and the last, or the odd and the even ones) then differ by δ, and the camera from all
+//! views differs by half of that from either. If δ is significantly larger than the observed covariance predicts, δδᵀ/4
+//! is added: the variance of a mean of two, estimated from the two.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -11,17 +11,16 @@ use super::state_equations::{Candidate, StateEquations, significance};
 use deltille_core::camera::Camera;
 use deltille_core::statistics::f_chance;
 
-/// Probability that a covariance that is right is raised, for all parameters and both ways to split.
+/// Probability that a correct covariance is raised, for all parameters and both splits together.
 const SIGNIFICANT: f64 = 0.01;
 
-/// Ways to split the views.
+/// Number of splits of the views.
 const WAYS: usize = 2;
 
-/// Least number of views of a half.
+/// Least number of views in a half.
 const LEAST_VIEWS: usize = 5;
 
-/// The covariance of a camera's parameters, raised where the halves call for it. `noise` is the one that follows
-/// from noise.
+/// The covariance of a camera's parameters, raised if the halves call for it. `noise` is the covariance from noise.
 pub(crate) fn raised(
     equations: &StateEquations,
     camera: &Camera,
@@ -35,12 +34,13 @@ pub(crate) fn raised(
     }
     let limit = SIGNIFICANT / (WAYS * (n + 1)) as f64;
     let ways: [&dyn Fn(usize) -> bool; WAYS] = [&|view| 2 * view < count, &|view| view % 2 == 0];
-    // All parameters, each half by itself.
+    // All parameters, separately for each half.
     let apart = ways.iter().filter_map(|is_first| {
         let first = equations.some(is_first).fit(&equations.camera())?;
         let second = equations.some(|view| !is_first(view)).fit(&equations.camera())?;
         let off: DVector<f64> = first.values() - second.values();
-        // The deviation of a half difference: as observed for all, and as much larger as noise has it for halves.
+        // Standard deviation of a half difference: the observed one, scaled by the ratio that noise predicts for
+        // halves.
         let of_halves = |i: usize| {
             let half = first.noise_variance(i) + second.noise_variance(i);
             (observed[(i, i)] * half / noise[(i, i)]).sqrt()
@@ -48,7 +48,7 @@ pub(crate) fn raised(
         let chance = |i: usize| f_chance((off[i] / of_halves(i)).powi(2), 1.0, (count - 2) as f64);
         ((0..n).map(chance).fold(1.0, f64::min) < limit).then_some(off)
     });
-    // The focal lengths alone: halves that show the board differently tell more of them with one lens.
+    // The focal lengths alone: with one common lens, halves that show the board differently determine them better.
     let focal = ways.iter().filter(|_| equations.is_focal_free()).filter_map(|is_first| {
         let mut columns = equations.camera();
         let weights = (0..count).map(|view| f64::from(u8::from(is_first(view)))).collect();

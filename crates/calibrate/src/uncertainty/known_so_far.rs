@@ -1,4 +1,4 @@
-//! What corners say of the first camera and the board, by which views are proposed.
+//! The information of the corners on the first camera and the board, from which views are proposed.
 
 use nalgebra::DMatrix;
 
@@ -7,16 +7,16 @@ use crate::equations::covariances::Covariances;
 use crate::problem::shape::COUNT as SHAPE_COEFFICIENTS;
 use deltille_core::statistics::median;
 
-/// What corners say of the unknowns of one camera, and of the shape of the board.
+/// The information on the unknowns of one camera and on the shape of the board.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct KnownSoFar {
-    /// Inverse covariance of the parameters that were found, then of the shape.
+    /// Inverse covariance of the estimated parameters, then of the shape.
     pub information: DMatrix<f64>,
-    /// Variance of a coordinate of a corner, px², the median.
+    /// Median variance of a corner per axis, px².
     pub corner_variance_px2: f64,
 }
 
-/// What corners say of the first camera and of the board's shape, all else that is shared taken out.
+/// The information on the first camera and the board's shape, after elimination of all other shared unknowns.
 pub(crate) fn known_so_far(
     settled: &Settled,
     found: &Covariances,

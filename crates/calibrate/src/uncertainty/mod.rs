@@ -1,11 +1,13 @@
-//! Covariances of what was found, and what views say of changes that a calibration does not allow for.
+//! Covariances of the estimate, and tests for changes that a calibration does not model.
 //!
-//! Comes in: a minimum with its covariances for noise. Goes out: covariances that also have errors of model and board.
+//! Input: a minimum with its covariances from noise. Output: covariances that include errors of model and board.
 //!
-//! 1. `agreement` is the covariance from the scatter between frames; `board_errors` what errors of the board add.
-//! 2. `state_equations` are equations of each view for changes of the camera, a rolling shutter and a stretched board.
-//! 3. `halves` raises the covariance where halves of the views differ by more.
-//! 4. `projection` is how sure a camera is of where it projects a point; `known_so_far` what proposals of views start from.
+//! 1. `agreement` computes the covariance from the scatter between frames, `board_errors` the part from errors of the
+//! board.
+//! 2. `state_equations` forms equations of each view for changes of the camera, a rolling shutter and a stretched
+//! board.
+//! 3. `halves` raises the covariance if halves of the views differ by more.
+//! 4. `projection` is the uncertainty of projections; `known_so_far` the information from which views are proposed.
 
 pub(crate) mod agreement;
 pub(crate) mod board_errors;

@@ -1,8 +1,8 @@
-//! How sure a camera is of where it projects a point.
+//! The uncertainty of projections of a camera.
 //!
-//! Parameters alone do not say: a principal point that is one pixel off is made up for by a camera that is turned
-//! a little, and no picture tells the two apart. So a change of the parameters goes with the motion of the camera
-//! that explains the corners best that were seen, as in the cross-reprojection uncertainty of mrcal 3.0
+//! Parameters alone do not give it: a principal point that is off by one pixel is compensated by a slightly rotated
+//! camera, and no image distinguishes the two. So a change of the parameters is combined with the motion of the camera
+//! that best explains the detected corners, as in the cross-reprojection uncertainty of mrcal 3.0
 //! (<https://mrcal.secretsauce.net/docs-3.0/uncertainty-cross-reprojection.html>):
 //!
 //! ```text
@@ -10,7 +10,7 @@
 //!     covariance of a projection = (J_θ + J_ξ K) Σ_θ (J_θ + J_ξ K)ᵀ
 //! ```
 //!
-//! with ξ = (ω, τ), a turn and a move of what the camera sees. At infinity τ moves nothing.
+//! with ξ = (ω, τ), a rotation and a translation of the scene. At infinity τ has no effect.
 
 use glam::{DVec2, DVec3};
 use nalgebra::{DMatrix, Dyn, Matrix2, Matrix6, OMatrix, SMatrix, U2};
@@ -21,34 +21,33 @@ use crate::problem::whitening::Whitening;
 use deltille_core::camera::{Camera, Projection};
 use deltille_core::statistics::median;
 
-/// How the projections of a camera are known.
+/// The uncertainty of the projections of a camera.
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct ProjectionUncertainty {
-    /// K: the motion (ω in rad, τ in mm) of what the camera sees for a change of each parameter that was found.
+    /// K: the motion of the scene (ω in rad, τ in mm) per change of each estimated parameter.
     pub alignment: Matrix,
-    /// How far the points are for which it is told, beside those at infinity, mm: what was asked for, else the
-    /// median distance of the corners.
+    /// Distances for which it is reported in addition to infinity, mm: the requested ones, else the median distance of
+    /// the corners.
     pub distances_mm: Vec<f64>,
-    /// Covariance of the parameters that were found as the frames agree with each other; `None` of too few
-    /// frames.
+    /// Observed covariance of the estimated parameters, from the scatter between frames; `None` with too few frames.
     pub observed: Option<ObservedCovariance>,
 }
 
-/// A covariance of parameters as frames show it.
+/// A covariance of parameters from the scatter between frames.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ObservedCovariance {
-    /// The covariance, in the order of the parameters that were found.
+    /// The covariance, in the order of the estimated parameters.
     pub covariance: Matrix,
-    /// The part of it that comes from errors of the board, which are the same in every frame, and in every
-    /// calibration with that board; `None` where the board is exact or its corners were found too.
+    /// The part from errors of the board, which are the same in every frame and in every calibration with that board;
+    /// `None` if the board is exact or its corners were estimated too.
     pub of_board: Option<Matrix>,
-    /// How well it is known: a variance of it as from so many independent squares.
+    /// Degrees of freedom of its variances.
     pub freedom: f64,
 }
 
 impl ObservedCovariance {
-    /// The covariance without the part that comes from errors of the board.
+    /// The covariance without the part from errors of the board.
     pub fn without_board(&self) -> Matrix {
         match &self.of_board {
             Some(of_board) => Matrix::new(self.covariance.inner() - of_board.inner()),
@@ -57,18 +56,18 @@ impl ObservedCovariance {
     }
 }
 
-/// Where a deviation comes from.
+/// The source of a standard deviation.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Source {
-    /// The noise of the corners, if camera and target are what they are taken for.
+    /// The noise of the corners, for an exact model of camera and target.
     Noise,
-    /// How far the frames agree with each other, whatever the cause, and what errors of the board do to all of
-    /// them alike.
+    /// The scatter between frames, whatever its cause, and the effect of errors of the board, which all frames have in
+    /// common.
     Observed,
 }
 
 impl ProjectionUncertainty {
-    /// As an earlier calibration found it.
+    /// Restores the uncertainty from an earlier calibration.
     pub fn new(
         alignment: Matrix,
         distances_mm: Vec<f64>,
@@ -77,7 +76,8 @@ impl ProjectionUncertainty {
         Self { alignment, distances_mm, observed }
     }
 
-    /// Of a camera as its blocks show it; `free` are the parameters that were found. `None` where its motion is open.
+    /// Computes it from the blocks of a camera; `free` are the estimated parameters. `None` if its motion is
+    /// undetermined.
     pub(crate) fn of(
         problem: &Problem,
         whitening: &Whitening,
@@ -109,7 +109,7 @@ impl ProjectionUncertainty {
     }
 }
 
-/// A⁻¹ B of turns and moves, which have different units.
+/// A⁻¹ B for rotations and translations, which have different units.
 pub(crate) fn solved(a: &Matrix6<f64>, b: &DMatrix<f64>) -> Option<DMatrix<f64>> {
     let scale =
         SMatrix::<f64, 6, 1>::from_fn(|i, _| a[(i, i)].max(f64::MIN_POSITIVE).sqrt().recip());
@@ -119,32 +119,33 @@ pub(crate) fn solved(a: &Matrix6<f64>, b: &DMatrix<f64>) -> Option<DMatrix<f64>>
     Some(DMatrix::from_fn(6, b.ncols(), |i, j| solution[(i, j)] * scale[i]))
 }
 
-/// Derivatives of a pixel by a turn and a move of the point.
+/// Derivatives of a pixel with respect to a rotation and a translation of the point.
 pub(crate) fn by_motion(at: &Projection, point: DVec3) -> SMatrix<f64, 2, 6> {
     let rows = at.by_point.map(DVec3::from);
     let turns = rows.map(|row| point.cross(row));
     SMatrix::from_fn(|i, j| if j < 3 { turns[i][j] } else { rows[i][j - 3] })
 }
 
-/// Derivatives of a pixel by some parameters.
+/// Derivatives of a pixel with respect to some parameters.
 pub(crate) fn by_parameters(at: &Projection, free: &[usize]) -> OMatrix<f64, U2, Dyn> {
     OMatrix::<f64, U2, Dyn>::from_fn(free.len(), |i, j| at.by_parameter(free[j])[i])
 }
 
-/// WᵀW of a pixel.
+/// WᵀW for a pixel.
 fn information([a, b, c]: [f64; 3]) -> Matrix2<f64> {
     Matrix2::new(a * a + b * b, b * c, b * c, c * c)
 }
 
-/// The point that a pixel shows so many mm away, or the direction to one at infinity.
+/// The point seen at a pixel at a distance, or its direction for infinity.
 pub(crate) fn seen_at(camera: &Camera, pixel: DVec2, distance_mm: Option<f64>) -> Option<DVec3> {
     let ray = camera.unproject(pixel)?;
-    // A pupil that moves does so by millimetres.
+    // A moving pupil shifts by millimetres.
     Some(match distance_mm {
         Some(distance) => ray.origin + ray.direction * distance,
         None => ray.direction * INFINITY_MM,
     })
 }
 
-/// Far enough for an entrance pupil's place, a few millimetres, to be none of a pixel's millionths.
+/// Distance that counts as infinity, mm: the position of an entrance pupil, a few millimetres, shifts a pixel by less
+/// than a millionth.
 pub(crate) const INFINITY_MM: f64 = 1e9;

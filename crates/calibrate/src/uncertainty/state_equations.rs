@@ -1,12 +1,12 @@
-//! What each view says of a camera and of changes that a calibration does not allow for, as linear equations.
+//! Linear equations of each view for the camera and for changes that a calibration does not model.
 //!
 //! ```text
 //!   rows of a view:    residual = [ camera | candidates | pose ] · unknowns        whitened, weighted by the loss
 //!   Gram matrix:       [ camera | candidates | residual ]ᵀ[ … ], the pose of the view eliminated
 //! ```
 //!
-//! The candidates are what may differ between views (focal length, principal point), what a rolling shutter does
-//! while the board moves, and how the board may be stretched and bent. With these matrices any combination of
+//! The candidates are quantities that may differ between views (focal length, principal point), displacements by a
+//! rolling shutter while the board moves, and stretch and bend of the board. With these matrices any combination of
 //! columns is fitted by one Gauss–Newton step (a score test), without another bundle adjustment.
 
 use std::collections::BTreeSet;
@@ -22,7 +22,7 @@ use crate::problem::whitening::Whitening;
 use deltille_core::camera::Lens;
 use deltille_core::statistics::f_chance;
 
-/// Columns beside those of the camera.
+/// The columns besides those of the camera.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Candidate {
     /// Relative change of both focal lengths.
@@ -31,15 +31,15 @@ pub(crate) enum Candidate {
     CentreX,
     /// Change of the principal point in y, px.
     CentreY,
-    /// Displacement of the board along x of the camera while the shutter passes the image, mm.
+    /// Displacement of the board along x of the camera while the shutter scans the image, mm.
     ShutterX,
     /// The same along y.
     ShutterY,
     /// The same along z.
     ShutterZ,
-    /// Stretch of the board: x longer and y shorter by this part.
+    /// Stretch of the board: x longer and y shorter by this fraction.
     Stretch,
-    /// Shear of the board, by this part.
+    /// Shear of the board by this fraction.
     Shear,
     /// Bend of the board along x, mm at a half diagonal.
     BendX,
@@ -52,29 +52,29 @@ pub(crate) enum Candidate {
 const CANDIDATES: usize = 11;
 
 impl Candidate {
-    /// What of a camera may change.
+    /// The intrinsics that may change.
     const CAMERA: [Self; 3] = [Self::Focal, Self::CentreX, Self::CentreY];
 
-    /// Displacements while the shutter passes the image.
+    /// Displacements while the shutter scans the image.
     pub(crate) const SHUTTER: [Self; 3] = [Self::ShutterX, Self::ShutterY, Self::ShutterZ];
 
-    /// How a board may differ from its description.
+    /// The deviations of a board from its description.
     pub(crate) const SHEET: [Self; 5] =
         [Self::Stretch, Self::Shear, Self::BendX, Self::Twist, Self::BendY];
 }
 
-/// What a view says.
+/// The equations of a view.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct ViewEquations {
     /// Index of its frame.
     pub frame: usize,
     /// Gram matrix of the camera's columns, the candidates and the residual.
     gram: DMatrix<f64>,
-    /// How many coordinates there are, less the pose.
+    /// Number of coordinates less the unknowns of the pose.
     pub freedom: f64,
-    /// How many px a whitened coordinate is worth.
+    /// Size of a whitened coordinate, px.
     px: f64,
-    /// Root mean square of how a pixel moves with the board, px/mm, along x, y and z.
+    /// RMS derivative of a pixel with respect to the position of the board, px/mm, along x, y and z.
     pub px_per_mm: f64,
     /// Mean squared sine of the angle between the line of sight and the normal of the board.
     pub obliquity: f64,
@@ -82,7 +82,7 @@ pub(crate) struct ViewEquations {
     pub log_distance: f64,
 }
 
-/// What the views of a camera say, in their order.
+/// The equations of the views of a camera, in their order.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct StateEquations {
     pub views: Vec<ViewEquations>,
@@ -105,21 +105,21 @@ pub(crate) struct Fit {
     parts: Vec<(DMatrix<f64>, DVector<f64>)>,
     whole: DMatrix<f64>,
     right: DVector<f64>,
-    /// The sum of squares that is left, and its degrees of freedom.
+    /// The residual sum of squares, and its degrees of freedom.
     pub left: f64,
     pub freedom: f64,
 }
 
-/// An unknown with its deviation, as the views agree with each other.
+/// An unknown with its standard deviation from the scatter between views.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Effect {
     pub value: f64,
     pub sd: f64,
-    /// Degrees of freedom of the deviation.
+    /// Degrees of freedom of the standard deviation.
     pub freedom: f64,
 }
 
-/// How often noise makes as much of an effect.
+/// The p-value of an effect: the probability that noise causes it.
 pub(crate) fn significance(effect: Effect) -> f64 {
     match effect.freedom >= 1.0 {
         true => f_chance((effect.value / effect.sd).powi(2), 1.0, effect.freedom),
@@ -128,7 +128,7 @@ pub(crate) fn significance(effect: Effect) -> f64 {
 }
 
 impl StateEquations {
-    /// What the views of a camera say at an estimate; `None` where nothing of it was found.
+    /// Forms the equations of the views of a camera at an estimate; `None` if none of its parameters was estimated.
     pub(crate) fn of(
         problem: &Problem,
         whitening: &Whitening,
@@ -141,7 +141,7 @@ impl StateEquations {
         if free.is_empty() {
             return None;
         }
-        // A spline is rigid here: its knots are known far better from all views than the differences of two groups.
+        // A spline is rigid here: all views determine its knots far better than differences of two groups.
         let free = if matches!(unknowns.camera.lens, Lens::Spline(_)) { Vec::new() } else { free };
         let of_camera = || problem.blocks.iter().filter(|block| block.camera == camera);
         let panels: BTreeSet<usize> = of_camera().map(|block| block.panel.index()).collect();
@@ -156,19 +156,19 @@ impl StateEquations {
         Some(Self { views, free: equations.free, is_of_one_panel: panels.len() == 1 })
     }
 
-    /// The same of some of the views only, by index.
+    /// The equations of some of the views only, by index.
     pub(crate) fn some(&self, is_kept: impl Fn(usize) -> bool) -> Self {
         let views = self.views.iter().enumerate().filter(|&(index, _)| is_kept(index));
         let views = views.map(|(_, view)| view.clone()).collect();
         Self { views, free: self.free.clone(), ..*self }
     }
 
-    /// How many views there are.
+    /// Number of views.
     pub(crate) fn count(&self) -> usize {
         self.views.len()
     }
 
-    /// How many unknowns the camera has.
+    /// Number of unknowns of the camera.
     pub(super) fn parameter_count(&self) -> usize {
         self.free.len()
     }
@@ -178,8 +178,8 @@ impl StateEquations {
         self.free.starts_with(&[0, 1])
     }
 
-    /// By how much a parameter changes in a fit whose first columns are those of the camera, px; of a rigid camera the
-    /// candidate in its place, whose unit is so many px.
+    /// The change of a parameter in a fit whose first columns are those of the camera, px; for a rigid camera, that of
+    /// the candidate in its place, whose unit is `px` pixels.
     pub(crate) fn change_px(
         &self,
         fit: &Fit,
@@ -214,12 +214,12 @@ impl StateEquations {
         Column { weights: Some(weights), ..self.column(candidate) }
     }
 
-    /// The fit of some columns; `None` where they cannot be told apart.
+    /// Fits some columns; `None` if they are not distinguishable.
     pub(crate) fn fit(&self, columns: &[Column]) -> Option<Fit> {
         self.fit_with_each(columns, &[])
     }
 
-    /// The same with candidates that have a value of their own in every view.
+    /// Fits some columns and candidates with a separate value in every view.
     pub(crate) fn fit_with_each(&self, columns: &[Column], each: &[Candidate]) -> Option<Fit> {
         let m = columns.len();
         let mut parts = Vec::with_capacity(self.views.len());
@@ -241,7 +241,7 @@ impl StateEquations {
         Some(Fit { beta, inverse, parts, whole, right, left, freedom })
     }
 
-    /// The values of candidates in each view of such a fit, and by how much they lower its sum of squares.
+    /// The values of the candidates in each view of such a fit, and the reduction of its sum of squares.
     pub(crate) fn each(
         &self,
         columns: &[Column],
@@ -274,7 +274,7 @@ impl StateEquations {
         })
     }
 
-    /// How many px a whitened coordinate is worth.
+    /// Size of a whitened coordinate, px.
     pub(crate) fn px(&self) -> f64 {
         let squares: f64 = self.views.iter().map(|view| view.px * view.px).sum();
         (squares / self.views.len().max(1) as f64).sqrt()
@@ -297,11 +297,11 @@ impl Fit {
         self.left / self.freedom.max(1.0)
     }
 
-    /// An unknown with its deviation: the mean of the variances from the delete-one jackknife over views and from
-    /// noise as much larger as views scatter more than it in all directions, and never less than that from noise.
+    /// An unknown with its standard deviation. The variance is the mean of that of the delete-one jackknife over views
+    /// and of that from noise scaled by the excess scatter of views in all directions, but at least that from noise.
     ///
-    /// The degrees of freedom of the jackknife are those of Satterthwaite's formula for what the views contribute,
-    /// less `taken`; the mean has twice as many, as the other variance is known from all directions together.
+    /// The degrees of freedom of the jackknife follow from Satterthwaite's formula for the contributions of views, less
+    /// `taken`; the mean has twice as many, as all directions together determine the other variance.
     pub(crate) fn effect(&self, index: usize, taken: f64) -> Option<Effect> {
         let count = self.parts.len() as f64;
         let (mut without, mut shares) = (Vec::with_capacity(self.parts.len()), Vec::new());
@@ -322,8 +322,7 @@ impl Fit {
         (sd > 0.0 && sd.is_finite()).then_some(Effect { value, sd, freedom })
     }
 
-    /// How much larger the squares of what views pull at the unknowns are than noise has them: about 1 where
-    /// it is all there is.
+    /// The ratio of the squared gradients of views to their expectation from noise: about 1 with noise alone.
     fn scatter(&self) -> f64 {
         let (mut squares, mut freedom) = (0.0, -(self.beta.len() as f64));
         for (own, pull) in &self.parts {
@@ -347,7 +346,7 @@ impl Fit {
     }
 }
 
-/// A direction of which a view says less than this part of what it says of its coordinates is open to it.
+/// Least information of a view on a direction, relative to that on its coordinates, for the view to determine it.
 const OPEN: f64 = 1e-6;
 
 struct Equations<'a> {
@@ -386,7 +385,7 @@ impl Equations<'_> {
                 }
                 let whitened = Whitening::apply(w, residual);
                 let (_, weight) = loss.of(whitened.length_squared(), whitening.sigma);
-                // Mid-image rows are at the moment of the view.
+                // The rows in the image centre are read at the nominal time of the view.
                 let ramp = (seen.pixel.y + 0.5) / height - 0.5;
                 let by_point = at.by_point.map(DVec3::from);
                 let by_place = by_point.map(|by| panel_from_camera * by);
@@ -435,8 +434,9 @@ impl Equations<'_> {
     }
 }
 
-/// Derivatives of a coordinate by how the sheet is stretched, sheared and bent, in the order of [`Candidate::SHEET`], from
-/// that by the place of the corner; `uv` is its place from the middle of the sheet in parts of `reach`, mm.
+/// Derivatives of a coordinate with respect to stretch, shear and bend of the sheet, in the order of
+/// [`Candidate::SHEET`]. `by_place` is the derivative with respect to the corner's position; `uv` is its position from
+/// the centre of the sheet in units of `reach`, mm.
 fn by_sheet(uv: DVec3, by_place: DVec3, reach: f64) -> [f64; 5] {
     [
         reach * (uv.x * by_place.x - uv.y * by_place.y),
@@ -447,8 +447,8 @@ fn by_sheet(uv: DVec3, by_place: DVec3, reach: f64) -> [f64; 5] {
     ]
 }
 
-/// Derivatives of coordinate `i` of a pixel by all candidates. `off` is its offset from the principal point, `shutter` the
-/// derivatives by a shift of the point while rows are read.
+/// Derivatives of coordinate `i` of a pixel with respect to all candidates. `off` is its offset from the principal
+/// point, `shutter` the derivatives with respect to a shift of the point while rows are read.
 fn by_candidates(i: usize, off: f64, shutter: DVec3, sheet: [f64; 5]) -> [f64; CANDIDATES] {
     let axis = |of: usize| f64::from(u8::from(of == i));
     let [stretch, shear, bend_x, twist, bend_y] = sheet;
@@ -478,5 +478,5 @@ fn inverted(matrix: &DMatrix<f64>) -> Option<DMatrix<f64>> {
     Some(DMatrix::from_fn(n, n, |i, j| inverse[(i, j)] * scale[i] * scale[j]))
 }
 
-/// Added to a diagonal of 1: what is determined less than so is left where it is.
+/// Term added to a diagonal of 1: directions with less information stay unchanged.
 const SINGULAR: f64 = 1e-11;
