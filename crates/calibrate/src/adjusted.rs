@@ -38,7 +38,7 @@ impl Calibration {
         problem.stop = self.stop.clone();
         let gross = Gross::of(problem).ok_or(CalibrationError::NoStart)?;
         own.check_frames(&gross)?;
-        let prepare = |kept: &mut Kept| panels::hold(&mut kept.problem, &kept.left_out, &own);
+        let prepare = |kept: &mut Kept| panels::fix_gauge(&mut kept.problem, &kept.left_out, &own);
         let (gross, settled) = gross.settled(own.weights, own.loss, prepare)?;
         let of_frames = gross.frames.iter();
         excluded.extend(of_frames.map(|(&frame, why)| {

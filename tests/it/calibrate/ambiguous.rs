@@ -23,7 +23,7 @@ fn checkerboard(rows: u32, cols: u32) -> Target {
     Target::new("board", spec).unwrap()
 }
 
-/// Cameras 120 mm from one another, each rolled about its optical axis.
+/// Cameras at intervals of 120 mm, each rolled about its optical axis.
 fn placed(rolls_rad: &[f64]) -> Vec<Pose> {
     let place = |(index, roll): (usize, &f64)| Pose {
         rotation: DQuat::from_rotation_z(*roll),
@@ -32,7 +32,7 @@ fn placed(rolls_rad: &[f64]) -> Vec<Pose> {
     rolls_rad.iter().enumerate().map(place).collect()
 }
 
-/// Board poses about upright, tilted up to 35°, and rolled in the image by up to `roll_rad`.
+/// Nearly upright board poses, tilted up to 35°, and rolled in the image by up to `roll_rad`.
 fn moved(frames: usize, tilt_rad: f64, roll_rad: f64, random: &mut ChaCha8Rng) -> Vec<Pose> {
     let pose = |_| {
         let axis = random.random_range(0.0..2.0 * PI);
@@ -55,7 +55,7 @@ fn moved(frames: usize, tilt_rad: f64, roll_rad: f64, random: &mut ChaCha8Rng) -
     (0..frames).map(pose).collect()
 }
 
-/// Views with labels as the detector gives them: row 0, column 0 is the corner that lies lowest in the image.
+/// Views labelled as by the detector: row 0, column 0 is the lowest corner in the image.
 fn views(
     target: &Target,
     camera_from_rig: &Pose,
@@ -121,12 +121,12 @@ impl Rig {
         Self { found, said, truth }
     }
 
-    /// How far the cameras are from where they were, mm.
+    /// Distance of the cameras from their true positions, mm.
     fn off_mm(&self) -> f64 {
         let cameras = self.found.cameras.iter().zip(&self.truth);
         let off = cameras.map(|(camera, truth)| {
             let at = |pose: &Pose| pose.inverse().translation;
-            // The first camera is the rig's frame.
+            // The first camera is the rig frame.
             let truth = truth.after(&self.truth[0].inverse());
             at(&camera.camera_from_rig).distance(at(&truth))
         });
@@ -135,7 +135,7 @@ impl Rig {
 }
 
 #[test]
-fn an_upside_down_camera_is_found_where_it_is() {
+fn the_pose_of_an_upside_down_camera_is_right() {
     for seed in 0..2 {
         let mut random = ChaCha8Rng::seed_from_u64(100 + seed);
         let boards = moved(16, 0.6, 0.4, &mut random);
@@ -149,10 +149,10 @@ fn an_upside_down_camera_is_found_where_it_is() {
     }
 }
 
-/// A board that is rolled in any way is labelled otherwise in some moments only, also by cameras on their side, and on
-/// square boards by quarter turns.
+/// A rolled board has different labels in some frames only, also for cameras on their side and, on square boards, for
+/// quarter turns.
 #[test]
-fn labels_that_change_from_moment_to_moment_are_brought_together() {
+fn labels_that_change_between_frames_are_unified() {
     for (rows, cols, rolls) in [
         (4, 6, &[0.0, FRAC_PI_2][..]),
         (4, 6, &[0.3, PI, -FRAC_PI_2]),
@@ -170,7 +170,7 @@ fn labels_that_change_from_moment_to_moment_are_brought_together() {
 }
 
 #[test]
-fn nothing_is_rotated_where_labels_agree() {
+fn consistent_labels_are_not_rotated() {
     for (rows, cols, rolls) in [(4, 6, [0.0, 0.2]), (4, 7, [0.0, PI]), (5, 7, [0.1, -0.1])] {
         let mut random = ChaCha8Rng::seed_from_u64(u64::from(rows + cols));
         let boards = moved(12, 0.6, 0.2, &mut random);
@@ -180,9 +180,9 @@ fn nothing_is_rotated_where_labels_agree() {
     }
 }
 
-/// A board that never moved looks the same with either labels.
+/// A board that never moved fits both labellings.
 #[test]
-fn what_cannot_be_decided_is_said() {
+fn undecidable_labels_are_reported() {
     let mut random = ChaCha8Rng::seed_from_u64(5);
     let boards = vec![moved(1, 0.6, 0.1, &mut random)[0]; 6];
     let camera = Camera::pinhole(1280, 960, 1.0);
@@ -192,7 +192,7 @@ fn what_cannot_be_decided_is_said() {
     assert!(rig.off_mm() < 8.0);
 }
 
-/// A pair of which the right camera is upside down; the baseline is 120.3 mm.
+/// A stereo pair whose right camera is upside down; the baseline is 120.3 mm.
 #[test]
 #[cfg_attr(not(has_data), ignore = "no detections: set DELTILLE_DATA to their folder")]
 fn a_real_pair_with_one_camera_upside_down_has_its_baseline() {
@@ -205,8 +205,8 @@ fn a_real_pair_with_one_camera_upside_down_has_its_baseline() {
     ] {
         let result =
             deltille(folder.path(), &format!("rig {cameras} {target} --model radtan")).success();
-        let told = String::from_utf8_lossy(&result.get_output().stderr).into_owned();
-        assert!(told.contains("the board has no tags"), "{told}");
+        let stderr = String::from_utf8_lossy(&result.get_output().stderr).into_owned();
+        assert!(stderr.contains("the board has no tags"), "{stderr}");
         let rig = std::fs::read_to_string(folder.path().join("rig.json")).unwrap();
         let rig: serde_json::Value = serde_json::from_str(&rig).unwrap();
         let at = &rig["cameras"][1]["camera_from_rig"]["translation_mm"];

@@ -1,4 +1,4 @@
-//! The shape of a board's sheet: found where it is bent, and called chance where it is not.
+//! Estimation of the shape of a board's sheet, which is significant only for a bent sheet.
 
 use deltille::calibrate::{
     BoardShape, Calibration, CalibrationError, Diagnosis, Estimate, Instead, LackOfFit, Model,
@@ -19,8 +19,8 @@ fn of(views: &[View]) -> Calibration {
     Calibration::new([Pose::IDENTITY]).camera("", views.to_vec(), Model::Radtan)
 }
 
-/// Views of a board of 9 × 9 corners, 20 mm apart, whose corners are moved by `offset` of the place
-/// from its middle in parts of its half diagonal, seen by a camera at this place on its rig.
+/// Views of a board of 9 × 9 corners, 20 mm apart, from a camera with this pose on its rig. `offset` moves each corner
+/// as a function of its position from the centre in units of half the diagonal.
 fn views_of(camera_from_rig: &Pose, offset: impl Fn(f64, f64) -> DVec3, seed: u64) -> Vec<View> {
     let mut random = ChaCha8Rng::seed_from_u64(seed);
     let mut noisy = ChaCha8Rng::seed_from_u64(seed ^ camera_from_rig.translation.x.to_bits());
@@ -74,7 +74,7 @@ fn check_shape(found: &Estimate) {
     }
 }
 
-/// Reads a file back, and compares all that it holds.
+/// Reads a file back, and compares all its contents.
 fn check_read_back(found: &Estimate, text: &str) {
     let board = UntaggedGrid { kind: GridKind::Checker, edge_mm: 20.0, size: None };
     let read = saved::read(text, &Reference::Grid(board)).unwrap();
@@ -117,9 +117,9 @@ fn check_same(found: &Estimate, read: &Estimate) {
     }
 }
 
-/// Two cameras tell the shape better than one, and frames that took no part are as good with it.
+/// Two cameras determine the shape better than one, and the shape fits held-out frames equally well.
 #[test]
-fn a_rig_finds_the_shape_of_a_sheet() {
+fn a_rig_estimates_the_shape_of_a_sheet() {
     let eye = DVec3::new(60.0, 0.0, 0.0);
     let right = Pose::looking_at(eye, DVec3::new(0.0, 0.0, 350.0), DVec3::NEG_Y);
     let of_right = views_of(&right, bent, 1);
@@ -142,7 +142,7 @@ fn a_rig_finds_the_shape_of_a_sheet() {
     assert!(turn.length() < 1e-3 && step.length() < 0.5, "{turn} {step}");
     let text = rig::write(&found, &[], "radtan", Print::default(), Residuals::Listed);
     check_read_back(&found, &text);
-    // Without the shape the board is to blame.
+    // Without the shape the board is blamed.
     let flat = both.solve().unwrap();
     let said = both.explain(&flat);
     let is_of_shape = |said: &Diagnosis| matches!(said, Diagnosis::Remedied { remedy, .. } if remedy.instead == Instead::Shape);
@@ -150,7 +150,7 @@ fn a_rig_finds_the_shape_of_a_sheet() {
 }
 
 #[test]
-fn a_bent_and_stretched_sheet_is_found() {
+fn a_bent_and_stretched_sheet_is_estimated() {
     let views = views(bent, 1);
     let (plain, with_shape) = (of(&views), of(&views).board_shape(true));
     let (flat, found) = (plain.solve().unwrap(), with_shape.solve().unwrap());
@@ -168,12 +168,12 @@ fn a_bent_and_stretched_sheet_is_found() {
     assert!(flat.rms_px > 2.0 * found.rms_px, "{} {}", flat.rms_px, found.rms_px);
     assert!((found.rms_px / NOISE_PX - 1.0).abs() < 0.05, "{}", found.rms_px);
     check_shape(&found);
-    // The camera has as many parameters as without.
+    // The number of camera parameters does not change.
     assert_eq!(found.cameras[0].covariance.rows(), flat.cameras[0].covariance.rows());
 }
 
 #[test]
-fn a_flat_sheet_is_called_flat() {
+fn the_shape_of_a_flat_sheet_is_not_significant() {
     let significant = (0..10).filter(|&seed| {
         let views = views(|_, _| DVec3::ZERO, 100 + seed);
         let found = of(&views).board_shape(true).solve().unwrap();

@@ -1,4 +1,4 @@
-//! Laws that every camera model obeys.
+//! Properties of every camera model.
 
 use deltille::camera::{
     BrownConrady, Camera, DoubleSphere, ExtendedUnified, KannalaBrandt, Lens, Pupil, Spline,
@@ -7,7 +7,7 @@ use deltille::camera::{
 use glam::{DVec2, DVec3};
 use proptest::prelude::*;
 
-/// A camera of each model with lenses as they are met, and how far from the axis it is tried, rad.
+/// A camera of each model with a typical lens, and the largest tested angle from the axis, rad.
 fn cameras() -> Vec<(Camera, f64)> {
     let rational = BrownConrady {
         radial: [0.4, -0.1, 0.002],
@@ -46,7 +46,7 @@ fn cameras() -> Vec<(Camera, f64)> {
     lenses.into_iter().map(|(lens, reach)| (camera(lens), reach)).collect()
 }
 
-/// A spline whose knots are bent by a tenth of their distance.
+/// A spline whose knots are displaced by a tenth of their distance.
 fn spline(degree: usize, knots: [usize; 2], fov_x_deg: u32) -> Lens {
     let grid = SplineGrid::new(degree, knots, fov_x_deg).unwrap();
     let bend = |i: usize| {
@@ -56,14 +56,14 @@ fn spline(degree: usize, knots: [usize; 2], fov_x_deg: u32) -> Lens {
     Lens::Spline(Spline::new(grid).with_knots((0..grid.count()).map(bend).collect()))
 }
 
-/// A point at an angle from the axis, a turn around it, and a distance.
+/// A point at an angle from the axis, an azimuth, and a distance.
 fn point(theta: f64, phi: f64, distance: f64) -> DVec3 {
     distance * DVec3::new(theta.sin() * phi.cos(), theta.sin() * phi.sin(), theta.cos())
 }
 
 proptest! {
     #[test]
-    fn derivatives_are_those_of_the_projection(
+    fn derivatives_match_the_projection(
         part in 0.0f64..1.0, phi in -3.2f64..3.2, distance in 50.0f64..2000.0,
     ) {
         for (camera, reach) in cameras() {
@@ -72,8 +72,8 @@ proptest! {
             prop_assert!(at.is_some(), "{camera:?}");
             let at = at.unwrap();
             prop_assert_eq!(Some(at.pixel), camera.project(point));
-            // Central differences: an error of h² in the formula, of 1e-13/h in the digits. Curves of degree 2 have another
-            // curvature beyond a knot, which is an error of h where the two points lie on either side of it.
+            // Central differences: a truncation error of h², and a rounding error of 1e-13/h. The curvature of curves
+            // of degree 2 jumps at a knot, which adds an error of h if the two points lie on either side of it.
             let is_quadratic = matches!(&camera.lens, Lens::Spline(spline) if spline.grid().degree == 2);
             let limit = if is_quadratic { 1e-2 } else { 1e-4 };
             let differences = |high: Option<DVec2>, low: Option<DVec2>, h: f64| {
@@ -108,7 +108,7 @@ proptest! {
     }
 
     #[test]
-    fn the_ray_of_a_pixel_passes_the_point_that_is_seen_there(
+    fn the_ray_of_a_pixel_passes_through_its_point(
         part in 0.0f64..1.0, phi in -3.2f64..3.2, distance in 50.0f64..2000.0,
     ) {
         for (camera, reach) in cameras() {
@@ -123,7 +123,7 @@ proptest! {
 }
 
 #[test]
-fn what_lies_outside_the_domain_is_not_seen() {
+fn points_outside_the_domain_have_no_projection() {
     for (camera, _) in cameras() {
         assert_eq!(camera.project(DVec3::new(0.0, 0.0, -100.0)), None, "{:?}", camera.lens);
         assert!(camera.project(DVec3::new(0.0, 0.0, 100.0)).is_some());
@@ -151,5 +151,5 @@ fn a_pole_that_cancels_leaves_a_gap_no_wider_than_itself() {
     }
     let between = at((1.0f64 + 0.5e-6).sqrt());
     assert_eq!(camera.project(between), None);
-    assert!(camera.project_with_derivatives(between).is_some(), "a search passes it");
+    assert!(camera.project_with_derivatives(between).is_some(), "a search crosses the gap");
 }

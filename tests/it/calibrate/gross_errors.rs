@@ -1,5 +1,5 @@
-//! Calibrations of simulated views with gross errors of many kinds: they are found and named, and what is
-//! told of the camera is as true as without them.
+//! Calibrations of simulated views with many kinds of outliers: these are found and named, and the estimated camera is
+//! as accurate as without them.
 
 use std::f64::consts::PI;
 
@@ -17,7 +17,7 @@ use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, Normal};
 
-/// Deviation of the simulated corners, px.
+/// Standard deviation of the simulated corners, px.
 const NOISE_PX: f64 = 0.05;
 
 const SIZE_PX: [u32; 2] = [1600, 1200];
@@ -46,7 +46,7 @@ fn camera(model: Model) -> Camera {
     Camera { centre_px: DVec2::new(804.0, 606.0), ..Camera::centred(width, height, focal, lens) }
 }
 
-/// Poses of the target before a camera, turned and tilted anyhow.
+/// Poses of the target in front of a camera, randomly rotated and tilted.
 fn places(camera: &Camera, target: &Target, count: usize, rng: &mut ChaCha8Rng) -> Vec<Pose> {
     let corners: Vec<DVec3> =
         target.panels.iter().flat_map(|p| &p.corners).map(|c| c.target_mm).collect();
@@ -73,7 +73,7 @@ fn places(camera: &Camera, target: &Target, count: usize, rng: &mut ChaCha8Rng) 
     found
 }
 
-/// What a camera sees of a target whose panels are where `panels` has them.
+/// The view of a target by a camera, with its panels at the poses `panels`.
 fn seen(
     camera: &Camera,
     target: &Target,
@@ -106,35 +106,35 @@ fn seen(
     View { name: name.to_owned(), image: format!("{name}.png"), size_px: SIZE_PX, sightings }
 }
 
-/// What is wrong with the views.
+/// The fault of the views.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Wrong {
     Nothing,
-    /// So many of all corners are anywhere in the picture.
+    /// This fraction of all corners is anywhere in the image.
     Anywhere(f64),
-    /// So many of all corners are off in the same way.
+    /// This fraction of all corners is displaced in the same way.
     Off(f64, DVec2),
-    /// So many of all corners have the label of their neighbour in the row.
+    /// This fraction of all corners has the label of the neighbour in the row.
     OneTile(f64),
-    /// A view has its labels in any order.
+    /// The labels of a view are permuted.
     Permuted,
     /// A view is mirrored.
     Mirrored,
     /// A corner of three views is at 1e300.
     Endless,
-    /// Panel 7 is displaced by so many mm.
+    /// Panel 7 is displaced by this distance, mm.
     Displaced(f64),
-    /// Panels 7 and 12 are at each other's place.
+    /// Panels 7 and 12 are exchanged.
     Exchanged,
-    /// A panel of one view has its labels in any order.
+    /// The labels of a panel in one view are permuted.
     PanelPermuted,
-    /// Every panel is displaced by so many mm.
+    /// Every panel is displaced by this distance, mm.
     AllDisplaced(f64),
-    /// A view was taken with a focal length that is longer by this factor.
+    /// A view was taken with a focal length longer by this factor.
     Zoomed(f64),
 }
 
-/// Views of a target by a camera, with what is wrong.
+/// Views of a target by a camera, with a fault.
 fn views(model: Model, target: &Target, wrong: Wrong, seed: u64) -> Vec<View> {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     let camera = camera(model);
@@ -229,14 +229,14 @@ fn solve(
     of_target(target).camera("", views(model, target, wrong, seed), model).solve()
 }
 
-/// Error of the focal length in deviations, and its deviation, px.
+/// Error of the focal length in standard deviations, and its standard deviation, px.
 fn focal(found: &Estimate, model: Model) -> (f64, f64) {
     let (truth, fx) = (camera(model).focal_px.x, &found.cameras[0].parameters[0]);
     let sd = fx.sd.unwrap();
     ((fx.value - truth) / sd, sd)
 }
 
-/// How many corners are called outliers that are none, and how many are that are not called so.
+/// Number of correct corners called outliers, and number of missed outliers.
 fn confused(found: &Estimate, model: Model, target: &Target, seed: u64) -> (usize, usize) {
     let clean = views(model, target, Wrong::Nothing, seed);
     let (mut innocent, mut missed) = (0, 0);
@@ -257,7 +257,7 @@ fn confused(found: &Estimate, model: Model, target: &Target, seed: u64) -> (usiz
 const RADTAN: Model = Model::Radtan;
 const FISHEYE: Model = Model::KannalaBrandt(4);
 
-/// All that can be wrong with a target of one panel, and of several.
+/// All faults of a target of one panel, and of several.
 const OF_BOARDS: [Wrong; 10] = [
     Wrong::Nothing,
     Wrong::Anywhere(0.2),
@@ -273,7 +273,7 @@ const OF_BOARDS: [Wrong; 10] = [
 const OF_SOLIDS: [Wrong; 4] =
     [Wrong::Displaced(0.6), Wrong::Displaced(1.5), Wrong::Exchanged, Wrong::PanelPermuted];
 
-/// The findings and views left out that a fault must lead to.
+/// Checks the findings and excluded views for a fault.
 fn check_named(found: &Estimate, target: &Target, wrong: Wrong, case: &str) {
     let shared: Vec<&Shared> = found.findings.iter().map(|finding| &finding.shared).collect();
     let is_solid = target.panels.len() > 1;
@@ -331,7 +331,8 @@ fn check_named(found: &Estimate, target: &Target, wrong: Wrong, case: &str) {
     }
 }
 
-/// Errors of the focal length in deviations, and the deviations over those of clean views, of every seed.
+/// Errors of the focal length in standard deviations, and standard deviations relative to those of clean views, for
+/// every seed.
 fn table(
     model: Model,
     target: &Target,
@@ -365,10 +366,10 @@ fn check(rows: &[(Wrong, Vec<f64>, Vec<f64>)], most_sigma: f64) {
     for (wrong, errors, ratios) in rows {
         let worst = errors.iter().fold(0.0, |worst: f64, error| worst.max(error.abs()));
         assert!(worst < most_sigma, "{wrong:?}: {errors:?}");
-        // Half of the corners are left in the worst case, and some views fewer.
+        // In the worst case half of the corners remain, and fewer in some views.
         let most = match wrong {
             Wrong::Anywhere(part) if *part < 0.3 => 1.3,
-            // One seed of twenty comes to rest between the two crowds, and says so by its deviations.
+            // One seed of twenty ends between the two groups, with a large standard deviation.
             Wrong::Off(..) if ratios.len() > 2 => 30.0,
             _ => 1.8,
         };
@@ -377,7 +378,7 @@ fn check(rows: &[(Wrong, Vec<f64>, Vec<f64>)], most_sigma: f64) {
 }
 
 #[test]
-fn gross_errors_are_named_and_do_no_harm() {
+fn outliers_are_named_and_do_no_harm() {
     for model in [RADTAN, FISHEYE] {
         check(&table(model, &board(), &OF_BOARDS, 0..2), 3.0);
         check(&table(model, &icosahedron(), &OF_SOLIDS, 0..2), 3.0);
@@ -385,10 +386,10 @@ fn gross_errors_are_named_and_do_no_harm() {
     check(&table(RADTAN, &icosahedron(), &OF_BOARDS, 0..1), 3.0);
 }
 
-/// Of 20 seeds one may be off by more than three deviations, as 1 of 370 is by chance.
+/// One of 20 seeds may be off by more than 3σ; by chance 1 of 370 is.
 #[test]
 #[ignore = "20 seeds of each fault: minutes"]
-fn gross_errors_over_twenty_seeds() {
+fn outliers_over_twenty_seeds() {
     let (board, solid) = (board(), icosahedron());
     let all: Vec<Wrong> = OF_BOARDS.iter().chain(&OF_SOLIDS).copied().collect();
     for (model, target, faults) in [
@@ -426,7 +427,7 @@ fn rig(wrong: Wrong, frames: usize, seed: u64) -> (Vec<CameraViews>, Vec<PanelPl
     let views = [0.0, 0.25, -0.25].into_iter().enumerate().map(|(index, turn)| {
         let turn = DQuat::from_rotation_y(turn);
         let views = places.iter().enumerate().map(|(i, place)| {
-            // Around a point before the first camera.
+            // Around a point in front of the first camera.
             let middle = DVec3::new(0.0, 0.0, places[0].translation.z);
             let place = Pose {
                 rotation: turn * place.rotation,
@@ -446,7 +447,7 @@ fn solve_rig(views: &[CameraViews], panels: &[PanelPlace]) -> Result<Estimate, C
 }
 
 #[test]
-fn what_is_wrong_in_a_rig_is_named() {
+fn faults_of_a_rig_are_named() {
     let (views, panels) = rig(Wrong::Displaced(0.6), 20, 5);
     let found = solve_rig(&views, &panels).unwrap();
     let [Finding { shared: Shared::Panel { panel, moved: Some(moved) }, .. }] = found.findings[..]
@@ -456,7 +457,7 @@ fn what_is_wrong_in_a_rig_is_named() {
     assert_eq!(panel.index(), 7);
     assert!((moved.by_mm - 0.6).abs() < 0.02, "{moved:?}");
     assert!(found.inlier_rms_px() < 1.1 * NOISE_PX && found.excluded.is_empty());
-    // One camera's pictures bear the names of other moments, and are not late by the same time.
+    // The images of one camera have the names of other frames, without a constant lag.
     let (mut confused, _) = rig(Wrong::Nothing, 20, 5);
     let names: Vec<String> = confused[1].views.iter().map(|view| view.name.clone()).collect();
     confused[1].views.iter_mut().zip(names.iter().rev()).for_each(|(view, name)| {
@@ -469,9 +470,9 @@ fn what_is_wrong_in_a_rig_is_named() {
     );
 }
 
-/// A camera that is turned after half of the frames: these go, and no panel is to blame.
+/// A camera that is rotated after half of the frames: these are excluded, and no panel is blamed.
 #[test]
-fn panels_are_not_to_blame_for_a_camera_that_was_moved() {
+fn panels_are_not_blamed_for_a_moved_camera() {
     for seed in 0..4 {
         let (mut views, panels) = rig(Wrong::Nothing, 20, seed);
         let late = views[1].views.iter_mut().filter(|view| view.name.as_str() >= "10");
@@ -484,7 +485,7 @@ fn panels_are_not_to_blame_for_a_camera_that_was_moved() {
     }
 }
 
-/// The panels that findings name, and nothing but panels.
+/// The panels that the findings name; there must be no other findings.
 fn panels_named(found: &Estimate) -> Vec<usize> {
     let panels = found.findings.iter().map(|finding| match &finding.shared {
         Shared::Panel { panel, .. } => panel.index(),
@@ -493,9 +494,9 @@ fn panels_named(found: &Estimate) -> Vec<usize> {
     panels.collect()
 }
 
-/// What looks wrong beside two panels at each other's place is let back in.
+/// Panels that look wrong because of two exchanged ones are included again.
 #[test]
-fn only_panels_that_were_exchanged_are_named() {
+fn only_exchanged_panels_are_named() {
     for seed in 0..6 {
         let views = views(FISHEYE, &icosahedron(), Wrong::Exchanged, seed);
         let found = solve(FISHEYE, &icosahedron(), Wrong::Exchanged, seed).unwrap();
@@ -512,9 +513,9 @@ fn only_panels_that_were_exchanged_are_named() {
     }
 }
 
-/// Where panels are displaced a little, no other lens is to be taken.
+/// Slightly displaced panels do not suggest another lens model.
 #[test]
-fn displaced_panels_are_no_fault_of_the_lens() {
+fn displaced_panels_are_not_attributed_to_the_lens() {
     let target = icosahedron();
     for seed in 0..2 {
         let views = views(RADTAN, &target, Wrong::AllDisplaced(0.5), seed);
@@ -533,9 +534,9 @@ fn displaced_panels_are_no_fault_of_the_lens() {
     }
 }
 
-/// A picture that was taken at another zoom goes, and no other, and the camera is as true as without it.
+/// An image taken at another zoom is the only one excluded, and the camera is as accurate as without it.
 #[test]
-fn a_view_of_another_zoom_is_left_out() {
+fn a_view_of_another_zoom_is_excluded() {
     for (model, target) in [(RADTAN, board()), (RADTAN, icosahedron()), (FISHEYE, board())] {
         for seed in 0..4 {
             let case = format!("{model}, {}, seed {seed}", target.name);
@@ -548,7 +549,7 @@ fn a_view_of_another_zoom_is_left_out() {
 }
 
 #[test]
-fn a_pose_holds_with_two_fifths_of_wrong_corners() {
+fn a_pose_tolerates_two_fifths_of_wrong_corners() {
     for (wrong, model) in
         [(Wrong::Anywhere(0.4), RADTAN), (Wrong::Off(0.3, DVec2::new(3.0, 0.0)), FISHEYE)]
     {
@@ -572,9 +573,9 @@ fn a_pose_holds_with_two_fifths_of_wrong_corners() {
     }
 }
 
-/// Where the lens is another one views do not agree, but none of them is to blame.
+/// With the wrong lens model views disagree, but none of them is blamed.
 #[test]
-fn no_view_is_left_out_for_a_lens_that_does_not_fit() {
+fn no_view_is_excluded_for_a_lens_that_does_not_fit() {
     for seed in 0..6 {
         let views = views(FISHEYE, &board(), Wrong::Nothing, seed);
         let found = of_target(&board()).camera("", views, Model::Eucm).solve().unwrap();

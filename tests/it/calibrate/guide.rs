@@ -1,4 +1,4 @@
-//! `deltille guide` on folders that are filled while it looks.
+//! `deltille guide` on folders that fill up while it watches.
 
 use std::path::Path;
 use std::process::{Command, Output, Stdio};
@@ -34,7 +34,7 @@ fn photograph(target: &Target, pose: &Pose, seed: u64) -> Vec<u8> {
     png.into_inner()
 }
 
-/// Poses as somebody takes them who was told to tilt the board.
+/// Poses of a person who was asked to tilt the board.
 fn poses(target: &Target, count: usize) -> Vec<Pose> {
     let middle = target.panels[0].middle_mm();
     let pose = |index: usize| {
@@ -55,7 +55,7 @@ fn json(path: &Path) -> Value {
     serde_json::from_str(&std::fs::read_to_string(path).unwrap()).unwrap()
 }
 
-/// The pose that a file proposes.
+/// The pose proposed in a file.
 fn proposed(next: &Value) -> Pose {
     let numbers = |of: &Value| -> Vec<f64> {
         of.as_array().unwrap().iter().map(|number| number.as_f64().unwrap()).collect()
@@ -69,7 +69,7 @@ fn proposed(next: &Value) -> Pose {
 }
 
 #[test]
-fn photographs_that_are_asked_for_are_taken_until_they_are_enough() {
+fn proposed_photographs_are_taken_until_they_suffice() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
     let target = board();
@@ -79,7 +79,7 @@ fn photographs_that_are_asked_for_are_taken_until_they_are_enough() {
 
     let empty = deltille(at, command).success().get_output().clone();
     assert!(said(&empty).contains("hold the board in the middle"), "{}", said(&empty));
-    assert!(!at.join("next.json").exists(), "the size of the pictures is not known");
+    assert!(!at.join("next.json").exists(), "the image size is not known");
 
     let mut pose = poses(&target, 1)[0];
     let mut sure = Vec::new();
@@ -94,16 +94,16 @@ fn photographs_that_are_asked_for_are_taken_until_they_are_enough() {
         let svg = std::fs::read_to_string(at.join("next.svg")).unwrap();
         let circles = svg.matches("<circle").count();
         assert_eq!(circles, next["corners"].as_array().unwrap().len());
-        assert_eq!(svg.matches("<polyline").count(), 1, "an arrow tells the upper side");
+        assert_eq!(svg.matches("<polyline").count(), 1, "an arrow shows the upper side");
         sure.push(next["uncertainty_px"].as_f64());
         pose = proposed(&next);
     }
     let sure: Vec<f64> = sure.into_iter().flatten().collect();
     assert!(sure.len() > 4, "a camera from the fourth photograph on: {sure:?}");
     let falls = sure.windows(2).all(|pair| pair[1] < pair[0]);
-    assert!(falls, "every photograph that is asked for makes projections surer: {sure:?}");
+    assert!(falls, "every proposed photograph reduces the uncertainty: {sure:?}");
 
-    // What it watches is enough at once, and it ends by itself.
+    // The photographs suffice at once, and it ends on its own.
     let until = 1.01 * sure[sure.len() - 1];
     let watch = format!("guide photos --target desk.json --until {until} --picture next.png");
     let output = deltille(at, &watch).success().get_output().clone();
@@ -111,11 +111,11 @@ fn photographs_that_are_asked_for_are_taken_until_they_are_enough() {
     let picture = image::open(at.join("next.png")).unwrap();
     assert_eq!((picture.width(), picture.height()), (1024, 768));
     let last = image::open(at.join("photos/7.png")).unwrap();
-    assert!(picture.to_rgb8() == last.to_rgb8(), "nothing is drawn that nobody has to hold");
+    assert!(picture.to_rgb8() == last.to_rgb8(), "no outline is drawn at the end");
 }
 
 #[test]
-fn pictures_of_the_size_that_most_have_count_and_each_counts_once() {
+fn images_of_the_most_common_size_count_once_each() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
     let target = board();
@@ -148,7 +148,7 @@ fn pictures_of_the_size_that_most_have_count_and_each_counts_once() {
     assert!(stderr.contains("c3: left out: it is a copy of the image of b3"), "{stderr}");
 }
 
-/// A picture reduced by a whole number.
+/// An image reduced by a whole number.
 fn reduced(png: &[u8], by: u32) -> Vec<u8> {
     let image = image::load_from_memory(png).unwrap();
     let (width, height) = (image.width() / by, image.height() / by);
@@ -159,7 +159,7 @@ fn reduced(png: &[u8], by: u32) -> Vec<u8> {
 }
 
 #[test]
-fn a_photograph_that_still_grows_is_waited_for_and_what_is_none_is_told() {
+fn a_growing_photograph_is_awaited_and_other_files_are_reported() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
     let target = board();
@@ -192,7 +192,7 @@ fn a_photograph_that_still_grows_is_waited_for_and_what_is_none_is_told() {
 }
 
 #[test]
-fn what_cannot_be_guided_is_refused_in_a_line() {
+fn wrong_options_are_refused_in_one_line() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
     std::fs::write(at.join("desk.json"), board().to_json()).unwrap();

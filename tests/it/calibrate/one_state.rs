@@ -1,5 +1,4 @@
-//! Views that are not of one camera in one state, or not of the board that is described: each is named, and nothing is
-//! where nothing is wrong.
+//! Views that do not show one camera in one state, or not the described board: each case is named, and no other is.
 
 use std::sync::atomic::AtomicBool;
 
@@ -25,15 +24,15 @@ fn a_changed_camera_a_rolling_shutter_and_another_board_are_named() {
 }
 
 #[test]
-fn nothing_is_named_where_camera_and_board_are_as_described_or_bent() {
+fn unchanged_cameras_and_bent_boards_are_not_named() {
     for run in runs(&[(Scene::Clean, 12), (Scene::Curved, 3)]) {
         assert!(run.is_calibrated && run.said.is_empty(), "{run:?}");
     }
 }
 
-/// Of a focal length that changed by 90 px the halves of the views show tens of px, and noise half a pixel.
+/// For a focal length that changed by 90 px, halves of the views show tens of px, and noise half a pixel.
 #[test]
-fn an_observed_deviation_is_not_below_what_halves_of_the_views_show() {
+fn the_observed_sd_is_at_least_what_halves_of_the_views_show() {
     for run in runs(&[(Scene::Zoom, 3)]) {
         let [_, noise, observed] = run.focal;
         assert!(noise < 2.0 && observed > 20.0 * noise, "{run:?}");

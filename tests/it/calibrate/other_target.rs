@@ -1,4 +1,4 @@
-//! Results of one board are not used with the description of another one.
+//! Results with one board are not used with the description of another.
 
 use std::fs;
 use std::path::Path;
@@ -14,7 +14,7 @@ const SMALL: &str = "--target small/desk.json";
 const LARGE: &str = "--target large/desk.json";
 const BOTH_SIZES: [&str; 2] = ["20 mm", "25 mm"];
 
-/// Two boards of the same tags, of 20 and 25 mm, and what a camera sees of the smaller one.
+/// Two boards with the same tags and edges of 20 and 25 mm, and detections of the smaller one.
 fn scene() -> tempfile::TempDir {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
@@ -39,7 +39,7 @@ fn scene() -> tempfile::TempDir {
     folder
 }
 
-/// One line that names both sizes, exit code 2, and nothing written.
+/// Expects one line that names both sizes, exit code 2, and no output.
 fn is_refused(at: &Path, command: &str) {
     let before = files(at);
     let said = refused(deltille(at, command));
@@ -65,7 +65,7 @@ fn every_command_refuses_a_description_of_another_size() {
     deltille(at, &format!("calibrate seen {SMALL} --model radtan -o right --board-shape"))
         .success();
 
-    // A board without description is one of its rows, columns and edges.
+    // A board without a description is identified by its rows, columns and edge.
     deltille(
         at,
         "calibrate seen --grid deltille --rows 7 --cols 8 --edge 20mm --model radtan -o plain.yaml",
@@ -87,7 +87,7 @@ fn every_command_refuses_a_description_of_another_size() {
     ] {
         is_refused(at, &command);
     }
-    // A sheet's shape is that of its board, also of one without description.
+    // The shape of a sheet belongs to its board, also without a description.
     let grid = "calibrate seen --grid deltille --rows 7 --cols 8 --model radtan";
     deltille(at, &format!("{grid} --edge 20mm --board-shape -o bent.yaml")).success();
     is_refused(at, &format!("{grid} --edge 25mm --assume-target --shape bent.json -o wrong"));
@@ -99,7 +99,7 @@ fn every_command_refuses_a_description_of_another_size() {
     ));
     assert!(BOTH_SIZES.iter().all(|size| said.contains(size)), "{said}");
 
-    // Whoever knows better may say so; then nothing tells that the cameras are the same.
+    // The user may override the check; then the cameras no longer compare as equal.
     let assumed =
         deltille(at, &format!("calibrate seen {LARGE} --model radtan --assume-target -o wrong"))
             .success();
@@ -111,7 +111,7 @@ fn every_command_refuses_a_description_of_another_size() {
     deltille(at, &format!("pose view-0.png {SMALL} --camera right/camera.yaml")).success();
 }
 
-/// A description in another format, under another name, or of measured corners is still that of the same board.
+/// A description in another format, under another name, or with measured corners still describes the same board.
 #[test]
 fn the_same_board_is_accepted_by_any_name_and_format() {
     let folder = scene();
@@ -137,7 +137,7 @@ fn the_same_board_is_accepted_by_any_name_and_format() {
     deltille(at, "compare measured/camera.json again/camera.json --tolerance 1").success();
 }
 
-/// Files of a target are verified by what was measured of it, too: they bear the name of its plan.
+/// A refined description also verifies the files of its target: they have the name of its plan.
 #[test]
 fn prints_are_verified_by_a_refined_description() {
     let folder = tempfile::tempdir().unwrap();
@@ -171,7 +171,7 @@ fn detections_without_a_target_are_noted_once() {
     assert_eq!(said.matches(note).count(), 1, "{said}");
 }
 
-/// A description whose corners or tags were edited is not that of the print any more.
+/// A description with edited corners or tags no longer matches the print.
 #[test]
 fn an_edited_description_is_refused() {
     let folder = scene();
@@ -188,7 +188,7 @@ fn an_edited_description_is_refused() {
     assert!(said.contains("field `fingerprint`: it is"), "{said}");
 }
 
-/// Boards that are given by tiling and edge are those that detections name.
+/// Boards given by tiling and edge are the boards that the detections name.
 #[test]
 fn untagged_boards_keep_the_name_of_detections() {
     let folder = tempfile::tempdir().unwrap();

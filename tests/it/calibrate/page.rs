@@ -1,4 +1,4 @@
-//! What the page about a calibration shows is what was found, and files without residuals are read as those with them.
+//! The report page of a calibration shows the estimate, and files without residuals read like those with residuals.
 
 use std::collections::BTreeMap;
 
@@ -16,7 +16,7 @@ use super::models::{camera, of, simulated};
 const VIEWS: usize = 20;
 const TILT_RAD: f64 = 0.7;
 
-/// Row and column of a corner that is elsewhere on the board than it is taken to be, by so much, mm.
+/// Row and column of a displaced corner of the board, and its displacement, mm.
 const MOVED: (i32, i32) = (3, 4);
 const MOVED_BY_MM: DVec2 = DVec2::new(0.2, -0.1);
 
@@ -31,7 +31,7 @@ fn views(truth: &Camera, seed: u64) -> Vec<View> {
     views
 }
 
-/// The page of an estimate whose pictures are grey, and of which models were compared.
+/// The page of an estimate with grey images and compared models.
 fn page(model: Model) -> (Estimate, String) {
     let calibration = of(&views(&camera(model), 1), model);
     let estimate = calibration.solve().unwrap();
@@ -49,18 +49,18 @@ fn page(model: Model) -> (Estimate, String) {
     (estimate, html)
 }
 
-/// What stands between two texts, of all places where it does.
+/// All texts between two others.
 fn between<'a>(text: &'a str, before: &str, after: &str) -> Vec<&'a str> {
     let parts = text.split(before).skip(1);
     parts.map(|part| part.split_once(after).map_or(part, |(inner, _)| inner)).collect()
 }
 
-/// The picture with this description.
+/// The figure with this description.
 fn picture<'a>(page: &'a str, shows: &str) -> &'a str {
     between(page, &format!("aria-label=\"{shows}\">"), "</figure>")[0]
 }
 
-/// From the numbers at an axis what a coordinate of the picture means.
+/// The scale of a figure from the numbers at an axis.
 fn axis(svg: &str, anchor: &str, place: &str) -> impl Fn(f64) -> f64 {
     let texts = between(svg, "<text x=\"", "</text>");
     let ticks: Vec<(f64, f64)> = texts
@@ -78,7 +78,7 @@ fn axis(svg: &str, anchor: &str, place: &str) -> impl Fn(f64) -> f64 {
 }
 
 #[test]
-fn the_page_stands_by_itself_with_all_its_parts_in_order() {
+fn the_page_is_self_contained_with_all_parts_in_order() {
     let (_, page) = page(Model::Radtan5);
     assert!(!page.contains("<script") && !page.contains("http"), "something from elsewhere");
     for place in between(&page, "href=\"", "\"").into_iter().chain(between(&page, "src=\"", "\"")) {
@@ -98,7 +98,7 @@ fn the_page_stands_by_itself_with_all_its_parts_in_order() {
         "Views, the worst first",
     ];
     assert_eq!(heads, expected);
-    // A verdict before all, and a caption for each figure.
+    // The verdict comes first, and every figure has a caption.
     assert!(page.find("class=\"verdict").unwrap() < page.find("<h2>").unwrap());
     assert_eq!(page.matches("<figure").count(), page.matches("<figcaption>").count());
     for model in ["radtan", "radtan5", "kannala-brandt", "rational", "thin-prism"] {
@@ -107,7 +107,7 @@ fn the_page_stands_by_itself_with_all_its_parts_in_order() {
 }
 
 #[test]
-fn the_distortion_curve_is_that_of_the_lens() {
+fn the_distortion_curve_matches_the_lens() {
     for (model, is_pinhole) in [(Model::Radtan, true), (Model::KannalaBrandt(4), false)] {
         let (estimate, page) = page(model);
         let lens = &estimate.cameras[0].camera;
@@ -129,8 +129,8 @@ fn the_distortion_curve_is_that_of_the_lens() {
             let direction = DVec3::new(angle.sin(), 0.0, angle.cos());
             let radius = lens.project(1e9 * direction).unwrap().distance(lens.centre_px);
             let ideal = lens.focal_px.x * if is_pinhole { angle.tan() } else { angle };
-            // Tangential terms and focal lengths that are not alike are in the band around the curve; a tenth of a
-            // unit of the drawing is what its numbers are rounded to.
+            // Tangential terms and unequal focal lengths are in the band around the curve; the numbers of the drawing
+            // are rounded to a tenth of a unit.
             let expected = radius - ideal;
             let most = 0.02 * (high - low).max(expected.abs()) + 1.0;
             assert!((drawn - expected).abs() < most, "{model} {angle}: {drawn} {expected}");
@@ -139,7 +139,7 @@ fn the_distortion_curve_is_that_of_the_lens() {
 }
 
 #[test]
-fn residuals_of_the_targets_corners_are_those_of_all_views() {
+fn residuals_over_the_target_are_means_over_all_views() {
     let (estimate, page) = page(Model::Radtan);
     let mut seen: BTreeMap<(i32, i32), Vec<&Corner>> = BTreeMap::new();
     for corner in estimate.corners() {
@@ -156,7 +156,7 @@ fn residuals_of_the_targets_corners_are_those_of_all_views() {
             .collect();
         let [row, col, rms, x, y, views] = numbers[..] else { panic!("{title}") };
         let all = &seen[&(row as i32, col as i32)];
-        // A corner that is an outlier in most views is none by accident.
+        // A corner that is an outlier in most views is not one by accident.
         let inliers = all.iter().filter(|corner| !corner.outlier).count();
         let counts = |corner: &&&Corner| 2 * inliers < all.len() || !corner.outlier;
         let corners: Vec<&&Corner> = all.iter().filter(counts).collect();
@@ -170,11 +170,11 @@ fn residuals_of_the_targets_corners_are_those_of_all_views() {
             assert!(DVec2::new(x, y).length() < 0.05, "{title}");
         }
     }
-    // Poses take up a little of it.
+    // Poses absorb a little of it.
     assert!(moved.distance(MOVED_BY_MM) < 0.05, "{moved}");
 }
 
-/// A file with residuals as versions up to 2026-11-24 wrote it: without what was added since.
+/// A file with residuals as written by versions up to 2026-11-24: without later additions.
 fn as_before(text: &str) -> String {
     let mut file: Value = serde_json::from_str(text).unwrap();
     let of_file = file.as_object_mut().unwrap();
@@ -186,7 +186,7 @@ fn as_before(text: &str) -> String {
 }
 
 #[test]
-fn files_without_residuals_and_files_of_before_say_the_same() {
+fn files_without_residuals_and_earlier_files_give_the_same_page() {
     let found = of(&views(&camera(Model::Radtan), 2), Model::Radtan).solve().unwrap();
     let other = of(&views(&camera(Model::Radtan), 3), Model::Radtan).solve().unwrap();
     let written = |residuals| calibration::write(&found, &[], Print::default(), residuals).unwrap();

@@ -1,4 +1,4 @@
-//! Rigs of simulated cameras: what is found is what was put in, and the stated deviations are true.
+//! Rigs of simulated cameras: the estimates match the truth within the stated standard deviations.
 
 use deltille::calibrate::{
     Calibration, CalibrationError, CameraViews, Diagnosis, Estimate, Instead, LackOfFit, Model,
@@ -12,17 +12,17 @@ use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, Normal};
 
-/// Deviation of the simulated corners, px.
+/// Standard deviation of the simulated corners, px.
 const NOISE_PX: f64 = 0.05;
 
 /// Placement errors of the panels, mm and rad.
 const PLACED_MM: f64 = 0.1;
 const PLACED_RAD: f64 = 0.1 * std::f64::consts::PI / 180.0;
 
-/// Cameras around an icosahedron, and what they saw of it.
+/// Cameras around an icosahedron, and their views of it.
 struct Simulated {
     stated: Vec<PanelPlace>,
-    /// Where the panels really are.
+    /// True poses of the panels.
     panels: Vec<Pose>,
     cameras: Vec<Camera>,
     camera_from_rig: Vec<Pose>,
@@ -72,7 +72,7 @@ fn simulated(seed: u64, frames: usize) -> Simulated {
             Camera::centred(2000, 1500, random.random_range(2500.0..3500.0), lens)
         })
         .collect();
-    // Cameras a quarter of a metre apart, turned to a point 0.9 m before the first.
+    // Cameras a quarter of a metre apart, facing a point 0.9 m in front of the first.
     let camera_from_rig: Vec<Pose> = (0..3)
         .map(|index| {
             let eye = DVec3::new(250.0 * index as f64, 30.0 * index as f64, 0.0);
@@ -149,8 +149,8 @@ impl Simulated {
     }
 }
 
-/// Errors of everything that was found, in stated deviations. The target frame is that of the panel
-/// that was kept, so that panels are compared relative to it.
+/// Errors of all estimates in stated standard deviations. The target frame is that of the fixed panel, so panels are
+/// compared relative to it.
 fn normalised_errors(truth: &Simulated, found: &Estimate) -> Vec<f64> {
     let mut errors = Vec::new();
     for (index, camera) in found.cameras.iter().enumerate() {
@@ -163,7 +163,7 @@ fn normalised_errors(truth: &Simulated, found: &Estimate) -> Vec<f64> {
         }
     }
     let held = found.panels.iter().position(|panel| panel.covariance.is_none()).unwrap();
-    // The true poses of the panels in a frame in which the held one is where it is stated to be.
+    // The true poses of the panels in a frame in which the fixed panel is at its stated pose.
     let frame = truth.stated[held].target_from_panel.after(&truth.panels[held].inverse());
     for (panel, truth) in found.panels.iter().zip(&truth.panels) {
         if let Some(covariance) = panel.covariance {
@@ -180,7 +180,7 @@ fn pose_errors(found: &Pose, truth: &Pose, sd: [f64; 6]) -> [f64; 6] {
     std::array::from_fn(|i| off[i] / sd[i])
 }
 
-/// Part of the errors within three deviations; normally distributed ones have 0.9973.
+/// Fraction of the errors within 3σ; 0.9973 for a normal distribution.
 fn honest(seeds: std::ops::Range<u64>, frames: usize) -> f64 {
     let mut errors = Vec::new();
     for seed in seeds {
@@ -193,23 +193,23 @@ fn honest(seeds: std::ops::Range<u64>, frames: usize) -> f64 {
 }
 
 #[test]
-fn a_rig_and_its_target_are_found_within_their_deviations() {
+fn errors_of_a_rig_and_its_target_match_their_sd() {
     let part = honest(0..2, 30);
     assert!(part >= 0.98, "{part}");
 }
 
-/// The figure of fifty seeds, for a release build: some minutes.
+/// The statistic over fifty seeds, for a release build: some minutes.
 #[test]
 #[ignore = "takes minutes; run with --release -- --ignored"]
-fn fifty_rigs_are_found_within_their_deviations() {
+fn errors_of_fifty_rigs_match_their_sd() {
     let part = honest(0..50, 40);
-    println!("within three deviations: {:.4}", part);
+    println!("within three standard deviations: {:.4}", part);
     assert!(part >= 0.99, "{part}");
 }
 
-/// What one calibration found of the target helps the next, which sees little of it.
+/// A calibrated target helps the next calibration, which has few views of it.
 #[test]
-fn a_refined_target_is_known_in_the_next_calibration() {
+fn a_refined_target_is_a_prior_of_the_next_calibration() {
     let truth = simulated(11, 40);
     let first = truth.solve(true);
     let few = |views: &CameraViews| {
@@ -246,7 +246,7 @@ fn placement_errors_show_unless_the_target_is_refined() {
 }
 
 #[test]
-fn a_camera_that_is_another_one_is_named() {
+fn a_wrong_given_camera_is_named() {
     let mut truth = simulated(5, 20);
     for (views, camera) in truth.views.iter_mut().zip(&truth.cameras) {
         views.intrinsics = camera.clone().into();
@@ -256,7 +256,7 @@ fn a_camera_that_is_another_one_is_named() {
         calibration.explain(&calibration.solve().unwrap())
     };
     assert_eq!(said(&truth), []);
-    // Refocused since: all fits worse.
+    // Refocused since: everything fits worse.
     let mut refocused = truth.cameras[1].clone();
     refocused.focal_px *= 1.01;
     truth.views[1].intrinsics = refocused.into();
@@ -266,7 +266,7 @@ fn a_camera_that_is_another_one_is_named() {
         (*camera, remedy.instead) == (1, Instead::Camera)
     };
     assert!(!said.is_empty() && said.iter().all(is_named), "{said:?}");
-    // Another one: nothing fits.
+    // A different camera: nothing fits.
     truth.views[1].intrinsics = truth.cameras[2].clone().into();
     let error = calibration(&truth.views, &truth.really(), false).solve().unwrap_err();
     assert!(
@@ -282,9 +282,9 @@ impl Simulated {
 }
 
 #[test]
-fn pictures_of_another_moment_are_left_out_and_cameras_without_common_frames_refused() {
+fn images_of_another_time_are_excluded_and_cameras_without_common_frames_refused() {
     let mut truth = simulated(3, 30);
-    // One picture of camera 1 carries the name of another moment.
+    // One image of camera 1 has the name of another frame.
     let views = &mut truth.views[1].views;
     let (a, b) = (views[3].name.clone(), views[7].name.clone());
     (views[3].name, views[7].name) = (b.clone(), a.clone());

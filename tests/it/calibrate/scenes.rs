@@ -1,5 +1,5 @@
-//! Rigs in which something is not as it should be, and scenes of several targets: simulated with exact truth, what is
-//! found is what was put in, or the culprit is named.
+//! Rigs with faults, and scenes of several targets, simulated with exact truth: the estimates match the truth, or the
+//! fault is named.
 
 use std::fs;
 
@@ -19,19 +19,19 @@ use rand_distr::{Distribution, Normal};
 
 use crate::common::command::deltille;
 
-/// Deviation of the simulated corners, px.
+/// Standard deviation of the simulated corners, px.
 const NOISE_PX: f64 = 0.07;
 
 const SIZE_PX: [u32; 2] = [1600, 1200];
 
-/// What is photographed, by what, and what was seen.
+/// The targets, the cameras, and the views.
 #[derive(Clone)]
 struct Scene {
     targets: Vec<Target>,
     scene_from_target: Vec<Pose>,
     cameras: Vec<Camera>,
     camera_from_rig: Vec<Pose>,
-    /// Of the scene on the rig, in each moment.
+    /// Poses of the scene on the rig, by frame.
     places: Vec<Pose>,
     /// By camera.
     views: Vec<Vec<View>>,
@@ -55,13 +55,13 @@ fn camera(random: &mut ChaCha8Rng) -> Camera {
     Camera::centred(width, height, random.random_range(1200.0..1500.0), lens)
 }
 
-/// The middle of a target's corners.
+/// The centroid of a target's corners.
 fn middle(target: &Target) -> DVec3 {
     let corners = || target.panels.iter().flat_map(|panel| &panel.corners);
     corners().map(|corner| corner.target_mm).sum::<DVec3>() / corners().count() as f64
 }
 
-/// What a camera sees of the targets of a scene.
+/// The view of the targets of a scene by a camera.
 fn seen(
     scene: &Scene,
     camera: usize,
@@ -99,7 +99,7 @@ fn seen(
 }
 
 impl Scene {
-    /// The views of all cameras with the rig at these places, of each those that it shows.
+    /// The views of all cameras, with the rig at these poses.
     fn photographed(
         mut self,
         places: &[Pose],
@@ -135,7 +135,7 @@ impl Scene {
         self.calibration().solve()
     }
 
-    /// Errors of everything that was found, in stated deviations.
+    /// Errors of all estimates, in stated standard deviations.
     fn errors(&self, found: &Estimate) -> Vec<f64> {
         let mut errors = Vec::new();
         let index = |name: &str| name[1..].parse::<usize>().unwrap();
@@ -163,19 +163,20 @@ fn off(found: &Pose, truth: &Pose, sd: Option<[f64; 6]>) -> Vec<f64> {
     sd.map_or(Vec::new(), |sd| off.zip(sd).map(|(off, sd)| off / sd).collect())
 }
 
-/// Whether errors are as their deviations have it: normally distributed ones are beyond three of them in 0.3 %.
+/// Whether errors match their standard deviations: 0.3 % of a normal distribution are beyond 3σ.
 fn is_within(errors: &[f64]) -> bool {
     let beyond = errors.iter().filter(|error| error.abs() > 3.0).count();
     let worst = errors.iter().fold(0.0, |worst: f64, error| worst.max(error.abs()));
     beyond as f64 <= 0.02 * errors.len() as f64 && worst < 4.5
 }
 
-/// Two cameras back to back, each before a board of its own; the rig turns by so much about its axes.
+/// Two cameras back to back, each with a board of its own in front; the rig rotates about its axes by up to
+/// `reach_rad`.
 fn back_to_back(frames: usize, reach_rad: DVec3, seed: u64) -> Scene {
     back_to_back_late(frames, reach_rad, 0, seed)
 }
 
-/// The same with pictures of the second that show what the first saw so many frames before.
+/// The same with images of the second camera that lag by `late` frames.
 fn back_to_back_late(frames: usize, reach_rad: DVec3, late: usize, seed: u64) -> Scene {
     let mut random = ChaCha8Rng::seed_from_u64(seed);
     let behind = Pose {
@@ -183,7 +184,7 @@ fn back_to_back_late(frames: usize, reach_rad: DVec3, late: usize, seed: u64) ->
         translation: any(&mut random, 80.0),
     };
     let targets = vec![board("front", 0), board("back", 100)];
-    // The boards as the rig has them where it is not turned.
+    // The boards as seen by the unrotated rig.
     let facing = |target: &Target, random: &mut ChaCha8Rng| {
         let rotation = DQuat::from_scaled_axis(any(random, 0.3))
             * DQuat::from_rotation_x(std::f64::consts::PI);
@@ -213,7 +214,7 @@ fn back_to_back_late(frames: usize, reach_rad: DVec3, late: usize, seed: u64) ->
 const ALL_WAYS: DVec3 = DVec3::splat(0.4);
 
 #[test]
-fn cameras_back_to_back_are_found_by_boards_of_their_own() {
+fn cameras_back_to_back_are_calibrated_with_boards_of_their_own() {
     for seed in 0..3 {
         let scene = back_to_back(30, ALL_WAYS, seed);
         let found = scene.solve().unwrap();
@@ -224,12 +225,12 @@ fn cameras_back_to_back_are_found_by_boards_of_their_own() {
 }
 
 #[test]
-fn motion_that_leaves_cameras_open_is_named() {
+fn insufficient_motion_is_named() {
     for (reach, expected) in
         [(DVec3::new(0.0, 0.4, 0.0), TooPlain::OneAxis), (DVec3::ZERO, TooPlain::NoTurn)]
     {
         let mut scene = back_to_back(30, reach, 3);
-        // Cameras by themselves need boards that are tilted.
+        // Single cameras need tilted boards.
         let calibration = scene.views.iter().zip(&scene.cameras).enumerate().fold(
             Calibration::of_targets(scene.targets.iter().map(|t| {
                 (t.name.to_string(), t.panels.iter().map(|p| (&p.pose).into()).collect())
@@ -254,12 +255,12 @@ fn icosahedron() -> Target {
     Target::build("ico", &spec, Some(&family)).unwrap()
 }
 
-/// Cameras around an icosahedron that is carried about and turned between frames, little enough to be a motion.
+/// Cameras around an icosahedron that moves and rotates little between frames, as in a continuous motion.
 fn around(cameras: usize, frames: usize, seed: u64) -> Scene {
     around_late(cameras, frames, &vec![0; cameras], seed)
 }
 
-/// The same with cameras whose pictures show what the others saw so many frames before.
+/// The same with cameras whose images lag by these frames.
 fn around_late(cameras: usize, frames: usize, late: &[i32], seed: u64) -> Scene {
     let mut random = ChaCha8Rng::seed_from_u64(seed);
     let target = icosahedron();
@@ -300,7 +301,7 @@ fn around_late(cameras: usize, frames: usize, late: &[i32], seed: u64) -> Scene 
     scene.photographed(&places, &shown.collect::<Vec<_>>(), &mut random)
 }
 
-/// Faces carry the ids of others, this part of them.
+/// This fraction of the faces has the ids of others.
 fn with_wrong_faces(mut scene: Scene, part: f64, seed: u64) -> Scene {
     let mut random = ChaCha8Rng::seed_from_u64(seed + 1000);
     let panels = &scene.targets[0].panels;
@@ -315,9 +316,9 @@ fn with_wrong_faces(mut scene: Scene, part: f64, seed: u64) -> Scene {
     scene
 }
 
-/// Solves scenes of many seeds: errors are as their deviations have it. Those of one scene hang together: where the
-/// first camera is off all others are, so they are judged over all seeds.
-fn check(seeds: std::ops::Range<u64>, scene: impl Fn(u64) -> Scene, told: impl Fn(&Estimate)) {
+/// Solves scenes of many seeds and compares the errors with their standard deviations. Errors within a scene are
+/// correlated: an error of the first camera shifts all others, so the test is over all seeds.
+fn check(seeds: std::ops::Range<u64>, scene: impl Fn(u64) -> Scene, also: impl Fn(&Estimate)) {
     let mut all = Vec::new();
     for seed in seeds {
         let scene = scene(seed);
@@ -325,11 +326,11 @@ fn check(seeds: std::ops::Range<u64>, scene: impl Fn(u64) -> Scene, told: impl F
         let errors = scene.errors(&found);
         let worst = errors.iter().fold(0.0, |worst: f64, error| worst.max(error.abs()));
         assert!(worst < 4.5, "seed {seed}: {errors:.1?}");
-        told(&found);
+        also(&found);
         all.extend(errors);
     }
     let variance = all.iter().map(|error| error * error).sum::<f64>() / all.len() as f64;
-    // Errors of one scene hang together, so that their squares scatter more than χ² does.
+    // Errors within a scene are correlated, so their squares scatter more than χ² does.
     let scatter = 2.0 * (2.0 / all.len() as f64).sqrt();
     assert!((variance - 1.0).abs() < 3.0 * scatter, "{variance} of {} errors", all.len());
     let beyond = all.iter().filter(|error| error.abs() > 3.0).count() as f64 / all.len() as f64;
@@ -347,16 +348,16 @@ fn one_is_late(found: &Estimate) {
 }
 
 #[test]
-fn a_camera_that_is_a_frame_late_is_named_and_put_in_time() {
+fn a_camera_that_lags_is_named_and_corrected() {
     check(0..2, |seed| around_late(8, 30, &LATE, seed), one_is_late);
-    // The first is late, one is ahead.
+    // The first lags, one leads.
     let delays = [3, 0, 0, -2];
     let found = around_late(4, 30, &delays, 5).solve().unwrap();
     assert_eq!(found.cameras.iter().map(|camera| camera.delay).collect::<Vec<_>>(), delays);
 }
 
 #[test]
-fn frames_held_out_are_put_in_time_too() {
+fn held_out_frames_are_corrected_for_lag_too() {
     let scene = around_late(4, 30, &[0, 0, 1, 0], 1);
     let found = scene.calibration().hold_out(Some(5)).solve().unwrap();
     let test = found.held_out.unwrap();
@@ -365,13 +366,13 @@ fn frames_held_out_are_put_in_time_too() {
 }
 
 #[test]
-fn a_late_camera_that_sees_a_target_of_its_own_is_put_in_time() {
+fn a_lagging_camera_with_its_own_target_is_corrected() {
     let found = back_to_back_late(40, ALL_WAYS, 2, 1).solve().unwrap();
     assert_eq!((found.cameras[0].delay, found.cameras[1].delay), (0, 2));
 }
 
 #[test]
-fn faces_with_ids_of_others_are_left_out() {
+fn faces_with_wrong_ids_are_excluded() {
     for part in [0.02, 0.1] {
         check(
             0..2,
@@ -408,13 +409,13 @@ fn scenes_of_twenty_seeds() {
     );
 }
 
-/// Photographs by the two cameras, and what the programs make of them.
+/// Images of the two cameras, through the programs.
 #[test]
-fn programs_find_cameras_back_to_back() {
+fn programs_calibrate_cameras_back_to_back() {
     let folder = tempfile::tempdir().unwrap();
     let folder = folder.path();
     let scene = back_to_back(14, ALL_WAYS, 11);
-    // Each sees the target of its own.
+    // Each camera sees its own target.
     for (index, (target, camera)) in scene.targets.iter().zip(&scene.cameras).enumerate() {
         fs::write(folder.join(format!("{}.json", target.name)), target.to_json()).unwrap();
         fs::write(folder.join(format!("c{index}.yaml")), camera.to_yaml()).unwrap();
@@ -437,9 +438,9 @@ fn programs_find_cameras_back_to_back() {
         deltille(folder, &format!("detect {camera}/*.png {targets} -o seen/{camera}")).success();
     }
     let cameras = "--camera c0=seen/c0 --camera c1=seen/c1";
-    let told = deltille(folder, &format!("rig {cameras} {targets} -o found")).success();
-    let told = String::from_utf8(told.get_output().stdout.clone()).unwrap();
-    assert!(told.contains("target back: at ("), "{told}");
+    let result = deltille(folder, &format!("rig {cameras} {targets} -o found")).success();
+    let stdout = String::from_utf8(result.get_output().stdout.clone()).unwrap();
+    assert!(stdout.contains("target back: at ("), "{stdout}");
     let rig = fs::read_to_string(folder.join("found/rig.json")).unwrap();
     let found = saved::read(&rig, &Reference::Scene(&scene.targets)).unwrap();
     let errors = scene.errors(&found);

@@ -1,4 +1,4 @@
-//! Lenses that no parametric model holds, found as splines.
+//! Lenses that no parametric model fits, calibrated as splines.
 
 use deltille::calibrate::{
     Calibration, CameraEstimate, Comparison, Estimate, Model, PanelRef, Region, Source, View,
@@ -12,7 +12,7 @@ use super::models::{camera, of, simulated, solved};
 /// Standard deviation of the simulated corners, px.
 const NOISE_PX: f64 = 0.05;
 
-/// A fisheye with waves of a pixel that are not radial, as a spline of a grid that no calibration has.
+/// A fisheye with non-radial waves of a pixel, as a spline on a grid that no calibration uses.
 fn wavy(seed: u64) -> Camera {
     let grid = SplineGrid::new(3, [27, 21], 250).unwrap();
     let phase = seed as f64;
@@ -35,11 +35,11 @@ fn wavy(seed: u64) -> Camera {
     camera
 }
 
-/// How far a camera is from the truth, over what its uncertainties expect, px.
+/// The error of a camera, and the error expected from its uncertainties, px.
 fn off(found: &CameraEstimate, truth: &Camera) -> [f64; 2] {
     let mut truth = CameraEstimate::given("", truth.clone());
     truth.views = found.views.clone();
-    // As good as exact.
+    // Practically exact.
     truth.parameters[0].sd = Some(1e-9);
     truth.covariance = deltille::calibrate::Matrix::from_fn(1, 1, |_, _| 1e-18);
     let compared = Comparison::of(found, &truth, None, Region::Seen).unwrap();
@@ -47,7 +47,7 @@ fn off(found: &CameraEstimate, truth: &Camera) -> [f64; 2] {
 }
 
 #[test]
-fn a_lens_that_no_parameters_hold_is_found_as_well_as_it_says() {
+fn a_spline_fits_an_arbitrary_lens_within_its_uncertainty() {
     let (mut found_px, mut expected_px): (f64, f64) = (0.0, 0.0);
     for seed in 0..2 {
         let truth = wavy(seed);
@@ -70,9 +70,9 @@ fn a_lens_that_no_parameters_hold_is_found_as_well_as_it_says() {
     assert!((0.6..1.5).contains(&ratio), "{ratio}");
 }
 
-/// Where a polynomial holds the lens there is nothing to be bent, and a spline is known hardly less well.
+/// For a polynomial lens the spline has nothing to correct, and its uncertainty is hardly larger.
 #[test]
-fn a_spline_is_no_freer_than_the_lens_asks_for() {
+fn a_spline_is_no_freer_than_the_lens_requires() {
     let truth = camera(Model::KannalaBrandt(4));
     let (views, _) = simulated(&truth, 60, 0.8, 3);
     let sd = |model: Model| {
@@ -84,18 +84,18 @@ fn a_spline_is_no_freer_than_the_lens_asks_for() {
 }
 
 #[test]
-fn a_spline_is_chosen_where_it_holds_what_others_do_not() {
+fn a_spline_is_selected_if_no_other_model_fits() {
     let (views, _) = simulated(&wavy(5), 90, 0.7, 5);
     let (model, tried) = of(&views, Model::Radtan).choose_model(0).unwrap();
     assert_eq!(model, Model::SPLINE, "{tried:?}");
-    // Of few corners it is not even tried.
+    // With few corners it is not even tried.
     let (_, tried) = of(&views[..20], Model::Radtan).choose_model(0).unwrap();
     assert!(tried.iter().all(|candidate| candidate.model != Model::SPLINE));
 }
 
-/// A target that is measured along, and a bent board.
+/// With a measured target, and with a bent board.
 #[test]
-fn whatever_else_is_found_a_spline_may_be_found_too() {
+fn a_spline_combines_with_all_other_unknowns() {
     let truth = wavy(2);
     let (views, _) = simulated(&truth, 36, 0.8, 2);
     is_noise(&of(&views, Model::SPLINE).board_shape(true).solve().unwrap());
@@ -128,8 +128,8 @@ fn large_splines_and_rigs_of_splines() {
     }
 }
 
-/// Whether no more than noise is left: a spline that is expected to be smooth leaves a part of the waves, here up to a
-/// tenth of the noise.
+/// Whether only noise remains. The smoothness prior of a spline leaves a part of the waves, here up to a tenth of the
+/// noise.
 #[track_caller]
 fn is_noise(found: &Estimate) {
     let rms = found.inlier_rms_px() / NOISE_PX;
@@ -141,7 +141,7 @@ fn is_noise(found: &Estimate) {
     );
 }
 
-/// The board as a camera sees it from another place.
+/// Views of the board by a camera at another pose.
 fn seen(camera: &Camera, poses: &[Pose], beside: &Pose) -> Vec<View> {
     use rand::SeedableRng;
     use rand_distr::Distribution;

@@ -1,4 +1,4 @@
-//! Targets that measure themselves: offsets of corners are found within their deviations, none where there is
+//! Self-measured targets: offsets of corners match the truth within their standard deviations, perfect boards have
 //! none, and a measured target serves other calibrations.
 
 use deltille::calibrate::{
@@ -21,14 +21,14 @@ const SIDE: i32 = 9;
 const BOARD: UntaggedGrid =
     UntaggedGrid { kind: GridKind::Checker, edge_mm: 20.0, size: Some([SIDE as u32, SIDE as u32]) };
 
-/// A print and a mount of their own: corners off at random, and a sheet that is bent.
+/// A print and its mount: random errors of corners, and a bent sheet.
 struct Sheet {
     random_mm: f64,
     bent_mm: f64,
 }
 
 impl Sheet {
-    /// Offsets of the corners of panel after panel.
+    /// Offsets of the corners, panel by panel.
     fn offsets(&self, panels: usize, seed: u64) -> Vec<Vec<DVec3>> {
         let mut random = ChaCha8Rng::seed_from_u64(seed);
         let normal = Normal::new(0.0, self.random_mm).unwrap();
@@ -50,7 +50,7 @@ fn camera() -> Camera {
     Camera::pinhole(1600, 1200, 1.0)
 }
 
-/// Views of panels whose corners are off.
+/// Views of panels with displaced corners.
 fn views(
     panels: &[Pose],
     offsets: &[Vec<DVec3>],
@@ -93,7 +93,7 @@ fn of(views: Vec<View>) -> Calibration {
     Calibration::new([Pose::IDENTITY]).camera("", views, Model::Radtan)
 }
 
-/// The truth less what poses and distances take up, of each panel by itself or of all together.
+/// The truth without what poses and distances absorb, for each panel separately or for all together.
 fn without_gauge(truth: &[DVec3], map: &TargetMap, panels: &[Pose], by_panel: bool) -> Vec<DVec3> {
     let corners = map.corners();
     let [plane, out] = map.expected_mm;
@@ -126,7 +126,7 @@ fn without_gauge(truth: &[DVec3], map: &TargetMap, panels: &[Pose], by_panel: bo
     left.as_slice().chunks(3).map(|v| DVec3::new(v[0], v[1], v[2]) * DVec3::from(prior)).collect()
 }
 
-/// How many corners of a map lie within 3σ of the truth, a coordinate, and the mean squared deviation.
+/// Number of corners of a map within 3σ of the truth per axis, and the mean squared normalised error.
 fn compared(map: &TargetMap, truth: &[DVec3]) -> (usize, f64) {
     let (mut within, mut squares) = (0, 0.0);
     for (corner, truth) in map.corners().iter().zip(truth) {
@@ -147,9 +147,9 @@ fn check(found: &Estimate, truth: &[Vec<DVec3>], panels: &[Pose], by_panel: bool
     [within, map.corners().len()]
 }
 
-/// Of all corners of ten boards 99 in a hundred are within 3σ in all three coordinates, as they should be.
+/// 99 % of all corners of ten boards are within 3σ on all three axes, as expected.
 #[test]
-fn offsets_are_within_their_deviations() {
+fn offsets_match_their_sd() {
     let mut counts = [0; 2];
     for seed in 0..10 {
         let offsets = Sheet { random_mm: 0.08, bent_mm: 0.1 }.offsets(1, seed);
@@ -168,9 +168,9 @@ fn offsets_are_within_their_deviations() {
     assert!(counts[0] as f64 >= 0.985 * counts[1] as f64, "{counts:?}");
 }
 
-/// Four views leave a bent sheet's shape open: what is drawn to the plan is in the deviations.
+/// Four views do not determine the shape of a bent sheet: the attraction to the plan is included in the uncertainty.
 #[test]
-fn deviations_of_four_views_hold() {
+fn uncertainties_of_four_views_are_right() {
     let (mut of_camera, mut of_corners) = (0.0, 0.0);
     for seed in 0..8 {
         let offsets = Sheet { random_mm: 0.03, bent_mm: 0.1 }.offsets(1, 50 + seed);
@@ -187,7 +187,7 @@ fn deviations_of_four_views_hold() {
     assert!(of_corners.sqrt() < 1.5, "{}", of_corners.sqrt());
 }
 
-/// A corner that most views have elsewhere, each in another place, is not measured.
+/// A corner at a different position in most views is not measured.
 #[test]
 fn a_corner_that_rests_on_outliers_is_not_measured() {
     let offsets = Sheet { random_mm: 0.05, bent_mm: 0.0 }.offsets(1, 3);
@@ -202,7 +202,7 @@ fn a_corner_that_rests_on_outliers_is_not_measured() {
     assert_eq!(map.offset_mm(PanelRef::ONLY, 40 / SIDE, 40 % SIDE), DVec3::ZERO);
 }
 
-/// How many of so many boards as planned show an offset.
+/// Number of perfect boards that show a significant offset.
 fn alarms(boards: u64) -> usize {
     let is_alarm = |seed: &u64| {
         let offsets = Sheet { random_mm: 0.0, bent_mm: 0.0 }.offsets(1, *seed);
@@ -214,17 +214,17 @@ fn alarms(boards: u64) -> usize {
 }
 
 #[test]
-fn a_perfect_board_has_no_offsets() {
+fn a_perfect_board_has_no_significant_offsets() {
     assert_eq!(alarms(12), 0);
 }
 
 #[test]
 #[ignore = "200 boards"]
-fn one_of_a_hundred_perfect_boards_has_offsets() {
+fn one_in_a_hundred_perfect_boards_has_significant_offsets() {
     assert!(alarms(200) <= 2);
 }
 
-/// Two panels of a target whose places are found too, seen by two cameras.
+/// Two panels of a target with unknown poses, seen by two cameras.
 #[test]
 fn a_rig_measures_several_panels() {
     let up = |x: f64, angle: f64| Pose {
@@ -248,7 +248,7 @@ fn a_rig_measures_several_panels() {
     assert!(within as f64 >= 0.97 * all as f64, "{within} of {all}");
 }
 
-/// What was measured with some views makes the residuals of others noise, and is read back from both files.
+/// A map measured with some views reduces the residuals of others to noise, and both files restore it.
 #[test]
 fn a_measured_target_serves_other_views() {
     let offsets = Sheet { random_mm: 0.08, bent_mm: 0.1 }.offsets(1, 7);
@@ -281,7 +281,7 @@ fn a_measured_target_serves_other_views() {
     assert!(of(some(2)).solve().unwrap().rms_px > 3.0 * NOISE_PX);
 }
 
-/// A corner that is somewhere else in every view has no place; all others do.
+/// A corner at a different position in every view is not measured; all others are.
 #[test]
 fn a_corner_that_is_wrong_everywhere_is_not_measured() {
     let offsets = Sheet { random_mm: 0.08, bent_mm: 0.1 }.offsets(1, 8);

@@ -1,5 +1,5 @@
-//! Deviations of projections are as large as calibrations of one camera differ, and cameras that differ by more are
-//! told from those that do not.
+//! Projection uncertainties match the differences between calibrations of one camera, and larger differences are
+//! recognised as significant.
 
 use deltille::calibrate::{CameraEstimate, Comparison, Estimate, Model, Region, Source, View};
 use deltille::camera::{Camera, Pose};
@@ -21,7 +21,7 @@ fn compared(first: &CameraEstimate, second: &CameraEstimate) -> Comparison {
     Comparison::of(first, second, None, Region::Seen).unwrap()
 }
 
-/// The root mean square of found over expected differences of pairs of calibrations, and how many are significant.
+/// The RMS of observed over expected differences of pairs of calibrations, and the number of significant ones.
 fn pairs(
     model: Model,
     seeds: std::ops::Range<u64>,
@@ -36,7 +36,7 @@ fn pairs(
         found += both.rms_px.powi(2);
         expected += both.expected_px.unwrap().powi(2);
         significant += usize::from(both.is_significant().unwrap());
-        // The two numbers and the probability do not contradict each other.
+        // The two numbers and the p-value are consistent.
         assert!(both.rms_px > both.expected_px.unwrap() || both.chance.unwrap() > 0.2);
     }
     ((found / expected).sqrt(), significant)
@@ -49,8 +49,8 @@ fn calibrations_of_one_camera_differ_as_expected() {
     assert_eq!(significant, 0);
 }
 
-/// Twenty pairs of calibrations of five models. Of a double sphere less is found than expected: along its valley a
-/// change of parameters moves projections by less than the derivatives say.
+/// Twenty pairs of calibrations of five models. For a double sphere the differences are smaller than expected: along
+/// its valley, a change of parameters moves projections by less than the derivatives predict.
 #[test]
 #[ignore = "200 calibrations"]
 fn calibrations_of_one_camera_differ_as_expected_over_twenty_seeds() {
@@ -58,14 +58,14 @@ fn calibrations_of_one_camera_differ_as_expected_over_twenty_seeds() {
         [Model::Radtan, Model::Radtan5, Model::KannalaBrandt(4), Model::Eucm, Model::DoubleSphere]
     {
         let (ratio, significant) = pairs(model, 0..20, |camera| camera);
-        println!("{model}: found over expected {ratio:.2}, {significant} of 20 significant");
+        println!("{model}: observed over expected {ratio:.2}, {significant} of 20 significant");
         assert!((0.75..1.25).contains(&ratio), "{model}: {ratio}");
         assert_eq!(significant, 0, "{model}");
     }
 }
 
 #[test]
-fn a_camera_that_has_changed_is_told() {
+fn a_changed_camera_is_recognised() {
     // Half a pixel at the border of the image, ten times the noise of a corner.
     let longer =
         |camera: Camera| Camera { focal_px: camera.focal_px * (1.0 + 0.5 / 800.0), ..camera };
@@ -73,9 +73,9 @@ fn a_camera_that_has_changed_is_told() {
     assert_eq!(significant, 4);
 }
 
-/// A principal point that is elsewhere is a camera that is turned, but for what the lens makes of it.
+/// A shifted principal point is equivalent to a rotated camera, except for the effect of the lens.
 #[test]
-fn a_turn_explains_what_a_turn_can() {
+fn a_rotation_compensates_a_shifted_principal_point() {
     let first = CameraEstimate::given("", Camera::pinhole(1600, 1200, 0.2));
     let focal = first.camera.focal_px.x;
     let second =
@@ -86,7 +86,7 @@ fn a_turn_explains_what_a_turn_can() {
     let [turn, _] = found.second_from_first.off(&Pose::IDENTITY);
     assert!((turn.length() - 0.5 / focal).abs() < 1e-2 * 0.5 / focal);
     assert!(found.chance.is_none() && found.expected_px.is_none());
-    // At a distance a move explains it as well.
+    // At a distance, a translation explains it too.
     let near = Comparison::of(&first, &second, Some(500.0), Region::Image).unwrap();
     assert!(near.rms_px <= found.rms_px * (1.0 + 1e-6));
     let part = Region::Within(DVec2::new(100.0, 100.0), DVec2::new(700.0, 500.0));
@@ -95,10 +95,10 @@ fn a_turn_explains_what_a_turn_can() {
     assert!(part.rms_px < found.rms_px);
 }
 
-/// Boards that are not flat pull at a calibration in every view another way: what is observed is many times what
-/// follows from noise, and what calibrations differ by.
+/// Boards that are not flat bias every view differently: the observed uncertainty is many times that from noise, and
+/// matches the differences between calibrations.
 #[test]
-fn what_noise_does_not_explain_is_observed() {
+fn the_observed_uncertainty_includes_model_errors() {
     let bend = |mut views: Vec<View>| {
         for observation in
             views.iter_mut().flat_map(|view| &mut view.sightings).flat_map(|s| &mut s.observations)
@@ -128,10 +128,10 @@ fn what_noise_does_not_explain_is_observed() {
     assert!(from_noise / 12.0 < 0.6, "{from_noise}");
 }
 
-/// A board that is stretched, sheared and bent alike in every view moves the camera, and no scatter between views
-/// shows that.
+/// A board that is stretched, sheared and bent in the same way in every view biases the camera, and the scatter between
+/// views does not show it.
 #[test]
-fn errors_of_the_board_are_in_the_observed_deviations() {
+fn the_observed_uncertainty_includes_errors_of_the_board() {
     use rand::{Rng, SeedableRng};
     let truth = camera(Model::Radtan);
     let (mut with, mut without) = (0.0, 0.0);
@@ -159,10 +159,10 @@ fn errors_of_the_board_are_in_the_observed_deviations() {
     assert!(without > 2.0 * with, "{with} {without}");
 }
 
-/// Of many calibrations from the same places, each moved so that it explains the corners best where they really were,
-/// projections scatter as the covariance says.
+/// Many calibrations from the same poses, each aligned by the motion that explains the true corners best: their
+/// projections scatter as the covariance predicts.
 #[test]
-fn projections_scatter_as_their_covariance_says() {
+fn projections_scatter_as_their_covariance_predicts() {
     let truth = camera(Model::Radtan);
     let (views, poses) = simulated(&truth, VIEWS, TILT_RAD, 5);
     let points: Vec<DVec3> = views
@@ -200,7 +200,7 @@ fn projections_scatter_as_their_covariance_says() {
     }
 }
 
-/// The same views with other noise.
+/// The same views with different noise.
 fn noisy(views: &[View], camera: &Camera, poses: &[Pose], draw: u32) -> Vec<View> {
     use rand::SeedableRng;
     use rand_distr::Distribution;
@@ -216,7 +216,7 @@ fn noisy(views: &[View], camera: &Camera, poses: &[Pose], draw: u32) -> Vec<View
     views
 }
 
-/// The motion of points after which a camera sees them nearest to where another one does, by differences.
+/// The motion of points after which a camera projects them nearest to another camera, by finite differences.
 fn explaining(camera: &Camera, truth: &Camera, points: &[DVec3]) -> Pose {
     let at = |x: &DVector<f64>| {
         let turn = DQuat::from_scaled_axis(DVec3::new(x[0], x[1], x[2]));
@@ -244,7 +244,7 @@ fn explaining(camera: &Camera, truth: &Camera, points: &[DVec3]) -> Pose {
 }
 
 #[test]
-fn what_is_known_of_projections_is_read_back() {
+fn projection_uncertainties_are_read_back() {
     let found = of(&simulated(&camera(Model::Pupil), VIEWS, TILT_RAD, 3).0, Model::Pupil)
         .distances_mm(vec![250.0, 4000.0])
         .solve()

@@ -2,7 +2,7 @@
 //! crop changed.
 //!
 //! At the minimum the gradients of all views with respect to the camera sum to zero. With S = Σ Sᵥ
-//! the reduced normal equations (Schur complement), the gradient s of a view has by chance the
+//! the reduced normal equations (Schur complement), the gradient s of a consistent view has the
 //! covariance Sᵥ − Sᵥ S⁻¹ Sᵥ, so that the statistic
 //!
 //! ```text

@@ -363,8 +363,7 @@ fn walked_without(mut problem: Problem, wrong: &BTreeSet<PanelRef>) -> Option<Wa
     Some(Walked { problem, ..walked })
 }
 
-/// Whether residuals show no lack of fit: they depend neither on the position in the image nor on
-/// that on the target.
+/// Whether residuals show no lack of fit: they are independent of the position in the image and on the target.
 fn has_no_pattern(settled: &Settled) -> bool {
     lack_of_fit(&settled.minimum.problem, &settled.whitening).is_empty()
 }

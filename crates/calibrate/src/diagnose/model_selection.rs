@@ -178,15 +178,14 @@ impl Calibration {
 
     /// The same for a calibration of one camera.
     ///
-    /// With q parameters less the sum of squares grows by F q variances of a residual; by chance F
-    /// is about 1.
+    /// Without q parameters, the sum of squares grows by F q variances of a residual; with noise alone, F is about 1.
     pub(super) fn sufficient(&self, found: &Estimate) -> Option<Model> {
         let (trial, of_trial) = self.trial(found)?;
         let mut sufficient = None;
         let mut next = self.cameras[0].intrinsics.model()?.smaller();
         while let Some(model) = next {
             let smaller = trial.of_intrinsics(model).adjusted();
-            if !smaller.is_ok_and(|smaller| holds_as_well(&smaller, &of_trial)) {
+            if !smaller.is_ok_and(|smaller| fits_as_well(&smaller, &of_trial)) {
                 break;
             }
             sufficient = Some(model);
@@ -255,7 +254,7 @@ fn panel_count(estimate: &Estimate) -> f64 {
     estimate.corners().map(|corner| corner.panel.index()).collect::<BTreeSet<usize>>().len() as f64
 }
 
-fn holds_as_well(smaller: &Estimate, found: &Estimate) -> bool {
+fn fits_as_well(smaller: &Estimate, found: &Estimate) -> bool {
     let names = |estimate: &Estimate| -> Vec<String> {
         estimate.frames.iter().map(|frame| frame.name.clone()).collect()
     };

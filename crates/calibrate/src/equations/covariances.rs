@@ -13,7 +13,7 @@ use super::normal::{Normal, PARTS_AT_A_TIME, Part, Reduced};
 /// each corner's offset.
 pub(crate) struct Covariances {
     pub shared: DMatrix<f64>,
-    /// Of all kept unknowns.
+    /// The covariance of all kept unknowns.
     pub kept: DMatrix<f64>,
     /// A square root of the covariance of the shared unknowns.
     pub root: Root,

@@ -82,13 +82,13 @@ pub struct CameraViews {
     pub name: String,
     /// Its views; views of the same name in different cameras were taken at the same time.
     pub views: Vec<View>,
-    /// What is known of its intrinsics.
+    /// Prior knowledge of its intrinsics.
     pub intrinsics: Intrinsics,
     /// Its pose on the rig, if it is known. Without a given pose, the frame of the first camera is the rig frame.
     pub camera_from_rig: Option<Pose>,
 }
 
-/// What is known of the intrinsics of a camera.
+/// Prior knowledge of the intrinsics of a camera.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Intrinsics {
     /// Only the model is known; its parameters are estimated.

@@ -5,7 +5,7 @@
 //!
 //! 1. `reference` describes one target, several targets, or an untagged board (`grid`), and checks labels against it.
 //! 2. `views` converts all detections and checks them for image sizes, duplicates, wrong labels and mirrored images.
-//! 3. `observation` holds the content of an image: corners of panels (`panel`).
+//! 3. `observation` is the content of an image: corners of panels (`panel`).
 //! 4. `calibration` collects cameras with their views and the settings, among them `loss` and `weights`.
 //!
 //! `order` sorts the names of frames by their numbers, `sample` selects some of many items.

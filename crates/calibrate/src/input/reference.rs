@@ -138,8 +138,8 @@ impl Reference<'_> {
     }
 
     /// Whether the labels of a view identify the corners of the board, except for a [symmetry](Self::label_symmetries).
-    /// This always holds for targets. For an untagged board it holds if rows and columns are given and the view reaches
-    /// from the first to the last of them.
+    /// This is always true for targets. For an untagged board it is true if rows and columns are given and the view
+    /// reaches from the first to the last of them.
     pub fn labels_are_of_board(&self, view: &View) -> bool {
         let Self::Grid(grid) = self else { return true };
         view.sightings.iter().all(|sighting| {

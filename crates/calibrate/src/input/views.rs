@@ -17,7 +17,7 @@ use deltille_core::targets::TargetIdentity;
 const MIRRORED_MOST: f64 = 0.5;
 
 /// Least excess in standard deviations. Misplaced corners have either orientation, and all of a few may be reversed by
-/// chance. By chance, one in a thousand images of misplaced corners only reaches this value.
+/// chance. One in a thousand images of misplaced corners only reaches this value by chance.
 const MIRRORED_SURE: f64 = 3.09;
 
 /// The views of detections.

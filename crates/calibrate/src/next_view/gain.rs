@@ -2,7 +2,7 @@
 //! uncertainty with it.
 //!
 //! ```text
-//!     view:  Σ Jᵀ J / σ²  of (θ, ξ)  =  ⎡ S  Bᵀ ⎤       tells of θ:  S − Bᵀ A⁻¹ B
+//!     view:  Σ Jᵀ J / σ²  of (θ, ξ)  =  ⎡ S  Bᵀ ⎤       information on θ:  S − Bᵀ A⁻¹ B
 //!                                       ⎣ B  A  ⎦
 //!
 //!     V = (I₀ + S − Bᵀ A⁻¹ B)⁻¹,     K = −(A₀ + A)⁻¹ (B₀ + B)
@@ -146,12 +146,12 @@ impl Gain {
             sums.add(&row, &by_motion(at, *point), *weight, true);
         }
         let through = solved(&sums.motion, &sums.across)?;
-        let mut told = &sums.own - sums.across.tr_mul(&through);
-        told /= self.variance;
+        let mut gained = &sums.own - sums.across.tr_mul(&through);
+        gained /= self.variance;
         let mut aligned = sums;
         aligned.motion += self.sums.motion;
         aligned.across += &self.sums.across;
-        self.px(&(&self.known + told), &aligned)
+        self.px(&(&self.known + gained), &aligned)
     }
 
     fn px(&self, information: &DMatrix<f64>, sums: &Sums) -> Option<f64> {

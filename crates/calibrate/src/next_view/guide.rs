@@ -2,8 +2,8 @@
 //!
 //! ```text
 //!   no camera yet ─→ a first set: facing, then tilted to three sides
-//!   an estimate ─→ what is known so far ─→ candidates (place × size × tilt × turn) ─→ the best, refined
-//!                                              │ what each would tell, its own pose eliminated
+//!   an estimate ─→ information so far ─→ candidates (position × size × tilt × roll) ─→ the best, refined
+//!                                              │ information of each, its own pose eliminated
 //!                                              └→ projection uncertainty over the image with it
 //! ```
 //!
@@ -250,10 +250,10 @@ impl Guide {
         let (at, tilt, away) = match taken + self.refused.len() {
             0 => (DVec2::splat(0.5), 0.0, 0.0),
             number => {
-                let turn = number - 1;
+                let step = number - 1;
                 // Right, below, left, above, then the directions between them.
-                let away = FRAC_PI_2 * (turn % 4) as f64 + 0.25 * PI * (turn / 4 % 2) as f64;
-                let aside = if turn < 3 { 0.0 } else { 0.2 };
+                let away = FRAC_PI_2 * (step % 4) as f64 + 0.25 * PI * (step / 4 % 2) as f64;
+                let aside = if step < 3 { 0.0 } else { 0.2 };
                 (DVec2::splat(0.5) - aside * DVec2::from_angle(away), FIRST_TILT, away)
             }
         };

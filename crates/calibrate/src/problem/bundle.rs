@@ -85,7 +85,7 @@ impl Problem {
         self.blocks.iter().map(|block| block.observations.len()).sum()
     }
 
-    /// The problem with the frames for which `keep` holds, and their observations.
+    /// The problem with the frames for which `keep` returns true, and their observations.
     pub(crate) fn with_frames(&self, keep: impl Fn(usize) -> bool) -> Problem {
         let mut places = vec![None; self.frames.len()];
         let mut frames = Vec::new();

@@ -50,7 +50,7 @@ pub(crate) fn targets_unknown(
 
 /// Fixes one of the used panels, and a target. After the exclusion of frames, a panel may no longer be connected to the
 /// others, or another panel may have to be fixed.
-pub(crate) fn hold(problem: &mut Problem, left_out: &[bool], calibration: &Calibration) {
+pub(crate) fn fix_gauge(problem: &mut Problem, left_out: &[bool], calibration: &Calibration) {
     let of_blocks = problem.blocks.iter().zip(left_out);
     let taking_part = of_blocks.filter(|(_, out)| !**out).map(|(block, _)| block.clone());
     let taking_part: Vec<Block> = taking_part.collect();

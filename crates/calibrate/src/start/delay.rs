@@ -24,7 +24,7 @@ const MOST_MOMENTS: usize = 60;
 const DECISIVE: f64 = 3.0;
 
 /// Greatest number of frames over which rotations are compared.
-const LONGEST_TURN: usize = 3;
+const LONGEST_SPAN: usize = 3;
 
 /// The observations of a camera in each frame, in order.
 type Track<'a> = Vec<&'a [Seen]>;
@@ -51,11 +51,11 @@ pub(super) fn delays(
             let open = (0..tracks.len()).filter(|&to| found[to].is_none());
             open.map(move |to| (from, delay, to)).collect::<Vec<_>>()
         });
-        let told = pairs.filter_map(|(from, delay, to)| {
+        let compared = pairs.filter_map(|(from, delay, to)| {
             let (by, moments) = delay_between(&tracks[from], &tracks[to], symmetries)?;
             Some((moments, std::cmp::Reverse(from), std::cmp::Reverse(to), delay + by))
         });
-        let Some((_, _, to, delay)) = told.max() else { break };
+        let Some((_, _, to, delay)) = compared.max() else { break };
         found[to.0] = Some(delay);
     }
     let found: Vec<i32> = found.into_iter().map(Option::unwrap_or_default).collect();
@@ -78,7 +78,7 @@ fn delay_between(from: &Track, to: &Track, symmetries: &Symmetries) -> Option<(i
     };
     let mut all = scatters(&|delay| scatter_of_poses(from, to, delay, symmetries));
     if all.is_empty() {
-        all = scatters(&|delay| scatter_of_turns(from, to, delay));
+        all = scatters(&|delay| scatter_of_rotations(from, to, delay));
     }
     let &(delay, (least, moments)) = all.iter().min_by(|a, b| a.1.0.total_cmp(&b.1.0))?;
     let in_time = all.iter().find(|(delay, _)| *delay == 0);
@@ -87,7 +87,7 @@ fn delay_between(from: &Track, to: &Track, symmetries: &Symmetries) -> Option<(i
         Some((_, (scatter, moments))) => (*scatter, *moments),
         None => (usual()?, moments),
     };
-    // Agreement by chance in a few frames is no evidence against agreement in many.
+    // Chance agreement in a few frames does not outweigh agreement in many.
     match DECISIVE * least < compared && 2 * moments >= of_moments {
         true => Some((delay, moments)),
         false => Some((0, of_moments)),
@@ -126,14 +126,14 @@ fn scatter_of_poses(
 }
 
 /// Difference of the rotations between frames as seen by the two cameras, rad.
-fn scatter_of_turns(from: &Track, to: &Track, delay: i32) -> Option<(f64, usize)> {
+fn scatter_of_rotations(from: &Track, to: &Track, delay: i32) -> Option<(f64, usize)> {
     let both: Vec<(usize, usize)> = moments(from, to, delay).collect();
     let mut off = Vec::new();
     for (index, &(first, second)) in both.iter().enumerate() {
-        let later = both[index + 1..].iter().take_while(|(a, _)| *a <= first + LONGEST_TURN);
+        let later = both[index + 1..].iter().take_while(|(a, _)| *a <= first + LONGEST_SPAN);
         for &(first_later, second_later) in later {
-            let a = turn_rad(from[first], from[first_later]);
-            let b = turn_rad(to[second], to[second_later]);
+            let a = rotation_rad(from[first], from[first_later]);
+            let b = rotation_rad(to[second], to[second_later]);
             off.extend(a.zip(b).map(|(a, b)| (a - b).abs()));
         }
     }
@@ -142,7 +142,7 @@ fn scatter_of_turns(from: &Track, to: &Track, delay: i32) -> Option<(f64, usize)
 }
 
 /// Rotation of a target between two frames; `None` if no target is seen in both.
-fn turn_rad(before: &[Seen], after: &[Seen]) -> Option<f64> {
+fn rotation_rad(before: &[Seen], after: &[Seen]) -> Option<f64> {
     let mut pairs = before.iter().flat_map(|a| after.iter().map(move |b| (a, b)));
     let (a, b) = pairs.find(|(a, b)| a.target == b.target)?;
     Some(a.camera_from_target.rotation.angle_between(b.camera_from_target.rotation))

@@ -2,8 +2,8 @@
 //!
 //! ```text
 //!   two cameras that see one target in one frame  ─→ camera_from_camera
-//!   a frame that is known, and another target in it ─→ scene_from_target
-//!   a camera and a target that only it sees         ─→ both, from how the rig moves
+//!   a known frame, and another target in it ─→ scene_from_target
+//!   a camera and a target that only it sees         ─→ both, from the motion of the rig
 //! ```
 
 use std::collections::{BTreeMap, BTreeSet};

@@ -17,7 +17,7 @@ use deltille_core::camera::Pose;
 use deltille_core::statistics::median;
 
 /// Least rotation about a second axis, rad (1°): more than the noise of poses.
-const LEAST_TURN_RAD: f64 = 0.017;
+const LEAST_ROTATION_RAD: f64 = 0.017;
 
 /// Number of reweighting rounds, in which frames that do not fit lose their weight.
 const ROUNDS: usize = 10;
@@ -31,11 +31,11 @@ pub(super) struct Moment {
 
 /// Computes `camera_from_rig` and `scene_from_target`.
 pub(super) fn placed_by_motion(moments: &[Moment]) -> Result<[Pose; 2], TooPlain> {
-    check_turns(moments)?;
+    check_rotations(moments)?;
     let mut weights = vec![1.0; moments.len()];
     let mut rotations = [DQuat::IDENTITY; 2];
     for _ in 0..ROUNDS {
-        rotations = turned(moments, &weights);
+        rotations = rotations(moments, &weights);
         let off = |moment: &Moment| {
             let [camera, target] = rotations;
             let predicted = camera * moment.rig_from_scene.rotation * target;
@@ -45,7 +45,7 @@ pub(super) fn placed_by_motion(moments: &[Moment]) -> Result<[Pose; 2], TooPlain
     }
     let mut places = [DVec3::ZERO; 2];
     for _ in 0..ROUNDS {
-        places = moved(moments, rotations[0], &weights);
+        places = positions(moments, rotations[0], &weights);
         let off = |moment: &Moment| {
             let [camera, target] = posed(rotations, places);
             let predicted = camera.after(&moment.rig_from_scene).after(&target);
@@ -61,7 +61,7 @@ fn posed(rotations: [DQuat; 2], places: [DVec3; 2]) -> [Pose; 2] {
 }
 
 /// Rejects a rig that did not rotate about two axes.
-fn check_turns(moments: &[Moment]) -> Result<(), TooPlain> {
+fn check_rotations(moments: &[Moment]) -> Result<(), TooPlain> {
     let Some(first) = moments.first() else { return Err(TooPlain::NoTurn) };
     let back = first.rig_from_scene.rotation.conjugate();
     let turns = moments.iter().map(|moment| {
@@ -76,8 +76,8 @@ fn check_turns(moments: &[Moment]) -> Result<(), TooPlain> {
         scatter.symmetric_eigenvalues().iter().map(|v| v.max(0.0).sqrt()).collect();
     rms.sort_by(f64::total_cmp);
     match rms[..] {
-        [_, _, most] if most < LEAST_TURN_RAD => Err(TooPlain::NoTurn),
-        [_, second, _] if second < LEAST_TURN_RAD => Err(TooPlain::OneAxis),
+        [_, _, most] if most < LEAST_ROTATION_RAD => Err(TooPlain::NoTurn),
+        [_, second, _] if second < LEAST_ROTATION_RAD => Err(TooPlain::OneAxis),
         _ => Ok(()),
     }
 }
@@ -89,7 +89,7 @@ fn lighter(off: Vec<f64>) -> Vec<f64> {
 }
 
 /// The rotations X of the camera and Y of the target for which R = X F Y, from R Y⁻¹ − X F = 0.
-fn turned(moments: &[Moment], weights: &[f64]) -> [DQuat; 2] {
+fn rotations(moments: &[Moment], weights: &[f64]) -> [DQuat; 2] {
     let mut normal = SMatrix::<f64, 18, 18>::zeros();
     for (moment, weight) in moments.iter().zip(weights) {
         let [seen, rig] = [moment.camera_from_target, moment.rig_from_scene]
@@ -123,7 +123,7 @@ fn nearest_rotation(matrix: Matrix3<f64>) -> DQuat {
 }
 
 /// The positions x of the camera and y of the target, from X F y + x = place − X f.
-fn moved(moments: &[Moment], camera: DQuat, weights: &[f64]) -> [DVec3; 2] {
+fn positions(moments: &[Moment], camera: DQuat, weights: &[f64]) -> [DVec3; 2] {
     let (mut normal, mut right) = (Matrix6::zeros(), Vector6::zeros());
     for (moment, weight) in moments.iter().zip(weights) {
         let Moment { rig_from_scene: rig, camera_from_target: seen } = moment;

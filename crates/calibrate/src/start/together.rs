@@ -2,10 +2,10 @@
 //! results are combined.
 //!
 //! ```text
-//!   each camera by itself ─→ camera_from_target in its own views
-//!   pictures of all cameras ─→ by how many frames each is late
-//!   two cameras, one frame ─→ camera_from_camera: the middle one of all such frames
-//!   a camera and a target of its own ─→ both, from how the rig moves
+//!   each camera on its own ─→ camera_from_target in its own views
+//!   images of all cameras ─→ lag of each camera in frames
+//!   two cameras, one frame ─→ camera_from_camera: the medoid over all such frames
+//!   a camera and a target of its own ─→ both, from the motion of the rig
 //!   from camera 0 on to all others ─→ camera_from_rig, scene_from_target, rig_from_scene(frame)
 //! ```
 

@@ -46,7 +46,7 @@ fn a_camera_is_calibrated_and_read_back() {
 }
 
 #[test]
-fn what_is_wrong_is_told_on_the_terminal_in_the_file_and_on_the_page() {
+fn problems_are_reported_on_the_terminal_in_the_file_and_on_the_page() {
     let flat = board(8, 9);
     let good = detections(&flat, 15, 0.7);
     let lens = |lens: BrownConrady| Camera { lens: Lens::BrownConrady(lens), ..camera() };
@@ -60,7 +60,7 @@ fn what_is_wrong_is_told_on_the_terminal_in_the_file_and_on_the_page() {
     let pole = lens(BrownConrady { denominator: [pole, 0.0, 0.0], ..factors });
 
     let mut page = Page::default();
-    let mut told = |title: &str, detections: &[Detection], args: &str| {
+    let mut diagnosed = |title: &str, detections: &[Detection], args: &str| {
         let folder = folder(&flat, detections);
         let path = |name: &str| folder.path().join(name);
         for (name, camera) in [("foreign", &foreign), ("other", &other), ("pole", &pole)] {
@@ -77,7 +77,7 @@ fn what_is_wrong_is_told_on_the_terminal_in_the_file_and_on_the_page() {
             assert!(!path("out.yaml").exists() && !path("out.json").exists());
             return Value::Null;
         }
-        // What is said is the same everywhere.
+        // The sentences are the same everywhere.
         let (found, shown) = (json(&path("out.json")), std::fs::read(path("page.html")).unwrap());
         let (said, shown) =
             (String::from_utf8(output.stderr).unwrap(), String::from_utf8(shown).unwrap());
@@ -93,14 +93,14 @@ fn what_is_wrong_is_told_on_the_terminal_in_the_file_and_on_the_page() {
         found
     };
 
-    let found = told("Nothing is wrong", &good, "--model radtan");
+    let found = diagnosed("Nothing is wrong", &good, "--model radtan");
     assert!(kinds(&found, "diagnoses").is_empty() && found["outliers"] == 0, "{found}");
 
     let mut wrong = good.clone();
     mirror(&mut wrong[4]);
     swap(&mut wrong[7]);
     wrong[9].grids[0].panel = Some(77);
-    let found = told("Wrong detections among good ones", &wrong, "--model radtan");
+    let found = diagnosed("Wrong detections among good ones", &wrong, "--model radtan");
     let excluded = found["excluded"].as_array().unwrap().iter();
     let excluded: Vec<[&Value; 4]> =
         excluded.map(|one| ["view", "image", "panel", "corners"].map(|key| &one[key])).collect();
@@ -111,14 +111,14 @@ fn what_is_wrong_is_told_on_the_terminal_in_the_file_and_on_the_page() {
 
     let mut wild = good.clone();
     wild[3].grids[0].corners[20].x += 60.0;
-    let found = told("A wild corner", &wild, "--model radtan --print-scale 0.998,1.001");
+    let found = diagnosed("An outlier", &wild, "--model radtan --print-scale 0.998,1.001");
     assert_eq!(found["print_scale"], serde_json::json!([0.998, 1.001]));
     assert_eq!(found["outliers"], 1);
     let rms = ["rms_px", "inlier_rms_px"].map(|key| found[key].as_f64().unwrap());
     assert!(rms[0] > 1.0 && rms[1] < 0.2, "{rms:?}");
 
-    told("Another camera took the pictures", &good, "--fixed-intrinsics foreign.yaml");
-    let found = told("A pole within the image", &good, "--fixed-intrinsics pole.yaml");
+    diagnosed("Another camera took the images", &good, "--fixed-intrinsics foreign.yaml");
+    let found = diagnosed("A pole within the image", &good, "--fixed-intrinsics pole.yaml");
     let [diagnosis] = &found["diagnoses"].as_array().unwrap()[..] else { panic!("{found}") };
     // 1.2 (1 − 0.17 · 1.44 + 0.02 · 1.44²) · 625 px.
     assert_eq!(diagnosis["kind"], "lens_ends");
@@ -133,7 +133,7 @@ fn what_is_wrong_is_told_on_the_terminal_in_the_file_and_on_the_page() {
     for (title, seen, args, kind, key, value) in [
         ("A bent sheet", &bent, "--model radtan", "remedy", "instead", "board_shape"),
         (
-            "A print scale that is wrong",
+            "A wrong print scale",
             &good,
             "--model radtan --print-scale 1.2,1.1",
             "stretched_board",
@@ -141,7 +141,7 @@ fn what_is_wrong_is_told_on_the_terminal_in_the_file_and_on_the_page() {
             "stretched_board",
         ),
         (
-            "Not quite this camera",
+            "A slightly different camera",
             &good,
             "--fixed-intrinsics other.yaml",
             "remedy",
@@ -157,7 +157,7 @@ fn what_is_wrong_is_told_on_the_terminal_in_the_file_and_on_the_page() {
             "radtan",
         ),
     ] {
-        let found = told(title, seen, args);
+        let found = diagnosed(title, seen, args);
         let mut said = found["diagnoses"].as_array().unwrap().iter();
         assert!(said.any(|d| d["kind"] == kind && d[key] == value), "{title}: {said:?}");
     }
@@ -165,7 +165,7 @@ fn what_is_wrong_is_told_on_the_terminal_in_the_file_and_on_the_page() {
 }
 
 #[test]
-fn pictures_that_show_no_board_are_told_with_the_reason_of_most() {
+fn images_without_a_board_are_reported_with_the_most_common_reason() {
     let reasons = |kinds: &[&str]| {
         let mut found = Detection::new("", [1600, 1200], Vec::new());
         let figures = serde_json::json!({"id": 4, "tags": 1, "corners": 0});
@@ -191,7 +191,7 @@ fn pictures_that_show_no_board_are_told_with_the_reason_of_most() {
 }
 
 #[test]
-fn a_folder_that_is_given_twice_is_told_in_a_line() {
+fn a_repeated_folder_is_reported_in_one_line() {
     let folder = folder(&board(8, 9), &detections(&board(8, 9), 6, 0.7));
     let command = CALIBRATE.replacen("corners", "corners corners", 1);
     let said = String::from_utf8(output(folder.path(), &command).stderr).unwrap();
@@ -201,7 +201,7 @@ fn a_folder_that_is_given_twice_is_told_in_a_line() {
 }
 
 #[test]
-fn a_file_without_the_shape_of_a_sheet_is_refused_with_what_makes_one() {
+fn a_file_without_a_board_shape_is_refused_with_advice() {
     let folder = folder(&board(8, 9), &detections(&board(8, 9), 6, 0.7));
     let at = folder.path();
     done(at, CALIBRATE);
@@ -213,7 +213,7 @@ fn a_file_without_the_shape_of_a_sheet_is_refused_with_what_makes_one() {
     }
 }
 
-/// From the eleventh picture on the focal length is 2 % longer.
+/// From the eleventh image on, the focal length is 2 % longer.
 #[test]
 fn a_change_of_zoom_ends_with_an_error_that_names_the_view() {
     let target = board(8, 9);
@@ -234,14 +234,14 @@ fn a_change_of_zoom_ends_with_an_error_that_names_the_view() {
     assert!((focal(1) / focal(0) - 1.02).abs() < 1e-3, "{change}");
     let page = std::fs::read_to_string(folder.path().join("page.html")).unwrap();
     assert!(page.contains("The camera changed between views"));
-    // What is said of such a camera is no measure of a change.
+    // The uncertainty of a failed calibration is no measure of a change.
     let result = output(folder.path(), "compare camera.json camera.json --distance 1m");
     let said = String::from_utf8(result.stderr).unwrap();
     assert!(said.contains("camera.json: the calibration failed: the camera changed"), "{said}");
 }
 
 #[test]
-fn the_shape_of_a_sheet_is_taken_along() {
+fn the_shape_of_a_sheet_is_stored_and_used() {
     let flat = board(8, 9);
     let mut bent = flat.clone();
     for corner in &mut bent.panels[0].corners {
@@ -262,7 +262,7 @@ fn the_shape_of_a_sheet_is_taken_along() {
 }
 
 #[test]
-fn what_calibrate_refuses() {
+fn calibrate_refuses_wrong_input() {
     let target = board(8, 9);
     let good = detections(&target, 6, 0.7);
     let folder = folder(&target, &good);
@@ -277,11 +277,11 @@ fn what_calibrate_refuses() {
     let pose = "--pose 3.1415926,0,0,-150,80,400";
     done(at, &format!("render board.json --camera known.yaml {pose} -o photos/00.png"));
 
-    page.title("Files of other kinds in the folder are passed over");
+    page.title("Files of other kinds in the folder are skipped");
     done(at, &format!("{CALIBRATE} -o corners/camera.yaml"));
     page.warned(at, &format!("deltille {CALIBRATE}"));
     std::fs::remove_file(at.join("corners/camera.json")).unwrap();
-    page.title("Where they were meant, they are named");
+    page.title("Files of other kinds given by name are reported");
     for args in [
         "corners camera.json --target board.json --model radtan",
         "foreign --target board.json --model radtan",
@@ -292,7 +292,7 @@ fn what_calibrate_refuses() {
     ] {
         page.refused(at, &format!("deltille calibrate {args}"));
     }
-    page.title("Nothing of another kind is replaced");
+    page.title("Files of other kinds are not replaced");
     for args in [
         format!("{CALIBRATE} -o board.yaml --report page.html"),
         format!("{CALIBRATE} -o corners/00.yaml"),
@@ -303,7 +303,7 @@ fn what_calibrate_refuses() {
     ] {
         page.refused(at, &format!("deltille {args}"));
     }
-    page.title("Options that say nothing, or contradict each other or the pictures");
+    page.title("Options without effect, or in contradiction to each other or to the images");
     for args in [
         "calibrate corners --target board.json",
         "calibrate corners --grid deltille --edge -20mm --model radtan",
@@ -352,7 +352,7 @@ fn what_calibrate_refuses() {
         page.refused(self::folder(target, &detections).path(), &format!("deltille {CALIBRATE}"));
     }
 
-    page.title("A plain board that is cut off");
+    page.title("A cut-off board without tags");
     let cut_off = |seen: &mut Detection| {
         let cut = &mut seen.grids[0];
         cut.panel = None;
@@ -365,7 +365,7 @@ fn what_calibrate_refuses() {
     page.is("calibrate");
 }
 
-/// Camera files have no uncertainties, and neither have cameras that were given: no verdict has a basis then.
+/// Neither camera files nor given cameras have uncertainties, so there is no basis for a verdict.
 #[test]
 fn a_comparison_without_uncertainties_is_undecided() {
     let folder = tempfile::tempdir().unwrap();
@@ -395,16 +395,16 @@ fn a_comparison_without_uncertainties_is_undecided() {
     for (args, which) in
         [("a.yaml b.yaml", "both"), ("a.yaml b.json", "the first"), ("a.json b.yaml", "the second")]
     {
-        let (code, told) = code(&format!("compare {args} --region image -o said.json"));
-        assert_eq!(code, Some(3), "{told}");
-        assert!(told.contains("cannot judge whether the camera has changed"), "{told}");
+        let (code, stdout) = code(&format!("compare {args} --region image -o said.json"));
+        assert_eq!(code, Some(3), "{stdout}");
+        assert!(stdout.contains("cannot judge whether the camera has changed"), "{stdout}");
         let which = format!("{which} calibration");
-        assert!(told.contains(&which), "{told}");
+        assert!(stdout.contains(&which), "{stdout}");
         let said = json(&at.join("said.json"));
         assert!(said["cameras"][0]["significant"].is_null());
         assert!(said["cameras"][0]["undecided"].as_str().unwrap().contains(&which));
     }
-    // What is tolerated needs no uncertainty, and what is the same is the same.
+    // Differences within the tolerance and equal cameras need no uncertainties.
     assert_eq!(code("compare a.yaml b.yaml --region image --tolerance 50").0, Some(0));
     assert_eq!(code("compare a.yaml a.yaml").0, Some(0));
 }

@@ -1,4 +1,4 @@
-//! `deltille calibrate`, `rig` and `pose` from files to files, and input of which no camera is calibrated.
+//! `deltille calibrate`, `rig` and `pose` on files, and input that cannot be calibrated.
 
 mod cameras;
 mod names;
@@ -23,7 +23,7 @@ fn output(folder: &Path, args: &str) -> Output {
     deltille(folder, args).get_output().clone()
 }
 
-/// What a command that has to succeed says on standard output.
+/// The standard output of a command that must succeed.
 fn done(folder: &Path, args: &str) -> String {
     let result = deltille(folder, args).success();
     String::from_utf8(result.get_output().stdout.clone()).unwrap()
@@ -45,7 +45,7 @@ fn camera() -> Camera {
     Camera { centre_px: DVec2::new(804.0, 606.0), ..Camera::centred(1600, 1200, 625.0, lens) }
 }
 
-/// What a detector finds of a board of one panel that is seen whole.
+/// The detection of a fully visible board of one panel.
 fn seen_whole(target: &Target, camera: &Camera, pose: &Pose, random: &mut ChaCha8Rng) -> Detection {
     let panel = &target.panels[0];
     let corners = panel.corners.iter().map(|corner| {
@@ -66,14 +66,14 @@ fn seen_whole(target: &Target, camera: &Camera, pose: &Pose, random: &mut ChaCha
     Detection::new("", [camera.width, camera.height], vec![grid])
 }
 
-/// Detections of a board in so many pictures, tilted by up to 0.7 rad.
+/// Detections of a board in `count` images, tilted by up to 0.7 rad.
 fn detections(target: &Target, count: usize, tilt_rad: f64) -> Vec<Detection> {
     let mut random = ChaCha8Rng::seed_from_u64(1);
     let middle = DVec3::new(150.0, 80.0, 0.0);
     let poses = (0..count).map(|_| {
         let mut any = |reach: f64| random.random_range(-reach..reach);
         let tilt = DVec3::new(any(1.0), any(1.0), 0.0) * tilt_rad;
-        // y up on the print is y down in the camera: half a turn about x faces the board.
+        // y up on the print is y down in the camera: a rotation by 180° about x faces the board.
         let rotation = DQuat::from_scaled_axis(tilt) * DQuat::from_rotation_x(std::f64::consts::PI);
         let centre = DVec3::new(any(120.0), any(70.0), 400.0 + any(100.0));
         Pose { rotation, translation: centre - rotation * middle }
@@ -106,13 +106,13 @@ fn swap(detection: &mut Detection) {
     }
 }
 
-/// Turns left to right.
+/// Mirrors left and right.
 fn mirror(detection: &mut Detection) {
     for corner in &mut detection.grids[0].corners {
         corner.x = 1599.0 - corner.x;
     }
 }
-/// One line with the name of a file and what to do, exit code 2.
+/// Expects one line with the name of a file and advice, and exit code 2.
 fn refused(folder: &Path, args: &str, words: &[&str]) {
     let said = String::from_utf8(output(folder, args).stderr).unwrap();
     deltille(folder, args).code(2);
@@ -120,7 +120,7 @@ fn refused(folder: &Path, args: &str, words: &[&str]) {
     assert!(words.iter().all(|words| said.contains(words)), "{args}: {said}");
 }
 
-/// The kinds of what is said of an estimate.
+/// The kinds of the diagnoses of an estimate.
 fn kinds<'a>(of: &'a Value, list: &str) -> Vec<&'a str> {
     let all = of[list].as_array().into_iter().flatten();
     all.map(|said| said["kind"].as_str().unwrap()).collect()

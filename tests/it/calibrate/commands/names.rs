@@ -4,9 +4,9 @@ use super::{board, camera, detections, folder};
 use crate::common::page::Page;
 use deltille::export::detection;
 
-/// What a file calls a target, a camera or a picture leads to no other folder, and does nothing to a terminal.
+/// Names of targets, cameras and images in files lead to no other folder, and do not affect a terminal.
 #[test]
-fn names_in_files_lead_nowhere() {
+fn names_in_files_do_not_escape_the_folder() {
     let target = board(8, 9);
     let found = detections(&target, 6, 0.7);
     let folder = folder(&target, &found);
@@ -36,11 +36,11 @@ fn names_in_files_lead_nowhere() {
         }
     }
 
-    // A picture beside the folder of pictures is not shown.
+    // An image outside the image folder is not shown.
     std::fs::create_dir(path("photos")).unwrap();
     image::GrayImage::from_pixel(64, 48, image::Luma([99])).save(path("secret.png")).unwrap();
     let args = "calibrate corners --target board.json --model radtan --images photos --report page.html -o camera2.yaml";
-    page.title("Pictures that are not there");
+    page.title("Missing images");
     assert!(page.warned(folder.path(), &format!("deltille {args}")).status.success());
     page.is("names");
     assert!(!std::fs::read_to_string(path("page.html")).unwrap().contains("data:image"));

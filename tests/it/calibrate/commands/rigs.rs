@@ -1,4 +1,4 @@
-//! `deltille rig`, `pose` and `rectify` from files to files.
+//! `deltille rig`, `pose` and `rectify` on files.
 
 use std::path::Path;
 
@@ -17,7 +17,7 @@ use rand_chacha::ChaCha8Rng;
 use serde_json::Value;
 
 #[test]
-fn a_pair_with_a_camera_upside_down_is_rectified_as_upright_as_the_first() {
+fn a_pair_with_an_upside_down_camera_is_rectified_upright() {
     let target = board(8, 9);
     let second_from_first = Pose {
         rotation: DQuat::from_euler(glam::EulerRot::XYZ, 0.02, -0.03, 3.13),
@@ -43,7 +43,7 @@ fn a_pair_with_a_camera_upside_down_is_rectified_as_upright_as_the_first() {
     let said = done(at, "rectify rig.json --pair first,second -o pair");
     assert!(said.contains("a point is in the same row of both pictures"), "{said}");
     let pair = json(&at.join("pair/first-second.json"));
-    // Their diagonals are 1 where nothing is rotated.
+    // Their diagonals are 1 without a rotation.
     let upright: Vec<f64> = [0, 4, 8]
         .map(|place| pair["views"][0]["view_from_camera"][place].as_f64().unwrap())
         .to_vec();
@@ -55,9 +55,9 @@ fn a_pair_with_a_camera_upside_down_is_rectified_as_upright_as_the_first() {
     assert!(views.iter().all(|view| view.calibrated_with == [target.identity()]));
 }
 
-/// An icosahedron before two cameras, rendered, detected, calibrated, and its poses found.
+/// An icosahedron in front of two cameras: rendered, detected, calibrated, and located.
 #[test]
-fn a_rig_is_calibrated_from_pictures() {
+fn a_rig_is_calibrated_from_images() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
     let family = Family::shipped("delTag25h7").unwrap();
@@ -88,7 +88,7 @@ fn a_rig_is_calibrated_from_pictures() {
         let [turn, step] = found.off(&truth);
         assert!(turn.length() < 1e-3 && step.length() < 0.5, "{found:?} {truth:?}");
     }
-    // A picture that cannot be read ends nothing, and has a line where each has one.
+    // An unreadable image does not stop the others, and has a line of its own.
     std::fs::write(at.join("broken.png"), "no picture").unwrap();
     let args = "pose left/0.png broken.png left/1.png --target ico.json --camera true.yaml";
     for (option, count) in [("", 2), (" --every-picture", 3)] {
@@ -103,7 +103,7 @@ fn a_rig_is_calibrated_from_pictures() {
             count - 2
         );
     }
-    // A net printed at 101 % makes a larger solid, so much farther away.
+    // A net printed at 101 % makes a larger solid, which is proportionally farther away.
     let pose = "pose left/0.png --target ico.json --camera true.yaml --print-scale";
     let line: Value = serde_json::from_str(&done(at, &format!("{pose} 1.01"))).unwrap();
     let first: Value = serde_json::from_str(lines.lines().next().unwrap()).unwrap();
@@ -119,7 +119,7 @@ fn a_rig_is_calibrated_from_pictures() {
         .refused(at, &format!("deltille rig {cameras} --camera third=nowhere --target ico.json"));
     refused.is("rig");
 
-    // Frames that took no part, and a page with a section for each camera.
+    // Held-out frames, and a page with a section for each camera.
     let page = "--holdout 5 --report held --images left=left";
     std::fs::create_dir(at.join("held")).unwrap();
     done(at, &format!("rig {cameras} --target ico.json -o held {page}"));
@@ -145,7 +145,7 @@ fn a_rig_is_calibrated_from_pictures() {
         "sections of cameras, pictures and a sample of the left one"
     );
 
-    // A wild corner, and a picture of another target.
+    // An outlier, and an image of another target.
     let path = at.join("corners/right/1.json");
     let mut wild = json(&path);
     let x = &mut wild["grids"][0]["corners"][3]["x"];
@@ -164,7 +164,7 @@ fn a_rig_is_calibrated_from_pictures() {
     assert_eq!(excluded["panel"], 99);
 }
 
-/// Photographs of a target in several poses by two cameras, and what is found in them; where the right camera is.
+/// Renders and detects images of a target in several poses by two cameras; returns the pose of the right camera.
 fn photographed(at: &Path, target: &str, frames: u32) -> Pose {
     let eye = DVec3::new(200.0, 20.0, 0.0);
     let right = Pose::looking_at(eye, DVec3::new(0.0, 0.0, 650.0), DVec3::NEG_Y);
@@ -189,10 +189,10 @@ fn photographed(at: &Path, target: &str, frames: u32) -> Pose {
     right
 }
 
-/// A cube, and a solid of triangles and squares: the rig and the poses of the target are where they were, within four of
-/// the deviations that are stated.
+/// A cube, and a solid of triangles and squares: the errors of the rig and of the poses of the target are within four
+/// stated standard deviations.
 #[test]
-fn rigs_are_calibrated_from_pictures_of_squares() {
+fn rigs_are_calibrated_from_images_of_squares() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
     let camera = Camera::centred(1200, 900, 1700.0, camera().lens);
@@ -243,7 +243,7 @@ fn motion(value: &Value) -> Pose {
     Pose { rotation: DQuat::from_mat3(&rotation), translation }
 }
 
-/// Detections of an icosahedron of which panel 7 is displaced, in so many pictures.
+/// Detections of an icosahedron with a displaced panel 7, in `count` images.
 fn of_displaced_panel(target: &Target, count: usize, by_mm: DVec3) -> Vec<Detection> {
     let mut random = ChaCha8Rng::seed_from_u64(4);
     let lens = Lens::BrownConrady(BrownConrady::default());
@@ -305,7 +305,7 @@ fn a_displaced_panel_is_named_on_the_terminal_in_the_file_and_on_the_page() {
     assert!(outliers <= of_panel["corners"].as_u64().unwrap() + 2, "{outliers} {of_panel}");
     let page = std::fs::read_to_string(folder.path().join("page.html")).unwrap();
     assert!(page.contains(&format!("Panel {id}: ")), "the page names it");
-    // Of less than makes outliers the residuals tell, and of nothing they tell nothing.
+    // A displacement too small for outliers shows in the residuals; no displacement does not.
     for (by_mm, is_named) in [(0.15, true), (0.0, false)] {
         let detections = of_displaced_panel(&target, 20, DVec3::new(by_mm, 0.0, 0.0));
         let folder = self::folder(&target, &detections);
@@ -316,9 +316,9 @@ fn a_displaced_panel_is_named_on_the_terminal_in_the_file_and_on_the_page() {
     }
 }
 
-/// Boards of a `.dsc` that are each listed in their own plane have no poses to each other, unless a `.tp` has them.
+/// Boards of a `.dsc` that are listed each in its own plane have no relative poses, unless a `.tp` file gives them.
 #[test]
-fn boards_of_a_list_without_poses_are_each_taken_by_itself() {
+fn boards_of_a_list_without_poses_are_independent() {
     use deltille::export::dsc::{self, Dialect};
     use deltille::limits::Limits;
     use deltille::target_file;
@@ -333,10 +333,10 @@ fn boards_of_a_list_without_poses_are_each_taken_by_itself() {
 
     let loose = read().unwrap();
     assert!(loose.target.is_loose() && loose.target.overlapping_boards() == Some([0, 1]));
-    let told = output(at, "calibrate none.json --target cube.dsc --model radtan");
-    let told = String::from_utf8_lossy(&told.stderr).into_owned();
-    assert!(told.contains("the poses of its 3 boards on the target are missing"), "{told}");
-    assert!(told.contains("put cube.tp beside it"), "{told}");
+    let result = output(at, "calibrate none.json --target cube.dsc --model radtan");
+    let stderr = String::from_utf8_lossy(&result.stderr).into_owned();
+    assert!(stderr.contains("the poses of its 3 boards on the target are missing"), "{stderr}");
+    assert!(stderr.contains("put cube.tp beside it"), "{stderr}");
 
     let poses = "#calibration date\n0\n1 0 0 0\n0 1 0 0\n0 0 1 0\n1\n 0 0 -1 617.5\n0 1 0 4\n1 0 0 12\n\
                  2\n0 0 1 -10\n0 1 0 3\n-1 0 0 618\n7\n1 0 0 0\n0 1 0 0\n0 0 1 0\n";
