@@ -121,7 +121,7 @@ impl Calibration {
             }
             WrongFrame::Off { off_px, .. } => Reason::Off { off_px, usual_px: gross.usual_px },
             WrongFrame::Mirrored => Reason::Mirrored,
-            WrongFrame::Stranger { deviations } => Reason::Stranger { is_rig, deviations },
+            WrongFrame::Inconsistent { deviations } => Reason::Stranger { is_rig, deviations },
             WrongFrame::OnlyWrongPanels => Reason::OnlyWrongPanels,
         };
         if let (false, [(camera, view)]) = (is_rig, frame.views.as_slice()) {

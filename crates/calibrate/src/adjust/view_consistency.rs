@@ -85,7 +85,7 @@ pub(super) struct Consistency {
     pub agree: bool,
     /// The frame that contradicts the cameras of all others most significantly, if any, and the
     /// shift of the cameras that it causes, in standard deviations.
-    pub stranger: Option<(usize, f64)>,
+    pub inconsistent: Option<(usize, f64)>,
 }
 
 impl Consistency {
@@ -108,8 +108,8 @@ impl Consistency {
         let strange =
             of_frames.filter(|(_, pull)| pull.moves > HARMFUL && deviations(pull) > SIGNIFICANT);
         let most = strange.max_by(|a, b| deviations(&a.1).total_cmp(&deviations(&b.1)));
-        let stranger = most.map(|(frame, pull)| (frame, pull.moves));
-        Some(Self { agree: usual <= AGREEING, stranger })
+        let inconsistent = most.map(|(frame, pull)| (frame, pull.moves));
+        Some(Self { agree: usual <= AGREEING, inconsistent })
     }
 }
 

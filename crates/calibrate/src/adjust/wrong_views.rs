@@ -86,7 +86,7 @@ pub(crate) struct Gross {
 
 /// The estimate on which most corners agree.
 #[derive(Clone, Debug)]
-struct Walked {
+struct Agreed {
     problem: Problem,
     /// The standard deviation per axis, px.
     sigma: f64,
@@ -108,19 +108,19 @@ pub(crate) enum WrongFrame {
     OnlyWrongPanels,
     /// It contradicts the cameras of the other frames, and shifts their estimate by this many
     /// standard deviations.
-    Stranger { deviations: f64 },
+    Inconsistent { deviations: f64 },
 }
 
 impl Gross {
     /// Estimates where most corners of a problem agree, and finds the parts that do not; `None`
     /// where nothing can be adjusted.
     pub(crate) fn of(problem: Problem) -> Option<Self> {
-        agree(problem).map(|(walked, panels)| Self::without(walked, panels))
+        agree(problem).map(|(agreed, panels)| Self::without(agreed, panels))
     }
 
     /// Finds the frames and blocks that contradict the estimate, besides the excluded `panels`.
-    fn without(walked: Walked, panels: BTreeSet<PanelRef>) -> Self {
-        let Walked { problem, some_stand_out, .. } = walked;
+    fn without(agreed: Agreed, panels: BTreeSet<PanelRef>) -> Self {
+        let Agreed { problem, some_stand_out, .. } = agreed;
         let residuals = residuals(&problem);
         let off_px: Vec<f64> = residuals.iter().map(median_px).collect();
         // The blocks of every image, that is, of each camera in each frame.
@@ -184,16 +184,16 @@ impl Gross {
             let settled = settle(&self)?;
             let wrong = self.wrong_in(&settled);
             if wrong == self.panels {
-                return Ok(self.without_strangers(settled, loss, settle));
+                return Ok(self.without_inconsistent_frames(settled, loss, settle));
             }
-            let walked = walked_without(self.problem, &wrong).ok_or(CalibrationError::NoStart)?;
-            self = Self::without(walked, wrong);
+            let agreed = agreed_without(self.problem, &wrong).ok_or(CalibrationError::NoStart)?;
+            self = Self::without(agreed, wrong);
         }
     }
 
     /// Excludes the few frames that contradict the cameras of the others, if the remaining frames
     /// then agree.
-    fn without_strangers(
+    fn without_inconsistent_frames(
         mut self,
         settled: Settled,
         loss: Loss,
@@ -210,13 +210,13 @@ impl Gross {
                 break;
             };
             match consistency
-                .stranger
+                .inconsistent
                 .and_then(|(index, by)| Some((self.belonging().nth(index)?, by)))
             {
                 None if consistency.agree => return (self, without.unwrap_or(settled)),
                 None => break,
                 Some((frame, deviations)) => {
-                    self.frames.insert(frame, WrongFrame::Stranger { deviations });
+                    self.frames.insert(frame, WrongFrame::Inconsistent { deviations });
                     match settle(&self) {
                         Ok(settled) => without = Some(settled),
                         Err(_) => break,
@@ -331,36 +331,36 @@ fn mirrored(problem: &Problem) -> Vec<usize> {
 }
 
 /// Estimates where most corners agree, without the panels that contradict most others.
-fn agree(problem: Problem) -> Option<(Walked, BTreeSet<PanelRef>)> {
+fn agree(problem: Problem) -> Option<(Agreed, BTreeSet<PanelRef>)> {
     let seen: BTreeSet<PanelRef> = problem.blocks.iter().map(|block| block.panel).collect();
     let mut wrong: BTreeSet<PanelRef> = BTreeSet::new();
     let all = narrowed(problem)?;
     if seen.len() < LEAST_PANELS {
         return Some((all, wrong));
     }
-    let mut walked = all.clone();
-    while let Some(panel) = worst_panel(&walked.problem, walked.sigma, &wrong) {
+    let mut agreed = all.clone();
+    while let Some(panel) = worst_panel(&agreed.problem, agreed.sigma, &wrong) {
         wrong.insert(panel);
         // If half of the panels are wrong, it is another target.
         if 2 * wrong.len() >= seen.len() {
             return Some((all, BTreeSet::new()));
         }
-        walked = walked_without(walked.problem, &wrong)?;
+        agreed = agreed_without(agreed.problem, &wrong)?;
     }
-    Some((walked, wrong))
+    Some((agreed, wrong))
 }
 
 /// Estimates where most corners agree without the panels in `wrong`. Frames that show these first get new poses, as the
 /// wrong panels biased them.
-fn walked_without(mut problem: Problem, wrong: &BTreeSet<PanelRef>) -> Option<Walked> {
+fn agreed_without(mut problem: Problem, wrong: &BTreeSet<PanelRef>) -> Option<Agreed> {
     let of_wrong = problem.blocks.iter().filter(|block| wrong.contains(&block.panel));
     let frames: BTreeSet<usize> = of_wrong.map(|block| block.frame).collect();
     frames.into_iter().for_each(|frame| reestimate_pose(&mut problem, frame, wrong));
     let mut part = problem.part(|_, block| !wrong.contains(&block.panel));
-    let walked = narrowed(part.problem)?;
-    part.problem = walked.problem;
+    let agreed = narrowed(part.problem)?;
+    part.problem = agreed.problem;
     problem.take(part);
-    Some(Walked { problem, ..walked })
+    Some(Agreed { problem, ..agreed })
 }
 
 /// Whether residuals show no lack of fit: they are independent of the position in the image and on the target.
@@ -421,7 +421,7 @@ fn worst_panel(problem: &Problem, sigma: f64, wrong: &BTreeSet<PanelRef>) -> Opt
 }
 
 /// Estimates where most corners agree, with a redescending loss whose scale shrinks in every round.
-fn narrowed(mut problem: Problem) -> Option<Walked> {
+fn narrowed(mut problem: Problem) -> Option<Agreed> {
     let mut sigma = f64::INFINITY;
     for _ in 0..MOST_ROUNDS {
         let mut whitening = scale(&problem);
@@ -439,7 +439,7 @@ fn narrowed(mut problem: Problem) -> Option<Walked> {
     let none_left_out = vec![false; problem.blocks.len()];
     let gross = with_gross_errors(&problem, &none_left_out, &whitening);
     let some_stand_out = gross.concat().contains(&true);
-    Some(Walked { problem, sigma: whitening.sigma, some_stand_out })
+    Some(Agreed { problem, sigma: whitening.sigma, some_stand_out })
 }
 
 /// Re-estimates from the nearest corners of every frame, away from an estimate between two groups

@@ -59,7 +59,7 @@ impl UntaggedGrid {
             )),
             Some(seen) if self.size.is_some_and(|[rows, cols]| rows * cols != seen.corners) => {
                 Err(format!(
-                    "it was detected as {seen}, but {UntaggedGridSize} has {} corners: {}",
+                    "it was detected as {seen}, but a board of {} corners is given by {UntaggedGridSize}: {}",
                     self.size.map_or(0, |[rows, cols]| rows * cols),
                     assume_target()
                 ))
@@ -87,7 +87,7 @@ impl UntaggedGrid {
         }
         Err(if labels == self.labels(cols, rows) {
             format!(
-                "it has {cols} rows × {rows} columns: {UntaggedGridSize} has rows and columns exchanged"
+                "it has {cols} rows × {rows} columns: exchange the values of {UntaggedGridSize}"
             )
         } else {
             format!("its rows and columns do not match a board of {rows} × {cols} corners")

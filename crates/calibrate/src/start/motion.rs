@@ -35,7 +35,7 @@ pub(super) fn placed_by_motion(moments: &[Moment]) -> Result<[Pose; 2], TooPlain
     let mut weights = vec![1.0; moments.len()];
     let mut rotations = [DQuat::IDENTITY; 2];
     for _ in 0..ROUNDS {
-        rotations = rotations(moments, &weights);
+        rotations = solved_rotations(moments, &weights);
         let off = |moment: &Moment| {
             let [camera, target] = rotations;
             let predicted = camera * moment.rig_from_scene.rotation * target;
@@ -45,7 +45,7 @@ pub(super) fn placed_by_motion(moments: &[Moment]) -> Result<[Pose; 2], TooPlain
     }
     let mut places = [DVec3::ZERO; 2];
     for _ in 0..ROUNDS {
-        places = positions(moments, rotations[0], &weights);
+        places = solved_positions(moments, rotations[0], &weights);
         let off = |moment: &Moment| {
             let [camera, target] = posed(rotations, places);
             let predicted = camera.after(&moment.rig_from_scene).after(&target);
@@ -89,7 +89,7 @@ fn lighter(off: Vec<f64>) -> Vec<f64> {
 }
 
 /// The rotations X of the camera and Y of the target for which R = X F Y, from R Y⁻¹ − X F = 0.
-fn rotations(moments: &[Moment], weights: &[f64]) -> [DQuat; 2] {
+fn solved_rotations(moments: &[Moment], weights: &[f64]) -> [DQuat; 2] {
     let mut normal = SMatrix::<f64, 18, 18>::zeros();
     for (moment, weight) in moments.iter().zip(weights) {
         let [seen, rig] = [moment.camera_from_target, moment.rig_from_scene]
@@ -123,7 +123,7 @@ fn nearest_rotation(matrix: Matrix3<f64>) -> DQuat {
 }
 
 /// The positions x of the camera and y of the target, from X F y + x = place − X f.
-fn positions(moments: &[Moment], camera: DQuat, weights: &[f64]) -> [DVec3; 2] {
+fn solved_positions(moments: &[Moment], camera: DQuat, weights: &[f64]) -> [DVec3; 2] {
     let (mut normal, mut right) = (Matrix6::zeros(), Vector6::zeros());
     for (moment, weight) in moments.iter().zip(weights) {
         let Moment { rig_from_scene: rig, camera_from_target: seen } = moment;

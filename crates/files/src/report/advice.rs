@@ -460,7 +460,7 @@ mod tests {
             assert_eq!(told[0].weight, Weight::Warning, "{text}");
         }
         // What is said of the whole result comes first.
-        assert!(found[3].text.starts_with("Camera c1 is 2 frames late"), "{found:?}");
+        assert!(found[3].text.starts_with("Camera c1 lags by 2 frames"), "{found:?}");
     }
 
     /// Of a lens that is not that of the model some views are much worse than others.
