@@ -240,7 +240,7 @@ fn over_target(seen: &[Seen]) -> Explained {
     found
 }
 
-/// Displacements of panels as a whole, from views that show several panels.
+/// Displacements of panels as a whole; only panels with a significant displacement count.
 fn over_panels(seen: &[Seen]) -> Explained {
     let mut panels: BTreeMap<PanelRef, Vec<usize>> = BTreeMap::new();
     for (index, corner) in seen.iter().enumerate() {

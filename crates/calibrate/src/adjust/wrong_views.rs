@@ -443,7 +443,7 @@ fn narrowed(mut problem: Problem) -> Option<Agreed> {
 }
 
 /// Re-estimates from the nearest corners of every frame, away from an estimate between two groups
-/// of corners; `None` where there are not two.
+/// of corners; `None` if there is only one group.
 fn to_larger_group(problem: &Problem) -> Option<(Problem, Whitening)> {
     let between = scale(problem);
     let (mut found, mut whitening) = (problem.clone(), between.clone());

@@ -265,7 +265,7 @@ impl Calibration {
         others.min_by(|(_, one), (_, other)| one.total_cmp(other))
     }
 
-    /// The calibration of every camera on its own; `None` where it fails or is not needed.
+    /// The calibration of every camera on its own; `None` if it fails or is not needed.
     fn each_alone(&self, found: &Estimate) -> Vec<Alone> {
         let is_good = is_explained(found);
         let alone = found.cameras.iter().enumerate().map(|(index, camera)| {

@@ -219,7 +219,7 @@ impl<'a> Words<'a> {
             Instead::Panels => {
                 (self.moved_panels(None), "estimating the pose of every panel".to_owned())
             }
-            Instead::Camera => (GIVEN_CAMERA.to_owned(), "estimating the camera".to_owned()),
+            Instead::Camera => (GIVEN_CAMERA.to_owned(), "estimating the intrinsics".to_owned()),
             Instead::Model(other) => (
                 match model {
                     Some(model) => {

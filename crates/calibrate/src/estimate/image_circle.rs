@@ -68,7 +68,8 @@ impl ImageCircle {
     }
 }
 
-/// Radius from the principal point up to which a lens images the direction of an image corner beyond its range.
+/// Radius from the principal point up to which the lens sees towards a corner of the image; `None` if it sees the
+/// corner.
 fn seen_towards(camera: &Camera, corner: DVec2) -> Option<f64> {
     let centre = camera.centre_px;
     let at = |part: f64| centre + part * (corner - centre);

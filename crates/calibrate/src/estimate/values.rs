@@ -97,8 +97,8 @@ pub struct CameraEstimate {
     /// Observed standard deviations of that pose, from the scatter between frames; `None` if it was not estimated, or
     /// with too few frames.
     pub observed_pose_sd: Option<[f64; 6]>,
-    /// Lag of its images in frames, relative to most other cameras: its image shows the moment that the others showed
-    /// so many frames earlier.
+    /// Lag of its images in frames, relative to most other cameras: its image shows what the others showed this many
+    /// frames earlier.
     pub delay: i32,
     /// The rotation of its labels that makes the cameras of a rig agree, for a board that looks the same after a
     /// rotation. `None` if there is no such board, or the detected labels agree and are decisive.

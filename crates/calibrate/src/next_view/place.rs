@@ -35,7 +35,7 @@ impl Placing {
         let pixel = self.at * size - 0.5;
         let sight = camera.unproject(pixel)?.direction.normalize();
         let along = |step: DVec2| {
-            // On whichever side of the position the lens has a ray.
+            // Use the side of the position on which the lens has a ray.
             let ends = [camera.unproject(pixel + step), camera.unproject(pixel - step)];
             let across = match ends {
                 [Some(after), Some(before)] => after.direction - before.direction,

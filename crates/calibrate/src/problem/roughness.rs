@@ -198,7 +198,7 @@ impl Roughness {
         parts.collect()
     }
 
-    /// For each parameter of the lens its column; `None` where it is known.
+    /// The column of each parameter of the lens; `None` if it is known.
     fn columns(&self, parameters: &[(usize, usize)]) -> Vec<Option<usize>> {
         let mut columns = vec![None; 2 * self.grid.count()];
         for &(parameter, column) in parameters {

@@ -107,7 +107,7 @@ fn left_free(problem: &Problem) -> f64 {
 /// Least value of that fraction: two views of a corner leave a quarter.
 const LEAST_FREE: f64 = 0.25;
 
-/// The covariances of all corners, `None` where no corner has one. A corner without one among
+/// The covariances of all corners; `None` if no corner has one. A corner without one among
 /// others that have one was the hardest to refine: it gets the largest variance of all.
 fn covariances(problem: &Problem) -> Option<Vec<Vec<[f64; 3]>>> {
     let all = || problem.blocks.iter().flat_map(|block| block.observations.iter());

@@ -30,7 +30,7 @@ const SMOOTH: f64 = 1e-9;
 
 /// Replaces the lens of a camera by a spline of a degree, with this number of knots (columns and rows) or as many as it
 /// takes. `seen` are the pixels of corners. The prior of the knots expects a lens of the same kind with free parameters
-/// `free`. `None` if the lens images none of the pixels.
+/// `free`. `None` if the lens cannot image the pixels.
 pub(super) fn splined(
     camera: &Camera,
     free: &[bool],

@@ -31,9 +31,9 @@ use deltille_core::statistics::median;
 /// Greatest number of frames whose poses are compared: more do not improve the decision.
 const MOST_FRAMES: usize = 60;
 
-/// Factor by which poses must scatter more with the detected labels before these are changed. Poses from single frames
-/// scatter by a factor of two or three between data sets, and poses with wrong labels scatter as far as the board was
-/// tilted.
+/// Factor by which poses must scatter more with the detected labels before these are changed. The pose from a single
+/// frame may scatter two to three times as much as that from other frames, and poses with wrong labels scatter as far
+/// as the board was tilted.
 const DECISIVE: f64 = 3.0;
 
 /// Half of the least difference between rotations of a board, 90°, which separates them.
