@@ -72,8 +72,8 @@ impl Reference<'_> {
         let of_most = maps.iter().max_by_key(|maps| maps.len()).filter(|maps| !maps.is_empty())?;
         let degrees = 360 / (of_most.len() + 1);
         Some(format!(
-            "a board without tags that looks the same after a rotation by {degrees}° is labelled by how it lies in the \
-             image: which of its {} sides is the lower one is not known",
+            "the board has no tags and looks the same after a rotation by {degrees}°, so its labels follow its \
+             orientation in the image, and {} poses are possible",
             of_most.len() + 1
         ))
     }
